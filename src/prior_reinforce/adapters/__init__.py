@@ -1,0 +1,1 @@
+"""M: condition adapters. One file each; all share the interface of `base`."""

@@ -1,0 +1,61 @@
+"""Every error a caller can cause, in one tree.
+
+A message is one line that names the value, what was expected and the remedy; the command line
+prints it as it stands and exits with status 2. Errors are raised before anything is written.
+"""
+
+
+class PriorReinforceError(Exception):
+    """Base of all errors that this package raises on purpose."""
+
+
+class InvalidPlanError(PriorReinforceError, ValueError):
+    """A plan, or its format, has a wrong shape, unit, or a value that is not finite."""
+
+
+class InvalidDemonstrationsError(PriorReinforceError, ValueError):
+    """Demonstrations that cannot be learned from: too few, repeated, degenerate, or not finite."""
+
+
+class InvalidGoalError(PriorReinforceError, ValueError):
+    """A goal of the wrong dimension, or not finite."""
+
+
+class InvalidFeedbackError(PriorReinforceError, ValueError):
+    """A perceived error of the wrong shape, or not finite."""
+
+
+class ConfigurationError(PriorReinforceError, ValueError):
+    """A setting outside its range, or settings that contradict each other."""
+
+
+class FileFormatError(PriorReinforceError, ValueError):
+    """A file that is missing, truncated, or not of the format its name promises."""
+
+
+class NotFittedError(PriorReinforceError, RuntimeError):
+    """A generator or an adapter was used before `fit` or `start`."""
+
+
+class TrialStateError(PriorReinforceError, RuntimeError):
+    """A trial was told, voided or amended in a state that does not allow it."""
+
+
+class PerceptionFailedError(PriorReinforceError, RuntimeError):
+    """Perception gives no number; an operator has to be asked instead of inventing one."""
+
+
+class RenderingUnavailableError(PriorReinforceError, RuntimeError):
+    """This machine has no OpenGL to draw with; the remedy is in the message."""
+
+
+class MissingExtraError(PriorReinforceError, ImportError):
+    """An optional dependency is not installed; the message names the extra to install."""
+
+
+class RobotLimitError(PriorReinforceError, ValueError):
+    """A plan breaks a limit of the robot; the report names the joint, the time and the margin."""
+
+
+class WorkspaceError(PriorReinforceError, RuntimeError):
+    """A task folder on disk is missing, incomplete, locked, or inconsistent with its journal."""

@@ -1,0 +1,1 @@
+"""Recipes for every table and figure of the paper: protocol, statistics, report."""

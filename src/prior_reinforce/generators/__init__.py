@@ -1,0 +1,1 @@
+"""pi: conditional motion generators. One file each; all share the interface of `base`."""

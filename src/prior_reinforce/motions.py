@@ -1,0 +1,369 @@
+"""Motions: what a plan is, and the demonstrations that are learned from.
+
+Shapes, units and values are checked once, here; the rest of the package relies on it.
+
+Notation (docs/notation.md):
+    A        `plan`           (H, D)     unit of its `PlanFormat`, mostly [rad]
+    H        `horizon`        frames
+    D        `action_dim`     numbers a frame
+    r tilde  `outcomes_seen`  (N, k)     mostly [m], table frame
+    D_prior  `Demonstrations`            N plans with the N outcomes that were perceived
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import warnings
+import zipfile
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from prior_reinforce.errors import (
+    FileFormatError,
+    InvalidDemonstrationsError,
+    InvalidFeedbackError,
+    InvalidGoalError,
+    InvalidPlanError,
+)
+
+_FILE_FORMAT = "prior-reinforce demonstrations"
+_FILE_VERSION = 1
+# Ours: a table is a metre or so; 5 m of outcome, or 7 rad of joint angle, is a wrong unit far more
+# often than a real motion. Only ever a warning.
+_LARGEST_PLAUSIBLE_METRES = 5.0
+_LARGEST_PLAUSIBLE_RADIANS = 7.0
+
+
+@dataclass(frozen=True)
+class PlanFormat:
+    """What the numbers of a frame mean (paper, Table I: "Frame Action Format")."""
+
+    names: tuple[str, ...]
+    """Name of each of the D action dimensions, for instance `joint1`."""
+    units: tuple[str, ...]
+    """Unit of each dimension: `rad`, `m`, `1` for pure numbers, or any other word."""
+    dt: float
+    """Time between two frames, in [s]."""
+
+    def __post_init__(self) -> None:
+        """Check the format.
+
+        Raises:
+            InvalidPlanError: No names, repeated names, or another number of units than of names.
+        """
+        object.__setattr__(self, "names", tuple(self.names))
+        object.__setattr__(self, "units", tuple(self.units))
+        if not self.names:
+            raise InvalidPlanError("a plan format needs at least one action name, got none")
+        if len(set(self.names)) != len(self.names):
+            raise InvalidPlanError(f"action names must differ from each other, got {self.names}")
+        if len(self.units) != len(self.names):
+            raise InvalidPlanError(
+                f"{len(self.names)} action names need as many units, got {len(self.units)}: "
+                f"{self.units}"
+            )
+        if not (math.isfinite(self.dt) and self.dt > 0):
+            raise InvalidPlanError(f"dt must be a positive number of seconds, got {self.dt}")
+
+    @property
+    def action_dim(self) -> int:
+        """D, the number of action dimensions."""
+        return len(self.names)
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """One open-loop action plan A with its meaning."""
+
+    actions: np.ndarray
+    """Frames, shape (H, D), float64, read-only."""
+    format: PlanFormat
+
+    def __post_init__(self) -> None:
+        """Copy and check the frames.
+
+        Raises:
+            InvalidPlanError: Wrong shape, or values that are not finite.
+        """
+        actions = as_plans(self.actions, self.format.action_dim, name="plan", single=True)
+        object.__setattr__(self, "actions", actions)
+
+    @property
+    def horizon(self) -> int:
+        """H, the number of frames."""
+        return self.actions.shape[0]
+
+    @property
+    def times(self) -> np.ndarray:
+        """Time of each frame from the first, shape (H,), in [s]."""
+        return np.arange(self.horizon) * self.format.dt
+
+
+@dataclass(frozen=True, eq=False)
+class Demonstrations:
+    """D_prior with its perceived outcomes: N plans of one horizon, N outcomes (paper, Stage 1)."""
+
+    plans: np.ndarray
+    """A_i, shape (N, H, D), float64, read-only."""
+    outcomes_seen: np.ndarray
+    """r tilde_i, shape (N, k), mostly [m] in the table frame, float64, read-only."""
+    format: PlanFormat
+    outcome_names: tuple[str, ...] = ()
+    """Names of the k components; `x`, `y`, `z` where none are given."""
+    outcome_units: tuple[str, ...] = ()
+    """Unit of each component; metres where none are given."""
+
+    def __post_init__(self) -> None:
+        """Copy and check everything; warn about units that look wrong.
+
+        Raises:
+            InvalidDemonstrationsError: Fewer than two, repeated outcomes, outcomes in a subspace
+                (on one line when k = 2), shapes that do not fit, values that are not finite.
+        """
+        if isinstance(self.plans, (list, tuple)):
+            horizons = sorted({np.asarray(plan).shape[0] for plan in self.plans if np.ndim(plan)})
+            if len(horizons) > 1:
+                raise InvalidDemonstrationsError(
+                    f"demonstrations have mixed horizons {horizons}; resample or pad them to one "
+                    "number of frames first"
+                )
+        try:
+            plans = as_plans(self.plans, self.format.action_dim, name="plans")
+        except InvalidPlanError as error:
+            raise InvalidDemonstrationsError(str(error)) from error
+        outcomes = _as_outcomes(self.outcomes_seen, plans.shape[0])
+        k = outcomes.shape[1]
+        names = tuple(self.outcome_names) or tuple("xyz"[:k] if k <= 3 else map(str, range(k)))
+        units = tuple(self.outcome_units) or ("m",) * k
+        if len(names) != k or len(units) != k:
+            raise InvalidDemonstrationsError(
+                f"outcomes have {k} components; got names {names} and units {units}"
+            )
+        object.__setattr__(self, "plans", plans)
+        object.__setattr__(self, "outcomes_seen", outcomes)
+        object.__setattr__(self, "outcome_names", names)
+        object.__setattr__(self, "outcome_units", units)
+        self._warn_about_units()
+
+    @property
+    def n(self) -> int:
+        """N, the number of demonstrations."""
+        return self.plans.shape[0]
+
+    @property
+    def horizon(self) -> int:
+        """H, the number of frames of every plan."""
+        return self.plans.shape[1]
+
+    @property
+    def action_dim(self) -> int:
+        """D, the number of action dimensions."""
+        return self.plans.shape[2]
+
+    @property
+    def outcome_dim(self) -> int:
+        """k, the number of components of an outcome."""
+        return self.outcomes_seen.shape[1]
+
+    def check_goal(self, goal: np.ndarray) -> np.ndarray:
+        """Return the goal as a fresh float array, warning when it lies far outside the outcomes.
+
+        Args:
+            goal: g tilde, shape (k,), in the outcomes' units.
+
+        Returns:
+            The goal, shape (k,), float64.
+
+        Raises:
+            InvalidGoalError: Wrong shape, or not finite.
+        """
+        goal = np.array(goal, dtype=float)
+        if goal.shape != (self.outcome_dim,):
+            raise InvalidGoalError(
+                f"goal has shape {goal.shape}, but the demonstrations' outcomes have "
+                f"{self.outcome_dim} components {self.outcome_names}; give that many numbers"
+            )
+        if not np.all(np.isfinite(goal)):
+            raise InvalidGoalError(f"goal must be finite, got {goal.tolist()}")
+        low, high = self.outcomes_seen.min(axis=0), self.outcomes_seen.max(axis=0)
+        spread = np.maximum(high - low, 1e-12)
+        beyond = np.maximum(np.maximum(low - goal, goal - high), 0.0)
+        # Ours: half the demonstrated extent beyond it is extrapolation that no figure of the paper
+        # supports (its displacement field degrades towards the boundary already).
+        if np.any(beyond > 0.5 * spread):
+            warnings.warn(
+                f"goal {np.round(goal, 4).tolist()} lies {np.round(beyond, 4).tolist()} "
+                f"{self.outcome_units} outside the demonstrated outcomes "
+                f"{np.round(low, 4).tolist()} to {np.round(high, 4).tolist()}; check its unit, or "
+                "demonstrate nearer to it",
+                stacklevel=2,
+            )
+        return goal
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write an `.npz`: two arrays and a JSON text; nothing in it can run code."""
+        metadata = {
+            "file_format": _FILE_FORMAT,
+            "version": _FILE_VERSION,
+            "format": asdict(self.format),
+            "outcome_names": self.outcome_names,
+            "outcome_units": self.outcome_units,
+        }
+        arrays: dict[str, Any] = {
+            "plans": self.plans,
+            "outcomes_seen": self.outcomes_seen,
+            "metadata": np.array(json.dumps(metadata)),
+        }
+        with open(path, "wb") as file:
+            np.savez_compressed(file, **arrays)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Demonstrations:
+        """Read what `save` wrote.
+
+        Raises:
+            FileFormatError: The file is missing, truncated, or not such an `.npz`.
+            InvalidDemonstrationsError: It holds demonstrations that cannot be learned from.
+        """
+        path = Path(path)
+        if not path.is_file():
+            raise FileFormatError(f"no demonstrations at {path}; give the path of an .npz file")
+        try:
+            with np.load(path, allow_pickle=False) as archive:
+                plans, outcomes = archive["plans"], archive["outcomes_seen"]
+                metadata = json.loads(str(archive["metadata"]))
+            if metadata["file_format"] != _FILE_FORMAT or metadata["version"] != _FILE_VERSION:
+                raise ValueError(f"written as {metadata['file_format']} {metadata['version']}")
+            format_ = PlanFormat(**metadata["format"])
+            names = tuple(metadata["outcome_names"])
+            units = tuple(metadata["outcome_units"])
+        except (OSError, EOFError, ValueError, KeyError, TypeError, zipfile.BadZipFile) as error:
+            raise FileFormatError(
+                f"{path} is not a demonstrations file ({error}); write one with Demonstrations.save"
+            ) from error
+        return cls(plans, outcomes, format_, names, units)
+
+    def _warn_about_units(self) -> None:
+        metres = np.array([unit == "m" for unit in self.outcome_units])
+        largest = np.abs(self.outcomes_seen[:, metres]).max(initial=0.0)
+        if largest > _LARGEST_PLAUSIBLE_METRES:
+            warnings.warn(
+                f"an outcome of {largest:g} m looks like centimetres; outcomes are in metres: "
+                "divide by 100",
+                stacklevel=4,
+            )
+        radians = np.array([unit == "rad" for unit in self.format.units])
+        largest = np.abs(self.plans[:, :, radians]).max(initial=0.0)
+        if largest > _LARGEST_PLAUSIBLE_RADIANS:
+            warnings.warn(
+                f"an angle of {largest:g} rad looks like degrees; plans are in radians: "
+                "convert with numpy.deg2rad",
+                stacklevel=4,
+            )
+
+
+def as_plans(
+    values: np.ndarray, action_dim: int, *, name: str = "plans", single: bool = False
+) -> np.ndarray:
+    """Return plans as a fresh, read-only float64 array of checked shape.
+
+    Args:
+        values: Shape (n, H, D), or (H, D) if `single`.
+        action_dim: D that is expected.
+        name: What to call the array in a message.
+        single: Expect one plan instead of a batch.
+
+    Raises:
+        InvalidPlanError: Wrong shape, fewer than two frames, or values that are not finite.
+    """
+    expected = "(H, D)" if single else "(n, H, D)"
+    try:
+        array = np.array(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InvalidPlanError(f"{name} must be an array {expected} of numbers: {error}") from error
+    if array.ndim != (2 if single else 3):
+        raise InvalidPlanError(f"{name} must have shape {expected}, got {array.shape}")
+    if array.shape[-1] != action_dim:
+        raise InvalidPlanError(
+            f"{name} have {array.shape[-1]} action dimensions, but the plan format names "
+            f"{action_dim}; check the order of the axes {expected}"
+        )
+    if array.shape[-2] < 2:
+        raise InvalidPlanError(f"{name} need at least two frames, got {array.shape[-2]}")
+    bad = np.argwhere(~np.isfinite(array))
+    if bad.size:
+        raise InvalidPlanError(
+            f"{name} must be finite, but element {tuple(bad[0].tolist())} is "
+            f"{array[tuple(bad[0])]}; mend or drop that recording"
+        )
+    array.setflags(write=False)
+    return array
+
+
+def as_error(values: np.ndarray, outcome_dim: int) -> np.ndarray:
+    """Return a perceived error as a fresh float array, shape (k,).
+
+    Raises:
+        InvalidFeedbackError: Wrong shape, or not finite.
+    """
+    try:
+        error = np.array(values, dtype=float)
+    except (TypeError, ValueError) as problem:
+        raise InvalidFeedbackError(f"an error must be numbers, got {values!r}") from problem
+    if error.shape != (outcome_dim,):
+        raise InvalidFeedbackError(
+            f"error has shape {error.shape}, expected {outcome_dim} numbers: outcome minus goal"
+        )
+    if not np.all(np.isfinite(error)):
+        raise InvalidFeedbackError(
+            f"error must be finite, got {error.tolist()}; void the trial if nothing was seen"
+        )
+    return error
+
+
+def _as_outcomes(values: np.ndarray, n_plans: int) -> np.ndarray:
+    try:
+        outcomes = np.array(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InvalidDemonstrationsError(f"outcomes must be an array (N, k): {error}") from error
+    if outcomes.ndim != 2 or outcomes.shape[1] < 1:
+        raise InvalidDemonstrationsError(f"outcomes must have shape (N, k), got {outcomes.shape}")
+    n, k = outcomes.shape
+    if n != n_plans:
+        raise InvalidDemonstrationsError(f"{n_plans} plans need as many outcomes, got {n}")
+    if n < 2:
+        raise InvalidDemonstrationsError(f"at least two demonstrations are needed, got {n}")
+    if not np.all(np.isfinite(outcomes)):
+        row = int(np.argwhere(~np.isfinite(outcomes))[0][0])
+        raise InvalidDemonstrationsError(
+            f"outcomes must be finite, but demonstration {row} has {outcomes[row].tolist()}; "
+            "measure it again, or drop that demonstration"
+        )
+    for i in range(n):
+        for j in range(i):
+            if np.array_equal(outcomes[i], outcomes[j]):
+                raise InvalidDemonstrationsError(
+                    f"demonstrations {j} and {i} have the same outcome {outcomes[i].tolist()}; one "
+                    "condition cannot stand for two motions: drop one"
+                )
+    spread = np.ptp(outcomes, axis=0)
+    if np.any(spread == 0):
+        raise InvalidDemonstrationsError(
+            f"all outcomes agree in component {int(np.argmin(spread))}; a goal cannot ask for "
+            "another value: spread the demonstrations, or drop that component"
+        )
+    if n > k:
+        scaled = (outcomes - outcomes.mean(axis=0)) / spread
+        singular = np.linalg.svd(scaled, compute_uv=False)
+        if singular[-1] < 1e-6 * singular[0]:
+            raise InvalidDemonstrationsError(
+                f"the {n} outcomes span fewer than {k} dimensions (they lie on one line or "
+                "plane); add a demonstration off it"
+            )
+    outcomes.setflags(write=False)
+    return outcomes

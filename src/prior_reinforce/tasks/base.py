@@ -1,0 +1,99 @@
+"""The interface of Env: action plans in, true outcomes out.
+
+A task is one `.py` with one `.xml` of the same name, in a fixed order: constants with their
+provenance, the scene, the rollout, the outcome. It never sees a condition or an adapter.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from typing import ClassVar
+
+import numpy as np
+
+from prior_reinforce.motions import Demonstrations, PlanFormat
+from prior_reinforce.rollouts import Rollout
+
+
+class Task(ABC):
+    """A goal-conditioned dynamic manipulation task (paper, Section III).
+
+    Outcomes and goals are in the table frame: origin on the robot's base axis at table height,
+    x forward, y left, z up, in [m].
+    """
+
+    name: ClassVar[str]
+    """Name on the command line and in results, for instance `basketball-v1`."""
+    format: ClassVar[PlanFormat]
+    """What a frame of a plan means, and how fast frames follow each other."""
+    outcome_names: ClassVar[tuple[str, ...]] = ("x", "y")
+    """Names of the k components of an outcome."""
+    tolerance: ClassVar[float]
+    """epsilon of the paper: largest true error that counts as reached, in [m]."""
+    region: ClassVar[np.ndarray]
+    """Reachable region of goals, a box: lower and upper corner, shape (2, k), in [m]."""
+    demonstration_sets: ClassVar[tuple[str, ...]] = ("A", "B")
+    """Names of the shipped prior sets."""
+
+    @abstractmethod
+    def rollout(self, plans: np.ndarray, rng: np.random.Generator | None) -> list[Rollout]:
+        """Execute plans open loop, each from the same start state.
+
+        Args:
+            plans: Action plans, shape (n, H, D), in the units of `format`. Any H.
+            rng: Source of the execution's small disturbances; None switches them off.
+
+        Returns:
+            One rollout a plan, in order. The same plans and seed give the same numbers.
+
+        Raises:
+            InvalidPlanError: Wrong shape, or values that are not finite.
+        """
+
+    @abstractmethod
+    def demonstrations(self, name: str) -> Demonstrations:
+        """Load the shipped prior set `name`, one of `demonstration_sets`.
+
+        Raises:
+            ConfigurationError: There is no such set.
+        """
+
+    @abstractmethod
+    def film(
+        self,
+        plan: np.ndarray,
+        goal: np.ndarray,
+        rng: np.random.Generator | None = None,
+        *,
+        width: int = 640,
+        height: int = 480,
+        frames_per_second: int = 30,
+        camera: str = "film",
+    ) -> Iterator[np.ndarray]:
+        """Execute one plan with the goal's object in place and draw it, frame by frame.
+
+        Args:
+            plan: Action plan, shape (H, D).
+            goal: Where the goal's object stands, shape (k,), in [m].
+            rng: Disturbances, as in `rollout`.
+            width: Picture width, in pixels.
+            height: Picture height, in pixels.
+            frames_per_second: Of simulated time.
+            camera: A camera of the scene: `film` or `birdseye`.
+
+        Yields:
+            Pictures, shape (height, width, 3), dtype uint8.
+
+        Raises:
+            RenderingUnavailableError: There is no OpenGL on this machine.
+        """
+
+    def sample_goals(self, n: int, rng: np.random.Generator) -> np.ndarray:
+        """Draw n goals uniformly from the reachable region (paper, Evaluation Protocol).
+
+        Returns:
+            Goals, shape (n, k), in [m].
+        """
+        low, high = self.region
+        return rng.uniform(low, high, size=(n, low.shape[0]))

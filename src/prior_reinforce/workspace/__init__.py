@@ -1,0 +1,1 @@
+"""A task's folder on disk: manifest, demonstrations, model, trial journal."""
