@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from prior_reinforce.errors import (
     FileFormatError,
@@ -170,7 +171,7 @@ class Demonstrations:
         """k, the number of components of an outcome."""
         return self.outcomes_seen.shape[1]
 
-    def check_goal(self, goal: np.ndarray) -> np.ndarray:
+    def check_goal(self, goal: ArrayLike) -> np.ndarray:
         """Return the goal as a fresh float array, warning when it lies far outside the outcomes.
 
         Args:
@@ -182,7 +183,10 @@ class Demonstrations:
         Raises:
             InvalidGoalError: Wrong shape, or not finite.
         """
-        goal = np.array(goal, dtype=float)
+        try:
+            goal = np.array(goal, dtype=float)
+        except (TypeError, ValueError) as error:
+            raise InvalidGoalError(f"a goal must be numbers, got {goal!r}") from error
         if goal.shape != (self.outcome_dim,):
             raise InvalidGoalError(
                 f"goal has shape {goal.shape}, but the demonstrations' outcomes have "
@@ -268,7 +272,7 @@ class Demonstrations:
 
 
 def as_plans(
-    values: np.ndarray, action_dim: int, *, name: str = "plans", single: bool = False
+    values: ArrayLike, action_dim: int, *, name: str = "plans", single: bool = False
 ) -> np.ndarray:
     """Return plans as a fresh, read-only float64 array of checked shape.
 
@@ -305,7 +309,7 @@ def as_plans(
     return array
 
 
-def as_error(values: np.ndarray, outcome_dim: int) -> np.ndarray:
+def as_error(values: ArrayLike, outcome_dim: int) -> np.ndarray:
     """Return a perceived error as a fresh float array, shape (k,).
 
     Raises:
@@ -326,7 +330,7 @@ def as_error(values: np.ndarray, outcome_dim: int) -> np.ndarray:
     return error
 
 
-def _as_outcomes(values: np.ndarray, n_plans: int) -> np.ndarray:
+def _as_outcomes(values: ArrayLike, n_plans: int) -> np.ndarray:
     try:
         outcomes = np.array(values, dtype=np.float64)
     except (TypeError, ValueError) as error:
