@@ -1,0 +1,37 @@
+# Every target sets up .venv by itself. `make demo` is the main job; `make test` runs all tests.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+# Pictures are drawn without a display (EGL); without OpenGL the report says so in one line.
+export MUJOCO_GL ?= egl
+
+.PHONY: demo test check reproduce clean
+
+demo: $(VENV)/.core
+	$(BIN)/prior-reinforce demo --out runs/demo $(ARGS)
+
+test: $(VENV)/.all
+	$(BIN)/python -m pytest $(ARGS)
+
+check: $(VENV)/.all
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+reproduce: $(VENV)/.all
+	$(BIN)/prior-reinforce reproduce all --out results $(ARGS)
+
+# The exact versions of constraints.txt. `.core` is what a user needs; `.all` adds every extra.
+$(VENV)/.core: pyproject.toml constraints.txt
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt torch==2.13.0
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e .
+	touch $@
+
+$(VENV)/.all: $(VENV)/.core
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev,baselines,vlm,lerobot,hdf5,ros,ray]'
+	touch $@
+
+clean:
+	rm -rf $(VENV) runs

@@ -1,0 +1,122 @@
+"""Many goals at once on a simulated task, in lock step (paper, "Evaluation Protocol").
+
+One round is one trial for every goal that is not reached yet: one call of the generator, one
+batched rollout. Whether a goal is reached is decided by the true outcome; adapters only ever
+receive what perception saw.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from prior_reinforce.adapters.base import Adapter
+from prior_reinforce.errors import PerceptionFailedError
+from prior_reinforce.generators.base import Generator
+from prior_reinforce.motions import Demonstrations
+from prior_reinforce.perception.base import Perception
+from prior_reinforce.perception.eye import Eye
+from prior_reinforce.rollouts import Rollout
+from prior_reinforce.session import Session, Trial, ask_all
+from prior_reinforce.tasks.base import Task
+
+
+@dataclass(frozen=True, eq=False)
+class GoalTrials:
+    """All trials of one goal, as executed in simulation."""
+
+    goal: np.ndarray
+    """g, shape (k,), [m]."""
+    trials: tuple[Trial, ...]
+    """As the session kept them; the last one hit, unless the rounds were spent."""
+    rollouts: tuple[Rollout, ...]
+    """What truly came of each."""
+    failed_readings: int = 0
+    """Trials in which perception gave up and a person looked instead (`Eye`)."""
+
+    @property
+    def solved_at(self) -> int | None:
+        """Number of the trial that reached the goal, from 1; None where none did."""
+        return next((trial.number for trial in self.trials if trial.hit), None)
+
+    @property
+    def errors(self) -> np.ndarray:
+        """True errors r - g, shape (trials, k), [m]."""
+        return np.array([rollout.outcome - self.goal for rollout in self.rollouts])
+
+
+def is_hit(rollout: Rollout, goal: np.ndarray, tolerance: float) -> bool:
+    """Whether the true outcome is within the tolerance of the goal; a lost object never is."""
+    return bool(rollout.valid and np.linalg.norm(rollout.outcome - goal) <= tolerance)
+
+
+def run_goals(
+    task: Task,
+    generator: Generator,
+    make_adapter: Callable[[], Adapter],
+    perception: Perception,
+    demonstrations: Demonstrations,
+    goals: np.ndarray,
+    *,
+    rounds: int,
+    seed: int,
+    on_round: Callable[[int, list[GoalTrials]], None] | None = None,
+) -> list[GoalTrials]:
+    """Try every goal until it is reached, or for a number of rounds.
+
+    Args:
+        task: Where plans are executed, with its disturbances.
+        generator: pi, fitted to `demonstrations`.
+        make_adapter: Makes one adapter for each goal.
+        perception: What the adapters see through.
+        demonstrations: D_prior.
+        goals: Shape (n, k), [m].
+        rounds: Largest number of trials a goal.
+        seed: Of the disturbances (a stream a round) and of perception (a stream a goal).
+        on_round: Called after every round with its number and the results so far.
+
+    Returns:
+        One result a goal, in order.
+    """
+    sessions = [
+        Session(generator, make_adapter(), demonstrations, goal, task.tolerance) for goal in goals
+    ]
+    seers = [np.random.default_rng([seed, 1, i]) for i in range(len(goals))]
+    rollouts: list[list[Rollout]] = [[] for _ in goals]
+    failed = [0] * len(goals)
+
+    def results() -> list[GoalTrials]:
+        return [
+            GoalTrials(session.goal, session.trials, tuple(rollouts[i]), failed[i])
+            for i, session in enumerate(sessions)
+        ]
+
+    for number in range(1, rounds + 1):
+        active = [i for i, session in enumerate(sessions) if not session.solved]
+        if not active:
+            break
+        trials = ask_all([sessions[i] for i in active])
+        plans = np.stack([trial.plan for trial in trials])
+        executed = task.rollout(plans, np.random.default_rng([seed, 0, number]))
+        for i, trial, rollout in zip(active, trials, executed, strict=True):
+            session = sessions[i]
+            try:
+                error_seen = perception.perceive(rollout, session.goal, seers[i])
+            except PerceptionFailedError:
+                failed[i] += 1
+                error_seen = Eye().perceive(rollout, session.goal, seers[i])
+            rollouts[i].append(rollout)
+            session.tell(
+                trial.number, error_seen, hit=is_hit(rollout, session.goal, task.tolerance)
+            )
+        if on_round is not None:
+            on_round(number, results())
+    return results()
+
+
+def success_by_round(results: list[GoalTrials], rounds: int) -> np.ndarray:
+    """Fraction of goals reached in at most 1, 2, ..., `rounds` trials, shape (rounds,)."""
+    solved_at = np.array([result.solved_at or rounds + 1 for result in results])
+    return np.array([np.mean(solved_at <= number) for number in range(1, rounds + 1)])
