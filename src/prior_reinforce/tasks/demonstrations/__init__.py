@@ -1,0 +1,1 @@
+"""The shipped prior sets, and the modules that regenerate them."""

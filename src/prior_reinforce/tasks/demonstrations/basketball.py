@@ -1,0 +1,129 @@
+"""Make the prior sets of Basketball Shot V1: `python -m prior_reinforce.tasks.demonstrations.basketball`.
+
+As in the paper, the demonstrations are found in simulation and spread over the reachable region.
+All are one motion pattern, with differences such as a person's repetitions have: when it starts,
+how fast it goes, how far each joint swings, and the posture it swings in. Each is solved, in
+simulation, for the swing and the direction that land the ball near its designed point; then it is
+executed once, with the disturbances of any execution, and where that ball landed is its outcome.
+"""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.special import betainc
+
+from prior_reinforce.motions import Demonstrations
+from prior_reinforce.tasks.basketball import BasketballShot
+
+HORIZON = 140
+"""Frames, as in the paper."""
+READY = np.array([0.0, -1.098, 0.0, -0.598, 0.0, 2.775, np.pi / 4])
+"""Posture before the throw, in [rad]: the spoon level behind the head, the ball at 0.9 m."""
+SWING = np.array([0.0, 0.747, 0.0, -0.728, 0.0, -0.987, 0.0])
+"""Travel of each joint at swing 1, in [rad]."""
+DURATION = 1.05
+"""Of the throw at tempo 1, in [s]."""
+DESIGNED = {
+    "A": ((0.92, -0.28), (0.92, 0.27), (1.19, -0.28), (1.20, 0.28), (1.03, -0.02), (1.13, 0.05)),
+    "B": ((0.91, 0.02), (0.99, -0.29), (0.96, 0.28), (1.20, -0.24), (1.19, 0.25), (1.08, -0.05)),
+}
+"""Where the six throws of each set are to land, (x, y) in [m]."""
+SEEDS = {"A": 1, "B": 2}
+
+
+@dataclass(frozen=True)
+class Differences:
+    """How repetitions of the throw differ; standard deviations unless said otherwise; ours."""
+
+    start: tuple[float, float] = (0.04, 0.60)
+    """Range of start times, in [s]: a third of the horizon, evenly spread over a set."""
+    tempo: float = 0.015
+    """Relative difference of duration."""
+    amplitude: float = 0.015
+    """Relative difference of every throwing joint's travel."""
+    posture: float = 0.02
+    """Offset of every joint but the first through the whole throw, in [rad]."""
+
+
+def throw(
+    start: float, tempo: float, travel: np.ndarray, posture: np.ndarray, dt: float
+) -> np.ndarray:
+    """One throw as a plan: from rest to rest along a quintic (minimum-jerk) time course.
+
+    Args:
+        start: When the throw begins, in [s].
+        tempo: Its speed relative to `DURATION`.
+        travel: Travel of each joint, shape (7,), in [rad].
+        posture: Joint positions before the throw, shape (7,), in [rad].
+        dt: Time between frames, in [s].
+
+    Returns:
+        Plan, shape (HORIZON, 7), in [rad].
+    """
+    part = np.clip((np.arange(HORIZON) * dt - start) * tempo / DURATION, 0.0, 1.0)
+    return posture + travel * betainc(3, 3, part)[:, None]
+
+
+def make(name: str, differences: Differences | None = None) -> Demonstrations:
+    """Make the prior set `name` ("A" or "B"), the same every time on the same machine."""
+    size = differences or Differences()
+    task = BasketballShot()
+    rng = np.random.default_rng(SEEDS[name])
+    designed = np.array(DESIGNED[name])
+    n, dt = len(designed), task.format.dt
+    starts = rng.permutation(np.linspace(*size.start, n))
+    tempi = 1.0 + rng.normal(0.0, size.tempo, n)
+    amplitudes = 1.0 + rng.normal(0.0, size.amplitude, (n, 7))
+    postures = READY + rng.normal(0.0, size.posture, (n, 7)) * (np.arange(7) > 0)
+
+    def plans(knobs: np.ndarray) -> np.ndarray:
+        """Plans (n, H, 7) for swings and directions of the throw, shape (n, 2)."""
+        base = np.zeros((n, 7))
+        base[:, 0] = knobs[:, 1]
+        return np.stack(
+            [
+                throw(*one, dt)
+                for one in zip(
+                    starts, tempi, knobs[:, :1] * amplitudes * SWING, postures + base, strict=True
+                )
+            ]
+        )
+
+    def land(knobs: np.ndarray) -> np.ndarray:
+        return np.array([rollout.outcome for rollout in task.rollout(plans(knobs), None)])
+
+    knobs = _solve(land, designed)
+    solved = plans(knobs)
+    outcomes = np.array([rollout.outcome for rollout in task.rollout(solved, rng)])
+    return Demonstrations(solved, outcomes, task.format)
+
+
+def _solve(land, targets: np.ndarray, tolerance: float = 4e-3) -> np.ndarray:
+    """Newton's method on swing and direction, all throws at once, differences of 3 %."""
+    knobs = np.column_stack([np.full(len(targets), 0.95), np.arctan2(targets[:, 1], targets[:, 0])])
+    for _ in range(12):
+        miss = land(knobs) - targets
+        if np.linalg.norm(miss, axis=1).max() < tolerance:
+            return knobs
+        slopes = np.stack(
+            [(land(knobs + step) - targets - miss) / 0.03 for step in 0.03 * np.eye(2)], axis=-1
+        )
+        knobs = knobs - np.clip(np.linalg.solve(slopes, miss[..., None])[..., 0], -0.1, 0.1)
+    raise RuntimeError(f"no throw lands within {tolerance} m of {targets.tolist()}")
+
+
+def main() -> None:
+    """Write both sets."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--folder", type=Path, default=Path(__file__).parent)
+    folder = parser.parse_args().folder
+    for name in DESIGNED:
+        make(name).save(folder / f"basketball_{name}.npz")
+
+
+if __name__ == "__main__":
+    main()

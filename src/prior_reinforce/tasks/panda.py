@@ -1,0 +1,117 @@
+"""The Franka Emika Panda: published kinematics and limits, its servo, and how a task mounts it.
+
+Frames of reference: the base frame is the table frame, because the robot stands at table height.
+A plan is a path of the seven joint positions q_d in [rad]; the servo's control sequence is made
+from it here, once, so that a whole batch of executions is pure physics.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import mujoco
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+N_JOINTS = 7
+JOINT_NAMES = tuple(f"joint{i}" for i in range(1, N_JOINTS + 1))
+STEP = 0.001
+"""Physics and servo period, in [s]: the real arm's control loop runs at 1 kHz."""
+
+
+@dataclass(frozen=True, eq=False)
+class JointLimits:
+    """Bounds of a joint path; each an array of shape (7,).
+
+    Source: the maker's table for the Panda (frankarobotics/docs,
+    control-parameters-joint-panda.csv, read 4 May 2026).
+    """
+
+    lower: np.ndarray
+    """Smallest position, in [rad]."""
+    upper: np.ndarray
+    """Largest position, in [rad]."""
+    velocity: np.ndarray
+    """Largest speed, in [rad/s]."""
+    acceleration: np.ndarray
+    """Largest acceleration, in [rad/s^2]."""
+    jerk: np.ndarray
+    """Largest jerk, in [rad/s^3]."""
+
+
+LIMITS = JointLimits(
+    lower=np.array([-2.8973, -1.7628, -2.8973, -3.0718, -2.8973, -0.0175, -2.8973]),
+    upper=np.array([2.8973, 1.7628, 2.8973, -0.0698, 2.8973, 3.7525, 2.8973]),
+    velocity=np.array([2.175, 2.175, 2.175, 2.175, 2.61, 2.61, 2.61]),
+    acceleration=np.array([15.0, 7.5, 10.0, 12.5, 15.0, 20.0, 20.0]),
+    jerk=np.array([7500.0, 3750.0, 5000.0, 6250.0, 7500.0, 10000.0, 10000.0]),
+)
+
+
+def build_scene(path: Path) -> mujoco.MjModel:
+    """Compile a task's scene with the Panda at its origin and the scene's tool on its flange.
+
+    Args:
+        path: MJCF of the task. Its body `tool`, written at the top level in the flange's frame,
+            moves onto the flange; everything else stays where it is written.
+    """
+    scene = mujoco.MjSpec.from_file(str(path))
+    scene.delete(scene.body("tool"))
+    tool = mujoco.MjSpec.from_file(str(path)).body("tool")
+    scene.site("panda/flange").attach_body(tool, "tool/", "")
+    return scene.compile()
+
+
+@lru_cache(maxsize=8)
+def _interpolation(
+    horizon: int, dt: float, lead_in: float, n_steps: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Matrices (n_steps, H) from frames to positions and to velocities at 1 kHz.
+
+    A cubic spline is linear in its frames, so interpolating the identity gives the matrix.
+    """
+    frame_times = np.arange(horizon) * dt
+    spline = CubicSpline(frame_times, np.eye(horizon), bc_type="clamped")
+    times = np.clip(np.arange(n_steps) * STEP - lead_in, 0.0, frame_times[-1])
+    return spline(times), spline(times, 1)
+
+
+def setpoints(
+    plans: np.ndarray, dt: float, n_steps: int, *, lead_in: float = 0.0
+) -> tuple[np.ndarray, np.ndarray]:
+    """Joint positions and velocities asked for at every servo period.
+
+    Frames are joined by a cubic spline with continuous acceleration, at rest at both ends; the
+    first frame is held before it and the last one after it.
+
+    Args:
+        plans: Shape (n, H, 7), in [rad].
+        dt: Time between frames, in [s].
+        n_steps: Servo periods, counted from the start of the lead-in.
+        lead_in: How long the first frame is held, in [s].
+
+    Returns:
+        Positions in [rad] and velocities in [rad/s], each of shape (n, n_steps, 7).
+    """
+    position, velocity = _interpolation(plans.shape[1], dt, lead_in, n_steps)
+    return position @ plans, velocity @ plans
+
+
+def servo_controls(
+    model: mujoco.MjModel, plans: np.ndarray, dt: float, n_steps: int, *, lead_in: float = 0.0
+) -> np.ndarray:
+    """Controls that make the position servos follow the plans with velocity feed-forward.
+
+    A MuJoCo position servo gives kp (ctrl - q) - kv dq; with ctrl = q_d + kv / kp dq_d that is
+    kp (q_d - q) + kv (dq_d - dq), the law of the real arm's joint position controllers.
+
+    Returns:
+        Controls, shape (n, n_steps, 7), in [rad].
+    """
+    position, velocity = setpoints(plans, dt, n_steps, lead_in=lead_in)
+    position += velocity * (
+        -model.actuator_biasprm[:N_JOINTS, 2] / model.actuator_gainprm[:N_JOINTS, 0]
+    )
+    return position
