@@ -1,13 +1,19 @@
 """Robots: the limits their makers publish, and the gate that holds every plan against them."""
 
-from prior_reinforce.robots.gate import GateSettings, LimitLine, LimitReport, check_plan
-from prior_reinforce.robots.limits import RobotLimits, robot_limits
+from prior_reinforce.robots.gate import check_plan
+from prior_reinforce.robots.interpolation import FineMotion, interpolate
+from prior_reinforce.robots.limits import RobotLimits, VelocityEnvelope, robot_limits
+from prior_reinforce.robots.report import LimitLine, LimitReport
+from prior_reinforce.robots.settings import GateSettings
 
 __all__ = [
+    "FineMotion",
     "GateSettings",
     "LimitLine",
     "LimitReport",
     "RobotLimits",
+    "VelocityEnvelope",
     "check_plan",
+    "interpolate",
     "robot_limits",
 ]

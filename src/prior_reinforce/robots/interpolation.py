@@ -1,0 +1,104 @@
+"""From the frames of a plan to what the arm is asked for at 1 kHz: the one place that decides it.
+
+The frames are joined by a cubic spline with continuous acceleration that starts and ends at rest;
+the first pose is held before, the last one after. Ours, because it is what a servo loop is given
+(a clamped spline indexed by the robot's own clock), it passes through every frame, and its peak
+velocity and acceleration are those of the recorded motion rather than of a filter.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from prior_reinforce.errors import InvalidPlanError
+
+RATE = 1000.0
+"""Control cycles a second of the Franka arms' interface (frankarobotics/docs,
+robot_specifications.rst: limits hold for the command stream at 1 kHz)."""
+
+
+@dataclass(frozen=True, eq=False)
+class FineMotion:
+    """A plan sampled evenly in time; every array but `t` has shape (T, D)."""
+
+    t: np.ndarray
+    """Time from the plan's first frame, shape (T,), in [s]; negative during the hold before."""
+    q: np.ndarray
+    """Positions, in the plan's unit, mostly [rad]."""
+    dq: np.ndarray
+    """Velocities, unit/s: the spline's exact derivative."""
+    ddq: np.ndarray
+    """Accelerations, unit/s^2: the spline's exact second derivative, 0 while a pose is held."""
+    dddq: np.ndarray
+    """Jerks, unit/s^3: backward differences of `ddq`, as a controller sees them, so that the step
+    of acceleration where a hold meets the motion counts too."""
+
+
+def join_frames(frames: np.ndarray, dt: float) -> CubicSpline:
+    """The spline through the frames, at rest at both ends, over [0, (H - 1) dt].
+
+    Args:
+        frames: Shape (H, D), H >= 2.
+        dt: Time between two frames, in [s].
+
+    Raises:
+        InvalidPlanError: Another shape, values that are not finite, or a dt that is not positive.
+    """
+    frames = np.asarray(frames, dtype=np.float64)
+    if frames.ndim != 2 or frames.shape[0] < 2 or not np.all(np.isfinite(frames)):
+        raise InvalidPlanError(
+            f"frames must be finite, of shape (H, D) with H >= 2, got {frames.shape}"
+        )
+    if not (math.isfinite(dt) and dt > 0):
+        raise InvalidPlanError(f"dt must be a positive number of seconds, got {dt}")
+    return CubicSpline(np.arange(frames.shape[0]) * dt, frames, bc_type="clamped")
+
+
+def interpolate(
+    frames: np.ndarray,
+    dt: float,
+    *,
+    rate: float = RATE,
+    hold_before: float = 0.0,
+    hold_after: float = 0.0,
+) -> FineMotion:
+    """Sample a plan at a fixed rate, with its end poses held before and after.
+
+    The map is linear in the frames: `interpolate(numpy.eye(H), dt)` gives the matrices that turn
+    the frames of any plan of that horizon into fine positions, velocities and so on.
+
+    Args:
+        frames: Shape (H, D), H >= 2.
+        dt: Time between two frames, in [s].
+        rate: Samples a second.
+        hold_before: How long the first pose is held, in [s]; rounded up to a sample.
+        hold_after: How long the last pose is held, in [s]; rounded up to a sample.
+
+    Raises:
+        InvalidPlanError: As `join_frames`, or a rate or a hold out of range.
+    """
+    if not (math.isfinite(rate) and rate > 0):
+        raise InvalidPlanError(f"rate must be a positive number of samples a second, got {rate}")
+    if not (0 <= hold_before < math.inf and 0 <= hold_after < math.inf):
+        raise InvalidPlanError(f"holds must be 0 s or more, got {hold_before} and {hold_after}")
+    spline = join_frames(frames, dt)
+    end = float(spline.x[-1])
+    # The small subtraction keeps 1.39 s * 1000 Hz = 1390.0000000000002 from adding a sample.
+    first = -math.ceil(hold_before * rate - 1e-9)
+    last = math.ceil(end * rate - 1e-9) + math.ceil(hold_after * rate - 1e-9)
+    t = np.arange(first, last + 1) / rate
+    inside = ((t >= 0) & (t <= end + 1e-12))[:, None]
+    at = np.clip(t, 0.0, end)
+    ddq = spline(at, 2) * inside
+    before = np.zeros_like(ddq[:1])
+    return FineMotion(
+        t=t,
+        q=spline(at),
+        dq=spline(at, 1) * inside,
+        ddq=ddq,
+        dddq=np.diff(ddq, axis=0, prepend=before) * rate,
+    )

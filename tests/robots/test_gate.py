@@ -1,0 +1,261 @@
+"""The gate finds the joint, the time and the margin of plans whose peaks are known."""
+
+import json
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from prior_reinforce.errors import ConfigurationError, InvalidPlanError, RobotLimitError
+from prior_reinforce.motions import Demonstrations, Plan, PlanFormat
+from prior_reinforce.robots import GateSettings, RobotLimits, check_plan, robot_limits
+
+HOME = np.array([0.0, -0.4, 0.0, -2.0, 0.0, 1.8, 0.8])
+DT = 0.01
+FORMAT = PlanFormat(tuple(f"joint{i}" for i in range(1, 8)), ("rad",) * 7, DT)
+PANDA = robot_limits("panda")
+
+
+def swing(joint: int, amplitude: float, duration: float, frames: int = 0) -> np.ndarray:
+    """Minimum jerk of one joint (from 1) away from HOME; peak speed 15/8 amplitude/duration."""
+    n = frames or round(duration / DT) + 1
+    s = np.linspace(0, 1, n)
+    plan = np.tile(HOME, (n, 1))
+    plan[:, joint - 1] += amplitude * (10 * s**3 - 15 * s**4 + 6 * s**5)
+    return plan
+
+
+def lines(report):
+    return {line.check: line for line in report.lines}
+
+
+def test_a_gentle_swing_passes_everything():
+    report = check_plan(Plan(swing(4, 0.5, 1.0), FORMAT), PANDA)
+    assert not report.refused
+    assert not report.warned
+    assert [line.check for line in report.lines] == [
+        "position",
+        "velocity",
+        "acceleration",
+        "jerk",
+        "rest at start",
+        "rest at end",
+        "demonstrations",
+        "workspace",
+    ]
+    report.require()
+
+
+def test_speed_is_found_with_its_joint_time_and_margin():
+    # Peak 15/8 * 1.2 / 1.0 = 2.25 rad/s at half time, beyond the Panda's 2.175.
+    report = check_plan(Plan(swing(4, 1.2, 1.0), FORMAT), PANDA)
+    line = lines(report)["velocity"]
+    assert line.status == "refuse"
+    assert line.joint == "joint4"
+    assert line.time == pytest.approx(0.5, abs=0.002)
+    assert line.value == pytest.approx(2.25, rel=1e-4)
+    assert line.limit == 2.175
+    assert line.margin == pytest.approx(-0.075, abs=1e-3)
+    with pytest.raises(RobotLimitError, match=r"velocity: joint4 at 2\.25 rad/s.*0\.500 s"):
+        report.require()
+
+
+def test_acceleration_is_found():
+    # Peak 10/sqrt(3) * 0.4 / 0.5^2 = 9.24 rad/s^2 on joint 2, whose limit is 7.5.
+    line = lines(check_plan(Plan(swing(2, 0.4, 0.5), FORMAT), PANDA))["acceleration"]
+    assert (line.status, line.joint, line.limit) == ("refuse", "joint2", 7.5)
+    assert line.value == pytest.approx(10 / np.sqrt(3) * 0.4 / 0.25, rel=1e-3)
+
+
+def test_nearly_used_up_warns():
+    amplitude = 0.97 * 2.175 * 8 / 15
+    report = check_plan(Plan(swing(1, amplitude, 1.0), FORMAT), PANDA)
+    assert lines(report)["velocity"].status == "warn"
+    assert report.warned
+    assert not report.refused
+    report.require()
+
+
+def test_jitter_shows_in_acceleration_and_jerk_though_not_in_position():
+    plan = swing(4, 0.3, 1.0)
+    plan[40:60, 3] += 0.002 * (-1) ** np.arange(20)
+    found = lines(check_plan(Plan(plan, FORMAT), PANDA))
+    assert found["position"].status == "pass"
+    assert found["acceleration"].status == "refuse"
+    assert found["jerk"].status == "refuse"
+    assert found["jerk"].joint == "joint4"
+
+
+def test_position_beyond_the_range():
+    line = lines(check_plan(Plan(swing(4, 2.0, 3.0), FORMAT), PANDA))["position"]
+    assert (line.status, line.joint, line.limit) == ("refuse", "joint4", -0.0698)
+    assert line.margin == pytest.approx(-0.0698, abs=1e-6)
+
+
+@pytest.mark.parametrize("end", ["start", "end"])
+def test_motion_at_an_end_is_refused(end):
+    plan = swing(4, 0.5, 1.0)
+    plan = plan[30:] if end == "start" else plan[:-30]
+    found = lines(check_plan(Plan(plan, FORMAT), PANDA))
+    assert found[f"rest at {end}"].status == "refuse"
+    assert found[f"rest at {end}"].joint == "joint4"
+    other = "end" if end == "start" else "start"
+    assert found[f"rest at {other}"].status == "pass"
+    # The step where the held pose meets the motion is seen by the rates as well.
+    assert found["jerk"].status == "refuse"
+
+
+def test_an_fr3_near_its_stop_is_slower():
+    limits = robot_limits("fr3", ">=5.9")
+    # Peak 15/8 * 0.7 / 0.6 = 2.19 rad/s at 2.35 rad, where -0.6599 + sqrt(12 * 0.5507) = 1.911.
+    s = np.linspace(0, 1, 61)
+    plan = np.tile(HOME, (61, 1))
+    plan[:, 0] = 2.0 + 0.7 * (10 * s**3 - 15 * s**4 + 6 * s**5)
+    found = lines(check_plan(Plan(plan, FORMAT), limits))["velocity"]
+    assert (found.status, found.joint) == ("refuse", "joint1")
+    assert found.value > found.limit
+    assert found.limit < 1.911
+    centre = plan.copy()
+    centre[:, 0] -= 2.0
+    assert lines(check_plan(Plan(centre, FORMAT), limits))["velocity"].status == "pass"
+    # The same motion away from the stop is held against the other side's bound.
+    assert lines(check_plan(Plan(plan[::-1], FORMAT), limits))["velocity"].status == "pass"
+
+
+def demonstrations():
+    plans = [swing(4, amplitude, 1.0) for amplitude in (0.4, 0.5, 0.6)]
+    return Demonstrations(np.array(plans), np.array([[0.8, 0.0], [0.9, 0.1], [1.0, -0.1]]), FORMAT)
+
+
+@pytest.mark.parametrize(
+    ("amplitude", "status"), [(0.5, "pass"), (0.65, "pass"), (0.75, "warn"), (1.0, "refuse")]
+)
+def test_distance_from_the_demonstrations(amplitude, status):
+    # Demonstrated range of joint 4 is 0.6; 0.65 lies 8 % of it beyond, 0.75 25 %, 1.0 67 %.
+    line = lines(check_plan(Plan(swing(4, amplitude, 1.0), FORMAT), PANDA, demonstrations()))[
+        "demonstrations"
+    ]
+    assert line.status == status
+    assert line.value == pytest.approx(max(0.0, amplitude - 0.6) / 0.6, abs=1e-9)
+
+
+def test_the_envelope_follows_time():
+    # The same path in reverse stays within the overall range, but not within the band in time.
+    line = lines(check_plan(Plan(swing(4, 0.5, 1.0)[::-1], FORMAT), PANDA, demonstrations()))[
+        "demonstrations"
+    ]
+    assert line.status == "refuse"
+    other = Plan(swing(4, 0.5, 1.2)[::-1], FORMAT)
+    assert lines(check_plan(other, PANDA, demonstrations()))["demonstrations"].status == "pass"
+
+
+def test_demonstrations_of_other_columns_are_named():
+    renamed = PlanFormat(tuple("abcdefg"), ("rad",) * 7, DT)
+    with pytest.raises(InvalidPlanError, match="learned from"):
+        check_plan(Plan(swing(4, 0.5, 1.0), renamed), PANDA, demonstrations())
+
+
+def test_workspace_box():
+    plan = Plan(swing(4, 0.5, 1.0), FORMAT)
+    free = GateSettings(workspace_low=(-1, -1, 0), workspace_high=(1, 1, 1.5))
+    line = lines(check_plan(plan, PANDA, settings=free))["workspace"]
+    assert line.status == "pass"
+    low = GateSettings(
+        workspace_low=(-1, -1, 0), workspace_high=(1, 1, 1.5), tool_tip=(0.0, 0.0, 0.9)
+    )
+    line = lines(check_plan(plan, PANDA, settings=low))["workspace"]
+    assert (line.status, line.joint, line.limit) == ("refuse", "z", 0.0)
+    assert line.margin < 0
+
+
+def test_columns_are_matched_by_name_whatever_their_order():
+    plan = swing(4, 1.2, 1.0)
+    order = [6, 3, 0, 5, 1, 4, 2]
+    names = ("gripper", *(f"fr3_joint{i + 1}" for i in order))
+    shuffled = np.column_stack([np.zeros(len(plan)), plan[:, order]])
+    report = check_plan(Plan(shuffled, PlanFormat(names, ("m", *("rad",) * 7), DT)), PANDA)
+    straight = check_plan(Plan(plan, FORMAT), PANDA)
+    assert [(a.value, a.joint) for a in report.lines[:4]] == [
+        (b.value, b.joint) for b in straight.lines[:4]
+    ]
+
+
+def test_some_joints_only():
+    form = PlanFormat(("joint4.pos", "joint6.pos"), ("rad", "rad"), DT)
+    report = check_plan(Plan(swing(4, 1.2, 1.0)[:, [3, 5]], form), PANDA)
+    found = lines(report)
+    assert found["velocity"].joint == "joint4"
+    assert "not in the plan: joint1" in found["velocity"].text
+    assert found["workspace"].status == "unchecked"
+
+
+def test_what_cannot_be_checked_says_so():
+    form = PlanFormat(("x", "y", "z"), ("m",) * 3, DT)
+    report = check_plan(Plan(np.zeros((10, 3)), form), PANDA)
+    assert {line.status for line in report.lines} == {"unchecked"}
+    assert not report.refused
+    assert "not checked" in report.text()
+
+
+def test_degrees_are_refused():
+    form = PlanFormat(FORMAT.names, ("deg",) * 7, DT)
+    with pytest.raises(InvalidPlanError, match="in rad"):
+        check_plan(Plan(swing(4, 0.5, 1.0), form), PANDA)
+
+
+def test_the_report_is_plain_data():
+    report = check_plan(Plan(swing(4, 1.2, 1.0), FORMAT), PANDA, demonstrations())
+    data = json.loads(json.dumps(report.as_json(), allow_nan=False))
+    assert data["refused"] is True
+    assert data["lines"][1]["joint"] == "joint4"
+    assert "REFUSE velocity" in report.text()
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"warn_above": 0.0},
+        {"beyond_warn": 2.0},
+        {"rest_speed": -1.0},
+        {"workspace_low": (0, 0, 0)},
+        {"workspace_low": (0, 0, 0), "workspace_high": (1, 1, 0)},
+        {"tool_tip": (0.0, np.nan, 0.0)},
+    ],
+)
+def test_settings_are_checked(values):
+    with pytest.raises(ConfigurationError):
+        GateSettings(**values)
+
+
+def test_a_joint_resting_at_a_stop_breaks_no_velocity_bound():
+    limits = robot_limits("fr3", ">=5.9")
+    plan = np.tile(HOME, (50, 1))
+    plan[:, 0] = limits.upper[0] - 1e-4
+    line = lines(check_plan(Plan(plan, FORMAT), limits))["velocity"]
+    assert line.status == "pass"
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_a_plan_passes_exactly_when_looser_limits_of_its_own_peaks_hold(seed):
+    """Limits a hair above the plan's own peaks pass; a hair below any of them is refused."""
+    rng = np.random.default_rng(seed)
+    plan = Plan(swing(int(rng.integers(1, 8)), rng.uniform(0.1, 0.6), 1.0), FORMAT)
+    loose = RobotLimits(
+        "arm", "1", "test", FORMAT.names, *(np.full(7, v) for v in (-9, 9, 1e3, 1e4, 1e7))
+    )
+    peaks = {line.check: line.value for line in check_plan(plan, loose).lines[1:4]}
+    for check, peak in peaks.items():
+        for factor, status in ((1.001, "warn"), (0.999, "refuse")):
+            values = {"velocity": 1e3, "acceleration": 1e4, "jerk": 1e7} | {check: peak * factor}
+            limits = RobotLimits(
+                "arm",
+                "1",
+                "test",
+                FORMAT.names,
+                np.full(7, -9.0),
+                np.full(7, 9.0),
+                *(np.full(7, value) for value in values.values()),
+            )
+            assert lines(check_plan(plan, limits))[check].status == status

@@ -1,0 +1,101 @@
+"""Published numbers, the position-dependent bound by hand, and given limits."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from prior_reinforce.errors import ConfigurationError
+from prior_reinforce.robots import RobotLimits, robot_limits
+
+FIRMWARES = [("panda", "any"), ("fr3", ">=5.9"), ("fr3", "<5.9"), ("fr3", "any")]
+
+
+def test_velocity_of_an_fr3_shrinks_towards_its_stop():
+    limits = robot_limits("fr3", ">=5.9")
+    q = np.zeros(7)
+    q[0] = 2.5
+    low, high = limits.velocity_bounds(q)
+    # -0.6599 + sqrt(2 * 6 * (2.9007 - 2.5)) = 1.532906
+    assert high[0] == pytest.approx(1.532906, abs=1e-6)
+    assert low[0] == pytest.approx(-2.62)
+    q[0] = -2.5
+    low, high = limits.velocity_bounds(q)
+    assert low[0] == pytest.approx(-1.532906, abs=1e-6)
+    assert high[0] == pytest.approx(2.62)
+
+
+def test_velocity_of_an_fr3_is_zero_at_and_beyond_its_stop():
+    limits = robot_limits("fr3", ">=5.9")
+    low, high = limits.velocity_bounds(np.array([limits.upper, limits.upper + 1, limits.lower - 1]))
+    assert not high[:2].any()
+    assert not low[2].any()
+    assert np.all(low <= 0)
+    assert np.all(high >= 0)
+
+
+def test_old_firmware_reaches_zero_speed_at_its_position_limit():
+    # libfranka ends, to 8 mrad, where the documented range does: upper - offset^2 / (2 dec).
+    limits = robot_limits("fr3", "<5.9")
+    (e,) = limits.envelopes
+    np.testing.assert_allclose(
+        e.upper - e.offset**2 / (2 * e.deceleration), limits.upper, atol=1e-2
+    )
+    np.testing.assert_allclose(
+        e.lower + e.offset**2 / (2 * e.deceleration), limits.lower, atol=1e-2
+    )
+
+
+def test_unknown_firmware_is_never_wider_than_a_known_one():
+    narrow = robot_limits("fr3")
+    q = np.random.default_rng(0).uniform(-3, 3, size=(500, 7))
+    low, high = narrow.velocity_bounds(q)
+    for firmware in (">=5.9", "<5.9"):
+        wide = robot_limits("fr3", firmware)
+        assert np.all(narrow.lower >= wide.lower)
+        assert np.all(narrow.upper <= wide.upper)
+        wide_low, wide_high = wide.velocity_bounds(q)
+        assert np.all(low >= wide_low)
+        assert np.all(high <= wide_high)
+
+
+@pytest.mark.parametrize(("robot", "firmware"), FIRMWARES)
+def test_every_table_says_where_it_is_from(robot, firmware):
+    limits = robot_limits(robot, firmware)
+    assert "frank" in limits.source
+    assert len(limits.joint_names) == 7
+
+
+def test_fer_is_the_panda():
+    assert robot_limits("FER") is robot_limits("panda")
+
+
+@pytest.mark.parametrize(("robot", "firmware"), [("ur5", "any"), ("fr3", "6.0"), ("panda", "4.2")])
+def test_unknown_robots_and_firmwares_list_the_known(robot, firmware):
+    with pytest.raises(ConfigurationError, match="known are"):
+        robot_limits(robot, firmware)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"lower": np.zeros(6)},
+        {"velocity": np.zeros(7)},
+        {"jerk": np.full(7, np.nan)},
+        {"upper": np.full(7, -9.0)},
+        {"joint_names": ("a",) * 7},
+        {"acceleration": "fast"},
+    ],
+)
+def test_given_limits_are_checked(change):
+    with pytest.raises(ConfigurationError, match="limit"):
+        replace(robot_limits("panda"), **change)
+
+
+def test_given_limits_of_another_arm():
+    limits = RobotLimits(
+        "arm", "1", "its manual", ("a", "b"), [-1, -1], [1, 1], [2, 2], [9, 9], [5, 5]
+    )
+    low, high = limits.velocity_bounds(np.zeros((3, 2)))
+    np.testing.assert_array_equal(high, np.full((3, 2), 2.0))
+    np.testing.assert_array_equal(low, -high)
