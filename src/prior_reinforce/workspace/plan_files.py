@@ -1,15 +1,52 @@
-"""Plans on disk, immutable and hashed, and their hand-over to whatever drives the arm."""
+"""Plans on disk: written once, read-only, known by their SHA-256 hash.
+
+`npz` and `csv` hold t, q, dq, ddq; `json` has the field order of ROS 2's
+trajectory_msgs/JointTrajectory. Velocities and accelerations go with the positions because a ROS 2
+joint trajectory controller interpolates positions alone linearly, and all three by quintics
+(control.ros.org, joint_trajectory_controller).
+"""
 
 from __future__ import annotations
 
+import csv
+import errno
+import hashlib
+import io
+import json
+import math
 import os
+import tempfile
+import zipfile
+import zlib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, cast, get_args
 
-from prior_reinforce.motions import Plan
+import numpy as np
+
+from prior_reinforce.errors import (
+    ConfigurationError,
+    FileFormatError,
+    PriorReinforceError,
+    WorkspaceError,
+)
+from prior_reinforce.motions import Plan, PlanFormat
+from prior_reinforce.robots.interpolation import FineMotion, interpolate
+from prior_reinforce.workspace.hand_over import HandOver, run_command
+
+__all__ = [
+    "HandOver",
+    "PlanFile",
+    "PlanFileFormat",
+    "encode_plan",
+    "read_plan",
+    "run_with_plan",
+    "write_plan",
+]
 
 PlanFileFormat = Literal["npz", "csv", "json"]
+_FILE_FORMAT = "prior-reinforce plan"
+_FILE_VERSION = 1
 
 
 @dataclass(frozen=True)
@@ -17,28 +54,27 @@ class PlanFile:
     """A plan that was written once and will never change."""
 
     path: Path
+    """Where it lies."""
     sha256: str
+    """Hash of the file's bytes, 64 hexadecimal digits."""
 
+    def verify(self) -> None:
+        """Do nothing if the file is still what was written.
 
-@dataclass(frozen=True)
-class HandOver:
-    """What became of a command that was given a plan."""
-
-    command: tuple[str, ...]
-    exit_status: int | None
-    """None if the command was stopped at its time limit."""
-    timed_out: bool
-    seconds: float
-    output_tail: str
-
-    @property
-    def succeeded(self) -> bool:
-        """Whether the command ended by itself with status 0."""
-        return self.exit_status == 0
-
-    def as_json(self) -> dict[str, Any]:
-        """The same as plain data for the journal."""
-        raise NotImplementedError
+        Raises:
+            FileFormatError: It is gone, unreadable, or its bytes have another hash.
+        """
+        try:
+            found = hashlib.sha256(self.path.read_bytes()).hexdigest()
+        except OSError as error:
+            raise FileFormatError(
+                f"cannot read the plan {self.path} ({error.strerror}); put the file back"
+            ) from error
+        if found != self.sha256:
+            raise FileFormatError(
+                f"{self.path} has SHA-256 {found[:12]}..., expected {self.sha256[:12]}...; plans "
+                "never change: put the original back, or void the trial"
+            )
 
 
 def write_plan(
@@ -50,6 +86,8 @@ def write_plan(
 ) -> PlanFile:
     """Write a plan, durable and read-only; the suffix gives the format unless `format` does.
 
+    The same plan always gives the same bytes, and so the same hash.
+
     Args:
         plan: The plan.
         path: Where to; an existing file with the same content is kept, another one is an error.
@@ -57,10 +95,32 @@ def write_plan(
         rate: Samples a second; None writes the plan's own frames.
 
     Raises:
-        FileFormatError: Unknown suffix, or another file is there already.
+        ConfigurationError: An unknown format or suffix.
+        FileFormatError: Another file is there already.
+        InvalidPlanError: A rate that is not a positive number.
         WorkspaceError: The disk is full or the folder read-only; nothing is left behind.
     """
-    raise NotImplementedError
+    path = Path(path)
+    kind = format or path.suffix.lower().removeprefix(".")
+    if kind not in get_args(PlanFileFormat):
+        raise ConfigurationError(
+            f"cannot write a plan as {kind or path.name!r}; end the name in .npz, .csv or .json, "
+            "or say the format"
+        )
+    content = encode_plan(plan, cast(PlanFileFormat, kind), rate=rate)
+    _write_once(path, content)
+    return PlanFile(path, hashlib.sha256(content).hexdigest())
+
+
+def encode_plan(plan: Plan, format: PlanFileFormat, *, rate: float | None = None) -> bytes:
+    """The bytes of a plan's file, as `write_plan` writes them."""
+    fine = interpolate(plan.actions, plan.format.dt, rate=rate or 1 / plan.format.dt)
+    if rate is None:
+        # On the frames themselves the spline is exact to rounding; write them as they are.
+        fine = FineMotion(plan.times, np.array(plan.actions), fine.dq, fine.ddq, fine.dddq)
+    if format == "npz":
+        return _as_npz(plan, fine, 1 / rate if rate else plan.format.dt)
+    return _as_csv(plan.format, fine) if format == "csv" else _as_json(plan.format, fine)
 
 
 def read_plan(path: str | os.PathLike[str], *, sha256: str | None = None) -> Plan:
@@ -68,15 +128,163 @@ def read_plan(path: str | os.PathLike[str], *, sha256: str | None = None) -> Pla
 
     Raises:
         FileFormatError: Missing, damaged, or not what the hash says.
+        InvalidPlanError: It holds no plan that could be executed.
     """
-    raise NotImplementedError
+    path = Path(path)
+    if not path.is_file():
+        raise FileFormatError(f"no plan at {path}; give the path of an .npz plan file")
+    if sha256 is not None:
+        PlanFile(path, sha256).verify()
+    try:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
+            q = np.array(archive["q"])
+            metadata = json.loads(str(archive["metadata"]))
+        if metadata["file_format"] != _FILE_FORMAT or metadata["version"] != _FILE_VERSION:
+            raise ValueError(f"written as {metadata['file_format']} {metadata['version']}")
+        names, units = tuple(metadata["joint_names"]), tuple(metadata["units"])
+        return Plan(q, PlanFormat(names, units, float(metadata["dt"])))
+    except PriorReinforceError:
+        raise
+    except (
+        OSError,
+        EOFError,
+        ValueError,
+        KeyError,
+        TypeError,
+        MemoryError,
+        NotImplementedError,
+        RuntimeError,
+        zipfile.BadZipFile,
+        zlib.error,
+    ) as error:
+        raise FileFormatError(
+            f"{path} is not a plan file ({error}); write one with write_plan or `export`"
+        ) from error
 
 
 def run_with_plan(command: str, plan_file: PlanFile, *, time_limit: float) -> HandOver:
-    """Run `mycontroller {plan}` in a process of its own and wait for it.
+    """Run `mycontroller {plan}` in a process of its own, once the plan's hash is checked.
+
+    Args:
+        command: Program and arguments, `{plan}` among them; no shell sees it.
+        plan_file: What is to be executed.
+        time_limit: In [s]; then the command and everything it started are stopped.
 
     Raises:
-        ConfigurationError: No `{plan}` in the command, or its program cannot be started.
-        FileFormatError: The plan is no longer what its hash says.
+        ConfigurationError: A command or a limit that cannot be used, or a program that cannot be
+            started; nothing has run then.
+        FileFormatError: The plan is no longer what its hash says; nothing has run.
     """
-    raise NotImplementedError
+    plan_file.verify()
+    return run_command(command, plan_file.path, time_limit=time_limit)
+
+
+def _as_npz(plan: Plan, fine: FineMotion, dt: float) -> bytes:
+    metadata = {
+        "file_format": _FILE_FORMAT,
+        "version": _FILE_VERSION,
+        "joint_names": plan.format.names,
+        "units": plan.format.units,
+        "dt": dt,
+    }
+    buffer = io.BytesIO()
+    # numpy stamps every member with the same date, so the bytes depend on the plan alone.
+    np.savez(
+        buffer,
+        t=fine.t,
+        q=fine.q,
+        dq=fine.dq,
+        ddq=fine.ddq,
+        metadata=np.array(json.dumps(metadata)),
+    )
+    return buffer.getvalue()
+
+
+def _as_csv(format: PlanFormat, fine: FineMotion) -> bytes:
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    prefixes = ("", "d_", "dd_")
+    writer.writerow(["t", *(prefix + name for prefix in prefixes for name in format.names)])
+    # repr of a float is the shortest text that reads back as the same number.
+    writer.writerows(
+        [repr(float(value)) for value in row]
+        for row in np.column_stack([fine.t, fine.q, fine.dq, fine.ddq])
+    )
+    return text.getvalue().encode()
+
+
+def _as_json(format: PlanFormat, fine: FineMotion) -> bytes:
+    message: dict[str, Any] = {
+        "header": {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""},
+        "joint_names": list(format.names),
+        "points": [
+            {
+                "positions": q.tolist(),
+                "velocities": dq.tolist(),
+                "accelerations": ddq.tolist(),
+                "effort": [],
+                "time_from_start": _duration(float(t)),
+            }
+            for t, q, dq, ddq in zip(fine.t, fine.q, fine.dq, fine.ddq, strict=True)
+        ],
+    }
+    return (json.dumps(message, indent=1) + "\n").encode()
+
+
+def _duration(seconds: float) -> dict[str, int]:
+    nanoseconds = round(seconds * 1e9)
+    whole = math.floor(nanoseconds / 1_000_000_000)
+    return {"sec": whole, "nanosec": nanoseconds - whole * 1_000_000_000}
+
+
+def _write_once(path: Path, content: bytes) -> None:
+    """Put content at path so that it is there wholly or not at all, and never replaces a file."""
+    temporary: str | None = None
+    try:
+        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}-")
+        with os.fdopen(handle, "wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        os.chmod(temporary, 0o444)
+        _put_in_place(temporary, path)
+        folder = os.open(path.parent, os.O_RDONLY)
+        try:
+            os.fsync(folder)
+        finally:
+            os.close(folder)
+    except FileExistsError:
+        if not (path.is_file() and path.read_bytes() == content):
+            raise FileFormatError(
+                f"{path} is there already with another content; plans are never overwritten: "
+                "choose another name"
+            ) from None
+    except OSError as error:
+        remedy = {
+            errno.ENOSPC: "free some space",
+            errno.ENOENT: "make the folder first",
+        }.get(error.errno or 0, "choose a folder that can be written to")
+        raise WorkspaceError(f"cannot write {path} ({error.strerror}); {remedy}") from error
+    finally:
+        if temporary is not None:
+            Path(temporary).unlink(missing_ok=True)
+
+
+def _put_in_place(temporary: str, path: Path) -> None:
+    """Give the finished file its name.
+
+    Raises:
+        FileExistsError: A file of that name is there already.
+    """
+    try:
+        # A link, unlike a rename, fails where a file is there already.
+        os.link(temporary, path)
+    except FileExistsError:
+        raise
+    except OSError as error:
+        # Memory sticks (FAT) have no links.
+        if error.errno not in (errno.EPERM, errno.EOPNOTSUPP, errno.ENOSYS):
+            raise
+        if path.exists():
+            raise FileExistsError(errno.EEXIST, "File exists", str(path)) from error
+        os.rename(temporary, path)

@@ -1,0 +1,146 @@
+"""Handing a plan to whatever drives the arm, in a process of its own.
+
+Bindings of robot libraries exclude each other in one process, and the session must outlive a
+driver that crashes or hangs; so the plan's file is given to a command, and its exit status and the
+end of its output come back.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import shlex
+import signal
+import subprocess
+import tempfile
+import time
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import IO, Any
+
+from prior_reinforce.errors import ConfigurationError
+
+_PLAN = "{plan}"
+_TAIL_BYTES = 4000
+"""Kept of the command's output: the last screenful, where a driver says why it stopped."""
+_GRACE = 2.0
+"""Between asking a command to stop and killing it, in [s]: time to bring an arm to rest."""
+
+
+@dataclass(frozen=True)
+class HandOver:
+    """What became of a command that was given a plan."""
+
+    command: tuple[str, ...]
+    """Program and arguments as they were started."""
+    exit_status: int
+    """Status the command ended with; minus the signal's number if a signal ended it."""
+    timed_out: bool
+    """Whether it was stopped at its time limit. The arm may have moved."""
+    seconds: float
+    """How long it ran."""
+    output_tail: str
+    """The end of what it wrote to its output and error streams, in order."""
+
+    @property
+    def succeeded(self) -> bool:
+        """Whether the command ended by itself with status 0."""
+        return self.exit_status == 0 and not self.timed_out
+
+    def as_json(self) -> dict[str, Any]:
+        """The same as plain data for the journal."""
+        return asdict(self) | {"command": list(self.command)}
+
+
+def split_command(command: str, plan: Path) -> tuple[str, ...]:
+    """Program and arguments, with `{plan}` replaced by the file's path within one argument.
+
+    The text is split as a shell would, but no shell ever sees it: nothing in a path can become a
+    second command.
+
+    Raises:
+        ConfigurationError: Quotes that do not match, no program, or no `{plan}`.
+    """
+    try:
+        arguments = shlex.split(command)
+    except ValueError as error:
+        raise ConfigurationError(
+            f"cannot split the command {command!r} ({error}); close its quotes"
+        ) from error
+    if not any(_PLAN in argument for argument in arguments[1:]):
+        raise ConfigurationError(
+            f"the command {command!r} must name a program and hold {_PLAN} where the plan's path "
+            'goes, for instance "mycontroller {plan}"'
+        )
+    path = str(plan.resolve())
+    return tuple(argument.replace(_PLAN, path) for argument in arguments)
+
+
+def run_command(command: str, plan: Path, *, time_limit: float) -> HandOver:
+    """Run `mycontroller {plan}` in a process of its own and wait for it.
+
+    At the time limit the command and everything it started are asked to stop (SIGTERM), and killed
+    two seconds later.
+
+    Args:
+        command: Program and arguments, `{plan}` among them.
+        plan: File of the plan to be executed.
+        time_limit: In [s].
+
+    Raises:
+        ConfigurationError: A command or a limit that cannot be used, or a program that cannot be
+            started; nothing has run then.
+    """
+    if not (math.isfinite(time_limit) and time_limit > 0):
+        raise ConfigurationError(f"the time limit must be a positive number, got {time_limit} s")
+    arguments = split_command(command, plan)
+    with tempfile.TemporaryFile() as output:
+        start = time.monotonic()
+        try:
+            process = subprocess.Popen(
+                arguments,
+                stdin=subprocess.DEVNULL,
+                stdout=output,
+                stderr=subprocess.STDOUT,
+                start_new_session=True,
+            )
+        except (OSError, ValueError) as error:
+            raise ConfigurationError(
+                f"cannot start {arguments[0]!r} ({error}); give the path of a program that can run"
+            ) from error
+        timed_out = False
+        try:
+            process.wait(time_limit)
+        except subprocess.TimeoutExpired:
+            timed_out = True
+            _stop(process)
+        except BaseException:
+            # Ctrl-C: a driver must not go on without its session.
+            _stop(process)
+            raise
+        return HandOver(
+            command=arguments,
+            exit_status=process.returncode,
+            timed_out=timed_out,
+            seconds=time.monotonic() - start,
+            output_tail=_tail(output),
+        )
+
+
+def _stop(process: subprocess.Popen[bytes]) -> None:
+    """Stop the command and everything it started: ask, wait, kill; then collect its status."""
+    os.killpg(process.pid, signal.SIGTERM)
+    deadline = time.monotonic() + _GRACE
+    # WNOWAIT leaves the ended command uncollected, which keeps its group's number from being
+    # given to a stranger before the last signal.
+    ended = os.WEXITED | os.WNOHANG | os.WNOWAIT
+    while os.waitid(os.P_PID, process.pid, ended) is None and time.monotonic() < deadline:
+        time.sleep(0.01)
+    os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+
+
+def _tail(output: IO[bytes]) -> str:
+    size = output.seek(0, os.SEEK_END)
+    output.seek(max(0, size - _TAIL_BYTES))
+    return output.read().decode(errors="replace")
