@@ -1,0 +1,50 @@
+"""Exact seeing made worse on purpose (paper, Section V-B, "Amplified Perception Noise")."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from prior_reinforce.errors import ConfigurationError
+from prior_reinforce.perception.base import Perception
+from prior_reinforce.rollouts import Rollout
+
+
+@dataclass(frozen=True)
+class Amplified(Perception):
+    """The true error times one random factor, plus Gaussian noise on each component."""
+
+    name: ClassVar[str] = "amplified"
+
+    scale_low: float = 0.7
+    """Least factor, uniformly drawn once a vector (paper: 0.7)."""
+    scale_high: float = 1.4
+    """Greatest factor (paper: 1.4)."""
+    noise_sd: float = 0.01
+    """Standard deviation of the noise of each component, in [m]. Ours, because the paper gives
+    none: 1 cm is two thirds of the tolerance, and half of the finest step of an estimate by eye."""
+
+    def __post_init__(self) -> None:
+        """Check the settings.
+
+        Raises:
+            ConfigurationError: The factors do not rise from 0, or the noise is negative.
+        """
+        if not 0 <= self.scale_low <= self.scale_high < math.inf:
+            raise ConfigurationError(
+                "scale_low and scale_high must rise from 0 or more, got "
+                f"{self.scale_low} and {self.scale_high}; the paper's are 0.7 and 1.4"
+            )
+        if not 0 <= self.noise_sd < math.inf:
+            raise ConfigurationError(
+                f"noise_sd must be 0 m or more, got {self.noise_sd}; 0.01 is the default"
+            )
+
+    def perceive(self, rollout: Rollout, goal: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+        """Return s (r - g) + n, shape (k,), in [m], with one s and k components of n drawn."""
+        error = rollout.outcome - goal
+        scale = rng.uniform(self.scale_low, self.scale_high)
+        return scale * error + rng.normal(0.0, self.noise_sd, size=error.shape)

@@ -1,0 +1,40 @@
+"""An observer's estimate by eye, as coarse as the paper's (Section V-A, "Perception Process")."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from prior_reinforce.perception.base import Perception
+from prior_reinforce.rollouts import Rollout
+
+_NEAR = np.array([0.0, 0.02, 0.05, 0.10])
+"""Distances told apart near the goal, in [m] (paper: 0 cm, 2 cm, 5 cm, multiples of 10 cm)."""
+_BETWEEN_NEAR = (0.01, 0.035, 0.075)
+"""Half-way between them; written out, since the float (5 cm + 10 cm) / 2 is not 7.5 cm."""
+_STEP = 0.10
+"""Distances beyond are multiples of this, in [m]."""
+_RESOLUTION_DECIMALS = 9
+"""Errors are compared to the nanometre, so that 0.92 - 0.91 is a tie as 1 cm is on paper."""
+
+
+@dataclass(frozen=True)
+class Eye(Perception):
+    """Each component of the error, rounded to the nearest of 0, 2, 5, 10, 20, 30, ... cm.
+
+    The sign is kept. A tie (1, 3.5, 7.5, 15, ... cm) counts as the larger: who is in doubt reports
+    the miss. Nothing is random: the paper describes the rounding and no other error.
+    """
+
+    name: ClassVar[str] = "eye"
+
+    def perceive(self, rollout: Rollout, goal: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+        """Return the rounded error, shape (k,), in [m]; draws nothing from `rng`."""
+        error = rollout.outcome - goal
+        size = np.round(np.abs(error), _RESOLUTION_DECIMALS)
+        near = _NEAR[np.searchsorted(_BETWEEN_NEAR, size, side="right")]
+        far = _STEP * np.floor(np.round(size / _STEP + 0.5, _RESOLUTION_DECIMALS))
+        # Adding 0 turns the -0.0 of a small negative error into 0.0.
+        return np.sign(error) * np.where(size < _NEAR[-1], near, far) + 0.0

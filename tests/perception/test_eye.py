@@ -1,0 +1,46 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from prior_reinforce.perception import Eye
+from prior_reinforce.rollouts import Rollout
+
+
+def seen_cm(error_cm: float, goal: float = 0.0) -> float:
+    rollout = Rollout(outcome=np.array([goal + error_cm / 100.0]), valid=True)
+    return float(100.0 * Eye().perceive(rollout, np.array([goal]), np.random.default_rng(0))[0])
+
+
+@pytest.mark.parametrize(
+    ("error", "seen"),
+    [
+        *[(0.0, 0), (0.9, 0), (1.1, 2), (3.4, 2), (3.6, 5), (7.4, 5), (7.6, 10), (14.9, 10)],
+        *[(15.1, 20), (24.9, 20), (25.1, 30), (95.1, 100), (-1.1, -2), (-7.6, -10), (-25.1, -30)],
+    ],
+)
+def test_rounds_to_0_2_5_or_tens_and_keeps_the_sign(error, seen):
+    assert seen_cm(error) == pytest.approx(seen)
+
+
+@pytest.mark.parametrize(
+    ("tie", "seen"), [(1, 2), (3.5, 5), (7.5, 10), (15, 20), (25, 30), (-1, -2), (-35, -40)]
+)
+@pytest.mark.parametrize("goal", [0.0, 0.91, 0.1, 1.07])
+def test_a_tie_counts_as_the_larger_whatever_the_rounding_of_floats(tie, seen, goal):
+    assert seen_cm(tie, goal) == pytest.approx(seen)
+
+
+@given(st.floats(-3.0, 3.0))
+def test_nothing_is_seen_further_off_than_half_a_step(error):
+    rollout = Rollout(outcome=np.array([error]), valid=True)
+    seen = float(Eye().perceive(rollout, np.zeros(1), np.random.default_rng(0))[0])
+    half_step = 0.01 if abs(error) < 0.02 else 0.015 if abs(error) < 0.05 else 0.025
+    half_step = half_step if abs(error) < 0.1 else 0.05
+    assert abs(seen - error) <= half_step + 1e-9
+    again = Rollout(outcome=np.array([seen]), valid=True)
+    assert Eye().perceive(again, np.zeros(1), np.random.default_rng(0))[0] == pytest.approx(seen)
+
+
+def test_a_small_miss_to_the_left_is_no_negative_zero():
+    assert not np.signbit(seen_cm(-0.5))
