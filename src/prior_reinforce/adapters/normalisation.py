@@ -1,0 +1,46 @@
+"""The units in which the Gaussian process works: demonstrated outcomes around 0, spread about 1."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from prior_reinforce.motions import Demonstrations
+
+
+@dataclass(frozen=True, eq=False)
+class Normalisation:
+    """An affine map fixed by the demonstrations, so that trials cannot move it."""
+
+    offset: np.ndarray
+    """Mean of the demonstrated outcomes, shape (k,), in the outcomes' units."""
+    scale: np.ndarray
+    """Length that counts as 1, shape (k,), in the outcomes' units."""
+
+    @classmethod
+    def of(cls, demonstrations: Demonstrations) -> Normalisation:
+        """Return the demonstrations' own: their mean, and their standard deviation.
+
+        Components of one unit share one scale (the root mean square of their deviations), so that
+        the kernel stays isotropic on a table: 5 cm to the side are as far as 5 cm ahead. Metres
+        beside seconds have a scale each, without which a sum of squares would mean nothing.
+        """
+        outcomes = demonstrations.outcomes_seen
+        variance = outcomes.var(axis=0)
+        units = np.array(demonstrations.outcome_units)
+        scale = np.sqrt([variance[units == unit].mean() for unit in units])
+        return cls(offset=outcomes.mean(axis=0), scale=scale)
+
+    @property
+    def outcome_dim(self) -> int:
+        """k, the number of components."""
+        return len(self.offset)
+
+    def apply(self, values: np.ndarray) -> np.ndarray:
+        """Return outcomes or conditions, shape (..., k), in normalised units."""
+        return (values - self.offset) / self.scale
+
+    def undo(self, values: np.ndarray) -> np.ndarray:
+        """Return normalised values, shape (..., k), in the outcomes' units."""
+        return values * self.scale + self.offset

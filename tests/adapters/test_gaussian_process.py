@@ -1,0 +1,235 @@
+import warnings
+
+import numpy as np
+import pytest
+from sklearn.exceptions import ConvergenceWarning
+from sklearn.gaussian_process import GaussianProcessRegressor
+from sklearn.gaussian_process.kernels import RBF, ConstantKernel
+
+from prior_reinforce.adapters import GaussianProcessAdapter, GaussianProcessConfig
+from prior_reinforce.adapters.gp_posterior import GPPosterior
+from prior_reinforce.errors import ConfigurationError
+from prior_reinforce.motions import Demonstrations, PlanFormat
+
+REGION = np.array([[0.80, -0.25], [1.05, 0.25]])
+
+
+def demonstrations(outcomes: np.ndarray, units: tuple[str, ...] = ()) -> Demonstrations:
+    plans = np.random.default_rng(0).normal(size=(len(outcomes), 4, 1))
+    return Demonstrations(plans, outcomes, PlanFormat(("j1",), ("rad",), 0.02), (), units)
+
+
+def spread_over_region(seed: int, n: int = 6) -> np.ndarray:
+    corners = np.array([[0.1, 0.1], [0.1, 0.5], [0.1, 0.9], [0.9, 0.1], [0.9, 0.5], [0.9, 0.9]])
+    jitter = np.random.default_rng(seed).uniform(-0.1, 0.1, size=(n, 2))
+    return REGION[0] + (REGION[1] - REGION[0]) * (corners[:n] + jitter)
+
+
+def random_adapter(seed: int) -> GaussianProcessAdapter:
+    """An adapter after random trials: k, n, m, noise, jitters and near-duplicates all vary."""
+    rng = np.random.default_rng(seed)
+    k = 1 + seed % 3
+    adapter = GaussianProcessAdapter(
+        GaussianProcessConfig(
+            memory_size=[2, None, 1][seed % 3],
+            demonstration_jitter=float(10 ** rng.uniform(-4, -1)),
+            trial_jitter=float(10 ** rng.uniform(-4, -1)),
+        )
+    )
+    outcomes = rng.uniform(size=(rng.integers(k + 2, 9), k)) * [0.25, 0.5, 0.4][:k]
+    adapter.start(demonstrations(outcomes))
+    spread = 1e-4 if seed % 4 == 0 else 0.2
+    centre = rng.uniform(size=k) * 0.3
+    for outcome in centre + spread * rng.normal(size=(rng.integers(0, 6), k)):
+        adapter.observe(outcome + rng.normal(size=k) * rng.choice([0.005, 0.02, 0.1]), outcome)
+    return adapter
+
+
+def reference(adapter: GaussianProcessAdapter, restarts: int) -> GaussianProcessRegressor:
+    regressor = GaussianProcessRegressor(
+        ConstantKernel(1.0, (1e-5, 1e5)) * RBF(1.0, (1e-5, 1e5)),
+        alpha=adapter.jitter_,
+        n_restarts_optimizer=restarts,
+        random_state=0,
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ConvergenceWarning)  # a kernel at its bounds is expected
+        return regressor.fit(adapter.memory_outcomes_, adapter.memory_conditions_)
+
+
+def assert_no_worse_than_scikit_learn(seeds: range, restarts: int) -> int:
+    """Return for how many seeds both found the same kernel, on which predictions must agree."""
+    same = 0
+    for seed in seeds:
+        adapter = random_adapter(seed)
+        fitted = reference(adapter, restarts)
+        likelihood = fitted.log_marginal_likelihood_value_
+        assert likelihood <= adapter.log_marginal_likelihood_ + 1e-6, seed
+        amplitude, length_scale = np.exp(fitted.kernel_.theta)
+        if np.allclose(
+            [amplitude, length_scale], [adapter.amplitude_, adapter.length_scale_], 1e-3
+        ):
+            same += 1
+            points = np.random.default_rng(seed).normal(size=(5, adapter.memory_outcomes_.shape[1]))
+            expected = fitted.predict(points).reshape(points.shape)
+            offset, scale = adapter._normalisation.offset, adapter._normalisation.scale
+            for point, value in zip(points, expected, strict=True):
+                proposed = (adapter.propose(point * scale + offset) - offset) / scale
+                np.testing.assert_allclose(proposed, value, atol=1e-3)
+    return same
+
+
+def test_never_less_likely_than_scikit_learn_with_its_restarts():
+    assert assert_no_worse_than_scikit_learn(range(6), restarts=50) >= 4
+
+
+@pytest.mark.slow
+def test_never_less_likely_than_scikit_learn_on_200_data_sets():
+    assert assert_no_worse_than_scikit_learn(range(6, 200), restarts=50) >= 150
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_predictions_are_scikit_learns_given_the_same_kernel(seed):
+    adapter = random_adapter(seed)
+    kernel = ConstantKernel(adapter.amplitude_, "fixed") * RBF(adapter.length_scale_, "fixed")
+    fitted = GaussianProcessRegressor(kernel, alpha=adapter.jitter_, optimizer=None)
+    fitted.fit(adapter.memory_outcomes_, adapter.memory_conditions_)
+    assert adapter.log_marginal_likelihood_ == pytest.approx(
+        fitted.log_marginal_likelihood_value_, abs=1e-6
+    )
+    points = np.random.default_rng(seed).normal(size=(5, adapter.memory_outcomes_.shape[1]))
+    expected = fitted.predict(points).reshape(points.shape)
+    np.testing.assert_allclose(adapter._posterior.mean(points), expected, atol=1e-6)
+
+
+def test_posterior_of_one_point_by_hand():
+    # a = 2, alpha = 0.5, y = 3 at x = 0: mean(x) = 2 exp(-x^2 / 2 l^2) / 2.5 * 3.
+    posterior = GPPosterior.condition_on(
+        np.array([[0.0]]),
+        np.array([[3.0]]),
+        amplitude=2.0,
+        length_scale=2.0,
+        jitter=np.array([0.5]),
+    )
+    expected = [[2.4], [2.4 * np.exp(-0.5)], [0.0]]
+    np.testing.assert_allclose(posterior.mean(np.array([[0.0], [2.0], [200.0]])), expected)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_first_condition_is_the_goal(seed):
+    outcomes = spread_over_region(seed)
+    adapter = GaussianProcessAdapter()
+    adapter.start(demonstrations(outcomes))
+    weights = np.random.default_rng(seed).dirichlet(np.ones(6), size=200)
+    inside = [np.linalg.norm(adapter.propose(goal) - goal) for goal in weights @ outcomes]
+    assert max(inside) < 0.0025
+    assert np.median(inside) < 0.001
+    centre = outcomes.mean(axis=0)
+    outside = [centre + 1.25 * (corner - centre) for corner in outcomes]
+    assert max(np.linalg.norm(adapter.propose(goal) - goal) for goal in outside) < 0.01
+
+
+def test_far_outside_a_condition_returns_to_the_demonstrations_mean():
+    outcomes = spread_over_region(0)
+    adapter = GaussianProcessAdapter()
+    adapter.start(demonstrations(outcomes))
+    far = outcomes.mean(axis=0) + np.array([50.0, 0.0])
+    np.testing.assert_allclose(adapter.propose(far), outcomes.mean(axis=0), atol=1e-6)
+
+
+def test_trials_are_learned_from_and_the_oldest_is_forgotten():
+    outcomes = spread_over_region(1)
+    adapter = GaussianProcessAdapter(GaussianProcessConfig(memory_size=2))
+    adapter.start(demonstrations(outcomes))
+    trials = np.random.default_rng(0).uniform(*REGION, size=(4, 2, 2))
+    scale, offset = adapter._normalisation.scale, adapter._normalisation.offset
+    for count, (condition, outcome) in enumerate(trials, start=1):
+        adapter.observe(condition, outcome)
+        kept = trials[max(0, count - 2) : count]
+        expected_outcomes = np.vstack([outcomes, kept[:, 1]])
+        expected_conditions = np.vstack([outcomes, kept[:, 0]])
+        np.testing.assert_allclose(adapter.memory_outcomes_ * scale + offset, expected_outcomes)
+        np.testing.assert_allclose(adapter.memory_conditions_ * scale + offset, expected_conditions)
+    assert adapter.jitter_.tolist() == [1e-2] * 6 + [2e-3] * 2
+
+
+def test_what_was_forgotten_leaves_no_trace():
+    goal, trials = np.array([0.9, 0.0]), np.random.default_rng(0).uniform(*REGION, size=(4, 2, 2))
+    proposals = []
+    for first in (0, 2):
+        adapter = GaussianProcessAdapter(GaussianProcessConfig(memory_size=2))
+        adapter.start(demonstrations(spread_over_region(1)))
+        for condition, outcome in trials[first:]:
+            adapter.observe(condition, outcome)
+        proposals.append(adapter.propose(goal))
+    np.testing.assert_array_equal(*proposals)
+
+
+def test_m_of_infinity_keeps_every_trial():
+    adapter = GaussianProcessAdapter(GaussianProcessConfig(memory_size=None))
+    adapter.start(demonstrations(spread_over_region(1)))
+    for condition, outcome in np.random.default_rng(0).uniform(*REGION, size=(7, 2, 2)):
+        adapter.observe(condition, outcome)
+    assert len(adapter.memory_outcomes_) == 13
+
+
+def test_the_order_of_the_demonstrations_does_not_matter():
+    outcomes, order = spread_over_region(2), [3, 1, 5, 0, 4, 2]
+    proposals = []
+    for arrangement in (outcomes, outcomes[order]):
+        adapter = GaussianProcessAdapter()
+        adapter.start(demonstrations(arrangement))
+        adapter.observe(np.array([0.9, 0.0]), np.array([0.93, -0.02]))
+        proposals.append(adapter.propose(np.array([0.9, 0.0])))
+    np.testing.assert_allclose(*proposals, atol=1e-6)
+
+
+def test_a_constant_offset_is_corrected_for():
+    adapter = GaussianProcessAdapter()
+    adapter.start(demonstrations(spread_over_region(3)))
+    goal, offset = np.array([0.92, 0.05]), np.array([0.03, -0.02])
+    errors = []
+    for _ in range(5):
+        condition = adapter.propose(goal)
+        errors.append(np.linalg.norm(condition + offset - goal))
+        adapter.observe(condition, condition + offset)
+    assert errors[0] == pytest.approx(np.linalg.norm(offset), abs=0.002)
+    assert errors[1] < 0.5 * errors[0]
+    assert errors[-1] < 0.005
+
+
+def test_units_do_not_matter_when_all_components_share_one():
+    outcomes = spread_over_region(4)
+    proposals = []
+    for factor in (1.0, 100.0):
+        adapter = GaussianProcessAdapter()
+        adapter.start(demonstrations(factor * outcomes, units=("u", "u")))
+        adapter.observe(factor * np.array([0.9, 0.0]), factor * np.array([0.93, -0.02]))
+        proposals.append(adapter.propose(factor * np.array([0.9, 0.0])) / factor)
+    np.testing.assert_allclose(*proposals, atol=1e-7)
+
+
+def test_metres_and_milliseconds_are_as_good_as_metres_and_seconds():
+    outcomes = spread_over_region(4)
+    proposals = []
+    for factor in ([1.0, 1.0], [1.0, 1000.0]):
+        adapter = GaussianProcessAdapter()
+        adapter.start(demonstrations(factor * outcomes, units=("m", "s")))
+        adapter.observe(factor * np.array([0.9, 0.0]), factor * np.array([0.93, -0.02]))
+        proposals.append(adapter.propose(factor * np.array([0.9, 0.0])) / factor)
+    np.testing.assert_allclose(*proposals, atol=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("settings", "word"),
+    [
+        ({"memory_size": 0}, "memory_size"),
+        ({"demonstration_jitter": 0.0}, "demonstration_jitter"),
+        ({"trial_jitter": float("nan")}, "trial_jitter"),
+        ({"amplitude_bounds": (0.0, 1.0)}, "amplitude_bounds"),
+        ({"length_scale_bounds": (2.0, 1.0)}, "length_scale_bounds"),
+    ],
+)
+def test_settings_out_of_range_are_refused(settings, word):
+    with pytest.raises(ConfigurationError, match=word):
+        GaussianProcessConfig(**settings)
