@@ -13,7 +13,20 @@ from typing import Protocol
 
 import tyro
 
-from prior_reinforce.commands.simulated import Adapt, Demo, Learn, Rollout
+from prior_reinforce.commands.learning import Learn
+from prior_reinforce.commands.simulated import Adapt, Demo, Rollout
+from prior_reinforce.commands.workspace import (
+    Amend,
+    Ask,
+    Export,
+    Goal,
+    Import,
+    Log,
+    New,
+    Status,
+    Tell,
+    Void,
+)
 from prior_reinforce.errors import PriorReinforceError
 
 
@@ -29,6 +42,16 @@ COMMANDS: dict[str, type[Command]] = {
     "learn": Learn,
     "adapt": Adapt,
     "rollout": Rollout,
+    "new": New,
+    "import": Import,
+    "goal": Goal,
+    "ask": Ask,
+    "tell": Tell,
+    "void": Void,
+    "amend": Amend,
+    "status": Status,
+    "log": Log,
+    "export": Export,
 }
 
 

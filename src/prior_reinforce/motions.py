@@ -12,6 +12,7 @@ Notation (docs/notation.md):
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
 import os
@@ -169,6 +170,15 @@ class Demonstrations:
     def outcome_dim(self) -> int:
         """k, the number of components of an outcome."""
         return self.outcomes_seen.shape[1]
+
+    @property
+    def sha256(self) -> str:
+        """Fingerprint of plans and outcomes, to tell which model was learned from them."""
+        digest = hashlib.sha256()
+        for array in (self.plans, self.outcomes_seen):
+            digest.update(str(array.shape).encode())
+            digest.update(array.tobytes())
+        return digest.hexdigest()
 
     def check_goal(self, goal: ArrayLike) -> np.ndarray:
         """Return the goal as a fresh float array, warning when it lies far outside the outcomes.
