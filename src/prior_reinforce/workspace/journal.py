@@ -1,0 +1,144 @@
+"""The trial journal: append-only events in SQLite, each durable before a command returns.
+
+Nothing is ever changed or deleted; what happened is the list of events, and everything else is a
+fold over it (`history.py`). One program at a time may read-then-append (`Journal.exclusive`).
+"""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import Any
+
+from prior_reinforce.errors import WorkspaceError
+
+JOURNAL_FILE = "journal.sqlite"
+_VERSION = 1
+# Ours: an operator's second window should wait out a command, not a training.
+_LOCK_TIMEOUT_S = 10.0
+
+_SCHEMA = """
+CREATE TABLE IF NOT EXISTS events (
+    id INTEGER PRIMARY KEY AUTOINCREMENT,
+    time TEXT NOT NULL,
+    kind TEXT NOT NULL,
+    data TEXT NOT NULL
+) STRICT;
+CREATE TRIGGER IF NOT EXISTS events_are_never_changed BEFORE UPDATE ON events
+BEGIN SELECT RAISE(ABORT, 'the journal is append-only'); END;
+CREATE TRIGGER IF NOT EXISTS events_are_never_deleted BEFORE DELETE ON events
+BEGIN SELECT RAISE(ABORT, 'the journal is append-only'); END;
+"""
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that happened, and will always have happened."""
+
+    id: int
+    """Order of events, from 1."""
+    time: str
+    """When it was written, ISO 8601, UTC."""
+    kind: str
+    """`demonstrations_imported`, `model_trained`, `goal_set`, `asked`, `executing`, `executed`,
+    `not_executed`, `told`, `voided` or `amended`."""
+    data: Mapping[str, Any]
+    """What it says, as plain JSON data."""
+
+    def as_json(self) -> str:
+        """The event as one line of JSON."""
+        return json.dumps({"id": self.id, "time": self.time, "kind": self.kind, **self.data})
+
+
+class Journal:
+    """Events of one workspace."""
+
+    def __init__(self, path: Path) -> None:
+        """Open a journal; made if there is none.
+
+        Raises:
+            WorkspaceError: It cannot be opened, is damaged, or was written by a newer version.
+        """
+        self._path = path
+        with self._named_errors():
+            self._connection = sqlite3.connect(path, timeout=_LOCK_TIMEOUT_S, isolation_level=None)
+            # A commit returns only when the rollback journal and its folder are on the disk.
+            self._connection.execute("PRAGMA synchronous = EXTRA")
+            version = self._connection.execute("PRAGMA user_version").fetchone()[0]
+            if version == 0:
+                self._connection.executescript(
+                    f"BEGIN IMMEDIATE; {_SCHEMA} PRAGMA user_version = {_VERSION}; COMMIT;"
+                )
+            elif version != _VERSION:
+                raise WorkspaceError(
+                    f"{path} was written by another version of this program (journal {version}, "
+                    f"this is {_VERSION}); use that version"
+                )
+
+    def close(self) -> None:
+        """Close the file."""
+        self._connection.close()
+
+    def events(self) -> list[Event]:
+        """All events, in order."""
+        with self._named_errors():
+            rows = self._connection.execute("SELECT id, time, kind, data FROM events ORDER BY id")
+            return [Event(id_, time, kind, json.loads(data)) for id_, time, kind, data in rows]
+
+    @contextmanager
+    def exclusive(self) -> Iterator[None]:
+        """Hold the journal for reading and then appending; others wait, and then say so.
+
+        Appends inside become durable together when the block ends; none does if it raises.
+
+        Raises:
+            WorkspaceError: Another program holds it, or the disk refuses.
+        """
+        with self._named_errors():
+            self._connection.execute("BEGIN IMMEDIATE")
+        try:
+            yield
+        except BaseException:
+            self._connection.execute("ROLLBACK")
+            raise
+        with self._named_errors():
+            try:
+                self._connection.execute("COMMIT")
+            except sqlite3.Error:
+                if self._connection.in_transaction:
+                    self._connection.execute("ROLLBACK")
+                raise
+
+    def append(self, kind: str, data: Mapping[str, Any]) -> None:
+        """Add an event; call it inside `exclusive`.
+
+        Raises:
+            WorkspaceError: The disk is full, or the folder is read-only.
+        """
+        assert self._connection.in_transaction, "append inside Journal.exclusive"
+        now = datetime.now(timezone.utc).isoformat(timespec="milliseconds")
+        text = json.dumps(data, allow_nan=False)
+        with self._named_errors():
+            self._connection.execute(
+                "INSERT INTO events (time, kind, data) VALUES (?, ?, ?)", (now, kind, text)
+            )
+
+    @contextmanager
+    def _named_errors(self) -> Iterator[None]:
+        try:
+            yield
+        except sqlite3.Error as error:
+            text = str(error)
+            remedy = "restore it from a copy"
+            if "locked" in text or "busy" in text:
+                remedy = "another command works on this workspace; wait for it, then try again"
+            elif "readonly" in text or "unable to open" in text:
+                remedy = "make the folder writable"
+            elif "full" in text or "disk I/O" in text:
+                remedy = "free some disk space; what was told before is safe"
+            raise WorkspaceError(f"{self._path}: {text}; {remedy}") from error
