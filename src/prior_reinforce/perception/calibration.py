@@ -1,0 +1,230 @@
+"""From a picture's pixels to metres on the table: one homography, and how far it can be trusted.
+
+Notation:
+    H  `homography`  (3, 3)  table plane [m] to picture [px], both in homogeneous coordinates
+
+Pixel coordinates are continuous: (0, 0) is the picture's top left corner, x runs right, y runs
+down, and the first pixel's centre is (0.5, 0.5).
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from prior_reinforce.errors import ConfigurationError, FileFormatError
+
+_FILE_KIND = "prior-reinforce table calibration 1"
+
+# Singular values of the design matrix below this share of the largest count as zero: points on
+# one line leave about 1e-16, points clicked to a pixel on a real table 1e-2 (ours).
+_RANK_FLOOR = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class TableCalibration:
+    """Maps pixels to one plane parallel to the table, and back.
+
+    A homography is exact for a pinhole camera and one plane. What stands above or below that plane
+    is seen shifted away from the camera's foot (parallax), so calibrate in the plane in which the
+    outcome is defined, with `fit`, or move a calibration there, with `at_height`.
+    """
+
+    homography: np.ndarray
+    """H, shape (3, 3), with Frobenius norm 1 and positive depth over the table."""
+    height: float
+    """Height of the plane above the table, in [m]."""
+    fit_error: float
+    """Root mean square distance between the points and their pixels seen through H, in [m].
+    Zero by construction where there were only four points."""
+    left_out_error: float | None
+    """The same for each point seen through an H fitted to all others, in [m]: what to expect of
+    a point that was not clicked. None where there were only four points."""
+
+    @classmethod
+    def fit(
+        cls, table_points: np.ndarray, pixels: np.ndarray, *, height: float = 0.0
+    ) -> TableCalibration:
+        """Fit H to known points by the normalised direct linear transform.
+
+        Source: Hartley and Zisserman, Multiple View Geometry, 2nd ed., algorithm 4.2.
+
+        Args:
+            table_points: Known points in the plane, table frame, shape (n, 2), n >= 4, in [m].
+            pixels: Where they are in the picture, shape (n, 2), in [px].
+            height: Height of the plane above the table, in [m].
+
+        Raises:
+            ConfigurationError: Too few points, points on one line, or pixels in another order.
+        """
+        points, pixels = _checked_pairs(table_points, pixels)
+        homography = _direct_linear_transform(points, pixels)
+        fit_error = _rms(_map(np.linalg.inv(homography), pixels) - points)
+        return cls(homography, float(height), fit_error, _left_out_error(points, pixels))
+
+    def to_table(self, pixels: np.ndarray) -> np.ndarray:
+        """Map pixels, shape (..., 2), to points in the plane, shape (..., 2), in [m]."""
+        return _map(np.linalg.inv(self.homography), np.asarray(pixels, dtype=float))
+
+    def to_pixels(self, table_points: np.ndarray) -> np.ndarray:
+        """Map points in the plane, shape (..., 2), in [m], to pixels, shape (..., 2)."""
+        return _map(self.homography, np.asarray(table_points, dtype=float))
+
+    def at_height(self, height: float, camera_position: np.ndarray) -> TableCalibration:
+        """Return the calibration of a parallel plane, from where the camera hangs.
+
+        The ray through a pixel meets the two planes in p and p'. With the camera at c, higher than
+        both by d and d', p' = c + (p - c) d' / d: a scaling about the camera's foot.
+
+        Args:
+            height: Height of the new plane above the table, in [m].
+            camera_position: Camera in the table frame, shape (3,), in [m]. A tape measure will do:
+                its error enters by the factor (height - self.height) / d, and drops out of the
+                difference of two points in the same plane but for its vertical part.
+
+        Raises:
+            ConfigurationError: The camera is not above both planes.
+        """
+        camera = np.asarray(camera_position, dtype=float)
+        if camera.shape != (3,) or not camera[2] > max(height, self.height):
+            raise ConfigurationError(
+                f"camera position {camera_position} must be three numbers in metres, higher than "
+                f"the planes at {self.height} m and {height} m; measure it from the table's frame"
+            )
+        scale = (camera[2] - self.height) / (camera[2] - height)
+        from_new_plane = np.eye(3)
+        from_new_plane[:2] *= scale
+        from_new_plane[:2, 2] = (1 - scale) * camera[:2]
+        homography = self.homography @ from_new_plane
+        homography /= np.linalg.norm(homography)
+        left_out = None if self.left_out_error is None else self.left_out_error / scale
+        return TableCalibration(homography, float(height), self.fit_error / scale, left_out)
+
+    def summary(self) -> str:
+        """One line for the operator, in centimetres."""
+        if self.left_out_error is None:
+            return "calibrated on four points; a fifth would tell how well"
+        return (
+            f"calibrated to {100 * self.left_out_error:.2f} cm "
+            f"(each point through the others), plane {100 * self.height:.1f} cm above the table"
+        )
+
+    def save(self, path: Path) -> None:
+        """Write the calibration as JSON."""
+        content = {
+            "kind": _FILE_KIND,
+            "homography": self.homography.tolist(),
+            "height_m": self.height,
+            "fit_error_m": self.fit_error,
+            "left_out_error_m": self.left_out_error,
+        }
+        path.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
+
+    @classmethod
+    def load(cls, path: Path) -> TableCalibration:
+        """Read what `save` wrote.
+
+        Raises:
+            FileFormatError: The file is missing or is not a calibration.
+        """
+        try:
+            content = json.loads(path.read_text(encoding="utf-8"))
+            homography = np.array(content["homography"], dtype=float)
+            left_out = content["left_out_error_m"]
+            if content["kind"] != _FILE_KIND or homography.shape != (3, 3):
+                raise ValueError("another kind of file")
+            if not np.isfinite(homography).all():
+                raise ValueError("a homography that is not finite")
+            return cls(
+                homography,
+                float(content["height_m"]),
+                float(content["fit_error_m"]),
+                None if left_out is None else float(left_out),
+            )
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            raise FileFormatError(
+                f"{path} is not a table calibration ({error}); write one with TableCalibration.save"
+            ) from error
+
+
+def _checked_pairs(table_points: np.ndarray, pixels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    points, pixels = np.asarray(table_points, dtype=float), np.asarray(pixels, dtype=float)
+    if points.ndim != 2 or points.shape[1] != 2 or points.shape != pixels.shape or len(points) < 4:
+        raise ConfigurationError(
+            f"calibration points of shape {points.shape} and pixels of shape {pixels.shape}: "
+            "expected (n, 2) for both, with n >= 4; click at least four known points"
+        )
+    if not (np.isfinite(points).all() and np.isfinite(pixels).all()):
+        raise ConfigurationError("calibration points and pixels must be finite; click them again")
+    return points, pixels
+
+
+def _direct_linear_transform(points: np.ndarray, pixels: np.ndarray) -> np.ndarray:
+    """Least algebraic error H with unit norm; `points` and `pixels` are (n, 2)."""
+    to_unit_points, to_unit_pixels = _similarity_to_unit(points), _similarity_to_unit(pixels)
+    x, y = _map(to_unit_points, points).T
+    u, v = _map(to_unit_pixels, pixels).T
+    one, zero = np.ones_like(x), np.zeros_like(x)
+    rows_u = np.stack([x, y, one, zero, zero, zero, -u * x, -u * y, -u], axis=1)
+    rows_v = np.stack([zero, zero, zero, x, y, one, -v * x, -v * y, -v], axis=1)
+    _, singular_values, right = np.linalg.svd(np.concatenate([rows_u, rows_v]))
+    if singular_values[7] < _RANK_FLOOR * singular_values[0]:
+        raise ConfigurationError(
+            f"{len(points)} calibration points (nearly) on one line do not fix a plane; spread "
+            "them to the corners of the table"
+        )
+    homography = np.linalg.inv(to_unit_pixels) @ right[-1].reshape(3, 3) @ to_unit_points
+    homography /= np.linalg.norm(homography)
+    depths = homography[2] @ np.vstack([points.T, np.ones(len(points))])
+    if depths.sum() < 0:
+        homography, depths = -homography, -depths
+    # A camera above the table sees all points before it, and turns x forward, y left (which are
+    # counterclockwise) into x right, y down (clockwise): a negative determinant.
+    if not (depths > 0).all() or not np.linalg.det(homography) < 0:
+        raise ConfigurationError(
+            "no camera above the table sees the calibration points in these places; give the "
+            "pixels in the points' order, with the table's x forward and y left"
+        )
+    return homography
+
+
+def _left_out_error(points: np.ndarray, pixels: np.ndarray) -> float | None:
+    """Root mean square distance of each point from where the other points' H sees it, in [m]."""
+    if len(points) == 4:
+        return None
+    misses = []
+    for left_out in range(len(points)):
+        others = np.arange(len(points)) != left_out
+        try:
+            homography = _direct_linear_transform(points[others], pixels[others])
+        except ConfigurationError:
+            continue  # the others lie on one line: they cannot judge this point
+        seen = _map(np.linalg.inv(homography), pixels[left_out])
+        misses.append(seen - points[left_out])
+    return _rms(np.array(misses)) if misses else None
+
+
+def _similarity_to_unit(points: np.ndarray) -> np.ndarray:
+    """Similarity that moves points to centroid 0 and root mean square distance sqrt(2)."""
+    centre = points.mean(axis=0)
+    spread = np.sqrt(((points - centre) ** 2).sum(axis=1).mean() / 2)
+    if not spread > 0:
+        raise ConfigurationError(
+            f"all {len(points)} calibration points are the same; spread them over the table"
+        )
+    return np.array(
+        [[1 / spread, 0, -centre[0] / spread], [0, 1 / spread, -centre[1] / spread], [0, 0, 1]]
+    )
+
+
+def _map(homography: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Apply a (3, 3) projective map to points of shape (..., 2)."""
+    mapped: np.ndarray = points @ homography[:, :2].T + homography[:, 2]
+    return mapped[..., :2] / mapped[..., 2:]
+
+
+def _rms(differences: np.ndarray) -> float:
+    return float(np.sqrt((differences**2).sum(axis=-1).mean()))

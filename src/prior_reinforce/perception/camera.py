@@ -1,0 +1,187 @@
+"""A bird's-eye picture of a trial's key frame, drawn by MuJoCo without a display.
+
+The paper photographs the key frame from above (Section V-A, Perception Process); here the camera is
+the scene's own `birdseye`. Pixel coordinates are those of `calibration`.
+"""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from prior_reinforce.errors import ConfigurationError, RenderingUnavailableError
+from prior_reinforce.perception.calibration import TableCalibration
+from prior_reinforce.rollouts import KeyFrame
+
+GOAL_BODY = "goal"
+"""Mocap body that is the goal's object in every scene (see `rollouts.KeyFrame`)."""
+
+# Calibration marks are bright discs of 1 cm radius (ours): large enough for a centroid finer than
+# a tenth of a pixel, small enough that perspective does not shift it (below 0.1 mm at 1 m).
+_MARK_RADIUS = 0.01
+_MARK_THICKNESS = 1e-4
+
+
+@dataclass(frozen=True)
+class CameraConfig:
+    """Which camera of the scene, and how finely it sees."""
+
+    name: str = "birdseye"
+    """Camera of the scene."""
+    width: int = 896
+    """Picture width, in [px]. Over the 1.3 m that our scenes show, a pixel is 1.4 mm (ours)."""
+    height: int = 896
+    """Picture height, in [px]. Square, as the scale of 0-1000 in which most models answer is
+    coarser along a longer side; 896 is a multiple of the 28 and 32 px of their image patches."""
+
+
+class Camera:
+    """Draws key frames of one scene after another; keeps the renderer of the latest scene."""
+
+    def __init__(self, config: CameraConfig | None = None) -> None:
+        self.config = config or CameraConfig()
+        if self.config.width < 1 or self.config.height < 1:
+            raise ConfigurationError(
+                f"a picture of {self.config.width} x {self.config.height} pixels cannot be drawn; "
+                "give a positive width and height"
+            )
+        self._source: mujoco.MjModel | None = None
+        self._renderer: mujoco.Renderer | None = None
+
+    def picture(self, key_frame: KeyFrame, goal: np.ndarray) -> np.ndarray:
+        """Draw a key frame with the goal's object at the goal.
+
+        Args:
+            key_frame: What to draw; not changed.
+            goal: True goal, shape (k,) with k <= 3, in [m]; the components it leaves out are
+                zero, so that a goal (x, y) puts the body's origin on the table.
+
+        Returns:
+            Picture, shape (height, width, 3), dtype uint8.
+
+        Raises:
+            RenderingUnavailableError: There is no OpenGL on this machine.
+            ConfigurationError: The scene has no such camera, or no mocap body `goal`.
+        """
+        renderer = self._renderer_for(key_frame.model)
+        model = renderer.model
+        data = mujoco.MjData(model)
+        data.qpos[:] = key_frame.state
+        data.mocap_pos[_goal_mocap_id(model)] = np.pad(goal, (0, 3 - len(goal)))
+        mujoco.mj_forward(model, data)
+        renderer.update_scene(data, camera=self.config.name)
+        picture: np.ndarray = renderer.render()
+        return picture
+
+    def find_marks(self, model: mujoco.MjModel, points: np.ndarray) -> np.ndarray:
+        """Lay a bright mark on each point in turn and find its centre in the picture.
+
+        Everything else is out of the scene meanwhile, as an arm is out of the way when a lab
+        calibrates. This looks at drawn pixels only and knows nothing of the camera's geometry.
+
+        Args:
+            model: The scene; not changed.
+            points: Where the marks lie, table frame, shape (n, 3), in [m].
+
+        Returns:
+            Centres of the marks, shape (n, 2), in [px].
+
+        Raises:
+            ConfigurationError: A mark is outside the picture or cut by its edge.
+            RenderingUnavailableError: There is no OpenGL on this machine.
+        """
+        renderer = self._renderer_for(model)
+        data = mujoco.MjData(renderer.model)
+        mujoco.mj_forward(renderer.model, data)
+        renderer.update_scene(data, camera=self.config.name)
+        renderer.scene.ngeom = 0
+        empty = renderer.render().astype(float)
+        centres = []
+        for point in np.asarray(points, dtype=float):
+            _add_mark(renderer.scene, point)
+            brightness = np.abs(renderer.render() - empty).sum(axis=2)
+            renderer.scene.ngeom = 0
+            edge = (brightness[0], brightness[-1], brightness[:, 0], brightness[:, -1])
+            if not brightness.any() or any(line.any() for line in edge):
+                raise ConfigurationError(
+                    f"the mark at {point.tolist()} m is not wholly in the picture of camera "
+                    f"'{self.config.name}'; choose a point nearer to the table's middle"
+                )
+            rows, columns = np.indices(brightness.shape)
+            centre = [(columns * brightness).sum(), (rows * brightness).sum()]
+            centres.append(np.array(centre) / brightness.sum() + 0.5)
+        return np.array(centres)
+
+    def calibrate(
+        self, model: mujoco.MjModel, table_points: np.ndarray, *, height: float
+    ) -> TableCalibration:
+        """Calibrate the camera on marks laid at known points of a plane parallel to the table.
+
+        Args:
+            model: The scene; not changed.
+            table_points: Where the marks lie, table frame, shape (n, 2), n >= 4, in [m].
+            height: Height of the plane above the table, in [m].
+        """
+        points = np.asarray(table_points, dtype=float)
+        heights = np.full((len(points), 1), height)
+        pixels = self.find_marks(model, np.hstack([points, heights]))
+        return TableCalibration.fit(points, pixels, height=height)
+
+    def close(self) -> None:
+        """Free the graphics memory; the next picture takes it again."""
+        if self._renderer is not None:
+            self._renderer.close()
+        self._renderer = self._source = None
+
+    def _renderer_for(self, model: mujoco.MjModel) -> mujoco.Renderer:
+        if self._renderer is not None and self._source is model:
+            return self._renderer
+        self.close()
+        if mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_CAMERA, self.config.name) < 0:
+            raise ConfigurationError(
+                f"the scene has no camera '{self.config.name}'; its cameras are "
+                f"{', '.join(model.cam(i).name for i in range(model.ncam)) or 'none'}"
+            )
+        # The frame buffer's size is part of the model, and the model is shared: draw a copy.
+        drawn = copy.copy(model)
+        screen = drawn.vis.global_
+        screen.offwidth = max(screen.offwidth, self.config.width)
+        screen.offheight = max(screen.offheight, self.config.height)
+        try:
+            self._renderer = mujoco.Renderer(drawn, self.config.height, self.config.width)
+        except Exception as error:  # each OpenGL backend fails with exceptions of its own
+            raise RenderingUnavailableError(
+                f"no picture can be drawn, OpenGL is not available ({error}); on a machine "
+                "without a display set MUJOCO_GL=egl and install libegl1 (or MUJOCO_GL=osmesa "
+                "and libosmesa6)"
+            ) from error
+        self._source = model
+        return self._renderer
+
+
+def _goal_mocap_id(model: mujoco.MjModel) -> int:
+    body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, GOAL_BODY)
+    mocap = int(model.body_mocapid[body]) if body >= 0 else -1
+    if mocap < 0:
+        raise ConfigurationError(
+            f"the scene has no mocap body '{GOAL_BODY}' to put at the goal; add "
+            f'<body name="{GOAL_BODY}" mocap="true"> with the goal\'s object'
+        )
+    return mocap
+
+
+def _add_mark(scene: mujoco.MjvScene, point: np.ndarray) -> None:
+    mark = scene.geoms[scene.ngeom]
+    mujoco.mjv_initGeom(
+        mark,
+        mujoco.mjtGeom.mjGEOM_CYLINDER,
+        np.array([_MARK_RADIUS, _MARK_RADIUS, _MARK_THICKNESS]),
+        point,
+        np.eye(3).ravel(),
+        np.ones(4, dtype=np.float32),
+    )
+    mark.emission = 1.0
+    scene.ngeom += 1

@@ -1,0 +1,136 @@
+"""Calibration: against the pinhole's own formulas, and against what a lab does wrong."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from prior_reinforce.errors import ConfigurationError, FileFormatError
+from prior_reinforce.perception.calibration import TableCalibration
+
+CORNERS = np.array([[0.4, -0.4], [1.2, -0.4], [1.2, 0.4], [0.4, 0.4]])
+GRID = np.array([(x, y) for x in (0.4, 0.8, 1.2) for y in (-0.4, 0.0, 0.4)])
+CAMERA = np.array([0.3, 0.1, 2.2])
+
+
+def through_pinhole(points: np.ndarray) -> np.ndarray:
+    """Pixels of points (n, 3) in a slanted camera at CAMERA with a focal length of 1500 px."""
+    forward = np.array([0.22, -0.05, -0.97]) / np.linalg.norm([0.22, -0.05, -0.97])
+    right = np.cross(forward, [1.0, 0.0, 0.0])
+    right /= np.linalg.norm(right)
+    down = np.cross(forward, right)
+    seen = (points - CAMERA) @ np.stack([right, down, forward], axis=1)
+    return 448 + 1500 * seen[:, :2] / seen[:, 2:]
+
+
+def at(points: np.ndarray, height: float) -> np.ndarray:
+    return np.hstack([points, np.full((len(points), 1), height)])
+
+
+@pytest.mark.parametrize("height", [0.0, 0.1])
+def test_four_points_fix_every_other_point_of_their_plane(height):
+    calibration = TableCalibration.fit(CORNERS, through_pinhole(at(CORNERS, height)))
+    others = np.random.default_rng(0).uniform([0.2, -0.6], [1.4, 0.6], size=(50, 2))
+    pixels = through_pinhole(at(others, height))
+    np.testing.assert_allclose(calibration.to_table(pixels), others, atol=1e-9)
+    np.testing.assert_allclose(calibration.to_pixels(others), pixels, atol=1e-6)
+
+
+def test_camera_straight_above_is_similar_triangles():
+    # 2 m up with f = 1000 px: half a metre is 250 px; x forward is up, y left is left.
+    pixels = 400 - 1000 * CORNERS[:, ::-1] / 2.0
+    calibration = TableCalibration.fit(CORNERS, pixels)
+    np.testing.assert_allclose(calibration.to_table([400.0, 400.0]), [0, 0], atol=1e-9)
+    np.testing.assert_allclose(calibration.to_table([150.0, -100.0]), [1.0, 0.5], atol=1e-9)
+
+
+def test_errors_are_in_metres_and_left_out_points_are_judged_harder():
+    pixels = through_pinhole(at(GRID, 0.0))
+    metre_per_pixel = 2.2 / 1500
+    noise = np.random.default_rng(1).normal(size=(200, *pixels.shape))
+    fits = [TableCalibration.fit(GRID, pixels + n) for n in noise]
+    fitted = np.sqrt(np.mean([fit.fit_error**2 for fit in fits]))
+    left_out = np.sqrt(np.mean([fit.left_out_error**2 for fit in fits]))
+    # 18 numbers, 8 parameters: the residuals keep 10/18 of the noise's variance.
+    assert fitted == pytest.approx(np.sqrt(2) * np.sqrt(10 / 18) * metre_per_pixel, rel=0.15)
+    assert left_out > np.sqrt(2) * metre_per_pixel
+
+
+def test_four_points_say_nothing_of_the_error():
+    pixels = through_pinhole(at(CORNERS, 0.0)) + np.random.default_rng(2).normal(size=(4, 2))
+    calibration = TableCalibration.fit(CORNERS, pixels)
+    assert calibration.fit_error < 1e-9
+    assert calibration.left_out_error is None
+    assert "a fifth" in calibration.summary()
+
+
+@pytest.mark.parametrize(("made_at", "wanted_at"), [(0.0, 0.1), (0.1, 0.0), (0.03, 0.2)])
+def test_a_calibration_moves_to_a_parallel_plane(made_at, wanted_at):
+    made = TableCalibration.fit(GRID, through_pinhole(at(GRID, made_at)), height=made_at)
+    moved = made.at_height(wanted_at, CAMERA)
+    pixels = through_pinhole(at(GRID, wanted_at))
+    np.testing.assert_allclose(moved.to_table(pixels), GRID, atol=1e-9)
+    assert moved.height == wanted_at
+    assert np.abs(made.to_table(pixels) - GRID).max() > 0.01  # it had to be moved
+
+
+def test_a_tape_measured_camera_costs_almost_nothing_in_a_difference():
+    made = TableCalibration.fit(GRID, through_pinhole(at(GRID, 0.0)))
+    moved = made.at_height(0.1, CAMERA + np.array([0.02, -0.02, 0.02]))
+    seen = moved.to_table(through_pinhole(at(GRID, 0.1)))
+    differences = (seen[1:] - seen[:1]) - (GRID[1:] - GRID[:1])
+    assert np.abs(differences).max() < 0.001
+
+
+@pytest.mark.parametrize(
+    ("points", "pixels", "message"),
+    [
+        (CORNERS[:3], CORNERS[:3], "at least four"),
+        (CORNERS, CORNERS[:3], "expected"),
+        (CORNERS[:, :1], CORNERS[:, :1], "expected"),
+        (np.outer(np.arange(5.0), [1, 1]), np.outer(np.arange(5.0), [1, 2]), "on one line"),
+        (np.ones((4, 2)), through_pinhole(at(CORNERS, 0.0)), "the same"),
+        (CORNERS * [np.nan, 1], through_pinhole(at(CORNERS, 0.0)), "finite"),
+        (CORNERS, through_pinhole(at(CORNERS, 0.0))[[0, 2, 1, 3]], "order"),
+        (CORNERS, through_pinhole(at(CORNERS, 0.0))[[0, 3, 2, 1]], "order"),
+    ],
+    ids=["three", "unequal", "flat", "line", "one place", "nan", "crossed", "mirrored"],
+)
+def test_points_that_fix_no_camera_are_refused(points, pixels, message):
+    with pytest.raises(ConfigurationError, match=message):
+        TableCalibration.fit(points, pixels)
+
+
+def test_a_camera_below_the_plane_is_refused():
+    calibration = TableCalibration.fit(CORNERS, through_pinhole(at(CORNERS, 0.0)))
+    with pytest.raises(ConfigurationError, match="higher than"):
+        calibration.at_height(0.1, np.array([0.5, 0.0, 0.05]))
+
+
+def test_a_saved_calibration_comes_back(tmp_path):
+    made = TableCalibration.fit(GRID, through_pinhole(at(GRID, 0.1)).round(), height=0.1)
+    made.save(tmp_path / "table.json")
+    loaded = TableCalibration.load(tmp_path / "table.json")
+    np.testing.assert_array_equal(loaded.homography, made.homography)
+    assert loaded.summary() == made.summary()
+    assert (loaded.height, loaded.fit_error) == (made.height, made.fit_error)
+
+
+@pytest.mark.parametrize("damage", ["missing", "cut", "another kind", "no homography", "nan"])
+def test_a_file_that_is_no_calibration_is_refused(tmp_path, damage):
+    path = tmp_path / "table.json"
+    TableCalibration.fit(CORNERS, through_pinhole(at(CORNERS, 0.0))).save(path)
+    content = json.loads(path.read_text())
+    if damage == "missing":
+        path.unlink()
+    elif damage == "cut":
+        path.write_text(path.read_text()[:40])
+    else:
+        content.pop("homography") if damage == "no homography" else None
+        content.update({"kind": "x"} if damage == "another kind" else {})
+        content.update({"homography": [[float("nan")] * 3] * 3} if damage == "nan" else {})
+        path.write_text(json.dumps(content))
+    with pytest.raises(FileFormatError, match=r"table\.json"):
+        TableCalibration.load(path)
