@@ -2,7 +2,24 @@
 
 from prior_reinforce.perception.amplified import Amplified
 from prior_reinforce.perception.base import Perception
+from prior_reinforce.perception.calibration import TableCalibration
+from prior_reinforce.perception.camera import Camera, CameraConfig
 from prior_reinforce.perception.exact import Exact
 from prior_reinforce.perception.eye import Eye
+from prior_reinforce.perception.scenes import TableScene, scene_of
+from prior_reinforce.perception.vlm import VisionLanguageModel
+from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
 
-__all__ = ["Amplified", "Exact", "Eye", "Perception"]
+__all__ = [
+    "Amplified",
+    "Camera",
+    "CameraConfig",
+    "Exact",
+    "Eye",
+    "Perception",
+    "TableCalibration",
+    "TableScene",
+    "VisionLanguageModel",
+    "VisionLanguageModelConfig",
+    "scene_of",
+]

@@ -1,0 +1,46 @@
+"""What to look for in a picture of the table, and in which plane it lies."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from prior_reinforce.errors import ConfigurationError
+
+# Nine places around a 1 m x 1 m table whose near edge is 0.35 m from the robot's base axis (ours):
+# four would do, nine also tell how good the calibration is.
+_TABLE_MARKS = tuple((x, y) for x in (0.5, 0.85, 1.2) for y in (-0.4, 0.0, 0.4))
+
+
+@dataclass(frozen=True)
+class TableScene:
+    """The two objects whose centres' difference is the error, in words that a model understands."""
+
+    reached: str
+    """The object whose place is the outcome, for instance `the orange ball`."""
+    goal: str
+    """The object that stands at the goal, for instance `the red hoop`."""
+    plane_height: float
+    """Height above the table of the plane in which both centres lie at the key frame, in [m]."""
+    marks: tuple[tuple[float, float], ...] = _TABLE_MARKS
+    """Known points (x, y) of that plane to calibrate the camera on, table frame, in [m]."""
+
+
+SCENES: dict[str, TableScene] = {
+    # The outcome is where the ball's centre comes down through the rim's plane, 10 cm up.
+    "basketball-v1": TableScene("the orange ball", "the red hoop", plane_height=0.10),
+}
+"""The paper's tasks by name; for a task of your own construct a `TableScene`."""
+
+
+def scene_of(task_name: str) -> TableScene:
+    """Return what to look for in one of the paper's tasks.
+
+    Raises:
+        ConfigurationError: There is no such task.
+    """
+    if task_name not in SCENES:
+        raise ConfigurationError(
+            f"no scene is described for task '{task_name}', only for {', '.join(SCENES)}; "
+            "construct a TableScene with your objects' names"
+        )
+    return SCENES[task_name]

@@ -1,0 +1,177 @@
+"""P = a vision-language model that finds the two objects in the bird's-eye picture.
+
+Source: paper, Section V-A, Perception Process: bounding boxes of the relevant objects in the key
+frame, pixel differences between their centres turned into a feedback vector. One request an object,
+several answers a request, the median of those that agree, and the operator instead of a guess are
+ours, because models return no labels with their boxes, refuse, ramble and now and then see things.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+
+from prior_reinforce.errors import ConfigurationError, PerceptionFailedError
+from prior_reinforce.perception.base import Perception
+from prior_reinforce.perception.calibration import TableCalibration
+from prior_reinforce.perception.camera import Camera
+from prior_reinforce.perception.scenes import TableScene
+from prior_reinforce.perception.vlm_client import (
+    ModelClient,
+    SentPicture,
+    VisionLanguageModelConfig,
+)
+from prior_reinforce.perception.vlm_formats import Box
+from prior_reinforce.perception.vlm_reading import Answer, Reading, Sighting
+from prior_reinforce.rollouts import KeyFrame, Rollout
+
+
+class VisionLanguageModel(Perception):
+    """Sees the error in a picture, with any OpenAI-compatible endpoint.
+
+    Attributes:
+        last_reading: Record of the latest picture, also of one that gave no error; None before.
+    """
+
+    name: ClassVar[str] = "vlm"
+
+    def __init__(
+        self,
+        scene: TableScene,
+        config: VisionLanguageModelConfig | None = None,
+        *,
+        camera: Camera | None = None,
+        calibration: TableCalibration | None = None,
+    ) -> None:
+        """Connect to the endpoint; nothing is sent yet.
+
+        Args:
+            scene: What to look for.
+            config: Where and how to ask.
+            camera: Takes the pictures of simulated trials.
+            calibration: Of the camera. None calibrates it on the scene's marks, in simulation.
+
+        Raises:
+            MissingExtraError: The extra [vlm] is not installed.
+            ConfigurationError: The variable that should hold the key is not set.
+        """
+        self.scene = scene
+        self.config = config or VisionLanguageModelConfig()
+        self.last_reading: Reading | None = None
+        self._camera = camera or Camera()
+        self._client = ModelClient(self.config)
+        self._calibration = calibration
+        self._scene_model: object = None
+        """The model on which we calibrated ourselves; None where the calibration was given."""
+
+    def perceive(self, rollout: Rollout, goal: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+        """Photograph the key frame, with the goal's object at the goal, and read the picture.
+
+        The randomness is the model's own; `rng` is not used.
+
+        Raises:
+            PerceptionFailedError: There is no picture, or no error can be read from it.
+            ConfigurationError: The goal is not (x, y).
+            RenderingUnavailableError: There is no OpenGL on this machine.
+        """
+        if np.shape(goal) != (2,):
+            raise ConfigurationError(
+                f"a goal of shape {np.shape(goal)} cannot be seen from above, which shows (x, y); "
+                "use another perception"
+            )
+        if rollout.key_frame is None:
+            raise PerceptionFailedError(
+                "this trial left no key frame to draw; pass the camera's picture to `read`, or "
+                "ask the operator for the error"
+            )
+        self._calibrate_in(rollout.key_frame)
+        reading = self.read(self._camera.picture(rollout.key_frame, goal))
+        if reading.error_seen is None:
+            raise PerceptionFailedError(f"{reading.problem}; ask the operator for the error")
+        return reading.error_seen
+
+    def read(self, picture: np.ndarray) -> Reading:
+        """Read the error from any picture of the calibrated camera, a photograph for instance.
+
+        Args:
+            picture: Shape (height, width, 3), dtype uint8, RGB.
+
+        Returns:
+            The record; its `error_seen` is None, and `problem` says why, where reading failed.
+
+        Raises:
+            ConfigurationError: There is no calibration.
+        """
+        if self._calibration is None:
+            raise ConfigurationError(
+                "the camera is not calibrated; pass calibration=TableCalibration.fit(...)"
+            )
+        goal = None
+        sent = self._client.prepare(picture)
+        reached = self._find(self.scene.reached, sent, self._calibration)
+        if reached.problem is None:
+            goal = self._find(self.scene.goal, sent, self._calibration)
+        self.last_reading = Reading(picture, self.config.model, reached, goal)
+        return self.last_reading
+
+    def close(self) -> None:
+        """Close the connections and free the camera."""
+        self._client.close()
+        self._camera.close()
+
+    def _calibrate_in(self, key_frame: KeyFrame) -> None:
+        """Calibrate on a simulated scene's marks, once a scene, unless a calibration was given."""
+        given = self._calibration is not None and self._scene_model is None
+        if given or self._scene_model is key_frame.model:
+            return
+        marks, height = np.array(self.scene.marks), self.scene.plane_height
+        self._calibration = self._camera.calibrate(key_frame.model, marks, height=height)
+        self._scene_model = key_frame.model
+
+    def _find(self, words: str, picture: SentPicture, calibration: TableCalibration) -> Sighting:
+        """Ask for one object until enough answers agree, or none will."""
+        votes = self.config.votes
+        answers: list[Answer] = []
+        for _ in range(self.config.most_requests):
+            try:
+                answers.append(self._client.ask(words, picture))
+            except PerceptionFailedError as error:
+                return Sighting(words, tuple(answers), problem=f"looking for {words}: {error}")
+            boxes = [answer.box for answer in answers if answer.box is not None]
+            absent = sum(answer.absent for answer in answers)
+            if len(boxes) + absent >= votes and absent > len(boxes):
+                problem = f"{words} is not in the picture, say {absent} of {len(answers)} answers"
+                return Sighting(words, tuple(answers), problem=problem)
+            box = _agreed(boxes, calibration, self.config.spread_gate)
+            if len(boxes) >= votes and box is not None:
+                place = calibration.to_table(_centres(np.array([box])))[0]
+                return Sighting(words, tuple(answers), box, place)
+        return Sighting(words, tuple(answers), problem=_no_agreement(words, answers, self.config))
+
+
+def _centres(boxes: np.ndarray) -> np.ndarray:
+    """Centres of boxes (n, 4), shape (n, 2)."""
+    return (boxes[:, :2] + boxes[:, 2:]) / 2
+
+
+def _agreed(boxes: list[Box], calibration: TableCalibration, gate: float) -> Box | None:
+    """Median box of those near the median place, if they are more than half."""
+    if not boxes:
+        return None
+    stacked = np.array(boxes)
+    places = calibration.to_table(_centres(stacked))
+    near = np.linalg.norm(places - np.median(places, axis=0), axis=1) <= gate
+    if not 2 * near.sum() > len(boxes):
+        return None
+    left, top, right, bottom = np.median(stacked[near], axis=0).tolist()
+    return left, top, right, bottom
+
+
+def _no_agreement(words: str, answers: list[Answer], config: VisionLanguageModelConfig) -> str:
+    read = sum(answer.box is not None for answer in answers)
+    if read >= config.votes:
+        gate_cm = 100 * config.spread_gate
+        return f"{words}: {read} answers do not agree on a place to {gate_cm:g} cm"
+    problems = [answer.problem for answer in answers if answer.problem is not None]
+    return f"{words}: only {read} of {len(answers)} answers hold a box (last: {problems[-1]})"

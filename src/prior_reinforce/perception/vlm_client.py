@@ -1,0 +1,245 @@
+"""One request to an OpenAI-compatible endpoint: where is this object in this picture?"""
+
+from __future__ import annotations
+
+import base64
+import io
+import os
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from prior_reinforce.errors import ConfigurationError, MissingExtraError, PerceptionFailedError
+from prior_reinforce.perception.vlm_formats import (
+    FORMATS,
+    Family,
+    NotInPictureError,
+    UnreadableAnswerError,
+    read_box,
+    size_to_send,
+)
+from prior_reinforce.perception.vlm_reading import Answer
+
+
+@dataclass(frozen=True)
+class VisionLanguageModelConfig:
+    """Where the model is, how it speaks, and when its answers are believed."""
+
+    base_url: str = "http://127.0.0.1:8000/v1"
+    """OpenAI-compatible endpoint; the default is where vLLM and SGLang serve."""
+    model: str = "zai-org/GLM-4.5V"
+    """Name of the model at the endpoint."""
+    family: Family = "glm-4.5v"
+    """How the model is asked and in which scale it answers; cannot be told from its answers."""
+    server: Literal["vllm", "zai", "plain"] = "vllm"
+    """How thinking is switched: as vLLM and SGLang do, as Z.ai does, or not at all, for servers
+    that refuse fields they do not know."""
+    api_key_variable: str | None = None
+    """Environment variable that holds the key; None for a server that wants none."""
+    enable_thinking: bool = False
+    """Let the model think first: slower, and `max_tokens` must be enough to finish."""
+    votes: int = 3
+    """Readable answers wanted for each object; the median of three forgives one outlier."""
+    most_requests: int = 7
+    """Requests for each object before the operator is asked."""
+    spread_gate: float = 0.01
+    """More than half of the answers lie within this distance of their median, or they do not
+    agree, in [m]. 1 cm (ours): the finest distance on which the tasks' success depends."""
+    temperature: float = 0.7
+    """Of the model's sampling (ours). At 0 all votes are one answer, and voting means nothing."""
+    max_tokens: int = 2048
+    """Longest answer, thinking included."""
+    timeout: float = 60.0
+    """For one request, in [s]."""
+    max_retries: int = 2
+    """Repetitions of a request after a timeout, a lost connection, HTTP 429 or 5xx."""
+    max_image_side: int = 1000
+    """Larger pictures are shrunk before they are sent, in [px]: the scale is no finer."""
+
+    def __post_init__(self) -> None:
+        if self.family not in FORMATS:
+            raise ConfigurationError(
+                f"model family '{self.family}' is unknown; use one of {', '.join(FORMATS)}"
+            )
+        if not 1 <= self.votes <= self.most_requests:
+            raise ConfigurationError(
+                f"{self.votes} votes in at most {self.most_requests} requests; expected "
+                "1 <= votes <= most_requests"
+            )
+        for name in ("spread_gate", "timeout", "max_tokens", "max_image_side"):
+            if not getattr(self, name) > 0:
+                raise ConfigurationError(
+                    f"{name} = {getattr(self, name)} must be greater than zero; leave it out for "
+                    "the default"
+                )
+        if not (self.max_retries >= 0 and self.temperature >= 0):
+            raise ConfigurationError(
+                f"max_retries = {self.max_retries} and temperature = {self.temperature} must not "
+                "be negative; use 0 for none"
+            )
+
+
+@dataclass(frozen=True)
+class SentPicture:
+    """A picture in the form in which it is sent."""
+
+    url: str
+    """PNG data address."""
+    sent_size: tuple[int, int]
+    """Width and height in which it is sent, in [px]."""
+    size: tuple[int, int]
+    """Width and height in which it was taken, in [px]."""
+
+
+class ModelClient:
+    """Asks a model for one object at a time."""
+
+    def __init__(self, config: VisionLanguageModelConfig) -> None:
+        """Prepare the connection; nothing is sent yet.
+
+        Raises:
+            MissingExtraError: The extra [vlm] is not installed.
+            ConfigurationError: The variable that should hold the key is not set.
+        """
+        try:
+            import openai
+            import PIL  # noqa: F401
+        except ImportError as error:
+            raise MissingExtraError(
+                "perception by a vision-language model needs the openai client and Pillow; "
+                "install them with: pip install 'prior-reinforce[vlm]'"
+            ) from error
+        self.config = config
+        self._client = openai.OpenAI(
+            base_url=config.base_url,
+            api_key=_key(config),
+            timeout=config.timeout,
+            max_retries=config.max_retries,
+        )
+
+    def prepare(self, picture: np.ndarray) -> SentPicture:
+        """Shrink a picture if need be, and encode it once for all requests.
+
+        Args:
+            picture: Shape (height, width, 3), dtype uint8, RGB.
+        """
+        from PIL import Image
+
+        image = Image.fromarray(picture)
+        size = image.size
+        sent = size_to_send(*size, self.config.max_image_side, FORMATS[self.config.family])
+        if sent != size:
+            image = image.resize(sent, Image.Resampling.LANCZOS)
+        data = io.BytesIO()
+        image.save(data, format="PNG")
+        encoded = base64.b64encode(data.getvalue()).decode()
+        return SentPicture(f"data:image/png;base64,{encoded}", sent, size)
+
+    def ask(self, words: str, picture: SentPicture) -> Answer:
+        """Ask for one object in a picture.
+
+        Args:
+            words: The object, for instance `the orange ball`.
+            picture: What `prepare` made of it.
+
+        Returns:
+            What came back, readable or not; a box is in pixels of the picture as taken.
+
+        Raises:
+            PerceptionFailedError: Nothing came back, and trying again at once will not help.
+        """
+        text, thinking, reason = self._request(words, picture.url)
+        try:
+            if reason == "length":
+                raise UnreadableAnswerError("cut off at max_tokens")
+            sent_box = read_box(text, FORMATS[self.config.family], picture.sent_size)
+        except UnreadableAnswerError as error:
+            absent = isinstance(error, NotInPictureError)
+            return Answer(text, thinking, reason, problem=str(error), absent=absent)
+        per_x = picture.size[0] / picture.sent_size[0]
+        per_y = picture.size[1] / picture.sent_size[1]
+        left, top, right, bottom = sent_box
+        box = (left * per_x, top * per_y, right * per_x, bottom * per_y)
+        return Answer(text, thinking, reason, box)
+
+    def close(self) -> None:
+        """Close the connections."""
+        self._client.close()
+
+    def _request(self, words: str, url: str) -> tuple[str, str | None, str | None]:
+        """Return the answer's text, its separate thoughts, and why it stopped."""
+        import openai
+
+        prompt = FORMATS[self.config.family].prompt.format(words=words)
+        try:
+            completion = self._client.chat.completions.create(
+                model=self.config.model,
+                messages=[
+                    {
+                        "role": "user",
+                        "content": [
+                            {"type": "image_url", "image_url": {"url": url}},
+                            {"type": "text", "text": prompt},
+                        ],
+                    }
+                ],
+                temperature=self.config.temperature,
+                max_tokens=self.config.max_tokens,
+                extra_body=_extra_body(self.config),
+            )
+        except (openai.OpenAIError, ValueError) as error:
+            raise PerceptionFailedError(_what_failed(error, self.config)) from error
+        # The client's types promise choices; servers do not (a web page with status 200).
+        choices: Any = getattr(completion, "choices", None)
+        if not choices:
+            raise PerceptionFailedError(
+                f"{self.config.base_url} answers, but not with a chat completion; the address of "
+                "an OpenAI-compatible endpoint mostly ends in /v1"
+            )
+        message = choices[0].message
+        thinking = getattr(message, "reasoning_content", None)
+        return message.content or "", thinking, choices[0].finish_reason
+
+
+def _key(config: VisionLanguageModelConfig) -> str:
+    if config.api_key_variable is None:
+        return "EMPTY"  # the client insists on one; servers that want none take any
+    key = os.environ.get(config.api_key_variable, "")
+    if not key:
+        raise ConfigurationError(
+            f"environment variable {config.api_key_variable} is not set; export the key of "
+            f"{config.base_url} in it"
+        )
+    return key
+
+
+def _extra_body(config: VisionLanguageModelConfig) -> dict[str, Any]:
+    if config.server == "vllm":
+        # The markers around the box are special tokens, which vLLM strips unless told otherwise.
+        thinking = {"enable_thinking": config.enable_thinking}
+        return {"chat_template_kwargs": thinking, "skip_special_tokens": False}
+    if config.server == "zai":
+        return {"thinking": {"type": "enabled" if config.enable_thinking else "disabled"}}
+    return {}
+
+
+def _what_failed(error: Exception, config: VisionLanguageModelConfig) -> str:
+    """One line with the remedy for each way in which a request fails."""
+    import openai
+
+    url, tries = config.base_url, f"after {config.max_retries + 1} tries"
+    if isinstance(error, openai.APITimeoutError):
+        return f"no answer from {url} in {config.timeout:g} s {tries}; raise timeout"
+    if isinstance(error, openai.APIConnectionError):
+        return f"cannot reach {url} {tries}; is the server running?"
+    if isinstance(error, openai.RateLimitError):
+        return f"{url} refuses more requests for now (HTTP 429) {tries}; wait a minute"
+    if isinstance(error, openai.AuthenticationError):
+        return f"{url} refuses the key (HTTP 401); set api_key_variable"
+    if isinstance(error, openai.NotFoundError):
+        return f"{url} does not serve model '{config.model}' (HTTP 404); set base_url and model"
+    if isinstance(error, openai.APIStatusError):
+        said = " ".join(str(error).split())[:160]
+        return f"{url} failed with HTTP {error.status_code} ({said}); see the server's log"
+    return f"{url} gave an answer that is not the protocol's ({error}); is it the right address?"

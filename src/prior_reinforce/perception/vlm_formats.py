@@ -1,0 +1,200 @@
+"""How each family of vision-language models is asked for a box, and how its answer is read.
+
+Which scale a model answers in cannot be told from its numbers: 412 is a plausible value in
+thousandths and in pixels. So the scale belongs to the family, and the family is a setting.
+
+Sources: zai-org/GLM-V README, "Grounding" (prompt, markers, brackets, scale), issue #118 (drafts
+inside the thinking text); QwenLM/Qwen3-VL issues #676 and #866 (absolute pixels of the resized
+image for Qwen2.5-VL), #1486 and #1640 (0-1000 for Qwen3-VL).
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+from prior_reinforce.errors import PerceptionFailedError
+
+Family = Literal["glm-4.5v", "qwen2-vl", "qwen2.5-vl", "qwen3-vl"]
+"""GLM-4.1V, 4.5V and 4.6V are one family in this respect."""
+
+Box = tuple[float, float, float, float]
+"""Left, top, right, bottom, in pixels of the picture that was sent."""
+
+
+class UnreadableAnswerError(PerceptionFailedError):
+    """One answer holds no box that can be trusted; another answer may."""
+
+
+class NotInPictureError(UnreadableAnswerError):
+    """The model says that the object is not there."""
+
+
+@dataclass(frozen=True)
+class BoxFormat:
+    """The request and the answer of one family."""
+
+    prompt: str
+    """What to ask; `{words}` stands for the object."""
+    scale: Literal["thousandths", "pixels"]
+    """Unit of the answer: 1/1000 of the picture's width (x) and height (y), or pixels."""
+    side_multiple: int = 1
+    """The sent picture's sides are multiples of this, in [px]. Where the answer is in pixels, they
+    are pixels of the picture as the server resizes it; this leaves it no reason to."""
+
+
+# The smallest limit in use for pictures of these families: 1280 tokens of 28 x 28 px
+# (qwen-vl-utils; the models' own preprocessor_config.json allow more). Above it a server shrinks.
+MOST_PIXELS = 1280 * 28 * 28
+
+_QWEN_PROMPT = (
+    "Locate {words} in the image. There is at most one. Output its bounding box in JSON as "
+    '[{{"bbox_2d": [x1, y1, x2, y2], "label": "{words}"}}], or [] if it is not in the image.'
+)
+
+FORMATS: dict[Family, BoxFormat] = {
+    # The first sentence is the README's form; the rest is ours: one object, and a way to say no.
+    "glm-4.5v": BoxFormat(
+        prompt="Help me to locate {words} in the image and give me its bounding box. "
+        "There is at most one. Answer [] if it is not in the image.",
+        scale="thousandths",
+    ),
+    "qwen2-vl": BoxFormat(_QWEN_PROMPT, "thousandths"),
+    "qwen2.5-vl": BoxFormat(_QWEN_PROMPT, "pixels", side_multiple=28),
+    "qwen3-vl": BoxFormat(_QWEN_PROMPT, "thousandths"),
+}
+
+
+def size_to_send(width: int, height: int, most_side: int, box_format: BoxFormat) -> tuple[int, int]:
+    """Return the largest size, at most a picture's own, that a server will leave as it is.
+
+    Args:
+        width: Picture width, in [px].
+        height: Picture height, in [px].
+        most_side: Longest side to send, in [px].
+        box_format: Of the model that will see it.
+
+    Returns:
+        Width and height to resize to, in [px]; the shape may change by less than a multiple.
+    """
+    step = box_format.side_multiple
+    shrink = min(1.0, most_side / max(width, height), math.sqrt(MOST_PIXELS / (width * height)))
+    return max(1, int(width * shrink / step)) * step, max(1, int(height * shrink / step)) * step
+
+
+def read_box(answer: str, box_format: BoxFormat, size: tuple[int, int]) -> Box:
+    """Read the one box of an answer.
+
+    Thinking text is skipped; of several boxes the last marked one counts, else the last one in the
+    text, as models restate and correct themselves. Swapped corners are put right.
+
+    Args:
+        answer: What the model said, drafts, markers and all.
+        box_format: Of the model.
+        size: Width and height of the picture it was sent, in [px].
+
+    Returns:
+        The box in pixels of that picture.
+
+    Raises:
+        NotInPictureError: The answer is an empty list.
+        UnreadableAnswerError: No box, several at once, or one that cannot be in the picture.
+    """
+    said = _without_thinking(answer)
+    marked = _MARKED.findall(said)
+    boxes = _last_boxes(marked[-1] if marked else said)
+    if boxes is None and marked:
+        boxes = _last_boxes(said)
+    if boxes is None:
+        raise UnreadableAnswerError(f"no box in the answer {_shown(said)}")
+    if not boxes:
+        raise NotInPictureError("the model says that it is not in the picture")
+    if len(boxes) > 1:
+        raise UnreadableAnswerError(f"{len(boxes)} boxes for one object")
+    return _in_pixels(boxes[0], box_format, size)
+
+
+_NUMBER = r"-?\d+(?:\.\d+)?"
+_BETWEEN = r"\s*[\])>]?\s*,\s*[\[(<]?\s*"  # "(x1, y1), (x2, y2)" counts as one box
+_QUADRUPLE = re.compile(_BETWEEN.join([f"({_NUMBER})"] * 4))
+_EMPTY = re.compile(r"\[[\s\[\]]*\]")
+_MARKED = re.compile(
+    r"<\|(?:begin_of_box|box_start)\|>(.*?)(?:<\|(?:end_of_box|box_end)\|>|\Z)", re.DOTALL
+)
+_MARKER = re.compile(r"<\|[a-z_]+\|>")
+
+
+def _without_thinking(answer: str) -> str:
+    before, closed, said = answer.rpartition("</think>")
+    if closed:
+        return said
+    if "<think>" in before or "<think>" in said:
+        raise UnreadableAnswerError("the answer ends while the model is still thinking")
+    return answer
+
+
+def _last_boxes(said: str) -> list[tuple[float, ...]] | None:
+    """Return the different boxes of the last list in a text; [] for an empty list, None for none.
+
+    Boxes belong to one list if they share an outer bracket, or follow each other with nothing but
+    separators between them.
+    """
+    text = _MARKER.sub(" ", said)
+    last: list[tuple[float, ...]] | None = None
+    end = None
+    for start, stop, numbers in _finds(text):
+        if numbers is None:
+            last, end = [], None
+            continue
+        if last is None or end is None or not _same_list(text, end, start):
+            last = []
+        if numbers not in last:
+            last.append(numbers)
+        end = stop
+    return last
+
+
+def _finds(text: str) -> Iterator[tuple[int, int, tuple[float, ...] | None]]:
+    """Yield start, stop and numbers of each quadruple, and of each empty list with None."""
+    quadruples = [
+        (match.start(), match.end(), tuple(map(float, match.groups())))
+        for match in _QUADRUPLE.finditer(text)
+    ]
+    empties = [(match.start(), match.end(), None) for match in _EMPTY.finditer(text)]
+    yield from sorted([*quadruples, *empties], key=lambda found: found[0])
+
+
+def _same_list(text: str, end: int, start: int) -> bool:
+    between = text[end:start]
+    if not re.search(r"[^\s,;\[\](){}<>]", between):
+        return True
+    depth = sum((char in "[({") - (char in "])}") for char in text[:end])
+    for char in between:
+        depth += (char in "[({") - (char in "])}")
+        if depth <= 0:
+            return False
+    return True
+
+
+def _in_pixels(numbers: tuple[float, ...], box_format: BoxFormat, size: tuple[int, int]) -> Box:
+    thousandths = box_format.scale == "thousandths"
+    most_x, most_y = (1000, 1000) if thousandths else size
+    x1, y1, x2, y2 = numbers
+    left, right, top, bottom = min(x1, x2), max(x1, x2), min(y1, y2), max(y1, y2)
+    if left < 0 or top < 0 or right > most_x or bottom > most_y:
+        raise UnreadableAnswerError(
+            f"box {list(numbers)} leaves the picture, which ends at ({most_x}, {most_y}) in this "
+            "family's scale; is the model family set right?"
+        )
+    if not (right > left and bottom > top):
+        raise UnreadableAnswerError(f"box {list(numbers)} has no area")
+    per_x, per_y = size[0] / most_x, size[1] / most_y
+    return left * per_x, top * per_y, right * per_x, bottom * per_y
+
+
+def _shown(text: str) -> str:
+    flat = " ".join(text.split())
+    return repr(flat if len(flat) <= 80 else flat[:77] + "...")

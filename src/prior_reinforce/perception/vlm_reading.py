@@ -1,0 +1,152 @@
+"""What a vision-language model was shown, what it said, and what was made of it: the record.
+
+Every answer is kept as it came, so that a doubtful trial can be judged later; the boxes are drawn
+on the picture for the operator.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from prior_reinforce.errors import MissingExtraError
+from prior_reinforce.perception.vlm_formats import Box
+
+REACHED_COLOUR = (0, 90, 255)
+GOAL_COLOUR = (200, 0, 160)
+
+
+@dataclass(frozen=True)
+class Answer:
+    """One answer to one request."""
+
+    text: str
+    """The model's words, untouched."""
+    thinking: str | None
+    """Its thoughts, where the server keeps them apart; never searched for boxes."""
+    finish_reason: str | None
+    """Why it stopped, in the protocol's words: `stop`, `length`, ..."""
+    box: Box | None = None
+    """The box read, in pixels of the picture; None where there is a problem."""
+    problem: str | None = None
+    """Why no box could be read."""
+    absent: bool = False
+    """Whether the model says that the object is not there."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sighting:
+    """One object: all answers about it, and the place they agree on."""
+
+    words: str
+    """The object, as it was asked for."""
+    answers: tuple[Answer, ...]
+    box: Box | None = None
+    """Median box of the answers that agree, in pixels of the picture."""
+    place: np.ndarray | None = None
+    """Centre of `box` on the calibrated plane, table frame, shape (2,), in [m]."""
+    problem: str | None = None
+    """Why there is no place."""
+
+
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """One picture, read."""
+
+    picture: np.ndarray
+    """What was shown, shape (height, width, 3), dtype uint8."""
+    model: str
+    """Who was asked."""
+    reached: Sighting
+    goal: Sighting | None
+    """None where `reached` failed already, and nobody was asked."""
+
+    @property
+    def problem(self) -> str | None:
+        """Why there is no error to report; None where there is one."""
+        return self.reached.problem or (self.goal.problem if self.goal else None)
+
+    @property
+    def error_seen(self) -> np.ndarray | None:
+        """Reached place minus goal's place, shape (2,), in [m]; None where there is a problem."""
+        if self.goal is None or self.reached.place is None or self.goal.place is None:
+            return None
+        return self.reached.place - self.goal.place
+
+    def drawn(self) -> np.ndarray:
+        """Return the picture with all boxes: agreed ones thick, single answers thin.
+
+        Raises:
+            MissingExtraError: Pillow is not installed.
+        """
+        try:
+            from PIL import Image, ImageDraw
+        except ImportError as error:
+            raise MissingExtraError(
+                "drawing boxes needs Pillow; install it with: pip install 'prior-reinforce[vlm]'"
+            ) from error
+        image = Image.fromarray(self.picture)
+        pen = ImageDraw.Draw(image)
+        size = max(12, image.height // 40)
+        sightings = [(self.reached, REACHED_COLOUR, False)]
+        if self.goal is not None:
+            sightings.append((self.goal, GOAL_COLOUR, True))
+        for sighting, colour, below in sightings:
+            for answer in sighting.answers:
+                if answer.box is not None:
+                    pen.rectangle(answer.box, outline=colour, width=1)
+            if sighting.box is not None:
+                left, top, right, bottom = sighting.box
+                pen.rectangle(sighting.box, outline=colour, width=3)
+                middle = ((left + right) / 2, (top + bottom) / 2)
+                pen.circle(middle, 3, fill=colour)
+                corner, anchor = ((right + 8, bottom), "ls") if below else ((right + 8, top), "lt")
+                pen.text(
+                    corner,
+                    sighting.words,
+                    fill=colour,
+                    anchor=anchor,
+                    font_size=size,
+                    stroke_width=3,
+                    stroke_fill="white",
+                )
+        if self.reached.box is not None and self.goal is not None and self.goal.box is not None:
+            pen.line([_middle(self.goal.box), _middle(self.reached.box)], fill="black", width=2)
+        return np.asarray(image)
+
+    def save(self, folder: Path, stem: str) -> None:
+        """Write `stem`.png (the picture with boxes) and `stem`.json (every answer) to a folder."""
+        import imageio.v3 as imageio
+
+        imageio.imwrite(folder / f"{stem}.png", self.drawn())
+        content = json.dumps(self._record(), indent=2, ensure_ascii=False)
+        (folder / f"{stem}.json").write_text(content + "\n", encoding="utf-8")
+
+    def _record(self) -> dict[str, Any]:
+        error = self.error_seen
+        return {
+            "model": self.model,
+            "picture_size_px": [self.picture.shape[1], self.picture.shape[0]],
+            "error_seen_m": None if error is None else error.tolist(),
+            "problem": self.problem,
+            "reached": _sighting_record(self.reached),
+            "goal": None if self.goal is None else _sighting_record(self.goal),
+        }
+
+
+def _sighting_record(sighting: Sighting) -> dict[str, Any]:
+    return {
+        "words": sighting.words,
+        "box_px": sighting.box,
+        "place_m": None if sighting.place is None else sighting.place.tolist(),
+        "problem": sighting.problem,
+        "answers": [vars(answer) for answer in sighting.answers],
+    }
+
+
+def _middle(box: Box) -> tuple[float, float]:
+    return (box[0] + box[2]) / 2, (box[1] + box[3]) / 2

@@ -1,0 +1,133 @@
+"""Reading boxes: each line is an answer that a served model has been seen to give."""
+
+from __future__ import annotations
+
+import pytest
+
+from prior_reinforce.perception.vlm_formats import (
+    FORMATS,
+    MOST_PIXELS,
+    NotInPictureError,
+    UnreadableAnswerError,
+    read_box,
+    size_to_send,
+)
+
+GLM = FORMATS["glm-4.5v"]
+BOX = "<|begin_of_box|>[[100, 200, 300, 500]]<|end_of_box|>"
+DRAFT = "<|begin_of_box|>[[1, 2, 3, 4]]<|end_of_box|>"
+EXPECTED = (100.0, 200.0, 300.0, 500.0)
+
+
+@pytest.mark.parametrize(
+    "answer",
+    [
+        BOX,
+        "[[100,200,300,500]]",
+        "[100, 200, 300, 500]",
+        "<|begin_of_box|>(100, 200, 300, 500)<|end_of_box|>",
+        "<|begin_of_box|>(100,200),(300,500)<|end_of_box|>",
+        "<|begin_of_box|><100,200,300,500><|end_of_box|>",
+        "<|begin_of_box|>{100, 200, 300, 500}<|end_of_box|>",
+        "<|begin_of_box|>100, 200, 300, 500<|end_of_box|>",
+        "[[100.0, 200.0, 300.0, 500.0]]",
+        "[[300, 500, 100, 200]]",
+        "[[300, 200, 100, 500]]",
+        "[[100, 500, 300, 200]]",
+        "The ball (6 cm wide) is at [[100, 200, 300, 500]]. I looked 2 times, at 1 ball.",
+        f"{DRAFT} Looking again: {BOX}",
+        f"{BOX} That is the same as [[9, 9, 10, 10]] in the other picture.",
+        "At first [[1, 2, 3, 4]]. On second thought [[100, 200, 300, 500]].",
+        f"<think>It may be {DRAFT}</think>{BOX}",
+        f"It may be {DRAFT} hm {DRAFT}</think>\n{BOX}",
+        "<think>[[1, 2, 3, 4]]</think>So: [100, 200, 300, 500]",
+        BOX + "<|user|>",
+        "<|begin_of_box|>[[100, 200, 300, 500]]",
+        "[[100, 200, 300, 500]]<|end_of_box|>",
+        "[[100, 200, 300, 500]], as I said: [[100, 200, 300, 500]]",
+        "[[100, 200, 300, 500], [100, 200, 300, 500]]",
+        "[] would be wrong, it is there: [[100, 200, 300, 500]]",
+        "<|begin_of_box|>here<|end_of_box|> [[100, 200, 300, 500]]",
+        '```json\n[{"bbox_2d": [100, 200, 300, 500], "label": "the 2, 3, 4 ball"}]\n```',
+        "<|box_start|>(100,200),(300,500)<|box_end|>",
+    ],
+)
+def test_the_box_is_read(answer):
+    assert read_box(answer, GLM, (1000, 1000)) == EXPECTED
+
+
+@pytest.mark.parametrize(
+    ("answer", "message"),
+    [
+        ("", "no box"),
+        ("I'm sorry, I cannot help with that.", "no box in the answer \"I'm sorry"),
+        ("There is no orange ball in this image.", "no box"),
+        ("[[100, 200, 300", "no box"),
+        ("[[100, 200, 300]]", "no box"),
+        (f"<think>It may be {BOX}", "still thinking"),
+        ("[[100, 200, 300, 500], [600, 700, 800, 900]]", "2 boxes"),
+        ("[[100, 200, 300, 500]], [[600, 700, 800, 900]]", "2 boxes"),
+        ("<|begin_of_box|>[[1, 2, 3, 4], [5, 6, 7, 8], [5, 6, 9, 9]]<|end_of_box|>", "3 boxes"),
+        (
+            '[{"bbox_2d": [1, 2, 3, 4], "label": "b"}, {"bbox_2d": [5, 6, 7, 8], "label": "b"}]',
+            "2 boxes",
+        ),
+        ("[[100, 200, 300, 1001]]", "leaves the picture"),
+        ("[[-1, 200, 300, 500]]", "leaves the picture"),
+        ("[[100, 200, 1400, 500]]", "family set right"),
+        ("[[100, 200, 100, 500]]", "no area"),
+    ],
+)
+def test_what_holds_no_single_box_is_refused(answer, message):
+    with pytest.raises(UnreadableAnswerError, match=message):
+        read_box(answer, GLM, (1000, 1000))
+
+
+@pytest.mark.parametrize(
+    "answer",
+    [
+        "[]",
+        "[[]]",
+        "<|begin_of_box|>[]<|end_of_box|>",
+        "```json\n[]\n```",
+        "Not there: []",
+        "At first [[1, 2, 3, 4]], but no: []",
+        f"<think>{DRAFT}</think>[]",
+    ],
+)
+def test_an_empty_list_means_not_there(answer):
+    with pytest.raises(NotInPictureError):
+        read_box(answer, GLM, (1000, 1000))
+
+
+def test_the_scale_belongs_to_the_family():
+    answer = '[{"bbox_2d": [100, 200, 300, 500], "label": "the ball"}]'
+    thousandths = (50.0, 140.0, 150.0, 350.0)
+    for family in ("glm-4.5v", "qwen2-vl", "qwen3-vl"):
+        assert read_box(answer, FORMATS[family], (500, 700)) == thousandths
+    assert read_box(answer, FORMATS["qwen2.5-vl"], (504, 700)) == EXPECTED
+    with pytest.raises(UnreadableAnswerError, match=r"ends at \(280, 700\)"):
+        read_box(answer, FORMATS["qwen2.5-vl"], (280, 700))
+
+
+@pytest.mark.parametrize("width", [280, 640, 896, 1000, 1920, 6000])
+@pytest.mark.parametrize("height", [280, 480, 896, 1080])
+def test_a_server_has_no_reason_to_resize_what_is_sent(width, height):
+    sent = size_to_send(width, height, 1000, FORMATS["qwen2.5-vl"])
+    assert all(side % 28 == 0 and 28 <= side <= 1000 for side in sent)
+    assert sent[0] * sent[1] <= MOST_PIXELS
+    shrunk = min(1.0, 1000 / max(width, height))
+    assert abs(sent[0] - width * shrunk) < 28 * 2
+    assert abs(sent[1] - height * shrunk) < 28 * 2
+
+
+def test_a_small_picture_is_sent_as_it_is():
+    assert size_to_send(640, 481, 1000, GLM) == (640, 481)
+    assert size_to_send(896, 896, 1000, FORMATS["qwen2.5-vl"]) == (896, 896)
+
+
+def test_the_prompt_names_the_object_once_asked():
+    for box_format in FORMATS.values():
+        prompt = box_format.prompt.format(words="the orange ball")
+        assert "the orange ball" in prompt
+        assert "{{" not in prompt
