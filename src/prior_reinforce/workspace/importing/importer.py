@@ -2,14 +2,25 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
-from prior_reinforce.motions import Demonstrations
-from prior_reinforce.workspace.importing.preprocessing import Preprocessing
-from prior_reinforce.workspace.importing.preview import Preview
-from prior_reinforce.workspace.importing.recording import Recording, RecordingFormat
+from prior_reinforce.errors import ConfigurationError, FileFormatError, InvalidDemonstrationsError
+from prior_reinforce.motions import Demonstrations, PlanFormat
+from prior_reinforce.workspace.importing.detection import READERS, detect_format
+from prior_reinforce.workspace.importing.outcomes import (
+    find_outcomes,
+    given_outcomes,
+    outcomes_of,
+    read_outcomes,
+)
+from prior_reinforce.workspace.importing.preprocessing import Preprocessing, preprocess
+from prior_reinforce.workspace.importing.preview import Preview, make_preview
+from prior_reinforce.workspace.importing.recording import Reading, Recording, RecordingFormat
+from prior_reinforce.workspace.importing.selection import select
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +42,7 @@ def read_recordings(
     key: str | None = None,
     rate: float | None = None,
     episodes: Sequence[str] | None = None,
+    joints: Sequence[str] | None = None,
 ) -> list[Recording]:
     """Read every episode as it was recorded, for instance to ask for each one's outcome.
 
@@ -42,14 +54,40 @@ def read_recordings(
             candidate.
         rate: Frames a second, for files that hold neither times nor a rate.
         episodes: Names of the episodes to keep, in order; None keeps all.
+        joints: Recorded names that will be kept, so that the rest need not be there in every
+            message of a bag, nor be numbers in a CSV; None reads everything.
 
     Raises:
+        ConfigurationError: An unknown format, or a rate that is not positive.
         FileFormatError: Missing, truncated, of another format, or ambiguous without `key`.
         InvalidDemonstrationsError: An episode that cannot be used, or one asked for that is not
             there.
         MissingExtraError: The format's optional library is not installed.
     """
-    raise NotImplementedError
+    source = Path(source)
+    kind = format or detect_format(source)
+    if kind not in READERS:
+        raise ConfigurationError(f"unknown format {kind!r}; give one of {', '.join(READERS)}")
+    if not source.exists():
+        raise FileFormatError(f"no recording at {source}; give the path of a file or a folder")
+    if rate is not None and not (math.isfinite(rate) and rate > 0):
+        raise ConfigurationError(f"rate must be a positive number of frames a second, got {rate}")
+    wanted = None if episodes is None else tuple(str(episode) for episode in episodes)
+    reading = Reading(key, rate, wanted, None if joints is None else tuple(joints))
+    found = READERS[kind](source, reading)
+    if wanted is None:
+        if not found:
+            raise FileFormatError(f"{source} holds no episode of format {kind}; say its format")
+        return found
+    by_name = {recording.episode: recording for recording in found}
+    missing = [episode for episode in wanted if episode not in by_name]
+    if missing or not wanted:
+        there = READERS[kind](source, Reading(key, rate, None, reading.joints))
+        raise InvalidDemonstrationsError(
+            f"no episode {', '.join(missing) or 'named'} in {source}; it has "
+            f"{', '.join(recording.episode for recording in there) or 'none'}"
+        )
+    return [by_name[episode] for episode in wanted]
 
 
 def import_demonstrations(
@@ -65,7 +103,7 @@ def import_demonstrations(
     joints: Sequence[str] | None = None,
     names: Sequence[str] | None = None,
     units: Sequence[str] | None = None,
-    preprocessing: Preprocessing = Preprocessing(),  # noqa: B008 - frozen
+    preprocessing: Preprocessing | None = None,
 ) -> ImportResult:
     """Read, select joints, trim, resample, join with the outcomes, and preview.
 
@@ -83,7 +121,7 @@ def import_demonstrations(
             file names nothing, they name its columns in order.
         names: What to call them in the plan format; None keeps the recorded names.
         units: Recorded unit of each kept joint (`deg` is converted); None is radians.
-        preprocessing: Time step, horizon and trimming.
+        preprocessing: Time step, horizon and trimming; None takes the defaults.
 
     Raises:
         FileFormatError: As in `read_recordings`, or a damaged `outcomes.csv`.
@@ -92,4 +130,30 @@ def import_demonstrations(
         ConfigurationError: Settings that contradict each other.
         MissingExtraError: The format's optional library is not installed.
     """
-    raise NotImplementedError
+    source = Path(source)
+    kind = format or detect_format(source)
+    recordings = read_recordings(
+        source, format=kind, key=key, rate=rate, episodes=episodes, joints=joints
+    )
+    if outcomes is None:
+        known = find_outcomes(source, recordings)
+    elif isinstance(outcomes, Mapping):
+        known = given_outcomes(outcomes)
+    else:
+        known = read_outcomes(Path(outcomes))
+    seen = outcomes_of(recordings, known, partial=episodes is not None)
+    selection = select(recordings, joints, names, units)
+    done = preprocess(selection.recordings, selection.units, preprocessing or Preprocessing())
+    demonstrations = Demonstrations(
+        done.plans,
+        seen,
+        PlanFormat(selection.names, selection.units, done.dt),
+        tuple(outcome_names) if outcome_names is not None else known.names,
+        tuple(outcome_units) if outcome_units is not None else (),
+    )
+    preview = make_preview(
+        source.name, kind, selection.recordings, done, demonstrations, known.where
+    )
+    return ImportResult(
+        demonstrations, tuple(recording.episode for recording in recordings), preview
+    )
