@@ -22,20 +22,20 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.distance import cdist
 
-_SCAN_POINTS = 72
+_SCAN_POINTS = 64
 """Length scales of the scan, evenly spaced in log l: a step is about 0.25 for data that occur."""
 _AMPLITUDE_POINTS = 32
 """Amplitudes tried for each length scale, before Newton's method finds the best."""
-_NEWTON_STEPS = 6
+_NEWTON_STEPS = 5
 """From within 0.4 of the maximum in log a, four steps reach 1e-10."""
 _BASINS = 3
 """Local maxima of the scan that are zoomed into, at most."""
 _BASIN_MARGIN = 1.0
 """Log likelihood by which a peak of the scan may lie below the highest and still be tried: within
 half a step of a peak the likelihood of a dozen points falls by less than 0.5."""
-_ZOOM_POINTS = 9
-_ZOOM_ROUNDS = 6
-"""Each round divides the bracket by (points - 1) / 2 = 4: 6 rounds end at 1e-4 of a scan step."""
+_ZOOM_POINTS = 17
+_ZOOM_ROUNDS = 4
+"""Each round divides the bracket by (points - 1) / 2 = 8: 4 rounds end at 1e-4 of a scan step."""
 
 
 @dataclass(frozen=True)
