@@ -156,10 +156,10 @@ def _moving_spans(
             )
         # The last frame within the still band before the motion, and the first one after it. A
         # motion that returns to where it began has frames of both kinds all the same.
-        first = max(0.0, t[left[0] - 1] - settings.margin)
         last_moving = ahead[-1] if ahead.size else left[-1]
-        last = min(t[-1], t[min(last_moving + 1, len(t) - 1)] + settings.margin)
-        spans.append((float(first), float(last)))
+        first = np.searchsorted(t, t[left[0] - 1] - settings.margin, side="right") - 1
+        last = np.searchsorted(t, t[min(last_moving + 1, len(t) - 1)] + settings.margin)
+        spans.append((float(t[max(first, 0)]), float(t[min(last, len(t) - 1)])))
     return spans
 
 
@@ -168,7 +168,7 @@ def _resample(
 ) -> tuple[np.ndarray, list[str]]:
     """Frames (n, D) at start, start + dt, ... until the end is covered, and stepwise channels."""
     t, q = recording.times, recording.positions
-    count = max(2, math.ceil((end - start) / dt - 1e-6) + 1)
+    count = max(2, math.ceil((end - start) / dt - _ON_GRID) + 1)
     grid = start + np.arange(count) * dt
     nearest = np.clip(np.searchsorted(t, grid - dt / 2), 0, len(t) - 1)
     if np.all(np.abs(t[nearest] - grid) <= _ON_GRID * dt):

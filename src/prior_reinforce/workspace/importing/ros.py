@@ -53,7 +53,7 @@ def read_ros(source: Path, reading: Reading) -> list[Recording]:
             with highlevel.AnyReader([bag], default_typestore=definitions) as reader:
                 connections, kind = _topic(bag, reader, reading.key)
                 messages = [
-                    (stamp * 1e-9, reader.deserialize(raw, connection.msgtype))
+                    (stamp, reader.deserialize(raw, connection.msgtype))
                     for connection, stamp, raw in reader.messages(connections=connections)
                 ]
             if not messages:
@@ -79,7 +79,7 @@ def _topic(bag: Path, reader: Any, key: str | None) -> tuple[list[Any], str]:
 
 
 def _states(
-    bag: Path, name: str, messages: list[tuple[float, Any]], joints: tuple[str, ...] | None
+    bag: Path, name: str, messages: list[tuple[int, Any]], joints: tuple[str, ...] | None
 ) -> Recording:
     """One episode of JointStates; messages that lack a wanted joint are another publisher's."""
     kinds = Counter(tuple(sorted(message.name)) for _, message in messages)
@@ -100,17 +100,22 @@ def _states(
     names = tuple(n for n in kept[0][1].name if all(n in m.name for _, m in kept))
     rows = [[dict(zip(m.name, m.position, strict=True))[n] for n in names] for _, m in kept]
     positions = np.array(rows, dtype=np.float64)
-    stamps = np.array([m.header.stamp.sec + m.header.stamp.nanosec * 1e-9 for _, m in kept])
-    times = np.array([stamp for stamp, _ in kept])
-    if np.all(stamps > 0) and np.all(np.diff(stamps) >= 0) and stamps[-1] > stamps[0]:
-        times = stamps
+    stamps = [m.header.stamp.sec * 10**9 + m.header.stamp.nanosec for _, m in kept]
+    if stamps[0] > 0 and stamps[-1] > stamps[0] and sorted(stamps) == stamps:
+        times = _seconds(stamps)
     else:
+        times = _seconds([stamp for stamp, _ in kept])
         remarks.append(f"{name}: header stamps unusable, times are those of the recorder")
     # The same state may be published twice under one stamp; a second, different one is an error.
     repeated = np.concatenate(
         [[False], (np.diff(times) == 0) & np.all(np.diff(positions, axis=0) == 0, axis=1)]
     )
     return Recording(name, times[~repeated], positions[~repeated], names, remarks=tuple(remarks))
+
+
+def _seconds(stamps: list[int]) -> np.ndarray:
+    """Nanoseconds since 1970 to seconds since the first; as floats they would be 0.2 us coarse."""
+    return np.array([stamp - stamps[0] for stamp in stamps]) * 1e-9
 
 
 def _trajectories(name: str, messages: list[Any]) -> list[Recording]:
