@@ -15,6 +15,7 @@ from prior_reinforce.perception.scenes import TableScene, scene_of
 from prior_reinforce.perception.vlm import VisionLanguageModel
 from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
 from prior_reinforce.rollouts import Rollout
+from prior_reinforce.tasks import make_task
 
 SCENE = TableScene("the orange ball", "the red ring", RIM_HEIGHT)
 BALL, GOAL = np.array([0.95, 0.20]), np.array([0.80, 0.08])
@@ -166,6 +167,42 @@ def test_ten_per_cent_outliers_never_get_through(looking, picture):
     assert len(seen) >= n_readings - 1  # four outliers of seven: about 1 in 200 readings
 
 
+@pytest.fixture(scope="module", params=["basketball-v1"])
+def trials(request):
+    """Six real trials of a task with their goals: half anywhere, half as near as they get."""
+    task = make_task(request.param)
+    rng = np.random.default_rng(11)
+    plans = np.concatenate([task.demonstrations(name).plans[:4] for name in ("A", "B")])
+    rollouts = [rollout for rollout in task.rollout(plans, rng) if rollout.valid][:6]
+    assert len(rollouts) == 6
+    goals = task.sample_goals(6, rng)
+    goals[::2] = [r.outcome + rng.uniform(-0.08, 0.08, 2) for r in rollouts[::2]]
+    return scene_of(task.name), list(zip(rollouts, goals, strict=True))
+
+
+@pytest.mark.slow
+def test_the_error_of_real_trials_is_seen_to_a_centimetre_through_outliers(trials):
+    scene, pairs = trials
+    with VisionServer(outlier_rate=0.1, seed=7) as server:
+        config = VisionLanguageModelConfig(base_url=server.base_url)
+        perception = VisionLanguageModel(scene, config)
+        seen = [perception.perceive(rollout, goal, RNG) for rollout, goal in pairs]
+        perception.close()
+        assert len(server.requests) >= 6 * len(pairs)
+    truth = [rollout.outcome - goal for rollout, goal in pairs]
+    assert np.linalg.norm(np.subtract(seen, truth), axis=1).max() < 0.01
+
+
+def test_a_goal_beside_its_object_is_told_apart(looking, picture, camera, calibration):
+    scene = TableScene(SCENE.reached, SCENE.goal, RIM_HEIGHT, goal_offset=(-0.08, 0.01))
+    with VisionServer() as server:
+        config = looking(server).config
+        perception = VisionLanguageModel(scene, config, camera=camera, calibration=calibration)
+        error_seen = perception.read(picture).error_seen
+        perception._client.close()
+    np.testing.assert_allclose(error_seen, BALL - GOAL - [-0.08, 0.01], atol=0.003)
+
+
 @pytest.mark.parametrize("fault", ["http 429", "http 500", "dropped", "timeout"])
 def test_a_passing_failure_of_the_server_is_retried(fault, looking, picture):
     with VisionServer(faults=[fault]) as server:
@@ -271,5 +308,5 @@ def test_what_cannot_be_seen_is_refused_before_anyone_is_asked(
     monkeypatch.delenv("NO_SUCH_KEY", raising=False)
     with pytest.raises(ConfigurationError, match="NO_SUCH_KEY is not set"):
         VisionLanguageModel(SCENE, VisionLanguageModelConfig(api_key_variable="NO_SUCH_KEY"))
-    with pytest.raises(ConfigurationError, match="'bowling', only for basketball-v1"):
+    with pytest.raises(ConfigurationError, match="'bowling', only for basketball-v1, curling"):
         scene_of("bowling")

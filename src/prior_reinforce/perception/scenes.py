@@ -13,7 +13,11 @@ _TABLE_MARKS = tuple((x, y) for x in (0.5, 0.85, 1.2) for y in (-0.4, 0.0, 0.4))
 
 @dataclass(frozen=True)
 class TableScene:
-    """The two objects whose centres' difference is the error, in words that a model understands."""
+    """The two objects whose centres tell the error, in words that a model understands.
+
+    The error seen is the reached object's centre minus the goal; the goal is the goal object's
+    centre plus `goal_offset`.
+    """
 
     reached: str
     """The object whose place is the outcome, for instance `the orange ball`."""
@@ -21,6 +25,8 @@ class TableScene:
     """The object that stands at the goal, for instance `the red hoop`."""
     plane_height: float
     """Height above the table of the plane in which both centres lie at the key frame, in [m]."""
+    goal_offset: tuple[float, float] = (0.0, 0.0)
+    """From the centre of the goal's object to the goal, (x, y) in the table frame, in [m]."""
     marks: tuple[tuple[float, float], ...] = _TABLE_MARKS
     """Known points (x, y) of that plane to calibrate the camera on, table frame, in [m]."""
 
@@ -28,6 +34,13 @@ class TableScene:
 SCENES: dict[str, TableScene] = {
     # The outcome is where the ball's centre comes down through the rim's plane, 10 cm up.
     "basketball-v1": TableScene("the orange ball", "the red hoop", plane_height=0.10),
+    # Both stones lie on the table and are 3 cm high; the goal is 8 cm before the target stone.
+    "curling": TableScene(
+        "the curling stone with the blue handle",
+        "the curling stone with the red handle",
+        plane_height=0.02,
+        goal_offset=(-0.08, 0.0),
+    ),
 }
 """The paper's tasks by name; for a task of your own construct a `TableScene`."""
 

@@ -112,7 +112,8 @@ class VisionLanguageModel(Perception):
         reached = self._find(self.scene.reached, sent, self._calibration)
         if reached.problem is None:
             goal = self._find(self.scene.goal, sent, self._calibration)
-        self.last_reading = Reading(picture, self.config.model, reached, goal)
+        offset = self.scene.goal_offset
+        self.last_reading = Reading(picture, self.config.model, reached, goal, offset)
         return self.last_reading
 
     def close(self) -> None:

@@ -9,12 +9,15 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from prior_reinforce.errors import MissingExtraError
 from prior_reinforce.perception.vlm_formats import Box
+
+if TYPE_CHECKING:
+    from PIL import ImageDraw
 
 REACHED_COLOUR = (0, 90, 255)
 GOAL_COLOUR = (200, 0, 160)
@@ -64,6 +67,8 @@ class Reading:
     reached: Sighting
     goal: Sighting | None
     """None where `reached` failed already, and nobody was asked."""
+    goal_offset: tuple[float, float] = (0.0, 0.0)
+    """From the goal object's centre to the goal (see `TableScene`), in [m]."""
 
     @property
     def problem(self) -> str | None:
@@ -72,10 +77,10 @@ class Reading:
 
     @property
     def error_seen(self) -> np.ndarray | None:
-        """Reached place minus goal's place, shape (2,), in [m]; None where there is a problem."""
+        """Reached place minus goal, shape (2,), in [m]; None where there is a problem."""
         if self.goal is None or self.reached.place is None or self.goal.place is None:
             return None
-        return self.reached.place - self.goal.place
+        return self.reached.place - (self.goal.place + np.array(self.goal_offset))
 
     def drawn(self) -> np.ndarray:
         """Return the picture with all boxes: agreed ones thick, single answers thin.
@@ -91,31 +96,23 @@ class Reading:
             ) from error
         image = Image.fromarray(self.picture)
         pen = ImageDraw.Draw(image)
-        size = max(12, image.height // 40)
-        sightings = [(self.reached, REACHED_COLOUR, False)]
-        if self.goal is not None:
-            sightings.append((self.goal, GOAL_COLOUR, True))
-        for sighting, colour, below in sightings:
+        found = [(self.reached, REACHED_COLOUR)]
+        found += [(self.goal, GOAL_COLOUR)] if self.goal is not None else []
+        for sighting, colour in found:
             for answer in sighting.answers:
                 if answer.box is not None:
                     pen.rectangle(answer.box, outline=colour, width=1)
-            if sighting.box is not None:
-                left, top, right, bottom = sighting.box
-                pen.rectangle(sighting.box, outline=colour, width=3)
-                middle = ((left + right) / 2, (top + bottom) / 2)
-                pen.circle(middle, 3, fill=colour)
-                corner, anchor = ((right + 8, bottom), "ls") if below else ((right + 8, top), "lt")
-                pen.text(
-                    corner,
-                    sighting.words,
-                    fill=colour,
-                    anchor=anchor,
-                    font_size=size,
-                    stroke_width=3,
-                    stroke_fill="white",
-                )
-        if self.reached.box is not None and self.goal is not None and self.goal.box is not None:
-            pen.line([_middle(self.goal.box), _middle(self.reached.box)], fill="black", width=2)
+        agreed = [(sighting.words, sighting.box, colour) for sighting, colour in found]
+        boxes = [box for _, box, _ in agreed if box is not None]
+        if len(boxes) == 2:
+            pen.line([_middle(box) for box in boxes], fill="black", width=2)
+        for words, box, colour in agreed:
+            if box is not None:
+                pen.rectangle(box, outline=colour, width=3)
+                pen.circle(_middle(box), 3, fill=colour)
+                # The upper object's words above it, the lower's below: they never cover a box.
+                above = box == min(boxes, key=lambda each: each[1])
+                _write(pen, words, box, colour, image.size, above=above)
         return np.asarray(image)
 
     def save(self, folder: Path, stem: str) -> None:
@@ -146,6 +143,31 @@ def _sighting_record(sighting: Sighting) -> dict[str, Any]:
         "problem": sighting.problem,
         "answers": [vars(answer) for answer in sighting.answers],
     }
+
+
+def _write(
+    pen: ImageDraw.ImageDraw,
+    words: str,
+    box: Box,
+    colour: tuple[int, int, int],
+    size: tuple[int, int],
+    *,
+    above: bool,
+) -> None:
+    """Write words centred above or below a box, shifted to stay in a picture of `size` [px]."""
+    font_size = max(12, size[1] // 40)
+    half = pen.textlength(words, font_size=font_size) / 2 + 4
+    x = min(max(_middle(box)[0], half), size[0] - half)
+    y = max(box[1] - 6, font_size + 4) if above else min(box[3] + 6, size[1] - font_size - 4)
+    pen.text(
+        (x, y),
+        words,
+        fill=colour,
+        anchor="mb" if above else "mt",
+        font_size=font_size,
+        stroke_width=3,
+        stroke_fill="white",
+    )
 
 
 def _middle(box: Box) -> tuple[float, float]:
