@@ -1,0 +1,110 @@
+"""Colours, figures and PNG files, shared by every picture of every report.
+
+Colours are told apart by anyone: vermilion and bluish green of the Okabe-Ito palette (Okabe and
+Ito 2008, "Color Universal Design"), trials in one hue from light to dark, the rest in grey; and
+nothing is said by colour alone.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from matplotlib import rc_context
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import to_hex, to_rgb
+from matplotlib.figure import Figure
+
+INK = "#1f2933"
+INK_SOFT = "#616e7c"
+LINE = "#cbd2d9"
+DEMONSTRATION = "#9aa5b1"
+REGION = "#f3f5f7"
+GOAL = "#d55e00"
+HIT = "#009e73"
+_TRIAL_FIRST = "#8db7e3"
+_TRIAL_LAST = "#16406f"
+
+PICTURE_DPI = 200
+"""Twice a screen's resolution; sharp on paper at the size drawn."""
+
+_RC: Any = {  # matplotlib releases differ in how they type this
+    "font.family": "DejaVu Sans",  # comes with matplotlib, so pictures look alike everywhere
+    "font.size": 10.5,
+    "axes.unicode_minus": True,
+    "text.color": INK,
+    "text.parse_math": False,  # a title may hold dollar signs
+}
+
+
+@contextmanager
+def drawing() -> Iterator[None]:
+    """Draw in this style, whatever matplotlib is set to; decorates every function that draws."""
+    with rc_context(_RC):
+        yield
+
+
+def trial_colour(position: int, n: int, *, hit: bool = False) -> str:
+    """Colour of trial `position` (from 0) of n: light to dark in order; green where it hit."""
+    if hit:
+        return HIT
+    share = position / (n - 1) if n > 1 else 1.0
+    first, last = to_rgb(_TRIAL_FIRST), to_rgb(_TRIAL_LAST)
+    red, green, blue = (a + share * (b - a) for a, b in zip(first, last, strict=True))
+    return to_hex((red, green, blue))
+
+
+def text_on(colour: str) -> str:
+    """Ink or white, whichever is easier to read on a colour."""
+    red, green, blue = to_rgb(colour)
+    return INK if 0.299 * red + 0.587 * green + 0.114 * blue > 0.6 else "white"
+
+
+def new_figure(width: float, height: float, *, laid_out: bool = True) -> Figure:
+    """Make an empty figure outside matplotlib's list of figures.
+
+    Args:
+        width: In [inch].
+        height: In [inch].
+        laid_out: Let matplotlib arrange panels and labels; otherwise the caller does.
+    """
+    layout: Any = "constrained" if laid_out else None
+    figure = Figure(figsize=(width, height), dpi=PICTURE_DPI, layout=layout)
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def calm_axes(axes: Axes, *, grid: bool = True) -> None:
+    """Take away all lines that say nothing."""
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)
+    for side in ("left", "bottom"):
+        axes.spines[side].set_color(LINE)
+    axes.tick_params(colors=INK_SOFT, labelcolor=INK_SOFT, length=3, labelsize=9.5)
+    axes.xaxis.label.set(color=INK_SOFT, fontsize=10)
+    axes.yaxis.label.set(color=INK_SOFT, fontsize=10)
+    axes.set_axisbelow(True)
+    if grid:
+        axes.grid(color="#edf0f2", linewidth=0.8)
+
+
+def save_png(figure: Figure, path: Path) -> Path:
+    """Write a PNG; the same figure gives the same bytes, and the file appears only when complete.
+
+    Returns:
+        The path.
+    """
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial = path.with_name(f".{path.name}.partial")
+    try:
+        with drawing():
+            figure.savefig(partial, format="png", dpi=PICTURE_DPI, metadata={"Software": None})
+        os.replace(partial, path)
+    finally:
+        partial.unlink(missing_ok=True)
+    return path

@@ -1,0 +1,130 @@
+"""A closed-form world for reports: a generator that says its condition, an outcome that is bent."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from prior_reinforce.adapters.base import Adapter
+from prior_reinforce.generators.base import Generator
+from prior_reinforce.motions import Demonstrations, PlanFormat
+from prior_reinforce.report import AdaptationRecord
+from prior_reinforce.session import Session
+
+HORIZON = 60
+DT = 0.02
+
+
+def motion(conditions: np.ndarray, action_dim: int) -> np.ndarray:
+    """Plans (n, H, D): a smooth swing of each joint, as large as the condition says."""
+    phase = np.linspace(0, np.pi, HORIZON)[:, None]
+    joints = np.arange(action_dim)
+    size = conditions.sum(axis=1)[:, None, None] + conditions[:, :1, None] * joints / 4
+    return size * np.sin(phase * (1 + joints / 5) + joints / 3) * np.cos(phase / 2)
+
+
+class Swing(Generator):
+    name = "swing"
+
+    def __init__(self, action_dim: int) -> None:
+        self.action_dim = action_dim
+
+    def fit(self, demonstrations, *, seed, progress=None):
+        return self
+
+    def generate(self, conditions):
+        return motion(conditions, self.action_dim)
+
+    def save(self, folder): ...
+
+    @classmethod
+    def load(cls, folder):
+        return cls(1)
+
+
+class FullStep(Adapter):
+    """Subtracts the whole last error."""
+
+    name = "full-step"
+
+    def start(self, demonstrations):
+        self.last = None
+
+    def propose(self, goal_seen):
+        return goal_seen.copy() if self.last is None else self.last - (self.seen - goal_seen)
+
+    def observe(self, condition, outcome_seen):
+        self.last, self.seen = condition.copy(), outcome_seen.copy()
+
+
+def demonstrations(k: int = 2, action_dim: int = 7, units: tuple[str, ...] = ("m", "m")):
+    rng = np.random.default_rng(8)
+    low = np.array([0.82, -0.28, 0.30])[:k]
+    high = np.array([1.06, 0.28, 0.70])[:k]
+    outcomes = rng.uniform(low, high, size=(6, k))
+    if k == 2:
+        outcomes = np.array(
+            [[0.83, -0.26], [0.86, 0.06], [0.84, 0.27], [1.02, -0.20], [0.97, -0.02], [1.04, 0.22]]
+        )
+    shifts = rng.normal(0, 0.02, size=(6, 1, 1))
+    return Demonstrations(
+        plans=motion(outcomes, action_dim) + shifts,
+        outcomes_seen=outcomes,
+        format=PlanFormat(
+            tuple(f"joint{i + 1}" for i in range(action_dim)), ("rad",) * action_dim, DT
+        ),
+        outcome_names=tuple("xyz"[:k]) if set(units) == {"m"} else ("distance", "duration"),
+        outcome_units=units,
+    )
+
+
+def bend(condition: np.ndarray) -> np.ndarray:
+    """True outcome of a condition: a few centimetres off, differently everywhere."""
+    wave = np.sin(3 * condition.sum() + np.arange(condition.size))
+    return condition + 0.07 * wave + 0.02
+
+
+def adaptation(
+    goal=None,
+    adapter: Adapter | None = None,
+    *,
+    seed: int = 0,
+    k: int = 2,
+    action_dim: int = 7,
+    units: tuple[str, ...] = ("m", "m"),
+    demos: Demonstrations | None = None,
+    void_trial: int = 2,
+    most: int = 8,
+) -> AdaptationRecord:
+    """Adapt until the goal is truly within 1.5 cm; perceived to a centimetre, one trial voided."""
+    demos = demos or demonstrations(k, action_dim, units)
+    goal = np.array([0.9, 0.1, 0.5])[:k] if goal is None else np.array(goal)
+    session = Session(Swing(action_dim), adapter or FullStep(), demos, goal, 0.015)
+    rng = np.random.default_rng(seed)
+    outcomes: list[np.ndarray | None] = []
+    while not session.solved and len(session.trials) < most:
+        trial = session.ask()
+        if seed % 2 == 0 and trial.number == void_trial:
+            session.void(trial.number, "ball slipped")
+            outcomes.append(None)
+            continue
+        outcome = bend(trial.condition) + rng.normal(0, 0.003, size=k)
+        error = outcome - goal
+        outcomes.append(outcome)
+        seen = np.round(error / 0.01) * 0.01
+        session.tell(trial.number, seen, hit=bool(np.linalg.norm(error) <= 0.015))
+    return AdaptationRecord.from_session(session, outcomes=tuple(outcomes))
+
+
+def pictures(n: int, height: int = 240, width: int = 320) -> Iterator[np.ndarray]:
+    """A ball that flies: still for the first third, then a parabola."""
+    rows, columns = np.mgrid[:height, :width]
+    for i in range(n):
+        t = max(0.0, (i - n / 3) / (2 * n / 3))
+        x, y = width * (0.15 + 0.7 * t), height * (0.8 - 2.2 * t * (1 - t))
+        ball = (rows - y) ** 2 + (columns - x) ** 2 < (height / 20) ** 2
+        picture = np.full((height, width, 3), 235, dtype=np.uint8)
+        picture[int(height * 0.86) :] = (190, 196, 204)
+        picture[ball] = (213, 94, 0)
+        yield picture
