@@ -25,22 +25,23 @@ _LEAST_JITTER = 1e-6
 class GaussianProcessConfig:
     """Settings of `GaussianProcessAdapter`; lengths in normalised units (see `Normalisation`).
 
-    The paper asks for "a small diagonal regularization term" without a size. Ours has two, because
-    the two kinds of point are wrong by different amounts. That a demonstration's condition equals
-    its outcome is a convention, from which the generator strays by a tenth of the demonstrations'
-    spread between them: they tell the trend. A trial is wrong by what perception adds, and tells
-    what is true where it landed. One size for both either chases noise or hardly moves
-    (docs/decisions.md has the figures).
+    The paper asks for "a small diagonal regularization term" without a size. Ours has two sizes,
+    because the two kinds of point are wrong by different amounts. A trial is wrong by what
+    perception adds, and tells what is true where it landed. That a demonstration's condition equals
+    its outcome is a convention; between the demonstrations the generator strays from it, and by how
+    much is what trials show: the mean square of c - r over those remembered. One size for both
+    either chases noise or hardly moves (docs/decisions.md has the figures).
     """
 
     memory_size: int | None = 2
     """m, the number of latest trials kept beside all demonstrations; None keeps every trial."""
-    demonstration_jitter: float = 1e-2
-    """alpha of the demonstrations, added to the kernel's diagonal: a tenth of their spread,
-    squared."""
-    trial_jitter: float = 2e-3
-    """alpha of the trials: 4.5 % of the demonstrations' spread, squared; 7 mm on a table with a
-    reachable region of 0.25 m x 0.5 m."""
+    trial_jitter: float = 3e-3
+    """alpha of the trials, added to the kernel's diagonal: 5 % of the demonstrations' spread,
+    squared, which is 8 mm where 0.25 m x 0.5 m can be reached."""
+    demonstration_jitter_bounds: tuple[float, float] = (1e-3, 0.3)
+    """Least and greatest alpha of the demonstrations. The least is used before any trial, and makes
+    the first condition the goal to 0.2 mm inside their hull; the greatest (half of their spread,
+    squared) keeps one lost object from making the demonstrations worthless."""
     amplitude_bounds: tuple[float, float] = (1e-5, 1e5)
     """Least and greatest kernel constant; scikit-learn's defaults."""
     length_scale_bounds: tuple[float, float] = (1e-5, 1e5)
@@ -57,18 +58,21 @@ class GaussianProcessConfig:
                 f"memory_size must be at least 1 trial, got {self.memory_size}; "
                 "None keeps all trials, and FrozenAdapter learns from none"
             )
-        for name in ("demonstration_jitter", "trial_jitter"):
-            jitter = getattr(self, name)
-            if not _LEAST_JITTER <= jitter < np.inf:
-                raise ConfigurationError(
-                    f"{name} must be at least {_LEAST_JITTER:g}, so that rounding errors stay "
-                    f"below it, got {jitter}"
-                )
-        for name in ("amplitude_bounds", "length_scale_bounds"):
+        if not _LEAST_JITTER <= self.trial_jitter < np.inf:
+            raise ConfigurationError(
+                f"trial_jitter must be at least {_LEAST_JITTER:g}, so that rounding errors stay "
+                f"below it, got {self.trial_jitter}"
+            )
+        for name, least in (
+            ("demonstration_jitter_bounds", _LEAST_JITTER),
+            ("amplitude_bounds", np.finfo(float).tiny),
+            ("length_scale_bounds", np.finfo(float).tiny),
+        ):
             low, high = getattr(self, name)
-            if not 0 < low < high < np.inf:
+            if not least <= low <= high < np.inf:
                 raise ConfigurationError(
-                    f"{name} must be two positive numbers, the smaller first, got {(low, high)}"
+                    f"{name} must be two numbers of at least {least:g}, the smaller first, "
+                    f"got {(low, high)}"
                 )
 
 
@@ -130,13 +134,20 @@ class GaussianProcessAdapter(Adapter):
         self._memory.add(*as_trial(condition, outcome_seen, self._normalisation.outcome_dim))
         self._refit(self._memory)
 
+    def _jitter(self, outcomes: np.ndarray, conditions: np.ndarray, n_trials: int) -> np.ndarray:
+        """Return alpha of every remembered pair, shape (n,), all in normalised units."""
+        n_demonstrations = len(outcomes) - n_trials
+        low, high = self.config.demonstration_jitter_bounds
+        strayed = np.square(conditions - outcomes)[n_demonstrations:]
+        of_demonstrations = np.clip(np.mean(strayed), low, high) if n_trials else low
+        return np.repeat(
+            [of_demonstrations, self.config.trial_jitter], [n_demonstrations, n_trials]
+        )
+
     def _refit(self, memory: Memory) -> None:
         outcomes = self._normalisation.apply(memory.outcomes_seen)
         conditions = self._normalisation.apply(memory.conditions)
-        jitter = np.repeat(
-            [self.config.demonstration_jitter, self.config.trial_jitter],
-            [memory.n_demonstrations, memory.n_trials],
-        )
+        jitter = self._jitter(outcomes, conditions, memory.n_trials)
         kernel = maximise(
             outcomes,
             conditions,
