@@ -14,6 +14,7 @@ from prior_reinforce.workspace.importing.detection import READERS, detect_format
 from prior_reinforce.workspace.importing.outcomes import (
     find_outcomes,
     given_outcomes,
+    in_order,
     outcomes_of,
     read_outcomes,
 )
@@ -115,7 +116,8 @@ def import_demonstrations(
         episodes: Names of the episodes to keep, in order; None keeps all.
         outcomes: Where each demonstration's object landed: a CSV `episode,x,y[,z]`, or numbers by
             episode name. None takes `outcomes.csv` beside or inside the source.
-        outcome_names: Names of the k components, in order; None takes the CSV's columns.
+        outcome_names: Names of the k components, in order, matched to the CSV's columns; None
+            takes those as they stand.
         outcome_units: Unit of each component; None is metres.
         joints: Recorded names to keep, in the plan's order; None keeps all as recorded. Where the
             file names nothing, they name its columns in order.
@@ -141,6 +143,7 @@ def import_demonstrations(
         known = given_outcomes(outcomes)
     else:
         known = read_outcomes(Path(outcomes))
+    known = in_order(known, outcome_names)
     seen = outcomes_of(recordings, known, partial=episodes is not None)
     selection = select(recordings, joints, names, units)
     done = preprocess(selection.recordings, selection.units, preprocessing or Preprocessing())

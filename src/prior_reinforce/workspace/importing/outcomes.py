@@ -94,6 +94,29 @@ def read_outcomes(path: Path) -> Outcomes:
     return Outcomes(path.name, tuple(unit[0] for unit in units), values)
 
 
+def in_order(outcomes: Outcomes, names: Sequence[str] | None) -> Outcomes:
+    """The outcomes with their components in the order of the names.
+
+    Args:
+        outcomes: Their components are matched by name where they have names, else by position.
+        names: As wanted; None keeps the outcomes as they are.
+
+    Raises:
+        InvalidDemonstrationsError: A wanted component that the outcomes lack.
+    """
+    if names is None or not outcomes.names:
+        return outcomes
+    missing = [name for name in names if name not in outcomes.names]
+    if missing:
+        raise InvalidDemonstrationsError(
+            f"{outcomes.where} has no column {', '.join(missing)}; it has "
+            f"{', '.join(outcomes.names)}: rename or add it"
+        )
+    order = [outcomes.names.index(name) for name in names]
+    values = {name: tuple(v[i] for i in order) for name, v in outcomes.values.items()}
+    return Outcomes(outcomes.where, tuple(names), values)
+
+
 def outcomes_of(
     recordings: Sequence[Recording], outcomes: Outcomes, *, partial: bool
 ) -> np.ndarray:

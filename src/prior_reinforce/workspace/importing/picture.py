@@ -16,6 +16,8 @@ from prior_reinforce.motions import Demonstrations
 from prior_reinforce.workspace.importing.recording import Recording
 
 _COLUMNS = 4
+_LEAST_RANGE = 0.2
+"""Smallest vertical range of a channel's panel, as a share of the largest motion."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +67,11 @@ class Picture:
             moving = np.flatnonzero(np.any(plan != plan[-1], axis=1))
             end = min(int(moving[-1]) + 1, len(times) - 1) if moving.size else 0
             axes.plot(times[end], plan[end, channel], "o", color=colour, markersize=3, zorder=3)
+        # A channel that hardly moves must not look as if it did.
+        low, high = axes.get_ylim()
+        least = _LEAST_RANGE * float(np.ptp(self.demonstrations.plans, axis=(0, 1)).max())
+        if high - low < least:
+            axes.set_ylim((low + high - least) / 2, (low + high + least) / 2)
         axes.set_title(f"{form.names[channel]} [{form.units[channel]}]", fontsize=10)
         axes.set_xlabel("time from the plan's start [s]", fontsize=8)
         axes.tick_params(labelsize=8)
@@ -88,7 +95,7 @@ def draw_outcomes(
     axes.scatter(*points.T, c=colours, s=30, zorder=2)
     for point, episode in zip(points, episodes, strict=True):
         axes.annotate(episode, point, textcoords="offset points", xytext=(5, 4), fontsize=7)
-    axes.margins(0.2)
+    axes.margins(0.25)
     axes.set_xlabel(f"{demos.outcome_names[0]} [{demos.outcome_units[0]}]", fontsize=8)
     axes.set_title("outcomes and their hull", fontsize=10)
     axes.tick_params(labelsize=8)

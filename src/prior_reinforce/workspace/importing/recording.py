@@ -61,7 +61,8 @@ class Recording:
                 f"episode {self.episode} must hold numbers: {error}; mend or drop it"
             ) from error
         names = tuple(str(name) for name in self.names)
-        if times.ndim != 1 or positions.shape != (times.size, len(names)) or times.size < 2:
+        fits = positions.shape == (times.size, len(names)) and len(names) > 0
+        if times.ndim != 1 or not fits or times.size < 2:
             raise InvalidDemonstrationsError(
                 f"episode {self.episode} has times {times.shape} and positions {positions.shape} "
                 f"for {len(names)} channels; expected (T,) and (T, {len(names)}) with T >= 2: "
