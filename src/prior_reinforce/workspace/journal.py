@@ -103,16 +103,13 @@ class Journal:
             self._connection.execute("BEGIN IMMEDIATE")
         try:
             yield
-        except BaseException:
-            self._connection.execute("ROLLBACK")
-            raise
-        with self._named_errors():
-            try:
+            with self._named_errors():
                 self._connection.execute("COMMIT")
-            except sqlite3.Error:
-                if self._connection.in_transaction:
-                    self._connection.execute("ROLLBACK")
-                raise
+        except BaseException:
+            # A full disk has made SQLite roll back by itself already.
+            if self._connection.in_transaction:
+                self._connection.execute("ROLLBACK")
+            raise
 
     def append(self, kind: str, data: Mapping[str, Any]) -> None:
         """Add an event; call it inside `exclusive`.

@@ -375,6 +375,8 @@ class Workspace:
             )
         number = len(history.trials) + 1
         digest = hashlib.sha256(pending.plan.tobytes()).hexdigest()[:8]
+        with _named_disk_errors(self.folder):
+            (self.folder / "plans").mkdir(exist_ok=True)
         plan_file = write_plan(plan, self.folder / "plans" / f"trial-{number:03d}-{digest}.npz")
         assert history.goal is not None
         self._journal.append(
@@ -435,7 +437,9 @@ class Workspace:
         return Trial(
             number,
             record.condition,
-            self.plan(record).actions,
+            # What was seen needs no frames; `plan` reads them where they are wanted, so that a
+            # trial whose file was damaged can still be voided.
+            np.empty((0, self.manifest.format.action_dim)),
             state,
             record.error_seen if state is TrialState.TOLD else None,
             record.hit and state is TrialState.TOLD,

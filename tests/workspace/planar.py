@@ -1,0 +1,37 @@
+"""A small workspace that learns in a second: planar throws, two joints, no robot limits."""
+
+import numpy as np
+
+from prior_reinforce.generators import DiffusionConfig
+from prior_reinforce.generators.unet import UNetSize
+from prior_reinforce.motions import Demonstrations, PlanFormat
+from prior_reinforce.workspace.manifest import TEMPLATE
+
+FORMAT = PlanFormat(("joint1", "joint2"), ("rad", "rad"), 0.02)
+SMALL = DiffusionConfig(
+    network=UNetSize(widths=(8, 8), step_width=8, condition_width=8),
+    training_steps=3,
+    sampling_steps=2,
+)
+
+
+def demonstrations():
+    outcomes = np.array([[0.8, -0.2], [0.8, 0.2], [1.0, -0.2], [1.0, 0.2]])
+    phase = np.linspace(0.0, 1.0, 24)
+    swing = 10 * phase**3 - 15 * phase**4 + 6 * phase**5
+    plans = outcomes[:, None, :] * swing[None, :, None]
+    return Demonstrations(plans, outcomes, FORMAT)
+
+
+def manifest(**changes):
+    given = {
+        "name": "planar",
+        "names": '["joint1", "joint2"]',
+        "units": '["rad", "rad"]',
+        "dt": 0.02,
+        "outcome_names": '["x", "y"]',
+        "outcome_units": '["m", "m"]',
+        "tolerance": 0.015,
+        "robot": "none",
+    }
+    return TEMPLATE.format(**(given | changes))

@@ -1,0 +1,100 @@
+"""The manifest: what it says, and where a wrong value stands."""
+
+import contextlib
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from planar import manifest
+
+from prior_reinforce.errors import ConfigurationError, FileFormatError
+from prior_reinforce.workspace.manifest import load_manifest
+
+
+def write(tmp_path, text):
+    path = tmp_path / "workspace.toml"
+    path.write_text(text)
+    return path
+
+
+def test_the_template_says_what_was_filled_in(tmp_path):
+    read = load_manifest(write(tmp_path, manifest(robot="panda", names='["joint1", "joint2"]')))
+    assert read.name == "planar"
+    assert read.format.names == ("joint1", "joint2")
+    assert read.format.dt == 0.02
+    assert read.outcome_units == ("m", "m")
+    assert read.tolerance == 0.015
+    assert read.robot is not None
+    assert read.robot.robot == "panda"
+    assert read.robot.velocity[0] == 2.175
+
+
+def test_no_robot_means_no_limits(tmp_path):
+    assert load_manifest(write(tmp_path, manifest())).robot is None
+
+
+def test_limits_can_be_given(tmp_path):
+    text = manifest(robot="given").replace(
+        "# joint_names = [...]",
+        'joint_names = ["joint1", "joint2"]\nlower = [-1, -1]\nupper = [1, 1]\n'
+        "velocity = [2, 2]\nacceleration = [10, 10]\njerk = [500, 500]\n#",
+    )
+    limits = load_manifest(write(tmp_path, text)).robot
+    assert limits.upper.tolist() == [1, 1]
+    assert limits.jerk.tolist() == [500, 500]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("tolerance = 0.015", "tolerance = -1", r":\d+: \[outcome\] tolerance = -1.*more than 0"),
+        ("tolerance = 0.015", 'tolerance = "2cm"', r"tolerance = '2cm'.*must be a number"),
+        ("tolerance = 0.015", "tolerance = nan", "must be finite"),
+        ("tolerance = 0.015", "", r"\[outcome\] tolerance: missing"),
+        ("dt = 0.02", "dt = true", "must be a number"),
+        ("dt = 0.02", "dt = 0", r"\[plan\].*positive number of seconds"),
+        ('units = ["rad", "rad"]', 'units = ["rad"]', r"\[plan\].*as many units"),
+        ('names = ["joint1", "joint2"]', 'names = "joint1"', "must be a list of texts"),
+        ('units = ["m", "m"]', 'units = ["m"]', "one unit for each"),
+        ('name = "planar"', 'nmae = "planar"', r"nmae = 'planar'.*unknown; keys are name"),
+        ('name = "planar"', 'name = " "', "must not be empty"),
+        ('model = "none"', 'model = "ur5"', r"\[robot\].*known are panda and fr3"),
+        ('model = "none"', 'model = "given"', r"joint_names.*missing"),
+        ("[gate]", "[gait]", "unknown; sections are"),
+        ("[gate] ", "[gate]\nbeyond_refuse = -1 #", r"\[gate\].*beyond_warn"),
+    ],
+)
+def test_a_wrong_value_is_named_with_its_place(tmp_path, old, new, message):
+    text = manifest()
+    assert old in text
+    with pytest.raises(ConfigurationError, match=message) as caught:
+        load_manifest(write(tmp_path, text.replace(old, new, 1)))
+    assert "\n" not in str(caught.value)
+
+
+def test_the_line_is_the_line(tmp_path):
+    text = manifest().replace("tolerance = 0.015", "tolerance = -1")
+    line = next(i for i, row in enumerate(text.splitlines(), 1) if row.startswith("tolerance"))
+    with pytest.raises(ConfigurationError, match=rf"workspace\.toml:{line}:"):
+        load_manifest(write(tmp_path, text))
+
+
+def test_a_missing_file_and_one_that_is_no_toml_are_named(tmp_path):
+    with pytest.raises(FileFormatError, match="no manifest at"):
+        load_manifest(tmp_path / "workspace.toml")
+    with pytest.raises(FileFormatError, match=r"not a TOML file.*line 1"):
+        load_manifest(write(tmp_path, "name = \nx = 1"))
+    (tmp_path / "workspace.toml").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(FileFormatError, match="not a TOML file"):
+        load_manifest(tmp_path / "workspace.toml")
+
+
+@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.integers(0, 2000), st.binary(max_size=3))
+def test_no_damage_causes_anything_but_a_named_error(tmp_path, position, junk):
+    whole = manifest().encode()
+    position %= len(whole)
+    path = tmp_path / "workspace.toml"
+    path.write_bytes(whole[:position] + junk + whole[position + len(junk) :])
+    with contextlib.suppress(ConfigurationError, FileFormatError):
+        assert load_manifest(path).tolerance > 0

@@ -1,0 +1,23 @@
+"""Kill -9 at random moments of a scripted session; `power_cut.py` is the session."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+KILLS = 40
+
+
+@pytest.mark.slow
+def test_a_session_survives_being_killed_at_any_moment(tmp_path):
+    program = Path(__file__).with_name("power_cut.py")
+    done = subprocess.run(
+        [sys.executable, program, tmp_path, str(KILLS)],
+        capture_output=True,
+        text=True,
+        env=os.environ | {"OMP_NUM_THREADS": "1"},
+    )
+    assert done.returncode == 0, done.stderr
+    assert f"{KILLS} kills" in done.stdout
