@@ -26,6 +26,7 @@ def draw_badges(
     colours: Sequence[str],
     *,
     away_from: np.ndarray,
+    avoid: np.ndarray | None = None,
 ) -> None:
     """Draw a numbered badge near each point.
 
@@ -36,18 +37,24 @@ def draw_badges(
         labels: One a point.
         colours: One a point.
         away_from: Where badges should not point to (the goal), shape (2,), data coordinates.
+        avoid: Other marks that badges should not cover, shape (m, 2), data coordinates.
     """
     if not len(points):
         return
-    figure.draw_without_rendering()  # lays out, so that data coordinates have a place
+    # Lay out now, so that data coordinates have a place on paper, and leave it at that.
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")
     points_per_pixel = 72 / figure.dpi
     pixels = axes.transData.transform(points) * points_per_pixel
     centre = axes.transData.transform(away_from) * points_per_pixel
+    marks = pixels
+    if avoid is not None and len(avoid):
+        marks = np.concatenate([pixels, axes.transData.transform(avoid) * points_per_pixel])
     box = axes.get_window_extent()
     frame = np.array([[box.x0, box.y0], [box.x1, box.y1]]) * points_per_pixel
     taken: list[np.ndarray] = []
     for place, point, label, colour in zip(points, pixels, labels, colours, strict=True):
-        offset = _offset(point, centre, pixels, taken, frame)
+        offset = _offset(point, centre, marks, taken, frame)
         taken.append(point + offset)
         axes.annotate(
             label,
@@ -67,7 +74,7 @@ def draw_badges(
 def _offset(
     point: np.ndarray,
     centre: np.ndarray,
-    points: np.ndarray,
+    marks: np.ndarray,
     taken: list[np.ndarray],
     frame: np.ndarray,
 ) -> np.ndarray:
@@ -81,7 +88,7 @@ def _offset(
             place = point + offset
             cost = 4 * (ring - 1) + 1 - np.cos(direction - angle)
             cost += 100 * sum(np.linalg.norm(place - other) < 1.1 * _SIZE for other in taken)
-            cost += 3 * float(np.sum(np.linalg.norm(points - place, axis=1) < 0.7 * _SIZE))
+            cost += 3 * float(np.sum(np.linalg.norm(marks - place, axis=1) < 0.7 * _SIZE))
             outside = np.any(place < frame[0] + _SIZE / 2) or np.any(place > frame[1] - _SIZE / 2)
             cost += 50 * bool(outside)
             if cost < best_cost:

@@ -131,7 +131,7 @@ def draw_plans(record: AdaptationRecord) -> Figure:
     figure.legend(
         handles=keys,
         loc="outside upper left",
-        ncols=min(len(keys), 6),
+        ncols=max(3, 2 * columns),
         frameon=False,
         fontsize=9,
         labelcolor=INK_SOFT,

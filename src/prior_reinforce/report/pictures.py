@@ -73,6 +73,7 @@ def draw_overview(
                 low, size = np.array([low[0], -n_rows + 0.4]), np.array([size[0], n_rows + 0.4])
             axes.add_patch(Rectangle(tuple(low), *size, facecolor=REGION, edgecolor=LINE, zorder=0))
         _draw_demonstrations(axes, view, demonstrated)
+        _draw_legend(axes, box is not None)
         for record in records:
             _draw_goal(axes, view, record)
             _draw_landings(figure, axes, view, record, badges=numbered_trials, with_truth=False)
@@ -82,7 +83,6 @@ def draw_overview(
             draw_badges(
                 figure, axes, goals, labels, [GOAL] * len(records), away_from=goals.mean(axis=0)
             )
-        _draw_legend(axes, box is not None)
     return figure
 
 
@@ -188,12 +188,14 @@ def _draw_landings(
         np.broadcast_to(shown(record, record.goal), (len(order), record.outcome_dim)), rows
     )
     colours = [trial_colour(i, n, hit=record.trials[i].hit) for i in order]
+    true_places: list[np.ndarray] = []
     for i, place, goal, row, colour in zip(order, places, goals, rows, colours, strict=True):
         _draw_arrow(axes, goal, place, colour)
         axes.plot(*place, "o", color=colour, markersize=6.5, markeredgecolor="white", zorder=6)
         truth = record.true_outcomes[i]
         if with_truth and truth is not None:
             true_place = view.project(shown(record, truth), row)
+            true_places.append(true_place)
             axes.plot(*np.stack([place, true_place]).T, ":", color=INK_SOFT, linewidth=1, zorder=5)
             axes.plot(
                 *true_place,
@@ -206,7 +208,8 @@ def _draw_landings(
             )
     if badges:
         labels = [str(record.trials[i].number) for i in order]
-        draw_badges(figure, axes, places, labels, colours, away_from=goals[0])
+        avoid = np.array(true_places).reshape(-1, 2)
+        draw_badges(figure, axes, places, labels, colours, away_from=goals[0], avoid=avoid)
 
 
 def _draw_arrow(

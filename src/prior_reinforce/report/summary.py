@@ -73,7 +73,10 @@ def headline(records: Sequence[AdaptationRecord]) -> Headline:
     else:
         spent = f"{mean:.1f} trials on average to reach a goal, from {min(counts)} to {max(counts)}"
     missing = len(records) - len(counts)
-    left_out = f" The {missing} not reached are left out of this mean." if missing else ""
+    left_out = ""
+    if missing:
+        goals = "goal that was" if missing == 1 else "goals that were"
+        left_out = f" This mean leaves out the {missing} {goals} not reached."
     return Headline(text, count, f"{n} demonstrations, then {spent}.{left_out} {within}")
 
 

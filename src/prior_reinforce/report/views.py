@@ -98,7 +98,7 @@ def prepare_axes(
         axes.set_ylim(*extent[:, view.vertical])
         axes.set_ylabel(_axis_label(record, view.vertical, mirrored=False))
     for axis in (axes.xaxis, axes.yaxis) if view.vertical is not None else (axes.xaxis,):
-        axis.set_major_locator(MaxNLocator(7, steps=[1, 2, 5, 10]))
+        axis.set_major_locator(MaxNLocator(9, steps=[1, 2, 5, 10]))
     if view.mirrored:
         axes.invert_xaxis()
 

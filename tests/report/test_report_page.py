@@ -1,0 +1,174 @@
+"""The page: whole in one file, numbers as told, nothing of the outside world."""
+
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+from PIL import Image
+from swing_world import FullStep, adaptation, demonstrations, pictures
+
+from prior_reinforce.errors import ConfigurationError
+from prior_reinforce.report import page, record_film, write_report
+from prior_reinforce.report.style import PICTURE_DPI
+
+REGION = [[0.80, -0.32], [1.08, 0.32]]
+_VOID_TAGS = {"meta", "img", "br", "link", "input", "hr"}
+
+
+class StrictReader(HTMLParser):
+    """Collects text and addresses; every tag must be closed by its own end."""
+
+    def __init__(self):
+        super().__init__()
+        self.open, self.text, self.addresses, self.alts = [], [], [], []
+
+    def handle_starttag(self, tag, attributes):
+        values = dict(attributes)
+        self.addresses += [values[name] for name in ("src", "href", "poster") if name in values]
+        if tag == "img":
+            self.alts.append(values["alt"])
+        if tag not in _VOID_TAGS:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        if self.open and self.open[-1] != "style":
+            self.text.append(data)
+
+
+def read(path):
+    reader = StrictReader()
+    reader.feed(path.read_text(encoding="utf-8"))
+    reader.close()
+    assert reader.open == []
+    reader.words = " ".join(" ".join(reader.text).split())
+    return reader
+
+
+@pytest.fixture(scope="module")
+def records(tmp_path_factory):
+    """Two goals: the first with a voided trial and a film, the second without."""
+    demos = demonstrations()
+    first, second = (
+        adaptation(goal, seed=seed, demos=demos)
+        for seed, goal in enumerate(([0.92, 0.10], [1.0, -0.22]))
+    )
+    film = record_film(pictures(12), tmp_path_factory.mktemp("film"), "throw")
+    missing = "No film: this machine has no OpenGL."
+    return (
+        replace(first, title="<script>alert(1)</script>", film=film, film_caption="The hit."),
+        replace(second, film_caption=missing),
+    )
+
+
+@pytest.fixture(scope="module")
+def report(records, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("report")
+    facts = {"Seeds": "training 0, goals 1", "Made by": "a <b>generator</b> & $x$"}
+    path = write_report(folder, records, title="Two & two", facts=facts, region=REGION)
+    return path, read(path)
+
+
+def test_the_page_needs_no_other_file_and_no_network(report):
+    path, reader = report
+    assert path.name == "report.html"
+    assert all(address.startswith(("data:", "#")) for address in reader.addresses)
+    html = re.sub(r"data:[a-z/0-9]+;base64,[A-Za-z0-9+/=]+", "", path.read_text())
+    assert not re.search(r"https?:|//|url\(|@import|<link|<script", html)
+
+
+def test_numbers_appear_as_told(report, records):
+    words = report[1].words
+    counts = [r.trials_to_hit for r in records]
+    assert "2 of 2 goals reached" in words
+    assert f"N = 6 + {np.mean(counts):.1f} trials" in words
+    assert "92 cm ahead, 10 cm to the left" in words
+    assert "100 cm ahead, 22 cm to the right" in words
+    assert "voided: ball slipped" in words
+    assert "No film: this machine has no OpenGL." in words
+    assert "training 0, goals 1" in words
+    first = records[0].trials[0]
+    long, left = first.error_seen * 100
+    said = f"{abs(long):g} cm {'long' if long > 0 else 'short'}"
+    assert f"{said}, {abs(left):g} cm {'left' if left > 0 else 'right'}" in words
+    assert f"{np.linalg.norm(first.error_seen) * 100:.1f}".rstrip("0").rstrip(".") + " cm" in words
+
+
+def test_no_number_is_missing(report):
+    assert not re.search(r"\b(nan|inf|None)\b", report[1].words, re.IGNORECASE)
+    assert not any(re.search(r"\b(nan|None)\b", alt) for alt in report[1].alts)
+
+
+def test_what_users_write_is_escaped(report):
+    path, reader = report
+    assert "<script>alert" not in path.read_text()
+    assert "<script>alert(1)</script>" in reader.words
+    assert "a <b>generator</b> & $x$" in reader.words
+
+
+def test_every_picture_says_what_it_shows(report):
+    assert len(report[1].alts) == 1 + 2 * 5 + 1
+    assert all(len(alt) > 20 for alt in report[1].alts)
+    assert any("voided: ball slipped" in alt for alt in report[1].alts)
+
+
+def test_pictures_lie_beside_the_page_at_print_size(report):
+    folder = report[0].parent
+    for name in ("table", "landings", "aims", "errors"):
+        with Image.open(folder / f"goal-1-{name}.png") as image:
+            assert image.size == (round(5.4 * PICTURE_DPI), round(4.5 * PICTURE_DPI))
+    with Image.open(folder / "goal-1-plans.png") as image:
+        assert image.size[0] == round(4 * 2.75 * PICTURE_DPI)
+    assert (folder / "overview.png").is_file()
+    assert not list(folder.glob(".*"))
+
+
+@pytest.mark.slow
+def test_the_same_trials_give_the_same_bytes(records, report, tmp_path):
+    facts = {"Seeds": "training 0, goals 1", "Made by": "a <b>generator</b> & $x$"}
+    again = write_report(tmp_path, records, title="Two & two", facts=facts, region=REGION)
+    assert again.read_bytes() == report[0].read_bytes()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("k", "units", "action_dim"),
+    [(1, ("m",), 1), (3, ("m", "m", "m"), 9), (2, ("m", "s"), 2)],
+)
+def test_other_outcomes_and_plans_are_reported_too(k, units, action_dim, tmp_path):
+    record = adaptation(seed=1, k=k, units=units, action_dim=action_dim, most=3)
+    reader = read(write_report(tmp_path, [record], title="other"))
+    assert ("Goal reached" in reader.words) or ("Goal not reached yet" in reader.words)
+    if units == ("m", "s"):
+        assert "distance 0.9 m, duration 0.1 s" in reader.words
+        assert "cm" not in reader.words
+    else:
+        assert "90 cm ahead" in reader.words
+
+
+def test_a_goal_not_tried_yet_has_a_report(tmp_path):
+    record = adaptation(seed=1, most=0)
+    reader = read(write_report(tmp_path, [record], title="before"))
+    assert "Goal not reached yet" in reader.words
+    assert "not tried yet" in reader.words
+    assert "N =" not in reader.words
+
+
+def test_a_large_film_lies_beside_the_page(records, tmp_path, monkeypatch):
+    monkeypatch.setattr(page, "LARGEST_INLINE_VIDEO", 10)
+    reader = read(write_report(tmp_path, records[:1], title="large"))
+    assert "throw.mp4" in reader.addresses
+    assert (tmp_path / "throw.mp4").read_bytes() == records[0].film.video.read_bytes()
+
+
+def test_bad_input_is_named_and_writes_nothing(tmp_path):
+    folder = tmp_path / "report"
+    with pytest.raises(ConfigurationError, match="at least one adaptation"):
+        write_report(folder, [], title="none")
+    with pytest.raises(ConfigurationError, match=r"region must have shape \(2, 2\)"):
+        write_report(folder, [adaptation(adapter=FullStep(), most=1)], title="x", region=[1, 2])
+    assert not folder.exists()
