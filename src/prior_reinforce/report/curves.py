@@ -54,7 +54,7 @@ def draw_errors(record: AdaptationRecord) -> Figure:
     )
     for i, size in zip(told, seen, strict=True):
         trial, colour = record.trials[i], trial_colour(i, n, hit=record.trials[i].hit)
-        axes.plot(trial.number, size, "o", color=colour, markersize=10, zorder=5)
+        axes.plot(trial.number, size, "o", color=colour, markersize=10, clip_on=False, zorder=5)
         axes.annotate(
             say_length(record, size / float(shown(record, np.array(1.0)))),
             (trial.number, size),
@@ -121,7 +121,8 @@ def draw_plans(record: AdaptationRecord) -> Figure:
         axes.set_title(f"{name} [{unit}]", loc="left", fontsize=9.5, color=INK)
         if j + columns >= d:
             axes.tick_params(labelbottom=True)
-            axes.set_xlabel("time [s]", fontsize=9)
+            if j // columns == rows - 1:
+                axes.set_xlabel("time [s]", fontsize=9)
     keys = [panels[0].plot([], [], color=DEMONSTRATION, label="demonstrations")[0]]
     for i, trial in enumerate(record.trials):
         label = f"trial {trial.number}" + (" (hit)" if trial.hit else "")
