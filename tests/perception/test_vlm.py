@@ -11,13 +11,15 @@ from vision_server import VisionServer
 
 from prior_reinforce.errors import ConfigurationError, PerceptionFailedError
 from prior_reinforce.perception.camera import Camera, CameraConfig
-from prior_reinforce.perception.scenes import TableScene, scene_of
+from prior_reinforce.perception.scenes import SeenObject, TableScene, scene_of
 from prior_reinforce.perception.vlm import VisionLanguageModel
 from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
 from prior_reinforce.rollouts import Rollout
 from prior_reinforce.tasks import make_task
 
-SCENE = TableScene("the orange ball", "the red ring", RIM_HEIGHT)
+SCENE = TableScene(
+    SeenObject("the orange ball", 0.06), SeenObject("the red ring", 0.102), RIM_HEIGHT
+)
 BALL, GOAL = np.array([0.95, 0.20]), np.array([0.80, 0.08])
 FAMILIES = ["glm-4.5v", "qwen2-vl", "qwen2.5-vl", "qwen3-vl"]
 RNG = np.random.default_rng(0)
@@ -122,6 +124,7 @@ def test_what_can_be_mended_costs_no_further_request(fault, family, looking, pic
         "truncated",
         "out of range",
         "no area",
+        "whole picture",
         "thinking without end",
         "two objects",
         "null content",
@@ -308,5 +311,7 @@ def test_what_cannot_be_seen_is_refused_before_anyone_is_asked(
     monkeypatch.delenv("NO_SUCH_KEY", raising=False)
     with pytest.raises(ConfigurationError, match="NO_SUCH_KEY is not set"):
         VisionLanguageModel(SCENE, VisionLanguageModelConfig(api_key_variable="NO_SUCH_KEY"))
+    with pytest.raises(ConfigurationError, match="of 0 m"):
+        SeenObject("the ball", 0)
     with pytest.raises(ConfigurationError, match="'bowling', only for basketball-v1, curling"):
         scene_of("bowling")

@@ -20,24 +20,27 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 from PIL import Image
+from scipy import ndimage
 
 Fault = Literal[
     "refusal", "empty", "truncated", "swapped corners", "out of range", "no area",
     "thinking in the text", "thinking kept apart", "thinking without end", "draft before",
     "markers stripped", "markers leaked", "end marker lost", "bracket style", "two objects",
-    "null content", "outlier", "timeout", "dropped", "http 401", "http 404", "http 429",
-    "http 500", "web page", "no choices",
+    "null content", "outlier", "whole picture", "timeout", "dropped", "http 401", "http 404",
+    "http 429", "http 500", "web page", "no choices",
 ]  # fmt: skip
 FAULTS: tuple[Fault, ...] = get_args(Fault)
 
 # Hue in degrees, least saturation. Table, floor, arm and shadows of our scenes are all paler.
-COLOURS = {"red": (-12.0, 10.0, 0.62), "orange": (16.0, 40.0, 0.72), "blue": (195.0, 245.0, 0.55)}
+COLOURS = {"red": (-12.0, 10.0, 0.62), "orange": (14.0, 36.0, 0.72), "blue": (195.0, 245.0, 0.55)}
 
 Box = tuple[float, float, float, float]
 
 
 def find_by_colour(picture: np.ndarray, words: str) -> Box | None:
-    """Bounding box, in pixels, of all of the one colour that the words name; None if there is none.
+    """Bounding box, in pixels, of what has the colour that the words name; None if nothing has.
+
+    Specks do not count; pieces do, as something may lie across the object.
 
     Args:
         picture: Shape (height, width, 3), dtype uint8.
@@ -47,9 +50,12 @@ def find_by_colour(picture: np.ndarray, words: str) -> Box | None:
     hue, saturation, value = np.moveaxis(np.asarray(Image.fromarray(picture).convert("HSV")), 2, 0)
     degrees = (hue * (360 / 256) - low) % 360 + low
     of_colour = (degrees <= high) & (saturation > 255 * least_saturation) & (value > 60)
-    rows, columns = np.nonzero(of_colour)
-    if len(rows) < 12:
+    pieces, n_pieces = ndimage.label(of_colour, np.ones((3, 3)))
+    areas = np.bincount(pieces.ravel(), minlength=n_pieces + 1)
+    areas[0] = 0  # the background
+    if areas.max() < 12:
         return None
+    rows, columns = np.nonzero((areas > areas.max() / 5)[pieces])
     return float(columns.min()), float(rows.min()), columns.max() + 1.0, rows.max() + 1.0
 
 
@@ -176,6 +182,8 @@ class VisionServer:
             message["content"] = self._say((x2, y2, x1, y1), size, words)
         elif fault == "out of range":
             message["content"] = self._say((x1, y1, x2 + 2 * size[0], y2), size, words)
+        elif fault == "whole picture":
+            message["content"] = self._say((0.0, 0.0, *size), size, words)
         elif fault == "no area":
             message["content"] = self._say((x1, y1, x1, y2), size, words)
         elif fault == "thinking in the text":

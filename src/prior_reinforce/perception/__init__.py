@@ -6,7 +6,7 @@ from prior_reinforce.perception.calibration import TableCalibration
 from prior_reinforce.perception.camera import Camera, CameraConfig
 from prior_reinforce.perception.exact import Exact
 from prior_reinforce.perception.eye import Eye
-from prior_reinforce.perception.scenes import TableScene, scene_of
+from prior_reinforce.perception.scenes import SeenObject, TableScene, scene_of
 from prior_reinforce.perception.vlm import VisionLanguageModel
 from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
 
@@ -17,6 +17,7 @@ __all__ = [
     "Exact",
     "Eye",
     "Perception",
+    "SeenObject",
     "TableCalibration",
     "TableScene",
     "VisionLanguageModel",

@@ -12,17 +12,35 @@ _TABLE_MARKS = tuple((x, y) for x in (0.5, 0.85, 1.2) for y in (-0.4, 0.0, 0.4))
 
 
 @dataclass(frozen=True)
+class SeenObject:
+    """An object in words that a model understands."""
+
+    words: str
+    """For instance `the orange ball`; only one thing in the picture answers to it."""
+    size: float
+    """Longer side of a box around it, in [m]. A box of less than half of it, or more than twice,
+    is not around this object, however often the model repeats it."""
+
+    def __post_init__(self) -> None:
+        if not (self.words.strip() and self.size > 0):
+            raise ConfigurationError(
+                f"object '{self.words}' of {self.size} m cannot be looked for; give it words and "
+                "its size in metres"
+            )
+
+
+@dataclass(frozen=True)
 class TableScene:
-    """The two objects whose centres tell the error, in words that a model understands.
+    """The two objects whose centres tell the error.
 
     The error seen is the reached object's centre minus the goal; the goal is the goal object's
     centre plus `goal_offset`.
     """
 
-    reached: str
-    """The object whose place is the outcome, for instance `the orange ball`."""
-    goal: str
-    """The object that stands at the goal, for instance `the red hoop`."""
+    reached: SeenObject
+    """The object whose place is the outcome."""
+    goal: SeenObject
+    """The object that stands at the goal."""
     plane_height: float
     """Height above the table of the plane in which both centres lie at the key frame, in [m]."""
     goal_offset: tuple[float, float] = (0.0, 0.0)
@@ -33,11 +51,13 @@ class TableScene:
 
 SCENES: dict[str, TableScene] = {
     # The outcome is where the ball's centre comes down through the rim's plane, 10 cm up.
-    "basketball-v1": TableScene("the orange ball", "the red hoop", plane_height=0.10),
+    "basketball-v1": TableScene(
+        SeenObject("the orange ball", 0.06), SeenObject("the red hoop", 0.10), plane_height=0.10
+    ),
     # Both stones lie on the table and are 3 cm high; the goal is 8 cm before the target stone.
     "curling": TableScene(
-        "the curling stone with the blue handle",
-        "the curling stone with the red handle",
+        SeenObject("the curling stone with the blue handle", 0.06),
+        SeenObject("the curling stone with the red handle", 0.06),
         plane_height=0.02,
         goal_offset=(-0.08, 0.0),
     ),

@@ -8,6 +8,7 @@ ours, because models return no labels with their boxes, refuse, ramble and now a
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
@@ -16,7 +17,7 @@ from prior_reinforce.errors import ConfigurationError, PerceptionFailedError
 from prior_reinforce.perception.base import Perception
 from prior_reinforce.perception.calibration import TableCalibration
 from prior_reinforce.perception.camera import Camera
-from prior_reinforce.perception.scenes import TableScene
+from prior_reinforce.perception.scenes import SeenObject, TableScene
 from prior_reinforce.perception.vlm_client import (
     ModelClient,
     SentPicture,
@@ -130,15 +131,18 @@ class VisionLanguageModel(Perception):
         self._calibration = self._camera.calibrate(key_frame.model, marks, height=height)
         self._scene_model = key_frame.model
 
-    def _find(self, words: str, picture: SentPicture, calibration: TableCalibration) -> Sighting:
+    def _find(
+        self, wanted: SeenObject, picture: SentPicture, calibration: TableCalibration
+    ) -> Sighting:
         """Ask for one object until enough answers agree, or none will."""
-        votes = self.config.votes
+        words, votes = wanted.words, self.config.votes
         answers: list[Answer] = []
         for _ in range(self.config.most_requests):
             try:
-                answers.append(self._client.ask(words, picture))
+                answer = self._client.ask(words, picture)
             except PerceptionFailedError as error:
                 return Sighting(words, tuple(answers), problem=f"looking for {words}: {error}")
+            answers.append(_of_right_size(answer, wanted.size, calibration))
             boxes = [answer.box for answer in answers if answer.box is not None]
             absent = sum(answer.absent for answer in answers)
             if len(boxes) + absent >= votes and absent > len(boxes):
@@ -149,6 +153,19 @@ class VisionLanguageModel(Perception):
                 place = calibration.to_table(_centres(np.array([box])))[0]
                 return Sighting(words, tuple(answers), box, place)
         return Sighting(words, tuple(answers), problem=_no_agreement(words, answers, self.config))
+
+
+def _of_right_size(answer: Answer, size: float, calibration: TableCalibration) -> Answer:
+    """The answer, without its box where that cannot be around an object of this size [m]."""
+    if answer.box is None:
+        return answer
+    left, top, right, bottom = answer.box
+    corners = calibration.to_table(np.array([[left, top], [right, top], [left, bottom]]))
+    side = float(np.linalg.norm(corners[1:] - corners[0], axis=1).max())
+    if size / 2 <= side <= 2 * size:
+        return answer
+    problem = f"a box of {100 * side:.1f} cm for an object of {100 * size:.1f} cm"
+    return replace(answer, box=None, problem=problem)
 
 
 def _centres(boxes: np.ndarray) -> np.ndarray:
