@@ -1,15 +1,18 @@
-"""Make the prior sets of Basketball Shot V1: `python -m prior_reinforce.tasks.demonstrations.basketball`.
+"""Make the prior sets of Basketball Shot V1.
+
+    python -m prior_reinforce.tasks.demonstrations.basketball
 
 As in the paper, the demonstrations are found in simulation and spread over the reachable region.
 All are one motion pattern, with differences such as a person's repetitions have: when it starts,
 how fast it goes, how far each joint swings, and the posture it swings in. Each is solved, in
-simulation, for the swing and the direction that land the ball near its designed point; then it is
+simulation, for the reach and the direction that land the ball near its designed point; then it is
 executed once, with the disturbances of any execution, and where that ball landed is its outcome.
 """
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,14 +25,18 @@ from prior_reinforce.tasks.basketball import BasketballShot
 HORIZON = 140
 """Frames, as in the paper."""
 READY = np.array([0.0, -1.098, 0.0, -0.598, 0.0, 2.775, np.pi / 4])
-"""Posture before the throw, in [rad]: the spoon level behind the head, the ball at 0.9 m."""
-SWING = np.array([0.0, 0.747, 0.0, -0.728, 0.0, -0.987, 0.0])
-"""Travel of each joint at swing 1, in [rad]."""
+"""Posture before the throw, in [rad]: the arm leans back, the spoon is level on top."""
+SWING = np.array([0.0, 0.62, 0.0, -0.605, 0.0, -0.82, 0.0])
+"""Travel of each joint in a throw to the middle of the region, in [rad]."""
+LEAN = np.array([0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0])
+"""How the posture goes with reach, in [rad/rad]: a longer throw leans in; the spoon stays level."""
+SWING_PER_REACH = 0.6
+"""Relative change of the swing with reach, in [1/rad]: a longer throw also swings further."""
 DURATION = 1.05
 """Of the throw at tempo 1, in [s]."""
 DESIGNED = {
-    "A": ((0.92, -0.28), (0.92, 0.27), (1.19, -0.28), (1.20, 0.28), (1.03, -0.02), (1.13, 0.05)),
-    "B": ((0.91, 0.02), (0.99, -0.29), (0.96, 0.28), (1.20, -0.24), (1.19, 0.25), (1.08, -0.05)),
+    "A": ((0.92, -0.27), (0.92, 0.26), (1.18, -0.27), (1.19, 0.27), (1.00, -0.04), (1.11, 0.06)),
+    "B": ((0.91, 0.03), (0.97, -0.28), (0.95, 0.27), (1.20, -0.20), (1.17, 0.27), (1.07, -0.03)),
 }
 """Where the six throws of each set are to land, (x, y) in [m]."""
 SEEDS = {"A": 1, "B": 2}
@@ -81,16 +88,12 @@ def make(name: str, differences: Differences | None = None) -> Demonstrations:
     postures = READY + rng.normal(0.0, size.posture, (n, 7)) * (np.arange(7) > 0)
 
     def plans(knobs: np.ndarray) -> np.ndarray:
-        """Plans (n, H, 7) for swings and directions of the throw, shape (n, 2)."""
-        base = np.zeros((n, 7))
-        base[:, 0] = knobs[:, 1]
+        """Plans (n, H, 7) for reach and direction of the throw, shape (n, 2), in [rad]."""
+        reach, direction = knobs[:, :1], knobs[:, 1:]
+        base = reach * LEAN + direction * np.eye(7)[0]
+        travel = (1.0 + SWING_PER_REACH * reach) * amplitudes * SWING
         return np.stack(
-            [
-                throw(*one, dt)
-                for one in zip(
-                    starts, tempi, knobs[:, :1] * amplitudes * SWING, postures + base, strict=True
-                )
-            ]
+            [throw(*one, dt) for one in zip(starts, tempi, travel, postures + base, strict=True)]
         )
 
     def land(knobs: np.ndarray) -> np.ndarray:
@@ -102,9 +105,11 @@ def make(name: str, differences: Differences | None = None) -> Demonstrations:
     return Demonstrations(solved, outcomes, task.format)
 
 
-def _solve(land, targets: np.ndarray, tolerance: float = 4e-3) -> np.ndarray:
-    """Newton's method on swing and direction, all throws at once, differences of 3 %."""
-    knobs = np.column_stack([np.full(len(targets), 0.95), np.arctan2(targets[:, 1], targets[:, 0])])
+def _solve(
+    land: Callable[[np.ndarray], np.ndarray], targets: np.ndarray, tolerance: float = 4e-3
+) -> np.ndarray:
+    """Newton's method on reach and direction, all throws at once, differences of 0.03 rad."""
+    knobs = np.column_stack([np.zeros(len(targets)), np.arctan2(targets[:, 1], targets[:, 0])])
     for _ in range(12):
         miss = land(knobs) - targets
         if np.linalg.norm(miss, axis=1).max() < tolerance:

@@ -1,0 +1,36 @@
+"""Pictures of a scene, with one clear error where the machine cannot draw."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import mujoco
+
+from prior_reinforce.errors import RenderingUnavailableError
+
+
+@contextmanager
+def open_renderer(model: mujoco.MjModel, width: int, height: int) -> Iterator[mujoco.Renderer]:
+    """Give a renderer of `width` x `height` pixels and free its graphics memory afterwards.
+
+    Raises:
+        RenderingUnavailableError: There is no OpenGL on this machine.
+    """
+    # The frame buffer's size is part of the model, and the model is shared: draw a copy.
+    drawn = copy.copy(model)
+    screen = drawn.vis.global_
+    screen.offwidth = max(screen.offwidth, width)
+    screen.offheight = max(screen.offheight, height)
+    try:
+        renderer = mujoco.Renderer(drawn, height, width)
+    except Exception as error:  # each OpenGL backend fails with exceptions of its own
+        raise RenderingUnavailableError(
+            f"no film can be drawn, OpenGL is not available ({error}); on a machine without a "
+            "display set MUJOCO_GL=egl and install libegl1 (or MUJOCO_GL=osmesa and libosmesa6)"
+        ) from error
+    try:
+        yield renderer
+    finally:
+        renderer.close()
