@@ -5,19 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 from rich.console import Console
-from typing_extensions import assert_never
 
-from prior_reinforce.adapters import (
-    Adapter,
-    FrozenAdapter,
-    GaussianProcessAdapter,
-    GaussianProcessConfig,
-    ProportionalAdapter,
-)
 from prior_reinforce.commands.learning import learn, load_learned
 from prior_reinforce.commands.live import LiveView
 from prior_reinforce.commands.task_options import Simulated
@@ -27,15 +18,12 @@ from prior_reinforce.errors import (
     RenderingUnavailableError,
 )
 from prior_reinforce.experiments.goals import unseen_goals
+from prior_reinforce.experiments.methods import make_adapter, make_perception
 from prior_reinforce.experiments.protocol import GoalTrials, is_hit, run_goals
 from prior_reinforce.generators import DiffusionConfig, Generator
 from prior_reinforce.motions import Demonstrations
-from prior_reinforce.perception import Amplified, Exact, Eye, Perception
 from prior_reinforce.report import AdaptationRecord, Film, record_film, write_report
 from prior_reinforce.tasks import Task
-
-AdapterName = Literal["gp", "proportional", "frozen"]
-PerceptionName = Literal["exact", "eye", "amplified"]
 
 
 @dataclass(frozen=True)
@@ -44,12 +32,11 @@ class Adapt(Simulated):
 
     goal: tuple[str, ...] = ("random",)
     """The goal in metres, for instance `0.92 0.10` (forward, left), or `random`."""
-    perception: PerceptionName = "eye"
-    """How a trial's error is seen."""
-    adapter: AdapterName = "gp"
-    """How the condition is corrected."""
-    memory_size: int | None = 2
-    """Trials the gp adapter keeps (m of the paper); None keeps all."""
+    perception: str = "eye"
+    """How a trial's error is seen: exact, eye, amplified, or one's own as module:Class."""
+    adapter: str = "gp"
+    """How the condition is corrected: gp (m = 2), gp-all (m = infinity), proportional, frozen, or
+    one's own as module:Class."""
     rounds: int = 10
     """Trials at most."""
     model: Path | None = None
@@ -66,7 +53,8 @@ class Adapt(Simulated):
         if self.rounds < 1:
             raise ConfigurationError(f"--rounds must be at least 1, got {self.rounds}")
         goals = self._goals(task, demonstrations)
-        make_adapter(self.adapter, self.memory_size)
+        make_adapter(self.adapter)
+        make_perception(self.perception)
         if self.model is None:
             generator = learn(
                 demonstrations,
@@ -186,28 +174,6 @@ class Rollout(Simulated):
         return generator.generate(condition[None])[0], condition
 
 
-def make_adapter(name: AdapterName, memory_size: int | None) -> Adapter:
-    """Make an adapter by its name on the command line."""
-    if name == "gp":
-        return GaussianProcessAdapter(GaussianProcessConfig(memory_size=memory_size))
-    if name == "proportional":
-        return ProportionalAdapter()
-    if name == "frozen":
-        return FrozenAdapter()
-    assert_never(name)
-
-
-def make_perception(name: PerceptionName) -> Perception:
-    """Make a perception by its name on the command line."""
-    if name == "exact":
-        return Exact()
-    if name == "eye":
-        return Eye()
-    if name == "amplified":
-        return Amplified()
-    assert_never(name)
-
-
 def adapt(
     settings: Adapt,
     task: Task,
@@ -226,7 +192,7 @@ def adapt(
         (result,) = run_goals(
             task,
             generator,
-            lambda: make_adapter(settings.adapter, settings.memory_size),
+            lambda: make_adapter(settings.adapter),
             make_perception(settings.perception),
             demonstrations,
             goal[None],
@@ -258,7 +224,7 @@ def adapt(
             "Task": f"{task.name}, tolerance {task.tolerance * 100:g} cm",
             "Demonstrations": f"set {settings.demonstrations}, {demonstrations.n}",
             "Generator": generator.name,
-            "Adapter": _describe_adapter(settings),
+            "Adapter": settings.adapter,
             "Perception": settings.perception,
             "Seed": str(settings.seed),
             "Version": version("prior-reinforce"),
@@ -267,13 +233,6 @@ def adapt(
     )
     console.print(f"report: {page}")
     return results
-
-
-def _describe_adapter(settings: Adapt) -> str:
-    if settings.adapter != "gp":
-        return settings.adapter
-    kept = "all trials" if settings.memory_size is None else f"latest {settings.memory_size} trials"
-    return f"Gaussian process, demonstrations and {kept}"
 
 
 def _film(
