@@ -56,6 +56,9 @@ def test_a_step_of_acceleration_where_a_hold_ends_shows_in_the_jerk():
     start = int(np.flatnonzero(fine.t == 0)[0])
     assert fine.dddq[start, 0] == pytest.approx(fine.ddq[start, 0] * 1000)
     assert fine.ddq[start, 0] > 50
+    # Without samples of the hold, the first sample still counts the step from rest.
+    alone = interpolate(ramp, 0.01)
+    assert alone.dddq[0, 0] == pytest.approx(alone.ddq[0, 0] * 1000)
 
 
 def test_a_time_step_that_no_binary_fraction_holds_adds_no_sample():

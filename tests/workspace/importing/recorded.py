@@ -11,6 +11,7 @@ import h5py
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
+import zarr
 from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
@@ -169,6 +170,19 @@ def write_droid(folder: Path) -> Path:
                 int
             )
     return folder
+
+
+def write_zarr(folder: Path, rate: float = 50) -> Path:
+    path = folder / "replay_buffer.zarr"
+    root = zarr.open_group(str(path), mode="w", zarr_format=2)
+    data, meta = root.create_group("data"), root.create_group("meta")
+    parts = [sampled(i, rate)[1] for i in range(N)]
+    whole = np.concatenate(parts)
+    data.create_array("joint_pos", data=whole, chunks=(64, 7))
+    data.create_array("action", data=whole + 1, chunks=(64, 7))
+    data.create_array("img", data=np.zeros((len(whole), 2, 2, 3), dtype=np.uint8))
+    meta.create_array("episode_ends", data=np.cumsum([len(part) for part in parts]))
+    return path
 
 
 Bag = Callable[..., Path]

@@ -18,6 +18,7 @@ from recorded import (
     write_npz,
     write_outcomes,
     write_robomimic,
+    write_zarr,
 )
 
 from prior_reinforce.errors import (
@@ -33,10 +34,14 @@ WRITERS = {
     "lerobot": lambda folder: write_lerobot(folder / "set", rate=50),
     "robomimic": write_robomimic,
     "droid": write_droid,
+    "zarr": write_zarr,
     "ros1": lambda folder: write_bags(folder, kind="ros1", rate=20),
     "sqlite": lambda folder: write_bags(folder, kind="sqlite", rate=20),
     "mcap": lambda folder: write_bags(folder, kind="mcap", rate=20),
 }
+
+
+OPTIONS = {"zarr": {"key": "joint_pos", "rate": 50}}
 
 
 @pytest.fixture(scope="module")
@@ -53,12 +58,18 @@ def originals(tmp_path_factory):
 
 
 def source_of(folder, name):
-    return {"lerobot": folder / "set", "robomimic": folder / "demos.hdf5"}.get(name, folder)
+    return {
+        "lerobot": folder / "set",
+        "robomimic": folder / "demos.hdf5",
+        "zarr": folder / "replay_buffer.zarr",
+    }.get(name, folder)
 
 
 @pytest.mark.parametrize("name", WRITERS)
 def test_the_originals_are_good(originals, name):
-    result = import_demonstrations(source_of(originals[name], name), joints=JOINTS)
+    result = import_demonstrations(
+        source_of(originals[name], name), joints=JOINTS, **OPTIONS.get(name, {})
+    )
     assert result.demonstrations.n == N
 
 
@@ -83,7 +94,7 @@ def test_damaged_bytes(originals, tmp_path, name, cut, file, where, bit):
     import_damaged(originals[name], tmp_path, name, cut, file, where, bit)
 
 
-@pytest.mark.parametrize("name", ["lerobot", "droid", "ros1", "sqlite", "mcap"])
+@pytest.mark.parametrize("name", ["lerobot", "droid", "zarr", "ros1", "sqlite", "mcap"])
 @tries(25)
 @damage
 def test_damaged_bytes_of_slower_formats(originals, tmp_path, name, cut, file, where, bit):
@@ -109,7 +120,9 @@ def import_damaged(original, tmp_path, name, cut, file, where, bit):
         # A flipped bit may make an angle that looks like degrees; that is a warning's business.
         warnings.simplefilter("ignore", UserWarning)
         try:
-            result = import_demonstrations(source_of(folder, name), joints=JOINTS)
+            result = import_demonstrations(
+                source_of(folder, name), joints=JOINTS, **OPTIONS.get(name, {})
+            )
         except PriorReinforceError as error:
             message = str(error)
         else:

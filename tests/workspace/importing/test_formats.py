@@ -2,10 +2,12 @@
 
 import builtins
 import importlib
+import shutil
 
 import h5py
 import numpy as np
 import pytest
+import zarr
 from recorded import (
     AFTER,
     BEFORE,
@@ -23,6 +25,7 @@ from recorded import (
     write_npz,
     write_outcomes,
     write_robomimic,
+    write_zarr,
 )
 
 from prior_reinforce.errors import (
@@ -179,6 +182,30 @@ def test_droid_at_another_rate(tmp_path):
     assert result.episodes == tuple(f"episode_{i}" for i in range(N))
 
 
+@pytest.mark.parametrize("zipped", [False, True])
+def test_zarr_replay_buffers(tmp_path, zipped):
+    path = write_zarr(tmp_path)
+    if zipped:
+        shutil.make_archive(str(path), "zip", path)
+        path = path.with_suffix(".zarr.zip")
+    write_outcomes(tmp_path)
+    result = import_demonstrations(
+        path, key="joint_pos", rate=50, joints=JOINTS, preprocessing=AS_IS
+    )
+    check_motions(result, 50, tolerance=0)
+    with pytest.raises(FileFormatError, match=r"'action', 'joint_pos'\]: say which"):
+        read_recordings(path, rate=50)
+    with pytest.raises(FileFormatError, match="give the rate"):
+        read_recordings(path, key="action")
+
+
+def test_a_replay_buffer_whose_episodes_end_elsewhere(tmp_path):
+    path = write_zarr(tmp_path)
+    zarr.open_group(str(path), mode="r+")["meta/episode_ends"][1] = 5
+    with pytest.raises(FileFormatError, match="episodes end at"):
+        read_recordings(path, key="action", rate=50)
+
+
 KINDS = ["ros1", "sqlite", "mcap"]
 
 
@@ -239,6 +266,7 @@ def test_an_unknown_topic_lists_the_usable_ones(tmp_path):
     [
         ("pyarrow", "lerobot", lambda folder: write_lerobot(folder / "set")),
         ("h5py", "hdf5", write_robomimic),
+        ("zarr", "zarr", write_zarr),
         ("rosbags", "ros", lambda folder: write_bag(folder / "throw0", 0, kind="mcap")),
     ],
 )
@@ -260,7 +288,7 @@ def test_the_core_formats_need_no_optional_library(tmp_path, monkeypatch):
     real = builtins.__import__
 
     def without(name, *arguments, **options):
-        if name.split(".")[0] in ("pyarrow", "h5py", "rosbags"):
+        if name.split(".")[0] in ("pyarrow", "h5py", "rosbags", "zarr"):
             raise ModuleNotFoundError(f"No module named {name!r}")
         return real(name, *arguments, **options)
 
@@ -292,8 +320,8 @@ def test_a_folder_of_two_formats_asks_which(tmp_path):
     with pytest.raises(FileFormatError, match="npz and csv; say its format"):
         read_recordings(tmp_path)
     assert len(read_recordings(tmp_path, format="csv")) == N
-    with pytest.raises(ConfigurationError, match="unknown format 'zarr'"):
-        read_recordings(tmp_path, format="zarr")
+    with pytest.raises(ConfigurationError, match="unknown format 'pickle'"):
+        read_recordings(tmp_path, format="pickle")
 
 
 def test_durations_are_those_written(tmp_path):

@@ -12,6 +12,10 @@ from prior_reinforce.workspace.importing.hdf5 import read_droid, read_robomimic
 from prior_reinforce.workspace.importing.lerobot import read_lerobot
 from prior_reinforce.workspace.importing.npz_csv import read_csv, read_npz
 from prior_reinforce.workspace.importing.recording import Reading, Recording, RecordingFormat
+from prior_reinforce.workspace.importing.replay_buffer import (
+    is_replay_buffer,
+    read_replay_buffer,
+)
 from prior_reinforce.workspace.importing.ros import read_ros
 
 READERS: dict[RecordingFormat, Callable[[Path, Reading], list[Recording]]] = {
@@ -21,6 +25,7 @@ READERS: dict[RecordingFormat, Callable[[Path, Reading], list[Recording]]] = {
     "robomimic": read_robomimic,
     "droid": read_droid,
     "ros": read_ros,
+    "zarr": read_replay_buffer,
 }
 """One reader a format."""
 
@@ -33,6 +38,8 @@ def detect_format(source: Path) -> RecordingFormat:
     """
     if not source.exists():
         raise FileFormatError(f"no recording at {source}; give the path of a file or a folder")
+    if is_replay_buffer(source):
+        return "zarr"
     found: list[RecordingFormat] = []
     if source.is_dir():
         if (source / "meta" / "info.json").is_file():

@@ -9,8 +9,9 @@ import numpy as np
 
 from prior_reinforce.errors import FileFormatError, InvalidDemonstrationsError
 
-RecordingFormat = Literal["npz", "csv", "lerobot", "robomimic", "droid", "ros"]
-"""What can be read. `ros` covers ROS 1 bags, ROS 2 sqlite bags and MCAP."""
+RecordingFormat = Literal["npz", "csv", "lerobot", "robomimic", "droid", "ros", "zarr"]
+"""What can be read. `ros` covers ROS 1 bags, ROS 2 sqlite bags and MCAP; `zarr` is the replay
+buffer of Diffusion Policy."""
 
 
 @dataclass(frozen=True)
