@@ -118,7 +118,7 @@ def test_the_horizon_grows_rather_than_cut_a_motion_off():
 def test_a_step_like_channel_does_not_overshoot():
     plans = np.stack(
         [
-            np.stack([ramp(1 + s, 0.9), (FRAMES * DT > 1.4 + s).astype(float)], axis=1)
+            np.stack([ramp(1 + s, 0.9), (1.4 + s < FRAMES * DT).astype(float)], axis=1)
             for s in (0.013, -0.027)
         ]
     )

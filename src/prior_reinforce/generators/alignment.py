@@ -76,8 +76,8 @@ def align(demonstrations: Demonstrations, config: AlignmentConfig | None = None)
     Each velocity profile (all action dimensions; those of one unit divided by their pooled root
     mean square) is moved to where it correlates best with the sum of the others, in turn, until
     nothing moves: a coordinate ascent on the sum of all pairwise correlations. Lags are continuous,
-    not whole frames. The common offset, which no correlation can tell, is the one with mean shift zero, or
-    the nearest to it that cuts no motion off.
+    not whole frames. The common offset, which no correlation can tell, is the one with mean shift
+    zero, or the nearest to it that cuts no motion off.
 
     Args:
         demonstrations: N plans (N, H, D); each at rest at both ends.

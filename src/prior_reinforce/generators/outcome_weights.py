@@ -72,7 +72,8 @@ def smooth_weights(conditions: np.ndarray, outcomes: np.ndarray, *, kernel: Kern
 
     Args:
         conditions: c, shape (n, k).
-        outcomes: r, shape (N, k). With N <= k there is no affine tail but a constant one.
+        outcomes: r, shape (N, k). With N <= k the tail is constant, and the kernel linear, because
+            the other one needs an affine tail to be solvable.
         kernel: :math:`\varphi(d)` is d^2 log d (`thin-plate`) or d (`linear`).
 
     Returns:
@@ -84,6 +85,7 @@ def smooth_weights(conditions: np.ndarray, outcomes: np.ndarray, *, kernel: Kern
     known, asked = (outcomes - centre) / scale, (conditions - centre) / scale
     n_known, k = known.shape
     tail = k if n_known > k else 0
+    kernel = kernel if tail else "linear"
     tail_known = np.hstack([np.ones((n_known, 1)), known[:, :tail]])
     tail_asked = np.hstack([np.ones((len(asked), 1)), asked[:, :tail]])
     n_tail = tail_known.shape[1]

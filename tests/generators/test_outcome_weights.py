@@ -1,0 +1,77 @@
+"""Weights over demonstrations against values worked by hand and against SciPy."""
+
+import numpy as np
+import pytest
+from scipy.interpolate import RBFInterpolator
+
+from prior_reinforce.generators.outcome_weights import inverse_distance_weights, smooth_weights
+
+OUTCOMES = np.random.default_rng(0).uniform(size=(6, 2))
+CONDITIONS = np.random.default_rng(1).uniform(-0.3, 1.3, size=(20, 2))
+
+
+def test_inverse_distance_is_the_value_worked_by_hand():
+    """Distances 1, 2, 3: with power 1 the nearest two weigh 2:1; with power 2 all, 36:9:4."""
+    outcomes = np.array([[0.0], [3.0], [4.0]])
+    conditions = np.array([[1.0]])
+    weights = inverse_distance_weights(conditions, outcomes, neighbours=2, power=1.0)
+    np.testing.assert_allclose(weights, [[2 / 3, 1 / 3, 0]])
+    weights = inverse_distance_weights(conditions, outcomes, neighbours=3, power=2.0)
+    np.testing.assert_allclose(weights, np.array([[36, 9, 4]]) / 49)
+
+
+def test_inverse_distance_returns_a_demonstration_exactly_at_its_outcome():
+    weights = inverse_distance_weights(OUTCOMES, OUTCOMES, neighbours=4, power=2.0)
+    np.testing.assert_array_equal(weights, np.eye(6))
+
+
+def test_inverse_distance_survives_great_powers_and_tiny_distances():
+    conditions = OUTCOMES + 1e-14
+    weights = inverse_distance_weights(conditions, OUTCOMES, neighbours=6, power=50.0)
+    np.testing.assert_allclose(weights, np.eye(6), atol=1e-12)
+
+
+@pytest.mark.parametrize("kernel", ["linear", "thin-plate"])
+def test_smooth_weights_interpolate_as_scipy_does(kernel: str):
+    """SciPy's RBFInterpolator of the same kernel and tail, on outcomes scaled the same way."""
+    values = np.random.default_rng(2).normal(size=(6, 3))
+    scale = np.ptp(OUTCOMES, axis=0)
+    theirs = RBFInterpolator(
+        OUTCOMES / scale,
+        values,
+        kernel={"linear": "linear", "thin-plate": "thin_plate_spline"}[kernel],
+        degree=1,
+    )
+    ours = smooth_weights(CONDITIONS, OUTCOMES, kernel=kernel) @ values
+    np.testing.assert_allclose(ours, theirs(CONDITIONS / scale), atol=1e-9)
+
+
+@pytest.mark.parametrize("kernel", ["linear", "thin-plate"])
+def test_smooth_weights_reproduce_an_affine_dependence_everywhere(kernel: str):
+    slope = np.array([[0.4, -1.0], [2.0, 0.3]])
+    weights = smooth_weights(CONDITIONS, OUTCOMES, kernel=kernel)
+    np.testing.assert_allclose(weights @ (OUTCOMES @ slope + 3), CONDITIONS @ slope + 3, atol=1e-10)
+    np.testing.assert_allclose(weights.sum(axis=1), 1, atol=1e-12)
+
+
+def test_two_demonstrations_of_two_components_are_joined_without_an_affine_tail():
+    outcomes = np.array([[0.0, 0.0], [1.0, 2.0]])
+    middle = smooth_weights(outcomes.mean(axis=0)[None], outcomes, kernel="linear")
+    np.testing.assert_allclose(middle, [[0.5, 0.5]])
+    at_ends = smooth_weights(outcomes, outcomes, kernel="linear")
+    np.testing.assert_allclose(at_ends, np.eye(2), atol=1e-12)
+
+
+@pytest.mark.parametrize("scheme", ["nearest", "smooth"])
+def test_the_unit_of_a_component_does_not_matter(scheme: str):
+    """Metres and milliseconds: every component counts relative to its demonstrated range."""
+    factor = np.array([1.0, 1000.0])
+
+    def weights(conditions: np.ndarray, outcomes: np.ndarray) -> np.ndarray:
+        if scheme == "nearest":
+            return inverse_distance_weights(conditions, outcomes, neighbours=3, power=2.0)
+        return smooth_weights(conditions, outcomes, kernel="thin-plate")
+
+    np.testing.assert_allclose(
+        weights(CONDITIONS * factor, OUTCOMES * factor), weights(CONDITIONS, OUTCOMES), atol=1e-9
+    )
