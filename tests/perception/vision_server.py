@@ -32,7 +32,12 @@ Fault = Literal[
 FAULTS: tuple[Fault, ...] = get_args(Fault)
 
 # Hue in degrees, least saturation. Table, floor, arm and shadows of our scenes are all paler.
-COLOURS = {"red": (-12.0, 10.0, 0.62), "orange": (14.0, 36.0, 0.72), "blue": (195.0, 245.0, 0.55)}
+COLOURS = {
+    "red": (-12.0, 10.0, 0.62),
+    "orange": (14.0, 36.0, 0.72),
+    "blue": (195.0, 245.0, 0.55),
+    "yellow": (44.0, 60.0, 0.72),
+}
 
 Box = tuple[float, float, float, float]
 

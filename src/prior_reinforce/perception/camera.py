@@ -110,9 +110,9 @@ class Camera:
                     f"the mark at {point.tolist()} m is not wholly in the picture of camera "
                     f"'{self.config.name}'; choose a point nearer to the table's middle"
                 )
-            rows, columns = np.indices(brightness.shape)
-            centre = [(columns * brightness).sum(), (rows * brightness).sum()]
-            centres.append(np.array(centre) / brightness.sum() + 0.5)
+            middles = [np.arange(size) + 0.5 for size in brightness.shape[::-1]]
+            x, y = (brightness.sum(axis=axis) @ middles[axis] for axis in (0, 1))
+            centres.append(np.array([x, y]) / brightness.sum())
         return np.array(centres)
 
     def calibrate(

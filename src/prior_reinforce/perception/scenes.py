@@ -61,6 +61,10 @@ SCENES: dict[str, TableScene] = {
         plane_height=0.02,
         goal_offset=(-0.08, 0.0),
     ),
+    # The hook is a bead of 12 mm that touches the table; the magnet lies on a disc of 2 cm.
+    "fishing": TableScene(
+        SeenObject("the red hook", 0.012), SeenObject("the yellow disc", 0.02), plane_height=0.003
+    ),
 }
 """The paper's tasks by name; for a task of your own construct a `TableScene`."""
 
