@@ -7,6 +7,7 @@ end of its output come back.
 
 from __future__ import annotations
 
+import contextlib
 import math
 import os
 import shlex
@@ -130,13 +131,11 @@ def run_command(command: str, plan: Path, *, time_limit: float) -> HandOver:
 def _stop(process: subprocess.Popen[bytes]) -> None:
     """Stop the command and everything it started: ask, wait, kill; then collect its status."""
     os.killpg(process.pid, signal.SIGTERM)
-    deadline = time.monotonic() + _GRACE
-    # WNOWAIT leaves the ended command uncollected, which keeps its group's number from being
-    # given to a stranger before the last signal.
-    ended = os.WEXITED | os.WNOHANG | os.WNOWAIT
-    while os.waitid(os.P_PID, process.pid, ended) is None and time.monotonic() < deadline:
-        time.sleep(0.01)
-    os.killpg(process.pid, signal.SIGKILL)
+    with contextlib.suppress(subprocess.TimeoutExpired):
+        process.wait(_GRACE)
+    # The group is gone if all of it went by itself (macOS says so by PermissionError).
+    with contextlib.suppress(ProcessLookupError, PermissionError):
+        os.killpg(process.pid, signal.SIGKILL)
     process.wait()
 
 
