@@ -1,1 +1,40 @@
 """pi: conditional motion generators. One file each; all share the interface of `base`."""
+
+from __future__ import annotations
+
+import os
+
+from prior_reinforce.errors import FileFormatError
+from prior_reinforce.generators.base import FitProgress, Generator
+from prior_reinforce.generators.diffusion import DiffusionGenerator
+from prior_reinforce.generators.diffusion_config import DiffusionConfig
+from prior_reinforce.generators.saving import read_model
+
+FAMILY: tuple[type[Generator], ...] = (DiffusionGenerator,)
+"""Every generator that can be loaded from disk."""
+
+
+def load_generator(folder: str | os.PathLike[str]) -> Generator:
+    """Read a saved generator of any kind.
+
+    Raises:
+        FileFormatError: Files are missing, damaged, or of a generator that is not known here.
+    """
+    name = read_model(folder).generator
+    for kind in FAMILY:
+        if kind.name == name:
+            return kind.load(folder)
+    raise FileFormatError(
+        f"{folder} holds a generator {name!r}; known here are "
+        f"{', '.join(kind.name for kind in FAMILY)}"
+    )
+
+
+__all__ = [
+    "FAMILY",
+    "DiffusionConfig",
+    "DiffusionGenerator",
+    "FitProgress",
+    "Generator",
+    "load_generator",
+]

@@ -1,0 +1,148 @@
+"""The forward noising process of diffusion, and the steps that undo it.
+
+Notation (Ho et al. 2020, "Denoising Diffusion Probabilistic Models"; Song et al. 2021, "Denoising
+Diffusion Implicit Models"): step t counts 0 ... T-1, x_t = sqrt(abar_t) x_0 + sqrt(1 - abar_t) eps,
+and abar_{-1} = 1 is the clean sample.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import torch
+
+Prediction = Literal["epsilon", "v", "sample"]
+"""What the network is trained to tell from x_t: the noise, the velocity of Salimans and Ho (2022,
+"Progressive Distillation for Fast Sampling of Diffusion Models"), or the clean sample."""
+
+# Nichol and Dhariwal 2021, "Improved Denoising Diffusion Probabilistic Models", section 3.2.
+_COSINE_OFFSET = 0.008
+_LARGEST_BETA = 0.999
+
+
+@dataclass(frozen=True, eq=False)
+class NoiseSchedule:
+    """How much of the sample is left at every step."""
+
+    signal: torch.Tensor
+    """abar_t, the share of the variance that is signal, shape (T,), float64, falling."""
+
+    @classmethod
+    def squared_cosine(cls, n_steps: int) -> NoiseSchedule:
+        """The schedule that Diffusion Policy calls `squaredcos_cap_v2`.
+
+        abar_t is the product of 1 - beta_i over i <= t, with
+        beta_i = min(1 - f(i + 1) / f(i), 0.999) and f(i) = cos^2((i / T + 0.008) / 1.008 * pi / 2).
+        """
+        time = torch.arange(n_steps + 1, dtype=torch.float64) / n_steps
+        f = torch.cos((time + _COSINE_OFFSET) / (1 + _COSINE_OFFSET) * math.pi / 2) ** 2
+        beta = torch.clamp(1 - f[1:] / f[:-1], max=_LARGEST_BETA)
+        return cls(signal=torch.cumprod(1 - beta, dim=0))
+
+    @property
+    def n_steps(self) -> int:
+        """T, the number of noise levels."""
+        return self.signal.shape[0]
+
+    def signal_at(self, step: int) -> float:
+        """Return abar of one step; 1 for the clean sample, step -1."""
+        return 1.0 if step < 0 else float(self.signal[step])
+
+    def add_noise(
+        self, clean: torch.Tensor, noise: torch.Tensor, steps: torch.Tensor
+    ) -> torch.Tensor:
+        """Return x_t, shape (B, C, T), for clean samples and unit noise of that shape.
+
+        Args:
+            clean: x_0, shape (B, C, T).
+            noise: eps, shape (B, C, T).
+            steps: t of each sample, integers, shape (B,).
+        """
+        keep, add = self._mix(steps, clean)
+        return keep * clean + add * noise
+
+    def target(
+        self, clean: torch.Tensor, noise: torch.Tensor, steps: torch.Tensor, prediction: Prediction
+    ) -> torch.Tensor:
+        """Return what the network has to predict at x_t; shapes as in `add_noise`."""
+        if prediction == "epsilon":
+            return noise
+        if prediction == "sample":
+            return clean
+        keep, add = self._mix(steps, clean)
+        return keep * noise - add * clean
+
+    def clean_estimate(
+        self, noisy: torch.Tensor, predicted: torch.Tensor, step: int, prediction: Prediction
+    ) -> torch.Tensor:
+        """Return the estimate of x_0 that a prediction at x_t amounts to.
+
+        Args:
+            noisy: x_t, shape (B, C, T).
+            predicted: The network's answer, shape (B, C, T).
+            step: t, one for the whole batch.
+            prediction: What the answer means.
+        """
+        if prediction == "sample":
+            return predicted
+        signal = self.signal_at(step)
+        keep, add = math.sqrt(signal), math.sqrt(1 - signal)
+        if prediction == "v":
+            return keep * noisy - add * predicted
+        return (noisy - add * predicted) / keep
+
+    def ddim_step(
+        self, noisy: torch.Tensor, clean: torch.Tensor, step: int, next_step: int
+    ) -> torch.Tensor:
+        """Go from x_t to x_s, s < t, without fresh noise (Song et al., equation 12, sigma = 0).
+
+        Args:
+            noisy: x_t, shape (B, C, T).
+            clean: The (clipped) estimate of x_0; the noise direction is recomputed from it.
+            step: t.
+            next_step: s; -1 gives the clean sample itself.
+        """
+        signal, next_signal = self.signal_at(step), self.signal_at(next_step)
+        noise = (noisy - math.sqrt(signal) * clean) / math.sqrt(1 - signal)
+        return math.sqrt(next_signal) * clean + math.sqrt(1 - next_signal) * noise
+
+    def ddpm_step(
+        self, noisy: torch.Tensor, clean: torch.Tensor, step: int, noise: torch.Tensor
+    ) -> torch.Tensor:
+        """Draw x_{t-1} given x_t (Ho et al., equations 6 and 7).
+
+        The variance is the posterior's ("fixed small"); the last step, t = 0, adds none.
+
+        Args:
+            noisy: x_t, shape (B, C, T).
+            clean: The (clipped) estimate of x_0.
+            step: t.
+            noise: Unit Gaussian noise that broadcasts to x_t.
+        """
+        signal, previous = self.signal_at(step), self.signal_at(step - 1)
+        alpha = signal / previous
+        beta = 1 - alpha
+        mean = (
+            math.sqrt(previous) * beta / (1 - signal) * clean
+            + math.sqrt(alpha) * (1 - previous) / (1 - signal) * noisy
+        )
+        if step == 0:
+            return mean
+        return mean + math.sqrt(beta * (1 - previous) / (1 - signal)) * noise
+
+    def _mix(self, steps: torch.Tensor, like: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+        signal = self.signal.to(steps.device)[steps].view(-1, 1, 1)
+        return signal.sqrt().to(like.dtype), (1 - signal).sqrt().to(like.dtype)
+
+
+def inference_steps(n_training_steps: int, n_inference_steps: int) -> tuple[int, ...]:
+    """The noise levels visited while sampling, falling from T-1 to 0 in even strides.
+
+    Ours: both ends are always visited, so that sampling starts where training's noise ends.
+    """
+    if n_inference_steps == 1:
+        return (n_training_steps - 1,)
+    top = n_training_steps - 1
+    return tuple(round(top * (1 - i / (n_inference_steps - 1))) for i in range(n_inference_steps))

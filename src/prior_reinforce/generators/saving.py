@@ -1,0 +1,137 @@
+"""Models on disk: `config.json` says what it is, `model.safetensors` holds the numbers.
+
+Both are data; reading them runs no code. A SHA-256 of either file's content is kept in
+`config.json`, so that a damaged copy is an error rather than a slightly different throw.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from safetensors import SafetensorError
+from safetensors.numpy import load as load_tensors
+from safetensors.numpy import save as dump_tensors
+
+from prior_reinforce.errors import FileFormatError
+
+_FILE_FORMAT = "prior-reinforce generator"
+_FILE_VERSION = 1
+CONFIG_FILE = "config.json"
+TENSOR_FILE = "model.safetensors"
+
+
+@dataclass(frozen=True)
+class SavedModel:
+    """What the two files of a model folder say."""
+
+    generator: str
+    """`Generator.name` of what was saved."""
+    settings: dict[str, Any]
+    """JSON types."""
+    tensors: dict[str, np.ndarray]
+
+
+def write_model(
+    folder: str | os.PathLike[str],
+    generator: str,
+    settings: Mapping[str, Any],
+    tensors: Mapping[str, np.ndarray],
+) -> None:
+    """Write both files, `config.json` last, each by renaming a finished one into place.
+
+    Args:
+        folder: Made if need be; files of these names in it are replaced.
+        generator: `Generator.name`.
+        settings: JSON types only.
+        tensors: Arrays by name.
+    """
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    packed = dump_tensors({name: np.ascontiguousarray(array) for name, array in tensors.items()})
+    content = {
+        "file_format": _FILE_FORMAT,
+        "version": _FILE_VERSION,
+        "generator": generator,
+        "settings": dict(settings),
+        "tensors_sha256": hashlib.sha256(packed).hexdigest(),
+    }
+    content["config_sha256"] = _digest(content)
+    _replace(folder / TENSOR_FILE, packed)
+    _replace(folder / CONFIG_FILE, (json.dumps(content, indent=2) + "\n").encode())
+
+
+def read_model(folder: str | os.PathLike[str], expected: str | None = None) -> SavedModel:
+    """Read what `write_model` wrote.
+
+    Args:
+        folder: Of the model.
+        expected: The `Generator.name` that it must be of; any when None.
+
+    Raises:
+        FileFormatError: Files are missing, truncated, damaged, or of another generator.
+    """
+    folder = Path(folder)
+    content = _read_config(folder / CONFIG_FILE)
+    generator = content["generator"]
+    if expected is not None and generator != expected:
+        raise FileFormatError(
+            f"{folder} holds a {generator} generator, not {expected}; load it with load_generator"
+        )
+    packed = _read(folder / TENSOR_FILE)
+    if hashlib.sha256(packed).hexdigest() != content["tensors_sha256"]:
+        raise FileFormatError(
+            f"{folder / TENSOR_FILE} is damaged or belongs to another model: its checksum is not "
+            f"the one in {CONFIG_FILE}; copy the folder again, or learn the model again"
+        )
+    try:
+        tensors = load_tensors(packed)
+    except SafetensorError as error:
+        raise FileFormatError(
+            f"{folder / TENSOR_FILE} is not a safetensors file: {error}"
+        ) from error
+    return SavedModel(generator, content["settings"], tensors)
+
+
+def _read_config(path: Path) -> dict[str, Any]:
+    try:
+        content = json.loads(_read(path))
+        if content["file_format"] != _FILE_FORMAT or content["version"] != _FILE_VERSION:
+            raise ValueError(f"it says {content['file_format']!r} {content['version']!r}")
+        digest = content.pop("config_sha256")
+    except (ValueError, KeyError, TypeError, RecursionError) as error:
+        raise FileFormatError(
+            f"{path} is not the {CONFIG_FILE} of a saved generator (version {_FILE_VERSION}): "
+            f"{error}; learn the model again"
+        ) from error
+    if digest != _digest(content):
+        raise FileFormatError(
+            f"{path} was changed after it was saved, its checksum does not fit; copy the folder "
+            "again, or learn the model again"
+        )
+    return dict(content)
+
+
+def _digest(content: Mapping[str, Any]) -> str:
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
+def _read(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise FileFormatError(
+            f"cannot read {path} ({error.strerror}); give the folder that a generator was saved to"
+        ) from error
+
+
+def _replace(path: Path, content: bytes) -> None:
+    unfinished = path.with_name(path.name + ".unfinished")
+    unfinished.write_bytes(content)
+    os.replace(unfinished, path)
