@@ -270,7 +270,7 @@ def write_bag(
     return path
 
 
-def write_bags(folder: Path, *, kind: str, **options: object) -> Path:
-    for i in range(N):
+def write_bags(folder: Path, *, kind: str, count: int = N, **options: object) -> Path:
+    for i in range(count):
         write_bag(folder / f"throw{i}{'.bag' if kind == 'ros1' else ''}", i, kind=kind, **options)
     return folder
