@@ -108,13 +108,18 @@ class VisionLanguageModel(Perception):
             raise ConfigurationError(
                 "the camera is not calibrated; pass calibration=TableCalibration.fit(...)"
             )
-        goal = None
-        sent = self._client.prepare(picture)
-        reached = self._find(self.scene.reached, sent, self._calibration)
+        calibration, sent = self._calibration, self._client.prepare(picture)
+        goal = goal_place = goal_pixel = None
+        reached = self._find(self.scene.reached, sent, calibration)
         if reached.problem is None:
-            goal = self._find(self.scene.goal, sent, self._calibration)
-        offset = self.scene.goal_offset
-        self.last_reading = Reading(picture, self.config.model, reached, goal, offset)
+            goal = self._find(self.scene.goal, sent, calibration)
+            if goal.place is not None:
+                goal_place = goal.place + np.array(self.scene.goal_offset)
+                x, y = calibration.to_pixels(goal_place).tolist()
+                goal_pixel = (x, y)
+        self.last_reading = Reading(
+            picture, self.config.model, reached, goal, goal_place, goal_pixel
+        )
         return self.last_reading
 
     def close(self) -> None:

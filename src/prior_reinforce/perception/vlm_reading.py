@@ -67,8 +67,10 @@ class Reading:
     reached: Sighting
     goal: Sighting | None
     """None where `reached` failed already, and nobody was asked."""
-    goal_offset: tuple[float, float] = (0.0, 0.0)
-    """From the goal object's centre to the goal (see `TableScene`), in [m]."""
+    goal_place: np.ndarray | None = None
+    """The goal, as far from its object's centre as the scene says, shape (2,), in [m]."""
+    goal_pixel: tuple[float, float] | None = None
+    """The goal in the picture."""
 
     @property
     def problem(self) -> str | None:
@@ -78,12 +80,12 @@ class Reading:
     @property
     def error_seen(self) -> np.ndarray | None:
         """Reached place minus goal, shape (2,), in [m]; None where there is a problem."""
-        if self.goal is None or self.reached.place is None or self.goal.place is None:
+        if self.reached.place is None or self.goal_place is None:
             return None
-        return self.reached.place - (self.goal.place + np.array(self.goal_offset))
+        return self.reached.place - self.goal_place
 
     def drawn(self) -> np.ndarray:
-        """Return the picture with all boxes: agreed ones thick, single answers thin.
+        """Return the picture with boxes, agreed ones thick, single answers thin, and the error.
 
         Raises:
             MissingExtraError: Pillow is not installed.
@@ -104,12 +106,13 @@ class Reading:
                     pen.rectangle(answer.box, outline=colour, width=1)
         agreed = [(sighting.words, sighting.box, colour) for sighting, colour in found]
         boxes = [box for _, box, _ in agreed if box is not None]
-        if len(boxes) == 2:
-            pen.line([_middle(box) for box in boxes], fill="black", width=2)
+        if self.reached.box is not None and self.goal_pixel is not None:
+            pen.line([self.goal_pixel, _middle(self.reached.box)], fill="black", width=2)
+            pen.circle(self.goal_pixel, 4, outline="black", width=2)
         for words, box, colour in agreed:
             if box is not None:
-                pen.rectangle(box, outline=colour, width=3)
-                pen.circle(_middle(box), 3, fill=colour)
+                left, top, right, bottom = box
+                pen.rectangle((left - 3, top - 3, right + 3, bottom + 3), outline=colour, width=3)
                 # The upper object's words above it, the lower's below: they never cover a box.
                 above = box == min(boxes, key=lambda each: each[1])
                 _write(pen, words, box, colour, image.size, above=above)
@@ -132,6 +135,7 @@ class Reading:
             "problem": self.problem,
             "reached": _sighting_record(self.reached),
             "goal": None if self.goal is None else _sighting_record(self.goal),
+            "goal_place_m": None if self.goal_place is None else self.goal_place.tolist(),
         }
 
 
@@ -158,7 +162,7 @@ def _write(
     font_size = max(12, size[1] // 40)
     half = pen.textlength(words, font_size=font_size) / 2 + 4
     x = min(max(_middle(box)[0], half), size[0] - half)
-    y = max(box[1] - 6, font_size + 4) if above else min(box[3] + 6, size[1] - font_size - 4)
+    y = max(box[1] - 8, font_size + 4) if above else min(box[3] + 8, size[1] - font_size - 4)
     pen.text(
         (x, y),
         words,
