@@ -327,3 +327,19 @@ def test_a_folder_of_two_formats_asks_which(tmp_path):
 def test_durations_are_those_written(tmp_path):
     for i, recording in enumerate(read_recordings(write_npz(tmp_path))):
         assert recording.duration == pytest.approx(BEFORE + duration(i) + AFTER)
+
+
+def test_a_damaged_bag_that_was_not_asked_for_does_not_matter(tmp_path):
+    write_bags(tmp_path, kind="ros1", count=3)
+    (tmp_path / "throw1.bag").write_bytes(b"#ROSBAG V2.0\n")
+    with pytest.raises(FileFormatError, match=r"throw1\.bag as a ROS bag"):
+        read_recordings(tmp_path)
+    found = read_recordings(tmp_path, episodes=["throw2", "throw0"])
+    assert [recording.episode for recording in found] == ["throw2", "throw0"]
+
+
+def test_two_episodes_of_one_name(tmp_path):
+    (tmp_path / "log.csv").write_text("episode,t,a\nthrow,0,1\nthrow,1,2\n")
+    (tmp_path / "throw.csv").write_text("t,a\n0,1\n1,2\n")
+    with pytest.raises(InvalidDemonstrationsError, match="more than one episode named throw"):
+        read_recordings(tmp_path)

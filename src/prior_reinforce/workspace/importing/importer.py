@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -76,6 +77,11 @@ def read_recordings(
     wanted = None if episodes is None else tuple(str(episode) for episode in episodes)
     reading = Reading(key, rate, wanted, None if joints is None else tuple(joints))
     found = READERS[kind](source, reading)
+    twice = sorted(name for name, n in Counter(r.episode for r in found).items() if n > 1)
+    if twice:
+        raise InvalidDemonstrationsError(
+            f"{source} holds more than one episode named {', '.join(twice)}; rename their files"
+        )
     if wanted is None:
         if not found:
             raise FileFormatError(f"{source} holds no episode of format {kind}; say its format")

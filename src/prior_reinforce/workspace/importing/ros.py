@@ -47,6 +47,8 @@ def read_ros(source: Path, reading: Reading) -> list[Recording]:
     recordings: list[Recording] = []
     for bag in bags:
         name = bag.name if bag.is_dir() else bag.stem
+        if not any(e == name or e.startswith(f"{name}-") for e in reading.episodes or (name,)):
+            continue
         with named_damage(bag, "a ROS bag"):
             # Bags from before ROS 2 Iron carry no definitions; these two messages never changed.
             definitions = typesys.get_typestore(typesys.Stores.LATEST)
