@@ -113,9 +113,12 @@ class Reading:
             if box is not None:
                 left, top, right, bottom = box
                 pen.rectangle((left - 3, top - 3, right + 3, bottom + 3), outline=colour, width=3)
-                # The upper object's words above it, the lower's below: they never cover a box.
-                above = box == min(boxes, key=lambda each: each[1])
-                _write(pen, words, box, colour, image.size, above=above)
+                # The upper object's words go above it, the lower's below it; of two that are
+                # close together, above and below both, so that words never cover a box.
+                above = box == min(boxes, key=_middle_height)
+                clear_of = _around(boxes) if _are_close(boxes, image.width / 5) else box
+                at = ((left + right) / 2, clear_of[1] - 8 if above else clear_of[3] + 8)
+                _write(pen, words, at, colour, image.size, above=above)
         return np.asarray(image)
 
     def save(self, folder: Path, stem: str) -> None:
@@ -152,17 +155,17 @@ def _sighting_record(sighting: Sighting) -> dict[str, Any]:
 def _write(
     pen: ImageDraw.ImageDraw,
     words: str,
-    box: Box,
+    at: tuple[float, float],
     colour: tuple[int, int, int],
     size: tuple[int, int],
     *,
     above: bool,
 ) -> None:
-    """Write words centred above or below a box, shifted to stay in a picture of `size` [px]."""
+    """Write words centred above or below a point, shifted to stay in a picture of `size` [px]."""
     font_size = max(12, size[1] // 40)
     half = pen.textlength(words, font_size=font_size) / 2 + 4
-    x = min(max(_middle(box)[0], half), size[0] - half)
-    y = max(box[1] - 8, font_size + 4) if above else min(box[3] + 8, size[1] - font_size - 4)
+    x = min(max(at[0], half), size[0] - half)
+    y = max(at[1], font_size + 4) if above else min(at[1], size[1] - font_size - 4)
     pen.text(
         (x, y),
         words,
@@ -176,3 +179,17 @@ def _write(
 
 def _middle(box: Box) -> tuple[float, float]:
     return (box[0] + box[2]) / 2, (box[1] + box[3]) / 2
+
+
+def _middle_height(box: Box) -> float:
+    return box[1] + box[3]
+
+
+def _are_close(boxes: list[Box], distance: float) -> bool:
+    middles = np.array([_middle(box) for box in boxes])
+    return bool((np.ptp(middles, axis=0) < distance).all())
+
+
+def _around(boxes: list[Box]) -> Box:
+    left, top, right, bottom = zip(*boxes, strict=True)
+    return min(left), min(top), max(right), max(bottom)
