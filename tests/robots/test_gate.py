@@ -195,7 +195,8 @@ def test_what_cannot_be_checked_says_so():
     report = check_plan(Plan(np.zeros((10, 3)), form), PANDA)
     assert {line.status for line in report.lines} == {"unchecked"}
     assert not report.refused
-    assert "not checked" in report.text()
+    assert report.text().startswith("plan NOT CHECKED for the arm: limits of panda")
+    assert report.as_json()["unchecked"] == [line.check for line in report.lines]
 
 
 def test_degrees_are_refused():

@@ -64,9 +64,19 @@ class LimitReport:
         """Whether any line warns."""
         return any(line.status == "warn" for line in self.lines)
 
+    @property
+    def unchecked(self) -> tuple[str, ...]:
+        """Names of the checks that could not be made."""
+        return tuple(line.check for line in self.lines if line.status == "unchecked")
+
     def text(self) -> str:
         """Readable report, a verdict and a line a check."""
-        verdict = "refused" if self.refused else "passes with warnings" if self.warned else "passes"
+        if self.refused:
+            verdict = "refused"
+        elif "velocity" in self.unchecked:
+            verdict = "NOT CHECKED for the arm"
+        else:
+            verdict = "passes with warnings" if self.warned else "passes"
         head = f"plan {verdict}: limits of {self.robot} (firmware {self.firmware}) at 1 kHz"
         return "\n".join(
             [head, *(f"  {_MARK[line.status]} {line.check:<14} {line.text}" for line in self.lines)]
@@ -80,6 +90,7 @@ class LimitReport:
             "source": self.source,
             "refused": self.refused,
             "warned": self.warned,
+            "unchecked": list(self.unchecked),
             "lines": [asdict(line) for line in self.lines],
         }
 
