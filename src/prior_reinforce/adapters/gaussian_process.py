@@ -30,7 +30,7 @@ class GaussianProcessConfig:
     perception adds, and tells what is true where it landed. That a demonstration's condition equals
     its outcome is a convention; between the demonstrations the generator strays from it, and by how
     much is what trials show: the mean square of c - r over those remembered. One size for both
-    either chases noise or hardly moves (docs/decisions.md has the figures).
+    either chases noise or hardly moves (docs/decisions-adapter.md has the figures).
     """
 
     memory_size: int | None = 2
