@@ -13,8 +13,14 @@ from prior_reinforce.errors import FileFormatError, InvalidGoalError, NotFittedE
 from prior_reinforce.generators import (
     DiffusionConfig,
     DiffusionGenerator,
+    DynamicMovementPrimitives,
+    DynamicMovementPrimitivesConfig,
     FitProgress,
     Generator,
+    NearestNeighbours,
+    SmoothInterpolation,
+    UNetRegression,
+    UNetRegressionConfig,
     load_generator,
 )
 from prior_reinforce.generators.saving import CONFIG_FILE, TENSOR_FILE
@@ -37,8 +43,21 @@ def _small_ddpm() -> DiffusionGenerator:
 FACTORIES: list[Callable[[], Generator]] = [
     lambda: DiffusionGenerator(_MOMENT, threads=1),
     _small_ddpm,
+    NearestNeighbours,
+    SmoothInterpolation,
+    DynamicMovementPrimitives,
+    lambda: DynamicMovementPrimitives(DynamicMovementPrimitivesConfig(segmented=False)),
+    lambda: UNetRegression(UNetRegressionConfig(network=_TINY, training_steps=8)),
 ]
-IDS = ["diffusion-splines-ddim", "diffusion-frames-ddpm"]
+IDS = [
+    "diffusion-splines-ddim",
+    "diffusion-frames-ddpm",
+    "nearest",
+    "interpolation",
+    "dmp",
+    "dmp-whole",
+    "regression",
+]
 
 pytestmark = [pytest.mark.parametrize("make", FACTORIES, ids=IDS)]
 

@@ -5,12 +5,29 @@ from __future__ import annotations
 import os
 
 from prior_reinforce.errors import FileFormatError
+from prior_reinforce.generators.alignment import Alignment, AlignmentConfig, align
 from prior_reinforce.generators.base import FitProgress, Generator
 from prior_reinforce.generators.diffusion import DiffusionGenerator
 from prior_reinforce.generators.diffusion_config import DiffusionConfig
+from prior_reinforce.generators.dmp import (
+    DynamicMovementPrimitives,
+    DynamicMovementPrimitivesConfig,
+)
+from prior_reinforce.generators.interpolation import (
+    SmoothInterpolation,
+    SmoothInterpolationConfig,
+)
+from prior_reinforce.generators.nearest import NearestNeighbours, NearestNeighboursConfig
+from prior_reinforce.generators.regression import UNetRegression, UNetRegressionConfig
 from prior_reinforce.generators.saving import read_model
 
-FAMILY: tuple[type[Generator], ...] = (DiffusionGenerator,)
+FAMILY: tuple[type[Generator], ...] = (
+    DiffusionGenerator,
+    NearestNeighbours,
+    SmoothInterpolation,
+    DynamicMovementPrimitives,
+    UNetRegression,
+)
 """Every generator that can be loaded from disk."""
 
 
@@ -32,9 +49,20 @@ def load_generator(folder: str | os.PathLike[str]) -> Generator:
 
 __all__ = [
     "FAMILY",
+    "Alignment",
+    "AlignmentConfig",
     "DiffusionConfig",
     "DiffusionGenerator",
+    "DynamicMovementPrimitives",
+    "DynamicMovementPrimitivesConfig",
     "FitProgress",
     "Generator",
+    "NearestNeighbours",
+    "NearestNeighboursConfig",
+    "SmoothInterpolation",
+    "SmoothInterpolationConfig",
+    "UNetRegression",
+    "UNetRegressionConfig",
+    "align",
     "load_generator",
 ]

@@ -1,0 +1,75 @@
+"""Compare generators without any adapter: how far from new goals does the first throw land?
+
+    python examples/zero_shot.py --methods nearest interpolation dmp dmp-whole
+
+prints a line for each method, prior set and timeline (as recorded, or aligned): the median error
+with its quartiles, the share of goals within the task's tolerance, and the share of lost balls.
+Goals are drawn with a seed of their own; 3000 and above are for tuning, never for reported figures.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+
+import numpy as np
+
+from prior_reinforce.generators import (
+    DiffusionGenerator,
+    DynamicMovementPrimitives,
+    DynamicMovementPrimitivesConfig,
+    Generator,
+    NearestNeighbours,
+    SmoothInterpolation,
+    UNetRegression,
+    align,
+)
+from prior_reinforce.tasks.basketball import BasketballShot
+
+METHODS: dict[str, Callable[[], Generator]] = {
+    "nearest": NearestNeighbours,
+    "interpolation": SmoothInterpolation,
+    "dmp": DynamicMovementPrimitives,
+    "dmp-whole": lambda: DynamicMovementPrimitives(
+        DynamicMovementPrimitivesConfig(segmented=False)
+    ),
+    "regression": lambda: UNetRegression(threads=1),
+    "diffusion": lambda: DiffusionGenerator(threads=1),
+}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--methods", nargs="+", choices=METHODS, default=["nearest", "dmp"])
+    parser.add_argument("--sets", nargs="+", default=["A", "B"])
+    parser.add_argument("--timelines", nargs="+", default=["recorded", "aligned"])
+    parser.add_argument("--goals", type=int, default=100)
+    parser.add_argument("--goal-seed", type=int, default=3000)
+    parser.add_argument("--seed", type=int, default=0, help="of the training")
+    options = parser.parse_args()
+
+    task = BasketballShot()
+    goals = task.sample_goals(options.goals, np.random.default_rng(options.goal_seed))
+    print("| method | set | timeline | median error [cm] (quartiles) | reached | lost |")
+    print("|---|---|---|---|---|---|")
+    for method in options.methods:
+        for prior_set in options.sets:
+            for timeline in options.timelines:
+                demonstrations = task.demonstrations(prior_set)
+                if timeline == "aligned":
+                    demonstrations = align(demonstrations).demonstrations
+                generator = METHODS[method]().fit(demonstrations, seed=options.seed)
+                rollouts = task.rollout(generator.generate(goals), None)
+                outcomes = np.array([rollout.outcome for rollout in rollouts])
+                lost = np.mean([not rollout.valid for rollout in rollouts])
+                errors = np.linalg.norm(outcomes - goals, axis=1)
+                low, median, high = 100 * np.percentile(errors, [25, 50, 75])
+                print(
+                    f"| {method} | {prior_set} | {timeline} | {median:.2f} ({low:.2f}-{high:.2f}) "
+                    f"| {np.mean(errors <= task.tolerance):.2f} | {lost:.2f} |",
+                    flush=True,
+                )
+
+
+if __name__ == "__main__":
+    main()

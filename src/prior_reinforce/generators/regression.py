@@ -1,0 +1,259 @@
+"""U-Net regression: the diffusion generator's network without diffusion, the paper's "UNet".
+
+    theta, x = argmin mean_i |U_theta(x, 0, r_i) - code(A_i)|^2,    A(c) = decode(U_theta(x, 0, c))
+
+One forward pass maps an outcome to a plan. The network, the codec and the scaling of conditions are
+those of `diffusion`; where that one feeds a noisy code, this feeds a constant x that is learned
+with the weights. (Fed with zeros, convolutions know time only from the padding at the ends.)
+
+Notation:
+    x      learned input   (C, T)     [-]
+    codes  coded plans     (N, C, T)  [-], in [-1, 1]
+    r, c   outcomes seen, conditions, scaled  (., k)  [-]
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field
+from typing import Any, ClassVar
+
+import numpy as np
+import torch
+from torch import nn
+from typing_extensions import Self
+
+from prior_reinforce.errors import ConfigurationError, FileFormatError, NotFittedError
+from prior_reinforce.generators.base import FitProgress, Generator
+from prior_reinforce.generators.conditions import ConditionScale, as_conditions
+from prior_reinforce.generators.representation import PlanCodec, Representation
+from prior_reinforce.generators.saving import read_model, write_model
+from prior_reinforce.generators.threads import torch_threads
+from prior_reinforce.generators.unet import ConditionalUNet, UNetSize
+from prior_reinforce.motions import Demonstrations
+
+_REPORTS = 200
+"""Progress is told about so often in a fit."""
+_CHUNK = 128
+"""Plans generated at once; bounds the memory of a dense grid of conditions."""
+
+
+@dataclass(frozen=True)
+class UNetRegressionConfig:
+    """Everything that decides what `UNetRegression` learns; docs/baselines.md tells what was tried.
+
+    Network and representation default to the diffusion generator's, so that the two differ in
+    nothing but diffusion.
+    """
+
+    representation: Representation = "splines"
+    """Code plans by spline control points where they fit, or by raw frames."""
+    frames_per_point: int = 4
+    """Frames for each spline control point."""
+    margin: float = 0.05
+    """How far plans may leave the demonstrated range of a dimension, as a fraction of it."""
+    network: UNetSize = field(
+        default_factory=lambda: UNetSize(widths=(64, 128, 128), step_width=64, condition_width=64)
+    )
+    """Size of the U-Net."""
+    training_steps: int = 1000
+    """Optimiser steps, each on all demonstrations."""
+    learning_rate: float = 1e-3
+    """Peak of the cosine schedule, which starts there and ends at 0."""
+    weight_decay: float = 1e-6
+    """Of AdamW."""
+
+    def __post_init__(self) -> None:
+        """Check the settings.
+
+        Raises:
+            ConfigurationError: One is outside its range.
+        """
+        for name in ("frames_per_point", "training_steps"):
+            if getattr(self, name) < 1:
+                raise ConfigurationError(f"{name} must be at least 1, got {getattr(self, name)}")
+        if not self.learning_rate > 0:
+            raise ConfigurationError(f"learning_rate must be positive, got {self.learning_rate}")
+        for name in ("margin", "weight_decay"):
+            if not getattr(self, name) >= 0:
+                raise ConfigurationError(f"{name} must not be negative, got {getattr(self, name)}")
+
+    @classmethod
+    def from_json(cls, values: dict[str, Any]) -> Self:
+        """Rebuild the settings from `dataclasses.asdict`, which JSON turned tuples of to lists."""
+        network = dict(values["network"])
+        network["widths"] = tuple(network["widths"])
+        return cls(**{**values, "network": UNetSize(**network)})
+
+
+class UNetRegression(Generator):
+    """Supervised regression of plans on outcomes by a U-Net (paper, "UNet")."""
+
+    name: ClassVar[str] = "regression"
+
+    def __init__(
+        self, config: UNetRegressionConfig | None = None, *, threads: int | None = None
+    ) -> None:
+        """Choose settings.
+
+        Args:
+            config: All settings; the defaults when None.
+            threads: Cores to compute on; all when None. The last digits depend on it.
+        """
+        self.config = config or UNetRegressionConfig()
+        self._threads = threads
+        self._fitted: _Fitted | None = None
+
+    def fit(
+        self,
+        demonstrations: Demonstrations,
+        *,
+        seed: int,
+        progress: Callable[[FitProgress], None] | None = None,
+    ) -> Self:
+        """Learn from all demonstrations; the seed draws initial weights. See `Generator.fit`."""
+        codec = PlanCodec.fit(
+            demonstrations.plans,
+            representation=self.config.representation,
+            frames_per_point=self.config.frames_per_point,
+            length_multiple=self.config.network.length_multiple,
+            margin=self.config.margin,
+        )
+        scale = ConditionScale.fit(demonstrations.outcomes_seen)
+        with torch_threads(self._threads):
+            network = _train(
+                _tensor(codec.encode(demonstrations.plans)),
+                _tensor(scale.scale(demonstrations.outcomes_seen)),
+                self.config,
+                seed,
+                progress,
+            )
+        self._fitted = _Fitted(codec, scale, network)
+        return self
+
+    @torch.no_grad()
+    def generate(self, conditions: np.ndarray) -> np.ndarray:
+        """One forward pass for each condition; see `Generator.generate`."""
+        fitted = self._require()
+        conditions = as_conditions(conditions, len(fitted.scale.low))
+        plans = [np.empty((0, fitted.codec.horizon, len(fitted.codec.smooth)))]
+        with torch_threads(self._threads):
+            for chunk in torch.split(_tensor(fitted.scale.scale(conditions)), _CHUNK):
+                if len(chunk):
+                    plans.append(fitted.codec.decode(fitted.network(chunk).double().numpy()))
+        return np.concatenate(plans)
+
+    def save(self, folder: str | os.PathLike[str]) -> None:
+        """Write `config.json` and `model.safetensors`; see `Generator.save`."""
+        fitted = self._require()
+        weights = fitted.network.state_dict()
+        write_model(
+            folder,
+            self.name,
+            {"config": asdict(self.config), "codec": fitted.codec.settings()},
+            {
+                **{f"network.{name}": value.numpy() for name, value in weights.items()},
+                "plan_range": fitted.codec.plan_range,
+                "code_range": fitted.codec.code_range,
+                "condition_range": np.stack([fitted.scale.low, fitted.scale.high]),
+            },
+        )
+
+    @classmethod
+    def load(cls, folder: str | os.PathLike[str]) -> Self:
+        """Read what `save` wrote; see `Generator.load`."""
+        saved = read_model(folder, expected=cls.name)
+        try:
+            generator = cls(UNetRegressionConfig.from_json(saved.settings["config"]))
+            generator._fitted = _Fitted.restore(saved.settings, saved.tensors, generator.config)
+        except (KeyError, TypeError, ValueError, RuntimeError) as error:
+            raise FileFormatError(
+                f"{folder} holds no complete {cls.name} generator ({error!r}); learn it again"
+            ) from error
+        return generator
+
+    def _require(self) -> _Fitted:
+        if self._fitted is None:
+            raise NotFittedError("this UNetRegression has learned nothing yet; call fit first")
+        return self._fitted
+
+
+class _Network(nn.Module):
+    """A `ConditionalUNet` fed with a learned constant instead of a noisy code."""
+
+    def __init__(self, channels: int, length: int, condition_dim: int, size: UNetSize) -> None:
+        super().__init__()
+        self.unet = ConditionalUNet(channels, condition_dim, size)
+        self.input = nn.Parameter(torch.randn(1, channels, length))
+
+    def forward(self, conditions: torch.Tensor) -> torch.Tensor:
+        """Codes (B, C, T) for scaled conditions (B, k)."""
+        n = len(conditions)
+        codes: torch.Tensor = self.unet(self.input.expand(n, -1, -1), torch.zeros(n), conditions)
+        return codes
+
+
+def _train(
+    codes: torch.Tensor,
+    conditions: torch.Tensor,
+    config: UNetRegressionConfig,
+    seed: int,
+    progress: Callable[[FitProgress], None] | None,
+) -> _Network:
+    # Torch's layers draw their initial weights from the global generator: lend it, and put it back.
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(seed)
+        network = _Network(codes.shape[1], codes.shape[2], conditions.shape[1], config.network)
+    optimiser = torch.optim.AdamW(
+        network.parameters(),
+        lr=config.learning_rate,
+        weight_decay=config.weight_decay,
+        fused=True,
+    )
+    started = time.monotonic()
+    n_steps = config.training_steps
+    for step in range(n_steps):
+        for group in optimiser.param_groups:
+            group["lr"] = config.learning_rate * 0.5 * (1 + math.cos(math.pi * step / n_steps))
+        loss = nn.functional.mse_loss(network(conditions), codes)
+        optimiser.zero_grad()
+        torch.autograd.backward(loss)
+        optimiser.step()
+        done = step + 1
+        if progress is not None and (done == n_steps or done % max(1, n_steps // _REPORTS) == 0):
+            left = (time.monotonic() - started) / done * (n_steps - done)
+            progress(FitProgress(done, n_steps, loss.item(), left))
+    return network.eval().requires_grad_(False)
+
+
+def _tensor(values: np.ndarray) -> torch.Tensor:
+    return torch.as_tensor(values, dtype=torch.float32)
+
+
+class _Fitted:
+    """What `fit` makes and `save` keeps."""
+
+    def __init__(self, codec: PlanCodec, scale: ConditionScale, network: _Network) -> None:
+        self.codec = codec
+        self.scale = scale
+        self.network = network
+
+    @classmethod
+    def restore(
+        cls, settings: dict[str, Any], tensors: dict[str, np.ndarray], config: UNetRegressionConfig
+    ) -> _Fitted:
+        codec = PlanCodec.restore(settings["codec"], tensors["plan_range"], tensors["code_range"])
+        low, high = tensors["condition_range"]
+        with torch.random.fork_rng(devices=[]):
+            network = _Network(codec.channels, codec.length, len(low), config.network)
+        network.load_state_dict(
+            {
+                name.removeprefix("network."): torch.from_numpy(value)
+                for name, value in tensors.items()
+                if name.startswith("network.")
+            }
+        )
+        return cls(codec, ConditionScale(low, high), network.eval().requires_grad_(False))
