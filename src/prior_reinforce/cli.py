@@ -13,20 +13,11 @@ from typing import Protocol
 
 import tyro
 
+from prior_reinforce.commands.importing import Import
 from prior_reinforce.commands.learning import Learn
 from prior_reinforce.commands.simulated import Adapt, Demo, Rollout
-from prior_reinforce.commands.workspace import (
-    Amend,
-    Ask,
-    Export,
-    Goal,
-    Import,
-    Log,
-    New,
-    Status,
-    Tell,
-    Void,
-)
+from prior_reinforce.commands.trials import Amend, Ask, Export, Tell, Void
+from prior_reinforce.commands.workspace import Goal, Log, New, Report, Status
 from prior_reinforce.errors import PriorReinforceError
 
 
@@ -51,6 +42,7 @@ COMMANDS: dict[str, type[Command]] = {
     "amend": Amend,
     "status": Status,
     "log": Log,
+    "report": Report,
     "export": Export,
 }
 

@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 from planar import SMALL, demonstrations, manifest
 
+from prior_reinforce.workspace.trials import amend, ask, tell, void
 from prior_reinforce.workspace.workspace import Workspace
 
 TRIALS = 20
@@ -29,14 +30,14 @@ def script():
             goal = rng.uniform([0.82, -0.15], [0.98, 0.15]).tolist()
             memory = "workspace" if number > 10 else "goal"
             steps.append(lambda w, g=goal, m=memory: w.set_goal(g, memory=m))
-        steps.append(lambda w: w.ask())
+        steps.append(lambda w: ask(w))
         error = rng.normal(0, 0.03, 2).round(3).tolist()
         if number % 7 == 0:
-            steps.append(lambda w, n=number: w.void(n, "ball slipped"))
+            steps.append(lambda w, n=number: void(w, n, "ball slipped"))
         else:
-            steps.append(lambda w, n=number, e=error: w.tell(n, e))
+            steps.append(lambda w, n=number, e=error: tell(w, n, e))
         if number % 6 == 0:
-            steps.append(lambda w, n=number - 1, e=error: w.amend(n, e))
+            steps.append(lambda w, n=number - 1, e=error: amend(w, n, e))
     return steps
 
 

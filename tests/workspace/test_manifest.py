@@ -1,6 +1,7 @@
 """The manifest: what it says, and where a wrong value stands."""
 
 import contextlib
+import re
 
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -34,14 +35,13 @@ def test_no_robot_means_no_limits(tmp_path):
 
 
 def test_limits_can_be_given(tmp_path):
-    text = manifest(robot="given").replace(
-        "# joint_names = [...]",
-        'joint_names = ["joint1", "joint2"]\nlower = [-1, -1]\nupper = [1, 1]\n'
-        "velocity = [2, 2]\nacceleration = [10, 10]\njerk = [500, 500]\n#",
-    )
+    """The template's own example, its comment signs taken away."""
+    text = manifest(robot="given")
+    start, end = text.index("# joint_names"), text.index("# The program's own")
+    text = text[:start] + re.sub("^# ", "", text[start:end], flags=re.M) + text[end:]
     limits = load_manifest(write(tmp_path, text)).robot
-    assert limits.upper.tolist() == [1, 1]
-    assert limits.jerk.tolist() == [500, 500]
+    assert limits.upper.tolist() == [2, 2]
+    assert limits.jerk.tolist() == [5000, 5000]
 
 
 @pytest.mark.parametrize(
@@ -61,7 +61,7 @@ def test_limits_can_be_given(tmp_path):
         ('model = "none"', 'model = "ur5"', r"\[robot\].*known are panda and fr3"),
         ('model = "none"', 'model = "given"', r"joint_names.*missing"),
         ("[gate]", "[gait]", "unknown; sections are"),
-        ("[gate] ", "[gate]\nbeyond_refuse = -1 #", r"\[gate\].*beyond_warn"),
+        ("[gate]", "[gate]\nbeyond_refuse = -1", r"\[gate\].*beyond_warn"),
     ],
 )
 def test_a_wrong_value_is_named_with_its_place(tmp_path, old, new, message):
@@ -85,7 +85,7 @@ def test_a_missing_file_and_one_that_is_no_toml_are_named(tmp_path):
     with pytest.raises(FileFormatError, match=r"not a TOML file.*line 1"):
         load_manifest(write(tmp_path, "name = \nx = 1"))
     (tmp_path / "workspace.toml").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(FileFormatError, match="not a TOML file"):
+    with pytest.raises(FileFormatError, match="not a text in UTF-8"):
         load_manifest(tmp_path / "workspace.toml")
 
 

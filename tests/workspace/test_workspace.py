@@ -21,8 +21,10 @@ from prior_reinforce.errors import (
 )
 from prior_reinforce.motions import Demonstrations, PlanFormat
 from prior_reinforce.session import Session
+from prior_reinforce.workspace.execution import execute
 from prior_reinforce.workspace.history import TrialStage
 from prior_reinforce.workspace.status import describe
+from prior_reinforce.workspace.trials import amend, ask, tell, void
 from prior_reinforce.workspace.workspace import Workspace
 
 GOAL = [0.9, 0.05]
@@ -48,8 +50,8 @@ def reopened(workspace):
 
 
 def test_a_told_trial_is_there_when_the_program_starts_again(workspace):
-    trial = workspace.ask()
-    workspace.tell(trial.number, [0.05, -0.02])
+    trial = ask(workspace)
+    tell(workspace, trial.number, [0.05, -0.02])
     again = reopened(workspace)
     (kept,) = again.history.trials
     assert kept.stage is TrialStage.TOLD
@@ -59,9 +61,9 @@ def test_a_told_trial_is_there_when_the_program_starts_again(workspace):
 
 
 def test_ask_gives_the_same_plan_also_from_another_program(workspace):
-    first = workspace.ask()
+    first = ask(workspace)
     again = reopened(workspace)
-    second = again.ask()
+    second = ask(again)
     assert (second.number, second.plan_sha256) == (first.number, first.plan_sha256)
     assert len(list((workspace.folder / "plans").glob("*.npz"))) == 1
     again.close()
@@ -69,54 +71,54 @@ def test_ask_gives_the_same_plan_also_from_another_program(workspace):
 
 def test_the_next_condition_is_the_sessions(workspace):
     """The workspace adds nothing to Algorithm 1: a session in memory goes the same way."""
-    session = workspace.session(workspace.history)
+    session = workspace.session()
     for error in ([0.05, 0.0], [0.01, -0.02]):
         trial = session.ask()
         session.tell(trial.number, error)
-        number = workspace.ask().number
-        workspace.tell(number, error)
-    np.testing.assert_array_equal(workspace.ask().condition, session.ask().condition)
+        number = ask(workspace).number
+        tell(workspace, number, error)
+    np.testing.assert_array_equal(ask(workspace).condition, session.ask().condition)
 
 
 def test_numbers_run_over_all_goals_and_an_earlier_goals_trial_can_be_amended(workspace):
-    workspace.tell(workspace.ask().number, [0.0, 0.0])
+    tell(workspace, ask(workspace).number, [0.0, 0.0])
     workspace.set_goal([0.95, 0.0])
-    assert workspace.ask().number == 2
-    workspace.amend(1, [0.03, 0.0])
+    assert ask(workspace).number == 2
+    amend(workspace, 1, [0.03, 0.0])
     assert not workspace.history.trials[0].hit
     np.testing.assert_array_equal(workspace.history.trials[0].error_seen, [0.03, 0.0])
 
 
 @pytest.mark.parametrize("memory", ["goal", "workspace"])
 def test_earlier_goals_serve_a_later_one_only_when_asked_to(workspace, memory):
-    workspace.tell(workspace.ask().number, [0.06, 0.03])
+    tell(workspace, ask(workspace).number, [0.06, 0.03])
     workspace.set_goal([0.91, 0.05], memory=memory)
-    session = workspace.session(workspace.history)
+    session = workspace.session()
     alone = Session(
         session._generator, GaussianProcessAdapter(), demonstrations(), [0.91, 0.05], 0.015
     )
-    moved = np.linalg.norm(workspace.ask().condition - alone.ask().condition)
+    moved = np.linalg.norm(ask(workspace).condition - alone.ask().condition)
     assert moved > 0.01 if memory == "workspace" else moved == 0.0
 
 
 def test_a_trial_of_another_model_is_left_out(workspace):
-    first = workspace.ask()
-    workspace.tell(first.number, [0.06, 0.03])
+    first = ask(workspace)
+    tell(workspace, first.number, [0.06, 0.03])
     workspace.learn(SMALL, seed=1)
-    fresh = workspace.session(workspace.history)
+    fresh = workspace.session()
     assert fresh.n_trials == 0
-    np.testing.assert_array_equal(workspace.ask().condition, first.condition)
+    np.testing.assert_array_equal(ask(workspace).condition, first.condition)
 
 
 def test_bad_feedback_changes_nothing(workspace):
-    number = workspace.ask().number
+    number = ask(workspace).number
     before = workspace.events
     for error in ([0.1], [np.nan, 0.0], "far"):
         with pytest.raises(InvalidFeedbackError):
-            workspace.tell(number, error)
+            tell(workspace, number, error)
     for call in (
-        lambda: workspace.tell(7, [0.0, 0.0]),
-        lambda: workspace.amend(number, [0.0, 0.0]),
+        lambda: tell(workspace, 7, [0.0, 0.0]),
+        lambda: amend(workspace, number, [0.0, 0.0]),
         lambda: workspace.set_goal([0.9, 0.0]),
         lambda: workspace.learn(SMALL, seed=0),
     ):
@@ -140,11 +142,11 @@ def test_the_order_of_things_is_told(tmp_path):
     with pytest.raises(WorkspaceError, match="prior-reinforce import"):
         workspace.set_goal(GOAL)
     workspace.import_demonstrations(demonstrations(), "made up")
-    with pytest.raises(WorkspaceError, match="prior-reinforce goal"):
-        workspace.ask()
-    workspace.set_goal(GOAL)
     with pytest.raises(WorkspaceError, match="prior-reinforce learn"):
-        workspace.ask()
+        ask(workspace)
+    workspace.learn(SMALL, seed=0)
+    with pytest.raises(WorkspaceError, match="prior-reinforce goal"):
+        ask(workspace)
     workspace.close()
 
 
@@ -152,8 +154,8 @@ def test_demonstrations_that_changed_ask_for_learning_anew(workspace):
     other = demonstrations()
     changed = Demonstrations(other.plans * 1.01, other.outcomes_seen, other.format)
     workspace.import_demonstrations(changed, "again")
-    with pytest.raises(WorkspaceError, match="demonstrations changed"):
-        workspace.ask()
+    with pytest.raises(WorkspaceError, match="other demonstrations"):
+        ask(workspace)
 
 
 def test_demonstrations_must_fit_the_manifest(workspace):
@@ -166,19 +168,19 @@ def test_demonstrations_must_fit_the_manifest(workspace):
 
 
 def test_a_damaged_plan_or_model_is_never_handed_out(workspace):
-    trial = workspace.ask()
+    trial = ask(workspace)
     path = workspace.plan_path(trial)
     content = bytearray(path.read_bytes())
     content[len(content) // 2] ^= 1
     path.chmod(0o644)
     path.write_bytes(content)
     with pytest.raises(FileFormatError):
-        workspace.ask()
-    workspace.void(1, "damaged")
+        ask(workspace)
+    void(workspace, 1, "damaged")
     weights = next((workspace.folder / "models").glob("*/model.safetensors"))
     weights.write_bytes(weights.read_bytes()[:-1] + b"x")
     with pytest.raises(FileFormatError, match="not the one that was learned"):
-        workspace.ask()
+        ask(workspace)
 
 
 def test_a_plan_that_breaks_a_limit_is_refused_and_nothing_is_written(folder):
@@ -192,45 +194,45 @@ def test_a_plan_that_breaks_a_limit_is_refused_and_nothing_is_written(folder):
     workspace.set_goal(GOAL)
     before = workspace.events
     with pytest.raises(RobotLimitError, match="velocity"):
-        workspace.ask()
+        ask(workspace)
     assert workspace.events == before
     assert not list((folder / "plans").glob("*"))
     workspace.close()
 
 
 def test_a_command_runs_once_and_its_end_is_kept(workspace):
-    number = workspace.ask().number
-    done = workspace.execute(number, "cat {plan}", time_limit=20)
+    number = ask(workspace).number
+    done = execute(workspace, number, "cat {plan}", time_limit=20)
     assert done.succeeded
     assert workspace.history.trials[0].stage is TrialStage.EXECUTED
     with pytest.raises(TrialStateError, match="a plan runs once"):
-        workspace.execute(number, "cat {plan}", time_limit=20)
-    workspace.tell(number, [0.02, 0.0])
+        execute(workspace, number, "cat {plan}", time_limit=20)
+    tell(workspace, number, [0.02, 0.0])
     assert workspace.events[-2].data["exit_status"] == 0
 
 
 def test_a_program_that_is_not_there_leaves_the_trial_to_be_executed(workspace):
-    number = workspace.ask().number
+    number = ask(workspace).number
     with pytest.raises(ConfigurationError):
-        workspace.execute(number, "no-such-controller {plan}", time_limit=5)
+        execute(workspace, number, "no-such-controller {plan}", time_limit=5)
     assert workspace.history.trials[0].stage is TrialStage.ASKED
 
 
 def test_an_execution_that_was_cut_off_is_never_repeated_by_itself(workspace):
-    number = workspace.ask().number
-    with workspace._journal.exclusive():  # what execute writes before the program dies
-        workspace._journal.append("executing", {"trial": number, "command": "arm {plan}"})
+    number = ask(workspace).number
+    with workspace.journal.exclusive():  # what execute writes before the program dies
+        workspace.journal.append("executing", {"trial": number, "command": "arm {plan}"})
     again = reopened(workspace)
     with pytest.raises(WorkspaceError, match="did the arm move"):
-        again.ask()
+        ask(again)
     assert "did the arm move" in describe(again)
-    assert again.ask(arm_did_not_move=True).stage is TrialStage.ASKED
-    again.execute(number, "cat {plan}", time_limit=20)
+    assert ask(again, arm_did_not_move=True).stage is TrialStage.ASKED
+    execute(again, number, "cat {plan}", time_limit=20)
     again.close()
 
 
 def test_the_journal_is_append_only(workspace):
-    workspace.ask()
+    ask(workspace)
     connection = sqlite3.connect(workspace.folder / "journal.sqlite")
     for statement in ("DELETE FROM events", "UPDATE events SET kind = 'x'"):
         with pytest.raises(sqlite3.IntegrityError, match="append-only"):
@@ -241,18 +243,18 @@ def test_the_journal_is_append_only(workspace):
 def test_two_programs_exclude_each_other(workspace, monkeypatch):
     monkeypatch.setattr("prior_reinforce.workspace.journal._LOCK_TIMEOUT_S", 0.1)
     other = Workspace(workspace.folder)
-    with workspace._journal.exclusive(), pytest.raises(WorkspaceError, match="another command"):
-        other.ask()
-    other.ask()
+    with workspace.journal.exclusive(), pytest.raises(WorkspaceError, match="another command"):
+        ask(other)
+    ask(other)
     other.close()
     assert len(workspace.history.trials) == 1
 
 
 def test_a_workspace_that_was_copied_goes_on(workspace, tmp_path):
-    workspace.tell(workspace.ask().number, [0.05, -0.02])
+    tell(workspace, ask(workspace).number, [0.05, -0.02])
     shutil.copytree(workspace.folder, tmp_path / "elsewhere")
     copy = Workspace(tmp_path / "elsewhere")
-    np.testing.assert_array_equal(copy.ask().condition, workspace.ask().condition)
+    np.testing.assert_array_equal(ask(copy).condition, ask(workspace).condition)
     copy.close()
 
 
@@ -260,21 +262,21 @@ def test_a_workspace_that_was_copied_goes_on(workspace, tmp_path):
 def test_a_read_only_folder_is_named_for_users(workspace):
     workspace.folder.chmod(0o500)
     with pytest.raises(WorkspaceError, match="writable"):
-        workspace.ask()
+        ask(workspace)
     workspace.folder.chmod(0o700)
 
 
 def test_a_refused_disk_is_named_and_the_journal_stays_good(workspace):
     """A page limit stands for the full disk: SQLite then says `database or disk is full`."""
-    number = workspace.ask().number
-    connection = workspace._journal._connection
+    number = ask(workspace).number
+    connection = workspace.journal._connection
     pages = connection.execute("PRAGMA page_count").fetchone()[0]
     connection.execute(f"PRAGMA max_page_count = {pages}")
     with pytest.raises(WorkspaceError, match="free some disk space"):
-        workspace.void(number, "x" * 100_000)
+        void(workspace, number, "x" * 100_000)
     connection.execute("PRAGMA max_page_count = 1000000")
     assert workspace.history.trials[0].stage is TrialStage.ASKED
-    workspace.tell(number, [0.0, 0.0])
+    tell(workspace, number, [0.0, 0.0])
 
 
 def test_folders_that_are_no_workspace_are_named(tmp_path):
@@ -293,8 +295,8 @@ def test_a_damaged_journal_is_named(folder):
 
 def test_status_is_short_and_says_what_is_next(workspace):
     assert "prior-reinforce ask" in describe(workspace)
-    workspace.tell(workspace.ask().number, [0.05, 0.0])
-    workspace.tell(workspace.ask().number, [0.0, 0.0])
+    tell(workspace, ask(workspace).number, [0.05, 0.0])
+    tell(workspace, ask(workspace).number, [0.0, 0.0])
     text = describe(workspace)
     assert "5 cm long" in text
     assert "N = 4 demonstrations + 2 trials = 6" in text

@@ -12,7 +12,7 @@ from rich.console import Console
 
 from prior_reinforce.commands.progress import fit_progress
 from prior_reinforce.commands.task_options import Simulated
-from prior_reinforce.commands.workspace import opened
+from prior_reinforce.commands.workspace import opened, print_next
 from prior_reinforce.errors import ConfigurationError, FileFormatError
 from prior_reinforce.generators import DiffusionConfig, DiffusionGenerator, load_generator
 from prior_reinforce.generators.base import Generator
@@ -86,10 +86,11 @@ class Learn(Simulated):
         """Fit and save."""
         console = Console()
         if self.folder is not None:
-            with opened(self.folder) as workspace, fit_progress(console) as progress:
-                model = workspace.learn(self.config, seed=self.seed, progress=progress)
-            console.print(f"model {model} is in use")
-            console.print(f"next: prior-reinforce goal {self.folder} X Y")
+            with opened(self.folder) as workspace:
+                with fit_progress(console) as progress:
+                    model = workspace.learn(self.config, seed=self.seed, progress=progress)
+                print(f"model {model} is in use")
+                print_next(workspace)
             return
         _, demonstrations = self.open()
         learn(demonstrations, self.out, config=self.config, seed=self.seed, console=console)

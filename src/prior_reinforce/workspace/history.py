@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import Any
@@ -73,9 +73,12 @@ class History:
 
     goals: tuple[GoalRecord, ...] = ()
     trials: tuple[TrialRecord, ...] = ()
+    demonstrations: str | None = None
+    """SHA-256 of the demonstrations in use; None before the first import."""
     model: str | None = None
     """Hash of the model in use; None before the first training."""
-    last_event: Event | None = field(default=None)
+    learned_from: Mapping[str, str] = field(default_factory=dict)
+    """SHA-256 of the demonstrations that each model was learned from, by the model's hash."""
 
     @property
     def goal(self) -> GoalRecord | None:
@@ -101,7 +104,7 @@ def fold(events: Iterable[Event]) -> History:
     history = History()
     for event in events:
         try:
-            history = replace(_apply(history, event.kind, dict(event.data)), last_event=event)
+            history = _apply(history, event.kind, dict(event.data))
         except (KeyError, IndexError, TypeError, ValueError) as error:
             raise WorkspaceError(
                 f"event {event.id} ({event.kind}) does not fit the ones before it: {error!r}; "
@@ -112,9 +115,11 @@ def fold(events: Iterable[Event]) -> History:
 
 def _apply(history: History, kind: str, data: dict[str, Any]) -> History:
     if kind == "demonstrations_imported":
-        return history
+        return replace(history, demonstrations=data["sha256"])
     if kind == "model_trained":
-        return replace(history, model=data["model"])
+        model = data["model"]
+        learned_from = {**history.learned_from, model: data["demonstrations_sha256"]}
+        return replace(history, model=model, learned_from=learned_from)
     if kind == "goal_set":
         goal = GoalRecord(
             len(history.goals) + 1, np.array(data["goal"]), data["tolerance"], data["memory"]

@@ -1,11 +1,14 @@
 """The trial journal: append-only events in SQLite, each durable before a command returns.
 
 Nothing is ever changed or deleted; what happened is the list of events, and everything else is a
-fold over it (`history.py`). One program at a time may read-then-append (`Journal.exclusive`).
+fold over it (`history.py`). One program at a time may read-then-append (`Journal.exclusive`). Every
+event carries a digest of itself and of all before it, so that a damaged copy is an error rather
+than a reading that is slightly another one.
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
 import sqlite3
 from collections.abc import Iterator, Mapping
@@ -27,7 +30,8 @@ CREATE TABLE IF NOT EXISTS events (
     id INTEGER PRIMARY KEY AUTOINCREMENT,
     time TEXT NOT NULL,
     kind TEXT NOT NULL,
-    data TEXT NOT NULL
+    data TEXT NOT NULL,
+    digest TEXT NOT NULL
 ) STRICT;
 CREATE TRIGGER IF NOT EXISTS events_are_never_changed BEFORE UPDATE ON events
 BEGIN SELECT RAISE(ABORT, 'the journal is append-only'); END;
@@ -85,10 +89,26 @@ class Journal:
         self._connection.close()
 
     def events(self) -> list[Event]:
-        """All events, in order."""
+        """All events, in order.
+
+        Raises:
+            WorkspaceError: The file is damaged.
+        """
+        events: list[Event] = []
+        digest = ""
         with self._named_errors():
-            rows = self._connection.execute("SELECT id, time, kind, data FROM events ORDER BY id")
-            return [Event(id_, time, kind, json.loads(data)) for id_, time, kind, data in rows]
+            rows = self._connection.execute(
+                "SELECT id, time, kind, data, digest FROM events ORDER BY id"
+            )
+            for id_, time, kind, data, written in rows:
+                digest = _digest(digest, time, kind, data)
+                if digest != written:
+                    raise WorkspaceError(
+                        f"{self._path}: event {id_} is not what was written; restore the journal "
+                        "from a copy"
+                    )
+                events.append(Event(id_, time, kind, json.loads(data)))
+        return events
 
     @contextmanager
     def exclusive(self) -> Iterator[None]:
@@ -121,8 +141,13 @@ class Journal:
         now = datetime.now(timezone.utc).isoformat(timespec="milliseconds")
         text = json.dumps(data, allow_nan=False)
         with self._named_errors():
+            last = self._connection.execute(
+                "SELECT digest FROM events ORDER BY id DESC LIMIT 1"
+            ).fetchone()
+            digest = _digest(last[0] if last else "", now, kind, text)
             self._connection.execute(
-                "INSERT INTO events (time, kind, data) VALUES (?, ?, ?)", (now, kind, text)
+                "INSERT INTO events (time, kind, data, digest) VALUES (?, ?, ?, ?)",
+                (now, kind, text, digest),
             )
 
     @contextmanager
@@ -139,3 +164,7 @@ class Journal:
             elif "full" in text or "disk I/O" in text:
                 remedy = "free some disk space; what was told before is safe"
             raise WorkspaceError(f"{self._path}: {text}; {remedy}") from error
+
+
+def _digest(before: str, time: str, kind: str, data: str) -> str:
+    return hashlib.sha256("\0".join(map(str, (before, time, kind, data))).encode()).hexdigest()

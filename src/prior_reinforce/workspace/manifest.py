@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from prior_reinforce.errors import ConfigurationError, FileFormatError, PriorReinforceError
+from prior_reinforce.feedback import WORDS
 from prior_reinforce.motions import PlanFormat
 from prior_reinforce.robots import GateSettings, RobotLimits, robot_limits
 
@@ -32,31 +33,38 @@ TEMPLATE = """\
 [task]
 name = "{name}"
 
-[plan]                     # what one frame of a plan means
+# What one frame of a plan means; dt is the time between two frames.
+[plan]
 names = {names}
 units = {units}
-dt = {dt}                  # time between two frames [s]
+dt = {dt}
 
-[outcome]                  # where the object ends, measured in the table frame:
-names = {outcome_names}    # x points from the robot's base over the table, y to its left
+# Where the object ends, measured in the table frame: x points from the robot's base over the
+# table, y to its left. A goal is reached within the tolerance.
+[outcome]
+names = {outcome_names}
 units = {outcome_units}
-tolerance = {tolerance}    # largest distance from the goal that counts as reached
+tolerance = {tolerance}
 
-[robot]                    # every plan is held against these limits before it is handed out
-model = "{robot}"          # "panda", "fr3", "given" (with the lists below) or "none"
-firmware = "any"           # of an FR3's system image: ">=5.9", "<5.9", or "any"
-# joint_names = [...]      # for "given": one number a joint
-# lower = [...]            # [rad]
-# upper = [...]            # [rad]
-# velocity = [...]         # [rad/s]
-# acceleration = [...]     # [rad/s^2]
-# jerk = [...]             # [rad/s^3]
+# Every plan is held against these limits before it is handed out. The model is "panda", "fr3",
+# "given" (with the lists below, one number a joint) or "none". The firmware is that of an FR3's
+# system image: ">=5.9", "<5.9" or "any".
+[robot]
+model = "{robot}"
+firmware = "any"
+# joint_names = ["joint1", "joint2"]
+# lower = [-2.0, -2.0]            # [rad]
+# upper = [2.0, 2.0]              # [rad]
+# velocity = [2.0, 2.0]           # [rad/s]
+# acceleration = [10.0, 10.0]     # [rad/s^2]
+# jerk = [5000.0, 5000.0]         # [rad/s^3]
 
-[gate]                     # the program's own lines beside the robot's; all optional
-# tool_tip = [0.0, 0.0, 0.1]           # tool tip in the flange's frame [m]
-# workspace_low = [0.2, -0.6, 0.0]     # box that the tool tip must stay in [m], base frame
+# The program's own lines beside the robot's; all optional.
+[gate]
+# tool_tip = [0.0, 0.0, 0.1]         # tool tip in the flange's frame [m]
+# workspace_low = [0.2, -0.6, 0.0]   # box that the tool tip must stay in [m], base frame
 # workspace_high = [0.9, 0.6, 1.2]
-# beyond_refuse = 0.5                  # distance beyond the demonstrations that refuses a plan
+# beyond_refuse = 0.5                # how far beyond the demonstrations refuses, in joint ranges
 """
 
 _SECTIONS: Mapping[str, frozenset[str]] = {
@@ -98,6 +106,11 @@ class Manifest:
     gate: GateSettings
     """The gate's own lines."""
 
+    @property
+    def in_words(self) -> bool:
+        """Whether the words of `feedback` (long, left, high) describe this task's outcomes."""
+        return len(self.outcome_names) <= len(WORDS) and set(self.outcome_units) == {"m"}
+
 
 def load_manifest(path: Path) -> Manifest:
     """Read and check a manifest.
@@ -108,12 +121,25 @@ def load_manifest(path: Path) -> Manifest:
     """
     try:
         text = path.read_text(encoding="utf-8")
-        data = tomllib.loads(text)
     except OSError as error:
         raise FileFormatError(
             f"no manifest at {path} ({error.strerror}); make a workspace with: prior-reinforce new"
         ) from error
-    except ValueError as error:  # also a text that is no UTF-8
+    except ValueError as error:
+        raise FileFormatError(f"{path} is not a text in UTF-8: {error}; save it as one") from error
+    return parse_manifest(text, path)
+
+
+def parse_manifest(text: str, path: Path) -> Manifest:
+    """Check a manifest's text; `path` is where messages say it stands.
+
+    Raises:
+        FileFormatError: It is no TOML.
+        ConfigurationError: A value is missing, unknown, of the wrong kind, or out of range.
+    """
+    try:
+        data = tomllib.loads(text)
+    except (ValueError, RecursionError) as error:
         raise FileFormatError(f"{path} is not a TOML file: {error}; mend that line") from error
     return _Reader(path, text, data).manifest()
 

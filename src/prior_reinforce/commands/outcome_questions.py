@@ -1,0 +1,158 @@
+"""Asking a person where each recorded object landed, since no recording format says."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import os
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from prior_reinforce.errors import (
+    InvalidDemonstrationsError,
+    InvalidFeedbackError,
+)
+from prior_reinforce.feedback import from_words
+from prior_reinforce.workspace.importing import Recording
+from prior_reinforce.workspace.importing.outcomes import (
+    OUTCOMES_FILE,
+    Outcomes,
+    find_outcomes,
+    in_order,
+    outcomes_of,
+    read_outcomes,
+)
+from prior_reinforce.workspace.manifest import Manifest
+from prior_reinforce.workspace.store import named_disk_errors
+
+_PLACES = {"ahead": "long", "behind": "short", "up": "high", "down": "low", "to the ": ""}
+"""A place seen from the robot's base, in the words of an error seen from the goal."""
+
+
+def ask_for_outcomes(
+    source: Path, given: Path | None, recordings: Sequence[Recording], manifest: Manifest
+) -> dict[str, tuple[float, ...]]:
+    """Ask for the outcomes that no table has.
+
+    Args:
+        source: What the recordings were read from.
+        given: The table that was named, if any.
+        recordings: Of the episodes in question.
+        manifest: What an outcome is.
+
+    Returns:
+        Outcomes of all episodes, known and typed, by name; empty where nothing was missing.
+
+    Raises:
+        FileFormatError: The table is damaged.
+        InvalidDemonstrationsError: It has other columns, or the person stopped typing.
+    """
+    known = _known(source, given, recordings, manifest)
+    outcomes: dict[str, tuple[float, ...]] = {}
+    missing: list[str] = []
+    for recording in recordings:
+        try:
+            found = outcomes_of([recording], known, partial=True)[0]
+        except InvalidDemonstrationsError:
+            missing.append(recording.episode)
+        else:
+            outcomes[recording.episode] = tuple(found.tolist())
+    if not missing:
+        return {}
+    print(_explanation(manifest, missing))
+    for number, episode in enumerate(missing, start=1):
+        outcomes[episode] = _ask(f"{episode} ({number} of {len(missing)}): ", episode, manifest)
+    return {recording.episode: outcomes[recording.episode] for recording in recordings}
+
+
+def read_place(text: str, manifest: Manifest) -> tuple[float, ...]:
+    """Read where an object landed, from numbers in the outcome's units, or from words.
+
+    Args:
+        text: For instance `0.92 0.10`, or `92cm ahead, 10cm left`.
+        manifest: What an outcome is.
+
+    Raises:
+        InvalidFeedbackError: It is neither.
+    """
+    k = len(manifest.outcome_names)
+    parts = text.replace(",", " ").split()
+    try:
+        numbers = tuple(float(part) for part in parts)
+    except ValueError:
+        numbers = None
+    if numbers is not None:
+        if len(numbers) != k or not all(math.isfinite(number) for number in numbers):
+            raise InvalidFeedbackError(
+                f"{text!r} is not {k} finite numbers: {', '.join(manifest.outcome_names)}"
+            )
+        return numbers
+    if not manifest.in_words:
+        raise InvalidFeedbackError(
+            f"cannot read {text!r}; give {k} numbers: {', '.join(manifest.outcome_names)}"
+        )
+    words = text.lower()
+    for place, error in _PLACES.items():
+        words = re.sub(rf"\b{place}", error, words)
+    return tuple(from_words(words, k).tolist())
+
+
+def keep_typed(
+    folder: Path, outcomes: Mapping[str, tuple[float, ...]], names: Sequence[str]
+) -> Path:
+    """Write outcomes to a table in the workspace, so that nothing has to be typed twice.
+
+    Raises:
+        WorkspaceError: The disk is full, or the folder read-only.
+    """
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(["episode", *names])
+    writer.writerows([episode, *map(repr, values)] for episode, values in outcomes.items())
+    path = folder / OUTCOMES_FILE
+    unfinished = path.with_name(f".{OUTCOMES_FILE}.unfinished")
+    with named_disk_errors(folder):
+        unfinished.write_text(text.getvalue(), encoding="utf-8")
+        os.replace(unfinished, path)
+    return path
+
+
+def _known(
+    source: Path, given: Path | None, recordings: Sequence[Recording], manifest: Manifest
+) -> Outcomes:
+    if given is not None:
+        return in_order(read_outcomes(given), manifest.outcome_names)
+    try:
+        return in_order(find_outcomes(source, recordings), manifest.outcome_names)
+    except InvalidDemonstrationsError:
+        return Outcomes("nothing", (), {})
+
+
+def _explanation(manifest: Manifest, missing: Sequence[str]) -> str:
+    names = " ".join(manifest.outcome_names)
+    units = ", ".join(dict.fromkeys(manifest.outcome_units))
+    words = ""
+    if manifest.in_words:
+        example = ("92cm ahead", "10cm left", "5cm up")[: len(manifest.outcome_names)]
+        words = f', or words such as "{", ".join(example)}"'
+    return (
+        f"{len(missing)} episodes have no outcome: where did the object land, in the table frame?\n"
+        f"type {names} [{units}]{words}"
+    )
+
+
+def _ask(question: str, episode: str, manifest: Manifest) -> tuple[float, ...]:
+    while True:
+        try:
+            text = input(question)
+        except EOFError as error:
+            raise InvalidDemonstrationsError(
+                f"no outcome for episode {episode}; write {OUTCOMES_FILE} beside the recording, or "
+                "leave it out with --episodes"
+            ) from error
+        try:
+            return read_place(text, manifest)
+        except InvalidFeedbackError as error:
+            print(error)

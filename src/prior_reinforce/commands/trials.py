@@ -1,0 +1,274 @@
+"""Commands on the trials of a workspace: ask, tell, amend, void, export."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import tyro
+
+from prior_reinforce.commands.workspace import Folder, opened, print_next
+from prior_reinforce.errors import ConfigurationError, InvalidFeedbackError
+from prior_reinforce.feedback import from_words
+from prior_reinforce.workspace.executing_lock import is_executing
+from prior_reinforce.workspace.execution import execute
+from prior_reinforce.workspace.history import TrialRecord, TrialStage
+from prior_reinforce.workspace.plan_files import write_plan
+from prior_reinforce.workspace.status import say_trial, tell_example
+from prior_reinforce.workspace.trials import amend, ask, tell, void
+from prior_reinforce.workspace.wording import say_place
+from prior_reinforce.workspace.workspace import Workspace
+
+Number = Annotated[int, tyro.conf.Positional]
+
+_LARGEST_PLAUSIBLE_METRES = 1.0
+"""Ours: a bare number beyond it is centimetres far more often than a throw a metre off."""
+
+
+@dataclass(frozen=True)
+class Ask:
+    """Get the plan of the next trial; asking again gives the same one until it is told."""
+
+    folder: Folder
+    """Workspace."""
+    out: Path | None = None
+    """Write the plan to this file as well: .npz (t, q, dq, ddq), .csv or .json."""
+    rate: float | None = None
+    """Samples a second of --out; the plan's own frames if not given."""
+    run_command: Annotated[str | None, tyro.conf.arg(name="run")] = None
+    """Execute the plan with this command, once, for instance "mycontroller {plan}"; {plan} stands
+    for the plan's file."""
+    time_limit: float = 120.0
+    """Seconds that the command may take."""
+    arm_did_not_move: bool = False
+    """After a crash while executing: a person saw that nothing moved."""
+
+    def run(self) -> int:
+        """Hand the plan out."""
+        with opened(self.folder) as workspace:
+            did_not_move = self.arm_did_not_move
+            if not did_not_move and _should_ask_whether_it_moved(workspace):
+                moved = _ask_whether_it_moved(workspace)
+                if moved:
+                    print_next(workspace)
+                    return 1
+                did_not_move = True
+            trial = ask(workspace, arm_did_not_move=did_not_move)
+            plan = workspace.plan(trial)
+            print(
+                f"trial {trial.number}: aimed at {say_place(workspace.manifest, trial.condition)}"
+            )
+            if _reached_before(workspace, trial):
+                print("the goal is reached already: this trial repeats it")
+            report = workspace.gate(plan)
+            print(
+                "no robot in the manifest, no limits checked" if report is None else report.text()
+            )
+            print(f"plan: {workspace.plan_path(trial)}")
+            if self.out is not None:
+                print(f"written: {write_plan(plan, self.out, rate=self.rate).path}")
+            if self.run_command is not None:
+                return self._execute(workspace, trial, self.run_command)
+            if trial.stage is TrialStage.EXECUTED:
+                print("it was executed already")
+            else:
+                print("execute it, then say where the object went:")
+            print_next(workspace)
+            return 0
+
+    def _execute(self, workspace: Workspace, trial: TrialRecord, command: str) -> int:
+        hand_over = execute(workspace, trial.number, command, time_limit=self.time_limit)
+        if hand_over.output_tail:
+            print(hand_over.output_tail.rstrip())
+        if hand_over.succeeded:
+            print_next(workspace)
+            return 0
+        ended = f"ended with status {hand_over.exit_status}"
+        why = "was stopped at its time limit" if hand_over.timed_out else ended
+        print(
+            f"prior-reinforce: the command {why}; if the object flew, tell trial {trial.number}; "
+            f"if not, void it: prior-reinforce void {self.folder} {trial.number} --reason WHY",
+            file=sys.stderr,
+        )
+        return 1
+
+
+@dataclass(frozen=True)
+class _Reading:
+    folder: Folder
+    """Workspace."""
+    number: Number
+    """Number of the trial."""
+    error: tuple[str, ...] | None = None
+    """What was seen, outcome minus goal: words ("5cm long, 2cm left") or metres (0.05 -0.02)."""
+    outcome: tuple[float, ...] | None = None
+    """Or where the object ended, in the table frame, in the outcome's units."""
+    hit: bool = False
+    """The goal was reached, whatever the distance says."""
+    miss: bool = False
+    """The goal was not reached, whatever the distance says."""
+
+    def read(self, workspace: Workspace) -> tuple[np.ndarray, bool | None]:
+        """The error seen, and whether it was a hit if that was said."""
+        given = [self.error is not None, self.outcome is not None]
+        if sum(given) > 1 or not (any(given) or self.hit) or (self.hit and self.miss):
+            raise ConfigurationError(
+                "say what was seen: --error or --outcome, with --hit or --miss if that was seen "
+                "as well, or --hit alone"
+            )
+        hit = True if self.hit else False if self.miss else None
+        goal_number = workspace.record(self.number).goal_number
+        goal = workspace.history.goals[goal_number - 1].goal
+        if self.outcome is not None:
+            if len(self.outcome) != goal.size:
+                raise InvalidFeedbackError(
+                    f"--outcome needs {goal.size} numbers, got {len(self.outcome)}: "
+                    f"{', '.join(workspace.manifest.outcome_names)}"
+                )
+            return _plausible(workspace, np.array(self.outcome) - goal), hit
+        if self.error is None:
+            return np.zeros(goal.size), hit
+        return read_error(workspace, self.error), hit
+
+
+@dataclass(frozen=True)
+class Tell(_Reading):
+    """Report what was seen of a trial."""
+
+    def run(self) -> None:
+        """Write it down."""
+        with opened(self.folder) as workspace:
+            error, hit = self.read(workspace)
+            trial = tell(workspace, self.number, error, hit=hit)
+            print(f"trial {trial.number}: {say_trial(workspace, trial)}")
+            print_next(workspace)
+
+
+@dataclass(frozen=True)
+class Amend(_Reading):
+    """Correct what was told of a trial."""
+
+    def run(self) -> None:
+        """Write it down."""
+        with opened(self.folder) as workspace:
+            error, hit = self.read(workspace)
+            trial = amend(workspace, self.number, error, hit=hit)
+            print(f"trial {trial.number}, corrected: {say_trial(workspace, trial)}")
+            print_next(workspace)
+
+
+@dataclass(frozen=True)
+class Void:
+    """Declare that a trial is not data: the ball slipped, the arm stopped."""
+
+    folder: Folder
+    """Workspace."""
+    number: Number
+    """Number of the trial."""
+    reason: str = ""
+    """Why, for the log and the report."""
+
+    def run(self) -> None:
+        """Write it down."""
+        with opened(self.folder) as workspace:
+            trial = void(workspace, self.number, self.reason)
+            print(
+                f"trial {trial.number}: {say_trial(workspace, trial)}; nothing is learned from it"
+            )
+            print_next(workspace)
+
+
+@dataclass(frozen=True)
+class Export:
+    """Write a trial's plan in another form: NPZ, CSV, or JSON in ROS 2's JointTrajectory order."""
+
+    folder: Folder
+    """Workspace."""
+    number: Number
+    """Number of the trial."""
+    out: Annotated[Path, tyro.conf.Positional]
+    """File: .npz, .csv or .json."""
+    rate: float | None = None
+    """Samples a second; the plan's own frames if not given."""
+
+    def run(self) -> None:
+        """Write it."""
+        with opened(self.folder) as workspace:
+            plan = workspace.plan(workspace.record(self.number))
+            written = write_plan(plan, self.out, rate=self.rate)
+        print(f"written: {written.path}  sha256 {written.sha256}")
+
+
+def read_error(workspace: Workspace, given: tuple[str, ...]) -> np.ndarray:
+    """Read an error from words or numbers.
+
+    Returns:
+        Outcome minus goal, shape (k,), in the outcome's units.
+
+    Raises:
+        InvalidFeedbackError: It is neither, or as many numbers as components are missing.
+    """
+    manifest = workspace.manifest
+    k = len(manifest.outcome_names)
+    text = " ".join(given)
+    try:
+        numbers = [float(word) for word in text.replace(",", " ").split()]
+    except ValueError:
+        numbers = None
+    if numbers is None:
+        if manifest.in_words:
+            return from_words(text, k)
+        raise InvalidFeedbackError(
+            f"cannot read {text!r}; this task's outcomes have no words, give {k} numbers: "
+            f"{tell_example(workspace)}"
+        )
+    if len(numbers) != k:
+        words = ", or words" if manifest.in_words else ""
+        raise InvalidFeedbackError(
+            f"--error needs {k} numbers, got {len(numbers)}: outcome minus goal in "
+            f"{', '.join(manifest.outcome_names)}{words}: {tell_example(workspace)}"
+        )
+    return _plausible(workspace, np.array(numbers))
+
+
+def _plausible(workspace: Workspace, error: np.ndarray) -> np.ndarray:
+    """The error, unless it looks like centimetres where words could say it as well."""
+    largest = np.abs(error).max(initial=0.0)
+    if workspace.manifest.in_words and _LARGEST_PLAUSIBLE_METRES <= largest < np.inf:
+        raise InvalidFeedbackError(
+            f"an error of {largest:g} m looks like centimetres; numbers are metres, or say it in "
+            f"words: {tell_example(workspace)}"
+        )
+    return error
+
+
+def _reached_before(workspace: Workspace, trial: TrialRecord) -> bool:
+    return any(other.hit for other in workspace.history.trials_of(trial.goal_number))
+
+
+def _should_ask_whether_it_moved(workspace: Workspace) -> bool:
+    trial = workspace.history.open_trial
+    cut_off = trial is not None and trial.stage is TrialStage.EXECUTING
+    return cut_off and sys.stdin.isatty() and not is_executing(workspace.folder)
+
+
+def _ask_whether_it_moved(workspace: Workspace) -> bool:
+    trial = workspace.history.open_trial
+    assert trial is not None
+    print(f"trial {trial.number} was executing when the program stopped")
+    while True:
+        answer = _answer("did the arm move? (yes/no) ").lower()
+        if answer in {"y", "yes", "n", "no"}:
+            return answer.startswith("y")
+
+
+def _answer(question: str) -> str:
+    try:
+        return input(question).strip()
+    except EOFError as error:
+        raise ConfigurationError(
+            "no answer; ask again, with --arm-did-not-move if it did not"
+        ) from error
