@@ -49,11 +49,14 @@ class TableScene:
     """Known points (x, y) of that plane to calibrate the camera on, table frame, in [m]."""
 
 
+# The outcome is where the ball's centre comes down through the rim's plane, 10 cm up.
+_BALL_AND_HOOP = TableScene(
+    SeenObject("the orange ball", 0.06), SeenObject("the red hoop", 0.10), plane_height=0.10
+)
+
 SCENES: dict[str, TableScene] = {
-    # The outcome is where the ball's centre comes down through the rim's plane, 10 cm up.
-    "basketball-v1": TableScene(
-        SeenObject("the orange ball", 0.06), SeenObject("the red hoop", 0.10), plane_height=0.10
-    ),
+    "basketball-v1": _BALL_AND_HOOP,
+    "basketball-v2": _BALL_AND_HOOP,  # only the spoon is another
     # Both stones lie on the table and are 3 cm high; the goal is 8 cm before the target stone.
     "curling": TableScene(
         SeenObject("the curling stone with the blue handle", 0.06),
