@@ -38,7 +38,7 @@ class Task(ABC):
 
     @abstractmethod
     def rollout(self, plans: np.ndarray, rng: np.random.Generator | None) -> list[Rollout]:
-        """Execute plans open loop, each from the same start state.
+        """Execute plans open loop, each from rest in its own first frame.
 
         Args:
             plans: Action plans, shape (n, H, D), in the units of `format`. Any H.
