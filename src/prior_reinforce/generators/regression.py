@@ -59,12 +59,13 @@ class UNetRegressionConfig:
         default_factory=lambda: UNetSize(widths=(64, 128, 128), step_width=64, condition_width=64)
     )
     """Size of the U-Net."""
-    training_steps: int = 1000
+    training_steps: int = 800
     """Optimiser steps, each on all demonstrations."""
-    learning_rate: float = 1e-3
+    learning_rate: float = 3e-3
     """Peak of the cosine schedule, which starts there and ends at 0."""
-    weight_decay: float = 1e-6
-    """Of AdamW."""
+    weight_decay: float = 2.0
+    """Of AdamW. Large, because a net that meets six demonstrations to a milliradian ripples between
+    them; ten times less doubles the error at new goals, somewhat more misses the demonstrations."""
 
     def __post_init__(self) -> None:
         """Check the settings.
