@@ -3,8 +3,10 @@
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.tasks.base import Task
 from prior_reinforce.tasks.basketball import BasketballShot
+from prior_reinforce.tasks.curling import Curling
+from prior_reinforce.tasks.fishing import Fishing
 
-FAMILY: tuple[type[Task], ...] = (BasketballShot,)
+FAMILY: tuple[type[Task], ...] = (BasketballShot, Curling, Fishing)
 """Every task that can be named on the command line."""
 
 
@@ -22,4 +24,4 @@ def make_task(name: str) -> Task:
     )
 
 
-__all__ = ["FAMILY", "BasketballShot", "Task", "make_task"]
+__all__ = ["FAMILY", "BasketballShot", "Curling", "Fishing", "Task", "make_task"]

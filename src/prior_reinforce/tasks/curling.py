@@ -1,0 +1,98 @@
+"""Curling: a bar on the Panda's flange pushes a stone, which slides on and stops by friction.
+
+Nothing holds the stone: it leaves the bar when the bar brakes harder than friction brakes the
+stone. Pushed by a straight bar a round stone goes along the bar's normal, so the heading of the
+push is the direction of the slide, and the speed of the push its length, v^2 / (2 mu g). The
+outcome is where the stone comes to rest. The scene is in `curling.xml`, the arm in `panda.xml`;
+lengths in [m], table frame.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+import mujoco
+import numpy as np
+
+from prior_reinforce.motions import PlanFormat
+from prior_reinforce.rollouts import KeyFrame, Rollout
+from prior_reinforce.tasks.panda import JOINT_NAMES, N_JOINTS, STEP
+from prior_reinforce.tasks.panda_task import ArmDisturbances, PandaTask
+
+STONE_START = np.array([0.43, 0.0])
+"""Where the stone waits, (x, y) in [m]; in `curling.xml` too. Ours: near enough to the base that
+the arm can accelerate it over 20 cm, far enough that it can be reached from behind."""
+STONE_RADIUS = 0.03
+"""In [m]; ours, a table-top stone as in the paper's picture."""
+FRICTION = 0.12
+"""Of the stone on the table [-]; in `curling.xml` too. Ours: a waxed board. Less would need
+gentler pushes whose length is more sensitive to speed, more would need a faster arm."""
+TARGET_OFFSET = np.array([0.08, 0.0])
+"""From a goal to the centre of the target stone behind it, (x, y) in [m]; in `curling.xml` too.
+Ours: a gap of 2 cm between two stones, so that a success never touches the target."""
+_LOST = np.zeros(2)
+"""Outcome of a stone that leaves the table: the robot's own base."""
+
+
+@dataclass(frozen=True)
+class Disturbances:
+    """What differs between two executions of one plan; standard deviations, ours.
+
+    Together they spread the resting place of a repeated plan by about half a centimetre
+    (docs/tasks/curling.md).
+    """
+
+    arm: ArmDisturbances = field(default_factory=ArmDisturbances)
+    stone: float = 0.0005
+    """Where the stone is put, along each axis, in [m]."""
+    friction: float = 0.005
+    """Relative error of the friction between stone and table."""
+
+
+class Curling(PandaTask):
+    """Curling (paper, Section III and Figure 3), in MuJoCo."""
+
+    name: ClassVar[str] = "curling"
+    format: ClassVar[PlanFormat] = PlanFormat(JOINT_NAMES, ("rad",) * N_JOINTS, 0.0125)
+    tolerance: ClassVar[float] = 0.015
+    region: ClassVar[np.ndarray] = np.array([[0.78, -0.20], [1.03, 0.20]])
+    scene: ClassVar[str] = "curling"
+    lead_in: ClassVar[float] = 0.1
+    lead_out: ClassVar[float] = 1.5  # the fastest stone slides for 1 s
+
+    def __init__(self, disturbances: Disturbances | None = None) -> None:
+        """Compile the scene.
+
+        Args:
+            disturbances: How repeated executions differ; the documented ones when not given.
+        """
+        self.disturbances = disturbances or Disturbances()
+        super().__init__(self.disturbances.arm)
+        stone = self.model.body("stone")
+        self._stone = self.model.jnt_qposadr[stone.jntadr[0]]
+        self._feet = np.flatnonzero(
+            (self.model.geom_bodyid == stone.id)
+            & (self.model.geom_type == mujoco.mjtGeom.mjGEOM_SPHERE)
+        )
+
+    def joint_plans(self, plans: np.ndarray) -> np.ndarray:
+        """A plan is the joint path."""
+        return plans
+
+    def _disturb(self, model: mujoco.MjModel, rng: np.random.Generator) -> None:
+        model.geom_friction[self._feet, 0] *= 1.0 + rng.normal(0.0, self.disturbances.friction)
+
+    def _place(self, data: mujoco.MjData, rng: np.random.Generator | None) -> None:
+        """The stone starts at `STONE_START`, where the scene has it."""
+        if rng is not None:
+            data.qpos[self._stone : self._stone + 2] += rng.normal(0.0, self.disturbances.stone, 2)
+
+    def _result(self, states: np.ndarray, sensors: np.ndarray) -> Rollout:
+        """Where the stone is at the end of an execution, at rest on the table."""
+        qpos = states[-1, 1 : 1 + self.model.nq].copy()
+        stone = qpos[self._stone : self._stone + 3]
+        frame = KeyFrame(self.model, qpos, len(states) * STEP - self.lead_in)
+        if stone[2] < 0.0:
+            return Rollout(_LOST.copy(), valid=False, key_frame=frame)
+        return Rollout(stone[:2].copy(), True, frame)

@@ -1,0 +1,179 @@
+"""What every task with the simulated Panda shares: batched executions, disturbances, the film.
+
+A task adds its scene, where its objects start, what differs between repetitions and how an
+outcome is read from the recorded path; see `curling.py`.
+"""
+
+from __future__ import annotations
+
+import copy
+import os
+from abc import abstractmethod
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar
+
+import mujoco
+import mujoco.rollout
+import numpy as np
+
+from prior_reinforce.errors import ConfigurationError, InvalidGoalError
+from prior_reinforce.motions import Demonstrations, as_plans
+from prior_reinforce.rollouts import Rollout
+from prior_reinforce.tasks.base import Task
+from prior_reinforce.tasks.panda import N_JOINTS, STEP, build_scene, servo_controls
+from prior_reinforce.tasks.rendering import open_renderer
+
+_FOLDER = Path(__file__).parent
+_BATCH = 32
+"""Executions simulated at once: bounds memory at about 100 MB of recorded states."""
+_FULL = mujoco.mjtState.mjSTATE_FULLPHYSICS
+
+
+@dataclass(frozen=True)
+class ArmDisturbances:
+    """What differs in the arm between two executions of one plan; standard deviations, ours."""
+
+    pose: float = 0.001
+    """Offset of every joint, kept through the execution (its zero, its friction), in [rad]."""
+    servo: float = 0.03
+    """Relative error of every joint's servo stiffness and damping."""
+
+
+class PandaTask(Task):
+    """A task in which the Panda executes a plan from rest, and physics decides the rest."""
+
+    scene: ClassVar[str]
+    """File name of the scene without `.xml`; demonstrations are `demonstrations/<scene>_<set>`."""
+    lead_in: ClassVar[float]
+    """The arm stands in its first frame for so long before the plan begins, in [s]."""
+    lead_out: ClassVar[float]
+    """Physics goes on for so long after the last frame, in [s]."""
+
+    def __init__(self, arm: ArmDisturbances) -> None:
+        """Compile the scene.
+
+        Args:
+            arm: How the arm's repeated executions differ.
+        """
+        self._arm = arm
+        self.model = build_scene(_FOLDER / f"{self.scene}.xml")
+        self.model.opt.timestep = STEP
+        self._workers = [mujoco.MjData(self.model) for _ in range(_n_cores())]
+
+    @abstractmethod
+    def joint_plans(self, plans: np.ndarray) -> np.ndarray:
+        """Joint paths (n, H, 7) in [rad] that plans (n, H, D) stand for."""
+
+    @abstractmethod
+    def _disturb(self, model: mujoco.MjModel, rng: np.random.Generator) -> None:
+        """Change the task's own constants in a copy of the model, for one execution."""
+
+    @abstractmethod
+    def _place(self, data: mujoco.MjData, rng: np.random.Generator | None) -> None:
+        """Put the task's objects where they start; the arm already stands in its first frame."""
+
+    @abstractmethod
+    def _result(self, states: np.ndarray, sensors: np.ndarray) -> Rollout:
+        """Read the outcome of one execution.
+
+        Args:
+            states: Full physics states, shape (steps, 1 + nq + nv); row k is after k + 1 steps.
+            sensors: The scene's sensors, shape (steps, n), at the beginning of each step, so that
+                row k belongs to the state after k steps.
+        """
+
+    def rollout(self, plans: np.ndarray, rng: np.random.Generator | None) -> list[Rollout]:
+        """Execute plans open loop; see `Task.rollout`, and the task for its outcome."""
+        plans = as_plans(plans, self.format.action_dim)
+        results: list[Rollout] = []
+        for first in range(0, len(plans), _BATCH):
+            models, states, controls = self._prepare(plans[first : first + _BATCH], rng)
+            paths, sensors = mujoco.rollout.rollout(models, self._workers, states, controls)
+            results += [self._result(*pair) for pair in zip(paths, sensors, strict=True)]
+        return results
+
+    def demonstrations(self, name: str) -> Demonstrations:
+        """Load the shipped prior set `name`."""
+        if name not in self.demonstration_sets:
+            raise ConfigurationError(
+                f"{self.name} has no demonstration set {name!r}; use one of "
+                f"{', '.join(self.demonstration_sets)}"
+            )
+        return Demonstrations.load(_FOLDER / "demonstrations" / f"{self.scene}_{name}.npz")
+
+    def film(
+        self,
+        plan: np.ndarray,
+        goal: np.ndarray,
+        rng: np.random.Generator | None = None,
+        *,
+        width: int = 640,
+        height: int = 480,
+        frames_per_second: int = 30,
+        camera: str = "film",
+    ) -> Iterator[np.ndarray]:
+        """Execute one plan with the goal's object in place and draw it; see `Task.film`."""
+        plan = as_plans(plan, self.format.action_dim, name="plan", single=True)
+        goal = np.array(goal, dtype=float)
+        if goal.shape != (2,) or not np.all(np.isfinite(goal)):
+            raise InvalidGoalError(f"goal must be two finite numbers (x, y) in [m], got {goal}")
+        models, states, controls = self._prepare(plan[None], rng)
+        model, data = models[0], mujoco.MjData(models[0])
+        mujoco.mj_setState(model, data, states[0], _FULL)
+        data.mocap_pos[model.body("goal").mocapid[0]] = [*goal, 0.0]
+        mujoco.mj_forward(model, data)
+        with open_renderer(model, width, height) as renderer:
+            n_pictures = 0
+            for control in controls[0]:
+                if data.time * frames_per_second >= n_pictures:
+                    n_pictures += 1
+                    renderer.update_scene(data, camera)
+                    yield renderer.render().copy()
+                data.ctrl[:] = control
+                mujoco.mj_step(model, data)
+
+    def _prepare(
+        self, plans: np.ndarray, rng: np.random.Generator | None
+    ) -> tuple[list[mujoco.MjModel], np.ndarray, np.ndarray]:
+        """Models, initial full physics states (n, s) and controls (n, steps, 7) of a batch."""
+        n, horizon, _ = plans.shape
+        n_steps = round((self.lead_in + (horizon - 1) * self.format.dt + self.lead_out) / STEP)
+        joints = self.joint_plans(plans)
+        controls = servo_controls(self.model, joints, self.format.dt, n_steps, lead_in=self.lead_in)
+        models = [self.model]
+        starts = joints[:, 0].copy()
+        if rng is not None:
+            offsets = rng.normal(0.0, self._arm.pose, (n, N_JOINTS))
+            servos = 1.0 + rng.normal(0.0, self._arm.servo, (n, N_JOINTS))
+            models = [self._disturbed(servo, rng) for servo in servos]
+            controls += offsets[:, None, :]
+            starts += offsets
+        states = np.stack([self._start(start, rng) for start in starts])
+        return models, states, controls
+
+    def _disturbed(self, servo: np.ndarray, rng: np.random.Generator) -> mujoco.MjModel:
+        model = copy.copy(self.model)
+        model.actuator_gainprm[:, 0] *= servo
+        model.actuator_biasprm[:, 1:3] *= servo[:, None]
+        self._disturb(model, rng)
+        return model
+
+    def _start(self, joints: np.ndarray, rng: np.random.Generator | None) -> np.ndarray:
+        """Full physics state with the arm at `joints` (7,) and the objects in place."""
+        data = self._workers[0]
+        mujoco.mj_resetData(self.model, data)
+        data.qpos[:N_JOINTS] = joints
+        mujoco.mj_kinematics(self.model, data)
+        self._place(data, rng)
+        state = np.empty(mujoco.mj_stateSize(self.model, _FULL))
+        mujoco.mj_getState(self.model, data, state, _FULL)
+        return state
+
+
+def _n_cores() -> int:
+    """Cores this process may use; the affinity is known on Linux only."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
