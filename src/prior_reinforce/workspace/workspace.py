@@ -12,6 +12,7 @@ the events, made anew each time, so closing the program, or a power cut, loses n
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -45,7 +46,7 @@ MEMORIES = ("goal", "workspace")
 class Workspace:
     """Trials of one task, on disk."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: str | os.PathLike[str]) -> None:
         """Open a workspace that `create` made.
 
         Raises:
@@ -53,7 +54,7 @@ class Workspace:
             FileFormatError: Its manifest is no TOML.
             ConfigurationError: Its manifest holds a wrong value.
         """
-        self.folder = folder
+        self.folder = folder = Path(folder)
         if not (folder / MANIFEST_FILE).is_file():
             raise WorkspaceError(
                 f"{folder} is not a workspace (it has no {MANIFEST_FILE}); make one with: "
@@ -64,7 +65,7 @@ class Workspace:
         self.store = Store(folder)
 
     @classmethod
-    def create(cls, folder: Path, manifest: str) -> Workspace:
+    def create(cls, folder: str | os.PathLike[str], manifest: str) -> Workspace:
         """Make a workspace from the text of its manifest; nothing is made if that is wrong.
 
         Raises:
@@ -72,6 +73,7 @@ class Workspace:
             FileFormatError: The manifest is no TOML.
             ConfigurationError: The manifest holds a wrong value.
         """
+        folder = Path(folder)
         parse_manifest(manifest, folder / MANIFEST_FILE)
         try:
             if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
