@@ -26,6 +26,9 @@ HOOK_RADIUS = 0.006
 """In [m]; in `fishing.xml` too. The hook touches the table where its centre is so high."""
 TABLE = np.array([[0.35, -0.5], [1.35, 0.5]])
 """Lower and upper corner of the table top, (x, y) in [m]; the paper's 1 m x 1 m."""
+_PULL, _GRIP = 200.0, 1.5
+"""The magnet's force on a hook within its reach, in [N/m] and [N s/m]; for films only, and ours: it
+stops the hook within a centimetre and then holds against the rope."""
 _LOST = np.zeros(2)
 """Outcome of a hook that never touches the table: the robot's own base."""
 
@@ -94,6 +97,16 @@ class Fishing(PandaTask):
         mujoco.mju_quatIntegrate(quat := np.array([1.0, 0.0, 0.0, 0.0]), sway, 1.0)
         mujoco.mju_mulQuat(hanging, upright, quat)
         data.qpos[self._swivel : self._swivel + 4] = hanging
+
+    def _act_at_goal(self, data: mujoco.MjData, goal: np.ndarray) -> None:
+        """The magnet holds a hook that is within its reach."""
+        hook = data.geom("tool/hook")
+        off = np.append(goal, HOOK_RADIUS) - hook.xpos
+        body = self.model.geom("tool/hook").bodyid[0]
+        velocity = np.empty(6)
+        mujoco.mj_objectVelocity(self.model, data, mujoco.mjtObj.mjOBJ_GEOM, hook.id, velocity, 0)
+        near = np.linalg.norm(off) <= self.tolerance
+        data.xfrc_applied[body, :3] = near * (_PULL * off - _GRIP * velocity[3:])
 
     def _result(self, states: np.ndarray, sensors: np.ndarray) -> Rollout:
         """Where the hook first touches the table, between two steps by linear interpolation."""

@@ -132,7 +132,11 @@ class PandaTask(Task):
                     renderer.update_scene(data, camera)
                     yield renderer.render().copy()
                 data.ctrl[:] = control
+                self._act_at_goal(data, goal)
                 mujoco.mj_step(model, data)
+
+    def _act_at_goal(self, data: mujoco.MjData, goal: np.ndarray) -> None:
+        """What the goal's object does beyond standing in the way, at each step of a film."""
 
     def _prepare(
         self, plans: np.ndarray, rng: np.random.Generator | None
