@@ -154,7 +154,7 @@ def test_a_repeated_plan_lands_within_about_three_millimetres(task):
 
 @pytest.mark.slow
 def test_reach_moves_the_touch_smoothly_through_the_region(task):
-    plans = np.concatenate([casts([0.1], reach=value) for value in np.linspace(-0.4, 1.2, 13)])
+    plans = np.concatenate([casts([0.1], reach=value) for value in np.linspace(-0.4, 1.3, 14)])
     rollouts = task.rollout(plans, None)
     assert all(rollout.valid for rollout in rollouts)
     distance = np.linalg.norm(outcomes(rollouts), axis=1)
