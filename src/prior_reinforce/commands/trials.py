@@ -22,7 +22,7 @@ from prior_reinforce.workspace.trials import amend, ask, tell, void
 from prior_reinforce.workspace.wording import say_place
 from prior_reinforce.workspace.workspace import Workspace
 
-Number = Annotated[int, tyro.conf.Positional]
+Number = Annotated[int, tyro.conf.Positional, tyro.conf.arg(metavar="TRIAL")]
 
 _LARGEST_PLAUSIBLE_METRES = 1.0
 """Ours: a bare number beyond it is centimetres far more often than a throw a metre off."""

@@ -17,7 +17,7 @@ from prior_reinforce.workspace.status import describe, next_step
 from prior_reinforce.workspace.wording import say_place
 from prior_reinforce.workspace.workspace import Workspace
 
-Folder = Annotated[Path, tyro.conf.Positional]
+Folder = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="WORKSPACE")]
 
 
 @contextmanager
