@@ -1,6 +1,5 @@
 """A workspace: what happened is kept, whatever happens in between."""
 
-import os
 import shutil
 import sqlite3
 
@@ -256,14 +255,6 @@ def test_a_workspace_that_was_copied_goes_on(workspace, tmp_path):
     copy = Workspace(tmp_path / "elsewhere")
     np.testing.assert_array_equal(ask(copy).condition, ask(workspace).condition)
     copy.close()
-
-
-@pytest.mark.skipif(os.geteuid() == 0, reason="root may write to a read-only folder")
-def test_a_read_only_folder_is_named_for_users(workspace):
-    workspace.folder.chmod(0o500)
-    with pytest.raises(WorkspaceError, match="writable"):
-        ask(workspace)
-    workspace.folder.chmod(0o700)
 
 
 def test_a_refused_disk_is_named_and_the_journal_stays_good(workspace):
