@@ -22,8 +22,9 @@ from prior_reinforce.generators.conditions import ConditionScale, as_conditions
 from prior_reinforce.generators.diffusion_config import DiffusionConfig, Preset
 from prior_reinforce.generators.diffusion_training import train
 from prior_reinforce.generators.noise_schedule import NoiseSchedule, inference_steps
-from prior_reinforce.generators.representation import PlanCodec, Representation
+from prior_reinforce.generators.representation import Representation
 from prior_reinforce.generators.saving import read_model, write_model
+from prior_reinforce.generators.start_time import StartTimeCodec
 from prior_reinforce.generators.threads import torch_threads
 from prior_reinforce.generators.unet import ConditionalUNet
 from prior_reinforce.motions import Demonstrations
@@ -79,8 +80,9 @@ class DiffusionGenerator(Generator):
         progress: Callable[[FitProgress], None] | None = None,
     ) -> Self:
         """Learn from all demonstrations; see `Generator.fit`."""
-        codec = PlanCodec.fit(
-            demonstrations.plans,
+        codec, codes = StartTimeCodec.fit(
+            demonstrations,
+            start_times=self.config.start_times,
             representation=self.config.representation,
             frames_per_point=self.config.frames_per_point,
             length_multiple=self.config.network.length_multiple,
@@ -89,7 +91,7 @@ class DiffusionGenerator(Generator):
         scale = ConditionScale.fit(demonstrations.outcomes_seen)
         with torch_threads(self._threads):
             network = train(
-                self._tensor(codec.encode(demonstrations.plans)),
+                self._tensor(codes),
                 self._tensor(scale.scale(demonstrations.outcomes_seen)),
                 self.config,
                 seed=seed,
@@ -99,7 +101,7 @@ class DiffusionGenerator(Generator):
         return self
 
     @property
-    def codec(self) -> PlanCodec:
+    def codec(self) -> StartTimeCodec:
         """How plans are coded, decided by `fit`."""
         return self._require().codec
 
@@ -108,7 +110,7 @@ class DiffusionGenerator(Generator):
         fitted = self._require()
         conditions = as_conditions(conditions, len(fitted.scale.low))
         scaled = self._tensor(fitted.scale.scale(conditions))
-        plans = [np.empty((0, fitted.codec.horizon, len(fitted.codec.smooth)))]
+        plans = [np.empty((0, fitted.codec.horizon, fitted.codec.action_dim))]
         with torch_threads(1):
             for chunk in torch.split(scaled, _CHUNK):
                 if len(chunk):
@@ -130,8 +132,8 @@ class DiffusionGenerator(Generator):
             },
             {
                 **{f"network.{name}": value.cpu().numpy() for name, value in weights.items()},
-                "plan_range": fitted.codec.plan_range,
-                "code_range": fitted.codec.code_range,
+                "plan_range": fitted.codec.motion.plan_range,
+                "code_range": fitted.codec.motion.code_range,
                 "condition_range": np.stack([fitted.scale.low, fitted.scale.high]),
             },
         )
@@ -188,7 +190,7 @@ class _Fitted:
     """What `fit` makes and `save` keeps."""
 
     def __init__(
-        self, codec: PlanCodec, scale: ConditionScale, network: ConditionalUNet, seed: int
+        self, codec: StartTimeCodec, scale: ConditionScale, network: ConditionalUNet, seed: int
     ) -> None:
         self.codec = codec
         self.scale = scale
@@ -199,7 +201,9 @@ class _Fitted:
     def restore(
         cls, settings: dict[str, Any], tensors: dict[str, np.ndarray], config: DiffusionConfig
     ) -> _Fitted:
-        codec = PlanCodec.restore(settings["codec"], tensors["plan_range"], tensors["code_range"])
+        codec = StartTimeCodec.restore(
+            settings["codec"], tensors["plan_range"], tensors["code_range"]
+        )
         low, high = tensors["condition_range"]
         with torch.random.fork_rng(devices=[]):
             network = ConditionalUNet(codec.channels, len(low), config.network)

@@ -26,13 +26,18 @@ class DiffusionConfig:
     """Code plans by spline control points where they fit, or by raw frames."""
     frames_per_point: int = 4
     """Frames for each spline control point."""
+    start_times: bool = True
+    """Generate when the motion starts as a number of its own, where demonstrations rest at both
+    ends, instead of leaving it to the frames."""
     margin: float = 0.05
     """How far plans may leave the demonstrated range of a dimension, as a fraction of it."""
     network: UNetSize = field(
-        default_factory=lambda: UNetSize(widths=(64, 128, 128), step_width=64, condition_width=64)
+        default_factory=lambda: UNetSize(
+            widths=(64, 128, 128), step_width=64, condition_width=64, activation="silu"
+        )
     )
     """Size of the U-Net."""
-    prediction: Prediction = "epsilon"
+    prediction: Prediction = "v"
     """What the network predicts."""
     noise_levels: int = 100
     """T, steps of the squared-cosine noise schedule."""
@@ -40,7 +45,7 @@ class DiffusionConfig:
     """DDIM from x_T = 0, or DDPM with noise that is drawn once and shared by all conditions."""
     sampling_steps: int = 20
     """Noise levels visited by DDIM; DDPM visits all."""
-    training_steps: int = 1500
+    training_steps: int = 1600
     """Optimiser steps."""
     batch_size: int = 24
     """Samples a step, at least one of each demonstration where there is room."""
@@ -56,7 +61,7 @@ class DiffusionConfig:
     """Of AdamW, whose betas are 0.95 and 0.999."""
     ema_power: float = 0.75
     """After n steps the averaged weights decay by 1 - (1 + n) ** -power a step."""
-    ema_limit: float = 0.99
+    ema_limit: float = 0.995
     """Upper bound of that decay."""
 
     def __post_init__(self) -> None:
@@ -102,8 +107,10 @@ class DiffusionConfig:
             raise ConfigurationError(f"no preset {name!r}; use 'laptop' or 'paper'")
         return cls(
             representation="frames",
+            start_times=False,
             margin=0.0,
             network=UNetSize(),
+            prediction="epsilon",
             sampler="ddpm",
             sampling_steps=100,
             training_steps=5000,

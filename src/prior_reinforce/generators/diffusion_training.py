@@ -120,5 +120,4 @@ def draw_batch(
 
 @torch.no_grad()
 def _average(averaged: ConditionalUNet, network: ConditionalUNet, decay: float) -> None:
-    for mean, latest in zip(averaged.parameters(), network.parameters(), strict=True):
-        mean.lerp_(latest, 1 - decay)
+    torch._foreach_lerp_(list(averaged.parameters()), list(network.parameters()), 1 - decay)
