@@ -7,47 +7,29 @@ from it here, once, so that a whole batch of executions is pure physics.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
 import mujoco
 import numpy as np
-from scipy.interpolate import CubicSpline
+
+from prior_reinforce.robots.interpolation import join_frames
+from prior_reinforce.robots.limits import PANDA as LIMITS
 
 N_JOINTS = 7
 JOINT_NAMES = tuple(f"joint{i}" for i in range(1, N_JOINTS + 1))
 STEP = 0.001
 """Physics and servo period, in [s]: the real arm's control loop runs at 1 kHz."""
 
-
-@dataclass(frozen=True, eq=False)
-class JointLimits:
-    """Bounds of a joint path; each an array of shape (7,).
-
-    Source: the maker's table for the Panda (frankarobotics/docs,
-    control-parameters-joint-panda.csv, read 4 May 2026).
-    """
-
-    lower: np.ndarray
-    """Smallest position, in [rad]."""
-    upper: np.ndarray
-    """Largest position, in [rad]."""
-    velocity: np.ndarray
-    """Largest speed, in [rad/s]."""
-    acceleration: np.ndarray
-    """Largest acceleration, in [rad/s^2]."""
-    jerk: np.ndarray
-    """Largest jerk, in [rad/s^3]."""
-
-
-LIMITS = JointLimits(
-    lower=np.array([-2.8973, -1.7628, -2.8973, -3.0718, -2.8973, -0.0175, -2.8973]),
-    upper=np.array([2.8973, 1.7628, 2.8973, -0.0698, 2.8973, 3.7525, 2.8973]),
-    velocity=np.array([2.175, 2.175, 2.175, 2.175, 2.61, 2.61, 2.61]),
-    acceleration=np.array([15.0, 7.5, 10.0, 12.5, 15.0, 20.0, 20.0]),
-    jerk=np.array([7500.0, 3750.0, 5000.0, 6250.0, 7500.0, 10000.0, 10000.0]),
-)
+__all__ = [
+    "JOINT_NAMES",
+    "LIMITS",
+    "N_JOINTS",
+    "STEP",
+    "build_scene",
+    "servo_controls",
+    "setpoints",
+]
 
 
 def build_scene(path: Path) -> mujoco.MjModel:
@@ -72,9 +54,8 @@ def _interpolation(
 
     A cubic spline is linear in its frames, so interpolating the identity gives the matrix.
     """
-    frame_times = np.arange(horizon) * dt
-    spline = CubicSpline(frame_times, np.eye(horizon), bc_type="clamped")
-    times = np.clip(np.arange(n_steps) * STEP - lead_in, 0.0, frame_times[-1])
+    spline = join_frames(np.eye(horizon), dt)
+    times = np.clip(np.arange(n_steps) * STEP - lead_in, 0.0, (horizon - 1) * dt)
     return spline(times), spline(times, 1)
 
 
