@@ -15,6 +15,7 @@ import tyro
 
 from prior_reinforce.commands.importing import Import
 from prior_reinforce.commands.learning import Learn
+from prior_reinforce.commands.reproduce import Reproduce
 from prior_reinforce.commands.simulated import Adapt, Demo, Rollout
 from prior_reinforce.commands.trials import Amend, Ask, Export, Tell, Void
 from prior_reinforce.commands.workspace import Goal, Log, New, Report, Status
@@ -33,6 +34,7 @@ COMMANDS: dict[str, type[Command]] = {
     "learn": Learn,
     "adapt": Adapt,
     "rollout": Rollout,
+    "reproduce": Reproduce,
     "new": New,
     "import": Import,
     "goal": Goal,

@@ -1,0 +1,198 @@
+"""The units that everything is made of: learn a generator; throw once; try goals with it."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import tempfile
+import time
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.spatial import Delaunay
+
+from prior_reinforce.experiments.goals import unseen_goals
+from prior_reinforce.experiments.methods import make_adapter, make_generator, make_perception
+from prior_reinforce.experiments.protocol import GoalTrials, run_goals
+from prior_reinforce.generators import Generator, load_generator
+from prior_reinforce.generators.alignment import align
+from prior_reinforce.motions import Demonstrations
+from prior_reinforce.tasks import make_task
+
+GOAL_SEED = 100
+"""Seed of the reported goals. Nothing was tuned on it (docs/decisions.md)."""
+
+
+@dataclass(frozen=True)
+class Training:
+    """Learn one generator from one prior set."""
+
+    task: str
+    """Name of the task that the demonstrations are of."""
+    demonstrations: str
+    """Prior set, A or B."""
+    generator: str
+    """Generator's name, or module:Class."""
+    seed: int
+    """Seed of the training."""
+    aligned: bool = False
+    """Whether the demonstrations are aligned in time first."""
+    subset: tuple[int, ...] | None = None
+    """Which of the demonstrations to learn from; None for all."""
+
+    @property
+    def label(self) -> str:
+        """What it is, for a progress line."""
+        aligned = ", aligned" if self.aligned else ""
+        return f"learn {self.generator} on {self.task} {self.demonstrations}{aligned}, {self.seed}"
+
+    def run(self, folder: Path) -> Mapping[str, Any]:
+        """Learn, unless it was learned before."""
+        started = time.process_time()
+        self.learned(folder)
+        return {"cpu_seconds": time.process_time() - started}
+
+    def prior(self) -> Demonstrations:
+        """The demonstrations that are learned from."""
+        demonstrations = make_task(self.task).demonstrations(self.demonstrations)
+        if self.aligned:
+            demonstrations = align(demonstrations).demonstrations
+        if self.subset is not None:
+            chosen = list(self.subset)
+            demonstrations = replace(
+                demonstrations,
+                plans=demonstrations.plans[chosen],
+                outcomes_seen=demonstrations.outcomes_seen[chosen],
+            )
+        return demonstrations
+
+    def learned(self, folder: Path) -> Generator:
+        """The generator: from the folder's models, or learned now and put there."""
+        key = hashlib.sha256(json.dumps(asdict(self)).encode()).hexdigest()[:16]
+        home = folder / "models" / key
+        if not (home / "config.json").is_file():
+            generator = make_generator(self.generator).fit(self.prior(), seed=self.seed)
+            home.parent.mkdir(parents=True, exist_ok=True)
+            with tempfile.TemporaryDirectory(dir=home.parent, prefix=".learning-") as temporary:
+                generator.save(Path(temporary) / "model")
+                # Another worker may have been quicker; the results are the same.
+                if not home.exists():
+                    os.replace(Path(temporary) / "model", home)
+        return load_generator(home) if ":" not in self.generator else _load(self.generator, home)
+
+
+@dataclass(frozen=True)
+class Trials:
+    """Try goals with one learned generator and one adapter."""
+
+    training: Training
+    """What was learned."""
+    task: str
+    """Where it is tried; another hardware variant than the training's, perhaps."""
+    adapter: str
+    """Adapter's name, or module:Class."""
+    perception: str
+    """Perception's name, or module:Class."""
+    goals: int
+    """Number of goals."""
+    unseen: bool = False
+    """Goals far from the demonstrations, as the paper places them by hand; else uniform."""
+    rounds: int = 10
+    """Trials a goal at most."""
+
+    @property
+    def label(self) -> str:
+        """What it is, for a progress line."""
+        return (
+            f"{self.task}: {self.training.generator} + {self.adapter}, {self.perception}, "
+            f"set {self.training.demonstrations}, {self.training.seed}"
+        )
+
+    def run(self, folder: Path) -> Mapping[str, Any]:
+        """Run the protocol."""
+        task = make_task(self.task)
+        prior = self.training.prior()
+        rng = np.random.default_rng(GOAL_SEED)
+        goals = (
+            unseen_goals(task, prior, self.goals, rng)
+            if self.unseen
+            else task.sample_goals(self.goals, rng)
+        )
+        results = run_goals(
+            task,
+            self.training.learned(folder),
+            lambda: make_adapter(self.adapter),
+            make_perception(self.perception),
+            prior,
+            goals,
+            rounds=self.rounds,
+            seed=GOAL_SEED + self.training.seed,
+        )
+        return summary(results)
+
+
+@dataclass(frozen=True)
+class ZeroShot:
+    """Generate for a dense grid of goals and for the demonstrations' own outcomes; throw once."""
+
+    training: Training
+    """What was learned."""
+    spacing: float = 0.02
+    """Of the grid inside the outcomes' hull, in [m]."""
+
+    @property
+    def label(self) -> str:
+        """What it is, for a progress line."""
+        return f"zero shot of {self.training.label.removeprefix('learn ')}"
+
+    def run(self, folder: Path) -> Mapping[str, Any]:
+        """Throw, with execution's disturbances switched off: the generator's error alone."""
+        task = make_task(self.training.task)
+        prior = self.training.prior()
+        generator = self.training.learned(folder)
+        own = generator.generate(prior.outcomes_seen)
+        own_rms = np.sqrt(np.mean((own - prior.plans) ** 2, axis=(1, 2)))
+        shown = np.array([rollout.outcome for rollout in task.rollout(prior.plans, None)])
+        landed = np.array([rollout.outcome for rollout in task.rollout(own, None)])
+        grid = _grid(prior.outcomes_seen, self.spacing)
+        rollouts = task.rollout(generator.generate(grid), None)
+        errors = np.linalg.norm([r.outcome for r in rollouts] - grid, axis=1)
+        return {
+            "own_rms_rad": own_rms.tolist(),
+            "own_landing_m": np.linalg.norm(landed - prior.outcomes_seen, axis=1).tolist(),
+            "own_landing_from_demonstrated_m": np.linalg.norm(landed - shown, axis=1).tolist(),
+            "grid_points": len(grid),
+            "grid_median_m": float(np.median(errors)),
+            "grid_p90_m": float(np.percentile(errors, 90)),
+            "grid_within_tolerance": float(np.mean(errors <= task.tolerance)),
+            "grid_lost": float(np.mean([not rollout.valid for rollout in rollouts])),
+        }
+
+
+def _grid(outcomes: np.ndarray, spacing: float) -> np.ndarray:
+    """Points of a square grid inside the outcomes' hull, shape (n, k)."""
+    axes = [
+        np.arange(low, high + spacing, spacing)
+        for low, high in zip(outcomes.min(axis=0), outcomes.max(axis=0), strict=True)
+    ]
+    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(axes))
+    return points[Delaunay(outcomes).find_simplex(points) >= 0]
+
+
+def summary(results: list[GoalTrials]) -> dict[str, Any]:
+    """What is kept of many goals: plain numbers, a row a goal."""
+    return {
+        "goals": [result.goal.tolist() for result in results],
+        "solved_at": [result.solved_at or 0 for result in results],
+        "first_error": [float(np.linalg.norm(result.errors[0])) for result in results],
+        "lost": [sum(not rollout.valid for rollout in result.rollouts) for result in results],
+        "failed_readings": [result.failed_readings for result in results],
+    }
+
+
+def _load(name: str, home: Path) -> Generator:
+    return type(make_generator(name)).load(home)
