@@ -292,3 +292,41 @@ def test_status_is_short_and_says_what_is_next(workspace):
     assert "5 cm long" in text
     assert "N = 4 demonstrations + 2 trials = 6" in text
     assert len(text.splitlines()) <= 12
+
+
+def test_a_trial_is_told_once_and_voided_once(workspace):
+    number = ask(workspace).number
+    tell(workspace, number, [0.05, 0.0])
+    with pytest.raises(TrialStateError, match="amend it"):
+        tell(workspace, number, [0.01, 0.0])
+    void(workspace, number, "slipped")
+    before = workspace.events
+    for call in (
+        lambda: void(workspace, number, "again"),
+        lambda: tell(workspace, number, [0.0, 0.0]),
+        lambda: amend(workspace, number, [0.0, 0.0]),
+    ):
+        with pytest.raises(TrialStateError, match="ask anew"):
+            call()
+    assert workspace.events == before
+
+
+def test_a_reading_that_was_damaged_on_the_disk_is_never_believed(workspace):
+    tell(workspace, ask(workspace).number, [0.0512, 0.0])
+    workspace.close()
+    path = workspace.folder / "journal.sqlite"
+    content = path.read_bytes()
+    assert content.count(b"0.0512") == 1
+    path.write_bytes(content.replace(b"0.0512", b"0.0112"))
+    again = Workspace(workspace.folder)
+    with pytest.raises(WorkspaceError, match="not what was written; restore"):
+        _ = again.history
+    again.close()
+
+
+def test_a_reading_can_be_told_where_the_model_is_gone(workspace):
+    number = ask(workspace).number
+    shutil.rmtree(workspace.folder / "models")
+    assert tell(workspace, number, [0.0, 0.0]).hit
+    with pytest.raises(FileFormatError, match="prior-reinforce learn"):
+        ask(workspace)
