@@ -20,7 +20,7 @@ check: $(VENV)/.all
 	$(BIN)/lint-imports
 
 reproduce: $(VENV)/.all
-	$(BIN)/prior-reinforce reproduce all --out results $(ARGS)
+	$(BIN)/prior-reinforce reproduce all --workers 2 $(ARGS)
 
 # The exact versions of constraints.txt. `.core` is what a user needs; `.all` adds every extra.
 $(VENV)/.core: pyproject.toml constraints.txt
@@ -30,7 +30,7 @@ $(VENV)/.core: pyproject.toml constraints.txt
 	touch $@
 
 $(VENV)/.all: $(VENV)/.core
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev,baselines,vlm,lerobot,hdf5,ros,ray]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev,baselines,vlm,lerobot,hdf5,ros,zarr,ray]'
 	touch $@
 
 clean:
