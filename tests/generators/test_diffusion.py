@@ -24,6 +24,7 @@ SMALL = DiffusionConfig(
     learning_rate=2e-3,
     warmup_steps=20,
     sampling_steps=5,
+    ema_limit=0.99,
 )  # fmt: skip
 
 

@@ -144,9 +144,10 @@ class _Cut:
 
 
 def _cut(demonstrations: Demonstrations) -> _Cut | None:
-    """Find the cut-outs; None where start times do not differ or cannot be told.
+    """Find the cut-outs; None where start times do not differ, or cannot be told or moved.
 
-    They cannot where a demonstration moves at an end that would have to be held.
+    They cannot be told where a demonstration moves at an end that would have to be held, nor moved
+    where the longest motion with the latest start would not end within the plan.
     """
     try:
         alignment = align(demonstrations)
@@ -159,7 +160,12 @@ def _cut(demonstrations: Demonstrations) -> _Cut | None:
     moving = [np.flatnonzero(np.any(plan[1:] != plan[:-1], axis=1)) for plan in plans]
     first = min(int(m[0]) - d for m, d in zip(moving, delays, strict=True) if m.size)
     last = max(int(m[-1]) + 1 - d for m, d in zip(moving, delays, strict=True) if m.size)
-    return _Cut(delays + first - _PADDING, last - first + 1 + 2 * _PADDING)
+    begins, length = delays + first - _PADDING, last - first + 1 + 2 * _PADDING
+    # A slower motion may be generated with a later start than any demonstrated pair of the two: it
+    # must still end within the plan. All that may be cut off is padding, which rests.
+    if begins.min() < -_PADDING or begins.max() + length > demonstrations.horizon + _PADDING:
+        return None
+    return _Cut(begins, length)
 
 
 def _moved(plans: np.ndarray, by: np.ndarray, length: int) -> np.ndarray:
