@@ -1,0 +1,97 @@
+"""An adapter of one's own: an affine correction, fitted to the trials by ridge regression.
+
+    python examples/own_adapter.py
+    PYTHONPATH=examples prior-reinforce adapt --adapter own_adapter:RidgeAdapter
+
+What was asked for minus what came of it, c - r, is modelled as b + B z, where z is r in units of
+the demonstrated spread. The penalty draws b and B towards 0, that is, towards c = r, which is what
+the demonstrations say. Prints the share of goals reached, next to our adapters.
+"""
+
+from __future__ import annotations
+
+import argparse
+from typing import ClassVar
+
+import numpy as np
+
+from prior_reinforce.adapters import Adapter
+from prior_reinforce.adapters.normalisation import Normalisation
+from prior_reinforce.adapters.vectors import as_goal, as_trial, not_started
+from prior_reinforce.experiments.methods import make_adapter, make_perception
+from prior_reinforce.experiments.protocol import run_goals, success_by_round
+from prior_reinforce.generators import NearestNeighbours, align
+from prior_reinforce.motions import Demonstrations
+from prior_reinforce.tasks import make_task
+
+
+class RidgeAdapter(Adapter):
+    """c = g + b + B z(g), with (b, B) the ridge solution over all trials so far."""
+
+    name: ClassVar[str] = "ridge"
+
+    def __init__(self, penalty: float = 0.1) -> None:
+        """Choose how strongly the map is drawn to the identity, in normalised units squared."""
+        self.penalty = penalty
+        self._units: Normalisation | None = None
+        self._trials: list[tuple[np.ndarray, np.ndarray]] = []
+
+    def start(self, demonstrations: Demonstrations) -> None:
+        """Take the units of the demonstrations and forget all trials."""
+        self._units = Normalisation.of(demonstrations)
+        self._trials = []
+
+    def propose(self, goal_seen: np.ndarray) -> np.ndarray:
+        """Return the goal plus the correction fitted there, shape (k,)."""
+        units = self._started()
+        goal = as_goal(goal_seen, units.outcome_dim)
+        if not self._trials:
+            return goal
+        conditions, outcomes = (units.apply(np.array(a)) for a in zip(*self._trials, strict=True))
+        ones = np.ones((len(outcomes), 1))
+        features = np.hstack([ones, outcomes])  # (n, 1 + k)
+        kernel = features @ features.T + self.penalty * np.eye(len(features))
+        weights = features.T @ np.linalg.solve(kernel, conditions - outcomes)  # (1 + k, k)
+        return goal + units.scale * (np.append(1.0, units.apply(goal)) @ weights)
+
+    def observe(self, condition: np.ndarray, outcome_seen: np.ndarray) -> None:
+        """Remember the trial."""
+        self._trials.append(as_trial(condition, outcome_seen, self._started().outcome_dim))
+
+    def _started(self) -> Normalisation:
+        if self._units is None:
+            raise not_started(self)
+        return self._units
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--goals", type=int, default=20)
+    parser.add_argument("--rounds", type=int, default=6)
+    parser.add_argument("--seed", type=int, default=0)
+    options = parser.parse_args()
+
+    task = make_task("basketball-v1")
+    demonstrations = align(task.demonstrations("A")).demonstrations
+    generator = NearestNeighbours().fit(demonstrations, seed=options.seed)
+    goals = task.sample_goals(options.goals, np.random.default_rng(options.seed))
+    makers = {
+        name: lambda name=name: make_adapter(name) for name in ("frozen", "proportional", "gp")
+    }
+    for name, make in {RidgeAdapter.name: RidgeAdapter, **makers}.items():
+        results = run_goals(
+            task,
+            generator,
+            make,
+            make_perception("amplified"),
+            demonstrations,
+            goals,
+            rounds=options.rounds,
+            seed=options.seed,
+        )
+        shares = " ".join(f"{share:4.0%}" for share in success_by_round(results, options.rounds))
+        print(f"{name:<12}  reached by trial 1, 2, ...: {shares}")
+
+
+if __name__ == "__main__":
+    main()
