@@ -1,0 +1,211 @@
+"""The examples print what they promise; one's own members keep their families' contracts."""
+
+import importlib
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from prior_reinforce.experiments.methods import make_adapter, make_generator, make_perception
+from prior_reinforce.motions import Demonstrations, PlanFormat
+from prior_reinforce.rollouts import Rollout
+
+REPOSITORY = Path(__file__).parents[1]
+EXAMPLES = REPOSITORY / "examples"
+GUIDE = (REPOSITORY / "docs" / "extending.md").read_text()
+BLOCKS = re.findall(r"^```python\n(.*?)^```$", GUIDE, re.MULTILINE | re.DOTALL)
+CONTRACT_TESTS = {
+    "adapter": BLOCKS[1],
+    "task": BLOCKS[2],
+    "generator": BLOCKS[1]
+    .replace("RidgeAdapter", "SoftmaxBlend")
+    .replace("own_adapter", "own_generator")
+    .replace("test_adapters", "test_generators"),
+    "perception": BLOCKS[1]
+    .replace("RidgeAdapter", "OverheadCamera")
+    .replace("own_adapter", "own_perception")
+    .replace("test_adapters", "test_perception"),
+}
+
+
+@pytest.fixture(autouse=True)
+def examples_can_be_imported(monkeypatch):
+    monkeypatch.syspath_prepend(EXAMPLES)
+
+
+@pytest.fixture
+def printed(monkeypatch, capsys):
+    """Run an example's main with a command line and return what it printed."""
+
+    def run(name, *args):
+        monkeypatch.setattr(sys, "argv", [f"{name}.py", *args])
+        status = importlib.import_module(name).main()
+        return status, capsys.readouterr().out
+
+    return run
+
+
+def shares(text):
+    return {
+        line.split()[0]: [int(share) for share in re.findall(r"(\d+)%", line)]
+        for line in text.splitlines()
+        if "%" in line
+    }
+
+
+@pytest.mark.slow
+def test_own_generator_is_nearer_than_plain_interpolation(printed):
+    _, text = printed("own_generator", "--goals", "12")
+    missed = dict(re.findall(r"^(\S+) +first throws miss by ([\d.]+) cm", text, re.MULTILINE))
+    assert float(missed["softmax-blend"]) < float(missed["nearest"])
+
+
+@pytest.mark.slow
+def test_own_adapter_reaches_more_than_none(printed):
+    _, text = printed("own_adapter", "--goals", "6", "--rounds", "4")
+    reached = shares(text)
+    assert list(reached) == ["ridge", "frozen", "proportional", "gp"]
+    assert reached["ridge"][0] == reached["frozen"][0]  # the first condition is the goal
+    assert reached["ridge"][-1] > reached["frozen"][-1]
+
+
+@pytest.mark.slow
+def test_own_perception_says_what_its_bias_costs(printed):
+    _, text = printed("own_perception", "--goals", "6", "--rounds", "4")
+    assert "a hit at (0.92, -0.26) m seems to be 2.2 cm off" in text  # |r - below| / 14
+    assert list(shares(text)) == ["exact", "calibrated", "biased"]
+
+
+@pytest.mark.slow
+def test_own_task_is_learned(printed):
+    _, text = printed("own_task", "--goals", "20", "--rounds", "4")
+    by_round = [int(share) for share in re.findall(r"(\d+)%", text)]
+    assert len(by_round) == 4
+    assert by_round == sorted(by_round)
+    assert by_round[-1] >= 80
+
+
+@pytest.mark.slow
+def test_ten_lines_tell_every_throw(printed):
+    status, text = printed("ten_lines", "--training-steps", "2", "--rounds", "2")
+    assert status == 1  # two steps teach nothing
+    assert re.findall(r"^throw (\d+): seen", text, re.MULTILINE) == ["1", "2"]
+    assert text.endswith("not reached, N = 6 demonstrations + 2 throws\n")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("family", "left_out"),
+    [
+        ("generator", ["loaded", "another_process"]),
+        ("adapter", []),
+        ("perception", []),
+        ("task", ["key_frames", "cameras"]),
+    ],
+)
+def test_the_examples_keep_the_contracts_by_the_guides_test_files(family, left_out, tmp_path):
+    (tmp_path / f"test_own_{family}.py").write_text(CONTRACT_TESTS[family])
+    choice = " and ".join(f"not {word}" for word in left_out)
+    if choice:
+        assert f'-k "{choice}"' in " ".join(GUIDE.split())
+    path = os.pathsep.join([str(EXAMPLES), str(REPOSITORY / "tests" / "contracts")])
+    inherited = os.environ.get("PYTHONPATH")
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", "-W", "error", "-k", choice, "."],
+        cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": f"{path}{os.pathsep}{inherited}" if inherited else path},
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert int(re.search(r"(\d+) passed", done.stdout)[1]) >= 7
+
+
+def test_the_guides_protocol_runs_as_it_stands(capsys):
+    namespace = {}
+    exec(compile(BLOCKS[0], "extending.md", "exec"), namespace)
+    reached = namespace["success_by_round"](namespace["results"], rounds=8)
+    assert reached[-1] >= 0.8
+    assert capsys.readouterr().out.strip() == str(reached)
+
+
+def test_own_members_are_made_by_the_names_the_guide_gives():
+    made = {
+        "own_generator:SoftmaxBlend": make_generator,
+        "own_adapter:RidgeAdapter": make_adapter,
+        "own_perception:OverheadCamera": make_perception,
+    }
+    assert set(re.findall(r"own_\w+:\w+", GUIDE)) == set(made)
+    for name, make in made.items():
+        assert type(make(name)).__name__ == name.split(":")[1]
+
+
+def test_ridge_by_hand():
+    """One trial, k = 1, spread 1: the ridge solution is (1, z) d / (1 + z^2 + penalty)."""
+    from own_adapter import RidgeAdapter
+
+    demonstrations = Demonstrations(
+        np.zeros((2, 2, 1)), [[-1.0], [1.0]], PlanFormat(("joint1",), ("rad",), 0.02)
+    )
+    adapter = RidgeAdapter(penalty=0.1)
+    adapter.start(demonstrations)
+    adapter.observe(np.array([0.5]), np.array([0.7]))
+    expected = 0.4 - 0.2 * (1 + 0.4 * 0.7) / (1 + 0.7**2 + 0.1)
+    np.testing.assert_allclose(adapter.propose(np.array([0.4])), expected)
+
+
+def test_a_blend_of_two_onsets_starts_in_between():
+    from own_generator import SoftmaxBlend
+
+    times = np.arange(60)
+    ramp = [np.clip((times - onset) / 20, 0, 1) for onset in (10, 20)]
+    smooth = np.array([r**3 * (10 - 15 * r + 6 * r**2) for r in ramp])[..., None]
+    demonstrations = Demonstrations(smooth, [[0.0], [1.0]], PlanFormat(("joint1",), ("rad",), 0.02))
+    plan = SoftmaxBlend().fit(demonstrations, seed=0).generate(np.array([[0.5]]))[0, :, 0]
+    middle = np.clip((times - 15) / 20, 0, 1)
+    np.testing.assert_allclose(plan, middle**3 * (10 - 15 * middle + 6 * middle**2), atol=2e-3)
+
+
+def test_parallax_by_hand():
+    from own_perception import OverheadCamera
+
+    camera = OverheadCamera(below=(0.5, 0.0), height=1.0, ball_height=0.2, noise_sd=0.0)
+    hit = Rollout(outcome=np.array([0.9, -0.2, 3.0]), valid=True)
+    seen = camera.perceive(hit, hit.outcome, np.random.default_rng(0))
+    np.testing.assert_allclose(seen, [0.1, -0.05, 0.0], atol=1e-12)
+
+
+def test_the_catapults_ball_falls_as_one_thrown_by_hand():
+    """Swung at constant speed, no turn: from height h at (u, w), x = x0 + u t, t the fall's."""
+    from own_task import ARM, GRAVITY, PIVOT, STOP, Toss
+
+    speed = 4.0
+    swing = -1.2 + speed * np.arange(20) * 0.02
+    (rollout,) = Toss().rollout(np.stack([np.zeros(20), swing], axis=1)[None], None)
+    height = PIVOT + ARM * np.cos(STOP)
+    ahead, up = ARM * speed * np.cos(STOP), -ARM * speed * np.sin(STOP)
+    time = np.roots([-GRAVITY / 2, up, height]).max()
+    np.testing.assert_allclose(rollout.outcome, [ARM * np.sin(STOP) + ahead * time, 0.0], atol=1e-9)
+    assert rollout.valid
+
+
+def test_the_catapults_film_ends_with_the_ball_on_its_goal():
+    from own_task import Toss
+
+    task = Toss()
+    demonstrations = task.demonstrations("A")
+    plan, landing = demonstrations.plans[4], demonstrations.outcomes_seen[4]
+    pictures = list(task.film(plan, landing, camera="birdseye", frames_per_second=100))
+    orange = np.array([230, 120, 20])
+    first, last = (
+        np.argwhere(np.all(picture == orange, axis=-1)).mean(axis=0)
+        for picture in (pictures[0], pictures[-1])
+    )
+    assert first[1] < last[1]
+    pixel = 2.0 / 640
+    np.testing.assert_allclose((last[1] + 0.5) * pixel - 0.5, landing[0], atol=0.03)
+    np.testing.assert_allclose((240 - last[0] - 0.5) * pixel, landing[1], atol=0.03)
