@@ -57,6 +57,12 @@ _BALL_AND_HOOP = TableScene(
 SCENES: dict[str, TableScene] = {
     "basketball-v1": _BALL_AND_HOOP,
     "basketball-v2": _BALL_AND_HOOP,  # only the spoon is another
+    # A ball of 5 cm and a white cup; its rim is as high as the hoop and 8.3 cm wide.
+    "basketball-v3": TableScene(
+        SeenObject("the orange ball", 0.05),
+        SeenObject("the red rim of the cup", 0.083),
+        plane_height=0.10,
+    ),
     # Both stones lie on the table and are 3 cm high; the goal is 8 cm before the target stone.
     "curling": TableScene(
         SeenObject("the curling stone with the blue handle", 0.06),

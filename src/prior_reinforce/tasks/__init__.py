@@ -3,10 +3,18 @@
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.tasks.base import Task
 from prior_reinforce.tasks.basketball import BasketballShot
+from prior_reinforce.tasks.basketball_v2 import BasketballShotV2
+from prior_reinforce.tasks.basketball_v3 import BasketballShotV3
 from prior_reinforce.tasks.curling import Curling
 from prior_reinforce.tasks.fishing import Fishing
 
-FAMILY: tuple[type[Task], ...] = (BasketballShot, Curling, Fishing)
+FAMILY: tuple[type[Task], ...] = (
+    BasketballShot,
+    BasketballShotV2,
+    BasketballShotV3,
+    Curling,
+    Fishing,
+)
 """Every task that can be named on the command line."""
 
 
@@ -24,4 +32,13 @@ def make_task(name: str) -> Task:
     )
 
 
-__all__ = ["FAMILY", "BasketballShot", "Curling", "Fishing", "Task", "make_task"]
+__all__ = [
+    "FAMILY",
+    "BasketballShot",
+    "BasketballShotV2",
+    "BasketballShotV3",
+    "Curling",
+    "Fishing",
+    "Task",
+    "make_task",
+]

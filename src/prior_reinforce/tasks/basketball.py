@@ -2,7 +2,8 @@
 
 The ball lies in the spoon and leaves it because the spoon brakes and tips; nothing else holds or
 frees it. The outcome is where the ball's centre comes down through the plane of the hoop's rim.
-The scene is in `basketball.xml`, the arm in `panda.xml`; lengths in [m], table frame.
+The scene is in `basketball.xml`, the arm in `panda.xml`; lengths in [m], table frame. V2 and V3
+are the same throw with other hardware: `basketball_v2.py`, `basketball_v3.py`.
 """
 
 from __future__ import annotations
@@ -33,7 +34,8 @@ from prior_reinforce.tasks.rendering import open_renderer
 
 _FOLDER = Path(__file__).parent
 RIM_HEIGHT = 0.10
-"""Height of the rim's plane above the table, in [m]; ours, the paper does not give it."""
+"""Height of the rim's plane (V3: the cup's) above the table, in [m]; ours, the paper does not
+give it."""
 _LEAD_IN = 0.2
 """The arm stands in its first frame for so long, and the ball settles in the spoon, in [s]."""
 _FLIGHT = 0.9
@@ -70,6 +72,8 @@ class BasketballShot(Task):
     outcome_names: ClassVar[tuple[str, ...]] = ("x", "y")
     tolerance: ClassVar[float] = 0.015  # clean pass: (9.0 cm - 6.0 cm) / 2
     region: ClassVar[np.ndarray] = np.array([[0.92, -0.26], [1.18, 0.26]])
+    scene: ClassVar[str] = "basketball"
+    """File name of the hardware's scene, without `.xml`."""
 
     def __init__(self, disturbances: Disturbances | None = None) -> None:
         """Compile the scene.
@@ -78,7 +82,7 @@ class BasketballShot(Task):
             disturbances: How repeated executions differ; the documented ones when not given.
         """
         self.disturbances = disturbances or Disturbances()
-        self.model = build_scene(_FOLDER / "basketball.xml")
+        self.model = build_scene(_FOLDER / f"{self.scene}.xml")
         self.model.opt.timestep = STEP
         self._bowl = np.flatnonzero(self.model.geom_bodyid == self.model.body("tool/bowl").id)
         self._ball = self.model.jnt_qposadr[self.model.joint("ball").id]
