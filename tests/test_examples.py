@@ -165,8 +165,9 @@ def test_a_blend_of_two_onsets_starts_in_between():
     ramp = [np.clip((times - onset) / 20, 0, 1) for onset in (10, 20)]
     smooth = np.array([r**3 * (10 - 15 * r + 6 * r**2) for r in ramp])[..., None]
     demonstrations = Demonstrations(smooth, [[0.0], [1.0]], PlanFormat(("joint1",), ("rad",), 0.02))
-    plan = SoftmaxBlend().fit(demonstrations, seed=0).generate(np.array([[0.5]]))[0, :, 0]
-    middle = np.clip((times - 15) / 20, 0, 1)
+    plan = SoftmaxBlend().fit(demonstrations, seed=0).generate(np.array([[0.3]]))[0, :, 0]
+    share = 1 / (1 + np.exp((0.7**2 - 0.3**2) / 0.4**2))  # of the later demonstration
+    middle = np.clip((times - 10 - 10 * share) / 20, 0, 1)
     np.testing.assert_allclose(plan, middle**3 * (10 - 15 * middle + 6 * middle**2), atol=2e-3)
 
 
@@ -181,7 +182,7 @@ def test_parallax_by_hand():
 
 def test_the_catapults_ball_falls_as_one_thrown_by_hand():
     """Swung at constant speed, no turn: from height h at (u, w), x = x0 + u t, t the fall's."""
-    from own_task import ARM, GRAVITY, PIVOT, STOP, Toss
+    from own_task import ARM, GRAVITY, PIVOT, STOP, Flight, Toss
 
     speed = 4.0
     swing = -1.2 + speed * np.arange(20) * 0.02
@@ -191,6 +192,8 @@ def test_the_catapults_ball_falls_as_one_thrown_by_hand():
     time = np.roots([-GRAVITY / 2, up, height]).max()
     np.testing.assert_allclose(rollout.outcome, [ARM * np.sin(STOP) + ahead * time, 0.0], atol=1e-9)
     assert rollout.valid
+    flight = Flight(np.array([0.0, 0.0, height]), np.array([ahead, 0.0, up]))
+    assert flight.at(flight.duration)[2] == pytest.approx(0.0, abs=1e-12)
 
 
 def test_the_catapults_film_ends_with_the_ball_on_its_goal():
