@@ -56,7 +56,9 @@ class UNetRegressionConfig:
     margin: float = 0.05
     """How far plans may leave the demonstrated range of a dimension, as a fraction of it."""
     network: UNetSize = field(
-        default_factory=lambda: UNetSize(widths=(64, 128, 128), step_width=64, condition_width=64)
+        default_factory=lambda: UNetSize(
+            widths=(64, 128, 128), step_width=64, condition_width=64, activation="silu"
+        )
     )
     """Size of the U-Net."""
     training_steps: int = 800

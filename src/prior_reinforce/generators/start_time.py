@@ -26,8 +26,8 @@ from prior_reinforce.generators.representation import PlanCodec, Representation
 from prior_reinforce.motions import Demonstrations
 
 _PADDING = 4
-"""Resting frames kept at either end of the cut-out motion: about one control point, which a
-spline needs to come to rest."""
+"""Resting frames kept at either end of the cut-out motion, if there are as many: about one control
+point, which a spline needs to come to rest."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,11 +160,13 @@ def _cut(demonstrations: Demonstrations) -> _Cut | None:
     moving = [np.flatnonzero(np.any(plan[1:] != plan[:-1], axis=1)) for plan in plans]
     first = min(int(m[0]) - d for m, d in zip(moving, delays, strict=True) if m.size)
     last = max(int(m[-1]) + 1 - d for m, d in zip(moving, delays, strict=True) if m.size)
-    begins, length = delays + first - _PADDING, last - first + 1 + 2 * _PADDING
-    # A slower motion may be generated with a later start than any demonstrated pair of the two: it
-    # must still end within the plan. All that may be cut off is padding, which rests.
-    if begins.min() < -_PADDING or begins.max() + length > demonstrations.horizon + _PADDING:
+    # A slower motion may be generated with a later start than any demonstrated pair of the two:
+    # every cut-out has to lie within the plan at every start, so that no rest is ever cut off.
+    before = min(_PADDING, int(delays.min()) + first)
+    after = min(_PADDING, demonstrations.horizon - 1 - int(delays.max()) - last)
+    if before < 0 or after < 0:
         return None
+    begins, length = delays + first - before, last - first + 1 + before + after
     return _Cut(begins, length)
 
 
