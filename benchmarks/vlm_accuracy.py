@@ -6,9 +6,9 @@
 
 The trials are the shipped demonstrations' plans, executed in physics with disturbances; half of the
 goals are drawn from the whole region, half within 10 cm of the outcome, where objects hide each
-other. Without --base-url the answers come from the tests' stand-in, which finds the objects by
-colour in the very picture it is sent: that measures everything but the model's eyesight. With it,
-the same pictures measure a real model.
+other. Without --base-url the answers come from the stand-in, which finds the objects by colour in
+the very picture it is sent: that measures everything but the model's eyesight. With it, the same
+pictures measure a real model.
 """
 
 from __future__ import annotations
@@ -16,19 +16,17 @@ from __future__ import annotations
 import argparse
 import contextlib
 import os
-import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
 
 os.environ.setdefault("MUJOCO_GL", "egl")
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "perception"))
 
 import numpy as np
-from vision_server import VisionServer
 
 from prior_reinforce.errors import PerceptionFailedError
 from prior_reinforce.perception import VisionLanguageModel, VisionLanguageModelConfig, scene_of
+from prior_reinforce.perception.stand_in_server import StandInServer
 from prior_reinforce.rollouts import Rollout
 from prior_reinforce.tasks import make_task
 from prior_reinforce.tasks.base import Task
@@ -109,7 +107,7 @@ def main() -> None:
     with contextlib.ExitStack() as stack:
         url = arguments.base_url
         if url is None:
-            stand_in = VisionServer(
+            stand_in = StandInServer(
                 arguments.family, outlier_rate=arguments.outliers, seed=arguments.seed
             )
             url = stack.enter_context(stand_in).base_url
