@@ -14,7 +14,8 @@ def execute(workspace: Workspace, number: int, command: str, *, time_limit: floa
     """Give an asked trial's plan to a command, once.
 
     The journal says `executing` before the command starts and `executed` after it ended, so a
-    program that dies in between leaves a trial of which only a person knows what moved.
+    program that dies in between leaves a trial of which only a person knows what moved. While the
+    command it left behind goes on, the trial still counts as executing.
 
     Args:
         workspace: Whose trial it is.
@@ -29,7 +30,7 @@ def execute(workspace: Workspace, number: int, command: str, *, time_limit: floa
             so.
         FileFormatError: The plan's file is not what was handed out; nothing moved.
     """
-    with executing_lock(workspace.folder):
+    with executing_lock(workspace.folder) as lock:
         with workspace.journal.exclusive():
             trial = workspace.record(number)
             if trial.stage is not TrialStage.ASKED:
@@ -40,7 +41,7 @@ def execute(workspace: Workspace, number: int, command: str, *, time_limit: floa
             workspace.journal.append("executing", {"trial": number, "command": command})
         plan_file = PlanFile(workspace.plan_path(trial), trial.plan_sha256)
         try:
-            hand_over = run_with_plan(command, plan_file, time_limit=time_limit)
+            hand_over = run_with_plan(command, plan_file, time_limit=time_limit, keep_open=(lock,))
         except (ConfigurationError, FileFormatError):
             with workspace.journal.exclusive():  # the command was never started: nothing moved
                 workspace.journal.append("not_executed", {"trial": number})

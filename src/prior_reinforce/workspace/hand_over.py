@@ -77,7 +77,9 @@ def split_command(command: str, plan: Path) -> tuple[str, ...]:
     return tuple(argument.replace(_PLAN, path) for argument in arguments)
 
 
-def run_command(command: str, plan: Path, *, time_limit: float) -> HandOver:
+def run_command(
+    command: str, plan: Path, *, time_limit: float, keep_open: tuple[int, ...] = ()
+) -> HandOver:
     """Run `mycontroller {plan}` in a process of its own and wait for it.
 
     At the time limit the command and everything it started are asked to stop (SIGTERM), and killed
@@ -87,6 +89,8 @@ def run_command(command: str, plan: Path, *, time_limit: float) -> HandOver:
         command: Program and arguments, `{plan}` among them.
         plan: File of the plan to be executed.
         time_limit: In [s].
+        keep_open: File descriptors that the command inherits, so that a lock on them lasts as long
+            as it runs.
 
     Raises:
         ConfigurationError: A command or a limit that cannot be used, or a program that cannot be
@@ -104,6 +108,7 @@ def run_command(command: str, plan: Path, *, time_limit: float) -> HandOver:
                 stdout=output,
                 stderr=subprocess.STDOUT,
                 start_new_session=True,
+                pass_fds=keep_open,
             )
         except (OSError, ValueError) as error:
             raise ConfigurationError(

@@ -162,13 +162,16 @@ def read_plan(path: str | os.PathLike[str], *, sha256: str | None = None) -> Pla
         ) from error
 
 
-def run_with_plan(command: str, plan_file: PlanFile, *, time_limit: float) -> HandOver:
+def run_with_plan(
+    command: str, plan_file: PlanFile, *, time_limit: float, keep_open: tuple[int, ...] = ()
+) -> HandOver:
     """Run `mycontroller {plan}` in a process of its own, once the plan's hash is checked.
 
     Args:
         command: Program and arguments, `{plan}` among them; no shell sees it.
         plan_file: What is to be executed.
         time_limit: In [s]; then the command and everything it started are stopped.
+        keep_open: File descriptors that the command inherits.
 
     Raises:
         ConfigurationError: A command or a limit that cannot be used, or a program that cannot be
@@ -176,7 +179,7 @@ def run_with_plan(command: str, plan_file: PlanFile, *, time_limit: float) -> Ha
         FileFormatError: The plan is no longer what its hash says; nothing has run.
     """
     plan_file.verify()
-    return run_command(command, plan_file.path, time_limit=time_limit)
+    return run_command(command, plan_file.path, time_limit=time_limit, keep_open=keep_open)
 
 
 def _as_npz(plan: Plan, fine: FineMotion, dt: float) -> bytes:
