@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import tyro
+from rich import box
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-from rich.table import Table
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.table import Table as TerminalTable
 
 from prior_reinforce.errors import ConfigurationError
-from prior_reinforce.experiments.recipes import RECIPES, Scale, interval, provenance
-from prior_reinforce.experiments.units import Workers, write_atomically
+from prior_reinforce.experiments.methods import family_of
+from prior_reinforce.experiments.provenance import provenance
+from prior_reinforce.experiments.recipes import QUICK, RECIPES, Recipe, Run, Scale, Table
+from prior_reinforce.experiments.recipes.base import Progress as OnProgress
+from prior_reinforce.experiments.units import Workers, run_units, write_atomically
 
 
 @dataclass(frozen=True)
@@ -22,89 +28,90 @@ class Reproduce:
     """Run a recipe of the paper's evidence; a killed run goes on where it was."""
 
     recipe: Annotated[str, tyro.conf.Positional]
-    """Which: zero-shot, adapters, eye, or all."""
+    """Which recipe, or all."""
     out: Path = Path("runs/reproduce")
     """Folder for results, and for the units that they are made of."""
     goals: int = 100
     """Goals a training."""
     seeds: tuple[int, ...] = (0, 1, 2)
     """Training seeds."""
+    quick: bool = False
+    """Ten goals and one training a method: shows that everything runs, decides no claim."""
     workers: int = 1
     """Processes on this machine."""
     ray: str | None = None
     """Address of a Ray cluster to run on."""
     include: tuple[str, ...] = ()
-    """One's own methods beside ours, each as module:Class."""
+    """One's own generators or adapters beside ours, each as module:Class."""
 
     def run(self) -> None:
         """Run, save, print."""
-        names = list(RECIPES) if self.recipe == "all" else [self.recipe]
-        for name in names:
-            if name not in RECIPES:
-                raise ConfigurationError(
-                    f"no recipe {name!r}; recipes are {', '.join(RECIPES)}, or all"
-                )
+        recipes = _chosen(self.recipe)
+        included = {recipe.name: self._included(recipe) for recipe in recipes}
         if self.goals < 1 or self.workers < 1 or not self.seeds:
             raise ConfigurationError("--goals and --workers must be at least 1, and --seeds given")
-        console = Console()
-        scale = Scale(goals=self.goals, seeds=self.seeds)
+        scale = QUICK if self.quick else Scale(goals=self.goals, seeds=self.seeds)
         workers = Workers(self.workers, self.ray)
-        columns = (
-            TextColumn("{task.completed}/{task.total}"),
-            BarColumn(bar_width=24),
-            TimeElapsedColumn(),
-            TextColumn("{task.description}"),
+        console = Console()
+        # All that has to be learned comes first, so that no core waits for one recipe's training.
+        trainings = dict.fromkeys(
+            training
+            for recipe in recipes
+            for training in recipe.trainings(scale, included[recipe.name])
         )
-        for name in names:
-            with Progress(*columns, console=console) as progress:
-                line = progress.add_task(name, total=None)
-
-                def show(done: int, total: int, label: str) -> None:
-                    progress.update(line, completed=done, total=total, description=label)  # noqa: B023
-
-                figures = RECIPES[name](self.out, scale, workers, show, self.include)
-            path = self.out / f"{name}.json"
+        with _progress(console, "learn") as show:
+            run_units(list(trainings), self.out, workers, show)
+        for recipe in recipes:
+            with _progress(console, recipe.name) as show:
+                figures = recipe.run(Run(self.out, scale, workers, show, included[recipe.name]))
+            path = self.out / f"{recipe.name}.json"
             text = json.dumps({**provenance(scale), **figures}, indent=1)
             write_atomically(path, text + "\n")
-            console.print(_table(name, figures))
+            console.print(_terminal(recipe, recipe.table(figures)))
             console.print(f"figures: {path}")
 
+    def _included(self, recipe: Recipe) -> tuple[str, ...]:
+        families = {name: family_of(name) for name in self.include}
+        fitting = tuple(name for name, family in families.items() if family == recipe.family)
+        if self.recipe != "all" and len(fitting) < len(families):
+            stranger = next(name for name in families if name not in fitting)
+            joined = [r.name for r in RECIPES.values() if r.family == families[stranger]]
+            raise ConfigurationError(
+                f"{stranger} is of the family {families[stranger]!r}, which recipe {recipe.name!r} "
+                f"does not compare; include it in {', '.join(joined)}, or in all"
+            )
+        return fitting
 
-def _table(name: str, figures: dict[str, Any]) -> Table:
-    table = Table(title=name)
-    if name == "adapters":
-        rounds = (1, 2, 4, 8, 10)
-        for column in ("adapter", *(f"by round {r}" for r in rounds)):
-            table.add_column(column)
-        for adapter, success in figures["success"].items():
-            cells = [str(interval(success[r - 1])) for r in rounds if r <= len(success)]
-            table.add_row(adapter, *cells)
-    elif name == "eye":
-        for column in ("goals", "Stage-2 trials", "sd", "total N", "not reached"):
-            table.add_column(column)
-        for goals, row in figures["trials"].items():
-            table.add_row(
-                goals,
-                str(interval(row["trials"])),
-                f"{row['sd']:.1f}",
-                f"{row['total']:.1f}",
-                str(row["not_reached"]),
-            )
-        table.add_row("paper, real arm", "2.9", "0.9", "8.9", "")
-    else:
-        for column in ("generator", "set", "seed", "own rms [mrad]", "own landing [cm]",
-                       "grid median [cm]", "p90", "within 1.5 cm", "lost"):  # fmt: skip
-            table.add_column(column)
-        for row in figures["rows"]:
-            table.add_row(
-                row["generator"],
-                row["demonstrations"],
-                str(row["seed"]),
-                f"{max(row['own_rms_rad']) * 1e3:.1f}",
-                f"{max(row['own_landing_m']) * 100:.1f}",
-                f"{row['grid_median_m'] * 100:.2f}",
-                f"{row['grid_p90_m'] * 100:.2f}",
-                f"{row['grid_within_tolerance']:.2f}",
-                f"{row['grid_lost']:.3f}",
-            )
-    return table
+
+def _chosen(name: str) -> Sequence[Recipe]:
+    if name == "all":
+        return list(RECIPES.values())
+    if name not in RECIPES:
+        raise ConfigurationError(f"no recipe {name!r}; recipes are {', '.join(RECIPES)}, or all")
+    return [RECIPES[name]]
+
+
+@contextmanager
+def _progress(console: Console, name: str) -> Iterator[OnProgress]:
+    columns = (
+        TextColumn("{task.completed}/{task.total}"),
+        BarColumn(bar_width=24),
+        TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
+        TextColumn("{task.description}"),
+    )
+    with Progress(*columns, console=console) as progress:
+        line = progress.add_task(name, total=None)
+
+        def show(done: int, total: int, label: str) -> None:
+            progress.update(line, completed=done, total=total, description=f"{name}: {label}")
+
+        yield show
+
+
+def _terminal(recipe: Recipe, table: Table) -> TerminalTable:
+    shown = TerminalTable(*table.header, title=recipe.title, box=box.SIMPLE)
+    for row in table.rows:
+        shown.add_row(*row)
+    return shown

@@ -1,0 +1,28 @@
+"""Recipes: one a figure or table of the paper, one file each."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from prior_reinforce.experiments.recipes.adapters import Adapters
+from prior_reinforce.experiments.recipes.base import QUICK, Picture, Recipe, Run, Scale, Table
+from prior_reinforce.experiments.recipes.claims import Claim, Verdict
+from prior_reinforce.experiments.recipes.eye import TrialsByEye
+from prior_reinforce.experiments.recipes.zero_shot import ZeroShotErrors
+
+RECIPES: Mapping[str, Recipe] = {
+    recipe.name: recipe for recipe in (ZeroShotErrors(), Adapters(), TrialsByEye())
+}
+"""Every recipe by its name, in the order of the evidence page."""
+
+__all__ = [
+    "QUICK",
+    "RECIPES",
+    "Claim",
+    "Picture",
+    "Recipe",
+    "Run",
+    "Scale",
+    "Table",
+    "Verdict",
+]

@@ -1,0 +1,119 @@
+"""What a recipe is: the units it needs, and what their results mean.
+
+A recipe's figures are one JSON-able dict. Table, pictures and claims are made from the figures
+alone, so a page can be drawn again from the files of a run that took an hour.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, ClassVar, Literal
+
+from prior_reinforce.experiments.evaluation import Training
+from prior_reinforce.experiments.recipes.claims import Claim
+from prior_reinforce.experiments.units import Unit, Workers, run_units
+
+Progress = Callable[[int, int, str], None]
+Family = Literal["generator", "adapter"]
+
+
+@dataclass(frozen=True)
+class Scale:
+    """How much of a recipe is run. Methods and their settings are the same at every scale."""
+
+    goals: int = 100
+    """Goals a training, as in the paper."""
+    seeds: tuple[int, ...] = (0, 1, 2)
+    """Training seeds."""
+    sets: tuple[str, ...] = ("A", "B")
+    """Prior sets."""
+    rounds: int = 10
+    """Trials a goal at most."""
+
+    @property
+    def trainings(self) -> int:
+        """Trainings of a method: what the intervals resample besides goals."""
+        return len(self.seeds) * len(self.sets)
+
+
+QUICK = Scale(goals=10, seeds=(0,), sets=("A",))
+"""One training a method: shows that everything runs, and decides no claim."""
+
+
+def _silent(done: int, total: int, label: str) -> None:
+    """Show no progress."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """One execution of a recipe."""
+
+    folder: Path
+    """Where units and models lie; a killed run goes on from there."""
+    scale: Scale
+    """How much is run."""
+    workers: Workers = field(default_factory=Workers)
+    """Where units run."""
+    progress: Progress = _silent
+    """Called with units done, units in all, and the label of the last one."""
+    include: tuple[str, ...] = ()
+    """One's own members of the recipe's family, each as module:Class."""
+
+    def results(self, units: Sequence[Unit]) -> list[Mapping[str, Any]]:
+        """Run units that are not done yet; every unit's result, in order."""
+        rows = run_units(units, self.folder, self.workers, self.progress)
+        return [row["result"] for row in rows]
+
+
+@dataclass(frozen=True)
+class Table:
+    """Text in rows and columns, the same in the terminal, in Markdown and on the page."""
+
+    header: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A picture that was drawn."""
+
+    path: Path
+    """PNG."""
+    caption: str
+    """What is seen, in a sentence or two; read aloud where the picture cannot be seen."""
+
+
+class Recipe(ABC):
+    """One figure or table of the paper."""
+
+    name: ClassVar[str]
+    """On the command line, and of its file of figures."""
+    title: ClassVar[str]
+    """Heading of its section."""
+    paper: ClassVar[str]
+    """The figure or table of the paper that it answers."""
+    family: ClassVar[Family | None] = None
+    """Which family's own members `--include` puts beside ours; None where none can join."""
+
+    def trainings(self, scale: Scale, include: Sequence[str]) -> Sequence[Training]:
+        """What is to be learned first, so that recipes can share it and learn side by side."""
+        return ()
+
+    @abstractmethod
+    def run(self, run: Run) -> dict[str, Any]:
+        """Run what is not done yet, and return the figures, JSON-able."""
+
+    @abstractmethod
+    def table(self, figures: Mapping[str, Any]) -> Table:
+        """Put the figures into rows."""
+
+    def draw(self, figures: Mapping[str, Any], folder: Path) -> list[Picture]:
+        """Draw the figures as PNGs in a folder."""
+        return []
+
+    def claims(self, figures: Mapping[str, Any]) -> list[Claim]:
+        """Hold what the paper says against what was measured."""
+        return []

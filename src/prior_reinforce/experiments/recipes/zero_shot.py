@@ -1,0 +1,59 @@
+"""How near generated plans come without any trial (the paper shows it as displacement only)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from typing import Any, ClassVar
+
+from prior_reinforce.experiments.evaluation import Training, ZeroShot
+from prior_reinforce.experiments.recipes.base import Family, Recipe, Run, Scale, Table
+from prior_reinforce.experiments.recipes.success import trainings_of
+
+
+class ZeroShotErrors(Recipe):
+    """Errors of first throws, and at the demonstrations' own outcomes."""
+
+    name: ClassVar[str] = "zero-shot"
+    title: ClassVar[str] = "First throws, before any trial"
+    paper: ClassVar[str] = "no table of its own"
+    family: ClassVar[Family | None] = "generator"
+
+    def trainings(self, scale: Scale, include: Sequence[str]) -> Sequence[Training]:
+        """Diffusion and what is included, on misaligned demonstrations."""
+        return [t for name in ("diffusion", *include) for t in trainings_of(scale, name)]
+
+    def run(self, run: Run) -> dict[str, Any]:
+        """Throw once at every point of a grid."""
+        trainings = self.trainings(run.scale, run.include)
+        run.results(trainings)
+        results = run.results([ZeroShot(training) for training in trainings])
+        return {
+            "rows": [
+                {**asdict(training), **result}
+                for training, result in zip(trainings, results, strict=True)
+            ]
+        }
+
+    def table(self, figures: Mapping[str, Any]) -> Table:
+        """One row a training."""
+        return Table(
+            (
+                "generator", "set", "seed", "own rms [mrad]", "own landing [cm]",
+                "grid median [cm]", "p90 [cm]", "within tolerance", "lost",
+            ),
+            tuple(
+                (
+                    row["generator"],
+                    row["demonstrations"],
+                    str(row["seed"]),
+                    f"{max(row['own_rms_rad']) * 1e3:.1f}",
+                    f"{max(row['own_landing_m']) * 100:.1f}",
+                    f"{row['grid_median_m'] * 100:.2f}",
+                    f"{row['grid_p90_m'] * 100:.2f}",
+                    f"{row['grid_within_tolerance']:.2f}",
+                    f"{row['grid_lost']:.3f}",
+                )
+                for row in figures["rows"]
+            ),
+        )  # fmt: skip
