@@ -1,6 +1,7 @@
 """The commands of a workspace through the installed entry point: what is printed, how it ends."""
 
 import json
+import os
 import shutil
 
 import numpy as np
@@ -102,6 +103,15 @@ def test_an_afternoon(run, folder):
     _, out, _ = run("log", folder)
     kinds = [json.loads(line)["kind"] for line in out.splitlines()]
     assert kinds[2:6] == ["goal_set", "asked", "told", "amended"]
+
+
+def test_a_reader_may_leave_before_the_log_ends(folder, monkeypatch, capsys):
+    reading, writing = os.pipe()
+    os.close(reading)
+    with open(writing, "w") as nobody_reads, monkeypatch.context() as patched:
+        patched.setattr("sys.stdout", nobody_reads)
+        assert main(["log", folder]) == 0
+    assert capsys.readouterr().err == ""
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -118,8 +120,15 @@ class Log:
     def run(self) -> None:
         """Print it."""
         with opened(self.folder) as workspace:
-            for event in workspace.events:
+            events = workspace.events
+        try:
+            for event in events:
                 print(event.as_json())
+            sys.stdout.flush()
+        except BrokenPipeError:
+            # Who reads has seen enough, as in `log hoop | head`. What Python would still flush when
+            # it exits goes nowhere.
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 @dataclass(frozen=True)
