@@ -24,13 +24,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from prior_reinforce.errors import (
-    FileFormatError,
-    InvalidDemonstrationsError,
-    InvalidFeedbackError,
-    InvalidGoalError,
-    InvalidPlanError,
-)
+from prior_reinforce.arrays import as_goal, as_outcomes, as_plans
+from prior_reinforce.errors import FileFormatError, InvalidDemonstrationsError, InvalidPlanError
 
 _FILE_FORMAT = "prior-reinforce demonstrations"
 _FILE_VERSION = 1
@@ -137,7 +132,7 @@ class Demonstrations:
             plans = as_plans(self.plans, self.format.action_dim, name="plans")
         except InvalidPlanError as error:
             raise InvalidDemonstrationsError(str(error)) from error
-        outcomes = _as_outcomes(self.outcomes_seen, plans.shape[0])
+        outcomes = as_outcomes(self.outcomes_seen, plans.shape[0])
         k = outcomes.shape[1]
         names = tuple(self.outcome_names) or tuple("xyz"[:k] if k <= 3 else map(str, range(k)))
         units = tuple(self.outcome_units) or ("m",) * k
@@ -192,17 +187,7 @@ class Demonstrations:
         Raises:
             InvalidGoalError: Wrong shape, or not finite.
         """
-        try:
-            goal = np.array(goal, dtype=float)
-        except (TypeError, ValueError) as error:
-            raise InvalidGoalError(f"a goal must be numbers, got {goal!r}") from error
-        if goal.shape != (self.outcome_dim,):
-            raise InvalidGoalError(
-                f"goal has shape {goal.shape}, but the demonstrations' outcomes have "
-                f"{self.outcome_dim} components {self.outcome_names}; give that many numbers"
-            )
-        if not np.all(np.isfinite(goal)):
-            raise InvalidGoalError(f"goal must be finite, got {goal.tolist()}")
+        goal = as_goal(goal, self.outcome_names)
         low, high = self.outcomes_seen.min(axis=0), self.outcomes_seen.max(axis=0)
         spread = np.maximum(high - low, 1e-12)
         beyond = np.maximum(np.maximum(low - goal, goal - high), 0.0)
@@ -210,9 +195,8 @@ class Demonstrations:
         # supports (its displacement field degrades towards the boundary already).
         if np.any(beyond > 0.5 * spread):
             warnings.warn(
-                f"goal {np.round(goal, 4).tolist()} lies {np.round(beyond, 4).tolist()} "
-                f"{self.outcome_units} outside the demonstrated outcomes "
-                f"{np.round(low, 4).tolist()} to {np.round(high, 4).tolist()}; check its unit, or "
+                f"goal {_say(goal)} lies {_say(beyond)} {self.outcome_units} outside the "
+                f"demonstrated outcomes {_say(low)} to {_say(high)}; check its unit, or "
                 "demonstrate nearer to it",
                 stacklevel=2,
             )
@@ -280,103 +264,6 @@ class Demonstrations:
             )
 
 
-def as_plans(
-    values: ArrayLike, action_dim: int, *, name: str = "plans", single: bool = False
-) -> np.ndarray:
-    """Return plans as a fresh, read-only float64 array of checked shape.
-
-    Args:
-        values: Shape (n, H, D), or (H, D) if `single`.
-        action_dim: D that is expected.
-        name: What to call the array in a message.
-        single: Expect one plan instead of a batch.
-
-    Raises:
-        InvalidPlanError: Wrong shape, fewer than two frames, or values that are not finite.
-    """
-    expected = "(H, D)" if single else "(n, H, D)"
-    try:
-        array = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise InvalidPlanError(f"{name} must be an array {expected} of numbers: {error}") from error
-    if array.ndim != (2 if single else 3):
-        raise InvalidPlanError(f"{name} must have shape {expected}, got {array.shape}")
-    if array.shape[-1] != action_dim:
-        raise InvalidPlanError(
-            f"{name} have {array.shape[-1]} action dimensions, but the plan format names "
-            f"{action_dim}; check the order of the axes {expected}"
-        )
-    if array.shape[-2] < 2:
-        raise InvalidPlanError(f"{name} need at least two frames, got {array.shape[-2]}")
-    bad = np.argwhere(~np.isfinite(array))
-    if bad.size:
-        raise InvalidPlanError(
-            f"{name} must be finite, but element {tuple(bad[0].tolist())} is "
-            f"{array[tuple(bad[0])]}; mend or drop that recording"
-        )
-    array.setflags(write=False)
-    return array
-
-
-def as_error(values: ArrayLike, outcome_dim: int) -> np.ndarray:
-    """Return a perceived error as a fresh float array, shape (k,).
-
-    Raises:
-        InvalidFeedbackError: Wrong shape, or not finite.
-    """
-    try:
-        error = np.array(values, dtype=float)
-    except (TypeError, ValueError) as problem:
-        raise InvalidFeedbackError(f"an error must be numbers, got {values!r}") from problem
-    if error.shape != (outcome_dim,):
-        raise InvalidFeedbackError(
-            f"error has shape {error.shape}, expected {outcome_dim} numbers: outcome minus goal"
-        )
-    if not np.all(np.isfinite(error)):
-        raise InvalidFeedbackError(
-            f"error must be finite, got {error.tolist()}; void the trial if nothing was seen"
-        )
-    return error
-
-
-def _as_outcomes(values: ArrayLike, n_plans: int) -> np.ndarray:
-    try:
-        outcomes = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise InvalidDemonstrationsError(f"outcomes must be an array (N, k): {error}") from error
-    if outcomes.ndim != 2 or outcomes.shape[1] < 1:
-        raise InvalidDemonstrationsError(f"outcomes must have shape (N, k), got {outcomes.shape}")
-    n, k = outcomes.shape
-    if n != n_plans:
-        raise InvalidDemonstrationsError(f"{n_plans} plans need as many outcomes, got {n}")
-    if n < 2:
-        raise InvalidDemonstrationsError(f"at least two demonstrations are needed, got {n}")
-    if not np.all(np.isfinite(outcomes)):
-        row = int(np.argwhere(~np.isfinite(outcomes))[0][0])
-        raise InvalidDemonstrationsError(
-            f"outcomes must be finite, but demonstration {row} has {outcomes[row].tolist()}; "
-            "measure it again, or drop that demonstration"
-        )
-    for i in range(n):
-        for j in range(i):
-            if np.array_equal(outcomes[i], outcomes[j]):
-                raise InvalidDemonstrationsError(
-                    f"demonstrations {j} and {i} have the same outcome {outcomes[i].tolist()}; one "
-                    "condition cannot stand for two motions: drop one"
-                )
-    spread = np.ptp(outcomes, axis=0)
-    if np.any(spread == 0):
-        raise InvalidDemonstrationsError(
-            f"all outcomes agree in component {int(np.argmin(spread))}; a goal cannot ask for "
-            "another value: spread the demonstrations, or drop that component"
-        )
-    if n > k:
-        scaled = (outcomes - outcomes.mean(axis=0)) / spread
-        singular = np.linalg.svd(scaled, compute_uv=False)
-        if singular[-1] < 1e-6 * singular[0]:
-            raise InvalidDemonstrationsError(
-                f"the {n} outcomes span fewer than {k} dimensions (they lie on one line or "
-                "plane); add a demonstration off it"
-            )
-    outcomes.setflags(write=False)
-    return outcomes
+def _say(values: np.ndarray) -> str:
+    """Numbers in four digits, however large."""
+    return "[" + ", ".join(f"{value:.4g}" for value in values) + "]"

@@ -22,9 +22,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from prior_reinforce.adapters.base import Adapter
+from prior_reinforce.arrays import as_error
 from prior_reinforce.errors import ConfigurationError, TrialStateError
 from prior_reinforce.generators.base import Generator
-from prior_reinforce.motions import Demonstrations, as_error
+from prior_reinforce.motions import Demonstrations
 
 
 class TrialState(Enum):

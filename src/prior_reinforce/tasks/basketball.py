@@ -19,8 +19,9 @@ import mujoco
 import mujoco.rollout
 import numpy as np
 
+from prior_reinforce.arrays import as_plans
 from prior_reinforce.errors import ConfigurationError, InvalidGoalError
-from prior_reinforce.motions import Demonstrations, PlanFormat, as_plans
+from prior_reinforce.motions import Demonstrations, PlanFormat
 from prior_reinforce.rollouts import KeyFrame, Rollout
 from prior_reinforce.tasks.base import Task
 from prior_reinforce.tasks.panda import (

@@ -18,8 +18,9 @@ import mujoco
 import mujoco.rollout
 import numpy as np
 
+from prior_reinforce.arrays import as_plans
 from prior_reinforce.errors import ConfigurationError, InvalidGoalError
-from prior_reinforce.motions import Demonstrations, as_plans
+from prior_reinforce.motions import Demonstrations
 from prior_reinforce.rollouts import Rollout
 from prior_reinforce.tasks.base import Task
 from prior_reinforce.tasks.panda import N_JOINTS, STEP, build_scene, servo_controls

@@ -9,8 +9,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from prior_reinforce.arrays import as_error
 from prior_reinforce.errors import RobotLimitError, TrialStateError, WorkspaceError
-from prior_reinforce.motions import Plan, as_error
+from prior_reinforce.motions import Plan
 from prior_reinforce.workspace.executing_lock import is_executing
 from prior_reinforce.workspace.history import TrialRecord, TrialStage
 from prior_reinforce.workspace.workspace import Workspace

@@ -1,0 +1,64 @@
+"""Numbers that a caller gives: what comes out is a checked copy, what cannot be used is named."""
+
+import numpy as np
+import pytest
+
+from prior_reinforce.arrays import as_error, as_goal, as_outcomes, as_plans
+from prior_reinforce.errors import (
+    InvalidDemonstrationsError,
+    InvalidFeedbackError,
+    InvalidGoalError,
+    InvalidPlanError,
+)
+
+
+@pytest.mark.parametrize(
+    "check",
+    [
+        lambda values: as_plans(values, 2, single=True),
+        lambda values: as_outcomes(values, 3),
+    ],
+)
+def test_arrays_are_read_only_copies(check):
+    given = np.array([[0.1, 0.2], [0.3, 0.1], [0.2, 0.2]])
+    checked = check(given)
+    np.testing.assert_array_equal(checked, given)
+    assert not np.shares_memory(checked, given)
+    assert not checked.flags.writeable
+
+
+@pytest.mark.parametrize("goal", [[1.0], [1.0, 2.0, 3.0], [np.nan, 0.0], ["a", "b"], 1.0])
+def test_bad_goals_are_named(goal):
+    with pytest.raises(InvalidGoalError):
+        as_goal(goal, ("x", "y"))
+
+
+@pytest.mark.parametrize("error", [[1.0], [np.inf, 0.0], [[0.0, 0.0]], "far", [[1], [2, 3]]])
+def test_bad_errors_are_named(error):
+    with pytest.raises(InvalidFeedbackError):
+        as_error(error, 2)
+
+
+@pytest.mark.parametrize(
+    ("plans", "message"),
+    [
+        ([[1.0, 2.0]], "at least two frames"),
+        ([[1.0, 2.0, 3.0]] * 2, "3 action dimensions"),
+        ([1.0, 2.0], "shape"),
+        ([["a", "b"]] * 2, "of numbers"),
+        ([[1.0, 2.0], [np.nan, 0.0]], r"element \(1, 0\) is nan"),
+    ],
+)
+def test_bad_plans_are_named(plans, message):
+    with pytest.raises(InvalidPlanError, match=message):
+        as_plans(plans, 2, single=True)
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e-200, 1e150])
+def test_outcomes_on_a_line_are_found_at_any_scale(scale):
+    line = np.array([[0.1, 0.2], [0.2, 0.4], [0.3, 0.6]]) * scale
+    with pytest.raises(InvalidDemonstrationsError, match="one line"):
+        as_outcomes(line, 3)
+    bent = line.copy()
+    bent[2, 1] *= 1.1
+    as_outcomes(bent, 3)
