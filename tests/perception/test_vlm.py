@@ -15,7 +15,7 @@ from prior_reinforce.perception.scenes import SeenObject, TableScene, scene_of
 from prior_reinforce.perception.vlm import VisionLanguageModel
 from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
 from prior_reinforce.rollouts import Rollout
-from prior_reinforce.tasks import make_task
+from prior_reinforce.tasks import FAMILY
 
 SCENE = TableScene(
     SeenObject("the orange ball", 0.06), SeenObject("the red ring", 0.102), RIM_HEIGHT
@@ -170,10 +170,10 @@ def test_ten_per_cent_outliers_never_get_through(looking, picture):
     assert len(seen) >= n_readings - 1  # four outliers of seven: about 1 in 200 readings
 
 
-@pytest.fixture(scope="module", params=["basketball-v1"])
+@pytest.fixture(scope="module", params=FAMILY, ids=lambda kind: kind.name)
 def trials(request):
     """Six real trials of a task with their goals: half anywhere, half as near as they get."""
-    task = make_task(request.param)
+    task = request.param()
     rng = np.random.default_rng(11)
     plans = np.concatenate([task.demonstrations(name).plans[:4] for name in ("A", "B")])
     rollouts = [rollout for rollout in task.rollout(plans, rng) if rollout.valid][:6]
