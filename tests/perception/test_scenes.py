@@ -1,0 +1,89 @@
+"""The shipped scenes: both objects can be seen at the key frame, whatever else is there."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from prior_reinforce.errors import ConfigurationError
+from prior_reinforce.generators.alignment import align
+from prior_reinforce.generators.interpolation import SmoothInterpolation
+from prior_reinforce.perception.camera import Camera
+from prior_reinforce.perception.colour_finder import find_by_colour
+from prior_reinforce.perception.scenes import scene_of
+from prior_reinforce.rollouts import KeyFrame
+from prior_reinforce.tasks import FAMILY, Curling, Fishing
+
+
+@pytest.fixture(scope="module")
+def camera():
+    camera = Camera()
+    yield camera
+    camera.close()
+
+
+def errors_seen(
+    camera: Camera, task_name: str, pairs: list[tuple[KeyFrame, np.ndarray]]
+) -> np.ndarray:
+    """Errors by the colours in the pictures of key frames and goals; NaN where one is not seen."""
+    scene, model = scene_of(task_name), pairs[0][0].model
+    calibration = camera.calibrate(model, np.array(scene.marks), height=scene.plane_height)
+    errors = np.full((len(pairs), 2), np.nan)
+    for i, (frame, goal) in enumerate(pairs):
+        picture = camera.picture(frame, goal)
+        boxes = [find_by_colour(picture, seen.words) for seen in (scene.reached, scene.goal)]
+        if None not in boxes:
+            reached, of_goal = calibration.to_table(np.array(boxes).reshape(2, 2, 2).mean(axis=1))
+            errors[i] = reached - of_goal - scene.goal_offset
+    return errors
+
+
+@pytest.mark.parametrize("kind", FAMILY, ids=lambda kind: kind.name)
+def test_the_camera_sees_the_whole_region_and_is_calibrated_to_a_millimetre(kind, camera):
+    model, scene = kind().model, scene_of(kind.name)
+    calibration = camera.calibrate(model, np.array(scene.marks), height=scene.plane_height)
+    assert calibration.left_out_error < 0.001
+    low, high = kind.region
+    corners = np.array([low, high, [low[0], high[1]], [high[0], low[1]]])
+    corners += 0.05 * np.sign(corners - (low + high) / 2)  # a margin for what goes too far
+    pixels = calibration.to_pixels(corners)
+    assert np.all((pixels > 0) & (pixels < [camera.config.width, camera.config.height]))
+
+
+@pytest.mark.slow
+def test_a_stone_as_far_as_the_target_hides_neither(camera):
+    # Outcomes are measured without the target, so that a picture may show one stone in the other.
+    task, goal = Curling(), np.array([0.90, 0.05])
+    stone = task.model.jnt_qposadr[task.model.joint("stone").id]
+    angles, distances = np.meshgrid([0.0, 0.8, 2.0, 4.0], [0.0, 0.01, 0.02, 0.035, 0.06])
+    circles = distances.ravel() * np.array([np.cos(angles.ravel()), np.sin(angles.ravel())])
+    places = goal + np.array([0.08, 0.0]) + circles.T
+    pairs = []
+    for place in places:
+        state = task.model.qpos0.copy()
+        state[stone : stone + 2] = place
+        pairs.append((KeyFrame(task.model, state, 0.0), goal))
+    seen = errors_seen(camera, "curling", pairs)
+    np.testing.assert_allclose(seen, places - goal, atol=0.005)
+
+
+@pytest.mark.slow
+def test_the_rod_hides_neither_hook_nor_magnet_in_twelve_casts(camera):
+    task, rng = Fishing(), np.random.default_rng(21)
+    rollouts = []
+    for name in ("A", "B"):
+        prior = task.demonstrations(name)
+        learned = SmoothInterpolation().fit(align(prior).demonstrations, seed=0)
+        rollouts += task.rollout(prior.plans[:3], rng)
+        rollouts += task.rollout(learned.generate(task.sample_goals(3, rng)), rng)
+    assert all(rollout.valid for rollout in rollouts)
+    outcomes = np.array([rollout.outcome for rollout in rollouts])
+    goals = np.clip(outcomes + rng.normal(0.0, 0.04, outcomes.shape), *task.region)
+    frames = [rollout.key_frame for rollout in rollouts]
+    seen = errors_seen(camera, "fishing", list(zip(frames, goals, strict=True)))
+    np.testing.assert_allclose(seen, outcomes - goals, atol=0.005)
+
+
+def test_an_unknown_task_is_named():
+    with pytest.raises(ConfigurationError, match="no scene is described for task 'darts'"):
+        scene_of("darts")
