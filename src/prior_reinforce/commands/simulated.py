@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib.metadata import version
 from pathlib import Path
 
@@ -11,6 +11,7 @@ from rich.console import Console
 
 from prior_reinforce.commands.learning import learn, load_learned
 from prior_reinforce.commands.live import LiveView
+from prior_reinforce.commands.operator import KeptSight, Operator
 from prior_reinforce.commands.task_options import Simulated
 from prior_reinforce.errors import (
     ConfigurationError,
@@ -18,10 +19,16 @@ from prior_reinforce.errors import (
     RenderingUnavailableError,
 )
 from prior_reinforce.experiments.goals import unseen_goals
-from prior_reinforce.experiments.methods import make_adapter, make_perception
+from prior_reinforce.experiments.methods import make_adapter
 from prior_reinforce.experiments.protocol import GoalTrials, is_hit, run_goals
+from prior_reinforce.experiments.sight import MODEL, open_sight
 from prior_reinforce.generators import DiffusionConfig, Generator
 from prior_reinforce.motions import Demonstrations
+from prior_reinforce.perception import (
+    Perception,
+    VisionLanguageModel,
+    VisionLanguageModelConfig,
+)
 from prior_reinforce.report import AdaptationRecord, Film, record_film, write_report
 from prior_reinforce.tasks import Task
 
@@ -33,7 +40,11 @@ class Adapt(Simulated):
     goal: tuple[str, ...] = ("random",)
     """The goal in metres, for instance `0.92 0.10` (forward, left), or `random`."""
     perception: str = "eye"
-    """How a trial's error is seen: exact, eye, amplified, or one's own as module:Class."""
+    """How a trial's error is seen: exact, eye, amplified, vlm (a vision-language model, --vlm.*),
+    stand-in (the same way without a model: objects found by colour), or one's own as
+    module:Class."""
+    vlm: VisionLanguageModelConfig = field(default_factory=VisionLanguageModelConfig)
+    """Endpoint and model for --perception vlm (docs/perception.md)."""
     adapter: str = "gp"
     """How the condition is corrected: gp (m = 2), gp-all (m = infinity), proportional, frozen, or
     one's own as module:Class."""
@@ -54,18 +65,19 @@ class Adapt(Simulated):
             raise ConfigurationError(f"--rounds must be at least 1, got {self.rounds}")
         goals = self._goals(task, demonstrations)
         make_adapter(self.adapter)
-        make_perception(self.perception)
-        if self.model is None:
-            generator = learn(
-                demonstrations,
-                self.out / "model",
-                config=DiffusionConfig(),
-                seed=self.seed,
-                console=console,
-            )
-        else:
-            generator = load_learned(self.model, demonstrations)
-        results = adapt(self, task, demonstrations, generator, goals, console)
+        # Opened first, so that a wrong setting is told before anything is learned.
+        with open_sight(self.perception, task.name, self.vlm) as sight:
+            if self.model is None:
+                generator = learn(
+                    demonstrations,
+                    self.out / "model",
+                    config=DiffusionConfig(),
+                    seed=self.seed,
+                    console=console,
+                )
+            else:
+                generator = load_learned(self.model, demonstrations)
+            results = adapt(self, task, demonstrations, generator, sight, goals, console)
         return 0 if all(result.solved_at for result in results) else 1
 
     def _goals(self, task: Task, demonstrations: Demonstrations) -> np.ndarray:
@@ -90,6 +102,10 @@ class Demo:
     """Seed of training, goals, disturbances and perception."""
     goals: int = 5
     """Number of unseen goals."""
+    perception: str = "eye"
+    """How a trial's error is seen; see `adapt`."""
+    vlm: VisionLanguageModelConfig = field(default_factory=VisionLanguageModelConfig)
+    """Endpoint and model for --perception vlm (docs/perception.md)."""
     film: bool = True
     """Draw the hits as films."""
 
@@ -98,19 +114,26 @@ class Demo:
         console = Console()
         if self.goals < 1:
             raise ConfigurationError(f"--goals must be at least 1, got {self.goals}")
-        settings = Adapt(seed=self.seed, out=self.out, film=self.film)
+        settings = Adapt(
+            seed=self.seed,
+            perception=self.perception,
+            vlm=self.vlm,
+            out=self.out,
+            film=self.film,
+        )
         task, demonstrations = settings.open()
         goals = unseen_goals(
             task, demonstrations, self.goals, np.random.default_rng([self.seed, 3])
         )
-        generator = learn(
-            demonstrations,
-            self.out / "model",
-            config=DiffusionConfig(),
-            seed=self.seed,
-            console=console,
-        )
-        results = adapt(settings, task, demonstrations, generator, goals, console)
+        with open_sight(self.perception, task.name, self.vlm) as sight:
+            generator = learn(
+                demonstrations,
+                self.out / "model",
+                config=DiffusionConfig(),
+                seed=self.seed,
+                console=console,
+            )
+            results = adapt(settings, task, demonstrations, generator, sight, goals, console)
         return 0 if all(result.solved_at for result in results) else 1
 
 
@@ -179,6 +202,7 @@ def adapt(
     task: Task,
     demonstrations: Demonstrations,
     generator: Generator,
+    sight: Perception,
     goals: np.ndarray,
     console: Console,
 ) -> list[GoalTrials]:
@@ -189,16 +213,20 @@ def adapt(
     for i, goal in enumerate(goals):
         view.goal(i + 1, len(goals), goal)
         seed = settings.seed + i
+        kept = sight
+        if isinstance(sight, VisionLanguageModel):
+            kept = KeptSight(sight, settings.out / "seen", i + 1)
         (result,) = run_goals(
             task,
             generator,
             lambda: make_adapter(settings.adapter),
-            make_perception(settings.perception),
+            kept,
             demonstrations,
             goal[None],
             rounds=settings.rounds,
             seed=seed,
             on_round=lambda _, so_far: view.trial(so_far[0]),
+            on_failed_reading=Operator(console, kept).look,
         )
         view.end(result)
         results.append(result)
@@ -225,14 +253,24 @@ def adapt(
             "Demonstrations": f"set {settings.demonstrations}, {demonstrations.n}",
             "Generator": generator.name,
             "Adapter": settings.adapter,
-            "Perception": settings.perception,
+            "Perception": _seen_by(settings),
             "Seed": str(settings.seed),
             "Version": version("prior-reinforce"),
         },
         region=task.region,
     )
     console.print(f"report: {page}")
+    if isinstance(sight, VisionLanguageModel):
+        console.print(
+            f"what the model saw, with boxes, and all that it said: {settings.out / 'seen'}"
+        )
     return results
+
+
+def _seen_by(settings: Adapt) -> str:
+    if settings.perception == MODEL:
+        return f"{MODEL}, {settings.vlm.model} at {settings.vlm.base_url}"
+    return settings.perception
 
 
 def _film(

@@ -22,6 +22,11 @@ from prior_reinforce.rollouts import Rollout
 from prior_reinforce.session import Session, Trial, ask_all
 from prior_reinforce.tasks.base import Task
 
+FailedReading = Callable[
+    [PerceptionFailedError, Rollout, np.ndarray, np.random.Generator], np.ndarray
+]
+"""Who looks where perception gives up: why, rollout, goal, source of noise -> error seen (k,)."""
+
 
 @dataclass(frozen=True, eq=False)
 class GoalTrials:
@@ -34,7 +39,7 @@ class GoalTrials:
     rollouts: tuple[Rollout, ...]
     """What truly came of each."""
     failed_readings: int = 0
-    """Trials in which perception gave up and a person looked instead (`Eye`)."""
+    """Trials in which perception gave up and somebody else looked."""
 
     @property
     def solved_at(self) -> int | None:
@@ -52,6 +57,13 @@ def is_hit(rollout: Rollout, goal: np.ndarray, tolerance: float) -> bool:
     return bool(rollout.valid and np.linalg.norm(rollout.outcome - goal) <= tolerance)
 
 
+def look_by_eye(
+    failure: PerceptionFailedError, rollout: Rollout, goal: np.ndarray, rng: np.random.Generator
+) -> np.ndarray:
+    """The simulated operator, who estimates by eye (`Eye`)."""
+    return Eye().perceive(rollout, goal, rng)
+
+
 def run_goals(
     task: Task,
     generator: Generator,
@@ -63,6 +75,7 @@ def run_goals(
     rounds: int,
     seed: int,
     on_round: Callable[[int, list[GoalTrials]], None] | None = None,
+    on_failed_reading: FailedReading = look_by_eye,
 ) -> list[GoalTrials]:
     """Try every goal until it is reached, or for a number of rounds.
 
@@ -76,6 +89,7 @@ def run_goals(
         rounds: Largest number of trials a goal.
         seed: Of the disturbances (a stream a round) and of perception (a stream a goal).
         on_round: Called after every round with its number and the results so far.
+        on_failed_reading: Called for the error of a trial in which perception gave up.
 
     Returns:
         One result a goal, in order.
@@ -104,9 +118,9 @@ def run_goals(
             session = sessions[i]
             try:
                 error_seen = perception.perceive(rollout, session.goal, seers[i])
-            except PerceptionFailedError:
+            except PerceptionFailedError as failure:
                 failed[i] += 1
-                error_seen = Eye().perceive(rollout, session.goal, seers[i])
+                error_seen = on_failed_reading(failure, rollout, session.goal, seers[i])
             rollouts[i].append(rollout)
             session.tell(
                 trial.number, error_seen, hit=is_hit(rollout, session.goal, task.tolerance)
