@@ -9,13 +9,18 @@ import pytest
 from conftest import RIM_HEIGHT
 from vision_server import VisionServer
 
+from prior_reinforce.adapters import GaussianProcessAdapter
 from prior_reinforce.errors import ConfigurationError, PerceptionFailedError
+from prior_reinforce.experiments.protocol import run_goals
+from prior_reinforce.generators.alignment import align
+from prior_reinforce.generators.interpolation import SmoothInterpolation
 from prior_reinforce.perception.camera import Camera, CameraConfig
 from prior_reinforce.perception.scenes import SeenObject, TableScene, scene_of
+from prior_reinforce.perception.stand_in_server import StandInServer
 from prior_reinforce.perception.vlm import VisionLanguageModel
 from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
 from prior_reinforce.rollouts import Rollout
-from prior_reinforce.tasks import FAMILY
+from prior_reinforce.tasks import FAMILY, BasketballShotV3
 
 SCENE = TableScene(
     SeenObject("the orange ball", 0.06), SeenObject("the red ring", 0.102), RIM_HEIGHT
@@ -194,6 +199,36 @@ def test_the_error_of_real_trials_is_seen_to_a_centimetre_through_outliers(trial
         assert len(server.requests) >= 6 * len(pairs)
     truth = [rollout.outcome - goal for rollout, goal in pairs]
     assert np.linalg.norm(np.subtract(seen, truth), axis=1).max() < 0.01
+
+
+@pytest.mark.slow
+def test_outliers_cost_less_than_a_trial():
+    # V1's demonstrations miss on V3's hardware by 5 cm: there is something to adapt.
+    task = BasketballShotV3()
+    prior = align(task.demonstrations("A")).demonstrations
+    generator = SmoothInterpolation().fit(prior, seed=0)
+    goals = task.sample_goals(6, np.random.default_rng(8))
+    trials = []
+    for rate in (0.0, 0.1):
+        with StandInServer(outlier_rate=rate, seed=2) as server:
+            config = VisionLanguageModelConfig(base_url=server.base_url)
+            perception = VisionLanguageModel(scene_of(task.name), config)
+            results = run_goals(
+                task,
+                generator,
+                GaussianProcessAdapter,
+                perception,
+                prior,
+                goals,
+                rounds=6,
+                seed=0,
+            )
+            perception.close()
+        trials.append([result.solved_at or 7 for result in results])
+    clean, spoilt = trials
+    assert max(clean) <= 6  # every goal is reached through the pictures,
+    assert np.mean(clean) >= 1.5  # and not by the first throw
+    assert np.mean(spoilt) - np.mean(clean) < 1
 
 
 def test_a_goal_beside_its_object_is_told_apart(looking, picture, camera, calibration):
