@@ -59,3 +59,7 @@ class RobotLimitError(PriorReinforceError, ValueError):
 
 class WorkspaceError(PriorReinforceError, RuntimeError):
     """A task folder on disk is missing, incomplete, locked, or inconsistent with its journal."""
+
+
+class UnitFailedError(PriorReinforceError, RuntimeError):
+    """A unit of an experiment failed; the message names it, and the others' results are kept."""

@@ -16,11 +16,12 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, Ti
 from rich.table import Table as TerminalTable
 
 from prior_reinforce.errors import ConfigurationError
+from prior_reinforce.experiments.files import write_atomically
 from prior_reinforce.experiments.methods import family_of
 from prior_reinforce.experiments.provenance import provenance
 from prior_reinforce.experiments.recipes import QUICK, RECIPES, Recipe, Run, Scale, Table
 from prior_reinforce.experiments.recipes.base import Progress as OnProgress
-from prior_reinforce.experiments.units import Workers, run_units, write_atomically
+from prior_reinforce.experiments.units import Workers, run_units
 
 
 @dataclass(frozen=True)

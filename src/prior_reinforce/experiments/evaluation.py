@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
-import tempfile
-import time
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -15,6 +12,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial import Delaunay
 
+from prior_reinforce.experiments.files import in_place
 from prior_reinforce.experiments.goals import unseen_goals
 from prior_reinforce.experiments.methods import make_adapter, make_generator, make_perception
 from prior_reinforce.experiments.protocol import GoalTrials, run_goals
@@ -51,10 +49,9 @@ class Training:
         return f"learn {self.generator} on {self.task} {self.demonstrations}{aligned}, {self.seed}"
 
     def run(self, folder: Path) -> Mapping[str, Any]:
-        """Learn, unless it was learned before."""
-        started = time.process_time()
+        """Learn, unless it was learned before; the model itself is the result."""
         self.learned(folder)
-        return {"cpu_seconds": time.process_time() - started}
+        return {}
 
     def prior(self) -> Demonstrations:
         """The demonstrations that are learned from."""
@@ -77,11 +74,8 @@ class Training:
         if not (home / "config.json").is_file():
             generator = make_generator(self.generator).fit(self.prior(), seed=self.seed)
             home.parent.mkdir(parents=True, exist_ok=True)
-            with tempfile.TemporaryDirectory(dir=home.parent, prefix=".learning-") as temporary:
-                generator.save(Path(temporary) / "model")
-                # Another worker may have been quicker; the results are the same.
-                if not home.exists():
-                    os.replace(Path(temporary) / "model", home)
+            with in_place(home) as unfinished:
+                generator.save(unfinished)
         return load_generator(home) if ":" not in self.generator else _load(self.generator, home)
 
 

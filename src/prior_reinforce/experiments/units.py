@@ -9,16 +9,21 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
-import tempfile
-from collections.abc import Callable, Mapping, Sequence
+import traceback
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
 
 import joblib
+from threadpoolctl import threadpool_limits
 
-from prior_reinforce.errors import MissingExtraError
+from prior_reinforce.errors import UnitFailedError
+from prior_reinforce.experiments.cluster import run_on_ray
+from prior_reinforce.experiments.files import sweep, write_atomically
+from prior_reinforce.generators.threads import torch_threads
 
 
 class Unit(Protocol):
@@ -32,6 +37,10 @@ class Unit(Protocol):
         """Do it and return a JSON-able result; `folder` holds models shared between units."""
 
 
+_Outcome = tuple[Unit, str | None]
+"""A unit, and why it failed; None where it did not."""
+
+
 @dataclass(frozen=True)
 class Workers:
     """Where units run."""
@@ -39,7 +48,7 @@ class Workers:
     count: int = 1
     """Processes on this machine."""
     ray: str | None = None
-    """Address of a Ray cluster to run on instead."""
+    """Address of a Ray cluster to run on instead; it decides how many units run at a time."""
 
 
 def run_units(
@@ -57,60 +66,87 @@ def run_units(
         progress: Called with units done, units in all, and the label of the last one.
 
     Raises:
+        UnitFailedError: Some units failed, or a worker process was killed. All others' results
+            are on disk, and running again goes on from there.
         MissingExtraError: A Ray address was given and Ray is not installed.
+        ConfigurationError: No Ray cluster answers at the address.
     """
     folder = folder.resolve()
-    (folder / "units").mkdir(parents=True, exist_ok=True)
+    for part in ("units", "failures"):
+        (folder / part).mkdir(parents=True, exist_ok=True)
     left = [unit for unit in units if not result_path(folder, unit).is_file()]
     done = len(units) - len(left)
     progress(done, len(units), "found on disk" if done else "")
-    with _backend(workers):
-        parallel = joblib.Parallel(n_jobs=workers.count, return_as="generator_unordered")
-        for label in parallel(joblib.delayed(_run)(unit, folder) for unit in left):
+    failed: list[tuple[Unit, str]] = []
+    for unit, reason in _outcomes(left, folder, workers):
+        if reason is None:
             done += 1
-            progress(done, len(units), label)
+            progress(done, len(units), unit.label)
+        else:
+            failed.append((unit, reason))
+    if failed:
+        unit, reason = failed[0]
+        more = f", and {len(failed) - 1} more" if len(failed) > 1 else ""
+        raise UnitFailedError(
+            f"{unit.label!r} failed: {reason}{more}; {done} of {len(units)} results are kept, mend "
+            f"it and run again (what happened: {_failure_path(folder, unit)})"
+        )
     return [json.loads(result_path(folder, unit).read_text()) for unit in units]
 
 
 def result_path(folder: Path, unit: Unit) -> Path:
     """Where a unit's result lies: named by its kind and a hash of its fields."""
-    fields = json.dumps(asdict(unit), sort_keys=True, default=str)  # type: ignore[call-overload]
-    digest = hashlib.sha256(fields.encode()).hexdigest()[:16]
-    return folder / "units" / f"{type(unit).__name__.lower()}-{digest}.json"
+    return folder / "units" / f"{_name(unit)}.json"
 
 
-def write_atomically(path: Path, text: str) -> None:
-    """Put a text in place whole or not at all, durable."""
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}-")
+def _outcomes(units: Sequence[Unit], folder: Path, workers: Workers) -> Iterator[_Outcome]:
+    """Run units and yield what became of each, as they come."""
+    if not units:
+        return
+    if workers.ray is not None:
+        lost = partial(_keep_failure, folder)
+        yield from run_on_ray(partial(_run, folder), units, workers.ray, lost=lost)
+        return
+    parallel = joblib.Parallel(n_jobs=workers.count, return_as="generator_unordered")
     try:
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            file.write(text)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(temporary, path)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
-
-
-def _run(unit: Unit, folder: Path) -> str:
-    result = unit.run(folder)
-    fields = asdict(unit)  # type: ignore[call-overload]
-    text = json.dumps({"unit": fields, "result": result}, default=str, allow_nan=False)
-    write_atomically(result_path(folder, unit), text)
-    return unit.label
-
-
-def _backend(workers: Workers) -> Any:
-    if workers.ray is None:
-        return joblib.parallel_config(backend="loky", inner_max_num_threads=1)
-    try:
-        import ray
-        from ray.util.joblib import register_ray
-    except ImportError as error:
-        raise MissingExtraError(
-            'a Ray cluster needs Ray; install it with: pip install "prior-reinforce[ray]"'
+        yield from parallel(joblib.delayed(_run)(folder, unit) for unit in units)
+    except BrokenProcessPool as error:
+        raise UnitFailedError(
+            "a worker process was killed, mostly for want of memory; the results so far are kept, "
+            "run again with fewer --workers"
         ) from error
-    ray.init(address=workers.ray, ignore_reinit_error=True, log_to_driver=False)
-    register_ray()  # type: ignore[no-untyped-call]
-    return joblib.parallel_config(backend="ray")
+
+
+def _run(folder: Path, unit: Unit) -> _Outcome:
+    """Run a unit and keep its result; or keep how it failed."""
+    sweep(folder / "units")
+    sweep(folder / "models")
+    try:
+        # The last digits of a sum depend on how many threads share it.
+        with threadpool_limits(1), torch_threads(1):
+            result = unit.run(folder)
+        text = json.dumps({"unit": _fields(unit), "result": result}, allow_nan=False)
+    except Exception as error:
+        return _keep_failure(folder, unit, error)
+    write_atomically(result_path(folder, unit), text)
+    _failure_path(folder, unit).unlink(missing_ok=True)
+    return unit, None
+
+
+def _keep_failure(folder: Path, unit: Unit, error: Exception) -> _Outcome:
+    write_atomically(_failure_path(folder, unit), "".join(traceback.format_exception(error)))
+    first_line = str(error).partition("\n")[0]
+    return unit, f"{type(error).__name__}: {first_line}"
+
+
+def _failure_path(folder: Path, unit: Unit) -> Path:
+    return folder / "failures" / f"{_name(unit)}.txt"
+
+
+def _name(unit: Unit) -> str:
+    digest = hashlib.sha256(json.dumps(_fields(unit), sort_keys=True).encode()).hexdigest()[:16]
+    return f"{type(unit).__name__.lower()}-{digest}"
+
+
+def _fields(unit: Unit) -> dict[str, Any]:
+    return asdict(unit)  # type: ignore[call-overload]

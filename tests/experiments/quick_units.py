@@ -1,0 +1,80 @@
+"""Real units that take a second or less, and some that show how one ends."""
+
+import os
+import signal
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from prior_reinforce.experiments.evaluation import Training, Trials, ZeroShot
+from prior_reinforce.generators import DiffusionConfig, DiffusionGenerator
+from prior_reinforce.generators.unet import UNetSize
+
+
+class BriefDiffusion(DiffusionGenerator):
+    """A tiny network after a few steps."""
+
+    name = "brief-diffusion"
+
+    def __init__(self, config=None, **options):
+        size = UNetSize(widths=(16, 32), step_width=16, condition_width=16)
+        brief = DiffusionConfig(network=size, training_steps=10, sampling_steps=2)
+        super().__init__(config or brief, **{"threads": 1, **options})
+
+
+def trainings():
+    kinds = ("nearest", "interpolation", "quick_units:BriefDiffusion")
+    return [Training("basketball-v1", "A", kind, seed=0) for kind in kinds]
+
+
+def real_units():
+    """A generator of each kind is learned, thrown, and adapted."""
+    nearest, smooth, diffusion = trainings()
+    return [
+        *trainings(),
+        Trials(nearest, "basketball-v1", "gp", "amplified", goals=3, rounds=2),
+        Trials(smooth, "basketball-v1", "proportional", "eye", goals=2, unseen=True, rounds=1),
+        Trials(diffusion, "basketball-v1", "gp-all", "eye", goals=2, rounds=2),
+        ZeroShot(nearest, spacing=0.2),
+    ]
+
+
+@dataclass(frozen=True)
+class Roots:
+    """Eigenvalues of a random matrix, slowly; numbers whose last digits threads would change."""
+
+    seed: int
+    pause: float = 0.0
+    """How long it takes, in [s]."""
+
+    @property
+    def label(self):
+        return f"roots {self.seed}"
+
+    def run(self, folder: Path):
+        matrix = np.random.default_rng(self.seed).normal(size=(200, 200))
+        time.sleep(self.pause)
+        return {
+            "product": float((matrix @ matrix.T).sum()),
+            "roots": np.linalg.svd(matrix)[1][:9].tolist(),
+        }
+
+
+@dataclass(frozen=True)
+class Ends:
+    """A unit that does not end well."""
+
+    how: str
+
+    @property
+    def label(self):
+        return f"one that {self.how}s"
+
+    def run(self, folder: Path):
+        if self.how == "raise":
+            raise ArithmeticError("0 is no divisor\nsecond line")
+        if self.how == "die":
+            os.kill(os.getpid(), signal.SIGKILL)
+        return {"value": float("nan")}

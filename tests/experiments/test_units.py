@@ -1,0 +1,143 @@
+"""The same files whatever the number of workers, however a run ends, and on a Ray cluster."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from killed_runs import results
+from quick_units import Ends, Roots, real_units
+
+from prior_reinforce.errors import UnitFailedError
+from prior_reinforce.experiments.files import in_place, sweep, write_atomically
+from prior_reinforce.experiments.units import Workers, result_path, run_units
+
+HERE = Path(__file__).parent
+KILLS = 12
+
+
+def silent(done, total, label):
+    pass
+
+
+def printed_by(program, *args):
+    """What a program of its own prints; these fork, or leave Ray around."""
+    path = os.pathsep.join([str(HERE), os.environ.get("PYTHONPATH", "")])
+    done = subprocess.run(
+        [sys.executable, HERE / program, *map(str, args)],
+        capture_output=True,
+        text=True,
+        env=os.environ
+        | {"OMP_NUM_THREADS": "1", "RAY_USAGE_STATS_ENABLED": "0", "PYTHONPATH": path},
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+@pytest.mark.slow
+def test_any_number_of_workers_gives_the_same_files_bit_for_bit(tmp_path):
+    units = [*real_units(), *map(Roots, range(4))]
+    for count in (1, 2, 3):
+        run_units(units, tmp_path / str(count), Workers(count), silent)
+    one = results(tmp_path / "1")
+    assert len(one) == len(units) + 6  # three models of two files each
+    assert results(tmp_path / "2") == one
+    assert results(tmp_path / "3") == one
+
+
+@pytest.mark.slow
+def test_runs_killed_at_any_moment_end_with_the_same_files(tmp_path):
+    text = printed_by("killed_runs.py", tmp_path, KILLS)
+    assert f"{KILLS} kills" in text
+    assert ", 0 unfinished ones" not in text  # some kills came while a file was being written
+
+
+@pytest.mark.slow
+def test_a_lost_node_of_a_ray_cluster_changes_nothing(tmp_path):
+    pytest.importorskip("ray")
+    text = printed_by("ray_cluster.py", tmp_path)
+    assert "1 of them twice" in text
+    assert "'one that raises' failed: ArithmeticError: 0 is no divisor;" in text
+    assert "'one that dies' failed: WorkerCrashedError" in text
+
+
+def test_what_is_done_is_not_run_again(tmp_path):
+    units = [Roots(seed) for seed in range(3)]
+    first = run_units(units[:2], tmp_path, Workers(), silent)
+    result_path(tmp_path, units[0]).write_text(json.dumps({"kept": True}))
+    calls = []
+    again = run_units(units, tmp_path, Workers(), lambda *call: calls.append(call))
+    assert again[:2] == [{"kept": True}, first[1]]
+    assert calls == [(2, 3, "found on disk"), (3, 3, "roots 2")]
+
+
+def test_a_failing_unit_is_named_and_the_others_stay(tmp_path):
+    units = [Ends("raise"), Roots(0), Ends("give nothing"), Roots(1)]
+    with pytest.raises(UnitFailedError) as caught:
+        run_units(units, tmp_path, Workers(), silent)
+    message = str(caught.value)
+    assert "\n" not in message
+    assert message.startswith("'one that raises' failed: ArithmeticError: 0 is no divisor, and 1")
+    assert "2 of 4 results are kept" in message
+    assert [result_path(tmp_path, unit).is_file() for unit in units] == [False, True, False, True]
+    told = Path(message.partition("what happened: ")[2].rstrip(")")).read_text()
+    assert "second line" in told
+    assert "quick_units.py" in told
+
+
+@pytest.mark.slow
+def test_a_worker_that_is_killed_is_told_in_a_line(tmp_path):
+    with pytest.raises(UnitFailedError, match=r"a worker process was killed.* fewer --workers"):
+        run_units([Ends("die"), Roots(0)], tmp_path, Workers(2), silent)
+
+
+def test_a_mended_unit_leaves_no_failure_behind(tmp_path):
+    unit = Roots(0)
+    failure = tmp_path / "failures" / f"{result_path(tmp_path, unit).stem}.txt"
+    failure.parent.mkdir()
+    failure.write_text("of yesterday")
+    run_units([unit], tmp_path, Workers(), silent)
+    assert not failure.exists()
+
+
+def test_a_file_is_replaced_whole_or_not_at_all(tmp_path):
+    path = tmp_path / "result.json"
+    write_atomically(path, "old")
+
+    def interrupted():
+        with in_place(path) as unfinished:
+            unfinished.write_text("half of the n")
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
+    assert results(tmp_path) == {"result.json": b"old"}
+
+
+def test_the_slower_of_two_leaves_the_quickers_folder(tmp_path):
+    with in_place(tmp_path / "model") as slow:
+        with in_place(tmp_path / "model") as quick:
+            quick.mkdir()
+            (quick / "weights").write_text("quick")
+        slow.mkdir()
+        (slow / "weights").write_text("slow")
+    assert results(tmp_path) == {"model/weights": b"quick"}
+
+
+@pytest.mark.skipif(os.name != "posix", reason="whether a process lives is known on POSIX only")
+def test_only_leftovers_of_the_dead_are_swept(tmp_path):
+    dead = subprocess.Popen([sys.executable, "-c", ""])
+    dead.wait()
+    with in_place(tmp_path / "mine") as unfinished:
+        unfinished.write_text("in the making")
+        mine = unfinished.parent
+        left = tmp_path / mine.name.replace(f"-{os.getpid()}-", f"-{dead.pid}-")
+        elsewhere = tmp_path / ".unfinished-another.host-1-x"
+        left.mkdir()
+        elsewhere.mkdir()
+        sweep(tmp_path)
+        assert not left.exists()
+        assert elsewhere.exists()
+        assert unfinished.read_text() == "in the making"
