@@ -159,6 +159,8 @@ class Rollout(Simulated):
         plan, aim = self._plan(demonstrations)
         if self.repeats < 1:
             raise ConfigurationError(f"--repeats must be at least 1, got {self.repeats}")
+        if self.film is not None and self.film.suffix != ".mp4":
+            raise ConfigurationError(f"--film must name an .mp4 file, got {self.film}")
         plans = np.repeat(plan[None], self.repeats, axis=0)
         rollouts = task.rollout(plans, np.random.default_rng(self.seed))
         outcomes = np.array([rollout.outcome for rollout in rollouts])
@@ -168,15 +170,15 @@ class Rollout(Simulated):
                 for name, value in zip(task.outcome_names, rollout.outcome, strict=True)
             )
             hit = "  within the tolerance" if is_hit(rollout, aim, task.tolerance) else ""
-            lost = "" if rollout.valid else "  (lost: never came down at the goal's height)"
+            lost = "" if rollout.valid else "  (lost: it has no place on the table)"
             console.print(f"rollout {number}: {place}{lost}{hit}")
         if self.repeats > 1:
             spread = outcomes.std(axis=0, ddof=1) * 100
             console.print("spread (sd): " + ", ".join(f"{value:.2f} cm" for value in spread))
         if self.film is not None:
             frames = task.film(plan, aim, np.random.default_rng(self.seed))
-            record_film(frames, self.film.parent, self.film.stem)
-            console.print(f"film: {self.film}")
+            film = record_film(frames, self.film.parent, self.film.stem)
+            console.print(f"film: {film.video}, its key moments: {film.strip}")
 
     def _plan(self, demonstrations: Demonstrations) -> tuple[np.ndarray, np.ndarray]:
         if (self.demonstration is None) == (self.condition is None):
