@@ -25,7 +25,12 @@ class Interval:
 
     def __str__(self) -> str:
         """Value and interval, two decimals."""
-        return f"{self.value:.2f} [{self.low:.2f}, {self.high:.2f}]"
+        return format(self, "")
+
+    def __format__(self, spec: str) -> str:
+        """Value and interval, each number in the format given; two decimals without one."""
+        spec = spec or ".2f"
+        return f"{self.value:{spec}} [{self.low:{spec}}, {self.high:{spec}}]"
 
 
 def bootstrap_mean(values: np.ndarray, *, seed: int = 0) -> Interval:

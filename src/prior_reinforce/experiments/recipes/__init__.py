@@ -5,13 +5,24 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from prior_reinforce.experiments.recipes.adapters import Adapters
+from prior_reinforce.experiments.recipes.alignment import TimelineAlignment
 from prior_reinforce.experiments.recipes.base import QUICK, Picture, Recipe, Run, Scale, Table
 from prior_reinforce.experiments.recipes.claims import Claim, Verdict
+from prior_reinforce.experiments.recipes.displacement import DisplacementFields
 from prior_reinforce.experiments.recipes.eye import TrialsByEye
+from prior_reinforce.experiments.recipes.generators import Generators
 from prior_reinforce.experiments.recipes.zero_shot import ZeroShotErrors
 
 RECIPES: Mapping[str, Recipe] = {
-    recipe.name: recipe for recipe in (ZeroShotErrors(), Adapters(), TrialsByEye())
+    recipe.name: recipe
+    for recipe in (
+        ZeroShotErrors(),
+        Generators(),
+        Adapters(),
+        TimelineAlignment(),
+        DisplacementFields(),
+        TrialsByEye(),
+    )
 }
 """Every recipe by its name, in the order of the evidence page."""
 

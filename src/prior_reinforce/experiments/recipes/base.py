@@ -117,3 +117,7 @@ class Recipe(ABC):
     def claims(self, figures: Mapping[str, Any]) -> list[Claim]:
         """Hold what the paper says against what was measured."""
         return []
+
+    def remarks(self, figures: Mapping[str, Any]) -> list[str]:
+        """Say in sentences what was measured besides the paper's claims and must not be missed."""
+        return []

@@ -1,4 +1,4 @@
-"""Stage-2 trials by eye: five unseen goals a set, as in the paper, and many (paper, Table I)."""
+"""Stage-2 trials by eye: five unseen goals a set, as in the paper, and many (paper, Table II)."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class TrialsByEye(Recipe):
 
     name: ClassVar[str] = "eye"
     title: ClassVar[str] = "Trials by eye"
-    paper: ClassVar[str] = "Table I, row 1"
+    paper: ClassVar[str] = "Table II, row 1"
     family: ClassVar[Family | None] = "adapter"
 
     def trainings(self, scale: Scale, include: Sequence[str]) -> Sequence[Training]:

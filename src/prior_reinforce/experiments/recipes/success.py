@@ -10,6 +10,7 @@ import numpy as np
 
 from prior_reinforce.experiments.evaluation import Training, Trials
 from prior_reinforce.experiments.recipes.base import Run, Scale
+from prior_reinforce.experiments.recipes.claims import Verdict, above, all_of
 from prior_reinforce.experiments.statistics import (
     Interval,
     bootstrap_difference,
@@ -22,6 +23,8 @@ TASK = "basketball-v1"
 
 Curve = list[dict[str, float]]
 """An interval for each round, from round 1."""
+
+_ROUNDS_SHOWN = (1, 2, 4, 8, 10)
 
 
 def trainings_of(scale: Scale, generator: str, *, aligned: bool = False) -> list[Training]:
@@ -54,3 +57,39 @@ def difference_curve(solved: np.ndarray, other: np.ndarray, rounds: int) -> Curv
 def interval_of(values: Mapping[str, Any]) -> Interval:
     """An interval as it was before it became JSON."""
     return Interval(**values)
+
+
+def mean_success_difference(solved: np.ndarray, other: np.ndarray, rounds: int) -> Interval:
+    """Area between two curves: the difference of the share reached, mean of all rounds."""
+    a, b = (
+        np.mean([reached_by(at, r) for r in range(1, rounds + 1)], axis=0) for at in (solved, other)
+    )
+    return bootstrap_difference(a, b)
+
+
+def rounds_shown(rounds: int) -> list[int]:
+    """Rounds that a table shows."""
+    return [r for r in _ROUNDS_SHOWN if r <= rounds]
+
+
+def verdict_by_round(
+    curve: Curve, other: Curve, difference: Curve, first: int, trainings: int
+) -> Verdict:
+    """Judge the claim that one method is above another at every round.
+
+    Rounds at which both reach every goal leave nothing to be above in, and are left out.
+
+    Args:
+        curve: Share reached by the method that is claimed to be better.
+        other: By the other one.
+        difference: The first minus the second, paired.
+        first: Round from which on the claim is made.
+        trainings: How many trainings the intervals resampled.
+    """
+    return all_of(
+        [
+            above(interval_of(difference[i]), 0.0, trainings)
+            for i in range(first - 1, len(difference))
+            if not curve[i]["value"] == other[i]["value"] == 1.0
+        ]
+    )
