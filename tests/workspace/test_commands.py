@@ -148,6 +148,7 @@ def test_an_error_can_be_told_in_many_ways(run, folder, said, seen):
         (("--error", "0.05"), "needs 2 numbers"),
         (("--error", "nan", "0"), "void the trial"),
         (("--error", "5cm far"), "write a length and one of long, short"),
+        (("--error", "50m long"), "say it again, in cm"),
         (("--error", "0.05", "0", "--outcome", "0.9", "0"), "--error or --outcome"),
         (("--outcome", "0.9"), "needs 2 numbers"),
         (("--hit", "--miss"), "--hit alone"),
@@ -195,6 +196,28 @@ def test_bad_input_ends_with_status_2_and_leaves_nothing_behind(folder, capsys, 
     assert capsys.readouterr().err
     assert journal(folder) == before
     assert not (tmp_path / "other").exists()
+
+
+@pytest.mark.parametrize(
+    ("flags", "remedy"),
+    [
+        (("--out", "plan.txt"), "end the name in"),
+        (("--out", "nowhere/plan.csv"), "make the folder first"),
+        (("--out", "plan.csv", "--rate", "1e12"), "up to 100000"),
+        (("--out", "plan.csv", "--rate", "nan"), "up to 100000"),
+        (("--run", "true"), "hold {plan}"),
+        (("--run", "no-such-controller {plan}"), "give the path of a program"),
+        (("--run", "true {plan}", "--time-limit", "0"), "must be a positive number"),
+    ],
+)
+def test_what_ask_cannot_do_is_said_before_a_trial_is_made(run, folder, flags, remedy):
+    run("goal", folder, "0.9", "0.05")
+    before = journal(folder)
+    status, out, err = run("ask", folder, *flags)
+    assert (status, out) == (2, "")
+    assert remedy in err
+    assert len(err.splitlines()) == 1
+    assert journal(folder) == before
 
 
 def test_a_command_that_fails_is_told_by_the_status(run, folder, tmp_path):

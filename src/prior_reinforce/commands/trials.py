@@ -15,8 +15,9 @@ from prior_reinforce.errors import ConfigurationError, InvalidFeedbackError
 from prior_reinforce.feedback import from_words
 from prior_reinforce.workspace.executing_lock import is_executing
 from prior_reinforce.workspace.execution import execute
+from prior_reinforce.workspace.hand_over import check_command
 from prior_reinforce.workspace.history import TrialRecord, TrialStage
-from prior_reinforce.workspace.plan_files import write_plan
+from prior_reinforce.workspace.plan_files import check_plan_path, write_plan
 from prior_reinforce.workspace.status import say_trial, tell_example
 from prior_reinforce.workspace.trials import amend, ask, tell, void
 from prior_reinforce.workspace.wording import say_place
@@ -26,6 +27,8 @@ Number = Annotated[int, tyro.conf.Positional, tyro.conf.arg(metavar="TRIAL")]
 
 _LARGEST_PLAUSIBLE_METRES = 1.0
 """Ours: a bare number beyond it is centimetres far more often than a throw a metre off."""
+_LARGEST_SAYABLE_METRES = 5.0
+"""Ours: words carry their unit, but nobody measures a throw that far off a table of a metre."""
 
 
 @dataclass(frozen=True)
@@ -48,6 +51,10 @@ class Ask:
 
     def run(self) -> int:
         """Hand the plan out."""
+        if self.out is not None:
+            check_plan_path(self.out, rate=self.rate)
+        if self.run_command is not None:
+            check_command(self.run_command, time_limit=self.time_limit)
         with opened(self.folder) as workspace:
             did_not_move = self.arm_did_not_move
             if not did_not_move and _should_ask_whether_it_moved(workspace):
@@ -220,7 +227,7 @@ def read_error(workspace: Workspace, given: tuple[str, ...]) -> np.ndarray:
         numbers = None
     if numbers is None:
         if manifest.in_words:
-            return from_words(text, k)
+            return _sayable(text, from_words(text, k))
         raise InvalidFeedbackError(
             f"cannot read {text!r}; this task's outcomes have no words, give {k} numbers: "
             f"{tell_example(workspace)}"
@@ -232,6 +239,16 @@ def read_error(workspace: Workspace, given: tuple[str, ...]) -> np.ndarray:
             f"{', '.join(manifest.outcome_names)}{words}: {tell_example(workspace)}"
         )
     return _plausible(workspace, np.array(numbers))
+
+
+def _sayable(text: str, error: np.ndarray) -> np.ndarray:
+    """The error, unless no throw is that far off."""
+    largest = np.abs(error).max(initial=0.0)
+    if largest > _LARGEST_SAYABLE_METRES:
+        raise InvalidFeedbackError(
+            f"{text!r} is {largest:g} m; say it again, in cm, or void the trial if that is true"
+        )
+    return error
 
 
 def _plausible(workspace: Workspace, error: np.ndarray) -> np.ndarray:

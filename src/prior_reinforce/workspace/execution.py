@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from prior_reinforce.errors import ConfigurationError, FileFormatError, TrialStateError
 from prior_reinforce.workspace.executing_lock import executing_lock
-from prior_reinforce.workspace.hand_over import HandOver
+from prior_reinforce.workspace.hand_over import HandOver, check_command
 from prior_reinforce.workspace.history import TrialStage
 from prior_reinforce.workspace.plan_files import PlanFile, run_with_plan
 from prior_reinforce.workspace.workspace import Workspace
@@ -30,6 +30,7 @@ def execute(workspace: Workspace, number: int, command: str, *, time_limit: floa
             so.
         FileFormatError: The plan's file is not what was handed out; nothing moved.
     """
+    check_command(command, time_limit=time_limit)
     with executing_lock(workspace.folder) as lock:
         with workspace.journal.exclusive():
             trial = workspace.record(number)

@@ -11,6 +11,7 @@ import contextlib
 import math
 import os
 import shlex
+import shutil
 import signal
 import subprocess
 import tempfile
@@ -77,6 +78,22 @@ def split_command(command: str, plan: Path) -> tuple[str, ...]:
     return tuple(argument.replace(_PLAN, path) for argument in arguments)
 
 
+def check_command(command: str, *, time_limit: float) -> None:
+    """Do nothing if a command and its limit could be used; arguments as in `run_command`.
+
+    Raises:
+        ConfigurationError: It cannot be split, names no program that can run, or lacks `{plan}`;
+            or the limit is not a positive number.
+    """
+    if not (math.isfinite(time_limit) and time_limit > 0):
+        raise ConfigurationError(f"the time limit must be a positive number, got {time_limit} s")
+    program = split_command(command, Path("plan"))[0]
+    if shutil.which(program) is None:
+        raise ConfigurationError(
+            f"cannot start {program!r}; give the path of a program that can run"
+        )
+
+
 def run_command(
     command: str, plan: Path, *, time_limit: float, keep_open: tuple[int, ...] = ()
 ) -> HandOver:
@@ -96,8 +113,7 @@ def run_command(
         ConfigurationError: A command or a limit that cannot be used, or a program that cannot be
             started; nothing has run then.
     """
-    if not (math.isfinite(time_limit) and time_limit > 0):
-        raise ConfigurationError(f"the time limit must be a positive number, got {time_limit} s")
+    check_command(command, time_limit=time_limit)
     arguments = split_command(command, plan)
     with tempfile.TemporaryFile() as output:
         start = time.monotonic()

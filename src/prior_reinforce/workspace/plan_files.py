@@ -27,6 +27,7 @@ import numpy as np
 from prior_reinforce.errors import (
     ConfigurationError,
     FileFormatError,
+    InvalidPlanError,
     PriorReinforceError,
     WorkspaceError,
 )
@@ -38,6 +39,7 @@ __all__ = [
     "HandOver",
     "PlanFile",
     "PlanFileFormat",
+    "check_plan_path",
     "encode_plan",
     "read_plan",
     "run_with_plan",
@@ -47,6 +49,8 @@ __all__ = [
 PlanFileFormat = Literal["npz", "csv", "json"]
 _FILE_FORMAT = "prior-reinforce plan"
 _FILE_VERSION = 1
+_HIGHEST_RATE = 1e5
+"""Samples a second; ours: a hundred times what the fastest arms are sent, in a file still small."""
 
 
 @dataclass(frozen=True)
@@ -101,15 +105,34 @@ def write_plan(
         WorkspaceError: The disk is full or the folder read-only; nothing is left behind.
     """
     path = Path(path)
+    content = encode_plan(plan, check_plan_path(path, format=format, rate=rate), rate=rate)
+    _write_once(path, content)
+    return PlanFile(path, hashlib.sha256(content).hexdigest())
+
+
+def check_plan_path(
+    path: Path, *, format: PlanFileFormat | None = None, rate: float | None = None
+) -> PlanFileFormat:
+    """Return the format that `write_plan` would write; nothing is written.
+
+    Raises:
+        ConfigurationError: An unknown format or suffix.
+        InvalidPlanError: A rate that no plan can be sampled at.
+        WorkspaceError: There is no folder to write to.
+    """
     kind = format or path.suffix.lower().removeprefix(".")
     if kind not in get_args(PlanFileFormat):
         raise ConfigurationError(
             f"cannot write a plan as {kind or path.name!r}; end the name in .npz, .csv or .json, "
             "or say the format"
         )
-    content = encode_plan(plan, cast(PlanFileFormat, kind), rate=rate)
-    _write_once(path, content)
-    return PlanFile(path, hashlib.sha256(content).hexdigest())
+    if rate is not None and not 0 < rate <= _HIGHEST_RATE:
+        raise InvalidPlanError(
+            f"rate must be a number of samples a second up to {_HIGHEST_RATE:g}, got {rate}"
+        )
+    if not path.parent.is_dir():
+        raise WorkspaceError(f"cannot write {path}, there is no such folder; make the folder first")
+    return cast(PlanFileFormat, kind)
 
 
 def encode_plan(plan: Plan, format: PlanFileFormat, *, rate: float | None = None) -> bytes:
