@@ -65,7 +65,8 @@ import pathlib, sys, time
 here = pathlib.Path(sys.argv[1])
 with open(here / "runs", "a") as file:
     file.write("moved\\n")
-while not (here / "stop").exists():
+until = time.monotonic() + 60
+while not (here / "stop").exists() and time.monotonic() < until:
     time.sleep(0.02)
 """
 PROGRAM = """

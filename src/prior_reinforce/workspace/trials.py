@@ -118,7 +118,7 @@ def _ask_new(workspace: Workspace) -> TrialRecord:
         try:
             report.require()
         except RobotLimitError as error:
-            condition = np.round(pending.condition, 4).tolist()
+            condition = (np.round(pending.condition, 4) + 0.0).tolist()  # -0 is 0
             raise RobotLimitError(f"nothing is handed out for {condition}: {error}") from error
     number = len(history.trials) + 1
     plan_file = workspace.store.save_plan(plan, number)
