@@ -1,9 +1,11 @@
 """A task of one's own, without a simulator: a catapult on a turntable, flight in closed form.
 
     python examples/own_task.py
+    PYTHONPATH=examples prior-reinforce adapt --task own_task:Toss --generator interpolation
 
 A plan turns the turntable and swings the arm; where the arm passes its stop, the ball leaves it and
-flies on a parabola. Prints how many throws new goals take.
+flies on a parabola. The script prints how many throws new goals take; the command goes through the
+trials of one goal and writes their report.
 
 Notation:
     psi    `turn`    angle of the turntable, to the left            [rad]

@@ -10,9 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from prior_reinforce.cli import main
 from prior_reinforce.experiments.methods import make_adapter, make_generator, make_perception
 from prior_reinforce.motions import Demonstrations, PlanFormat
 from prior_reinforce.rollouts import Rollout
+from prior_reinforce.tasks import make_task
 
 REPOSITORY = Path(__file__).parents[1]
 EXAMPLES = REPOSITORY / "examples"
@@ -138,10 +140,43 @@ def test_own_members_are_made_by_the_names_the_guide_gives():
         "own_generator:SoftmaxBlend": make_generator,
         "own_adapter:RidgeAdapter": make_adapter,
         "own_perception:OverheadCamera": make_perception,
+        "own_task:Toss": make_task,
     }
     assert set(re.findall(r"own_\w+:\w+", GUIDE)) == set(made)
     for name, make in made.items():
         assert type(make(name)).__name__ == name.split(":")[1]
+
+
+def test_own_task_and_generator_run_by_name(tmp_path, capsys):
+    own = ["--task", "own_task:Toss", "--generator", "own_generator:SoftmaxBlend"]
+    aim = ["--goal", "1.10", "0.05", "--perception", "exact", "--no-film"]
+    first, again = tmp_path / "first", tmp_path / "again"
+    assert main(["adapt", *own, *aim, "--out", str(first)]) == 0
+    told = capsys.readouterr().out
+    assert "HIT" in told
+    assert main(["adapt", *own, *aim, "--model", str(first / "model"), "--out", str(again)]) == 0
+    trials = [line for line in told.splitlines() if line.startswith("  trial")]
+    assert trials == [
+        line for line in capsys.readouterr().out.splitlines() if line.startswith("  trial")
+    ]
+    assert (again / "report.html").is_file()
+
+
+@pytest.mark.parametrize(
+    ("flag", "name", "message"),
+    [
+        ("--task", "toss", "no task 'toss'; known are basketball-v1"),
+        ("--task", "own_task:Tos", "cannot make own_task:Tos: .*no attribute 'Tos'"),
+        ("--task", "own_adapter:RidgeAdapter", "is no Task; derive it from that class"),
+        ("--generator", "neural", "no generator 'neural'; known are diffusion"),
+    ],
+)
+def test_a_name_that_is_nobodys_is_told(flag, name, message, tmp_path, capsys):
+    assert main(["adapt", flag, name, "--out", str(tmp_path / "out")]) == 2
+    told = capsys.readouterr().err
+    assert re.search(message, told)
+    assert told.count("\n") == 1
+    assert not (tmp_path / "out").exists()
 
 
 def test_ridge_by_hand():

@@ -14,6 +14,7 @@ from prior_reinforce.commands.progress import fit_progress
 from prior_reinforce.commands.task_options import Simulated
 from prior_reinforce.commands.workspace import opened, print_next
 from prior_reinforce.errors import ConfigurationError, FileFormatError
+from prior_reinforce.experiments.methods import make_generator
 from prior_reinforce.generators import DiffusionConfig, DiffusionGenerator, load_generator
 from prior_reinforce.generators.base import Generator
 from prior_reinforce.motions import Demonstrations
@@ -35,21 +36,29 @@ def learn(
     demonstrations: Demonstrations,
     folder: Path,
     *,
-    config: DiffusionConfig,
+    generator: Generator,
     seed: int,
     console: Console,
 ) -> Generator:
-    """Fit the diffusion generator under a progress line and save it to a folder."""
+    """Fit a generator under a progress line and save it to a folder."""
     with fit_progress(console) as progress:
-        generator = DiffusionGenerator(config).fit(demonstrations, seed=seed, progress=progress)
+        generator = generator.fit(demonstrations, seed=seed, progress=progress)
     generator.save(folder)
     record = TrainingRecord(demonstrations.sha256, seed)
     (folder / _RECORD).write_text(json.dumps(asdict(record), indent=2) + "\n")
     return generator
 
 
-def load_learned(folder: Path, demonstrations: Demonstrations) -> Generator:
+def load_learned(
+    folder: Path, demonstrations: Demonstrations, *, own: str | None = None
+) -> Generator:
     """Load a model that was learned from these demonstrations.
+
+    Args:
+        folder: Made by `learn`.
+        demonstrations: What it must have been learned from.
+        own: `module:Class` of the generator, where it is none of ours. It is never taken from the
+            folder: a model is data, and names no code to run.
 
     Raises:
         FileFormatError: The folder holds no model.
@@ -68,7 +77,7 @@ def load_learned(folder: Path, demonstrations: Demonstrations) -> Generator:
             f"the model in {folder} was learned from other demonstrations; learn anew with "
             "prior-reinforce learn, or name the set it was learned from"
         )
-    return load_generator(folder)
+    return load_generator(folder) if own is None else type(make_generator(own)).load(folder)
 
 
 @dataclass(frozen=True)
@@ -93,5 +102,11 @@ class Learn(Simulated):
                 print_next(workspace)
             return
         _, demonstrations = self.open()
-        learn(demonstrations, self.out, config=self.config, seed=self.seed, console=console)
+        learn(
+            demonstrations,
+            self.out,
+            generator=DiffusionGenerator(self.config),
+            seed=self.seed,
+            console=console,
+        )
         console.print(f"model of {demonstrations.n} demonstrations saved in {self.out}")

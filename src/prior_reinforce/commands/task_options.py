@@ -14,7 +14,8 @@ class Simulated:
     """What every command on a simulated task is told."""
 
     task: str = "basketball-v1"
-    """Task to simulate."""
+    """Task to simulate: basketball-v1, -v2 or -v3, curling, fishing, or one's own as
+    module:Class."""
     demonstrations: str = "A"
     """Prior set: A, B, or the path of a demonstrations file of the same plan format."""
     seed: int = 0

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import importlib
-from typing import Any, Literal
+from typing import Literal
 
 from prior_reinforce.adapters import (
     Adapter,
@@ -20,6 +19,7 @@ from prior_reinforce.generators import (
     DynamicMovementPrimitivesConfig,
     Generator,
 )
+from prior_reinforce.own_members import import_and_make, make_own
 from prior_reinforce.perception import Amplified, Exact, Eye, Perception
 
 
@@ -40,7 +40,7 @@ def make_generator(name: str) -> Generator:
         return DiffusionGenerator(threads=1)
     if name in known:
         return known[name]()
-    return _imported(name, Generator, [*known, "dmp-whole"])
+    return make_own(name, Generator, [*known, "dmp-whole"])
 
 
 def make_adapter(name: str) -> Adapter:
@@ -59,7 +59,7 @@ def make_adapter(name: str) -> Adapter:
         return ProportionalAdapter()
     if name == "frozen":
         return FrozenAdapter()
-    return _imported(name, Adapter, ["gp", "gp-all", "proportional", "frozen"])
+    return make_own(name, Adapter, ["gp", "gp-all", "proportional", "frozen"])
 
 
 def make_perception(name: str) -> Perception:
@@ -71,7 +71,7 @@ def make_perception(name: str) -> Perception:
     known = {"exact": Exact, "eye": Eye, "amplified": Amplified}
     if name in known:
         return known[name]()
-    return _imported(name, Perception, list(known))
+    return make_own(name, Perception, list(known))
 
 
 def family_of(name: str) -> Literal["generator", "adapter"]:
@@ -80,10 +80,9 @@ def family_of(name: str) -> Literal["generator", "adapter"]:
     Raises:
         ConfigurationError: It cannot be made, or is neither a generator nor an adapter.
     """
-    module, _, attribute = name.partition(":")
-    if not attribute:
+    if ":" not in name:
         raise ConfigurationError(f"expected one's own method as module:Class, got {name!r}")
-    made = _made(name, module, attribute)
+    made = import_and_make(name)
     if isinstance(made, Generator):
         return "generator"
     if isinstance(made, Adapter):
@@ -91,26 +90,3 @@ def family_of(name: str) -> Literal["generator", "adapter"]:
     raise ConfigurationError(
         f"{name} is neither a Generator nor an Adapter; only these are compared side by side"
     )
-
-
-def _imported(name: str, family: Any, known: list[str]) -> Any:
-    module, _, attribute = name.partition(":")
-    if not attribute:
-        raise ConfigurationError(
-            f"no {family.__name__.lower()} {name!r}; known are {', '.join(known)}, or give your "
-            "own as module:Class"
-        )
-    made = _made(name, module, attribute)
-    if not isinstance(made, family):
-        raise ConfigurationError(f"{name} is no {family.__name__}; derive it from that class")
-    return made
-
-
-def _made(name: str, module: str, attribute: str) -> Any:
-    try:
-        return getattr(importlib.import_module(module), attribute)()
-    except (ImportError, AttributeError, TypeError, ValueError) as error:
-        raise ConfigurationError(
-            f"cannot make {name}: {error}; it must be importable from here (PYTHONPATH) and need "
-            "no arguments"
-        ) from error

@@ -1,6 +1,6 @@
 """Env: dynamic manipulation tasks in contact physics. Each a `.py` with its `.xml`."""
 
-from prior_reinforce.errors import ConfigurationError
+from prior_reinforce.own_members import make_own
 from prior_reinforce.tasks.base import Task
 from prior_reinforce.tasks.basketball import BasketballShot
 from prior_reinforce.tasks.basketball_v2 import BasketballShotV2
@@ -19,17 +19,15 @@ FAMILY: tuple[type[Task], ...] = (
 
 
 def make_task(name: str) -> Task:
-    """Make the task of a name.
+    """Make a task by its name, or one's own by `module:Class`.
 
     Raises:
         ConfigurationError: There is no such task; the message lists them.
     """
-    for kind in FAMILY:
-        if kind.name == name:
-            return kind()
-    raise ConfigurationError(
-        f"no task {name!r}; tasks are {', '.join(kind.name for kind in FAMILY)}"
-    )
+    known = {kind.name: kind for kind in FAMILY}
+    if name in known:
+        return known[name]()
+    return make_own(name, Task, list(known))
 
 
 __all__ = [
