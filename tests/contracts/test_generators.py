@@ -50,7 +50,7 @@ FACTORIES: list[Callable[[], Generator]] = [
     lambda: UNetRegression(UNetRegressionConfig(network=_TINY, training_steps=8)),
 ]
 IDS = [
-    "diffusion-splines-ddim",
+    "diffusion-splines-mean-shift",
     "diffusion-frames-ddpm",
     "nearest",
     "interpolation",

@@ -73,7 +73,8 @@ def test_mixed_dimensions_come_back_at_outcomes_of_mixed_units():
         ]
     )
     outcomes = np.array([[0.9, 20.0], [1.0, 35.0], [1.1, 10.0]])
-    demos = Demonstrations(plans, outcomes, plan_format(4), outcome_units=("m", "s"))
+    plan = replace(plan_format(4), units=("rad", "rad", "rad", "m"))
+    demos = Demonstrations(plans, outcomes, plan, outcome_units=("m", "s"))
     generator = fitted(demos)
     assert misses(generator, demos)[:, [0, 3]].max() < 0.01
     back = generator.generate(outcomes)
@@ -114,7 +115,7 @@ def test_presets_and_representation_are_one_word_each():
 @pytest.mark.parametrize(
     "wrong",
     [{"training_steps": 0}, {"sampling_steps": 101}, {"learning_rate": 0.0}, {"ema_limit": 1.0},
-     {"margin": -0.1}, {"warmup_steps": -1}],
+     {"margin": -0.1}, {"warmup_steps": -1}, {"noise_draws": 3}],
 )  # fmt: skip
 def test_settings_out_of_range_are_named(wrong):
     with pytest.raises(ConfigurationError, match=next(iter(wrong))):

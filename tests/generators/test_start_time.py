@@ -1,5 +1,7 @@
 """Start times as a channel of their own: nothing is lost, and only where motions rest."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -105,3 +107,30 @@ def test_a_restored_codec_decodes_alike():
     )
     np.testing.assert_array_equal(again.decode(codes), codec.decode(codes))
     assert (again.horizon, again.action_dim, again.channels) == (90, 3, 4)
+
+
+def test_a_trembling_hand_rests_where_it_hardly_moves():
+    """Tele-operation never rests exactly; what holding removes of its tremor is small."""
+    demos = demonstrations()
+    rng = np.random.default_rng(0)
+    t = np.arange(90) * 0.0125
+    phases = rng.uniform(0, 2 * np.pi, (4, 1, 3))
+    tremor = 0.006 * np.sin(2 * np.pi * 1.1 * t[None, :, None] + phases)
+    trembling = demonstrations(plans=demos.plans + tremor)
+    codec, codes = fit(trembling)
+    assert codec.starts is not None
+    assert codec.starts[1] - codec.starts[0] == pytest.approx(max(STARTS) - min(STARTS), abs=2)
+    moving = np.ptp(trembling.plans, axis=(0, 1))[:2]
+    lost = np.abs(codec.decode(codes) - trembling.plans)[:, :, :2].max(axis=(0, 1))
+    assert np.all(lost < 0.03 * moving)
+
+
+def test_a_small_dimension_that_still_moves_at_the_end_is_not_held():
+    demos = demonstrations()
+    t = np.arange(90)[None] - np.array(STARTS)[:, None]
+    plans = demos.plans.copy()
+    plans[:, :, 2] = 0.01 * np.clip((t - 20) / 60, 0, 1)  # cut off at full speed
+    moving = demonstrations(plans=plans)
+    codec, codes = fit(replace(moving, format=replace(moving.format, units=("rad", "rad", "m"))))
+    assert codec.starts is None
+    np.testing.assert_allclose(codec.decode(codes), plans, atol=1e-12)

@@ -1,8 +1,6 @@
 """The paper's generator: a diffusion model of action plans, conditioned on the outcome.
 
-Two choices make it a function of the condition, which the adapter needs (docs/decisions.md): DDIM
-starts from the same latent for every condition, x_T = 0, and where DDPM is asked for, its noise is
-drawn once, from the fit's seed, and shared by all conditions.
+What it generates is a function of the condition, which the adapter needs: see `diffusion_sampling`.
 """
 
 from __future__ import annotations
@@ -20,8 +18,8 @@ from prior_reinforce.errors import ConfigurationError, FileFormatError, NotFitte
 from prior_reinforce.generators.base import FitProgress, Generator
 from prior_reinforce.generators.conditions import ConditionScale, as_conditions
 from prior_reinforce.generators.diffusion_config import DiffusionConfig, Preset
+from prior_reinforce.generators.diffusion_sampling import sample
 from prior_reinforce.generators.diffusion_training import train
-from prior_reinforce.generators.noise_schedule import NoiseSchedule, inference_steps
 from prior_reinforce.generators.representation import Representation
 from prior_reinforce.generators.saving import read_model, write_model
 from prior_reinforce.generators.start_time import StartTimeCodec
@@ -114,8 +112,9 @@ class DiffusionGenerator(Generator):
         with torch_threads(1):
             for chunk in torch.split(scaled, _CHUNK):
                 if len(chunk):
-                    codes = self._sample(fitted, chunk).double().cpu().numpy()
-                    plans.append(fitted.codec.decode(codes))
+                    shape = (fitted.codec.channels, fitted.codec.length)
+                    codes = sample(fitted.network, chunk, shape, self.config, seed=fitted.seed)
+                    plans.append(fitted.codec.decode(codes.double().cpu().numpy()))
         return np.concatenate(plans)
 
     def save(self, folder: str | os.PathLike[str]) -> None:
@@ -150,32 +149,6 @@ class DiffusionGenerator(Generator):
                 f"{folder} does not hold a complete {cls.name} generator: {error!r}; learn again"
             ) from error
         return generator
-
-    @torch.no_grad()
-    def _sample(self, fitted: _Fitted, conditions: torch.Tensor) -> torch.Tensor:
-        """Run the reverse process for scaled conditions (n, k); codes (n, C, T)."""
-        config = self.config
-        schedule = NoiseSchedule.squared_cosine(config.noise_levels)
-        steps = inference_steps(config.noise_levels, config.sampling_steps)
-        shape = (1, fitted.codec.channels, fitted.codec.length)
-        rng = torch.Generator().manual_seed(fitted.seed)
-        stochastic = config.sampler == "ddpm"
-        if stochastic:
-            steps = tuple(range(config.noise_levels - 1, -1, -1))
-        latent = torch.randn(shape, generator=rng) if stochastic else torch.zeros(shape)
-        x = latent.to(self._device).expand(len(conditions), -1, -1)
-        bound = 1 + config.margin
-        for step, next_step in zip(steps, (*steps[1:], -1), strict=True):
-            levels = torch.full((len(x),), step, device=self._device)
-            predicted = fitted.network(x, levels, conditions)
-            clean = schedule.clean_estimate(x, predicted, step, config.prediction)
-            clean = clean.clamp(-bound, bound)
-            if stochastic:
-                noise = torch.randn(shape, generator=rng).to(self._device)
-                x = schedule.ddpm_step(x, clean, step, noise)
-            else:
-                x = schedule.ddim_step(x, clean, step, next_step)
-        return x
 
     def _tensor(self, values: np.ndarray) -> torch.Tensor:
         return torch.as_tensor(values, dtype=torch.float32, device=self._device)

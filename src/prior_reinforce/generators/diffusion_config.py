@@ -41,11 +41,13 @@ class DiffusionConfig:
     """What the network predicts."""
     noise_levels: int = 100
     """T, steps of the squared-cosine noise schedule."""
-    sampler: Literal["ddim", "ddpm"] = "ddim"
-    """DDIM from x_T = 0, or DDPM with noise that is drawn once and shared by all conditions."""
-    sampling_steps: int = 20
-    """Noise levels visited by DDIM; DDPM visits all."""
-    training_steps: int = 1600
+    sampler: Literal["mean_shift", "ddim", "ddpm"] = "mean_shift"
+    """How codes are generated, see `diffusion_sampling`."""
+    sampling_steps: int = 6
+    """Noise levels visited by mean shift or DDIM; DDPM visits all."""
+    noise_draws: int = 4
+    """K, noise draws over which a step of mean shift averages; even."""
+    training_steps: int = 1000
     """Optimiser steps."""
     batch_size: int = 24
     """Samples a step, at least one of each demonstration where there is room."""
@@ -79,6 +81,11 @@ class DiffusionConfig:
             raise ConfigurationError(
                 f"sampling_steps must be at most noise_levels ({self.noise_levels}), "
                 f"got {self.sampling_steps}"
+            )
+        if self.noise_draws < 2 or self.noise_draws % 2:
+            raise ConfigurationError(
+                f"noise_draws must be even and at least 2 (a draw and its opposite), "
+                f"got {self.noise_draws}"
             )
         if not self.learning_rate > 0:
             raise ConfigurationError(f"learning_rate must be positive, got {self.learning_rate}")

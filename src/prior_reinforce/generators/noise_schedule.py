@@ -146,3 +146,13 @@ def inference_steps(n_training_steps: int, n_inference_steps: int) -> tuple[int,
         return (n_training_steps - 1,)
     top = n_training_steps - 1
     return tuple(round(top * (1 - i / (n_inference_steps - 1))) for i in range(n_inference_steps))
+
+
+def mean_shift_levels(n_training_steps: int, n_levels: int) -> tuple[int, ...]:
+    """The noise levels of annealed mean shift, falling from 95 % of T, denser towards 0.
+
+    Ours: a level's own spread is what the estimate can resolve, so the last one has to be low; the
+    first ones only choose among modes.
+    """
+    fractions = [(i / n_levels) ** 1.5 for i in range(n_levels, 0, -1)]
+    return tuple(int(0.95 * f * n_training_steps) for f in fractions)

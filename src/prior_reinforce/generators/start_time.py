@@ -21,13 +21,24 @@ import numpy as np
 from typing_extensions import Self
 
 from prior_reinforce.errors import InvalidDemonstrationsError
-from prior_reinforce.generators.alignment import align
+from prior_reinforce.generators.alignment import AlignmentConfig, align
 from prior_reinforce.generators.representation import PlanCodec, Representation
+from prior_reinforce.generators.velocity import velocity_profiles
 from prior_reinforce.motions import Demonstrations
 
 _PADDING = 4
 """Resting frames kept at either end of the cut-out motion, if there are as many: about one control
 point, which a spline needs to come to rest."""
+_TREMOR = 0.05
+"""Where a hand's tremor never rests, slower than this part of a demonstration's peak speed counts
+as rest. Ours: tremor of the shipped tele-operated sets reaches 0.03, their motions start within two
+frames of it."""
+_TREMOR_LOST = 0.01
+"""What holding may change of any demonstration, rms: this part of the largest range among the
+dimensions of that unit. Ours: the shipped tele-operated sets lose at most 0.008, and land within
+5 mm of where they did."""
+_TREMOR_PADDING = 12
+"""`_PADDING` where rest is told from speed: a motion's slow onset is then kept well inside."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,7 +158,8 @@ def _cut(demonstrations: Demonstrations) -> _Cut | None:
     """Find the cut-outs; None where start times do not differ, or cannot be told or moved.
 
     They cannot be told where a demonstration moves at an end that would have to be held, nor moved
-    where the longest motion with the latest start would not end within the plan.
+    where the longest motion with the latest start would not end within the plan. Where hands
+    tremble to the very ends, no frame rests exactly; what is slow there is held instead.
     """
     try:
         alignment = align(demonstrations)
@@ -158,16 +170,38 @@ def _cut(demonstrations: Demonstrations) -> _Cut | None:
         return None
     plans = demonstrations.plans
     moving = [np.flatnonzero(np.any(plan[1:] != plan[:-1], axis=1)) for plan in plans]
+    cut = _window(moving, delays, demonstrations.horizon, _PADDING)
+    if cut is not None:
+        return cut
+    smoothing = AlignmentConfig().smoothing / demonstrations.format.dt
+    profiles = velocity_profiles(plans, demonstrations.format.units, smoothing)
+    speeds = np.linalg.norm(profiles, axis=2)
+    moving = [np.flatnonzero(speed > _TREMOR * speed.max()) for speed in speeds]
+    cut = _window(moving, delays, demonstrations.horizon, _TREMOR_PADDING)
+    if cut is None:
+        return None
+    held = _moved(_moved(plans, -cut.begins, cut.length), cut.begins, demonstrations.horizon)
+    lost = np.sqrt(np.mean((held - plans) ** 2, axis=1)).max(axis=0)
+    ranges, units = np.ptp(plans, axis=(0, 1)), np.array(demonstrations.format.units)
+    largest = np.array([ranges[units == unit].max() for unit in units])
+    return cut if np.all(lost <= _TREMOR_LOST * largest) else None
+
+
+def _window(
+    moving: list[np.ndarray], delays: np.ndarray, horizon: int, padding: int
+) -> _Cut | None:
+    """The shortest common cut-out that holds every motion, if it fits into the plan at any start.
+
+    A slower motion may be generated with a later start than any demonstrated pair of the two: the
+    cut-out has to lie within the plan at every start, so that no rest is ever cut off.
+    """
     first = min(int(m[0]) - d for m, d in zip(moving, delays, strict=True) if m.size)
     last = max(int(m[-1]) + 1 - d for m, d in zip(moving, delays, strict=True) if m.size)
-    # A slower motion may be generated with a later start than any demonstrated pair of the two:
-    # every cut-out has to lie within the plan at every start, so that no rest is ever cut off.
-    before = min(_PADDING, int(delays.min()) + first)
-    after = min(_PADDING, demonstrations.horizon - 1 - int(delays.max()) - last)
+    before = min(padding, int(delays.min()) + first)
+    after = min(padding, horizon - 1 - int(delays.max()) - last)
     if before < 0 or after < 0:
         return None
-    begins, length = delays + first - before, last - first + 1 + before + after
-    return _Cut(begins, length)
+    return _Cut(delays + first - before, last - first + 1 + before + after)
 
 
 def _moved(plans: np.ndarray, by: np.ndarray, length: int) -> np.ndarray:

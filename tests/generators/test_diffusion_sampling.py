@@ -1,0 +1,75 @@
+"""Sampling with denoisers that are known exactly: what comes out can be worked by hand."""
+
+import math
+
+import pytest
+import torch
+
+from prior_reinforce.generators import DiffusionConfig
+from prior_reinforce.generators.diffusion_sampling import sample
+from prior_reinforce.generators.noise_schedule import NoiseSchedule, mean_shift_levels
+
+CONFIG = DiffusionConfig(prediction="sample", margin=1.0)
+SCHEDULE = NoiseSchedule.squared_cosine(CONFIG.noise_levels)
+
+
+def gaussian(spread):
+    """The exact denoiser of plans that scatter around the condition: E[x_0 | x_t]."""
+
+    def denoise(noisy, steps, conditions):
+        signal = SCHEDULE.signal_at(int(steps[0]))
+        gain = math.sqrt(signal) * spread**2 / (signal * spread**2 + 1 - signal)
+        mean = conditions[:, :, None]
+        return mean + gain * (noisy - math.sqrt(signal) * mean)
+
+    return denoise
+
+
+def mixture(weights, modes, spread):
+    """The exact denoiser of a mixture of Gaussians, whatever the condition."""
+    w, m = torch.tensor(weights), torch.tensor(modes)
+
+    def denoise(noisy, steps, conditions):
+        signal = SCHEDULE.signal_at(int(steps[0]))
+        variance = signal * spread**2 + 1 - signal
+        away = noisy[..., None] - math.sqrt(signal) * m
+        share = torch.softmax(w.log() - away**2 / (2 * variance), dim=-1)
+        gain = math.sqrt(signal) * spread**2 / variance
+        return (share * (m + gain * away)).sum(dim=-1)
+
+    return denoise
+
+
+def test_mean_shift_halves_what_is_left_as_worked_by_hand():
+    """Opposite draws cancel in a linear denoiser: a known factor of what is left, a level."""
+    spread, condition = 0.5, torch.tensor([[0.4], [-0.2]])
+    left = -condition[0].item()  # the estimate starts at zero
+    for level in mean_shift_levels(CONFIG.noise_levels, CONFIG.sampling_steps):
+        signal = SCHEDULE.signal_at(level)
+        left *= signal * spread**2 / (signal * spread**2 + 1 - signal)
+    codes = sample(gaussian(spread), condition, (1, 3), CONFIG, seed=0)
+    assert codes.shape == (2, 1, 3)
+    torch.testing.assert_close(codes[0], torch.full((1, 3), 0.4 + left), atol=1e-5, rtol=0)
+    torch.testing.assert_close(codes[1] * -2, codes[0], atol=1e-5, rtol=0)
+
+
+def test_mean_shift_ends_in_a_mode_not_between_two():
+    two = mixture([0.35, 0.65], [-0.8, 0.8], 0.05)
+    config = DiffusionConfig(prediction="sample", margin=1.0, sampling_steps=12)
+    codes = sample(two, torch.zeros(5, 2), (1, 1), config, seed=3)
+    torch.testing.assert_close(codes, torch.full((5, 1, 1), 0.8), atol=0.02, rtol=0)
+
+
+@pytest.mark.parametrize("sampler", ["mean_shift", "ddim", "ddpm"])
+def test_a_code_depends_on_its_condition_alone(sampler):
+    config = DiffusionConfig(prediction="sample", margin=1.0, sampler=sampler)
+    conditions = torch.tensor([[0.1], [0.5], [-0.7]])
+    together = sample(gaussian(0.01), conditions, (1, 4), config, seed=0)
+    alone = sample(gaussian(0.01), conditions[1:2], (1, 4), config, seed=0)
+    torch.testing.assert_close(together[1:2], alone, atol=1e-6, rtol=0)
+    torch.testing.assert_close(together, conditions[:, :, None].expand(3, 1, 4), atol=0.03, rtol=0)
+
+
+def test_levels_fall_and_reach_low_noise():
+    assert mean_shift_levels(100, 6) == (95, 72, 51, 33, 18, 6)
+    assert mean_shift_levels(100, 1) == (95,)
