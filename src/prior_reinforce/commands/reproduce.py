@@ -13,9 +13,12 @@ import tyro
 from rich import box
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.table import Column
 from rich.table import Table as TerminalTable
+from rich.text import Text
 
 from prior_reinforce.errors import ConfigurationError
+from prior_reinforce.experiments.evidence import claims_table, write_evidence
 from prior_reinforce.experiments.files import write_atomically
 from prior_reinforce.experiments.methods import family_of
 from prior_reinforce.experiments.provenance import provenance
@@ -46,7 +49,7 @@ class Reproduce:
     """One's own generators or adapters beside ours, each as module:Class."""
 
     def run(self) -> None:
-        """Run, save, print."""
+        """Run, save, print, and write the page of evidence."""
         recipes = _chosen(self.recipe)
         included = {recipe.name: self._included(recipe) for recipe in recipes}
         if self.goals < 1 or self.workers < 1 or not self.seeds:
@@ -65,11 +68,13 @@ class Reproduce:
         for recipe in recipes:
             with _progress(console, recipe.name) as show:
                 figures = recipe.run(Run(self.out, scale, workers, show, included[recipe.name]))
-            path = self.out / f"{recipe.name}.json"
             text = json.dumps({**provenance(scale), **figures}, indent=1)
-            write_atomically(path, text + "\n")
-            console.print(_terminal(recipe, recipe.table(figures)))
-            console.print(f"figures: {path}")
+            write_atomically(self.out / f"{recipe.name}.json", text + "\n")
+            console.print(_terminal(recipe.table(figures), recipe.title))
+            if claims := recipe.claims(figures):
+                console.print(_terminal(claims_table(claims), f"{recipe.title}: claims"))
+        page, _ = write_evidence(self.out)
+        console.print(f"evidence: {page}")
 
     def _included(self, recipe: Recipe) -> tuple[str, ...]:
         families = {name: family_of(name) for name in self.include}
@@ -111,8 +116,13 @@ def _progress(console: Console, name: str) -> Iterator[OnProgress]:
         yield show
 
 
-def _terminal(recipe: Recipe, table: Table) -> TerminalTable:
-    shown = TerminalTable(*table.header, title=recipe.title, box=box.SIMPLE)
+def _terminal(table: Table, title: str) -> TerminalTable:
+    # As Text: rich would take [cm] for a style.
+    shown = TerminalTable(*map(_column, table.header), title=title, box=box.SIMPLE)
     for row in table.rows:
-        shown.add_row(*row)
+        shown.add_row(*map(Text, row))
     return shown
+
+
+def _column(header: str) -> Column:
+    return Column(Text(header))

@@ -40,6 +40,8 @@ class DisplacementFields(Recipe):
 
     generator: str = "diffusion"
     """Generator whose conditions are laid out."""
+    spacing: float = 0.025
+    """Of the grid of conditions, in [m]."""
 
     def trainings(self, scale: Scale, include: Sequence[str]) -> Sequence[Training]:
         """The generator from all demonstrations of each set, then from three."""
@@ -50,17 +52,15 @@ class DisplacementFields(Recipe):
         """Throw once for every condition of a grid."""
         trainings = self.trainings(run.scale, run.include)
         run.results(trainings)
-        results = run.results([Displacement(training) for training in trainings])
+        results = run.results([Displacement(training, self.spacing) for training in trainings])
         region = make_task(TASK).region
         n = run.scale.trainings
-        measures = [
-            _measures(result, training.prior().outcomes_seen, region)
+        summed = [
+            measures(result, training.prior().outcomes_seen, region)
             for training, result in zip(trainings, results, strict=True)
         ]
         # The grid is the same for all, so only trainings are resampled.
-        by_name = {
-            name: np.array([m[name] for m in measures]).reshape(2, n, 1) for name in measures[0]
-        }
+        by_name = {name: np.array([m[name] for m in summed]).reshape(2, n, 1) for name in summed[0]}
         fields = [
             {
                 **result,
@@ -177,14 +177,21 @@ def widest_three(outcomes: np.ndarray) -> tuple[int, ...]:
     return max(combinations(range(len(outcomes)), 3), key=doubled_area)
 
 
-def _measures(
+def measures(
     result: Mapping[str, Any], outcomes: np.ndarray, region: np.ndarray
 ) -> dict[str, float]:
-    """What a field is summed up by, over the reachable region; lengths in [m].
+    """Sum a field up.
 
-    `inside_m` and `outside_m` are mean errors inside and outside the hull of the demonstrations'
-    outcomes; `steepness` is the mean change of the displacement from a point to the next, for each
-    unit of their distance.
+    Args:
+        result: Of a `Displacement` unit.
+        outcomes: Where the demonstrations landed, shape (N, 2), [m].
+        region: Lower and upper corner, shape (2, 2), [m].
+
+    Returns:
+        `high_error_area`, a share of the reachable region; `mean_m`, the mean error in it, [m];
+        `inside_m` and `outside_m`, mean errors of the whole grid inside and outside the hull of
+        the outcomes, [m]; `steepness`, the mean change of the displacement from a point of the
+        reachable region to the next, for each unit of their distance.
     """
     x, y = (np.array(axis) for axis in result["axes_m"])
     displacements = np.array(result["displacements_m"])
@@ -199,8 +206,8 @@ def _measures(
     return {
         "high_error_area": float(np.mean(errors[reachable] > HIGH_ERROR)),
         "mean_m": float(np.mean(errors[reachable])),
-        "inside_m": float(np.mean(errors[reachable & hull])),
-        "outside_m": float(np.mean(errors[reachable & ~hull])),
+        "inside_m": float(np.mean(errors[hull])),
+        "outside_m": float(np.mean(errors[~hull])),
         "steepness": float(np.mean(np.concatenate(steps))),
     }
 
