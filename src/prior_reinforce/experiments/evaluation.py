@@ -14,11 +14,13 @@ from scipy.spatial import Delaunay
 
 from prior_reinforce.experiments.files import in_place
 from prior_reinforce.experiments.goals import unseen_goals
-from prior_reinforce.experiments.methods import make_adapter, make_generator, make_perception
+from prior_reinforce.experiments.methods import make_adapter, make_generator
 from prior_reinforce.experiments.protocol import GoalTrials, run_goals
+from prior_reinforce.experiments.sight import open_sight
 from prior_reinforce.generators import Generator, load_generator
 from prior_reinforce.generators.alignment import align
 from prior_reinforce.motions import Demonstrations
+from prior_reinforce.perception import VisionLanguageModelConfig
 from prior_reinforce.tasks import make_task
 
 GOAL_SEED = 100
@@ -90,13 +92,15 @@ class Trials:
     adapter: str
     """Adapter's name, or module:Class."""
     perception: str
-    """Perception's name, or module:Class."""
+    """Perception's name (`sight.SIGHTS`), or module:Class."""
     goals: int
     """Number of goals."""
     unseen: bool = False
     """Goals far from the demonstrations, as the paper places them by hand; else uniform."""
     rounds: int = 10
     """Trials a goal at most."""
+    model: VisionLanguageModelConfig | None = None
+    """Endpoint to ask where `perception` is vlm."""
 
     @property
     def label(self) -> str:
@@ -116,16 +120,18 @@ class Trials:
             if self.unseen
             else task.sample_goals(self.goals, rng)
         )
-        results = run_goals(
-            task,
-            self.training.learned(folder),
-            lambda: make_adapter(self.adapter),
-            make_perception(self.perception),
-            prior,
-            goals,
-            rounds=self.rounds,
-            seed=GOAL_SEED + self.training.seed,
-        )
+        seed = GOAL_SEED + self.training.seed
+        with open_sight(self.perception, self.task, self.model, seed=seed) as perception:
+            results = run_goals(
+                task,
+                self.training.learned(folder),
+                lambda: make_adapter(self.adapter),
+                perception,
+                prior,
+                goals,
+                rounds=self.rounds,
+                seed=seed,
+            )
         return summary(results)
 
 
