@@ -18,7 +18,7 @@ import numpy as np
 from prior_reinforce.motions import PlanFormat
 from prior_reinforce.rollouts import KeyFrame, Rollout
 from prior_reinforce.tasks.panda import JOINT_NAMES, N_JOINTS, STEP
-from prior_reinforce.tasks.panda_task import ArmDisturbances, PandaTask
+from prior_reinforce.tasks.panda_task import ArmDisturbances, Draws, PandaTask
 
 STONE_START = np.array([0.43, 0.0])
 """Where the stone waits, (x, y) in [m]; in `curling.xml` too. Ours: near enough to the base that
@@ -58,6 +58,7 @@ class Curling(PandaTask):
     tolerance: ClassVar[float] = 0.015
     region: ClassVar[np.ndarray] = np.array([[0.78, -0.20], [1.03, 0.20]])
     scene: ClassVar[str] = "curling"
+    recordings: ClassVar[str] = "curling"
     lead_in: ClassVar[float] = 0.1
     lead_out: ClassVar[float] = 1.5  # the fastest stone slides for 1 s
 
@@ -68,7 +69,7 @@ class Curling(PandaTask):
             disturbances: How repeated executions differ; the documented ones when not given.
         """
         self.disturbances = disturbances or Disturbances()
-        super().__init__(self.disturbances.arm)
+        super().__init__()
         stone = self.model.body("stone")
         self._stone = self.model.jnt_qposadr[stone.jntadr[0]]
         self._feet = np.flatnonzero(
@@ -80,13 +81,18 @@ class Curling(PandaTask):
         """A plan is the joint path."""
         return plans
 
-    def _disturb(self, model: mujoco.MjModel, rng: np.random.Generator) -> None:
-        model.geom_friction[self._feet, 0] *= 1.0 + rng.normal(0.0, self.disturbances.friction)
+    def _draw(self, n: int, rng: np.random.Generator) -> Draws:
+        pose, servo = self.disturbances.arm.draw(n, rng)
+        friction = 1.0 + rng.normal(0.0, self.disturbances.friction, (n, 1))
+        return Draws(pose, servo, friction, rng.normal(0.0, self.disturbances.stone, (n, 2)))
 
-    def _place(self, data: mujoco.MjData, rng: np.random.Generator | None) -> None:
+    def _disturb(self, model: mujoco.MjModel, scene: np.ndarray) -> None:
+        model.geom_friction[self._feet, 0] *= scene[0]
+
+    def _place(self, data: mujoco.MjData, start: np.ndarray | None) -> None:
         """The stone starts at `STONE_START`, where the scene has it."""
-        if rng is not None:
-            data.qpos[self._stone : self._stone + 2] += rng.normal(0.0, self.disturbances.stone, 2)
+        if start is not None:
+            data.qpos[self._stone : self._stone + 2] += start
 
     def _result(self, states: np.ndarray, sensors: np.ndarray) -> Rollout:
         """Where the stone is at the end of an execution, at rest on the table."""

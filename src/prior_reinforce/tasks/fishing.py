@@ -20,7 +20,7 @@ from prior_reinforce.motions import PlanFormat
 from prior_reinforce.rollouts import KeyFrame, Rollout
 from prior_reinforce.tasks.inverse_kinematics import POSE_NAMES, POSE_UNITS, joint_paths
 from prior_reinforce.tasks.panda import STEP
-from prior_reinforce.tasks.panda_task import ArmDisturbances, PandaTask
+from prior_reinforce.tasks.panda_task import ArmDisturbances, Draws, PandaTask
 
 HOOK_RADIUS = 0.006
 """In [m]; in `fishing.xml` too. The hook touches the table where its centre is so high."""
@@ -56,6 +56,7 @@ class Fishing(PandaTask):
     tolerance: ClassVar[float] = 0.01  # the paper's magnet catches the hook within about 1 cm
     region: ClassVar[np.ndarray] = np.array([[0.78, -0.20], [0.98, 0.20]])
     scene: ClassVar[str] = "fishing"
+    recordings: ClassVar[str] = "fishing"
     lead_in: ClassVar[float] = 0.1
     lead_out: ClassVar[float] = 0.4
 
@@ -66,7 +67,7 @@ class Fishing(PandaTask):
             disturbances: How repeated executions differ; the documented ones when not given.
         """
         self.disturbances = disturbances or Disturbances()
-        super().__init__(self.disturbances.arm)
+        super().__init__()
         self._swivel = self.model.jnt_qposadr[self.model.joint("tool/swivel").id]
         self._hook = self.model.sensor("tool/hook").adr[0]
         balls = np.flatnonzero(self.model.jnt_type == mujoco.mjtJoint.mjJNT_BALL)
@@ -76,21 +77,26 @@ class Fishing(PandaTask):
         """Follow the poses with the arm, within its limits."""
         return joint_paths(plans, self.format.dt)
 
-    def _disturb(self, model: mujoco.MjModel, rng: np.random.Generator) -> None:
-        stiffness, damping = 1.0 + rng.normal(0.0, self.disturbances.rope, 2)
+    def _draw(self, n: int, rng: np.random.Generator) -> Draws:
+        pose, servo = self.disturbances.arm.draw(n, rng)
+        rope = 1.0 + rng.normal(0.0, self.disturbances.rope, (n, 2))
+        return Draws(pose, servo, rope, rng.normal(0.0, self.disturbances.sway, (n, 2)))
+
+    def _disturb(self, model: mujoco.MjModel, scene: np.ndarray) -> None:
+        stiffness, damping = scene
         model.jnt_stiffness[self._bends] *= stiffness
         dofs = (model.jnt_dofadr[self._bends][:, None] + np.arange(3)).ravel()
         model.dof_damping[dofs] *= damping
 
-    def _place(self, data: mujoco.MjData, rng: np.random.Generator | None) -> None:
+    def _place(self, data: mujoco.MjData, start: np.ndarray | None) -> None:
         """Let the rope hang: the swivel undoes the rod's attitude, every segment is straight.
 
         This is the settled state itself, because the swivel has no spring and the others are
         relaxed, so nothing has to be simulated to reach it.
         """
         sway = np.zeros(3)
-        if rng is not None:
-            sway[:2] = rng.normal(0.0, self.disturbances.sway, 2)
+        if start is not None:
+            sway[:2] = start
         upright, rod, hanging = np.empty(4), np.empty(4), np.empty(4)
         mujoco.mju_mat2Quat(rod, data.site("tool/tip").xmat)
         mujoco.mju_negQuat(upright, rod)

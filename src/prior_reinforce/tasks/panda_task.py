@@ -28,8 +28,6 @@ from prior_reinforce.tasks.panda import N_JOINTS, STEP, build_scene, servo_contr
 from prior_reinforce.tasks.rendering import open_renderer
 
 _FOLDER = Path(__file__).parent
-_BATCH = 32
-"""Executions simulated at once: bounds memory at about 100 MB of recorded states."""
 _FULL = mujoco.mjtState.mjSTATE_FULLPHYSICS
 _Batch = tuple[list[mujoco.MjModel], np.ndarray, np.ndarray]
 
@@ -43,24 +41,43 @@ class ArmDisturbances:
     servo: float = 0.03
     """Relative error of every joint's servo stiffness and damping."""
 
+    def draw(self, n: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+        """Pose offsets and servo factors of n executions, shape (n, 7) each."""
+        pose = rng.normal(0.0, self.pose, (n, N_JOINTS))
+        return pose, 1.0 + rng.normal(0.0, self.servo, (n, N_JOINTS))
+
+
+@dataclass(frozen=True, eq=False)
+class Draws:
+    """What differs between the executions of one batch; row i belongs to execution i."""
+
+    pose: np.ndarray
+    """Offset of every joint, shape (n, 7), in [rad]."""
+    servo: np.ndarray
+    """Factor on every joint's servo stiffness and damping, shape (n, 7)."""
+    scene: np.ndarray
+    """The task's own numbers for `_disturb`, shape (n, p)."""
+    start: np.ndarray
+    """The task's own numbers for `_place`, shape (n, q)."""
+
 
 class PandaTask(Task):
     """A task in which the Panda executes a plan from rest, and physics decides the rest."""
 
     scene: ClassVar[str]
-    """File name of the scene without `.xml`; demonstrations are `demonstrations/<scene>_<set>`."""
+    """File name of the scene without `.xml`."""
+    recordings: ClassVar[str]
+    """Shipped prior sets are `demonstrations/<recordings>_<set>.npz`."""
     lead_in: ClassVar[float]
     """The arm stands in its first frame for so long before the plan begins, in [s]."""
     lead_out: ClassVar[float]
     """Physics goes on for so long after the last frame, in [s]."""
+    batch: ClassVar[int] = 32
+    """Executions simulated at once: bounds memory at about 100 MB of recorded states. Draws are
+    made batch by batch, so the number is part of what a seed means."""
 
-    def __init__(self, arm: ArmDisturbances) -> None:
-        """Compile the scene.
-
-        Args:
-            arm: How the arm's repeated executions differ.
-        """
-        self._arm = arm
+    def __init__(self) -> None:
+        """Compile the scene."""
         self.model = build_scene(_FOLDER / f"{self.scene}.xml")
         self.model.opt.timestep = STEP
         self._workers = [mujoco.MjData(self.model) for _ in range(_n_cores())]
@@ -71,12 +88,21 @@ class PandaTask(Task):
         """Joint paths (n, H, 7) in [rad] that plans (n, H, D) stand for."""
 
     @abstractmethod
-    def _disturb(self, model: mujoco.MjModel, rng: np.random.Generator) -> None:
-        """Change the task's own constants in a copy of the model, for one execution."""
+    def _draw(self, n: int, rng: np.random.Generator) -> Draws:
+        """Draw what differs between n executions; the order is part of what a seed means."""
 
     @abstractmethod
-    def _place(self, data: mujoco.MjData, rng: np.random.Generator | None) -> None:
-        """Put the task's objects where they start; the arm already stands in its first frame."""
+    def _disturb(self, model: mujoco.MjModel, scene: np.ndarray) -> None:
+        """Change the task's own constants in a copy of the model by an execution's draws (p,)."""
+
+    @abstractmethod
+    def _place(self, data: mujoco.MjData, start: np.ndarray | None) -> None:
+        """Put the task's objects where they start; the arm already stands in its first frame.
+
+        Args:
+            data: The state to be changed.
+            start: The execution's draws, shape (q,); None where nothing is disturbed.
+        """
 
     @abstractmethod
     def _result(self, states: np.ndarray, sensors: np.ndarray) -> Rollout:
@@ -104,7 +130,7 @@ class PandaTask(Task):
                 f"{self.name} has no demonstration set {name!r}; use one of "
                 f"{', '.join(self.demonstration_sets)}"
             )
-        return Demonstrations.load(_FOLDER / "demonstrations" / f"{self.scene}_{name}.npz")
+        return Demonstrations.load(_FOLDER / "demonstrations" / f"{self.recordings}_{name}.npz")
 
     def film(
         self,
@@ -149,8 +175,8 @@ class PandaTask(Task):
         """
         with ThreadPoolExecutor(max_workers=1) as ahead:
             coming: Future[_Batch] | None = None
-            for first in range(0, len(plans), _BATCH):
-                following = ahead.submit(self._prepare, plans[first : first + _BATCH], rng)
+            for first in range(0, len(plans), self.batch):
+                following = ahead.submit(self._prepare, plans[first : first + self.batch], rng)
                 if coming is not None:
                     yield coming.result()
                 coming = following
@@ -163,31 +189,30 @@ class PandaTask(Task):
         n_steps = round((self.lead_in + (horizon - 1) * self.format.dt + self.lead_out) / STEP)
         joints = self.joint_plans(plans)
         controls = servo_controls(self.model, joints, self.format.dt, n_steps, lead_in=self.lead_in)
-        models = [self.model]
-        starts = joints[:, 0].copy()
-        if rng is not None:
-            offsets = rng.normal(0.0, self._arm.pose, (n, N_JOINTS))
-            servos = 1.0 + rng.normal(0.0, self._arm.servo, (n, N_JOINTS))
-            models = [self._disturbed(servo, rng) for servo in servos]
-            controls += offsets[:, None, :]
-            starts += offsets
-        states = np.stack([self._start(start, rng) for start in starts])
+        if rng is None:
+            states = np.stack([self._start(frame, None) for frame in joints[:, 0]])
+            return [self.model], states, controls
+        draws = self._draw(n, rng)
+        models = [self._disturbed(*own) for own in zip(draws.servo, draws.scene, strict=True)]
+        controls += draws.pose[:, None, :]
+        frames = joints[:, 0] + draws.pose
+        states = np.stack([self._start(*own) for own in zip(frames, draws.start, strict=True)])
         return models, states, controls
 
-    def _disturbed(self, servo: np.ndarray, rng: np.random.Generator) -> mujoco.MjModel:
+    def _disturbed(self, servo: np.ndarray, scene: np.ndarray) -> mujoco.MjModel:
         model = copy.copy(self.model)
         model.actuator_gainprm[:, 0] *= servo
         model.actuator_biasprm[:, 1:3] *= servo[:, None]
-        self._disturb(model, rng)
+        self._disturb(model, scene)
         return model
 
-    def _start(self, joints: np.ndarray, rng: np.random.Generator | None) -> np.ndarray:
+    def _start(self, joints: np.ndarray, start: np.ndarray | None) -> np.ndarray:
         """Full physics state with the arm at `joints` (7,) and the objects in place."""
         data = self._scratch
         mujoco.mj_resetData(self.model, data)
         data.qpos[:N_JOINTS] = joints
         mujoco.mj_kinematics(self.model, data)
-        self._place(data, rng)
+        self._place(data, start)
         state = np.empty(mujoco.mj_stateSize(self.model, _FULL))
         mujoco.mj_getState(self.model, data, state, _FULL)
         return state
