@@ -14,21 +14,14 @@ Notation:
 from __future__ import annotations
 
 import math
-import os
-from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from typing_extensions import Self
 
-from prior_reinforce.errors import ConfigurationError, FileFormatError, NotFittedError
-from prior_reinforce.generators.base import FitProgress, Generator
-from prior_reinforce.generators.conditions import as_conditions
+from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.generators.outcome_weights import inverse_distance_weights
-from prior_reinforce.generators.plan_memory import PlanMemory
-from prior_reinforce.generators.saving import read_model, write_model
-from prior_reinforce.motions import Demonstrations
+from prior_reinforce.generators.plan_mixture import PlanMixture
 
 
 @dataclass(frozen=True)
@@ -52,59 +45,19 @@ class NearestNeighboursConfig:
             raise ConfigurationError(f"power must be a positive number, got {self.power}")
 
 
-class NearestNeighbours(Generator):
+class NearestNeighbours(PlanMixture):
     """Inverse-distance interpolation of the nearest plans (paper, "I.N.N.")."""
 
     name: ClassVar[str] = "nearest"
+    config_type: ClassVar[type[NearestNeighboursConfig]] = NearestNeighboursConfig
+    config: NearestNeighboursConfig
 
     def __init__(self, config: NearestNeighboursConfig | None = None) -> None:
         """Choose settings; the defaults when None."""
-        self.config = config or NearestNeighboursConfig()
-        self._memory: PlanMemory | None = None
+        super().__init__(config or NearestNeighboursConfig())
 
-    def fit(
-        self,
-        demonstrations: Demonstrations,
-        *,
-        seed: int,
-        progress: Callable[[FitProgress], None] | None = None,
-    ) -> Self:
-        """Keep the demonstrations; nothing is random and nothing takes time."""
-        self._memory = PlanMemory.of(demonstrations)
-        if progress is not None:
-            progress(FitProgress(step=1, n_steps=1, loss=0.0, seconds_left=0.0))
-        return self
-
-    def generate(self, conditions: np.ndarray) -> np.ndarray:
-        """Mix the nearest plans; at a demonstration's outcome, exactly its plan."""
-        memory = self._require()
-        conditions = as_conditions(conditions, memory.outcomes.shape[1])
-        weights = inverse_distance_weights(
-            conditions,
-            memory.outcomes,
-            neighbours=self.config.neighbours,
-            power=self.config.power,
+    def weights(self, conditions: np.ndarray, outcomes: np.ndarray) -> np.ndarray:
+        """Weigh the nearest plans; at a demonstration's outcome, its own alone."""
+        return inverse_distance_weights(
+            conditions, outcomes, neighbours=self.config.neighbours, power=self.config.power
         )
-        return memory.mix(weights)
-
-    def save(self, folder: str | os.PathLike[str]) -> None:
-        """Write `config.json` and `model.safetensors`; see `Generator.save`."""
-        write_model(folder, self.name, {"config": asdict(self.config)}, self._require().tensors())
-
-    @classmethod
-    def load(cls, folder: str | os.PathLike[str]) -> Self:
-        """Read what `save` wrote; see `Generator.load`."""
-        saved = read_model(folder, expected=cls.name)
-        try:
-            generator = cls(NearestNeighboursConfig(**saved.settings["config"]))
-            generator._memory = PlanMemory.restore(saved.tensors)
-        except (KeyError, TypeError, ValueError) as error:
-            raise FileFormatError(
-                f"{folder} holds no complete {cls.name} generator ({error!r}); learn it again"
-            ) from error
-        return generator
-
-    def _require(self) -> PlanMemory:
-        if self._memory is None:
-            raise NotFittedError("this NearestNeighbours has learned nothing yet; call fit first")
-        return self._memory
