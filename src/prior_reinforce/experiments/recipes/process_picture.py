@@ -1,0 +1,213 @@
+"""The picture of the process: key frames from above, the error seen drawn on each as an arrow."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import mujoco
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.patches import FancyArrowPatch, Rectangle
+
+from prior_reinforce.feedback import to_words
+from prior_reinforce.perception import Camera, CameraConfig, TableCalibration, TableScene, scene_of
+from prior_reinforce.report.style import GOAL, HIT, INK, drawing, new_figure, save_png
+from prior_reinforce.rollouts import KeyFrame
+from prior_reinforce.tasks import Task
+
+_PIXELS = 1344
+"""Side of a picture as it is taken, in [px]: finer than a model's, to be looked at close up."""
+_SIDE = 448.0
+"""Side of a picture as it is drawn, in its own unit: the pixels of the calibration's camera."""
+_LEAST_HALF = 0.09
+"""Least half side of a close-up, in [m] (ours): shows a stone, a hoop and some table."""
+_MARGIN = 0.07
+"""Table shown beyond all that matters, in [m]."""
+_MOST_TRIALS = 4
+"""Trials shown; of more, the first three and the last."""
+_INCHES = 2.6  # of one panel
+_HALO = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 2.0}
+
+
+@dataclass(frozen=True, eq=False)
+class ProcessTrial:
+    """One trial."""
+
+    error_seen: np.ndarray
+    """Shape (2,), in [m]."""
+    outcome: np.ndarray
+    """True outcome, shape (2,), in [m]."""
+    hit: bool
+    key_state: np.ndarray
+    """Positions of the scene at the key frame, shape (nq,)."""
+
+
+@dataclass(frozen=True, eq=False)
+class ProcessRow:
+    """One goal of one task."""
+
+    title: str
+    task: Task
+    goal: np.ndarray
+    """Shape (2,), in [m]."""
+    demonstrated: np.ndarray
+    """Outcomes of the demonstrations, shape (n, 2), in [m]."""
+    trials: tuple[ProcessTrial, ...]
+
+
+@drawing()
+def draw_process(rows: Sequence[ProcessRow], path: Path) -> Path:
+    """Draw one row a task: the table, then its trials close up.
+
+    Args:
+        rows: In the order drawn.
+        path: PNG to write.
+
+    Returns:
+        The path.
+
+    Raises:
+        RenderingUnavailableError: There is no OpenGL on this machine.
+    """
+    n_columns = 1 + max(min(len(row.trials), _MOST_TRIALS) for row in rows)
+    figure = new_figure(_INCHES * n_columns, (_INCHES + 0.42) * len(rows))
+    grid = figure.subplots(len(rows), n_columns, squeeze=False)
+    fine = Camera(CameraConfig(width=_PIXELS, height=_PIXELS))
+    coarse = Camera(CameraConfig(width=int(_SIDE), height=int(_SIDE)))
+    for line, row in zip(grid, rows, strict=True):
+        for axes in line:
+            axes.set_axis_off()
+        _draw_row(line, row, fine, coarse)
+    fine.close()
+    coarse.close()
+    return save_png(figure, path)
+
+
+def _draw_row(line: Sequence[Axes], row: ProcessRow, fine: Camera, coarse: Camera) -> None:
+    model = _scene_model(row.task)
+    scene = scene_of(row.task.name)
+    calibration = coarse.calibrate(model, np.array(scene.marks), height=scene.plane_height)
+    close_up = _close_up(row, scene, calibration)
+    for axes, i in zip(line[1:], _shown(len(row.trials)), strict=False):
+        picture = fine.picture(KeyFrame(model, row.trials[i].key_state, 0.0), row.goal)
+        if i == 0:
+            _draw_table(line[0], row, picture, calibration, close_up)
+        _draw_trial(axes, row, i, picture, calibration, close_up)
+
+
+def _scene_model(task: Task) -> mujoco.MjModel:
+    """The scene as a camera sees it: of any rollout."""
+    (rollout,) = task.rollout(task.demonstrations(task.demonstration_sets[0]).plans[:1], None)
+    assert rollout.key_frame is not None
+    return rollout.key_frame.model
+
+
+def _shown(n: int) -> list[int]:
+    return list(range(n)) if n <= _MOST_TRIALS else [*range(_MOST_TRIALS - 1), n - 1]
+
+
+def _close_up(row: ProcessRow, scene: TableScene, calibration: TableCalibration) -> np.ndarray:
+    """Lower and upper corner of the square looked at, in units of the picture, shape (2, 2)."""
+    trials = [row.trials[i] for i in _shown(len(row.trials))]
+    seen = [row.goal + trial.error_seen for trial in trials]
+    goal_object = row.goal - np.array(scene.goal_offset)
+    places = np.array([row.goal, goal_object, *seen, *(trial.outcome for trial in trials)])
+    middle = (places.min(axis=0) + places.max(axis=0)) / 2
+    half = max(_LEAST_HALF, float(np.ptp(places, axis=0).max()) / 2 + _MARGIN)
+    corners = calibration.to_pixels(middle + half * np.array([[-1, -1], [-1, 1], [1, -1], [1, 1]]))
+    centre = corners.mean(axis=0)
+    side = np.ptp(corners, axis=0).max() / 2
+    # Moved rather than cut where it would leave the picture.
+    centre = np.clip(centre, min(side, _SIDE / 2), max(_SIDE - side, _SIDE / 2))
+    return np.stack([centre - side, centre + side])
+
+
+def _draw_table(
+    axes: Axes,
+    row: ProcessRow,
+    picture: np.ndarray,
+    calibration: TableCalibration,
+    close_up: np.ndarray,
+) -> None:
+    axes.imshow(picture[::2, ::2], extent=(0, _SIDE, _SIDE, 0))
+    axes.set_title(row.title, loc="left", fontsize=12, color=INK)
+    across, down = calibration.to_pixels(row.demonstrated).T
+    axes.scatter(
+        across,
+        down,
+        s=26,
+        marker="s",
+        color="white",
+        edgecolors=INK,
+        linewidths=0.8,
+    )
+    _draw_goal(axes, calibration.to_pixels(row.goal))
+    low, high = close_up
+    axes.add_patch(Rectangle(tuple(low), *(high - low), fill=False, edgecolor=INK, linewidth=1.2))
+    axes.text(
+        0.03,
+        0.03,
+        "□ demonstrations   ★ goal",
+        transform=axes.transAxes,
+        fontsize=8.5,
+        color=INK,
+        bbox=_HALO,
+    )
+
+
+def _draw_trial(
+    axes: Axes,
+    row: ProcessRow,
+    i: int,
+    picture: np.ndarray,
+    calibration: TableCalibration,
+    close_up: np.ndarray,
+) -> None:
+    trial = row.trials[i]
+    (left, top), (right, bottom) = close_up
+    axes.imshow(picture, extent=(0, _SIDE, _SIDE, 0))
+    axes.set_xlim(left, right)
+    axes.set_ylim(bottom, top)
+    goal = calibration.to_pixels(row.goal)
+    _draw_goal(axes, goal)
+    if not trial.hit and np.any(trial.error_seen):
+        end = calibration.to_pixels(row.goal + trial.error_seen)
+        axes.add_patch(
+            FancyArrowPatch(
+                tuple(goal),
+                tuple(end),
+                arrowstyle="-|>",
+                mutation_scale=14,
+                shrinkA=0,
+                shrinkB=0,
+                linewidth=2.0,
+                color="black",
+            )
+        )
+    colour = HIT if trial.hit else INK
+    axes.set_title(f"trial {i + 1}: {_said(row, i)}", loc="left", fontsize=10, color=colour)
+    frame = Rectangle(
+        (0, 0),
+        1,
+        1,
+        transform=axes.transAxes,
+        fill=False,
+        edgecolor=colour,
+        linewidth=5.0 if trial.hit else 1.2,
+    )
+    axes.add_patch(frame)
+
+
+def _said(row: ProcessRow, i: int) -> str:
+    trial = row.trials[i]
+    if trial.hit:
+        return "HIT"
+    if i == len(row.trials) - 1:
+        return "not reached"
+    return to_words(trial.error_seen) if np.any(trial.error_seen) else "just missed"
+
+
+def _draw_goal(axes: Axes, pixel: np.ndarray) -> None:
+    axes.plot(*pixel, marker="*", markersize=9, color="#f0e442", markeredgecolor=GOAL, zorder=5)
