@@ -6,14 +6,14 @@ the scene's own `birdseye`. Pixel coordinates are those of `calibration`.
 
 from __future__ import annotations
 
-import copy
 from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 
-from prior_reinforce.errors import ConfigurationError, RenderingUnavailableError
+from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.perception.calibration import TableCalibration
+from prior_reinforce.rendering import make_renderer
 from prior_reinforce.rollouts import KeyFrame
 
 GOAL_BODY = "goal"
@@ -145,19 +145,7 @@ class Camera:
                 f"the scene has no camera '{self.config.name}'; its cameras are "
                 f"{', '.join(model.cam(i).name for i in range(model.ncam)) or 'none'}"
             )
-        # The frame buffer's size is part of the model, and the model is shared: draw a copy.
-        drawn = copy.copy(model)
-        screen = drawn.vis.global_
-        screen.offwidth = max(screen.offwidth, self.config.width)
-        screen.offheight = max(screen.offheight, self.config.height)
-        try:
-            self._renderer = mujoco.Renderer(drawn, self.config.height, self.config.width)
-        except Exception as error:  # each OpenGL backend fails with exceptions of its own
-            raise RenderingUnavailableError(
-                f"no picture can be drawn, OpenGL is not available ({error}); on a machine "
-                "without a display set MUJOCO_GL=egl and install libegl1 (or MUJOCO_GL=osmesa "
-                "and libosmesa6)"
-            ) from error
+        self._renderer = make_renderer(model, self.config.width, self.config.height)
         self._source = model
         return self._renderer
 

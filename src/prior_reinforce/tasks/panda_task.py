@@ -22,10 +22,10 @@ import numpy as np
 from prior_reinforce.arrays import as_plans
 from prior_reinforce.errors import ConfigurationError, InvalidGoalError
 from prior_reinforce.motions import Demonstrations
+from prior_reinforce.rendering import open_renderer
 from prior_reinforce.rollouts import Rollout
 from prior_reinforce.tasks.base import Task
 from prior_reinforce.tasks.panda import N_JOINTS, STEP, build_scene, servo_controls
-from prior_reinforce.tasks.rendering import open_renderer
 
 _FOLDER = Path(__file__).parent
 _FULL = mujoco.mjtState.mjSTATE_FULLPHYSICS

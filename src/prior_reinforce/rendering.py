@@ -11,9 +11,13 @@ import mujoco
 from prior_reinforce.errors import RenderingUnavailableError
 
 
-@contextmanager
-def open_renderer(model: mujoco.MjModel, width: int, height: int) -> Iterator[mujoco.Renderer]:
-    """Give a renderer of `width` x `height` pixels and free its graphics memory afterwards.
+def make_renderer(model: mujoco.MjModel, width: int, height: int) -> mujoco.Renderer:
+    """Make a renderer of `width` x `height` pixels; its `close` frees the graphics memory.
+
+    Args:
+        model: The scene; not changed.
+        width: In [px].
+        height: In [px].
 
     Raises:
         RenderingUnavailableError: There is no OpenGL on this machine.
@@ -24,12 +28,18 @@ def open_renderer(model: mujoco.MjModel, width: int, height: int) -> Iterator[mu
     screen.offwidth = max(screen.offwidth, width)
     screen.offheight = max(screen.offheight, height)
     try:
-        renderer = mujoco.Renderer(drawn, height, width)
+        return mujoco.Renderer(drawn, height, width)
     except Exception as error:  # each OpenGL backend fails with exceptions of its own
         raise RenderingUnavailableError(
-            f"no film can be drawn, OpenGL is not available ({error}); on a machine without a "
+            f"no picture can be drawn, OpenGL is not available ({error}); on a machine without a "
             "display set MUJOCO_GL=egl and install libegl1 (or MUJOCO_GL=osmesa and libosmesa6)"
         ) from error
+
+
+@contextmanager
+def open_renderer(model: mujoco.MjModel, width: int, height: int) -> Iterator[mujoco.Renderer]:
+    """A renderer for the length of a block; arguments and errors as in `make_renderer`."""
+    renderer = make_renderer(model, width, height)
     try:
         yield renderer
     finally:
