@@ -9,8 +9,9 @@ from prior_reinforce.experiments.recipes.alignment import TimelineAlignment
 from prior_reinforce.experiments.recipes.base import QUICK, Picture, Recipe, Run, Scale, Table
 from prior_reinforce.experiments.recipes.claims import Claim, Verdict
 from prior_reinforce.experiments.recipes.displacement import DisplacementFields
-from prior_reinforce.experiments.recipes.eye import TrialsByEye
 from prior_reinforce.experiments.recipes.generators import Generators
+from prior_reinforce.experiments.recipes.process import ProcessPictures
+from prior_reinforce.experiments.recipes.trials import TrialsTable
 from prior_reinforce.experiments.recipes.zero_shot import ZeroShotErrors
 
 RECIPES: Mapping[str, Recipe] = {
@@ -21,7 +22,8 @@ RECIPES: Mapping[str, Recipe] = {
         Adapters(),
         TimelineAlignment(),
         DisplacementFields(),
-        TrialsByEye(),
+        TrialsTable(),
+        ProcessPictures(),
     )
 }
 """Every recipe by its name, in the order of the evidence page."""
