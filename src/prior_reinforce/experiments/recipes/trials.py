@@ -8,7 +8,7 @@ rounds: never flattering.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, ClassVar
@@ -25,7 +25,7 @@ from prior_reinforce.experiments.recipes.base import (
     Table,
 )
 from prior_reinforce.experiments.recipes.claims import Claim, Verdict, above, at_most
-from prior_reinforce.experiments.recipes.success import interval_of, solved_at
+from prior_reinforce.experiments.recipes.success import interval_of
 from prior_reinforce.experiments.recipes.trials_picture import TrialsRow, draw_trials
 from prior_reinforce.experiments.recipes.trials_rows import ROWS, PaperRow
 from prior_reinforce.experiments.sight import MODEL, STAND_IN
@@ -70,15 +70,19 @@ class TrialsTable(Recipe):
         """Try the paper's number of goals, and many, through every sense."""
         scale = run.scale
         run.results(self.trainings(scale, run.include))
-        solved = {
-            (row, adapter): (
-                self._solved(run, row, adapter, _UNSEEN_GOALS, unseen=True),
-                self._solved(run, row, adapter, self._goals(row, scale), unseen=False),
-            )
-            for row in self.rows
-            for adapter in ("gp", *run.include)
+        tried = [(row, adapter) for row in self.rows for adapter in ("gp", *run.include)]
+        units: dict[Hashable, list[Trials]] = {}
+        for row, adapter in tried:
+            for unseen in (True, False):
+                units[row, adapter, unseen] = self._units(row, adapter, scale, unseen=unseen)
+        for row in self.rows:
+            units[row.task] = self._first_throws(row, scale)
+        # All at once, so that no core waits for one row's last unit.
+        results = iter(run.results([unit for some in units.values() for unit in some]))
+        at = {
+            key: np.array([next(results)["solved_at"] for _ in some]) for key, some in units.items()
         }
-        learned_on = {row.task: row.learned_on for row in self.rows}
+        solved = {(row, a): (at[row, a, True], at[row, a, False]) for row, a in tried}
         by_eye = {row.task: row for row in self.rows if not row.by_model}
         return {
             "trainings": scale.trainings,
@@ -95,8 +99,7 @@ class TrialsTable(Recipe):
                 for (row, adapter), (unseen, many) in solved.items()
             ],
             "first_throws": {
-                task: asdict(self._first_throws(run, task, demonstrated))
-                for task, demonstrated in learned_on.items()
+                row.task: asdict(bootstrap_mean(reached_by(at[row.task], 1))) for row in self.rows
             },
             "eye_minus_model": {
                 row.task: asdict(
@@ -195,38 +198,32 @@ class TrialsTable(Recipe):
             for seed in scale.seeds
         ]
 
-    def _goals(self, row: PaperRow, scale: Scale) -> int:
-        return min(scale.goals, _MODEL_GOALS) if row.by_model else scale.goals
-
-    def _solved(
-        self, run: Run, row: PaperRow, adapter: str, goals: int, *, unseen: bool
-    ) -> np.ndarray:
-        """Trial that reached each goal, 0 where none did, shape (trainings, goals)."""
-        perception, model = "eye", None
+    def _units(self, row: PaperRow, adapter: str, scale: Scale, *, unseen: bool) -> list[Trials]:
+        """One row's units, one a training."""
+        goals = min(scale.goals, _MODEL_GOALS) if row.by_model else scale.goals
+        perception = "eye"
         if row.by_model:
-            perception, model = STAND_IN if self.model is None else MODEL, self.model
-        units = [
+            perception = STAND_IN if self.model is None else MODEL
+        return [
             Trials(
                 training,
                 row.task,
                 adapter,
                 perception,
-                goals,
+                _UNSEEN_GOALS if unseen else goals,
                 unseen=unseen,
-                rounds=run.scale.rounds,
-                model=model,
+                rounds=scale.rounds,
+                model=self.model if row.by_model else None,
             )
-            for training in self._trainings(row.learned_on, run.scale)
+            for training in self._trainings(row.learned_on, scale)
         ]
-        return solved_at(run, units)
 
-    def _first_throws(self, run: Run, task: str, learned_on: str) -> Interval:
-        """Share of goals reached by the first trial of the frozen adapter, with its interval."""
-        units = [
-            Trials(training, task, "frozen", "exact", run.scale.goals, rounds=1)
-            for training in self._trainings(learned_on, run.scale)
+    def _first_throws(self, row: PaperRow, scale: Scale) -> list[Trials]:
+        """The first trial alone, of the goal itself as the condition."""
+        return [
+            Trials(training, row.task, "frozen", "exact", scale.goals, rounds=1)
+            for training in self._trainings(row.learned_on, scale)
         ]
-        return bootstrap_mean(reached_by(solved_at(run, units), 1))
 
 
 def _paired(
