@@ -71,5 +71,5 @@ def test_a_code_depends_on_its_condition_alone(sampler):
 
 
 def test_levels_fall_and_reach_low_noise():
-    assert mean_shift_levels(100, 6) == (95, 72, 51, 33, 18, 6)
+    assert mean_shift_levels(100, 6) == (95, 65, 42, 23, 10, 2)
     assert mean_shift_levels(100, 1) == (95,)

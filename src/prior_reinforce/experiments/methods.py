@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Literal
 
 from prior_reinforce.adapters import (
@@ -14,10 +15,13 @@ from prior_reinforce.adapters import (
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.generators import FAMILY as GENERATORS
 from prior_reinforce.generators import (
+    DiffusionConfig,
     DiffusionGenerator,
     DynamicMovementPrimitives,
     DynamicMovementPrimitivesConfig,
     Generator,
+    UNetRegression,
+    UNetRegressionConfig,
 )
 from prior_reinforce.own_members import import_and_make, make_own
 from prior_reinforce.perception import Amplified, Exact, Eye, Perception
@@ -26,21 +30,31 @@ from prior_reinforce.perception import Amplified, Exact, Eye, Perception
 def make_generator(name: str) -> Generator:
     """Make a generator by its name, or one's own by `module:Class`.
 
-    `dmp` fits its primitives to the motion alone; `dmp-whole` to the whole plan, rests and all, as
-    we read the paper (docs/baselines.md).
+    `diffusion`, `regression` and `dmp` know when a motion starts as a number of its own;
+    `diffusion-whole`, `regression-whole` and `dmp-whole` learn whole plans, rests and all, as we
+    read the paper (docs/baselines.md).
 
     Raises:
         ConfigurationError: There is no such generator.
     """
-    known = {kind.name: kind for kind in GENERATORS}
-    if name == "dmp-whole":
-        return DynamicMovementPrimitives(DynamicMovementPrimitivesConfig(segmented=False))
-    if name == DiffusionGenerator.name:
-        # One core each, so that the last digits do not depend on how many there are.
-        return DiffusionGenerator(threads=1)
+    # Networks on one core each, so that the last digits do not depend on how many there are.
+    known: dict[str, Callable[[], Generator]] = {
+        **{kind.name: kind for kind in GENERATORS},
+        "diffusion": lambda: DiffusionGenerator(threads=1),
+        "diffusion-whole": lambda: DiffusionGenerator(
+            DiffusionConfig(start_times=False), threads=1
+        ),
+        "dmp-whole": lambda: DynamicMovementPrimitives(
+            DynamicMovementPrimitivesConfig(segmented=False)
+        ),
+        "regression": lambda: UNetRegression(threads=1),
+        "regression-whole": lambda: UNetRegression(
+            UNetRegressionConfig(start_times=False), threads=1
+        ),
+    }
     if name in known:
         return known[name]()
-    return make_own(name, Generator, [*known, "dmp-whole"])
+    return make_own(name, Generator, list(known))
 
 
 def make_adapter(name: str) -> Adapter:

@@ -45,7 +45,7 @@ class DiffusionConfig:
     """How codes are generated, see `diffusion_sampling`."""
     sampling_steps: int = 6
     """Noise levels visited by mean shift or DDIM; DDPM visits all."""
-    noise_draws: int = 4
+    noise_draws: int = 8
     """K, noise draws over which a step of mean shift averages; even."""
     training_steps: int = 1000
     """Optimiser steps."""

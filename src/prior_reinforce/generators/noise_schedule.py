@@ -154,5 +154,5 @@ def mean_shift_levels(n_training_steps: int, n_levels: int) -> tuple[int, ...]:
     Ours: a level's own spread is what the estimate can resolve, so the last one has to be low; the
     first ones only choose among modes.
     """
-    fractions = [(i / n_levels) ** 1.5 for i in range(n_levels, 0, -1)]
+    fractions = [(i / n_levels) ** 2 for i in range(n_levels, 0, -1)]
     return tuple(int(0.95 * f * n_training_steps) for f in fractions)

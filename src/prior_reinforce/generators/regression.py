@@ -29,8 +29,9 @@ from typing_extensions import Self
 from prior_reinforce.errors import ConfigurationError, FileFormatError, NotFittedError
 from prior_reinforce.generators.base import FitProgress, Generator
 from prior_reinforce.generators.conditions import ConditionScale, as_conditions
-from prior_reinforce.generators.representation import PlanCodec, Representation
+from prior_reinforce.generators.representation import Representation
 from prior_reinforce.generators.saving import read_model, write_model
+from prior_reinforce.generators.start_time import StartTimeCodec
 from prior_reinforce.generators.threads import torch_threads
 from prior_reinforce.generators.unet import ConditionalUNet, UNetSize
 from prior_reinforce.motions import Demonstrations
@@ -53,6 +54,8 @@ class UNetRegressionConfig:
     """Code plans by spline control points where they fit, or by raw frames."""
     frames_per_point: int = 4
     """Frames for each spline control point."""
+    start_times: bool = True
+    """Predict when the motion starts as a number of its own, as the diffusion generator does."""
     margin: float = 0.05
     """How far plans may leave the demonstrated range of a dimension, as a fraction of it."""
     network: UNetSize = field(
@@ -118,8 +121,9 @@ class UNetRegression(Generator):
         progress: Callable[[FitProgress], None] | None = None,
     ) -> Self:
         """Learn from all demonstrations; the seed draws initial weights. See `Generator.fit`."""
-        codec = PlanCodec.fit(
-            demonstrations.plans,
+        codec, codes = StartTimeCodec.fit(
+            demonstrations,
+            start_times=self.config.start_times,
             representation=self.config.representation,
             frames_per_point=self.config.frames_per_point,
             length_multiple=self.config.network.length_multiple,
@@ -128,7 +132,7 @@ class UNetRegression(Generator):
         scale = ConditionScale.fit(demonstrations.outcomes_seen)
         with torch_threads(self._threads):
             network = _train(
-                _tensor(codec.encode(demonstrations.plans)),
+                _tensor(codes),
                 _tensor(scale.scale(demonstrations.outcomes_seen)),
                 self.config,
                 seed,
@@ -142,7 +146,7 @@ class UNetRegression(Generator):
         """One forward pass for each condition; see `Generator.generate`."""
         fitted = self._require()
         conditions = as_conditions(conditions, len(fitted.scale.low))
-        plans = [np.empty((0, fitted.codec.horizon, len(fitted.codec.smooth)))]
+        plans = [np.empty((0, fitted.codec.horizon, fitted.codec.action_dim))]
         with torch_threads(self._threads):
             for chunk in torch.split(_tensor(fitted.scale.scale(conditions)), _CHUNK):
                 if len(chunk):
@@ -159,8 +163,8 @@ class UNetRegression(Generator):
             {"config": asdict(self.config), "codec": fitted.codec.settings()},
             {
                 **{f"network.{name}": value.numpy() for name, value in weights.items()},
-                "plan_range": fitted.codec.plan_range,
-                "code_range": fitted.codec.code_range,
+                "plan_range": fitted.codec.motion.plan_range,
+                "code_range": fitted.codec.motion.code_range,
                 "condition_range": np.stack([fitted.scale.low, fitted.scale.high]),
             },
         )
@@ -239,7 +243,7 @@ def _tensor(values: np.ndarray) -> torch.Tensor:
 class _Fitted:
     """What `fit` makes and `save` keeps."""
 
-    def __init__(self, codec: PlanCodec, scale: ConditionScale, network: _Network) -> None:
+    def __init__(self, codec: StartTimeCodec, scale: ConditionScale, network: _Network) -> None:
         self.codec = codec
         self.scale = scale
         self.network = network
@@ -248,7 +252,9 @@ class _Fitted:
     def restore(
         cls, settings: dict[str, Any], tensors: dict[str, np.ndarray], config: UNetRegressionConfig
     ) -> _Fitted:
-        codec = PlanCodec.restore(settings["codec"], tensors["plan_range"], tensors["code_range"])
+        codec = StartTimeCodec.restore(
+            settings["codec"], tensors["plan_range"], tensors["code_range"]
+        )
         low, high = tensors["condition_range"]
         with torch.random.fork_rng(devices=[]):
             network = _Network(codec.channels, codec.length, len(low), config.network)

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 from prior_reinforce.experiments.evaluation import Training, Trials
 from prior_reinforce.experiments.recipes.base import (
@@ -33,10 +33,13 @@ from prior_reinforce.experiments.recipes.success import (
     trainings_of,
     verdict_by_round,
 )
-from prior_reinforce.experiments.recipes.success_picture import Line, draw_success
+from prior_reinforce.experiments.recipes.success_picture import Line, Panel, draw_success
 
 _FIRST_CLAIMED = 2
 """The round from which on one generator is to be above another: before it nothing was adapted."""
+
+
+Kind = Literal["method", "baseline", "other"]
 
 
 @dataclass(frozen=True)
@@ -49,23 +52,26 @@ class Method:
     """Name for `make_generator`."""
     aligned: bool
     """Whether it learns from aligned demonstrations."""
-    in_paper: bool = True
-    """Whether the paper compares it."""
+    kind: Kind = "baseline"
+    """The paper's method, one of its baselines, or what the paper does not have."""
 
 
-OURS = Method("diffusion", "diffusion", aligned=False)
+OURS = Method("diffusion", "diffusion", aligned=False, kind="method")
 METHODS = (
     OURS,
+    Method("diffusion on whole plans", "diffusion-whole", aligned=False, kind="method"),
     Method("nearest neighbours", "nearest", aligned=False),
     Method("DMP", "dmp-whole", aligned=False),
-    Method("U-Net regression", "regression", aligned=False),
-    Method("segmented DMP", "dmp", aligned=False, in_paper=False),
+    Method("U-Net regression", "regression-whole", aligned=False),
+    Method("segmented DMP", "dmp", aligned=False, kind="other"),
+    Method("U-Net regression with start times", "regression", aligned=False, kind="other"),
     Method("nearest neighbours, aligned", "nearest", aligned=True),
     Method("DMP, aligned", "dmp-whole", aligned=True),
-    Method("U-Net regression, aligned", "regression", aligned=True),
-    Method("smooth interpolation, aligned", "interpolation", aligned=True, in_paper=False),
+    Method("U-Net regression, aligned", "regression-whole", aligned=True),
+    Method("smooth interpolation, aligned", "interpolation", aligned=True, kind="other"),
 )
-"""The paper's baselines, and two simple generators that it does not have."""
+"""Our default and the paper's form of it; the paper's baselines; and, so that nothing is gained by
+start times alone, simple generators that know them too."""
 
 
 @dataclass(frozen=True)
@@ -102,10 +108,17 @@ class Generators(Recipe):
         recorded = {m.generator: at for m, at in zip(methods, solved, strict=True) if not m.aligned}
         rows = []
         for method, at in zip(methods, solved, strict=True):
-            row: dict[str, Any] = {**asdict(method), "success": success_curve(at, rounds)}
+            row: dict[str, Any] = {
+                **asdict(method),
+                "success": success_curve(at, rounds),
+                "mean_minus": {
+                    other.label: asdict(mean_success_difference(theirs, at, rounds))
+                    for other, theirs in zip(methods, solved, strict=True)
+                    if other.kind == "method" and other is not method
+                },
+            }
             if method is not methods[0]:
                 row["ours_minus"] = difference_curve(ours, at, rounds)
-                row["ours_mean_minus"] = asdict(mean_success_difference(ours, at, rounds))
             if method.aligned and method.generator in recorded:
                 row["alignment_gain"] = asdict(
                     mean_success_difference(at, recorded[method.generator], rounds)
@@ -126,7 +139,7 @@ class Generators(Recipe):
             ),
             tuple(
                 (
-                    row["label"] + ("" if row["in_paper"] else " (not in the paper)"),
+                    row["label"] + (" (not in the paper)" if row["kind"] == "other" else ""),
                     *(str(interval_of(row["success"][r - 1])) for r in shown),
                     f"{interval_of(row['ours_minus'][at - 1]):+.2f}" if "ours_minus" in row else "",
                 )
@@ -138,19 +151,20 @@ class Generators(Recipe):
         """Two panels: as recorded, and aligned with diffusion beside."""
         rows = figures["rows"]
         names = list(dict.fromkeys(row["generator"] for row in rows))
-        panels = {}
+        panels = []
         for title, aligned in (("as recorded", False), ("aligned in time", True)):
-            panels[title] = [
+            lines = [
                 Line(
                     row["label"].removesuffix(", aligned")
                     + (" (as recorded)" if aligned and not row["aligned"] else ""),
                     row["success"],
                     place=names.index(row["generator"]),
-                    dashed=not row["in_paper"],
+                    dashed=row["kind"] == "other",
                 )
                 for row in rows
                 if row["aligned"] == aligned or row is rows[0]
             ]
+            panels.append(Panel(title, lines))
         path = draw_success(panels, folder / f"{self.name}.png")
         return [
             Picture(
@@ -164,7 +178,7 @@ class Generators(Recipe):
     def claims(self, figures: Mapping[str, Any]) -> list[Claim]:
         """Above the baselines as recorded; alignment lifts them; still above."""
         trainings = figures["trainings"]
-        rows = [row for row in figures["rows"] if row["in_paper"] and "ours_minus" in row]
+        rows = [row for row in figures["rows"] if row["kind"] == "baseline"]
         recorded = [row for row in rows if not row["aligned"]]
         aligned = [row for row in rows if row["aligned"]]
         ours = figures["rows"][0]["success"]
@@ -217,9 +231,9 @@ class Generators(Recipe):
         """Name every generator that is above ours."""
         ours, *others = figures["rows"]
         better = [
-            f"{row['label']} ({interval_of(row['ours_mean_minus']):+.2f})"
+            f"{row['label']} ({interval_of(row['mean_minus'][ours['label']]):+.2f})"
             for row in others
-            if interval_of(row["ours_mean_minus"]).high < 0
+            if interval_of(row["mean_minus"][ours["label"]]).high < 0
         ]
         if not better:
             return []
@@ -230,12 +244,19 @@ class Generators(Recipe):
         ]
 
     def _methods(self, include: Sequence[str]) -> tuple[Method, ...]:
-        own = (Method(name, name, aligned=False, in_paper=False) for name in include)
+        own = (Method(name, name, aligned=False, kind="other") for name in include)
         return (*self.methods, *own)
 
 
 def _differences(row: Mapping[str, Any]) -> str:
+    """By how much our default is above a method at some rounds, and the others on the whole."""
     rounds = [r for r in (2, 4, 10) if r <= len(row["ours_minus"])]
-    return "diffusion minus it: " + "; ".join(
-        f"round {r} {interval_of(row['ours_minus'][r - 1]):+.2f}" for r in rounds
+    ours, *forms = row["mean_minus"]
+    by_round = "; ".join(f"round {r} {interval_of(row['ours_minus'][r - 1]):+.2f}" for r in rounds)
+    return "; ".join(
+        [f"{ours} minus it: {by_round}"]
+        + [
+            f"{form} minus it, mean of all rounds: {interval_of(row['mean_minus'][form]):+.2f}"
+            for form in forms
+        ]
     )
