@@ -20,7 +20,6 @@ from rich.text import Text
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.experiments.evidence import claims_table, write_evidence
 from prior_reinforce.experiments.files import write_atomically
-from prior_reinforce.experiments.methods import family_of
 from prior_reinforce.experiments.provenance import provenance
 from prior_reinforce.experiments.recipes import QUICK, RECIPES, Recipe, Run, Scale, Table
 from prior_reinforce.experiments.recipes.base import Progress as OnProgress
@@ -51,7 +50,7 @@ class Reproduce:
     def run(self) -> None:
         """Run, save, print, and write the page of evidence."""
         recipes = _chosen(self.recipe)
-        included = {recipe.name: self._included(recipe) for recipe in recipes}
+        included = {recipe.name: self._joining(recipe) for recipe in recipes}
         if self.goals < 1 or self.workers < 1 or not self.seeds:
             raise ConfigurationError("--goals and --workers must be at least 1, and --seeds given")
         scale = QUICK if self.quick else Scale(goals=self.goals, seeds=self.seeds)
@@ -63,8 +62,9 @@ class Reproduce:
             for recipe in recipes
             for training in recipe.trainings(scale, included[recipe.name])
         )
-        with _progress(console, "learn") as show:
-            run_units(list(trainings), self.out, workers, show)
+        if trainings:
+            with _progress(console, "learn") as show:
+                run_units(list(trainings), self.out, workers, show)
         for recipe in recipes:
             with _progress(console, recipe.name) as show:
                 figures = recipe.run(Run(self.out, scale, workers, show, included[recipe.name]))
@@ -76,17 +76,16 @@ class Reproduce:
         page, _ = write_evidence(self.out)
         console.print(f"evidence: {page}")
 
-    def _included(self, recipe: Recipe) -> tuple[str, ...]:
-        families = {name: family_of(name) for name in self.include}
-        fitting = tuple(name for name, family in families.items() if family == recipe.family)
-        if self.recipe != "all" and len(fitting) < len(families):
-            stranger = next(name for name in families if name not in fitting)
-            joined = [r.name for r in RECIPES.values() if r.family == families[stranger]]
+    def _joining(self, recipe: Recipe) -> tuple[str, ...]:
+        joining = recipe.joining(self.include)
+        if self.recipe != "all" and joining != self.include:
+            stranger = next(name for name in self.include if name not in joining)
+            fitting = [other.name for other in RECIPES.values() if other.joining([stranger])]
             raise ConfigurationError(
-                f"{stranger} is of the family {families[stranger]!r}, which recipe {recipe.name!r} "
-                f"does not compare; include it in {', '.join(joined)}, or in all"
+                f"recipe {recipe.name!r} does not compare methods like {stranger}; include it in "
+                f"{', '.join(fitting)}, or in all"
             )
-        return fitting
+        return joining
 
 
 def _chosen(name: str) -> Sequence[Recipe]:
@@ -108,10 +107,13 @@ def _progress(console: Console, name: str) -> Iterator[OnProgress]:
         TextColumn("{task.description}"),
     )
     with Progress(*columns, console=console) as progress:
-        line = progress.add_task(name, total=None)
+        line = progress.add_task(name, total=None, visible=False)
 
         def show(done: int, total: int, label: str) -> None:
-            progress.update(line, completed=done, total=total, description=f"{name}: {label}")
+            description = f"{name}: {label}" if label else name
+            progress.update(
+                line, completed=done, total=total, description=description, visible=total > 0
+            )
 
         yield show
 

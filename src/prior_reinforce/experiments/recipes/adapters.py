@@ -18,6 +18,7 @@ from prior_reinforce.experiments.recipes.base import (
 )
 from prior_reinforce.experiments.recipes.claims import Claim, above, at_most
 from prior_reinforce.experiments.recipes.success import (
+    Curve,
     difference_curve,
     interval_of,
     mean_success_difference,
@@ -26,7 +27,7 @@ from prior_reinforce.experiments.recipes.success import (
     success_curve,
     trainings_of,
 )
-from prior_reinforce.experiments.recipes.success_picture import Line, draw_success
+from prior_reinforce.experiments.recipes.success_picture import Line, Panel, draw_success
 
 ADAPTERS = {
     "gp": "Gaussian process, m = 2",
@@ -108,17 +109,27 @@ class Adapters(Recipe):
         )
 
     def draw(self, figures: Mapping[str, Any], folder: Path) -> list[Picture]:
-        """One panel."""
-        lines = [
-            Line(ADAPTERS.get(name, name), curve, place=i, dashed=name not in ADAPTERS)
-            for i, (name, curve) in enumerate(figures["success"].items())
+        """Shares reached, and how far the Gaussian process is above the others."""
+
+        def lines(curves: Mapping[str, Curve]) -> list[Line]:
+            return [
+                Line(ADAPTERS.get(name, name), curves[name], place=i, dashed=name not in ADAPTERS)
+                for i, name in enumerate(figures["success"])
+                if name in curves
+            ]
+
+        panels = [
+            Panel("", lines(figures["success"])),
+            Panel("", lines(figures["gp_minus"]), difference="Gaussian process, m = 2, minus it"),
         ]
-        path = draw_success({"": lines}, folder / f"{self.name}.png")
+        path = draw_success(panels, folder / f"{self.name}.png")
         return [
             Picture(
                 path,
-                f"Share of goals reached within so many rounds, {figures['generator']} behind "
-                "every adapter, noise amplified. Bars: 95 % intervals over trainings and goals.",
+                f"Left: share of goals reached within so many rounds, {figures['generator']} "
+                "behind every adapter, noise amplified. Right: the paired difference; above zero "
+                "the Gaussian process with m = 2 is ahead. Bars: 95 % intervals over trainings "
+                "and goals.",
             )
         ]
 

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, ClassVar, Literal
 
 from prior_reinforce.experiments.evaluation import Training
+from prior_reinforce.experiments.methods import family_of
 from prior_reinforce.experiments.recipes.claims import Claim
 from prior_reinforce.experiments.units import Unit, Workers, run_units
 
@@ -101,6 +102,14 @@ class Recipe(ABC):
     def trainings(self, scale: Scale, include: Sequence[str]) -> Sequence[Training]:
         """What is to be learned first, so that recipes can share it and learn side by side."""
         return ()
+
+    def joining(self, include: Sequence[str]) -> tuple[str, ...]:
+        """Which of one's own methods belong to the family that is compared here.
+
+        Raises:
+            ConfigurationError: One cannot be made, or is neither a generator nor an adapter.
+        """
+        return tuple(name for name in include if family_of(name) == self.family)
 
     @abstractmethod
     def run(self, run: Run) -> dict[str, Any]:

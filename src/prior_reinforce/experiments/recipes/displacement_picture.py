@@ -7,12 +7,16 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from matplotlib import colormaps
+from matplotlib.colors import ListedColormap
 from matplotlib.patches import Rectangle
 
 from prior_reinforce.report.style import INK, calm_axes, drawing, new_figure, save_png
 
 _LARGEST_SHOWN = 10.0
 """Errors from here on have one colour, in [cm]: else a few far misses would hide all else."""
+# The light part of matplotlib's Blues, on which dark arrows can be seen.
+_COLOURS = ListedColormap(colormaps["Blues"](np.linspace(0.0, 0.62, 128)))
 _DEMONSTRATION = "#f0c800"
 
 
@@ -49,7 +53,7 @@ def draw_fields(fields: Sequence[Field], region: np.ndarray, path: Path) -> Path
         x, y = (100 * axis for axis in field.axes)
         arrows = 100 * field.displacements
         colours = axes.pcolormesh(
-            y, x, np.linalg.norm(arrows, axis=-1), cmap="Blues", vmin=0, vmax=_LARGEST_SHOWN,
+            y, x, np.linalg.norm(arrows, axis=-1), cmap=_COLOURS, vmin=0, vmax=_LARGEST_SHOWN,
             shading="nearest", rasterized=True,
         )  # fmt: skip
         axes.quiver(
