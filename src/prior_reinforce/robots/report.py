@@ -104,7 +104,8 @@ class LimitReport:
         if refusals:
             raise RobotLimitError(
                 f"plan refused for {self.robot}: " + "; ".join(refusals) + ". It is never clamped "
-                "or retimed: choose another goal, or demonstrate gentler motions"
+                "or retimed: choose another goal, learn again with another seed or more steps, "
+                "or demonstrate gentler motions"
             )
 
 
