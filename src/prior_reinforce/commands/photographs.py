@@ -1,0 +1,124 @@
+"""Commands on photographs of a real table: calibrate the camera, see a trial's error."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated
+
+import imageio.v3 as imageio
+import numpy as np
+import tyro
+
+from prior_reinforce.errors import ConfigurationError, FileFormatError, PerceptionFailedError
+from prior_reinforce.feedback import to_words
+from prior_reinforce.perception import (
+    SeenObject,
+    TableCalibration,
+    TableScene,
+    VisionLanguageModel,
+    VisionLanguageModelConfig,
+)
+
+_COLUMNS = ("x", "y", "u", "v")
+
+
+@dataclass(frozen=True)
+class Calibrate:
+    """Fit the camera to known points of the table, and say how well it fits."""
+
+    points: Annotated[Path, tyro.conf.Positional]
+    """CSV with columns x, y (table frame, in metres: forward, left) and u, v (in pixels: right,
+    down), four points at least, five to know how well it fits."""
+    height: float = 0.0
+    """Height of the points above the table, in [m]."""
+    outcome_height: float | None = None
+    """Height at which the outcome is defined, in [m], if it is another; needs --camera."""
+    camera: tuple[float, float, float] | None = None
+    """Where the camera hangs, table frame, in [m]; a tape measure will do."""
+    out: Path = Path("table.json")
+    """File for the calibration."""
+
+    def run(self) -> None:
+        """Fit, save, and say how far each point lies from where the others put it."""
+        table_points, pixels = np.hsplit(_read_points(self.points), 2)
+        calibration = TableCalibration.fit(table_points, pixels, height=self.height)
+        if self.outcome_height is not None:
+            if self.camera is None:
+                raise ConfigurationError("--outcome-height needs --camera X Y Z, in metres")
+            calibration = calibration.at_height(self.outcome_height, np.array(self.camera))
+        calibration.save(self.out)
+        print(f"{calibration.summary()}: {self.out}")
+
+
+@dataclass(frozen=True)
+class Look:
+    """See a trial's error in a photograph from above, with a vision-language model."""
+
+    picture: Annotated[Path, tyro.conf.Positional]
+    """Photograph of the key frame, from the calibrated camera."""
+    reached: str
+    """What flew or slid, in words that fit one thing only: "the orange ball"."""
+    reached_size: float
+    """Longer side of a box around it, in [m]."""
+    goal: str
+    """What stands at the goal: "the red hoop"."""
+    goal_size: float
+    """Longer side of a box around it, in [m]."""
+    goal_offset: tuple[float, float] = (0.0, 0.0)
+    """From that object's centre to the goal, forward and left, in [m]."""
+    calibration: Path = Path("table.json")
+    """What `calibrate` wrote."""
+    vlm: VisionLanguageModelConfig = field(default_factory=VisionLanguageModelConfig)
+    """Endpoint and model (docs/perception.md)."""
+
+    def run(self) -> None:
+        """Look, keep what was seen beside the photograph, and say what to tell."""
+        calibration = TableCalibration.load(self.calibration)
+        scene = TableScene(
+            SeenObject(self.reached, self.reached_size),
+            SeenObject(self.goal, self.goal_size),
+            plane_height=calibration.height,
+            goal_offset=self.goal_offset,
+        )
+        picture = _read_picture(self.picture)
+        model = VisionLanguageModel(scene, self.vlm, calibration=calibration)
+        try:
+            reading = model.read(picture)
+        finally:
+            model.close()
+        stem = f"{self.picture.stem}-seen"
+        reading.save(self.picture.parent, stem)
+        drawn = self.picture.with_name(f"{stem}.png")
+        if reading.error_seen is None:
+            raise PerceptionFailedError(
+                f"{reading.problem}; look at {drawn} and tell what you see yourself"
+            )
+        x, y = reading.error_seen
+        print(f"seen: {to_words(reading.error_seen)}   boxes: {drawn}")
+        print(f"if the boxes are right: prior-reinforce tell FOLDER TRIAL --error {x:.4f} {y:.4f}")
+
+
+def _read_points(path: Path) -> np.ndarray:
+    """Rows of x, y [m], u, v [px], shape (n, 4)."""
+    try:
+        with path.open(newline="", encoding="utf-8") as file:
+            rows = list(csv.DictReader(file, skipinitialspace=True))
+        return np.array([[float(row[name]) for name in _COLUMNS] for row in rows]).reshape(-1, 4)
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise FileFormatError(
+            f"cannot read points from {path} ({error}); expected a CSV with the columns "
+            f"{', '.join(_COLUMNS)} and a number in each"
+        ) from error
+
+
+def _read_picture(path: Path) -> np.ndarray:
+    """Shape (height, width, 3), dtype uint8, RGB; upright as the camera says."""
+    try:
+        return np.asarray(imageio.imread(path, plugin="pillow", mode="RGB", rotate=True))
+    except (OSError, ValueError) as error:
+        first_line = str(error).partition("\n")[0]
+        raise FileFormatError(
+            f"cannot read the picture {path} ({first_line}); expected a PNG or JPEG"
+        ) from error
