@@ -50,6 +50,8 @@ def test_limits_can_be_given(tmp_path):
         ("tolerance = 0.015", "tolerance = -1", r":\d+: \[outcome\] tolerance = -1.*more than 0"),
         ("tolerance = 0.015", 'tolerance = "2cm"', r"tolerance = '2cm'.*must be a number"),
         ("tolerance = 0.015", "tolerance = nan", "must be finite"),
+        ("tolerance = 0.015", "tolerance = 1.5", r":\d+:.*tolerance = 1.5: looks like centimetres"),
+        ("dt = 0.02", "dt = 12.5", r":\d+:.*dt = 12.5: looks like milliseconds"),
         ("tolerance = 0.015", "", r"\[outcome\] tolerance: missing"),
         ("dt = 0.02", "dt = true", "must be a number"),
         ("dt = 0.02", "dt = 0", r"\[plan\].*positive number of seconds"),

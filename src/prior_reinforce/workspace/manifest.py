@@ -26,6 +26,9 @@ else:
     import tomli as tomllib
 
 MANIFEST_FILE = "workspace.toml"
+# Ours: every throw within a metre would count as reached, and no swing is told a frame a second.
+_IMPLAUSIBLE_METRES = 1.0
+_IMPLAUSIBLE_SECONDS = 1.0
 
 TEMPLATE = """\
 # A task for Prior Reinforce. Lengths are metres, angles radians, times seconds.
@@ -173,6 +176,8 @@ class _Reader:
         tolerance = self._number("outcome", "tolerance")
         if tolerance <= 0:
             raise self._error("outcome", "tolerance", "must be more than 0")
+        if set(outcome_units) == {"m"} and tolerance >= _IMPLAUSIBLE_METRES:
+            raise self._error("outcome", "tolerance", "looks like centimetres; give metres")
         name = self._text("task", "name")
         if not name.strip():
             raise self._error("task", "name", "must not be empty")
@@ -187,9 +192,10 @@ class _Reader:
         )
 
     def _format(self) -> PlanFormat:
-        return PlanFormat(
-            self._texts("plan", "names"), self._texts("plan", "units"), self._number("plan", "dt")
-        )
+        dt = self._number("plan", "dt")
+        if dt > _IMPLAUSIBLE_SECONDS:
+            raise self._error("plan", "dt", "looks like milliseconds or a rate; give seconds")
+        return PlanFormat(self._texts("plan", "names"), self._texts("plan", "units"), dt)
 
     def _robot(self) -> RobotLimits | None:
         model = self._text("robot", "model")
