@@ -68,8 +68,9 @@ def time_scikit_learn(
 
 
 def spread(values: np.ndarray, unit: str) -> str:
-    low, median, high = np.percentile(values, [25, 50, 75])
-    return f"{median:8.2f} {unit}  (middle half {low:.2f} to {high:.2f}, worst {values.max():.2f})"
+    least, low, median, high, most = np.percentile(values, [0, 25, 50, 75, 100])
+    middle_half = f"middle half {low:.2f} to {high:.2f}"
+    return f"{median:8.2f} {unit}  ({middle_half}, all {least:.2f} to {most:.2f})"
 
 
 def main() -> None:
