@@ -57,9 +57,9 @@ def test_the_page_holds_claims_tables_and_pictures_in_one_file(tmp_path):
         assert f"## {heading}" in plain
     # Over 0.9 within 4 rounds, above proportional and above none: confirmed; by a margin: not;
     # forgetting: the interval holds zero.
-    summary = "Of 6 claims of the paper: 4 confirmed, 1 not confirmed, 1 open."
-    assert summary in text
-    assert summary in plain
+    assert "Of 6 claims of the paper: 4 confirmed, 1 not confirmed, 1 open." in plain
+    for counted in ("4 confirmed", "1 not confirmed", "1 open"):
+        assert f">{counted}</span>" in text
     assert f"commit {provenance(SCALE)['commit']}" in text
     pictures = re.findall(r"!\[.*\]\((.*)\)", plain)
     assert pictures

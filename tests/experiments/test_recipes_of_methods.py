@@ -90,7 +90,10 @@ def generators_figures(**minus):
                 **vars(method),
                 "success": [interval(s - below) for s in share],
                 "ours_minus": [interval(below) for _ in share],
-                "mean_minus": {"diffusion": interval(below)},
+                "mean_minus": {
+                    "diffusion": interval(below),
+                    "diffusion on whole plans": interval(below + 0.1),
+                },
             }
         )
     return {"trainings": 6, "rows": rows}
@@ -99,10 +102,12 @@ def generators_figures(**minus):
 def test_verdicts_and_remarks_follow_the_figures():
     figures = generators_figures(nearest=0.3, **{"regression-whole": -0.02, "dmp-whole": 0.005})
     recipe = Generators()
-    verdicts = [claim.verdict for claim in recipe.claims(figures)[:4]]
+    verdicts = [claim.verdict for claim in recipe.claims(figures)[:5]]
     assert verdicts == [
         Verdict.CONFIRMED, Verdict.CONFIRMED, Verdict.OPEN, Verdict.NOT_CONFIRMED,
+        Verdict.CONFIRMED,
     ]  # fmt: skip
+    assert "whole plans" in recipe.claims(figures)[4].measured
     (remark,) = recipe.remarks(figures)
     assert "U-Net regression" in remark
     assert "nearest" not in remark

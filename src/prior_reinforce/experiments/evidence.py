@@ -61,17 +61,17 @@ def write_evidence(folder: Path) -> tuple[Path, Path]:
             f"no figures in {folder}; expected one of "
             f"{', '.join(f'{name}.json' for name in RECIPES)}: run a recipe first"
         )
-    summary = _summary(sections)
+    counts = Counter(claim.verdict for section in sections for claim in section.claims)
     page = render(
         "evidence.html",
         package=_PACKAGE,
         title=_TITLE,
-        summary=summary,
+        counts={verdict.value: counts[verdict] for verdict in Verdict},
         sections=sections,
         unbroken=_unbroken,
         source=data_uri,
     )
-    markdown = _markdown(sections, summary, folder)
+    markdown = _markdown(sections, _summary(counts), folder)
     return (
         write_text(folder / "evidence.html", page),
         write_text(folder / "evidence.md", markdown),
@@ -116,18 +116,15 @@ def _made_by(name: str, figures: dict[str, Any]) -> str:
     )
 
 
-def _summary(sections: Sequence[Section]) -> str:
+def _summary(counts: Counter[Verdict]) -> str:
     """How many claims came out how, in a sentence."""
-    counts = Counter(claim.verdict for section in sections for claim in section.claims)
-    if not counts:
-        return "No claim of the paper is held against these figures."
     counted = ", ".join(f"{counts[verdict]} {verdict.value}" for verdict in Verdict)
     return f"Of {counts.total()} claims of the paper: {counted}."
 
 
 def _unbroken(text: str) -> str:
-    """A text whose intervals are never broken between lines."""
-    return re.sub(r"\[[^\]]*\]", lambda match: match[0].replace(" ", _NO_BREAK), text)
+    """A text whose intervals and percentages are never broken between lines."""
+    return re.sub(r"\[[^\]]*\]|\d %", lambda match: match[0].replace(" ", _NO_BREAK), text)
 
 
 def _markdown(sections: Sequence[Section], summary: str, folder: Path) -> str:
