@@ -10,7 +10,7 @@ import pytest
 from killed_runs import results
 from quick_units import Ends, Roots, real_units
 
-from prior_reinforce.errors import UnitFailedError
+from prior_reinforce.errors import ConfigurationError, UnitFailedError
 from prior_reinforce.experiments.files import in_place, sweep, write_atomically
 from prior_reinforce.experiments.units import Workers, result_path, run_units
 
@@ -61,6 +61,12 @@ def test_a_lost_node_of_a_ray_cluster_changes_nothing(tmp_path):
     assert "1 of them twice" in text
     assert "'one that raises' failed: ArithmeticError: 0 is no divisor;" in text
     assert "'one that dies' failed: WorkerCrashedError" in text
+
+
+@pytest.mark.parametrize("address", ["127.0.0.1:1", "ray://127.0.0.1:99999"])
+def test_a_cluster_that_does_not_answer_is_told_at_once(address, tmp_path):
+    with pytest.raises(ConfigurationError, match=f"no Ray cluster answers at {address}: .*start"):
+        run_units([Roots(0)], tmp_path, Workers(ray=address), silent)
 
 
 def test_what_is_done_is_not_run_again(tmp_path):

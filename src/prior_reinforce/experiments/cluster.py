@@ -7,6 +7,7 @@ Ray itself.
 
 from __future__ import annotations
 
+import socket
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, TypeVar
 
@@ -18,6 +19,8 @@ Result = TypeVar("Result")
 _RETRIES = 4
 """Lost nodes or workers that one piece of work survives; a unit that crashes them all by itself
 must come to an end."""
+_ANSWER_S = 5.0
+"""How long an address may take to answer, in [s]; Ray itself would try for minutes."""
 
 
 def run_on_ray(
@@ -42,6 +45,7 @@ def run_on_ray(
         MissingExtraError: Ray is not installed.
         ConfigurationError: No cluster answers at the address.
     """
+    _check_answers(address)
     try:
         import ray
     except ImportError as error:
@@ -52,10 +56,7 @@ def run_on_ray(
         try:
             ray.init(address=address, log_to_driver=False)
         except (ConnectionError, ValueError, RuntimeError) as error:
-            reason = str(error).splitlines()[0]
-            raise ConfigurationError(
-                f"no Ray cluster answers at {address}: {reason}; start one with: ray start --head"
-            ) from error
+            raise _no_cluster(address, error) from error
     remote: Any = ray.remote(num_cpus=1, max_retries=_RETRIES)(lambda item: work(item))
     waiting = {remote.remote(item): item for item in items}
     try:
@@ -70,3 +71,20 @@ def run_on_ray(
     finally:
         for left in waiting:
             ray.cancel(left)
+
+
+def _check_answers(address: str) -> None:
+    """Raise unless something listens at `host:port`; `auto` is left to Ray."""
+    host, _, port = address.removeprefix("ray://").rpartition(":")
+    if host and port.isdecimal():
+        try:
+            socket.create_connection((host, int(port)), timeout=_ANSWER_S).close()
+        except (OSError, OverflowError) as error:
+            raise _no_cluster(address, error) from error
+
+
+def _no_cluster(address: str, error: Exception) -> ConfigurationError:
+    reason = str(error).partition("\n")[0]
+    return ConfigurationError(
+        f"no Ray cluster answers at {address}: {reason}; start one with: ray start --head"
+    )
