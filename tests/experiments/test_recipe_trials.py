@@ -74,6 +74,7 @@ def test_claims_are_judged_by_the_interval():
 
     figures = {
         "trainings": 6,
+        "model": "stand-in",
         "rows": [row(2.0, 2.9), row(2.8, 3.0), row(2.95, 3.1)],
         "first_throws": {"curling": {"value": 0.4, "low": 0.3, "high": 0.49}},
         "eye_minus_model": {

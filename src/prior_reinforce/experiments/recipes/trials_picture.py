@@ -51,6 +51,16 @@ def draw_trials(rows: Sequence[TrialsRow], path: Path) -> Path:
     axes.grid(visible=False, axis="y")
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     for i, row in enumerate(rows):
+        axes.errorbar(
+            row.paper,
+            i - _APART,
+            xerr=row.paper_sd,
+            fmt="D",
+            color=GOAL,
+            elinewidth=1,
+            markersize=6,
+            label="paper, real arm (standard deviation)" if i == 0 else None,
+        )
         for interval, offset, colour, marker, label in (
             (row.many, 0.0, _MANY, "o", "ours, many goals (95 % interval)"),
             (row.unseen, _APART, _UNSEEN, "s", "ours, five unseen goals a set (95 % interval)"),
@@ -66,26 +76,9 @@ def draw_trials(rows: Sequence[TrialsRow], path: Path) -> Path:
                 capsize=3,
                 label=label if i == 0 else None,
             )
-        axes.errorbar(
-            row.paper,
-            i - _APART,
-            xerr=row.paper_sd,
-            fmt="D",
-            color=GOAL,
-            elinewidth=1,
-            markersize=6,
-            label="paper, real arm (standard deviation)" if i == 0 else None,
-        )
     axes.set_yticks(range(len(rows)), [row.label for row in rows], color=INK, fontsize=10.5)
     axes.set_ylim(len(rows) - 0.4, -0.6)
-    axes.set_xlim(left=0)
+    axes.set_xlim(left=0.8)
     axes.set_xlabel("Stage-2 trials to the first hit")
-    axes.legend(
-        loc="upper center",
-        bbox_to_anchor=(0.4, -0.9 / len(rows) - 0.04),
-        ncols=1,
-        frameon=False,
-        fontsize=9.5,
-        labelcolor=INK,
-    )
+    figure.legend(loc="outside lower center", frameon=False, fontsize=9.5, labelcolor=INK)
     return save_png(figure, path)
