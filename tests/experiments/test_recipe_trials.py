@@ -60,6 +60,8 @@ def test_a_row_counts_what_was_not_reached_as_one_trial_more(tmp_path):
         assert figures["first_throws"][unit["unit"]["task"]]["value"] == pytest.approx(share)
     assert len(recipe.table(figures).rows) == 2
     assert {claim.verdict for claim in recipe.claims(figures)} == {Verdict.OPEN}  # one training
+    assert figures["readings_judged_by_eye"] == 0
+    assert recipe.remarks(figures) == []  # nobody looked at pictures
     (picture,) = recipe.draw(figures, tmp_path)
     assert picture.path.stat().st_size > 10_000
 

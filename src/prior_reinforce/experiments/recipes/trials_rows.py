@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 
 @dataclass(frozen=True)
@@ -35,3 +37,8 @@ ROWS = (
     PaperRow("Basketball Shot V3", "basketball-v3", "basketball-v1", False, 6, 3.7, 1.5),
 )
 """Table II of the paper, in its order."""
+
+
+def sense_of(row: Mapping[str, Any], figures: Mapping[str, Any]) -> str:
+    """The paper's word for how a row of figures was seen, and who stood in for the VLM."""
+    return f"VLM ({figures['model']})" if row["by_model"] else "eye"

@@ -1,0 +1,53 @@
+"""What the paper says of its table of trials, held against ours."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from prior_reinforce.experiments.recipes.claims import Claim, Verdict, above, at_most
+from prior_reinforce.experiments.recipes.success import interval_of
+from prior_reinforce.experiments.recipes.trials_rows import sense_of
+
+_HALF = 0.5
+"""Ours: the paper says "often" without a number."""
+
+
+def trials_claims(figures: Mapping[str, Any]) -> list[Claim]:
+    """Each mean is at most the paper's; first throws miss; a VLM needs fewer trials than an eye.
+
+    Args:
+        figures: Of `trials.TrialsTable`.
+    """
+    n = figures["trainings"]
+    means = [
+        Claim(
+            f"{row['title']}, {sense_of(row, figures)}: {row['trials']:.1f} trials on average "
+            "(here: at most).",
+            f"{interval_of(row['many']['trials'])} on {row['many']['goals']} goals",
+            at_most(interval_of(row["many"]["trials"]), row["trials"], n),
+        )
+        for row in figures["rows"]
+        if row["adapter"] == "gp"
+    ]
+    first = [
+        Claim(
+            "The goal itself as the condition often leads to inaccurate outcomes (here: in "
+            f"more than half of the first attempts at {task}).",
+            f"share reached at once, no adapter: {interval_of(share)}",
+            at_most(interval_of(share), _HALF, n),
+        )
+        for task, share in figures["first_throws"].items()
+    ]
+    fewer = {task: interval_of(value) for task, value in figures["eye_minus_model"].items()}
+    if not fewer:
+        return [*means, *first]
+    verdicts = [above(interval, 0.0, n) for interval in fewer.values()]
+    # Of "in some tasks" one is enough.
+    some = Verdict.CONFIRMED if Verdict.CONFIRMED in verdicts else Verdict.OPEN
+    if all(verdict is Verdict.NOT_CONFIRMED for verdict in verdicts):
+        some = Verdict.NOT_CONFIRMED
+    said = "; ".join(f"{task} {interval:+.2f}" for task, interval in fewer.items())
+    claim = "Seeing by a VLM slightly reduces the trials in some tasks."
+    measured = f"eye minus {figures['model']}, same goals: {said}"
+    return [*means, *first, Claim(claim, measured, some)]
