@@ -132,8 +132,11 @@ def test_the_goal_shown_was_reached_in_about_three_trials():
 @pytest.mark.slow
 def test_the_process_is_that_of_the_table_and_its_picture_marks_the_hit(tmp_path):
     of_table = Trials(TRAINING, "basketball-v1", "gp", "eye", 5, unseen=True, rounds=6)
-    solved_at = of_table.run(tmp_path)["solved_at"]
+    in_table = of_table.run(tmp_path)
+    solved_at = in_table["solved_at"]
     goals = Process(TRAINING, rounds=6).run(tmp_path)["goals"]
+    first = [np.subtract(goal["trials"][0]["outcome"], goal["goal"]) for goal in goals]
+    np.testing.assert_allclose(np.linalg.norm(first, axis=1), in_table["first_error"])
     assert [len(goal["trials"]) for goal in goals] == [at or 6 for at in solved_at]
 
     recipe = ProcessPictures(tasks=("basketball-v1",), generator="nearest")
