@@ -281,6 +281,17 @@ def test_no_server_at_all_asks_the_operator(looking, picture):
     assert "is the server running?" in perception.read(picture).problem
 
 
+def test_a_server_on_this_machine_is_asked_without_the_proxy_for_others(
+    looking, picture, monkeypatch
+):
+    monkeypatch.delenv("NO_PROXY", raising=False)
+    monkeypatch.delenv("no_proxy", raising=False)
+    monkeypatch.setenv("HTTP_PROXY", "http://127.0.0.1:9")  # nobody listens there
+    with VisionServer() as server:
+        reading = looking(server, max_retries=0, votes=1).read(picture)
+    np.testing.assert_allclose(reading.error_seen, BALL - GOAL, atol=0.003)
+
+
 def test_a_lost_ball_is_named(looking, frame_with_ball_at):
     with VisionServer() as server:
         perception = looking(server)

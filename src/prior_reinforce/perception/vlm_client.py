@@ -7,6 +7,7 @@ import io
 import os
 from dataclasses import dataclass
 from typing import Any, Literal
+from urllib.parse import urlsplit
 
 import numpy as np
 
@@ -20,6 +21,8 @@ from prior_reinforce.perception.vlm_formats import (
     size_to_send,
 )
 from prior_reinforce.perception.vlm_reading import Answer
+
+_THIS_MACHINE = {"127.0.0.1", "localhost", "::1"}
 
 
 @dataclass(frozen=True)
@@ -111,11 +114,14 @@ class ModelClient:
                 "install them with: pip install 'prior-reinforce[vlm]'"
             ) from error
         self.config = config
+        # A proxy, set for the internet at large, does not know a server on this machine.
+        is_here = urlsplit(config.base_url).hostname in _THIS_MACHINE
         self._client = openai.OpenAI(
             base_url=config.base_url,
             api_key=_key(config),
             timeout=config.timeout,
             max_retries=config.max_retries,
+            http_client=openai.DefaultHttpxClient(trust_env=not is_here),
         )
 
     def prepare(self, picture: np.ndarray) -> SentPicture:
