@@ -51,8 +51,9 @@ def test_only_the_reachable_region_counts():
 
 
 def test_the_three_kept_span_the_largest_triangle():
-    outcomes = np.array([[0.5, 0.5], [0.0, 0.0], [1.0, 0.1], [0.4, 0.6], [0.0, 2.0], [0.3, 0.3]])
-    assert set(widest_three(outcomes)) == {1, 2, 4}
+    outcomes = np.array([[0.5, 0.5], [0.0, 0.0], [1.0, 1.0], [2.0, 2.0], [0.9, 0.2]])
+    # The farthest three lie on one line and span nothing.
+    assert set(widest_three(outcomes)) == {1, 3, 4}
 
 
 @pytest.mark.slow
