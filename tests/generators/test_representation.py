@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.interpolate import BSpline
 from throws import swing, throws
 
 from prior_reinforce.generators.representation import PlanCodec
@@ -111,3 +112,24 @@ def test_settings_and_arrays_are_all_there_is():
     again = PlanCodec.restore(codec.settings(), codec.plan_range, codec.code_range)
     codes = np.random.default_rng(0).normal(size=(5, codec.channels, codec.length))
     np.testing.assert_array_equal(again.decode(codes), codec.decode(codes))
+
+
+def test_ripple_between_control_points_hardly_accelerates_the_plan():
+    """An alternating error of the code moves a third of what the bare spline would, or less."""
+    horizon, points = 93, 24
+    t = np.linspace(0, 1, horizon)[None, :, None]
+    swings = np.array([0.8, 1.0, 1.2])[:, None, None] * (t**3 * (10 - 15 * t + 6 * t**2))
+    codec = PlanCodec.fit(
+        swings, representation="splines", frames_per_point=4, length_multiple=4, margin=0.5
+    )
+    assert codec.length == points
+    codes = codec.encode(swings)
+    np.testing.assert_allclose(codec.decode(codes), swings, atol=1e-4)
+    inner = (np.arange(points) > 4) & (np.arange(points) < points - 5)
+    ripple = 0.01 * np.where(inner, (-1.0) ** np.arange(points), 0.0)
+    moved = codec.decode(codes + ripple) - codec.decode(codes)
+    # The bare spline: second differences of its basis, for the same ripple of the control points.
+    half = (codec.code_range[1, 0] - codec.code_range[0, 0]) / 2
+    knots = np.concatenate([[0] * 3, np.linspace(0, horizon - 1, points - 2), [horizon - 1] * 3])
+    bare = BSpline(knots, half * ripple, 3)(np.arange(horizon))
+    assert np.abs(np.diff(moved[0, :, 0], 2)).max() < np.abs(np.diff(bare, 2)).max() / 3

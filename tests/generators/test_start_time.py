@@ -7,6 +7,7 @@ import pytest
 
 from prior_reinforce.generators.start_time import StartTimeCodec
 from prior_reinforce.motions import Demonstrations, PlanFormat
+from prior_reinforce.tasks import make_task
 
 STARTS = [5, 31, 12, 44]
 
@@ -134,3 +135,14 @@ def test_a_small_dimension_that_still_moves_at_the_end_is_not_held():
     codec, codes = fit(replace(moving, format=replace(moving.format, units=("rad", "rad", "m"))))
     assert codec.starts is None
     np.testing.assert_allclose(codec.decode(codes), plans, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["A", "B"])
+def test_a_trembling_hand_is_not_jerked_where_its_tremor_is_held(name):
+    """Cut in mid-swing, the shipped curling sets' tremor would jerk the wrist."""
+    demos = make_task("curling").demonstrations(name)
+    codec, codes = fit(demos, representation="splines")
+    jolts = np.abs(np.diff(codec.decode(codes), n=2, axis=1)).max(axis=(0, 1))
+    shown = np.abs(np.diff(demos.plans, n=2, axis=1)).max(axis=(0, 1))
+    assert codec.starts is not None
+    assert np.all(jolts <= 1.1 * shown)

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.special import betainc
 from typing_extensions import Self
 
 from prior_reinforce.errors import InvalidDemonstrationsError
@@ -80,7 +81,7 @@ class StartTimeCodec:
         plans = demonstrations.plans
         cut = _cut(demonstrations) if start_times else None
         if cut is not None:
-            plans = _moved(plans, -cut.begins, cut.length)
+            plans = _settled(_moved(plans, -cut.begins, cut.length), cut.before, cut.after)
         motion = PlanCodec.fit(
             plans,
             representation=representation,
@@ -152,6 +153,10 @@ class _Cut:
     """Frame at which each demonstration's cut-out begins, shape (N,); may be negative."""
     length: int
     """Frames of every cut-out; outside it a demonstration holds its ends."""
+    before: int
+    """Frames of it before the first motion begins."""
+    after: int
+    """Frames of it after the last motion has ended."""
 
 
 def _cut(demonstrations: Demonstrations) -> _Cut | None:
@@ -180,7 +185,8 @@ def _cut(demonstrations: Demonstrations) -> _Cut | None:
     cut = _window(moving, delays, demonstrations.horizon, _TREMOR_PADDING)
     if cut is None:
         return None
-    held = _moved(_moved(plans, -cut.begins, cut.length), cut.begins, demonstrations.horizon)
+    motions = _settled(_moved(plans, -cut.begins, cut.length), cut.before, cut.after)
+    held = _moved(motions, cut.begins, demonstrations.horizon)
     lost = np.sqrt(np.mean((held - plans) ** 2, axis=1)).max(axis=0)
     ranges, units = np.ptp(plans, axis=(0, 1)), np.array(demonstrations.format.units)
     largest = np.array([ranges[units == unit].max() for unit in units])
@@ -201,10 +207,23 @@ def _window(
     after = min(padding, horizon - 1 - int(delays.max()) - last)
     if before < 0 or after < 0:
         return None
-    return _Cut(delays + first - before, last - first + 1 + before + after)
+    return _Cut(delays + first - before, last - first + 1 + before + after, before, after)
 
 
 def _moved(plans: np.ndarray, by: np.ndarray, length: int) -> np.ndarray:
     """Plans (n, H, D) that many frames later, their ends held, cut to a length; (n, length, D)."""
     frames = np.clip(np.arange(length) - by[:, None], 0, plans.shape[1] - 1)
     return plans[np.arange(len(plans))[:, None], frames]
+
+
+def _settled(motions: np.ndarray, before: int, after: int) -> np.ndarray:
+    """Motions (n, L, D) that grow out of their first frame and die down to their last, smoothly.
+
+    Where ends rest exactly nothing changes; tremor that is cut in mid-swing would jerk the arm.
+    """
+    frames = np.arange(motions.shape[1])
+    rise = betainc(3, 3, np.minimum(1.0, frames / max(1, before)))[:, None]
+    fall = betainc(3, 3, np.minimum(1.0, frames[::-1] / max(1, after)))[:, None]
+    first, last = motions[:, :1], motions[:, -1:]
+    settled = first + rise * (motions - first)
+    return np.asarray(last + fall * (settled - last))
