@@ -75,6 +75,17 @@ def test_adapters_share_the_first_throw_and_differ_after(tmp_path):
     assert picture.path.is_file()
 
 
+def test_without_variants_the_papers_comparison_and_own_methods_are_left():
+    small = Scale(goals=5, seeds=(0,), sets=("A",), variants=False)
+    learned = [(t.generator, t.aligned) for t in Generators().trainings(small, (SOFTMAX,))]
+    assert learned == [
+        ("diffusion", False),
+        *((name, False) for name in ("nearest", "dmp-whole", "regression-whole")),
+        *((name, True) for name in ("nearest", "dmp-whole", "regression-whole")),
+        (SOFTMAX, False),
+    ]
+
+
 def generators_figures(**minus):
     """Figures in which diffusion reaches .5 and then .96, and others as far below as is said."""
     share = [0.5, 0.96, 0.96, 0.96]

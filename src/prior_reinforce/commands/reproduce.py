@@ -39,7 +39,7 @@ class Reproduce:
     seeds: tuple[int, ...] = (0, 1, 2)
     """Training seeds."""
     quick: bool = False
-    """Ten goals and one training a method: shows that everything runs, decides no claim."""
+    """Ten goals, one training a method, no variants: shows that it runs, decides no claim."""
     workers: int = 1
     """Processes on this machine."""
     ray: str | None = None

@@ -33,6 +33,8 @@ class Scale:
     """Prior sets."""
     rounds: int = 10
     """Trials a goal at most."""
+    variants: bool = True
+    """Whether what the paper does not compare is run beside it."""
 
     @property
     def trainings(self) -> int:
@@ -40,8 +42,8 @@ class Scale:
         return len(self.seeds) * len(self.sets)
 
 
-QUICK = Scale(goals=10, seeds=(0,), sets=("A",))
-"""One training a method: shows that everything runs, and decides no claim."""
+QUICK = Scale(goals=10, seeds=(0,), sets=("A",), variants=False)
+"""One training a method of the paper: shows that everything runs, and decides no claim."""
 
 
 def _silent(done: int, total: int, label: str) -> None:

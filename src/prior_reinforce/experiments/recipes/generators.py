@@ -90,13 +90,14 @@ class Generators(Recipe):
         """Every method, on every prior set."""
         return [
             training
-            for method in self._methods(include)
+            for method in self._methods(scale, include)
             for training in trainings_of(scale, method.generator, aligned=method.aligned)
         ]
 
     def run(self, run: Run) -> dict[str, Any]:
         """Try the same goals with every generator."""
-        scale, methods = run.scale, self._methods(run.include)
+        scale = run.scale
+        methods = self._methods(scale, run.include)
         trainings = self.trainings(scale, run.include)
         run.results(trainings)
         units = [
@@ -237,9 +238,10 @@ class Generators(Recipe):
             "docs/baselines.md says why."
         ]
 
-    def _methods(self, include: Sequence[str]) -> tuple[Method, ...]:
+    def _methods(self, scale: Scale, include: Sequence[str]) -> tuple[Method, ...]:
+        compared = (m for m in self.methods[1:] if scale.variants or m.kind == "baseline")
         own = (Method(name, name, aligned=False, kind="other") for name in include)
-        return (*self.methods, *own)
+        return (self.methods[0], *compared, *own)
 
 
 def _unaligned(label: str) -> str:
