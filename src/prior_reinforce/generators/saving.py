@@ -22,7 +22,7 @@ from safetensors.numpy import save as dump_tensors
 from prior_reinforce.errors import FileFormatError
 
 _FILE_FORMAT = "prior-reinforce generator"
-_FILE_VERSION = 1
+_FILE_VERSION = 2
 CONFIG_FILE = "config.json"
 TENSOR_FILE = "model.safetensors"
 
