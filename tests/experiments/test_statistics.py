@@ -1,0 +1,49 @@
+"""Intervals: they hold the truth as often as they say, also over few trainings."""
+
+import numpy as np
+import pytest
+
+from prior_reinforce.experiments.statistics import (
+    bootstrap_difference,
+    bootstrap_mean,
+    reached_by,
+)
+
+
+@pytest.mark.parametrize("goal_spread", [0.0, 0.3])
+def test_the_interval_holds_the_truth_over_six_trainings_that_share_goals(goal_spread):
+    rng = np.random.default_rng(0)
+    held = 0
+    for number in range(200):
+        training = rng.normal(0.0, 0.15, (6, 1))
+        goal = rng.normal(0.0, goal_spread, (1, 30))
+        interval = bootstrap_mean(training + goal + rng.normal(0.0, 0.4, (6, 30)), seed=number)
+        held += interval.low <= 0.0 <= interval.high
+    assert held >= 0.93 * 200
+
+
+def test_what_all_trainings_share_is_uncertain_through_the_goals_alone():
+    """Thirty equal rows: the interval of a mean over 50 goals, hardly widened."""
+    goals = np.random.default_rng(1).normal(0.0, 1.0, 50)
+    interval = bootstrap_mean(np.stack([goals] * 30))
+    half = 1.96 * goals.std() / np.sqrt(50)
+    assert interval.value == pytest.approx(goals.mean())
+    assert (interval.high - interval.low) / 2 == pytest.approx(half, rel=0.15)
+
+
+def test_an_interval_stays_within_what_was_seen():
+    certain = bootstrap_mean(np.ones((3, 5)))
+    assert (certain.value, certain.low, certain.high) == (1.0, 1.0, 1.0)
+    seen = bootstrap_mean(np.array([[1.0, 1.0, 0.0], [1.0, 1.0, 1.0]]))
+    assert 0.0 <= seen.low <= seen.value <= seen.high <= 1.0
+
+
+def test_a_paired_difference_does_not_know_what_both_share():
+    rng = np.random.default_rng(2)
+    shared = rng.normal(0.0, 5.0, (6, 40))
+    difference = bootstrap_difference(shared + 0.5, shared)
+    assert (difference.low, difference.high) == pytest.approx((0.5, 0.5))
+
+
+def test_goals_that_were_never_reached_count_as_missed():
+    np.testing.assert_array_equal(reached_by(np.array([0, 1, 3]), 2), [0.0, 1.0, 0.0])
