@@ -33,7 +33,13 @@ ADAPTERS = {
         "proportional": curve(0.0, 0.1),
         "frozen": curve(0.0, 0.25),
     },
-    "gp_mean_minus": {"proportional": curve(0.08)[0]},
+    "forms": {
+        "gp": {
+            "minus_proportional": curve(0.0, 0.1),
+            "mean_minus_proportional": curve(0.08)[0],
+            "minus_no_forgetting": curve(0.0, 0.0, 0.0, 0.01),
+        }
+    },
     "proportional_minus_frozen": curve(0.0, 0.15, 0.3),
     "proportional_mean_minus_frozen": curve(0.2)[0],
 }

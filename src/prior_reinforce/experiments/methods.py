@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Literal
 
 from prior_reinforce.adapters import (
@@ -60,20 +61,24 @@ def make_generator(name: str) -> Generator:
 def make_adapter(name: str) -> Adapter:
     """Make an adapter by its name, or one's own by `module:Class`.
 
-    `gp` is the paper's with m = 2; `gp-all` keeps every trial (m = infinity).
+    `gp` is ours with m = 2; `gp-all` keeps every trial (m = infinity). `gp-one-term` and
+    `gp-one-term-all` put one fixed size on the whole diagonal, as the paper writes it.
 
     Raises:
         ConfigurationError: There is no such adapter.
     """
-    if name == "gp":
-        return GaussianProcessAdapter()
-    if name == "gp-all":
-        return GaussianProcessAdapter(GaussianProcessConfig(memory_size=None))
-    if name == "proportional":
-        return ProportionalAdapter()
-    if name == "frozen":
-        return FrozenAdapter()
-    return make_own(name, Adapter, ["gp", "gp-all", "proportional", "frozen"])
+    one_term = GaussianProcessConfig(trial_jitter=1e-3, demonstration_jitter_bounds=(1e-3, 1e-3))
+    known: dict[str, Callable[[], Adapter]] = {
+        "gp": GaussianProcessAdapter,
+        "gp-all": lambda: GaussianProcessAdapter(GaussianProcessConfig(memory_size=None)),
+        "gp-one-term": lambda: GaussianProcessAdapter(one_term),
+        "gp-one-term-all": lambda: GaussianProcessAdapter(replace(one_term, memory_size=None)),
+        "proportional": ProportionalAdapter,
+        "frozen": FrozenAdapter,
+    }
+    if name in known:
+        return known[name]()
+    return make_own(name, Adapter, list(known))
 
 
 def make_perception(name: str) -> Perception:
