@@ -35,6 +35,7 @@ def test_a_gentle_swing_passes_everything():
     assert not report.refused
     assert not report.warned
     assert [line.check for line in report.lines] == [
+        "joints",
         "position",
         "velocity",
         "acceleration",
@@ -176,8 +177,8 @@ def test_columns_are_matched_by_name_whatever_their_order():
     shuffled = np.column_stack([np.zeros(len(plan)), plan[:, order]])
     report = check_plan(Plan(shuffled, PlanFormat(names, ("m", *("rad",) * 7), DT)), PANDA)
     straight = check_plan(Plan(plan, FORMAT), PANDA)
-    assert [(a.value, a.joint) for a in report.lines[:4]] == [
-        (b.value, b.joint) for b in straight.lines[:4]
+    assert [(a.value, a.joint) for a in report.lines[1:5]] == [
+        (b.value, b.joint) for b in straight.lines[1:5]
     ]
 
 
@@ -186,17 +187,36 @@ def test_some_joints_only():
     report = check_plan(Plan(swing(4, 1.2, 1.0)[:, [3, 5]], form), PANDA)
     found = lines(report)
     assert found["velocity"].joint == "joint4"
-    assert "not in the plan: joint1" in found["velocity"].text
     assert found["workspace"].status == "unchecked"
+    assert (found["joints"].status, found["joints"].value) == ("warn", 5)
+    assert found["joints"].text.endswith("joint1, joint2, joint3, joint5, joint7")
+
+
+def test_a_joint_without_a_column_never_just_passes():
+    """`Joint4` may be joint4, or another arm's: it is not guessed, and not passed over."""
+    gentle = swing(4, 0.5, 1.0)
+    names = ("joint1", "joint2", "joint3", "Joint4", "joint5", "j6", "joint7")
+    plan = Plan(gentle, PlanFormat(names, ("rad",) * 7, DT))
+    report = check_plan(plan, PANDA)
+    assert report.warned
+    assert report.text().startswith("plan passes with warnings")
+    assert "WARN   joints         not in the plan, so not checked: joint4, joint6" in report.text()
+    meant = check_plan(plan, PANDA, settings=GateSettings(absent_joints=("joint4", "joint6")))
+    assert meant.text().startswith("plan passes:")
+    assert "5 of 7, without joint4, joint6 on purpose" in meant.text()
+    for wrong, why in (("joint1", "the plan moves it"), ("joint9", "no such joint")):
+        with pytest.raises(ConfigurationError, match=why):
+            check_plan(plan, PANDA, settings=GateSettings(absent_joints=(wrong,)))
 
 
 def test_what_cannot_be_checked_says_so():
     form = PlanFormat(("x", "y", "z"), ("m",) * 3, DT)
     report = check_plan(Plan(np.zeros((10, 3)), form), PANDA)
-    assert {line.status for line in report.lines} == {"unchecked"}
+    assert {line.status for line in report.lines[1:]} == {"unchecked"}
+    assert lines(report)["joints"].status == "warn"
     assert not report.refused
     assert report.text().startswith("plan NOT CHECKED for the arm: limits of panda")
-    assert report.as_json()["unchecked"] == [line.check for line in report.lines]
+    assert report.as_json()["unchecked"] == [line.check for line in report.lines[1:]]
 
 
 def test_degrees_are_refused():
@@ -209,7 +229,7 @@ def test_the_report_is_plain_data():
     report = check_plan(Plan(swing(4, 1.2, 1.0), FORMAT), PANDA, demonstrations())
     data = json.loads(json.dumps(report.as_json(), allow_nan=False))
     assert data["refused"] is True
-    assert data["lines"][1]["joint"] == "joint4"
+    assert data["lines"][2]["joint"] == "joint4"
     assert "REFUSE velocity" in report.text()
 
 
@@ -246,7 +266,7 @@ def test_a_plan_passes_exactly_when_looser_limits_of_its_own_peaks_hold(seed):
     loose = RobotLimits(
         "arm", "1", "test", FORMAT.names, *(np.full(7, v) for v in (-9, 9, 1e3, 1e4, 1e7))
     )
-    peaks = {line.check: line.value for line in check_plan(plan, loose).lines[1:4]}
+    peaks = {line.check: line.value for line in check_plan(plan, loose).lines[2:5]}
     for check, peak in peaks.items():
         for factor, status in ((1.001, "warn"), (0.999, "refuse")):
             values = {"velocity": 1e3, "acceleration": 1e4, "jerk": 1e7} | {check: peak * factor}

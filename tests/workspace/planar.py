@@ -5,7 +5,7 @@ import numpy as np
 from prior_reinforce.generators import DiffusionConfig
 from prior_reinforce.generators.unet import UNetSize
 from prior_reinforce.motions import Demonstrations, PlanFormat
-from prior_reinforce.workspace.manifest import TEMPLATE
+from prior_reinforce.workspace.manifest_template import TEMPLATE
 
 FORMAT = PlanFormat(("joint1", "joint2"), ("rad", "rad"), 0.02)
 SMALL = DiffusionConfig(

@@ -11,6 +11,8 @@ from planar import manifest
 from prior_reinforce.errors import ConfigurationError, FileFormatError
 from prior_reinforce.workspace.manifest import load_manifest
 
+SEVEN = {"names": str([f"joint{i}" for i in range(1, 8)]), "units": str(["rad"] * 7)}
+
 
 def write(tmp_path, text):
     path = tmp_path / "workspace.toml"
@@ -19,9 +21,9 @@ def write(tmp_path, text):
 
 
 def test_the_template_says_what_was_filled_in(tmp_path):
-    read = load_manifest(write(tmp_path, manifest(robot="panda", names='["joint1", "joint2"]')))
+    read = load_manifest(write(tmp_path, manifest(robot="panda", **SEVEN)))
     assert read.name == "planar"
-    assert read.format.names == ("joint1", "joint2")
+    assert read.format.names == tuple(f"joint{i}" for i in range(1, 8))
     assert read.format.dt == 0.02
     assert read.outcome_units == ("m", "m")
     assert read.tolerance == 0.015
@@ -42,6 +44,39 @@ def test_limits_can_be_given(tmp_path):
     limits = load_manifest(write(tmp_path, text)).robot
     assert limits.upper.tolist() == [2, 2]
     assert limits.jerk.tolist() == [5000, 5000]
+
+
+@pytest.mark.parametrize("stem", ["Joint", "j", "q", "motor_"])
+def test_a_robots_joints_must_be_among_the_plans_names(tmp_path, stem):
+    """A column by another name would be handed out unchecked."""
+    given = SEVEN | {"names": str([f"{stem}{i}" for i in range(1, 8)])}
+    missing = ", ".join(f"joint{i}" for i in range(1, 8))
+    with pytest.raises(
+        ConfigurationError, match=rf":\d+: \[plan\] names = .*lacks {missing} of panda.*give"
+    ):
+        load_manifest(write(tmp_path, manifest(robot="panda", **given)))
+    assert load_manifest(write(tmp_path, manifest(robot="none", **given))).robot is None
+
+
+@pytest.mark.parametrize(
+    ("absent", "message"),
+    [
+        ('["joint1", "joint3", "joint5", "joint6"]', None),
+        ('["joint1", "joint3", "joint5"]', r"\[plan\] names = .*lacks joint6 of panda"),
+        ('["joint1", "joint2"]', r"\[gate\]: absent_joints names 'joint2', but the plan moves it"),
+        ('["elbow"]', r"\[gate\]: absent_joints names 'elbow', but panda has no such joint"),
+        ("[1]", r"\[gate\] absent_joints = \[1\]: must be a list of texts"),
+    ],
+)
+def test_joints_may_stay_still_on_purpose(tmp_path, absent, message):
+    names = {"names": '["panda_joint2", "joint4.pos", "joint7"]', "units": '["rad", "rad", "rad"]'}
+    text = manifest(robot="panda", **names)
+    text = text.replace("[gate]", f"[gate]\nabsent_joints = {absent}", 1)
+    if message is None:
+        assert load_manifest(write(tmp_path, text)).gate.absent_joints[0] == "joint1"
+    else:
+        with pytest.raises(ConfigurationError, match=message):
+            load_manifest(write(tmp_path, text))
 
 
 @pytest.mark.parametrize(
@@ -91,7 +126,9 @@ def test_a_missing_file_and_one_that_is_no_toml_are_named(tmp_path):
         load_manifest(tmp_path / "workspace.toml")
 
 
-@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(
+    max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
 @given(st.integers(0, 2000), st.binary(max_size=3))
 def test_no_damage_causes_anything_but_a_named_error(tmp_path, position, junk):
     whole = manifest().encode()

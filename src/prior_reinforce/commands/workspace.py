@@ -13,7 +13,7 @@ from typing import Annotated, Literal
 
 import tyro
 
-from prior_reinforce.workspace.manifest import TEMPLATE
+from prior_reinforce.workspace.manifest_template import TEMPLATE
 from prior_reinforce.workspace.reporting import report_workspace
 from prior_reinforce.workspace.status import describe, next_step
 from prior_reinforce.workspace.wording import say_place

@@ -3,6 +3,7 @@
 from prior_reinforce.robots.gate import check_plan
 from prior_reinforce.robots.interpolation import FineMotion, interpolate
 from prior_reinforce.robots.limits import RobotLimits, VelocityEnvelope, robot_limits
+from prior_reinforce.robots.matching import match_joints, missing_joints
 from prior_reinforce.robots.report import LimitLine, LimitReport
 from prior_reinforce.robots.settings import GateSettings
 
@@ -15,5 +16,7 @@ __all__ = [
     "VelocityEnvelope",
     "check_plan",
     "interpolate",
+    "match_joints",
+    "missing_joints",
     "robot_limits",
 ]

@@ -1,4 +1,4 @@
-"""Checks of a plan's joints against the maker's limits: position, velocity and so on, and rest."""
+"""Checks of a plan's joints against the maker's limits: all there, position and so on, and rest."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 from prior_reinforce.motions import Plan
 from prior_reinforce.robots.interpolation import FineMotion
 from prior_reinforce.robots.limits import RobotLimits
+from prior_reinforce.robots.matching import missing_joints
 from prior_reinforce.robots.report import LimitLine, Status, unchecked
 from prior_reinforce.robots.settings import GateSettings
 
@@ -28,27 +29,24 @@ class JointChecks:
 
     def lines(self) -> list[LimitLine]:
         """Position, velocity, acceleration and jerk, each at its worst joint and time."""
-        missing = [name for i, name in enumerate(self.limits.joint_names) if i not in self.columns]
         if not self.columns:
             why = f"the plan has no column named like {self.limits.joint_names[0]}"
             return [
                 unchecked(name, why) for name in ("position", "velocity", "acceleration", "jerk")
             ]
-        note = f"; not in the plan: {', '.join(missing)}" if missing else ""
         rows, picked = list(self.columns), list(self.columns.values())
         q, dq = self.fine.q[:, picked], self.fine.dq[:, picked]
         low, high = self._velocity_bounds(q, rows)
         bound = np.where(dq < 0, -low, high)
         return [
-            self._position(q, rows, note),
-            self._rate("velocity", "rad/s", dq, bound, rows, note),
+            self._position(q, rows),
+            self._rate("velocity", "rad/s", dq, bound, rows),
             self._rate(
                 "acceleration",
                 "rad/s^2",
                 self.fine.ddq[:, picked],
                 np.broadcast_to(self.limits.acceleration[rows], q.shape),
                 rows,
-                note,
             ),
             self._rate(
                 "jerk",
@@ -56,7 +54,6 @@ class JointChecks:
                 self.fine.dddq[:, picked],
                 np.broadcast_to(self.limits.jerk[rows], q.shape),
                 rows,
-                note,
             ),
         ]
 
@@ -66,7 +63,7 @@ class JointChecks:
         low, high = self.limits.velocity_bounds(everywhere)
         return low[:, rows], high[:, rows]
 
-    def _position(self, q: np.ndarray, rows: list[int], note: str) -> LimitLine:
+    def _position(self, q: np.ndarray, rows: list[int]) -> LimitLine:
         lower, upper = self.limits.lower[rows], self.limits.upper[rows]
         distance = np.minimum(q - lower, upper - q)
         sample, joint = np.unravel_index(int(np.argmin(distance)), distance.shape)
@@ -82,7 +79,7 @@ class JointChecks:
         where = "beyond" if margin <= 0 else "from"
         text = (
             f"{name} at {value:.3f} rad, {abs(margin):.3f} {where} its end {limit:.3f}, "
-            f"at {time:.3f} s{note}"
+            f"at {time:.3f} s"
         )
         return LimitLine("position", status, value, limit, margin, "rad", name, time, text)
 
@@ -93,7 +90,6 @@ class JointChecks:
         values: np.ndarray,
         bound: np.ndarray,
         rows: list[int],
-        note: str,
     ) -> LimitLine:
         # Next to a stop the bound is 0; a joint that rests there (to rounding) breaks nothing.
         used = np.where(np.abs(values) < 1e-6, 0.0, np.abs(values) / np.maximum(bound, 1e-12))
@@ -110,9 +106,30 @@ class JointChecks:
         here = " at that position" if check == "velocity" and self.limits.envelopes else ""
         text = (
             f"{name} at {abs(value):.4g} {unit}, {100 * share:.0f} % of {limit:.4g}{here}, "
-            f"at {time:.3f} s{note}"
+            f"at {time:.3f} s"
         )
         return LimitLine(check, status, abs(value), limit, margin, unit, name, time, text)
+
+
+def check_joints(columns: dict[int, int], limits: RobotLimits, settings: GateSettings) -> LimitLine:
+    """Whether the plan has a column for every joint, but for those left out on purpose.
+
+    Raises:
+        ConfigurationError: `absent_joints` names no joint of the robot, or one that the plan moves.
+    """
+    missing = missing_joints(columns, limits, settings.absent_joints)
+    n, all_ = len(columns), len(limits.joint_names)
+    if missing:
+        text = f"not in the plan, so not checked: {', '.join(missing)}"
+    elif settings.absent_joints:
+        text = f"{n} of {all_}, without {', '.join(settings.absent_joints)} on purpose"
+    else:
+        text = f"all {all_} are in the plan"
+    status: Status = "warn" if missing else "pass"
+    first = missing[0] if missing else None
+    return LimitLine(
+        "joints", status, float(len(missing)), 0.0, 0.0 - len(missing), "1", first, None, text
+    )
 
 
 def check_rest(

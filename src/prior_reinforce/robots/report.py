@@ -21,7 +21,7 @@ class LimitLine:
     """One check with its worst place."""
 
     check: str
-    """`position`, `velocity`, `acceleration`, `jerk`, `rest at start`, `rest at end`,
+    """`joints`, `position`, `velocity`, `acceleration`, `jerk`, `rest at start`, `rest at end`,
     `demonstrations` or `workspace`."""
     status: Status
     """`unchecked` where the plan, the robot or the settings lack what the check needs."""

@@ -29,6 +29,9 @@ class GateSettings:
     beyond_refuse: float = 0.5
     """How far beyond the band refuses. Ours: half a range beyond what was ever shown is no
     variation of the demonstrated motion."""
+    absent_joints: tuple[str, ...] = ()
+    """Joints that plans leave out on purpose, because they stay where they are: nothing of them is
+    checked. Any other joint without a column warns."""
     workspace_low: tuple[float, float, float] | None = None
     """Lowest corner that the tool tip may reach, [m], base frame; None leaves the box unchecked."""
     workspace_high: tuple[float, float, float] | None = None

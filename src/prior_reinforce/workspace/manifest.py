@@ -18,7 +18,13 @@ import numpy as np
 from prior_reinforce.errors import ConfigurationError, FileFormatError, PriorReinforceError
 from prior_reinforce.feedback import WORDS
 from prior_reinforce.motions import PlanFormat
-from prior_reinforce.robots import GateSettings, RobotLimits, robot_limits
+from prior_reinforce.robots import (
+    GateSettings,
+    RobotLimits,
+    match_joints,
+    missing_joints,
+    robot_limits,
+)
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -29,46 +35,6 @@ MANIFEST_FILE = "workspace.toml"
 # Ours: every throw within a metre would count as reached, and no swing is told a frame a second.
 _IMPLAUSIBLE_METRES = 1.0
 _IMPLAUSIBLE_SECONDS = 1.0
-
-TEMPLATE = """\
-# A task for Prior Reinforce. Lengths are metres, angles radians, times seconds.
-
-[task]
-name = "{name}"
-
-# What one frame of a plan means; dt is the time between two frames.
-[plan]
-names = {names}
-units = {units}
-dt = {dt}
-
-# Where the object ends, measured in the table frame: x points from the robot's base over the
-# table, y to its left. A goal is reached within the tolerance.
-[outcome]
-names = {outcome_names}
-units = {outcome_units}
-tolerance = {tolerance}
-
-# Every plan is held against these limits before it is handed out. The model is "panda", "fr3",
-# "given" (with the lists below, one number a joint) or "none". The firmware is that of an FR3's
-# system image: ">=5.9", "<5.9" or "any".
-[robot]
-model = "{robot}"
-firmware = "any"
-# joint_names = ["joint1", "joint2"]
-# lower = [-2.0, -2.0]            # [rad]
-# upper = [2.0, 2.0]              # [rad]
-# velocity = [2.0, 2.0]           # [rad/s]
-# acceleration = [10.0, 10.0]     # [rad/s^2]
-# jerk = [5000.0, 5000.0]         # [rad/s^3]
-
-# The program's own lines beside the robot's; all optional.
-[gate]
-# tool_tip = [0.0, 0.0, 0.1]         # tool tip in the flange's frame [m]
-# workspace_low = [0.2, -0.6, 0.0]   # box that the tool tip must stay in [m], base frame
-# workspace_high = [0.9, 0.6, 1.2]
-# beyond_refuse = 0.5                # how far beyond the demonstrations refuses, in joint ranges
-"""
 
 _SECTIONS: Mapping[str, frozenset[str]] = {
     "task": frozenset({"name"}),
@@ -181,7 +147,7 @@ class _Reader:
         name = self._text("task", "name")
         if not name.strip():
             raise self._error("task", "name", "must not be empty")
-        return Manifest(
+        manifest = Manifest(
             name=name,
             format=self._checked("plan", self._format),
             outcome_names=outcome_names,
@@ -190,6 +156,9 @@ class _Reader:
             robot=self._checked("robot", self._robot),
             gate=self._checked("gate", self._gate),
         )
+        if manifest.robot is not None:
+            self._check_joints(manifest, manifest.robot)
+        return manifest
 
     def _format(self) -> PlanFormat:
         dt = self._number("plan", "dt")
@@ -219,11 +188,28 @@ class _Reader:
     def _gate(self) -> GateSettings:
         content = dict(self._data.get("gate", {}))
         for key, value in content.items():
-            if isinstance(value, list):
+            if key == "absent_joints":
+                content[key] = self._texts("gate", key)
+            elif isinstance(value, list):
                 content[key] = tuple(self._numbers("gate", key))
             else:
                 content[key] = self._number("gate", key)
         return GateSettings(**content)
+
+    def _check_joints(self, manifest: Manifest, robot: RobotLimits) -> None:
+        """Refuse a plan format that lacks joints of the robot: nothing of them would be checked."""
+        columns = self._checked("plan", lambda: match_joints(manifest.format, robot))
+        absent = manifest.gate.absent_joints
+        missing = self._checked("gate", lambda: missing_joints(columns, robot, absent))
+        if missing:
+            raise self._error(
+                "plan",
+                "names",
+                f"lacks {', '.join(missing)} of {robot.robot}, whose limits could then not be "
+                "checked; give the joints these names (`import --joints` takes the recorded "
+                "ones), name those that stay still in [gate] absent_joints, or choose "
+                '[robot] model = "none"',
+            )
 
     def _checked(self, section: str, read: Any) -> Any:
         """Call a reader; say where a value stands that it finds to be wrong."""
