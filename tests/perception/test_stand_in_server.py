@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import closing
+
 import numpy as np
 import pytest
 
@@ -43,9 +45,8 @@ def test_words_must_name_one_colour(words):
 def answers(server: StandInServer, words: str, n: int) -> list:
     client = ModelClient(VisionLanguageModelConfig(base_url=server.base_url, max_retries=0))
     picture = client.prepare(table(((30, 40, 60, 55), RED)))
-    boxes = [client.ask(words, picture).box for _ in range(n)]
-    client.close()
-    return boxes
+    with closing(client):
+        return [client.ask(words, picture).box for _ in range(n)]
 
 
 def test_the_same_requests_get_the_same_answers_and_a_share_of_them_is_astray():
