@@ -15,6 +15,7 @@ from prior_reinforce.experiments.recipes.claims import Verdict
 from prior_reinforce.experiments.recipes.process import Process, ProcessPictures, _chosen
 from prior_reinforce.experiments.recipes.trials import TrialsTable
 from prior_reinforce.experiments.recipes.trials_rows import ROWS
+from prior_reinforce.experiments.sight import STAND_IN
 from prior_reinforce.perception import VisionLanguageModelConfig
 from prior_reinforce.perception.stand_in_server import StandInServer
 from prior_reinforce.tasks import make_task
@@ -67,17 +68,24 @@ def test_a_row_counts_what_was_not_reached_as_one_trial_more(tmp_path):
 
 
 def test_claims_are_judged_by_the_interval():
-    def row(low: float, high: float) -> dict:
-        summary = {"goals": 60, "trials": {"value": 3.0, "low": low, "high": high}, "sd": 1.0}
-        paper = {"title": "T", "task": "curling", "by_model": False, "prior": 6}
+    def row(many: tuple[float, float], unseen: tuple[float, float] = (2.0, 2.5)) -> dict:
+        def summary(low: float, high: float) -> dict:
+            return {"goals": 60, "trials": {"value": 3.0, "low": low, "high": high}, "sd": 1.0}
+
         return {
-            **paper, "trials": 2.9, "sd": 0.9, "adapter": "gp", "unseen": summary, "many": summary
+            "title": "T", "task": "curling", "by_model": False, "prior": 6, "trials": 2.9,
+            "sd": 0.9, "adapter": "gp", "unseen": summary(*unseen), "many": summary(*many),
         }  # fmt: skip
 
     figures = {
         "trainings": 6,
-        "model": "stand-in",
-        "rows": [row(2.0, 2.9), row(2.8, 3.0), row(2.95, 3.1)],
+        "model": "mine",
+        "rows": [
+            row((2.0, 2.9)),
+            row((2.8, 3.0)),
+            row((2.95, 3.1)),
+            row((2.0, 2.5), unseen=(2.0, 3.0)),
+        ],
         "first_throws": {"curling": {"value": 0.4, "low": 0.3, "high": 0.49}},
         "eye_minus_model": {
             "curling": {"value": 0.2, "low": 0.1, "high": 0.3},
@@ -89,9 +97,13 @@ def test_claims_are_judged_by_the_interval():
         Verdict.CONFIRMED,
         Verdict.OPEN,
         Verdict.NOT_CONFIRMED,
+        Verdict.OPEN,  # not on the unseen goals
         Verdict.CONFIRMED,
         Verdict.CONFIRMED,
     ]
+    # What the stand-in read says nothing of a model.
+    stood_in = TrialsTable().claims({**figures, "model": STAND_IN})
+    assert [claim.verdict for claim in stood_in] == [*verdicts[:-1], Verdict.OPEN]
 
 
 @pytest.mark.slow
