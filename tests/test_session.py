@@ -188,7 +188,17 @@ def test_wrong_numbers_and_states_are_named_and_change_nothing(session):
     assert [trial.state for trial in session.trials] == [TrialState.VOIDED]
 
 
-@pytest.mark.parametrize("tolerance", [0.0, -1.0, np.nan, np.inf])
+@pytest.mark.parametrize("number", [1.0, "1", None, True, [1]])
+def test_a_number_that_is_no_whole_number_is_named(session, number):
+    trial = session.ask()
+    for call in (session.tell, session.amend, session.void):
+        with pytest.raises(TrialStateError, match="whole number"):
+            call(number, [0.05, 0.0])
+    assert session.trials == (trial,)
+    assert session.tell(np.int64(1), [0.05, 0.0]).number == 1
+
+
+@pytest.mark.parametrize("tolerance", [0.0, -1.0, np.nan, np.inf, "x", "0.01", None, True, [0.1]])
 def test_bad_tolerances_are_named(tolerance):
     with pytest.raises(ConfigurationError, match="tolerance"):
         Session(RepeatingGenerator(), FullStepAdapter(), DEMOS, GOAL, tolerance)

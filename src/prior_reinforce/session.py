@@ -17,6 +17,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
+from numbers import Integral, Real
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -89,9 +90,10 @@ class Session:
             ConfigurationError: The tolerance is not a positive number.
             TrialStateError: `trials` are not numbered in order, or a pending one is not the last.
         """
-        if not (math.isfinite(tolerance) and tolerance > 0):
+        number = isinstance(tolerance, Real) and not isinstance(tolerance, bool)
+        if not (number and math.isfinite(tolerance) and tolerance > 0):
             raise ConfigurationError(
-                f"tolerance must be a positive number in the outcomes' units, got {tolerance}"
+                f"tolerance must be a positive number in the outcomes' units, got {tolerance!r}"
             )
         self.demonstrations = demonstrations
         self.goal: np.ndarray = _frozen(demonstrations.check_goal(goal))
@@ -206,6 +208,10 @@ class Session:
         return amended
 
     def _trial(self, number: int) -> Trial:
+        if not isinstance(number, Integral) or isinstance(number, bool):
+            raise TrialStateError(
+                f"a trial's number is a whole number, got {number!r}; give .number"
+            )
         if not 1 <= number <= len(self._trials):
             raise TrialStateError(
                 f"there is no trial {number}; "

@@ -8,9 +8,8 @@ import imageio.v3 as imageio
 import numpy as np
 import pytest
 
-from prior_reinforce.commands.photographs import Calibrate, Look
-from prior_reinforce.errors import ConfigurationError, FileFormatError, PerceptionFailedError
-from prior_reinforce.perception import Camera, VisionLanguageModelConfig, scene_of
+from prior_reinforce.cli import main
+from prior_reinforce.perception import Camera, scene_of
 from prior_reinforce.perception.stand_in_server import StandInServer
 from prior_reinforce.tasks import make_task
 
@@ -37,31 +36,30 @@ def table(tmp_path_factory):
     return folder, tuple(model.cam("birdseye").pos.tolist()), rollout.outcome - GOAL
 
 
-def look(folder, url: str, **settings) -> None:
-    vlm = VisionLanguageModelConfig(base_url=url, max_retries=0)
-    sizes = {"reached_size": 0.06, "goal_size": 0.10, **settings}
-    Look(
-        folder / "photo.png",
-        "the orange ball",
-        goal="the red hoop",
-        calibration=folder / "table.json",
-        vlm=vlm,
-        **sizes,
-    ).run()
+def look(folder, url: str, *more: str) -> int:
+    given = {
+        "--reached": "the orange ball",
+        "--goal": "the red hoop",
+        "--reached-size": "0.06",
+        "--goal-size": "0.10",
+        "--calibration": str(folder / "table.json"),
+        "--vlm.base-url": url,
+        "--vlm.max-retries": "0",
+    }
+    flags = [word for flag in given.items() for word in flag]
+    return main(["look", str(folder / "photo.png"), *flags, *more])
 
 
 @pytest.mark.slow
 def test_a_photograph_tells_the_error(table, capsys):
     folder, camera, truth = table
-    Calibrate(
-        folder / "points.csv",
-        outcome_height=SCENE.plane_height,
-        camera=camera,
-        out=folder / "table.json",
-    ).run()
+    files = (str(folder / "points.csv"), "--out", str(folder / "table.json"))
+    lens = ("--outcome-height", str(SCENE.plane_height), "--camera", *map(str, camera))
+    status = main(["calibrate", *files, *lens])
+    assert status == 0
     assert "plane 10.0 cm above the table" in capsys.readouterr().out
     with StandInServer() as server:
-        look(folder, server.base_url)
+        assert look(folder, server.base_url) == 0
         said = capsys.readouterr().out
         told = re.search(r"--error (\S+) (\S+)", said)
         assert told is not None
@@ -69,33 +67,33 @@ def test_a_photograph_tells_the_error(table, capsys):
         np.testing.assert_allclose(seen, truth, atol=0.006)
         assert (folder / "photo-seen.png").stat().st_size > 10_000
 
-        with pytest.raises(PerceptionFailedError, match=r"photo-seen\.png and tell what you see"):
-            look(folder, server.base_url, reached_size=0.6)
+        assert look(folder, server.base_url, "--reached-size", "0.6") == 2
+        assert "photo-seen.png and tell what you see" in capsys.readouterr().err
 
 
-def test_wrong_files_are_named(tmp_path):
+def test_wrong_files_are_named(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     points = tmp_path / "points.csv"
-    with pytest.raises(FileFormatError, match=r"points\.csv"):
-        Calibrate(points).run()
+
+    def refused(*args: str) -> str:
+        assert main(args) == 2
+        said = capsys.readouterr().err
+        assert len(said.splitlines()) == 1
+        return said
+
+    assert "points.csv" in refused("calibrate", "points.csv")
     points.write_text("x,y,u\n0,0,1\n")
-    with pytest.raises(FileFormatError, match="columns x, y, u, v"):
-        Calibrate(points).run()
+    assert "columns x, y, u, v" in refused("calibrate", "points.csv")
     points.write_text("x,y,u,v\n" + "0.5,0,10,10\n" * 5)
-    with pytest.raises(ConfigurationError, match="are the same"):
-        Calibrate(points, out=tmp_path / "t.json").run()
-    assert not (tmp_path / "t.json").exists()
+    assert "are the same" in refused("calibrate", "points.csv", "--out", "t.json")
     square = "x,y,u,v\n0,0,100,200\n1,0,100,100\n1,1,0,100\n0,1,0,200\n"
     points.write_text(square)
-    with pytest.raises(ConfigurationError, match="needs --camera"):
-        Calibrate(points, outcome_height=0.1, out=tmp_path / "t.json").run()
-    Calibrate(points, out=tmp_path / "t.json").run()
+    assert "needs --camera" in refused("calibrate", "points.csv", "--outcome-height", "0.1")
+    assert [path.name for path in tmp_path.iterdir()] == ["points.csv"]
+    assert main(["calibrate", "points.csv"]) == 0
+    capsys.readouterr()
     (tmp_path / "photo.png").write_text("no picture")
-    with pytest.raises(FileFormatError, match="PNG or JPEG"):
-        Look(
-            tmp_path / "photo.png",
-            "a ball",
-            0.1,
-            "a hoop",
-            0.1,
-            calibration=tmp_path / "t.json",
-        ).run()
+    assert "PNG or JPEG" in refused(
+        *("look", "photo.png", "--reached", "a ball", "--reached-size", "0.1"),
+        *("--goal", "a hoop", "--goal-size", "0.1", "--calibration", "table.json"),
+    )

@@ -105,12 +105,17 @@ def test_an_afternoon(run, folder):
     assert kinds[2:6] == ["goal_set", "asked", "told", "amended"]
 
 
-def test_a_reader_may_leave_before_the_log_ends(folder, monkeypatch, capsys):
+@pytest.mark.parametrize(
+    "args", [("log", "planar"), ("status", "planar"), ("goal", "planar", "0.9", "0")]
+)
+@pytest.mark.parametrize("buffering", [1, -1])
+def test_a_reader_may_leave_before_the_end(folder, monkeypatch, capsys, args, buffering):
+    """Line by line, printing itself fails; buffered, nothing does before the end."""
     reading, writing = os.pipe()
     os.close(reading)
-    with open(writing, "w") as nobody_reads, monkeypatch.context() as patched:
+    with open(writing, "w", buffering) as nobody_reads, monkeypatch.context() as patched:
         patched.setattr("sys.stdout", nobody_reads)
-        assert main(["log", folder]) == 0
+        assert main(args) == 141
     assert capsys.readouterr().err == ""
 
 

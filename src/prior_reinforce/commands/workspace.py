@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -121,14 +119,8 @@ class Log:
         """Print it."""
         with opened(self.folder) as workspace:
             events = workspace.events
-        try:
-            for event in events:
-                print(event.as_json())
-            sys.stdout.flush()
-        except BrokenPipeError:
-            # Who reads has seen enough, as in `log hoop | head`. What Python would still flush when
-            # it exits goes nowhere.
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        for event in events:
+            print(event.as_json())
 
 
 @dataclass(frozen=True)

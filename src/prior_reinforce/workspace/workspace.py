@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from numbers import Integral
 from pathlib import Path
 
 from numpy.typing import ArrayLike
@@ -118,6 +119,10 @@ class Workspace:
         Raises:
             TrialStateError: There is no such trial.
         """
+        if not isinstance(number, Integral) or isinstance(number, bool):
+            raise TrialStateError(
+                f"a trial's number is a whole number, got {number!r}; give .number"
+            )
         trials = self.history.trials
         if not 1 <= number <= len(trials):
             known = f"trials are 1 to {len(trials)}" if trials else "none was asked for yet"
