@@ -17,7 +17,7 @@ import numpy as np
 
 from prior_reinforce.adapters import Adapter
 from prior_reinforce.adapters.normalisation import Normalisation
-from prior_reinforce.adapters.vectors import as_goal, as_trial, not_started
+from prior_reinforce.adapters.vectors import as_goal_seen, as_trial, not_started
 from prior_reinforce.experiments.methods import make_adapter, make_perception
 from prior_reinforce.experiments.protocol import run_goals, success_by_round
 from prior_reinforce.generators import NearestNeighbours, align
@@ -44,7 +44,7 @@ class RidgeAdapter(Adapter):
     def propose(self, goal_seen: np.ndarray) -> np.ndarray:
         """Return the goal plus the correction fitted there, shape (k,)."""
         units = self._started()
-        goal = as_goal(goal_seen, units.outcome_dim)
+        goal = as_goal_seen(goal_seen, units.outcome_dim)
         if not self._trials:
             return goal
         conditions, outcomes = (units.apply(np.array(a)) for a in zip(*self._trials, strict=True))

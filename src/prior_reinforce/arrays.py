@@ -116,19 +116,15 @@ def as_goal(values: ArrayLike, outcome_names: Sequence[str]) -> np.ndarray:
     Raises:
         InvalidGoalError: Wrong shape, or not finite.
     """
-    try:
-        goal = np.array(values, dtype=float)
-    except (TypeError, ValueError) as error:
-        raise InvalidGoalError(f"a goal must be numbers, got {values!r}") from error
     k = len(outcome_names)
-    if goal.shape != (k,):
-        raise InvalidGoalError(
-            f"goal has shape {goal.shape}, but the demonstrations' outcomes have {k} components "
-            f"{tuple(outcome_names)}; give that many numbers"
-        )
-    if not np.all(np.isfinite(goal)):
-        raise InvalidGoalError(f"goal must be finite, got {goal.tolist()}")
-    return goal
+    return as_vector(
+        values,
+        k,
+        InvalidGoalError,
+        name="goal",
+        size=f"the demonstrations' outcomes have {k} components {tuple(outcome_names)}",
+        remedy="give numbers",
+    )
 
 
 def as_error(values: ArrayLike, outcome_dim: int) -> np.ndarray:
@@ -137,16 +133,44 @@ def as_error(values: ArrayLike, outcome_dim: int) -> np.ndarray:
     Raises:
         InvalidFeedbackError: Wrong shape, or not finite.
     """
+    return as_vector(
+        values,
+        outcome_dim,
+        InvalidFeedbackError,
+        name="error",
+        size=f"an error is {outcome_dim} numbers, outcome minus goal",
+        remedy="void the trial if nothing was seen",
+    )
+
+
+def as_vector(
+    values: ArrayLike,
+    length: int,
+    problem: type[InvalidGoalError] | type[InvalidFeedbackError],
+    *,
+    name: str,
+    size: str,
+    remedy: str,
+) -> np.ndarray:
+    """Return one vector as a fresh float array, shape (length,).
+
+    Args:
+        values: Shape (length,).
+        length: Components that are expected.
+        problem: Error to raise.
+        name: What to call the vector in a message.
+        size: Why it has this length, as a clause.
+        remedy: What to do about a vector that is not finite.
+
+    Raises:
+        InvalidGoalError, InvalidFeedbackError: As `problem` says: wrong shape, or not finite.
+    """
     try:
-        error = np.array(values, dtype=float)
-    except (TypeError, ValueError) as problem:
-        raise InvalidFeedbackError(f"an error must be numbers, got {values!r}") from problem
-    if error.shape != (outcome_dim,):
-        raise InvalidFeedbackError(
-            f"error has shape {error.shape}, expected {outcome_dim} numbers: outcome minus goal"
-        )
-    if not np.all(np.isfinite(error)):
-        raise InvalidFeedbackError(
-            f"error must be finite, got {error.tolist()}; void the trial if nothing was seen"
-        )
-    return error
+        vector = np.array(values, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise problem(f"{name} must be {length} numbers, got {values!r}") from error
+    if vector.shape != (length,):
+        raise problem(f"{name} has shape {vector.shape}, but {size}; give that many numbers")
+    if not np.all(np.isfinite(vector)):
+        raise problem(f"{name} must be finite, got {vector.tolist()}; {remedy}")
+    return vector

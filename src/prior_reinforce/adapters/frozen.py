@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from prior_reinforce.adapters.base import Adapter
-from prior_reinforce.adapters.vectors import as_goal, as_trial, not_started
+from prior_reinforce.adapters.vectors import as_goal_seen, as_trial, not_started
 from prior_reinforce.motions import Demonstrations
 
 
@@ -28,7 +28,7 @@ class FrozenAdapter(Adapter):
         """Return the goal, shape (k,), a fresh array."""
         if self._outcome_dim is None:
             raise not_started(self)
-        return as_goal(goal_seen, self._outcome_dim)
+        return as_goal_seen(goal_seen, self._outcome_dim)
 
     def observe(self, condition: np.ndarray, outcome_seen: np.ndarray) -> None:
         """Check the trial as every adapter does, and ignore it."""

@@ -12,7 +12,7 @@ from prior_reinforce.adapters.gp_posterior import GPPosterior
 from prior_reinforce.adapters.marginal_likelihood import maximise
 from prior_reinforce.adapters.memory import Memory
 from prior_reinforce.adapters.normalisation import Normalisation
-from prior_reinforce.adapters.vectors import as_goal, as_trial, not_started
+from prior_reinforce.adapters.vectors import as_goal_seen, as_trial, not_started
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.motions import Demonstrations
 
@@ -123,7 +123,7 @@ class GaussianProcessAdapter(Adapter):
         """Return the posterior mean at the goal, shape (k,), in the outcomes' units."""
         if self._memory is None:
             raise not_started(self)
-        goal = as_goal(goal_seen, self._normalisation.outcome_dim)
+        goal = as_goal_seen(goal_seen, self._normalisation.outcome_dim)
         mean = self._posterior.mean(self._normalisation.apply(goal)[None, :])[0]
         return self._normalisation.undo(mean)
 

@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from prior_reinforce.adapters.base import Adapter
-from prior_reinforce.adapters.vectors import as_goal, as_trial, not_started
+from prior_reinforce.adapters.vectors import as_goal_seen, as_trial, not_started
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.motions import Demonstrations
 
@@ -47,7 +47,7 @@ class ProportionalAdapter(Adapter):
         """Return the goal, or the last condition corrected, shape (k,)."""
         if self._outcome_dim is None:
             raise not_started(self)
-        goal = as_goal(goal_seen, self._outcome_dim)
+        goal = as_goal_seen(goal_seen, self._outcome_dim)
         if self._last is None:
             return goal
         condition, outcome_seen = self._last

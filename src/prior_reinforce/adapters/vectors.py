@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
+from prior_reinforce.arrays import as_vector
 from prior_reinforce.errors import InvalidFeedbackError, InvalidGoalError, NotFittedError
 
 
-def as_goal(values: np.ndarray, outcome_dim: int) -> np.ndarray:
-    """Return a goal as a fresh float array, shape (k,).
+def as_goal_seen(values: np.ndarray, outcome_dim: int) -> np.ndarray:
+    """Return a perceived goal as a fresh float array, shape (k,).
 
     Raises:
         InvalidGoalError: Wrong shape, or not finite.
     """
-    return _as_vector(values, outcome_dim, "goal", InvalidGoalError)
+    return _as_outcome_like(values, outcome_dim, "goal", InvalidGoalError)
 
 
 def as_trial(
@@ -25,8 +26,8 @@ def as_trial(
         InvalidFeedbackError: Wrong shape, or not finite.
     """
     return (
-        _as_vector(condition, outcome_dim, "condition", InvalidFeedbackError),
-        _as_vector(outcome_seen, outcome_dim, "perceived outcome", InvalidFeedbackError),
+        _as_outcome_like(condition, outcome_dim, "condition", InvalidFeedbackError),
+        _as_outcome_like(outcome_seen, outcome_dim, "perceived outcome", InvalidFeedbackError),
     )
 
 
@@ -37,21 +38,17 @@ def not_started(adapter: object) -> NotFittedError:
     )
 
 
-def _as_vector(
+def _as_outcome_like(
     values: np.ndarray,
     outcome_dim: int,
     name: str,
-    error: type[InvalidGoalError] | type[InvalidFeedbackError],
+    problem: type[InvalidGoalError] | type[InvalidFeedbackError],
 ) -> np.ndarray:
-    try:
-        vector = np.array(values, dtype=float)
-    except (TypeError, ValueError) as problem:
-        raise error(f"{name} must be {outcome_dim} numbers, got {values!r}") from problem
-    if vector.shape != (outcome_dim,):
-        raise error(
-            f"{name} has shape {vector.shape}, but the demonstrations' outcomes have "
-            f"{outcome_dim} components; give that many numbers"
-        )
-    if not np.all(np.isfinite(vector)):
-        raise error(f"{name} must be finite, got {vector.tolist()}; void a trial nobody saw")
-    return vector
+    return as_vector(
+        values,
+        outcome_dim,
+        problem,
+        name=name,
+        size=f"the demonstrations' outcomes have {outcome_dim} components",
+        remedy="void a trial nobody saw",
+    )
