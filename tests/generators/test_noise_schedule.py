@@ -86,3 +86,11 @@ def test_sampling_visits_falling_levels_from_the_noisiest(n):
     assert steps[0] == 99
     assert all(a > b for a, b in itertools.pairwise(steps))
     assert n == 1 or steps[-1] == 0
+
+
+def test_a_prediction_that_does_not_exist_is_never_taken_for_another():
+    sample = torch.zeros((1, 1, 1))
+    with pytest.raises(AssertionError, match="eps"):
+        SCHEDULE.target(sample, sample, torch.tensor([3]), "eps")
+    with pytest.raises(AssertionError, match="eps"):
+        SCHEDULE.clean_estimate(sample, sample, 3, "eps")

@@ -3,6 +3,7 @@
 import pytest
 import torch
 
+from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.generators.unet import ConditionalUNet, UNetSize
 
 TINY = UNetSize(widths=(8, 16), groups=2, step_width=8, condition_width=8)
@@ -96,3 +97,14 @@ def test_step_embedding_tells_all_levels_apart():
     with torch.no_grad():
         embedded = net.step_embedding(torch.arange(100))
     assert torch.pdist(embedded).min() > 1e-5
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [{"widths": ()}, {"widths": (64, 100)}, {"widths": (0,)}, {"kernel": 4}, {"kernel": 0},
+     {"groups": 0}, {"step_width": 2}, {"step_width": 9}, {"condition_width": 0},
+     {"activation": "relu"}],
+)  # fmt: skip
+def test_sizes_that_do_not_fit_are_named(wrong):
+    with pytest.raises(ConfigurationError, match=next(iter(wrong))):
+        UNetSize(**wrong)

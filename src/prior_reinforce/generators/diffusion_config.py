@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, field
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 from typing_extensions import Self
 
@@ -13,6 +13,7 @@ from prior_reinforce.generators.representation import Representation
 from prior_reinforce.generators.unet import UNetSize
 
 Preset = Literal["laptop", "paper"]
+Sampler = Literal["mean_shift", "ddim", "ddpm"]
 
 
 @dataclass(frozen=True)
@@ -41,7 +42,7 @@ class DiffusionConfig:
     """What the network predicts."""
     noise_levels: int = 100
     """T, steps of the squared-cosine noise schedule."""
-    sampler: Literal["mean_shift", "ddim", "ddpm"] = "mean_shift"
+    sampler: Sampler = "mean_shift"
     """How codes are generated, see `diffusion_sampling`."""
     sampling_steps: int = 6
     """Noise levels visited by mean shift or DDIM; DDPM visits all."""
@@ -72,6 +73,15 @@ class DiffusionConfig:
         Raises:
             ConfigurationError: One is outside its range.
         """
+        for name, choices in (
+            ("representation", get_args(Representation)),
+            ("prediction", get_args(Prediction)),
+            ("sampler", get_args(Sampler)),
+        ):
+            if getattr(self, name) not in choices:
+                raise ConfigurationError(
+                    f"{name} must be one of {choices}, got {getattr(self, name)!r}"
+                )
         for name in (
             "frames_per_point", "noise_levels", "sampling_steps", "training_steps", "batch_size",
         ):  # fmt: skip

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import torch
+from typing_extensions import assert_never
 
 Prediction = Literal["epsilon", "v", "sample"]
 """What the network is trained to tell from x_t: the noise, the velocity of Salimans and Ho (2022,
@@ -71,8 +72,10 @@ class NoiseSchedule:
             return noise
         if prediction == "sample":
             return clean
-        keep, add = self._mix(steps, clean)
-        return keep * noise - add * clean
+        if prediction == "v":
+            keep, add = self._mix(steps, clean)
+            return keep * noise - add * clean
+        assert_never(prediction)
 
     def clean_estimate(
         self, noisy: torch.Tensor, predicted: torch.Tensor, step: int, prediction: Prediction
@@ -91,7 +94,9 @@ class NoiseSchedule:
         keep, add = math.sqrt(signal), math.sqrt(1 - signal)
         if prediction == "v":
             return keep * noisy - add * predicted
-        return (noisy - add * predicted) / keep
+        if prediction == "epsilon":
+            return (noisy - add * predicted) / keep
+        assert_never(prediction)
 
     def ddim_step(
         self, noisy: torch.Tensor, clean: torch.Tensor, step: int, next_step: int
