@@ -9,7 +9,7 @@ import torch
 from throws import plan_format, swing, throws
 
 from prior_reinforce.errors import ConfigurationError
-from prior_reinforce.generators import DiffusionConfig, DiffusionGenerator
+from prior_reinforce.generators import DiffusionConfig, DiffusionGenerator, load_generator
 from prior_reinforce.generators.diffusion_training import draw_batch, learning_rate_factor
 from prior_reinforce.generators.unet import UNetSize
 from prior_reinforce.motions import Demonstrations
@@ -115,7 +115,8 @@ def test_presets_and_representation_are_one_word_each():
 @pytest.mark.parametrize(
     "wrong",
     [{"training_steps": 0}, {"sampling_steps": 101}, {"learning_rate": 0.0}, {"ema_limit": 1.0},
-     {"margin": -0.1}, {"warmup_steps": -1}, {"noise_draws": 3}],
+     {"margin": -0.1}, {"warmup_steps": -1}, {"noise_draws": 3}, {"prediction": "eps"},
+     {"sampler": "dpm"}, {"representation": "spline"}],
 )  # fmt: skip
 def test_settings_out_of_range_are_named(wrong):
     with pytest.raises(ConfigurationError, match=next(iter(wrong))):
@@ -127,10 +128,36 @@ def test_config_and_preset_contradict_each_other():
         DiffusionGenerator(DiffusionConfig(), preset="paper")
 
 
-@pytest.mark.skipif(torch.cuda.is_available(), reason="there is a CUDA device here")
-def test_a_device_that_is_not_there_is_named():
-    with pytest.raises(ConfigurationError, match="cuda"):
-        DiffusionGenerator(device="cuda")
+@pytest.mark.parametrize(
+    "device",
+    [
+        "gpu",
+        "meta",
+        pytest.param(
+            "cuda", marks=pytest.mark.skipif(torch.cuda.is_available(), reason="it is there")
+        ),
+    ],
+)
+def test_a_device_that_is_not_there_is_named(device, tmp_path):
+    with pytest.raises(ConfigurationError, match=device):
+        DiffusionGenerator(device=device)
+    config = replace(SMALL, training_steps=1)
+    DiffusionGenerator(config, threads=1).fit(throws(2, 20), seed=0).save(tmp_path)
+    with pytest.raises(ConfigurationError, match=device):
+        load_generator(tmp_path, device=device)
+
+
+@pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a CUDA device")
+def test_what_was_learned_on_a_gpu_is_loaded_on_either(tmp_path):
+    demos = throws(3, 40)
+    config = replace(SMALL, training_steps=5)
+    learned = DiffusionGenerator(config, device="cuda").fit(demos, seed=0)
+    learned.save(tmp_path)
+    plans = learned.generate(demos.outcomes_seen)
+    on_gpu = load_generator(tmp_path, device="cuda")
+    np.testing.assert_array_equal(on_gpu.generate(demos.outcomes_seen), plans)
+    on_cpu = load_generator(tmp_path)
+    np.testing.assert_allclose(on_cpu.generate(demos.outcomes_seen), plans, atol=1e-2)
 
 
 def test_configuration_survives_json():

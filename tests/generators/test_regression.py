@@ -4,11 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import torch
 
 from prior_reinforce.errors import ConfigurationError
+from prior_reinforce.generators import load_generator
 from prior_reinforce.generators.diffusion_config import DiffusionConfig
 from prior_reinforce.generators.regression import UNetRegression, UNetRegressionConfig
-from prior_reinforce.generators.unet import UNetSize
+from prior_reinforce.generators.unet import ConditionalUNet, UNetSize
 from prior_reinforce.motions import Demonstrations, PlanFormat
 
 SMALL = UNetRegressionConfig(
@@ -58,8 +60,39 @@ def test_another_seed_draws_other_initial_weights():
 
 
 @pytest.mark.parametrize(
-    ("setting", "value"), [("training_steps", 0), ("learning_rate", 0.0), ("weight_decay", -1.0)]
+    ("setting", "value"),
+    [
+        ("training_steps", 0),
+        ("learning_rate", 0.0),
+        ("weight_decay", -1.0),
+        ("representation", "spline"),
+    ],
 )
-def test_senseless_settings_are_refused(setting: str, value: float):
+def test_senseless_settings_are_refused(setting: str, value: float | str):
     with pytest.raises(ConfigurationError, match=setting):
         UNetRegressionConfig(**{setting: value})
+
+
+def test_plans_are_the_same_on_any_number_of_cores(monkeypatch):
+    demos = demonstrations()
+    config = replace(SMALL, training_steps=2)
+    generator = UNetRegression(config, threads=1).fit(demos, seed=0)
+    used: list[int] = []
+    forward = ConditionalUNet.forward
+
+    def listen(self, *inputs):
+        used.append(torch.get_num_threads())
+        return forward(self, *inputs)
+
+    monkeypatch.setattr(ConditionalUNet, "forward", listen)
+    all_cores = UNetRegression(config)
+    all_cores._fitted = generator._fitted
+    all_cores.generate(demos.outcomes_seen)
+    assert used == [1]
+
+
+def test_another_generators_device_is_refused(tmp_path):
+    config = replace(SMALL, training_steps=1)
+    UNetRegression(config, threads=1).fit(demonstrations(), seed=0).save(tmp_path)
+    with pytest.raises(ConfigurationError, match="CPU only"):
+        load_generator(tmp_path, device="cuda")

@@ -1,5 +1,6 @@
 """Start times as a channel of their own: nothing is lost, and only where motions rest."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -10,6 +11,12 @@ from prior_reinforce.motions import Demonstrations, PlanFormat
 from prior_reinforce.tasks import make_task
 
 STARTS = [5, 31, 12, 44]
+WHY = {
+    "ends in mid-swing": r"demonstration 1 still moves at its last frame, with \d+% of its peak",
+    "slow and late would not fit": (
+        r"demonstration 0's motion, begun as early as demonstration 2's, would begin \d+ frames"
+    ),
+}
 
 
 def demonstrations(*, plans=None, horizon=90):
@@ -98,6 +105,10 @@ def test_whole_plans_are_coded_where_there_is_nothing_to_cut(how):
         demos = demonstrations(plans=plans)
     codec, codes = fit(demos, start_times=how != "switched off")
     assert codec.starts is None
+    if how in ("switched off", "same start"):
+        assert codec.whole_because is None
+    else:
+        assert re.search(WHY[how], codec.whole_because)
     np.testing.assert_allclose(codec.decode(codes), demos.plans, atol=1e-3)
 
 
@@ -108,6 +119,18 @@ def test_a_restored_codec_decodes_alike():
     )
     np.testing.assert_array_equal(again.decode(codes), codec.decode(codes))
     assert (again.horizon, again.action_dim, again.channels) == (90, 3, 4)
+
+
+def test_why_whole_plans_are_coded_is_kept_on_disk():
+    demos = demonstrations()
+    codec, _ = fit(demonstrations(plans=demos.plans[:, :55]))
+    ranges = codec.motion.plan_range, codec.motion.code_range
+    again = StartTimeCodec.restore(codec.settings(), *ranges)
+    assert again.whole_because == codec.whole_because
+    assert again.whole_because
+    before_it_was_kept = codec.settings()
+    del before_it_was_kept["whole_because"]
+    assert StartTimeCodec.restore(before_it_was_kept, *ranges).whole_because is None
 
 
 def test_a_trembling_hand_rests_where_it_hardly_moves():
@@ -134,6 +157,7 @@ def test_a_small_dimension_that_still_moves_at_the_end_is_not_held():
     moving = demonstrations(plans=plans)
     codec, codes = fit(replace(moving, format=replace(moving.format, units=("rad", "rad", "m"))))
     assert codec.starts is None
+    assert re.search(r"demonstration 1 .* last frame, with 4\d% of its peak", codec.whole_because)
     np.testing.assert_allclose(codec.decode(codes), plans, atol=1e-12)
 
 

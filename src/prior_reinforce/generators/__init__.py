@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 
-from prior_reinforce.errors import FileFormatError
+from prior_reinforce.errors import ConfigurationError, FileFormatError
 from prior_reinforce.generators.alignment import Alignment, AlignmentConfig, align
 from prior_reinforce.generators.base import FitProgress, Generator
 from prior_reinforce.generators.diffusion import DiffusionGenerator
@@ -31,13 +31,22 @@ FAMILY: tuple[type[Generator], ...] = (
 """Every generator that can be loaded from disk."""
 
 
-def load_generator(folder: str | os.PathLike[str]) -> Generator:
+def load_generator(folder: str | os.PathLike[str], *, device: str = "cpu") -> Generator:
     """Read a saved generator of any kind.
+
+    Args:
+        folder: Of the model.
+        device: Where torch computes, `cpu` or `cuda`; only diffusion runs on the latter.
 
     Raises:
         FileFormatError: Files are missing, damaged, or of a generator that is not known here.
+        ConfigurationError: The device is not there, or the generator does not run on it.
     """
     name = read_model(folder).generator
+    if name == DiffusionGenerator.name:
+        return DiffusionGenerator.load(folder, device=device)
+    if device != "cpu":
+        raise ConfigurationError(f"a {name} generator runs on the CPU only, got device {device!r}")
     for kind in FAMILY:
         if kind.name == name:
             return kind.load(folder)

@@ -34,6 +34,22 @@ _NEWTON_STEPS = 4
 _REST = 0.005
 
 
+class NotAtRestError(InvalidDemonstrationsError):
+    """A demonstration moves at an end that would have to be held."""
+
+    def __init__(self, where: str) -> None:
+        """Say which.
+
+        Args:
+            where: Demonstration, end and speed, as a clause.
+        """
+        self.where = where
+        super().__init__(
+            f"{where}, so that frame cannot be held while the rest moves in time; record from "
+            "rest to rest, raise largest_end_speed, or do not align"
+        )
+
+
 @dataclass(frozen=True)
 class AlignmentConfig:
     """How demonstrations are aligned."""
@@ -87,8 +103,8 @@ def align(demonstrations: Demonstrations, config: AlignmentConfig | None = None)
         Aligned demonstrations (N, H', D), H' >= H, and the shifts (N,) in [s].
 
     Raises:
-        InvalidDemonstrationsError: A demonstration that has to be moved does not rest at the end
-            that would be held.
+        NotAtRestError: A demonstration that has to be moved does not rest at the end that would be
+            held; an InvalidDemonstrationsError.
 
     Source: ours; the paper aligns by hand.
     """
@@ -186,11 +202,10 @@ def _check_rest(
     for i, (speed, lag) in enumerate(zip(speeds, lags, strict=True)):
         for frame, name, held in ((0, "first", lag + before > 0), (-1, "last", lag - after < 0)):
             if held and speed[frame] > largest * speed.max():
-                raise InvalidDemonstrationsError(
+                raise NotAtRestError(
                     f"demonstration {i} still moves at its {name} frame, with "
                     f"{speed[frame] / speed.max():.0%} of its peak speed (at most {largest:.0%} "
-                    "counts as rest), so that frame cannot be held while the rest moves in time; "
-                    "record from rest to rest, raise largest_end_speed, or do not align"
+                    "counts as rest)"
                 )
 
 

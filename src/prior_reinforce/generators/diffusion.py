@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 import torch
@@ -16,7 +16,8 @@ from typing_extensions import Self
 
 from prior_reinforce.errors import ConfigurationError, FileFormatError, NotFittedError
 from prior_reinforce.generators.base import FitProgress, Generator
-from prior_reinforce.generators.conditions import ConditionScale, as_conditions
+from prior_reinforce.generators.coded_network import CodedNetwork, as_tensor
+from prior_reinforce.generators.conditions import ConditionScale
 from prior_reinforce.generators.diffusion_config import DiffusionConfig, Preset
 from prior_reinforce.generators.diffusion_sampling import sample
 from prior_reinforce.generators.diffusion_training import train
@@ -26,9 +27,6 @@ from prior_reinforce.generators.start_time import StartTimeCodec
 from prior_reinforce.generators.threads import torch_threads
 from prior_reinforce.generators.unet import ConditionalUNet
 from prior_reinforce.motions import Demonstrations
-
-_CHUNK = 128
-"""Plans sampled at once; bounds the memory of a dense grid of conditions."""
 
 
 class DiffusionGenerator(Generator):
@@ -63,12 +61,11 @@ class DiffusionGenerator(Generator):
         config = config or DiffusionConfig.preset(preset or "laptop")
         if representation is not None:
             config = replace(config, representation=representation)
-        if device.startswith("cuda") and not torch.cuda.is_available():
-            raise ConfigurationError(f"device {device!r} is not available here; use 'cpu'")
         self.config = config
-        self._device = torch.device(device)
+        self._device = _device(device)
         self._threads = threads
-        self._fitted: _Fitted | None = None
+        self._fitted: CodedNetwork[ConditionalUNet] | None = None
+        self._seed = 0
 
     def fit(
         self,
@@ -89,13 +86,14 @@ class DiffusionGenerator(Generator):
         scale = ConditionScale.fit(demonstrations.outcomes_seen)
         with torch_threads(self._threads):
             network = train(
-                self._tensor(codes),
-                self._tensor(scale.scale(demonstrations.outcomes_seen)),
+                as_tensor(codes, self._device),
+                as_tensor(scale.scale(demonstrations.outcomes_seen), self._device),
                 self.config,
                 seed=seed,
                 progress=progress,
             )
-        self._fitted = _Fitted(codec, scale, network, seed)
+        self._fitted = CodedNetwork(codec, scale, network, self._device)
+        self._seed = seed
         return self
 
     @property
@@ -106,89 +104,69 @@ class DiffusionGenerator(Generator):
     def generate(self, conditions: np.ndarray) -> np.ndarray:
         """Sample one plan for each condition; see `Generator.generate`."""
         fitted = self._require()
-        conditions = as_conditions(conditions, len(fitted.scale.low))
-        scaled = self._tensor(fitted.scale.scale(conditions))
-        plans = [np.empty((0, fitted.codec.horizon, fitted.codec.action_dim))]
-        with torch_threads(1):
-            for chunk in torch.split(scaled, _CHUNK):
-                if len(chunk):
-                    shape = (fitted.codec.channels, fitted.codec.length)
-                    codes = sample(fitted.network, chunk, shape, self.config, seed=fitted.seed)
-                    plans.append(fitted.codec.decode(codes.double().cpu().numpy()))
-        return np.concatenate(plans)
+        shape = (fitted.codec.channels, fitted.codec.length)
+        return fitted.generate(
+            conditions,
+            lambda scaled: sample(fitted.network, scaled, shape, self.config, seed=self._seed),
+        )
 
     def save(self, folder: str | os.PathLike[str]) -> None:
         """Write `config.json` and `model.safetensors`; see `Generator.save`."""
         fitted = self._require()
-        weights = fitted.network.state_dict()
         write_model(
             folder,
             self.name,
             {
                 "config": self.config.to_json(),
                 "codec": fitted.codec.settings(),
-                "seed": fitted.seed,
+                "seed": self._seed,
             },
-            {
-                **{f"network.{name}": value.cpu().numpy() for name, value in weights.items()},
-                "plan_range": fitted.codec.motion.plan_range,
-                "code_range": fitted.codec.motion.code_range,
-                "condition_range": np.stack([fitted.scale.low, fitted.scale.high]),
-            },
+            fitted.tensors(),
         )
 
     @classmethod
-    def load(cls, folder: str | os.PathLike[str]) -> Self:
-        """Read what `save` wrote, onto the CPU; see `Generator.load`."""
+    def load(cls, folder: str | os.PathLike[str], *, device: str = "cpu") -> Self:
+        """Read what `save` wrote, on whichever device it was learned; see `Generator.load`.
+
+        Args:
+            folder: Of the model.
+            device: Where torch computes, `cpu` or `cuda`.
+
+        Raises:
+            ConfigurationError: The device is not there.
+            FileFormatError: Files are missing, truncated, or of another generator.
+        """
+        _device(device)
         saved = read_model(folder, expected=cls.name)
         try:
-            generator = cls(DiffusionConfig.from_json(saved.settings["config"]))
-            generator._fitted = _Fitted.restore(saved.settings, saved.tensors, generator.config)
+            generator = cls(DiffusionConfig.from_json(saved.settings["config"]), device=device)
+            size = generator.config.network
+            generator._fitted = CodedNetwork.restore(
+                saved.settings["codec"],
+                saved.tensors,
+                lambda codec, k: ConditionalUNet(codec.channels, k, size),
+                generator._device,
+            )
+            generator._seed = int(saved.settings["seed"])
         except (KeyError, TypeError, ValueError, RuntimeError) as error:
             raise FileFormatError(
                 f"{folder} does not hold a complete {cls.name} generator: {error!r}; learn again"
             ) from error
         return generator
 
-    def _tensor(self, values: np.ndarray) -> torch.Tensor:
-        return torch.as_tensor(values, dtype=torch.float32, device=self._device)
-
-    def _require(self) -> _Fitted:
+    def _require(self) -> CodedNetwork[ConditionalUNet]:
         if self._fitted is None:
             raise NotFittedError("this DiffusionGenerator has learned nothing yet; call fit first")
         return self._fitted
 
 
-class _Fitted:
-    """What `fit` makes and `save` keeps."""
-
-    def __init__(
-        self, codec: StartTimeCodec, scale: ConditionScale, network: ConditionalUNet, seed: int
-    ) -> None:
-        self.codec = codec
-        self.scale = scale
-        self.network = network
-        self.seed = seed
-
-    @classmethod
-    def restore(
-        cls, settings: dict[str, Any], tensors: dict[str, np.ndarray], config: DiffusionConfig
-    ) -> _Fitted:
-        codec = StartTimeCodec.restore(
-            settings["codec"], tensors["plan_range"], tensors["code_range"]
-        )
-        low, high = tensors["condition_range"]
-        with torch.random.fork_rng(devices=[]):
-            network = ConditionalUNet(codec.channels, len(low), config.network)
-        weights = {
-            name.removeprefix("network."): torch.from_numpy(value)
-            for name, value in tensors.items()
-            if name.startswith("network.")
-        }
-        if {name: tuple(value.shape) for name, value in weights.items()} != {
-            name: tuple(value.shape) for name, value in network.state_dict().items()
-        }:
-            raise ValueError("its tensors are not those of the network in its config")
-        network.load_state_dict(weights)
-        network.eval().requires_grad_(False)
-        return cls(codec, ConditionScale(low, high), network, int(settings["seed"]))
+def _device(name: str) -> torch.device:
+    try:
+        device = torch.device(name)
+    except RuntimeError as error:
+        raise ConfigurationError(f"no device {name!r}; use 'cpu' or 'cuda'") from error
+    if device.type not in ("cpu", "cuda"):
+        raise ConfigurationError(f"no device {name!r}; use 'cpu' or 'cuda'")
+    if device.type == "cuda" and (device.index or 0) >= torch.cuda.device_count():
+        raise ConfigurationError(f"device {name!r} is not available here; use 'cpu'")
+    return device

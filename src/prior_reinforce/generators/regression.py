@@ -19,7 +19,7 @@ import os
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
-from typing import Any, ClassVar
+from typing import Any, ClassVar, get_args
 
 import numpy as np
 import torch
@@ -28,7 +28,8 @@ from typing_extensions import Self
 
 from prior_reinforce.errors import ConfigurationError, FileFormatError, NotFittedError
 from prior_reinforce.generators.base import FitProgress, Generator
-from prior_reinforce.generators.conditions import ConditionScale, as_conditions
+from prior_reinforce.generators.coded_network import CodedNetwork, as_tensor
+from prior_reinforce.generators.conditions import ConditionScale
 from prior_reinforce.generators.representation import Representation
 from prior_reinforce.generators.saving import read_model, write_model
 from prior_reinforce.generators.start_time import StartTimeCodec
@@ -38,8 +39,7 @@ from prior_reinforce.motions import Demonstrations
 
 _REPORTS = 200
 """Progress is told about so often in a fit."""
-_CHUNK = 128
-"""Plans generated at once; bounds the memory of a dense grid of conditions."""
+_CPU = torch.device("cpu")
 
 
 @dataclass(frozen=True)
@@ -78,6 +78,11 @@ class UNetRegressionConfig:
         Raises:
             ConfigurationError: One is outside its range.
         """
+        if self.representation not in get_args(Representation):
+            raise ConfigurationError(
+                f"representation must be one of {get_args(Representation)}, "
+                f"got {self.representation!r}"
+            )
         for name in ("frames_per_point", "training_steps"):
             if getattr(self, name) < 1:
                 raise ConfigurationError(f"{name} must be at least 1, got {getattr(self, name)}")
@@ -107,11 +112,12 @@ class UNetRegression(Generator):
 
         Args:
             config: All settings; the defaults when None.
-            threads: Cores to compute on; all when None. The last digits depend on it.
+            threads: Cores to train on; all when None. The last digits depend on it. Plans are
+                generated on one core, so that a model means the same ones on any number.
         """
         self.config = config or UNetRegressionConfig()
         self._threads = threads
-        self._fitted: _Fitted | None = None
+        self._fitted: CodedNetwork[_Network] | None = None
 
     def fit(
         self,
@@ -132,41 +138,33 @@ class UNetRegression(Generator):
         scale = ConditionScale.fit(demonstrations.outcomes_seen)
         with torch_threads(self._threads):
             network = _train(
-                _tensor(codes),
-                _tensor(scale.scale(demonstrations.outcomes_seen)),
+                as_tensor(codes, _CPU),
+                as_tensor(scale.scale(demonstrations.outcomes_seen), _CPU),
                 self.config,
                 seed,
                 progress,
             )
-        self._fitted = _Fitted(codec, scale, network)
+        self._fitted = CodedNetwork(codec, scale, network, _CPU)
         return self
 
-    @torch.no_grad()
+    @property
+    def codec(self) -> StartTimeCodec:
+        """How plans are coded, decided by `fit`."""
+        return self._require().codec
+
     def generate(self, conditions: np.ndarray) -> np.ndarray:
         """One forward pass for each condition; see `Generator.generate`."""
         fitted = self._require()
-        conditions = as_conditions(conditions, len(fitted.scale.low))
-        plans = [np.empty((0, fitted.codec.horizon, fitted.codec.action_dim))]
-        with torch_threads(self._threads):
-            for chunk in torch.split(_tensor(fitted.scale.scale(conditions)), _CHUNK):
-                if len(chunk):
-                    plans.append(fitted.codec.decode(fitted.network(chunk).double().numpy()))
-        return np.concatenate(plans)
+        return fitted.generate(conditions, fitted.network)
 
     def save(self, folder: str | os.PathLike[str]) -> None:
         """Write `config.json` and `model.safetensors`; see `Generator.save`."""
         fitted = self._require()
-        weights = fitted.network.state_dict()
         write_model(
             folder,
             self.name,
             {"config": asdict(self.config), "codec": fitted.codec.settings()},
-            {
-                **{f"network.{name}": value.numpy() for name, value in weights.items()},
-                "plan_range": fitted.codec.motion.plan_range,
-                "code_range": fitted.codec.motion.code_range,
-                "condition_range": np.stack([fitted.scale.low, fitted.scale.high]),
-            },
+            fitted.tensors(),
         )
 
     @classmethod
@@ -175,14 +173,20 @@ class UNetRegression(Generator):
         saved = read_model(folder, expected=cls.name)
         try:
             generator = cls(UNetRegressionConfig.from_json(saved.settings["config"]))
-            generator._fitted = _Fitted.restore(saved.settings, saved.tensors, generator.config)
+            size = generator.config.network
+            generator._fitted = CodedNetwork.restore(
+                saved.settings["codec"],
+                saved.tensors,
+                lambda codec, k: _Network(codec.channels, codec.length, k, size),
+                _CPU,
+            )
         except (KeyError, TypeError, ValueError, RuntimeError) as error:
             raise FileFormatError(
                 f"{folder} holds no complete {cls.name} generator ({error!r}); learn it again"
             ) from error
         return generator
 
-    def _require(self) -> _Fitted:
+    def _require(self) -> CodedNetwork[_Network]:
         if self._fitted is None:
             raise NotFittedError("this UNetRegression has learned nothing yet; call fit first")
         return self._fitted
@@ -234,35 +238,3 @@ def _train(
             left = (time.monotonic() - started) / done * (n_steps - done)
             progress(FitProgress(done, n_steps, loss.item(), left))
     return network.eval().requires_grad_(False)
-
-
-def _tensor(values: np.ndarray) -> torch.Tensor:
-    return torch.as_tensor(values, dtype=torch.float32)
-
-
-class _Fitted:
-    """What `fit` makes and `save` keeps."""
-
-    def __init__(self, codec: StartTimeCodec, scale: ConditionScale, network: _Network) -> None:
-        self.codec = codec
-        self.scale = scale
-        self.network = network
-
-    @classmethod
-    def restore(
-        cls, settings: dict[str, Any], tensors: dict[str, np.ndarray], config: UNetRegressionConfig
-    ) -> _Fitted:
-        codec = StartTimeCodec.restore(
-            settings["codec"], tensors["plan_range"], tensors["code_range"]
-        )
-        low, high = tensors["condition_range"]
-        with torch.random.fork_rng(devices=[]):
-            network = _Network(codec.channels, codec.length, len(low), config.network)
-        network.load_state_dict(
-            {
-                name.removeprefix("network."): torch.from_numpy(value)
-                for name, value in tensors.items()
-                if name.startswith("network.")
-            }
-        )
-        return cls(codec, ConditionScale(low, high), network.eval().requires_grad_(False))

@@ -9,11 +9,13 @@ frames are moved, so nothing is lost: plans come back as recorded.
 
 Ours; the paper leaves the misalignment to the network, or removes it by hand ("Timeline Aligned
 Variants"). Start time and duration are parameters of their own in movement primitives as well
-[Ijspeert2013]. Only where all demonstrations start and end at rest; else nothing is cut out.
+[Ijspeert2013]. Only where all demonstrations start and end at rest; else nothing is cut out, and
+`StartTimeCodec.whole_because` says why.
 """
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,8 +23,7 @@ import numpy as np
 from scipy.special import betainc
 from typing_extensions import Self
 
-from prior_reinforce.errors import InvalidDemonstrationsError
-from prior_reinforce.generators.alignment import AlignmentConfig, align
+from prior_reinforce.generators.alignment import AlignmentConfig, NotAtRestError, align
 from prior_reinforce.generators.representation import PlanCodec, Representation
 from prior_reinforce.generators.velocity import velocity_profiles
 from prior_reinforce.motions import Demonstrations
@@ -53,6 +54,9 @@ class StartTimeCodec:
     starts: tuple[int, int] | None
     """Earliest and latest frame at which a demonstration's cut-out begins; None where start times
     are not coded."""
+    whole_because: str | None = None
+    """What kept start times from being coded although they differ, as a clause: which demonstration
+    and which end. None where they are coded, or all the same, or were not to be."""
 
     @classmethod
     def fit(
@@ -79,7 +83,14 @@ class StartTimeCodec:
             The codec, and codes of the demonstrations, shape (N, C, T).
         """
         plans = demonstrations.plans
-        cut = _cut(demonstrations) if start_times else None
+        cut, whole_because = None, None
+        if start_times:
+            try:
+                cut = _cut(demonstrations)
+            except NotAtRestError as error:
+                whole_because = error.where
+            except _CannotCutError as error:
+                whole_because = str(error)
         if cut is not None:
             plans = _settled(_moved(plans, -cut.begins, cut.length), cut.before, cut.after)
         motion = PlanCodec.fit(
@@ -91,7 +102,7 @@ class StartTimeCodec:
         )
         codes = motion.encode(plans)
         if cut is None:
-            return cls(motion, demonstrations.horizon, None), codes
+            return cls(motion, demonstrations.horizon, None, whole_because), codes
         codec = cls(motion, demonstrations.horizon, (int(cut.begins.min()), int(cut.begins.max())))
         centre, half = codec._scale()
         start = ((cut.begins - centre) / half)[:, None, None]
@@ -125,7 +136,12 @@ class StartTimeCodec:
     def settings(self) -> dict[str, Any]:
         """Everything but the arrays, as JSON types."""
         starts = None if self.starts is None else list(self.starts)
-        return {"motion": self.motion.settings(), "horizon": self.horizon, "starts": starts}
+        return {
+            "motion": self.motion.settings(),
+            "horizon": self.horizon,
+            "starts": starts,
+            "whole_because": self.whole_because,
+        }
 
     @classmethod
     def restore(
@@ -137,6 +153,8 @@ class StartTimeCodec:
             PlanCodec.restore(settings["motion"], plan_range, code_range),
             int(settings["horizon"]),
             None if starts is None else (int(starts[0]), int(starts[1])),
+            # Not in models that were saved before it was kept; they generate the same.
+            settings.get("whole_because"),
         )
 
     def _scale(self) -> tuple[float, float]:
@@ -145,12 +163,16 @@ class StartTimeCodec:
         return (latest + earliest) / 2, (latest - earliest) / 2
 
 
+class _CannotCutError(Exception):
+    """Start times differ and cannot be coded; the message says why, as a clause."""
+
+
 @dataclass(frozen=True, eq=False)
 class _Cut:
     """Where the motions are cut out."""
 
     begins: np.ndarray
-    """Frame at which each demonstration's cut-out begins, shape (N,); may be negative."""
+    """Frame at which each demonstration's cut-out begins, shape (N,)."""
     length: int
     """Frames of every cut-out; outside it a demonstration holds its ends."""
     before: int
@@ -160,53 +182,78 @@ class _Cut:
 
 
 def _cut(demonstrations: Demonstrations) -> _Cut | None:
-    """Find the cut-outs; None where start times do not differ, or cannot be told or moved.
+    """Find the cut-outs; None where start times do not differ.
 
     They cannot be told where a demonstration moves at an end that would have to be held, nor moved
     where the longest motion with the latest start would not end within the plan. Where hands
     tremble to the very ends, no frame rests exactly; what is slow there is held instead.
+
+    Raises:
+        NotAtRestError: They cannot be told.
+        _CannotCutError: They cannot be moved, or the tremor is too large to be held.
     """
-    try:
-        alignment = align(demonstrations)
-    except InvalidDemonstrationsError:
-        return None
-    delays = -np.round(alignment.shifts / demonstrations.format.dt).astype(int)
+    delays = -np.round(align(demonstrations).shifts / demonstrations.format.dt).astype(int)
     if np.ptp(delays) == 0:
         return None
     plans = demonstrations.plans
     moving = [np.flatnonzero(np.any(plan[1:] != plan[:-1], axis=1)) for plan in plans]
-    cut = _window(moving, delays, demonstrations.horizon, _PADDING)
-    if cut is not None:
-        return cut
+    with suppress(_CannotCutError):
+        return _window(moving, delays, demonstrations.horizon, _PADDING)
     smoothing = AlignmentConfig().smoothing / demonstrations.format.dt
     profiles = velocity_profiles(plans, demonstrations.format.units, smoothing)
     speeds = np.linalg.norm(profiles, axis=2)
     moving = [np.flatnonzero(speed > _TREMOR * speed.max()) for speed in speeds]
     cut = _window(moving, delays, demonstrations.horizon, _TREMOR_PADDING)
-    if cut is None:
-        return None
+    _check_held(cut, demonstrations)
+    return cut
+
+
+def _check_held(cut: _Cut, demonstrations: Demonstrations) -> None:
+    """Refuse to hold ends that do not tremble but move."""
+    plans, plan_format = demonstrations.plans, demonstrations.format
     motions = _settled(_moved(plans, -cut.begins, cut.length), cut.before, cut.after)
-    held = _moved(motions, cut.begins, demonstrations.horizon)
-    lost = np.sqrt(np.mean((held - plans) ** 2, axis=1)).max(axis=0)
-    ranges, units = np.ptp(plans, axis=(0, 1)), np.array(demonstrations.format.units)
+    squares = (_moved(motions, cut.begins, demonstrations.horizon) - plans) ** 2
+    ranges, units = np.ptp(plans, axis=(0, 1)), np.array(plan_format.units)
     largest = np.array([ranges[units == unit].max() for unit in units])
-    return cut if np.all(lost <= _TREMOR_LOST * largest) else None
+    lost = np.sqrt(np.mean(squares, axis=1))
+    if np.all(lost <= _TREMOR_LOST * largest):
+        return
+    share = lost / np.where(largest > 0, largest, 1.0)
+    i, d = np.unravel_index(share.argmax(), share.shape)
+    middle = int(cut.begins[i]) + cut.length // 2
+    end = "before" if squares[i, :middle, d].sum() > squares[i, middle:, d].sum() else "after"
+    raise _CannotCutError(
+        f"demonstration {i} does not rest {end} its motion: holding {plan_format.names[d]} still "
+        f"there would change it by {share[i, d]:.1%} of the largest range, rms (at most "
+        f"{_TREMOR_LOST:.0%} counts as tremor)"
+    )
 
 
-def _window(
-    moving: list[np.ndarray], delays: np.ndarray, horizon: int, padding: int
-) -> _Cut | None:
+def _window(moving: list[np.ndarray], delays: np.ndarray, horizon: int, padding: int) -> _Cut:
     """The shortest common cut-out that holds every motion, if it fits into the plan at any start.
 
     A slower motion may be generated with a later start than any demonstrated pair of the two: the
     cut-out has to lie within the plan at every start, so that no rest is ever cut off.
+
+    Raises:
+        _CannotCutError: It does not fit.
     """
-    first = min(int(m[0]) - d for m, d in zip(moving, delays, strict=True) if m.size)
-    last = max(int(m[-1]) + 1 - d for m, d in zip(moving, delays, strict=True) if m.size)
+    some = [i for i, frames in enumerate(moving) if frames.size]
+    firsts = {i: int(moving[i][0] - delays[i]) for i in some}
+    lasts = {i: int(moving[i][-1]) + 1 - int(delays[i]) for i in some}
+    first, last = min(firsts.values()), max(lasts.values())
     before = min(padding, int(delays.min()) + first)
     after = min(padding, horizon - 1 - int(delays.max()) - last)
-    if before < 0 or after < 0:
-        return None
+    if before < 0:
+        raise _CannotCutError(
+            f"demonstration {min(firsts, key=firsts.__getitem__)}'s motion, begun as early as "
+            f"demonstration {int(delays.argmin())}'s, would begin {-before} frames before the plan"
+        )
+    if after < 0:
+        raise _CannotCutError(
+            f"demonstration {max(lasts, key=lasts.__getitem__)}'s motion, begun as late as "
+            f"demonstration {int(delays.argmax())}'s, would end {-after} frames after the plan"
+        )
     return _Cut(delays + first - before, last - first + 1 + before + after, before, after)
 
 
