@@ -127,4 +127,4 @@ def _terminal(table: Table, title: str) -> TerminalTable:
 
 
 def _column(header: str) -> Column:
-    return Column(Text(header))
+    return Column(Text(header), overflow="fold")
