@@ -49,7 +49,7 @@ class Reproduce:
 
     def run(self) -> None:
         """Run, save, print, and write the page of evidence."""
-        recipes = _chosen(self.recipe)
+        recipes = _chosen(self.recipe, quick=self.quick)
         included = {recipe.name: self._joining(recipe) for recipe in recipes}
         if self.goals < 1 or self.workers < 1 or not self.seeds:
             raise ConfigurationError("--goals and --workers must be at least 1, and --seeds given")
@@ -88,9 +88,9 @@ class Reproduce:
         return joining
 
 
-def _chosen(name: str) -> Sequence[Recipe]:
+def _chosen(name: str, *, quick: bool) -> Sequence[Recipe]:
     if name == "all":
-        return list(RECIPES.values())
+        return [recipe for recipe in RECIPES.values() if not (quick and recipe.variant)]
     if name not in RECIPES:
         raise ConfigurationError(f"no recipe {name!r}; recipes are {', '.join(RECIPES)}, or all")
     return [RECIPES[name]]

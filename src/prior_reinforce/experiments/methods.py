@@ -14,48 +14,12 @@ from prior_reinforce.adapters import (
     ProportionalAdapter,
 )
 from prior_reinforce.errors import ConfigurationError
-from prior_reinforce.generators import FAMILY as GENERATORS
-from prior_reinforce.generators import (
-    DiffusionConfig,
-    DiffusionGenerator,
-    DynamicMovementPrimitives,
-    DynamicMovementPrimitivesConfig,
-    Generator,
-    UNetRegression,
-    UNetRegressionConfig,
-)
+from prior_reinforce.generators import Generator
+from prior_reinforce.generators.by_name import make_generator
 from prior_reinforce.own_members import import_and_make, make_own
 from prior_reinforce.perception import Amplified, Exact, Eye, Perception
 
-
-def make_generator(name: str) -> Generator:
-    """Make a generator by its name, or one's own by `module:Class`.
-
-    `diffusion`, `regression` and `dmp` know when a motion starts as a number of its own;
-    `diffusion-whole`, `regression-whole` and `dmp-whole` learn whole plans, rests and all, as we
-    read the paper (docs/baselines.md).
-
-    Raises:
-        ConfigurationError: There is no such generator.
-    """
-    # Networks on one core each, so that the last digits do not depend on how many there are.
-    known: dict[str, Callable[[], Generator]] = {
-        **{kind.name: kind for kind in GENERATORS},
-        "diffusion": lambda: DiffusionGenerator(threads=1),
-        "diffusion-whole": lambda: DiffusionGenerator(
-            DiffusionConfig(start_times=False), threads=1
-        ),
-        "dmp-whole": lambda: DynamicMovementPrimitives(
-            DynamicMovementPrimitivesConfig(segmented=False)
-        ),
-        "regression": lambda: UNetRegression(threads=1),
-        "regression-whole": lambda: UNetRegression(
-            UNetRegressionConfig(start_times=False), threads=1
-        ),
-    }
-    if name in known:
-        return known[name]()
-    return make_own(name, Generator, list(known))
+__all__ = ["family_of", "make_adapter", "make_generator", "make_perception"]
 
 
 def make_adapter(name: str) -> Adapter:

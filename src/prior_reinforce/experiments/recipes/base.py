@@ -100,6 +100,8 @@ class Recipe(ABC):
     """The figure or table of the paper that it answers."""
     family: ClassVar[Family | None] = None
     """Which family's own members `--include` puts beside ours; None where none can join."""
+    variant: ClassVar[bool] = False
+    """Whether the paper does not have it; then a quick run of all recipes leaves it out."""
 
     def trainings(self, scale: Scale, include: Sequence[str]) -> Sequence[Training]:
         """What is to be learned first, so that recipes can share it and learn side by side."""
