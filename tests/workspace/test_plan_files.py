@@ -19,8 +19,9 @@ from prior_reinforce.errors import (
     WorkspaceError,
 )
 from prior_reinforce.motions import Plan, PlanFormat
-from prior_reinforce.workspace import plan_files
-from prior_reinforce.workspace.plan_files import PlanFile, encode_plan, read_plan, write_plan
+from prior_reinforce.workspace import write_once
+from prior_reinforce.workspace.plan_encoding import encode_plan
+from prior_reinforce.workspace.plan_files import PlanFile, read_plan, write_plan
 
 DT = 0.01
 
@@ -124,7 +125,7 @@ def test_a_disk_that_refuses_leaves_nothing(plan, tmp_path, monkeypatch, code):
     def refuse(descriptor):
         raise OSError(code, os.strerror(code))
 
-    monkeypatch.setattr(plan_files.os, "fsync", refuse)
+    monkeypatch.setattr(write_once.os, "fsync", refuse)
     with pytest.raises(WorkspaceError, match=os.strerror(code)):
         write_plan(plan, tmp_path / "plan.npz")
     assert not list(tmp_path.iterdir())
@@ -134,7 +135,7 @@ def test_a_disk_without_links(plan, tmp_path, monkeypatch):
     def refuse(source, target):
         raise PermissionError(errno.EPERM, "Operation not permitted")
 
-    monkeypatch.setattr(plan_files.os, "link", refuse)
+    monkeypatch.setattr(write_once.os, "link", refuse)
     file = write_plan(plan, tmp_path / "plan.npz")
     file.verify()
     with pytest.raises(FileFormatError, match="never overwritten"):

@@ -1,26 +1,15 @@
-"""Plans on disk: written once, read-only, known by their SHA-256 hash.
-
-`npz` and `csv` hold t, q, dq, ddq; `json` has the field order of ROS 2's
-trajectory_msgs/JointTrajectory. Velocities and accelerations go with the positions because a ROS 2
-joint trajectory controller interpolates positions alone linearly, and all three by quintics
-(control.ros.org, joint_trajectory_controller).
-"""
+"""Plans on disk: written once, read-only, known by their SHA-256 hash."""
 
 from __future__ import annotations
 
-import csv
-import errno
 import hashlib
-import io
 import json
-import math
 import os
-import tempfile
 import zipfile
 import zlib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, cast, get_args
+from typing import cast, get_args
 
 import numpy as np
 
@@ -32,23 +21,15 @@ from prior_reinforce.errors import (
     WorkspaceError,
 )
 from prior_reinforce.motions import Plan, PlanFormat
-from prior_reinforce.robots.interpolation import FineMotion, interpolate
 from prior_reinforce.workspace.hand_over import HandOver, run_command
+from prior_reinforce.workspace.plan_encoding import (
+    FILE_FORMAT,
+    FILE_VERSION,
+    PlanFileFormat,
+    encode_plan,
+)
+from prior_reinforce.workspace.write_once import write_once
 
-__all__ = [
-    "HandOver",
-    "PlanFile",
-    "PlanFileFormat",
-    "check_plan_path",
-    "encode_plan",
-    "read_plan",
-    "run_with_plan",
-    "write_plan",
-]
-
-PlanFileFormat = Literal["npz", "csv", "json"]
-_FILE_FORMAT = "prior-reinforce plan"
-_FILE_VERSION = 1
 _HIGHEST_RATE = 1e5
 """Samples a second; ours: a hundred times what the fastest arms are sent, in a file still small."""
 
@@ -106,7 +87,7 @@ def write_plan(
     """
     path = Path(path)
     content = encode_plan(plan, check_plan_path(path, format=format, rate=rate), rate=rate)
-    _write_once(path, content)
+    write_once(path, content)
     return PlanFile(path, hashlib.sha256(content).hexdigest())
 
 
@@ -135,17 +116,6 @@ def check_plan_path(
     return cast(PlanFileFormat, kind)
 
 
-def encode_plan(plan: Plan, format: PlanFileFormat, *, rate: float | None = None) -> bytes:
-    """The bytes of a plan's file, as `write_plan` writes them."""
-    fine = interpolate(plan.actions, plan.format.dt, rate=rate or 1 / plan.format.dt)
-    if rate is None:
-        # On the frames themselves the spline is exact to rounding; write them as they are.
-        fine = FineMotion(plan.times, np.array(plan.actions), fine.dq, fine.ddq, fine.dddq)
-    if format == "npz":
-        return _as_npz(plan, fine, 1 / rate if rate else plan.format.dt)
-    return _as_csv(plan.format, fine) if format == "csv" else _as_json(plan.format, fine)
-
-
 def read_plan(path: str | os.PathLike[str], *, sha256: str | None = None) -> Plan:
     """Read an NPZ plan, and check its hash where one is given.
 
@@ -162,7 +132,7 @@ def read_plan(path: str | os.PathLike[str], *, sha256: str | None = None) -> Pla
         with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
             q = np.array(archive["q"])
             metadata = json.loads(str(archive["metadata"]))
-        if metadata["file_format"] != _FILE_FORMAT or metadata["version"] != _FILE_VERSION:
+        if metadata["file_format"] != FILE_FORMAT or metadata["version"] != FILE_VERSION:
             raise ValueError(f"written as {metadata['file_format']} {metadata['version']}")
         names, units = tuple(metadata["joint_names"]), tuple(metadata["units"])
         return Plan(q, PlanFormat(names, units, float(metadata["dt"])))
@@ -203,114 +173,3 @@ def run_with_plan(
     """
     plan_file.verify()
     return run_command(command, plan_file.path, time_limit=time_limit, keep_open=keep_open)
-
-
-def _as_npz(plan: Plan, fine: FineMotion, dt: float) -> bytes:
-    metadata = {
-        "file_format": _FILE_FORMAT,
-        "version": _FILE_VERSION,
-        "joint_names": plan.format.names,
-        "units": plan.format.units,
-        "dt": dt,
-    }
-    buffer = io.BytesIO()
-    # numpy stamps every member with the same date, so the bytes depend on the plan alone.
-    np.savez(
-        buffer,
-        t=fine.t,
-        q=fine.q,
-        dq=fine.dq,
-        ddq=fine.ddq,
-        metadata=np.array(json.dumps(metadata)),
-    )
-    return buffer.getvalue()
-
-
-def _as_csv(format: PlanFormat, fine: FineMotion) -> bytes:
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    prefixes = ("", "d_", "dd_")
-    writer.writerow(["t", *(prefix + name for prefix in prefixes for name in format.names)])
-    # repr of a float is the shortest text that reads back as the same number.
-    writer.writerows(
-        [repr(float(value)) for value in row]
-        for row in np.column_stack([fine.t, fine.q, fine.dq, fine.ddq])
-    )
-    return text.getvalue().encode()
-
-
-def _as_json(format: PlanFormat, fine: FineMotion) -> bytes:
-    message: dict[str, Any] = {
-        "header": {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""},
-        "joint_names": list(format.names),
-        "points": [
-            {
-                "positions": q.tolist(),
-                "velocities": dq.tolist(),
-                "accelerations": ddq.tolist(),
-                "effort": [],
-                "time_from_start": _duration(float(t)),
-            }
-            for t, q, dq, ddq in zip(fine.t, fine.q, fine.dq, fine.ddq, strict=True)
-        ],
-    }
-    return (json.dumps(message, indent=1) + "\n").encode()
-
-
-def _duration(seconds: float) -> dict[str, int]:
-    nanoseconds = round(seconds * 1e9)
-    whole = math.floor(nanoseconds / 1_000_000_000)
-    return {"sec": whole, "nanosec": nanoseconds - whole * 1_000_000_000}
-
-
-def _write_once(path: Path, content: bytes) -> None:
-    """Put content at path so that it is there wholly or not at all, and never replaces a file."""
-    temporary: str | None = None
-    try:
-        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}-")
-        with os.fdopen(handle, "wb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        os.chmod(temporary, 0o444)
-        _put_in_place(temporary, path)
-        folder = os.open(path.parent, os.O_RDONLY)
-        try:
-            os.fsync(folder)
-        finally:
-            os.close(folder)
-    except FileExistsError:
-        if not (path.is_file() and path.read_bytes() == content):
-            raise FileFormatError(
-                f"{path} is there already with another content; plans are never overwritten: "
-                "choose another name"
-            ) from None
-    except OSError as error:
-        remedy = {
-            errno.ENOSPC: "free some space",
-            errno.ENOENT: "make the folder first",
-        }.get(error.errno or 0, "choose a folder that can be written to")
-        raise WorkspaceError(f"cannot write {path} ({error.strerror}); {remedy}") from error
-    finally:
-        if temporary is not None:
-            Path(temporary).unlink(missing_ok=True)
-
-
-def _put_in_place(temporary: str, path: Path) -> None:
-    """Give the finished file its name.
-
-    Raises:
-        FileExistsError: A file of that name is there already.
-    """
-    try:
-        # A link, unlike a rename, fails where a file is there already.
-        os.link(temporary, path)
-    except FileExistsError:
-        raise
-    except OSError as error:
-        # Memory sticks (FAT) have no links.
-        if error.errno not in (errno.EPERM, errno.EOPNOTSUPP, errno.ENOSYS):
-            raise
-        if path.exists():
-            raise FileExistsError(errno.EEXIST, "File exists", str(path)) from error
-        os.rename(temporary, path)
