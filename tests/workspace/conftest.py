@@ -3,6 +3,7 @@
 import pytest
 from planar import SMALL, demonstrations, manifest
 
+from prior_reinforce.generators import DiffusionGenerator
 from prior_reinforce.workspace.workspace import Workspace
 
 
@@ -12,6 +13,6 @@ def learned_folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("learned") / "planar"
     workspace = Workspace.create(folder, manifest())
     workspace.import_demonstrations(demonstrations(), "made up")
-    workspace.learn(SMALL, seed=0)
+    workspace.learn(DiffusionGenerator(SMALL), seed=0)
     workspace.close()
     return folder

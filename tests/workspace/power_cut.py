@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 from planar import SMALL, demonstrations, manifest
 
+from prior_reinforce.generators import DiffusionGenerator
 from prior_reinforce.workspace.trials import amend, ask, tell, void
 from prior_reinforce.workspace.workspace import Workspace
 
@@ -68,7 +69,7 @@ def learn(folder):
     if pid == 0:
         workspace = Workspace.create(folder, manifest())
         workspace.import_demonstrations(demonstrations(), "made up")
-        workspace.learn(SMALL, seed=0)
+        workspace.learn(DiffusionGenerator(SMALL), seed=0)
         workspace.close()
         os._exit(0)
     assert os.waitpid(pid, 0)[1] == 0

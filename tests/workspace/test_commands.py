@@ -225,6 +225,38 @@ def test_what_ask_cannot_do_is_said_before_a_trial_is_made(run, folder, flags, r
     assert journal(folder) == before
 
 
+def test_a_plan_can_be_put_elsewhere_trial_by_trial(run, folder, tmp_path):
+    run("goal", folder, "0.9", "0.05")
+    for number in (1, 2):
+        assert run("ask", folder, "--out", "plan-{trial}.csv")[0] == 0
+        assert run("ask", folder, "--out", ".")[0] == 0
+        run("tell", folder, number, "--error", "3cm long")
+    assert sorted(path.name for path in tmp_path.glob("*-*")) == [
+        *("plan-1.csv", "plan-2.csv", "trial-1.npz", "trial-2.npz")
+    ]
+    before = journal(folder)
+    status, out, err = run("ask", folder, "--out", "plan-1.csv")
+    assert (status, out) == (2, "")
+    assert "plan-1.csv is there already" in err
+    assert "{trial}" in err
+    assert journal(folder) == before
+
+
+def test_another_generator_can_be_learned(run, folder):
+    _, out, _ = run("learn", folder, "--generator", "interpolation", "--align")
+    assert "next: prior-reinforce goal" in out
+    assert "interpolation" in run("status", folder)[1]
+    before = journal(folder)
+    for args, remedy in (
+        (("--generator", "spline"), "known are diffusion"),
+        (("--generator", "nearest", "--config.training-steps", "5"), "drop one"),
+    ):
+        status, _, err = run("learn", folder, *args)
+        assert status == 2
+        assert remedy in err
+    assert journal(folder) == before
+
+
 def test_a_command_that_fails_is_told_by_the_status(run, folder, tmp_path):
     run("goal", folder, "0.9", "0.05")
     script = tmp_path / "arm.py"
@@ -305,9 +337,14 @@ def test_the_report_shows_every_goal_and_the_voided_trials(run, folder, tmp_path
     path = next((tmp_path / "planar" / "plans").glob("trial-001*"))
     path.chmod(0o644)
     path.write_bytes(path.read_bytes()[:-20])
-    status, _, err = run("report", folder)
-    assert status == 2
-    assert "put the original back" in err
+    assert run("ask", folder)[0] == 0  # goes on, for that trial was told
+    assert run("report", folder)[0] == 0
+    page = (tmp_path / "planar" / "report" / "report.html").read_text()
+    assert "the plan of trial 1 is not drawn" in page
+    assert path.name in page
+    path.unlink()
+    run("void", folder, 1)
+    assert run("report", folder)[0] == 0
 
 
 def test_export_writes_what_was_handed_out(run, folder):

@@ -18,6 +18,7 @@ from prior_reinforce.errors import (
     TrialStateError,
     WorkspaceError,
 )
+from prior_reinforce.generators import DiffusionGenerator, SmoothInterpolation, align
 from prior_reinforce.motions import Demonstrations, PlanFormat
 from prior_reinforce.session import Session
 from prior_reinforce.workspace.execution import execute
@@ -27,6 +28,12 @@ from prior_reinforce.workspace.trials import amend, ask, tell, void
 from prior_reinforce.workspace.workspace import Workspace
 
 GOAL = [0.9, 0.05]
+
+
+class OwnInterpolation(SmoothInterpolation):
+    """None of ours, as far as the package knows."""
+
+    name = "own-interpolation"
 
 
 @pytest.fixture
@@ -103,10 +110,54 @@ def test_earlier_goals_serve_a_later_one_only_when_asked_to(workspace, memory):
 def test_a_trial_of_another_model_is_left_out(workspace):
     first = ask(workspace)
     tell(workspace, first.number, [0.06, 0.03])
-    workspace.learn(SMALL, seed=1)
+    workspace.learn(DiffusionGenerator(SMALL), seed=1)
     fresh = workspace.session()
     assert fresh.n_trials == 0
     np.testing.assert_array_equal(ask(workspace).condition, first.condition)
+
+
+@pytest.mark.parametrize("aligned", [False, True])
+def test_any_generator_can_be_learned_from_aligned_demonstrations_too(tmp_path, aligned):
+    """A workspace whose recordings start at different times plans as the generator by itself."""
+    demos = demonstrations()
+    late = [
+        np.concatenate([p[:1].repeat(n, 0), p[: len(p) - n]]) for n, p in enumerate(demos.plans)
+    ]
+    rest = np.repeat(np.array(late)[:, -1:], 4, axis=1)
+    demos = Demonstrations(np.concatenate([late, rest], axis=1), demos.outcomes_seen, demos.format)
+    workspace = Workspace.create(tmp_path / "planar", manifest())
+    workspace.import_demonstrations(demos, "made up")
+    model = workspace.learn(SmoothInterpolation(), seed=0, aligned=aligned)
+    workspace.set_goal(GOAL)
+    fitted_to = align(demos).demonstrations if aligned else demos
+    alone = SmoothInterpolation().fit(fitted_to, seed=0)
+    trial = ask(workspace)
+    np.testing.assert_array_equal(
+        workspace.plan(trial).actions, alone.generate(trial.condition[None])[0]
+    )
+    np.testing.assert_array_equal(workspace.demonstrations_of(model).plans, fitted_to.plans)
+    said = describe(workspace)
+    assert f"{model}, interpolation" in said
+    assert ("demonstrations aligned" in said) == aligned
+    assert workspace.events[1].data["generator"] == "interpolation"
+    workspace.close()
+
+
+def test_ones_own_generator_is_named_by_a_person_not_by_the_journal(workspace):
+    workspace.learn(OwnInterpolation(), seed=0)
+    name = f"{__name__}:OwnInterpolation"
+    assert f"prior-reinforce ask {workspace.folder} --generator {name}" in describe(workspace)
+    before = workspace.events
+    with pytest.raises(ConfigurationError, match=f"--generator {name}"):
+        ask(workspace)
+    with pytest.raises(ConfigurationError, match="learned by"):
+        ask(workspace, own=SmoothInterpolation())
+    assert workspace.events == before
+    assert ask(workspace, own=OwnInterpolation()).number == 1
+    void(workspace, 1, "")
+    workspace.learn(SmoothInterpolation(), seed=0)
+    with pytest.raises(ConfigurationError, match="drop --generator"):
+        ask(workspace, own=OwnInterpolation())
 
 
 def test_bad_feedback_changes_nothing(workspace):
@@ -119,7 +170,7 @@ def test_bad_feedback_changes_nothing(workspace):
         lambda: tell(workspace, 7, [0.0, 0.0]),
         lambda: amend(workspace, number, [0.0, 0.0]),
         lambda: workspace.set_goal([0.9, 0.0]),
-        lambda: workspace.learn(SMALL, seed=0),
+        lambda: workspace.learn(DiffusionGenerator(SMALL), seed=0),
     ):
         with pytest.raises(TrialStateError):
             call()
@@ -143,7 +194,7 @@ def test_the_order_of_things_is_told(tmp_path):
     workspace.import_demonstrations(demonstrations(), "made up")
     with pytest.raises(WorkspaceError, match="prior-reinforce learn"):
         ask(workspace)
-    workspace.learn(SMALL, seed=0)
+    workspace.learn(DiffusionGenerator(SMALL), seed=0)
     with pytest.raises(WorkspaceError, match="prior-reinforce goal"):
         ask(workspace)
     workspace.close()

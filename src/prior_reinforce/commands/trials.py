@@ -11,8 +11,9 @@ import numpy as np
 import tyro
 
 from prior_reinforce.commands.workspace import Folder, opened, print_next
-from prior_reinforce.errors import ConfigurationError, InvalidFeedbackError
+from prior_reinforce.errors import ConfigurationError, FileFormatError, InvalidFeedbackError
 from prior_reinforce.feedback import from_words
+from prior_reinforce.generators.by_name import make_generator
 from prior_reinforce.workspace.executing_lock import is_executing
 from prior_reinforce.workspace.execution import execute
 from prior_reinforce.workspace.hand_over import check_command
@@ -38,7 +39,8 @@ class Ask:
     folder: Folder
     """Workspace."""
     out: Path | None = None
-    """Write the plan to this file as well: .npz (t, q, dq, ddq), .csv or .json."""
+    """Write the plan to this file as well: .npz (t, q, dq, ddq), .csv or .json. {trial} in its
+    name stands for the trial's number; a folder takes trial-{trial}.npz."""
     rate: float | None = None
     """Samples a second of --out; the plan's own frames if not given."""
     run_command: Annotated[str | None, tyro.conf.arg(name="run")] = None
@@ -48,14 +50,16 @@ class Ask:
     """Seconds that the command may take."""
     arm_did_not_move: bool = False
     """After a crash while executing: a person saw that nothing moved."""
+    generator: str | None = None
+    """The generator that the model was learned by, where it is one's own: module:Class."""
 
     def run(self) -> int:
         """Hand the plan out."""
-        if self.out is not None:
-            check_plan_path(self.out, rate=self.rate)
+        own = None if self.generator is None else make_generator(self.generator)
         if self.run_command is not None:
             check_command(self.run_command, time_limit=self.time_limit)
         with opened(self.folder) as workspace:
+            self._check_out(workspace)
             did_not_move = self.arm_did_not_move
             if not did_not_move and _should_ask_whether_it_moved(workspace):
                 moved = _ask_whether_it_moved(workspace)
@@ -63,7 +67,7 @@ class Ask:
                     print_next(workspace)
                     return 1
                 did_not_move = True
-            trial = ask(workspace, arm_did_not_move=did_not_move)
+            trial = ask(workspace, arm_did_not_move=did_not_move, own=own)
             plan = workspace.plan(trial)
             print(
                 f"trial {trial.number}: aimed at {say_place(workspace.manifest, trial.condition)}"
@@ -75,8 +79,9 @@ class Ask:
                 "no robot in the manifest, no limits checked" if report is None else report.text()
             )
             print(f"plan: {workspace.plan_path(trial)}")
-            if self.out is not None:
-                print(f"written: {write_plan(plan, self.out, rate=self.rate).path}")
+            out = self._out_of(trial.number)
+            if out is not None:
+                print(f"written: {write_plan(plan, out, rate=self.rate).path}")
             if self.run_command is not None:
                 return self._execute(workspace, trial, self.run_command)
             if trial.stage is TrialStage.EXECUTED:
@@ -85,6 +90,29 @@ class Ask:
                 print("execute it, then say where the object went:")
             print_next(workspace)
             return 0
+
+    def _out_of(self, number: int) -> Path | None:
+        """Where --out puts the plan of a trial."""
+        if self.out is None:
+            return None
+        out = self.out / "trial-{trial}.npz" if self.out.is_dir() else self.out
+        return Path(str(out).replace("{trial}", str(number)))
+
+    def _check_out(self, workspace: Workspace) -> None:
+        """Say what --out cannot do before a trial is made."""
+        history = workspace.history
+        new = history.open_trial is None
+        number = len(history.trials) + 1 if new else history.trials[-1].number
+        out = self._out_of(number)
+        if out is None:
+            return
+        check_plan_path(out, rate=self.rate)
+        # The open trial's plan may be there from the last time it was asked for.
+        if new and out.exists():
+            raise FileFormatError(
+                f"{out} is there already, and plans are never overwritten; choose another name, "
+                'for instance with the trial\'s number: --out "plan-{trial}.npz"'
+            )
 
     def _execute(self, workspace: Workspace, trial: TrialRecord, command: str) -> int:
         hand_over = execute(workspace, trial.number, command, time_limit=self.time_limit)

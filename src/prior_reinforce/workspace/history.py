@@ -67,6 +67,30 @@ class GoalRecord:
     """`goal`: the adapter sees this goal's trials; `workspace`: earlier goals' as well."""
 
 
+@dataclass(frozen=True)
+class ModelRecord:
+    """One training."""
+
+    model: str
+    """Hash of the model, the name of its folder."""
+    demonstrations: str
+    """SHA-256 of the demonstrations as they were imported."""
+    fitted_to: str
+    """SHA-256 of what the generator was fitted to: the same, or those aligned in time."""
+    generator: str = "diffusion"
+    """Its name, or `module:Class` of one's own."""
+
+    @property
+    def aligned(self) -> bool:
+        """Whether the demonstrations were aligned in time first."""
+        return self.fitted_to != self.demonstrations
+
+    @property
+    def own(self) -> bool:
+        """Whether the generator is none of ours."""
+        return ":" in self.generator
+
+
 @dataclass(frozen=True, eq=False)
 class History:
     """All that happened."""
@@ -77,13 +101,23 @@ class History:
     """SHA-256 of the demonstrations in use; None before the first import."""
     model: str | None = None
     """Hash of the model in use; None before the first training."""
-    learned_from: Mapping[str, str] = field(default_factory=dict)
-    """SHA-256 of the demonstrations that each model was learned from, by the model's hash."""
+    models: Mapping[str, ModelRecord] = field(default_factory=dict)
+    """Every training, by the model's hash."""
 
     @property
     def goal(self) -> GoalRecord | None:
         """The goal that is worked on: the latest."""
         return self.goals[-1] if self.goals else None
+
+    @property
+    def training(self) -> ModelRecord | None:
+        """The training of the model in use."""
+        return None if self.model is None else self.models[self.model]
+
+    @property
+    def stale(self) -> bool:
+        """Whether there is no model, or demonstrations were imported since it was learned."""
+        return self.training is None or self.training.demonstrations != self.demonstrations
 
     @property
     def open_trial(self) -> TrialRecord | None:
@@ -117,9 +151,16 @@ def _apply(history: History, kind: str, data: dict[str, Any]) -> History:
     if kind == "demonstrations_imported":
         return replace(history, demonstrations=data["sha256"])
     if kind == "model_trained":
-        model = data["model"]
-        learned_from = {**history.learned_from, model: data["demonstrations_sha256"]}
-        return replace(history, model=model, learned_from=learned_from)
+        sha256 = data["demonstrations_sha256"]
+        # The first journals name neither: all was diffusion on demonstrations as recorded.
+        training = ModelRecord(
+            model=data["model"],
+            demonstrations=sha256,
+            fitted_to=data.get("fitted_to_sha256", sha256),
+            generator=data.get("generator", "diffusion"),
+        )
+        models = {**history.models, training.model: training}
+        return replace(history, model=training.model, models=models)
     if kind == "goal_set":
         goal = GoalRecord(
             len(history.goals) + 1, np.array(data["goal"]), data["tolerance"], data["memory"]

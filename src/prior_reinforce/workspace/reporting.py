@@ -5,7 +5,9 @@ from __future__ import annotations
 from importlib.metadata import version
 from pathlib import Path
 
-from prior_reinforce.errors import WorkspaceError
+import numpy as np
+
+from prior_reinforce.errors import FileFormatError, WorkspaceError
 from prior_reinforce.report import AdaptationRecord, write_report
 from prior_reinforce.session import Trial, TrialState
 from prior_reinforce.workspace.history import GoalRecord, History, TrialRecord, TrialStage
@@ -25,7 +27,8 @@ def report_workspace(workspace: Workspace, folder: Path) -> Path:
 
     Raises:
         WorkspaceError: There is nothing to report yet, or the folder cannot be written.
-        FileFormatError: A plan is not what was handed out.
+        FileFormatError: The demonstrations are damaged. A plan that is lost or damaged stops
+            nothing: it is not drawn, and named.
     """
     history = workspace.history
     goals = [goal for goal in history.goals if history.trials_of(goal.number)]
@@ -60,15 +63,24 @@ def _models(history: History) -> str:
 
 
 def _record(workspace: Workspace, history: History, goal: GoalRecord) -> AdaptationRecord:
-    trials = history.trials_of(goal.number)
+    records = history.trials_of(goal.number)
+    # The page counts each goal's trials from 1; the title says what the journal calls them.
+    trials: list[Trial] = []
+    remarks = ["no film: a real arm is not filmed by this program"]
+    for number, record in enumerate(records, start=1):
+        try:
+            plan = workspace.plan(record).actions
+        except FileFormatError as error:
+            plan = np.empty((0, workspace.manifest.format.action_dim))
+            remarks.append(f"the plan of trial {number} is not drawn: {error}")
+        trials.append(_trial(record, number, plan))
     return AdaptationRecord(
-        demonstrations=workspace.demonstrations_of(trials[-1].model),
+        demonstrations=workspace.demonstrations_of(records[-1].model),
         goal=goal.goal,
         tolerance=goal.tolerance,
-        # The page counts each goal's trials from 1; the title says what the journal calls them.
-        trials=tuple(_trial(workspace, trial, i) for i, trial in enumerate(trials, start=1)),
-        title=_title(goal, trials),
-        film_caption="no film: a real arm is not filmed by this program",
+        trials=tuple(trials),
+        title=_title(goal, records),
+        film_caption="; ".join(remarks),
     )
 
 
@@ -80,12 +92,12 @@ def _title(goal: GoalRecord, trials: tuple[TrialRecord, ...]) -> str:
     return f"Goal {goal.number} ({numbers} in the journal)"
 
 
-def _trial(workspace: Workspace, record: TrialRecord, number: int) -> Trial:
+def _trial(record: TrialRecord, number: int, plan: np.ndarray) -> Trial:
     stages = {TrialStage.TOLD: TrialState.TOLD, TrialStage.VOIDED: TrialState.VOIDED}
     return Trial(
         number,
         record.condition,
-        workspace.plan(record).actions,
+        plan,
         stages.get(record.stage, TrialState.PENDING),
         record.error_seen,
         record.hit,

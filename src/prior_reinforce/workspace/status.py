@@ -61,7 +61,7 @@ def next_step(workspace: Workspace) -> str:
     trial = history.open_trial
     if history.demonstrations is None:
         return f"prior-reinforce import {folder} RECORDINGS"
-    if history.model is None or history.learned_from[history.model] != history.demonstrations:
+    if history.stale:
         return f"prior-reinforce learn {folder}"
     if history.goal is None:
         return f"prior-reinforce goal {folder} {_example_goal(workspace)}"
@@ -75,7 +75,9 @@ def next_step(workspace: Workspace) -> str:
             f"prior-reinforce goal {folder} {_example_goal(workspace)}, "
             f"or prior-reinforce report {folder}"
         )
-    return f"prior-reinforce ask {folder}"
+    training = history.training
+    own = f" --generator {training.generator}" if training is not None and training.own else ""
+    return f"prior-reinforce ask {folder}{own}"
 
 
 def tell_example(workspace: Workspace) -> str:
@@ -92,11 +94,12 @@ def _example_goal(workspace: Workspace) -> str:
 
 
 def _say_model(history: History) -> str:
-    if history.model is None:
+    training = history.training
+    if training is None:
         return "none yet"
-    if history.learned_from[history.model] != history.demonstrations:
-        return f"{history.model}, of other demonstrations"
-    return history.model
+    aligned = ", demonstrations aligned" if training.aligned else ""
+    said = f"{training.model}, {training.generator}{aligned}"
+    return f"{said}, of other demonstrations" if history.stale else said
 
 
 def _say_goal(workspace: Workspace, history: History, goal: GoalRecord, n: int) -> str:

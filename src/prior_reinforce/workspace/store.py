@@ -77,8 +77,13 @@ class Store:
                 _sync(models)
         return model
 
-    def model(self, model: str) -> Generator:
+    def model(self, model: str, kind: type[Generator] | None = None) -> Generator:
         """Load a generator that was kept.
+
+        Args:
+            model: Its hash.
+            kind: Its class, where it is none of ours. It is never taken from the folder: a model
+                is data, and names no code to run.
 
         Raises:
             FileFormatError: Its files are missing, damaged, or others.
@@ -89,7 +94,7 @@ class Store:
                 f"the model in {folder} is not the one that was learned; restore it from a copy, "
                 f"or run: prior-reinforce learn {self._folder}"
             )
-        return load_generator(folder)
+        return load_generator(folder) if kind is None else kind.load(folder)
 
     def save_plan(self, plan: Plan, number: int) -> PlanFile:
         """Keep a trial's plan.

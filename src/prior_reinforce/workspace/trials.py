@@ -11,31 +11,36 @@ from numpy.typing import ArrayLike
 
 from prior_reinforce.arrays import as_error
 from prior_reinforce.errors import RobotLimitError, TrialStateError, WorkspaceError
+from prior_reinforce.generators import Generator
 from prior_reinforce.motions import Plan
 from prior_reinforce.workspace.executing_lock import is_executing
 from prior_reinforce.workspace.history import TrialRecord, TrialStage
 from prior_reinforce.workspace.workspace import Workspace
 
 
-def ask(workspace: Workspace, *, arm_did_not_move: bool = False) -> TrialRecord:
+def ask(
+    workspace: Workspace, *, arm_did_not_move: bool = False, own: Generator | None = None
+) -> TrialRecord:
     """Return the trial to execute: the open one, or a new one that passed the gate.
 
     Args:
         workspace: Whose goal is worked on.
         arm_did_not_move: What a person saw of a trial that was executing when the program
             died: nothing moved, it may be executed after all.
+        own: A generator of the class that the model was learned by, where it is none of ours.
 
     Raises:
         WorkspaceError: A trial was executing when the program died, and nobody said yet
             whether the arm moved; or what a session needs is missing.
         TrialStateError: A trial is executing right now.
+        ConfigurationError: The model is of one's own class, and `own` is not of it.
         RobotLimitError: The plan breaks a limit; nothing is handed out.
         FileFormatError: The plan, the model or the demonstrations are damaged.
     """
     with workspace.journal.exclusive():
         trial = workspace.history.open_trial
         if trial is None:
-            trial = _ask_new(workspace)
+            trial = _ask_new(workspace, own)
         elif trial.stage is TrialStage.EXECUTING:
             if is_executing(workspace.folder):
                 raise TrialStateError(f"trial {trial.number} is executing now; wait for it")
@@ -107,8 +112,8 @@ def void(workspace: Workspace, number: int, reason: str) -> TrialRecord:
         return workspace.record(number)
 
 
-def _ask_new(workspace: Workspace) -> TrialRecord:
-    session = workspace.session()
+def _ask_new(workspace: Workspace, own: Generator | None) -> TrialRecord:
+    session = workspace.session(own)
     history = workspace.history
     assert history.goal is not None
     pending = session.ask()

@@ -25,8 +25,8 @@ from prior_reinforce.errors import (
     TrialStateError,
     WorkspaceError,
 )
-from prior_reinforce.generators import DiffusionConfig, DiffusionGenerator
-from prior_reinforce.generators.base import FitProgress
+from prior_reinforce.generators import FitProgress, Generator, align
+from prior_reinforce.generators.by_name import name_of
 from prior_reinforce.motions import Demonstrations, Plan
 from prior_reinforce.robots import LimitReport, check_plan
 from prior_reinforce.session import Session
@@ -151,17 +151,21 @@ class Workspace:
         return demonstrations
 
     def demonstrations_of(self, model: str) -> Demonstrations:
-        """The demonstrations that a model was learned from.
+        """The demonstrations that a model was fitted to, aligned if it was learned so.
 
         Raises:
             FileFormatError: The file is missing or damaged.
         """
-        return self.store.demonstrations(self.history.learned_from[model])
+        return self.store.demonstrations(self.history.models[model].fitted_to)
 
-    def session(self) -> Session:
+    def session(self, own: Generator | None = None) -> Session:
         """The session of the goal that is worked on, built from what happened.
 
+        Args:
+            own: A generator of the class that the model was learned by, where it is none of ours.
+
         Raises:
+            ConfigurationError: `own` is missing, or of another class.
             WorkspaceError: No goal was set, nothing learned, or from other demonstrations.
             FileFormatError: The model or the demonstrations are damaged.
         """
@@ -170,14 +174,25 @@ class Workspace:
         demonstrations = self.demonstrations
         if history.model is None:
             raise WorkspaceError(f"nothing is learned yet; run: prior-reinforce learn {folder}")
-        if history.learned_from[history.model] != demonstrations.sha256:
+        training = history.models[history.model]
+        if training.demonstrations != demonstrations.sha256:
             raise WorkspaceError(
                 "other demonstrations were imported since the model was learned; run: "
                 f"prior-reinforce learn {folder}"
             )
         if history.goal is None:
             raise WorkspaceError(f"no goal is set; run: prior-reinforce goal {folder} X Y")
-        generator = self.store.model(history.model)
+        expected = training.generator if training.own else None
+        if (None if own is None else name_of(own)) != expected:
+            raise ConfigurationError(
+                f"the model was learned by {training.generator}; "
+                + (
+                    f"name it, for the journal starts no code: --generator {training.generator}"
+                    if training.own
+                    else "drop --generator, or learn anew"
+                )
+            )
+        generator = self.store.model(history.model, None if own is None else type(own))
         return build_session(history, history.goal, generator, demonstrations)
 
     def plan_path(self, trial: TrialRecord) -> Path:
@@ -193,10 +208,17 @@ class Workspace:
         return self.store.plan(trial.plan_file, trial.plan_sha256)
 
     def gate(self, plan: Plan) -> LimitReport | None:
-        """Hold a plan against the robot's limits; None where the manifest names no robot."""
+        """Hold a plan against the robot's limits; None where the manifest names no robot.
+
+        Raises:
+            InvalidDemonstrationsError: The manifest says otherwise since they were imported.
+        """
         if self.manifest.robot is None:
             return None
-        return check_plan(plan, self.manifest.robot, self.demonstrations, self.manifest.gate)
+        model = self.history.model
+        shown = self.demonstrations if model is None else self.demonstrations_of(model)
+        self._check_fit(shown, "what was imported")
+        return check_plan(plan, self.manifest.robot, shown, self.manifest.gate)
 
     def import_demonstrations(self, demonstrations: Demonstrations, source: str) -> None:
         """Take in demonstrations, in place of earlier ones.
@@ -224,28 +246,41 @@ class Workspace:
 
     def learn(
         self,
-        config: DiffusionConfig,
+        generator: Generator,
         *,
         seed: int,
+        aligned: bool = False,
         progress: Callable[[FitProgress], None] | None = None,
     ) -> str:
-        """Learn a generator from the demonstrations and put it in use.
+        """Fit a generator to the demonstrations and put it in use.
+
+        Args:
+            generator: pi, fitted here.
+            seed: Of the fit.
+            aligned: Align the demonstrations in time first, for a generator that does not know when
+                a motion starts.
+            progress: Called now and then while fitting.
 
         Returns:
             The model's hash, the name of its folder.
 
         Raises:
             TrialStateError: A trial waits to be told.
+            InvalidDemonstrationsError: They cannot be aligned, or not be learned from.
         """
         self.refuse_open_trial("learning")
         demonstrations = self.demonstrations
-        generator = DiffusionGenerator(config).fit(demonstrations, seed=seed, progress=progress)
+        fitted_to = align(demonstrations).demonstrations if aligned else demonstrations
+        generator.fit(fitted_to, seed=seed, progress=progress)
+        if aligned:
+            self.store.save_demonstrations(fitted_to)
         model = self.store.save_model(generator)
         data = {
             "model": model,
+            "generator": name_of(generator),
             "seed": seed,
             "demonstrations_sha256": demonstrations.sha256,
-            "config": config.to_json(),
+            "fitted_to_sha256": fitted_to.sha256,
         }
         with self.journal.exclusive():
             self.refuse_open_trial("learning")
