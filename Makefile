@@ -5,10 +5,13 @@ BIN := $(VENV)/bin
 # Pictures are drawn without a display (EGL); without OpenGL the report says so in one line.
 export MUJOCO_GL ?= egl
 
-.PHONY: demo test check reproduce clean
+.PHONY: demo install test check reproduce clean
 
 demo: $(VENV)/.core
 	$(BIN)/prior-reinforce demo --out runs/demo $(ARGS)
+
+# What a user needs; `. .venv/bin/activate` then has `prior-reinforce`.
+install: $(VENV)/.core
 
 test: $(VENV)/.all
 	$(BIN)/python -m pytest $(ARGS)
