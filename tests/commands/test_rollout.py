@@ -11,7 +11,9 @@ from prior_reinforce.cli import main
 @pytest.mark.slow
 def test_one_command_makes_a_tasks_film(tmp_path, capsys):
     film = tmp_path / "slide.mp4"
-    assert main(["rollout", "--task", "curling", "--demonstration", "5", "--film", str(film)]) == 0
+    # Seed 2 disturbs this one by 2 mm, within curling's tolerance of 1 cm.
+    throw = ["--task", "curling", "--demonstration", "5", "--seed", "2"]
+    assert main(["rollout", *throw, "--film", str(film)]) == 0
     said = " ".join(capsys.readouterr().out.split())
     assert "within the tolerance" in said
     count, seconds = imageio_ffmpeg.count_frames_and_secs(str(film))
