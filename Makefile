@@ -18,7 +18,7 @@ test: $(VENV)/.all
 
 check: $(VENV)/.all
 	$(BIN)/ruff format --check .
-	$(BIN)/ruff check .
+	$(BIN)/ruff check --no-cache .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 

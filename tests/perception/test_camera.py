@@ -9,7 +9,7 @@ import sys
 import mujoco
 import numpy as np
 import pytest
-from conftest import RIM_HEIGHT
+from slanted_table import RIM_HEIGHT
 
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.perception.camera import Camera, CameraConfig

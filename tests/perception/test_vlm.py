@@ -6,7 +6,7 @@ import json
 
 import numpy as np
 import pytest
-from conftest import RIM_HEIGHT
+from slanted_table import RIM_HEIGHT
 from vision_server import VisionServer
 
 from prior_reinforce.adapters import GaussianProcessAdapter
