@@ -4,6 +4,7 @@ import pytest
 from planar import SMALL, demonstrations, manifest
 
 from prior_reinforce.generators import DiffusionGenerator
+from prior_reinforce.workspace.learning import learn
 from prior_reinforce.workspace.workspace import Workspace
 
 
@@ -13,6 +14,6 @@ def learned_folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("learned") / "planar"
     workspace = Workspace.create(folder, manifest())
     workspace.import_demonstrations(demonstrations(), "made up")
-    workspace.learn(DiffusionGenerator(SMALL), seed=0)
+    learn(workspace, DiffusionGenerator(SMALL), seed=0)
     workspace.close()
     return folder

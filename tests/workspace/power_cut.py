@@ -16,6 +16,7 @@ import numpy as np
 from planar import SMALL, demonstrations, manifest
 
 from prior_reinforce.generators import DiffusionGenerator
+from prior_reinforce.workspace.learning import learn
 from prior_reinforce.workspace.trials import amend, ask, tell, void
 from prior_reinforce.workspace.workspace import Workspace
 
@@ -63,13 +64,13 @@ def in_child(folder):
     return pid
 
 
-def learn(folder):
+def learn_in_child(folder):
     """Make the workspace in a child too: torch's threads do not survive a fork."""
     pid = os.fork()
     if pid == 0:
         workspace = Workspace.create(folder, manifest())
         workspace.import_demonstrations(demonstrations(), "made up")
-        workspace.learn(DiffusionGenerator(SMALL), seed=0)
+        learn(workspace, DiffusionGenerator(SMALL), seed=0)
         workspace.close()
         os._exit(0)
     assert os.waitpid(pid, 0)[1] == 0
@@ -97,7 +98,7 @@ def said(folder):
 
 def main(folder, n_kills):
     learned, reference, killed = folder / "learned", folder / "reference", folder / "killed"
-    learn(learned)
+    learn_in_child(learned)
     shutil.copytree(learned, reference)
     started = time.monotonic()
     assert os.waitpid(in_child(reference), 0)[1] == 0

@@ -23,6 +23,7 @@ from prior_reinforce.motions import Demonstrations, PlanFormat
 from prior_reinforce.session import Session
 from prior_reinforce.workspace.execution import execute
 from prior_reinforce.workspace.history import TrialStage
+from prior_reinforce.workspace.learning import learn
 from prior_reinforce.workspace.status import describe
 from prior_reinforce.workspace.trials import amend, ask, tell, void
 from prior_reinforce.workspace.workspace import Workspace
@@ -110,7 +111,7 @@ def test_earlier_goals_serve_a_later_one_only_when_asked_to(workspace, memory):
 def test_a_trial_of_another_model_is_left_out(workspace):
     first = ask(workspace)
     tell(workspace, first.number, [0.06, 0.03])
-    workspace.learn(DiffusionGenerator(SMALL), seed=1)
+    learn(workspace, DiffusionGenerator(SMALL), seed=1)
     fresh = workspace.session()
     assert fresh.n_trials == 0
     np.testing.assert_array_equal(ask(workspace).condition, first.condition)
@@ -127,7 +128,7 @@ def test_any_generator_can_be_learned_from_aligned_demonstrations_too(tmp_path, 
     demos = Demonstrations(np.concatenate([late, rest], axis=1), demos.outcomes_seen, demos.format)
     workspace = Workspace.create(tmp_path / "planar", manifest())
     workspace.import_demonstrations(demos, "made up")
-    model = workspace.learn(SmoothInterpolation(), seed=0, aligned=aligned)
+    model = learn(workspace, SmoothInterpolation(), seed=0, aligned=aligned)
     workspace.set_goal(GOAL)
     fitted_to = align(demos).demonstrations if aligned else demos
     alone = SmoothInterpolation().fit(fitted_to, seed=0)
@@ -144,7 +145,7 @@ def test_any_generator_can_be_learned_from_aligned_demonstrations_too(tmp_path, 
 
 
 def test_ones_own_generator_is_named_by_a_person_not_by_the_journal(workspace):
-    workspace.learn(OwnInterpolation(), seed=0)
+    learn(workspace, OwnInterpolation(), seed=0)
     name = f"{__name__}:OwnInterpolation"
     assert f"prior-reinforce ask {workspace.folder} --generator {name}" in describe(workspace)
     before = workspace.events
@@ -155,7 +156,7 @@ def test_ones_own_generator_is_named_by_a_person_not_by_the_journal(workspace):
     assert workspace.events == before
     assert ask(workspace, own=OwnInterpolation()).number == 1
     void(workspace, 1, "")
-    workspace.learn(SmoothInterpolation(), seed=0)
+    learn(workspace, SmoothInterpolation(), seed=0)
     with pytest.raises(ConfigurationError, match="drop --generator"):
         ask(workspace, own=OwnInterpolation())
 
@@ -170,7 +171,7 @@ def test_bad_feedback_changes_nothing(workspace):
         lambda: tell(workspace, 7, [0.0, 0.0]),
         lambda: amend(workspace, number, [0.0, 0.0]),
         lambda: workspace.set_goal([0.9, 0.0]),
-        lambda: workspace.learn(DiffusionGenerator(SMALL), seed=0),
+        lambda: learn(workspace, DiffusionGenerator(SMALL), seed=0),
     ):
         with pytest.raises(TrialStateError):
             call()
@@ -194,7 +195,7 @@ def test_the_order_of_things_is_told(tmp_path):
     workspace.import_demonstrations(demonstrations(), "made up")
     with pytest.raises(WorkspaceError, match="prior-reinforce learn"):
         ask(workspace)
-    workspace.learn(DiffusionGenerator(SMALL), seed=0)
+    learn(workspace, DiffusionGenerator(SMALL), seed=0)
     with pytest.raises(WorkspaceError, match="prior-reinforce goal"):
         ask(workspace)
     workspace.close()

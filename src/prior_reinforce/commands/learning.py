@@ -24,6 +24,7 @@ from prior_reinforce.generators import (
 from prior_reinforce.generators.base import Generator
 from prior_reinforce.generators.by_name import make_generator
 from prior_reinforce.motions import Demonstrations
+from prior_reinforce.workspace.learning import learn as learn_in_workspace
 
 _RECORD = "training.json"
 
@@ -131,8 +132,8 @@ class Learn(Simulated):
         if self.folder is not None:
             with opened(self.folder) as workspace:
                 with fit_progress(console) as progress:
-                    model = workspace.learn(
-                        generator, seed=self.seed, aligned=self.align, progress=progress
+                    model = learn_in_workspace(
+                        workspace, generator, seed=self.seed, aligned=self.align, progress=progress
                     )
                 if (note := whole_plans_note(generator)) is not None:
                     print(note)

@@ -7,29 +7,21 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
 import tyro
 
+from prior_reinforce.commands.reading import Number, Reading
 from prior_reinforce.commands.workspace import Folder, opened, print_next
-from prior_reinforce.errors import ConfigurationError, FileFormatError, InvalidFeedbackError
-from prior_reinforce.feedback import from_words
+from prior_reinforce.errors import ConfigurationError, FileFormatError
 from prior_reinforce.generators.by_name import make_generator
 from prior_reinforce.workspace.executing_lock import is_executing
 from prior_reinforce.workspace.execution import execute
 from prior_reinforce.workspace.hand_over import check_command
 from prior_reinforce.workspace.history import TrialRecord, TrialStage
 from prior_reinforce.workspace.plan_files import check_plan_path, write_plan
-from prior_reinforce.workspace.status import say_trial, tell_example
+from prior_reinforce.workspace.status import say_trial
 from prior_reinforce.workspace.trials import amend, ask, tell, void
 from prior_reinforce.workspace.wording import say_place
 from prior_reinforce.workspace.workspace import Workspace
-
-Number = Annotated[int, tyro.conf.Positional, tyro.conf.arg(metavar="TRIAL")]
-
-_LARGEST_PLAUSIBLE_METRES = 1.0
-"""Ours: a bare number beyond it is centimetres far more often than a throw a metre off."""
-_LARGEST_SAYABLE_METRES = 5.0
-"""Ours: words carry their unit, but nobody measures a throw that far off a table of a metre."""
 
 
 @dataclass(frozen=True)
@@ -132,45 +124,7 @@ class Ask:
 
 
 @dataclass(frozen=True)
-class _Reading:
-    folder: Folder
-    """Workspace."""
-    number: Number
-    """Number of the trial."""
-    error: tuple[str, ...] | None = None
-    """What was seen, outcome minus goal: words ("5cm long, 2cm left") or metres (0.05 -0.02)."""
-    outcome: tuple[float, ...] | None = None
-    """Or where the object ended, in the table frame, in the outcome's units."""
-    hit: bool = False
-    """The goal was reached, whatever the distance says."""
-    miss: bool = False
-    """The goal was not reached, whatever the distance says."""
-
-    def read(self, workspace: Workspace) -> tuple[np.ndarray, bool | None]:
-        """The error seen, and whether it was a hit if that was said."""
-        given = [self.error is not None, self.outcome is not None]
-        if sum(given) > 1 or not (any(given) or self.hit) or (self.hit and self.miss):
-            raise ConfigurationError(
-                "say what was seen: --error or --outcome, with --hit or --miss if that was seen "
-                "as well, or --hit alone"
-            )
-        hit = True if self.hit else False if self.miss else None
-        goal_number = workspace.record(self.number).goal_number
-        goal = workspace.history.goals[goal_number - 1].goal
-        if self.outcome is not None:
-            if len(self.outcome) != goal.size:
-                raise InvalidFeedbackError(
-                    f"--outcome needs {goal.size} numbers, got {len(self.outcome)}: "
-                    f"{', '.join(workspace.manifest.outcome_names)}"
-                )
-            return _plausible(workspace, np.array(self.outcome) - goal), hit
-        if self.error is None:
-            return np.zeros(goal.size), hit
-        return read_error(workspace, self.error), hit
-
-
-@dataclass(frozen=True)
-class Tell(_Reading):
+class Tell(Reading):
     """Report what was seen of a trial."""
 
     def run(self) -> None:
@@ -183,7 +137,7 @@ class Tell(_Reading):
 
 
 @dataclass(frozen=True)
-class Amend(_Reading):
+class Amend(Reading):
     """Correct what was told of a trial."""
 
     def run(self) -> None:
@@ -235,59 +189,6 @@ class Export:
             plan = workspace.plan(workspace.record(self.number))
             written = write_plan(plan, self.out, rate=self.rate)
         print(f"written: {written.path}  sha256 {written.sha256}")
-
-
-def read_error(workspace: Workspace, given: tuple[str, ...]) -> np.ndarray:
-    """Read an error from words or numbers.
-
-    Returns:
-        Outcome minus goal, shape (k,), in the outcome's units.
-
-    Raises:
-        InvalidFeedbackError: It is neither, or as many numbers as components are missing.
-    """
-    manifest = workspace.manifest
-    k = len(manifest.outcome_names)
-    text = " ".join(given)
-    try:
-        numbers = [float(word) for word in text.replace(",", " ").split()]
-    except ValueError:
-        numbers = None
-    if numbers is None:
-        if manifest.in_words:
-            return _sayable(text, from_words(text, k))
-        raise InvalidFeedbackError(
-            f"cannot read {text!r}; this task's outcomes have no words, give {k} numbers: "
-            f"{tell_example(workspace)}"
-        )
-    if len(numbers) != k:
-        words = ", or words" if manifest.in_words else ""
-        raise InvalidFeedbackError(
-            f"--error needs {k} numbers, got {len(numbers)}: outcome minus goal in "
-            f"{', '.join(manifest.outcome_names)}{words}: {tell_example(workspace)}"
-        )
-    return _plausible(workspace, np.array(numbers))
-
-
-def _sayable(text: str, error: np.ndarray) -> np.ndarray:
-    """The error, unless no throw is that far off."""
-    largest = np.abs(error).max(initial=0.0)
-    if largest > _LARGEST_SAYABLE_METRES:
-        raise InvalidFeedbackError(
-            f"{text!r} is {largest:g} m; say it again, in cm, or void the trial if that is true"
-        )
-    return error
-
-
-def _plausible(workspace: Workspace, error: np.ndarray) -> np.ndarray:
-    """The error, unless it looks like centimetres where words could say it as well."""
-    largest = np.abs(error).max(initial=0.0)
-    if workspace.manifest.in_words and _LARGEST_PLAUSIBLE_METRES <= largest < np.inf:
-        raise InvalidFeedbackError(
-            f"an error of {largest:g} m looks like centimetres; numbers are metres, or say it in "
-            f"words: {tell_example(workspace)}"
-        )
-    return error
 
 
 def _reached_before(workspace: Workspace, trial: TrialRecord) -> bool:

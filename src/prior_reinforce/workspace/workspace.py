@@ -13,7 +13,6 @@ the events, made anew each time, so closing the program, or a power cut, loses n
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
 from numbers import Integral
 from pathlib import Path
 
@@ -25,7 +24,7 @@ from prior_reinforce.errors import (
     TrialStateError,
     WorkspaceError,
 )
-from prior_reinforce.generators import FitProgress, Generator, align
+from prior_reinforce.generators import Generator
 from prior_reinforce.generators.by_name import name_of
 from prior_reinforce.motions import Demonstrations, Plan
 from prior_reinforce.robots import LimitReport, check_plan
@@ -243,49 +242,6 @@ class Workspace:
                 "demonstrations_imported",
                 {"n": demonstrations.n, "sha256": demonstrations.sha256, "source": source},
             )
-
-    def learn(
-        self,
-        generator: Generator,
-        *,
-        seed: int,
-        aligned: bool = False,
-        progress: Callable[[FitProgress], None] | None = None,
-    ) -> str:
-        """Fit a generator to the demonstrations and put it in use.
-
-        Args:
-            generator: pi, fitted here.
-            seed: Of the fit.
-            aligned: Align the demonstrations in time first, for a generator that does not know when
-                a motion starts.
-            progress: Called now and then while fitting.
-
-        Returns:
-            The model's hash, the name of its folder.
-
-        Raises:
-            TrialStateError: A trial waits to be told.
-            InvalidDemonstrationsError: They cannot be aligned, or not be learned from.
-        """
-        self.refuse_open_trial("learning")
-        demonstrations = self.demonstrations
-        fitted_to = align(demonstrations).demonstrations if aligned else demonstrations
-        generator.fit(fitted_to, seed=seed, progress=progress)
-        if aligned:
-            self.store.save_demonstrations(fitted_to)
-        model = self.store.save_model(generator)
-        data = {
-            "model": model,
-            "generator": name_of(generator),
-            "seed": seed,
-            "demonstrations_sha256": demonstrations.sha256,
-            "fitted_to_sha256": fitted_to.sha256,
-        }
-        with self.journal.exclusive():
-            self.refuse_open_trial("learning")
-            self.journal.append("model_trained", data)
-        return model
 
     def set_goal(self, goal: ArrayLike, *, memory: str = "goal") -> GoalRecord:
         """Set the goal that the next trials are for.
