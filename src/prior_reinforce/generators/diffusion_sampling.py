@@ -7,6 +7,9 @@ conditions.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
+
 import torch
 
 from prior_reinforce.generators.diffusion_config import DiffusionConfig
@@ -39,17 +42,47 @@ def sample(
     Returns:
         Codes, shape (n, C, T).
     """
-    run = {"mean_shift": _mean_shift, "ddim": _ddim, "ddpm": _ddpm}[config.sampler]
-    return run(network, conditions, shape, config, torch.Generator().manual_seed(seed))
+    schedule = NoiseSchedule.squared_cosine(config.noise_levels)
+    denoiser = _Denoiser(network, conditions, shape, config, schedule)
+    return _SAMPLERS[config.sampler](denoiser, torch.Generator().manual_seed(seed))
 
 
-def _mean_shift(
-    network: ConditionalUNet,
-    conditions: torch.Tensor,
-    shape: tuple[int, int],
-    config: DiffusionConfig,
-    rng: torch.Generator,
-) -> torch.Tensor:
+@dataclass(frozen=True)
+class _Denoiser:
+    """A trained network with the conditions it is asked about."""
+
+    network: ConditionalUNet
+    conditions: torch.Tensor
+    """Shape (n, k)."""
+    shape: tuple[int, int]
+    """(C, T) of a code."""
+    config: DiffusionConfig
+    schedule: NoiseSchedule
+
+    def mean(self) -> torch.Tensor:
+        """The mean of all latents, which is zero, for each condition; shape (n, C, T)."""
+        return torch.zeros((len(self.conditions), *self.shape), device=self.conditions.device)
+
+    def noise(self, count: int, rng: torch.Generator) -> torch.Tensor:
+        """Draws that all conditions share; shape (count, C, T)."""
+        return torch.randn((count, *self.shape), generator=rng).to(self.conditions.device)
+
+    def clean(self, noisy: torch.Tensor, level: int) -> torch.Tensor:
+        """The network's estimate of x_0, clipped to the demonstrated range and its margin.
+
+        Args:
+            noisy: Codes, shape (n * copies, C, T), a condition's copies one after another.
+            level: Of the noise in all of them.
+        """
+        conditions = self.conditions.repeat_interleave(len(noisy) // len(self.conditions), dim=0)
+        levels = torch.full((len(noisy),), level, device=noisy.device)
+        predicted = self.network(noisy, levels, conditions)
+        bound = 1 + self.config.margin
+        estimate = self.schedule.clean_estimate(noisy, predicted, level, self.config.prediction)
+        return estimate.clamp(-bound, bound)
+
+
+def _mean_shift(denoiser: _Denoiser, rng: torch.Generator) -> torch.Tensor:
     """Climb to a mode of what was learned: annealed mean shift.
 
     An estimate x_0 is noised, at a few falling levels, with the same K draws for every condition,
@@ -59,67 +92,41 @@ def _mean_shift(
     inputs with less noise than it was trained on, and has two to three times the error
     (docs/decisions-generator.md).
     """
-    n, draws = len(conditions), config.noise_draws
-    half = torch.randn((draws // 2, *shape), generator=rng)
+    config, schedule = denoiser.config, denoiser.schedule
+    draws = config.noise_draws
+    half = denoiser.noise(draws // 2, rng)
     # Opposite draws cancel what is odd in the noise.
-    noise = torch.cat([half, -half]).to(conditions.device).repeat(n, 1, 1)
-    repeated = conditions.repeat_interleave(draws, dim=0)
-    schedule = NoiseSchedule.squared_cosine(config.noise_levels)
-    x = torch.zeros((n, *shape), device=conditions.device)
+    x = denoiser.mean()
+    noise = torch.cat([half, -half]).repeat(len(x), 1, 1)
     for level in mean_shift_levels(config.noise_levels, config.sampling_steps):
-        levels = torch.full((n * draws,), level, device=conditions.device)
+        levels = torch.full((len(noise),), level, device=x.device)
         noisy = schedule.add_noise(x.repeat_interleave(draws, dim=0), noise, levels)
-        clean = _clean(network, noisy, level, repeated, schedule, config)
-        x = clean.view(n, draws, *shape).mean(dim=1)
+        x = denoiser.clean(noisy, level).view(len(x), draws, *denoiser.shape).mean(dim=1)
     return x
 
 
-def _ddim(
-    network: ConditionalUNet,
-    conditions: torch.Tensor,
-    shape: tuple[int, int],
-    config: DiffusionConfig,
-    rng: torch.Generator,
-) -> torch.Tensor:
+def _ddim(denoiser: _Denoiser, rng: torch.Generator) -> torch.Tensor:
     """DDIM [Song2021] from x_T = 0, the mean of the latents."""
     del rng
-    schedule = NoiseSchedule.squared_cosine(config.noise_levels)
+    config = denoiser.config
     steps = inference_steps(config.noise_levels, config.sampling_steps)
-    x = torch.zeros((len(conditions), *shape), device=conditions.device)
+    x = denoiser.mean()
     for step, next_step in zip(steps, (*steps[1:], -1), strict=True):
-        clean = _clean(network, x, step, conditions, schedule, config)
-        x = schedule.ddim_step(x, clean, step, next_step)
+        x = denoiser.schedule.ddim_step(x, denoiser.clean(x, step), step, next_step)
     return x
 
 
-def _ddpm(
-    network: ConditionalUNet,
-    conditions: torch.Tensor,
-    shape: tuple[int, int],
-    config: DiffusionConfig,
-    rng: torch.Generator,
-) -> torch.Tensor:
+def _ddpm(denoiser: _Denoiser, rng: torch.Generator) -> torch.Tensor:
     """DDPM [Ho2020] over all levels, as the paper samples; one noise path for all conditions."""
-    schedule = NoiseSchedule.squared_cosine(config.noise_levels)
-    latent = torch.randn((1, *shape), generator=rng)
-    x = latent.to(conditions.device).expand(len(conditions), -1, -1)
-    for step in range(config.noise_levels - 1, -1, -1):
-        clean = _clean(network, x, step, conditions, schedule, config)
-        noise = torch.randn((1, *shape), generator=rng).to(conditions.device)
-        x = schedule.ddpm_step(x, clean, step, noise)
+    x = denoiser.mean() + denoiser.noise(1, rng)
+    for step in range(denoiser.config.noise_levels - 1, -1, -1):
+        clean = denoiser.clean(x, step)
+        x = denoiser.schedule.ddpm_step(x, clean, step, denoiser.noise(1, rng))
     return x
 
 
-def _clean(
-    network: ConditionalUNet,
-    noisy: torch.Tensor,
-    step: int,
-    conditions: torch.Tensor,
-    schedule: NoiseSchedule,
-    config: DiffusionConfig,
-) -> torch.Tensor:
-    """The network's estimate of x_0, clipped to the demonstrated range and its margin."""
-    steps = torch.full((len(noisy),), step, device=noisy.device)
-    predicted = network(noisy, steps, conditions)
-    bound = 1 + config.margin
-    return schedule.clean_estimate(noisy, predicted, step, config.prediction).clamp(-bound, bound)
+_SAMPLERS: dict[str, Callable[[_Denoiser, torch.Generator], torch.Tensor]] = {
+    "mean_shift": _mean_shift,
+    "ddim": _ddim,
+    "ddpm": _ddpm,
+}
