@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from prior_reinforce.errors import ConfigurationError, InvalidPlanError
-from prior_reinforce.tasks import FAMILY, Task, panda
+from prior_reinforce.tasks import FAMILY, Task
 
 
 @pytest.fixture(scope="module", params=FAMILY, ids=lambda kind: kind.name)
@@ -87,23 +87,6 @@ def test_demonstrations_fit_the_task_and_surround_most_of_its_region(task):
         low, high = task.region
         seen = demonstrations.outcomes_seen
         assert np.all(np.ptp(seen, axis=0) >= 0.8 * (high - low))
-
-
-def test_demonstrations_leave_a_tenth_of_the_arms_limits_at_1_khz_and_rest_at_both_ends(task):
-    for name in task.demonstration_sets:
-        plans = task.demonstrations(name).plans
-        assert 6 <= len(plans) <= 8
-        n_steps = round(plans.shape[1] * task.format.dt / panda.STEP) + 50
-        joints = task.joint_plans(plans)
-        position, velocity = panda.setpoints(joints, task.format.dt, n_steps)
-        acceleration = np.diff(velocity, axis=1) / panda.STEP
-        jerk = np.diff(acceleration, axis=1) / panda.STEP
-        assert np.all((position > panda.LIMITS.lower) & (position < panda.LIMITS.upper))
-        assert np.all(np.abs(velocity) < 0.9 * panda.LIMITS.velocity)
-        assert np.all(np.abs(acceleration) < 0.9 * panda.LIMITS.acceleration)
-        assert np.all(np.abs(jerk) < 0.9 * panda.LIMITS.jerk)
-        np.testing.assert_allclose(np.diff(plans[:, :2], axis=1), 0.0, atol=1e-4)
-        np.testing.assert_allclose(np.diff(plans[:, -2:], axis=1), 0.0, atol=1e-4)
 
 
 def test_an_unknown_demonstration_set_is_named(task):

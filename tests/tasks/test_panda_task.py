@@ -1,9 +1,9 @@
-"""More plans than a batch: prepared ahead of the engine, and still drawn in order."""
+"""What all tasks on the simulated Panda share: its limits, and batches of rollouts."""
 
 import numpy as np
 import pytest
 
-from prior_reinforce.tasks import Curling
+from prior_reinforce.tasks import FAMILY, Curling, panda
 
 
 def final_states(rollouts):
@@ -24,3 +24,22 @@ def test_batches_draw_their_disturbances_one_after_another():
     assert len(together) == len(plans)
     np.testing.assert_array_equal(final_states(together), final_states(apart))
     assert len(np.unique(final_states(together)[:, 0])) == len(plans)
+
+
+@pytest.mark.parametrize("kind", FAMILY, ids=lambda kind: kind.name)
+def test_demonstrations_leave_a_tenth_of_the_arms_limits_at_1_khz_and_rest_at_both_ends(kind):
+    task = kind()
+    for name in task.demonstration_sets:
+        plans = task.demonstrations(name).plans
+        assert 6 <= len(plans) <= 8
+        n_steps = round(plans.shape[1] * task.format.dt / panda.STEP) + 50
+        joints = task.joint_plans(plans)
+        position, velocity = panda.setpoints(joints, task.format.dt, n_steps)
+        acceleration = np.diff(velocity, axis=1) / panda.STEP
+        jerk = np.diff(acceleration, axis=1) / panda.STEP
+        assert np.all((position > panda.LIMITS.lower) & (position < panda.LIMITS.upper))
+        assert np.all(np.abs(velocity) < 0.9 * panda.LIMITS.velocity)
+        assert np.all(np.abs(acceleration) < 0.9 * panda.LIMITS.acceleration)
+        assert np.all(np.abs(jerk) < 0.9 * panda.LIMITS.jerk)
+        np.testing.assert_allclose(np.diff(plans[:, :2], axis=1), 0.0, atol=1e-4)
+        np.testing.assert_allclose(np.diff(plans[:, -2:], axis=1), 0.0, atol=1e-4)
