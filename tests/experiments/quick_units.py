@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from prior_reinforce.experiments.evaluation import Training, Trials, ZeroShot
+from prior_reinforce.experiments.units import Unit
 from prior_reinforce.generators import DiffusionConfig, DiffusionGenerator
-from prior_reinforce.generators.unet import UNetSize
+from prior_reinforce.generators.unet_size import UNetSize
 
 
 class BriefDiffusion(DiffusionGenerator):
@@ -42,7 +43,7 @@ def real_units():
 
 
 @dataclass(frozen=True)
-class Roots:
+class Roots(Unit):
     """Eigenvalues of a random matrix, slowly; numbers whose last digits threads would change."""
 
     seed: int
@@ -63,7 +64,7 @@ class Roots:
 
 
 @dataclass(frozen=True)
-class Ends:
+class Ends(Unit):
     """A unit that does not end well."""
 
     how: str

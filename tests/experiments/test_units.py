@@ -11,7 +11,9 @@ from killed_runs import results
 from quick_units import Ends, Roots, real_units
 
 from prior_reinforce.errors import ConfigurationError, UnitFailedError
+from prior_reinforce.experiments.code_version import commit
 from prior_reinforce.experiments.files import in_place, sweep, write_atomically
+from prior_reinforce.experiments.recipes import Run, Scale
 from prior_reinforce.experiments.units import Workers, result_path, run_units
 
 HERE = Path(__file__).parent
@@ -77,6 +79,16 @@ def test_what_is_done_is_not_run_again(tmp_path):
     again = run_units(units, tmp_path, Workers(), lambda *call: calls.append(call))
     assert again[:2] == [{"kept": True}, first[1]]
     assert calls == [(2, 3, "found on disk"), (3, 3, "roots 2")]
+
+
+def test_what_other_code_made_is_kept_and_named(tmp_path):
+    units = [Roots(seed) for seed in range(2)]
+    kept, _ = run_units(units, tmp_path, Workers(), silent)
+    assert kept["commit"] == commit()
+    result_path(tmp_path, units[0]).write_text(json.dumps({**kept, "commit": "of May"}))
+    run = Run(tmp_path, Scale())
+    assert run.results(units)[0] == kept["result"]
+    assert run.commits == {"of May", commit()}
 
 
 def test_a_failing_unit_is_named_and_the_others_stay(tmp_path):

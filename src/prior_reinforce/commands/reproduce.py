@@ -67,12 +67,19 @@ class Reproduce:
                 run_units(list(trainings), self.out, workers, show)
         for recipe in recipes:
             with _progress(console, recipe.name) as show:
-                figures = recipe.run(Run(self.out, scale, workers, show, included[recipe.name]))
-            text = json.dumps({**provenance(scale), **figures}, indent=1)
+                run = Run(self.out, scale, workers, show, included[recipe.name])
+                figures = recipe.run(run)
+            text = json.dumps({**provenance(scale, run.commits), **figures}, indent=1)
             write_atomically(self.out / f"{recipe.name}.json", text + "\n")
             console.print(_terminal(recipe.table(figures), recipe.title))
             if claims := recipe.claims(figures):
                 console.print(_terminal(claims_table(claims), f"{recipe.title}: claims"))
+            if len(run.commits) > 1:
+                console.print(
+                    f"made by different code: {', '.join(sorted(run.commits))}; in a fresh --out "
+                    "all of it runs anew",
+                    markup=False,
+                )
         page, _ = write_evidence(self.out)
         console.print(f"evidence: {page}")
 

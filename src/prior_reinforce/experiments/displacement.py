@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 
 from prior_reinforce.experiments.evaluation import Training
+from prior_reinforce.experiments.units import Unit
 from prior_reinforce.tasks import make_task
 
 
 @dataclass(frozen=True)
-class Displacement:
+class Displacement(Unit):
     """Where a dense grid of conditions lands, over the reachable region and beyond its edge."""
 
     training: Training

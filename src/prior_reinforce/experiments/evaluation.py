@@ -17,6 +17,7 @@ from prior_reinforce.experiments.goals import unseen_goals
 from prior_reinforce.experiments.methods import make_adapter, make_generator
 from prior_reinforce.experiments.protocol import GoalTrials, run_goals
 from prior_reinforce.experiments.sight import open_sight
+from prior_reinforce.experiments.units import Unit
 from prior_reinforce.generators import Generator, load_generator
 from prior_reinforce.generators.alignment import align
 from prior_reinforce.motions import Demonstrations
@@ -28,7 +29,7 @@ GOAL_SEED = 100
 
 
 @dataclass(frozen=True)
-class Training:
+class Training(Unit):
     """Learn one generator from one prior set."""
 
     task: str
@@ -82,7 +83,7 @@ class Training:
 
 
 @dataclass(frozen=True)
-class Trials:
+class Trials(Unit):
     """Try goals with one learned generator and one adapter."""
 
     training: Training
@@ -136,7 +137,7 @@ class Trials:
 
 
 @dataclass(frozen=True)
-class ZeroShot:
+class ZeroShot(Unit):
     """Generate for a dense grid of goals and for the demonstrations' own outcomes; throw once."""
 
     training: Training

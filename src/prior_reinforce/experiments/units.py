@@ -10,29 +10,34 @@ from __future__ import annotations
 import hashlib
 import json
 import traceback
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import joblib
 from threadpoolctl import threadpool_limits
 
 from prior_reinforce.errors import UnitFailedError
 from prior_reinforce.experiments.cluster import run_on_ray
+from prior_reinforce.experiments.code_version import commit
 from prior_reinforce.experiments.files import sweep, write_atomically
 from prior_reinforce.generators.threads import torch_threads
 
 
-class Unit(Protocol):
+@dataclass(frozen=True)
+class Unit(ABC):
     """A piece of work: a frozen dataclass of plain values."""
 
     @property
+    @abstractmethod
     def label(self) -> str:
         """What it is, for a progress line."""
 
+    @abstractmethod
     def run(self, folder: Path) -> Mapping[str, Any]:
         """Do it and return a JSON-able result; `folder` holds models shared between units."""
 
@@ -57,13 +62,18 @@ def run_units(
     workers: Workers,
     progress: Callable[[int, int, str], None],
 ) -> list[Mapping[str, Any]]:
-    """Run what is not done yet, and return every unit's result in order.
+    """Run what is not done yet, and return what is kept of every unit, in order.
+
+    A result on disk is taken whatever commit made it: the caller is told which one did.
 
     Args:
         units: What to do.
         folder: Where results and shared models lie; on a cluster, a folder that all nodes share.
         workers: Where to do it.
         progress: Called with units done, units in all, and the label of the last one.
+
+    Returns:
+        The unit's fields (`unit`), the code that ran it (`commit`), what it gave (`result`).
 
     Raises:
         UnitFailedError: Some units failed, or a worker process was killed. All others' results
@@ -125,7 +135,8 @@ def _run(folder: Path, unit: Unit) -> _Outcome:
         # The last digits of a sum depend on how many threads share it.
         with threadpool_limits(1), torch_threads(1):
             result = unit.run(folder)
-        text = json.dumps({"unit": _fields(unit), "result": result}, allow_nan=False)
+        kept = {"unit": asdict(unit), "commit": commit(), "result": result}
+        text = json.dumps(kept, allow_nan=False)
     except Exception as error:
         return _keep_failure(folder, unit, error)
     write_atomically(result_path(folder, unit), text)
@@ -144,9 +155,5 @@ def _failure_path(folder: Path, unit: Unit) -> Path:
 
 
 def _name(unit: Unit) -> str:
-    digest = hashlib.sha256(json.dumps(_fields(unit), sort_keys=True).encode()).hexdigest()[:16]
+    digest = hashlib.sha256(json.dumps(asdict(unit), sort_keys=True).encode()).hexdigest()[:16]
     return f"{type(unit).__name__.lower()}-{digest}"
-
-
-def _fields(unit: Unit) -> dict[str, Any]:
-    return asdict(unit)  # type: ignore[call-overload]

@@ -64,10 +64,13 @@ class Run:
     """Called with units done, units in all, and the label of the last one."""
     include: tuple[str, ...] = ()
     """One's own members of the recipe's family, each as module:Class."""
+    commits: set[str] = field(default_factory=set)
+    """Code that made the results so far; more than one where a folder was used before."""
 
     def results(self, units: Sequence[Unit]) -> list[Mapping[str, Any]]:
         """Run units that are not done yet; every unit's result, in order."""
         rows = run_units(units, self.folder, self.workers, self.progress)
+        self.commits.update(row.get("commit", "unknown") for row in rows)
         return [row["result"] for row in rows]
 
 

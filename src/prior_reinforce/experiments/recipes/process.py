@@ -20,6 +20,7 @@ from prior_reinforce.experiments.recipes.process_picture import (
     draw_process,
 )
 from prior_reinforce.experiments.sight import open_sight
+from prior_reinforce.experiments.units import Unit
 from prior_reinforce.feedback import to_words
 from prior_reinforce.tasks import make_task
 
@@ -37,7 +38,7 @@ misses with their corrections and a hit tell the whole story."""
 
 
 @dataclass(frozen=True)
-class Process:
+class Process(Unit):
     """All trials of a training's unseen goals, with what a camera needs to draw them."""
 
     training: Training
