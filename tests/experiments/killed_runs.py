@@ -16,6 +16,8 @@ from quick_units import real_units
 
 from prior_reinforce.experiments.units import Workers, run_units
 
+WRITING = 0.02
+"""Seconds that every write takes at least, so that a kill within one does not depend on luck."""
 WORKERS = (1, 1, 1, 2)  # A new worker takes seconds to start, so most runs do without.
 
 
@@ -24,6 +26,8 @@ def start(folder: Path, workers: int) -> int:
     if pid == 0:
         status = 1
         try:
+            durable = os.fsync
+            os.fsync = lambda file: (durable(file), time.sleep(WRITING))
             os.setsid()  # the run's workers belong to its group
             run_units(real_units(), folder, Workers(workers), lambda *_: None)
             status = 0
