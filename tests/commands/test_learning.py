@@ -14,7 +14,7 @@ from prior_reinforce.generators import (
     UNetRegression,
     UNetRegressionConfig,
 )
-from prior_reinforce.generators.unet import UNetSize
+from prior_reinforce.generators.unet_size import UNetSize
 from prior_reinforce.tasks import make_task
 
 TINY = UNetSize(widths=(8, 16), groups=2, step_width=8, condition_width=8)

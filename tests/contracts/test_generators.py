@@ -24,7 +24,7 @@ from prior_reinforce.generators import (
     load_generator,
 )
 from prior_reinforce.generators.saving import CONFIG_FILE, TENSOR_FILE
-from prior_reinforce.generators.unet import UNetSize
+from prior_reinforce.generators.unet_size import UNetSize
 from prior_reinforce.motions import Demonstrations, PlanFormat
 
 # Trained for a moment only: these tests are about the contract, not about quality.

@@ -9,8 +9,10 @@ import torch
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.generators import load_generator
 from prior_reinforce.generators.diffusion_config import DiffusionConfig
-from prior_reinforce.generators.regression import UNetRegression, UNetRegressionConfig
-from prior_reinforce.generators.unet import ConditionalUNet, UNetSize
+from prior_reinforce.generators.regression import UNetRegression
+from prior_reinforce.generators.regression_config import UNetRegressionConfig
+from prior_reinforce.generators.unet import ConditionalUNet
+from prior_reinforce.generators.unet_size import UNetSize
 from prior_reinforce.motions import Demonstrations, PlanFormat
 
 SMALL = UNetRegressionConfig(

@@ -4,7 +4,8 @@ import pytest
 import torch
 
 from prior_reinforce.errors import ConfigurationError
-from prior_reinforce.generators.unet import ConditionalUNet, UNetSize
+from prior_reinforce.generators.unet import ConditionalUNet
+from prior_reinforce.generators.unet_size import UNetSize
 
 TINY = UNetSize(widths=(8, 16), groups=2, step_width=8, condition_width=8)
 

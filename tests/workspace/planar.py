@@ -3,7 +3,7 @@
 import numpy as np
 
 from prior_reinforce.generators import DiffusionConfig
-from prior_reinforce.generators.unet import UNetSize
+from prior_reinforce.generators.unet_size import UNetSize
 from prior_reinforce.motions import Demonstrations, PlanFormat
 from prior_reinforce.workspace.manifest_template import TEMPLATE
 

@@ -18,7 +18,8 @@ from prior_reinforce.generators.interpolation import (
     SmoothInterpolationConfig,
 )
 from prior_reinforce.generators.nearest import NearestNeighbours, NearestNeighboursConfig
-from prior_reinforce.generators.regression import UNetRegression, UNetRegressionConfig
+from prior_reinforce.generators.regression import UNetRegression
+from prior_reinforce.generators.regression_config import UNetRegressionConfig
 from prior_reinforce.generators.saving import read_model
 
 FAMILY: tuple[type[Generator], ...] = (

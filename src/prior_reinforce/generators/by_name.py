@@ -12,7 +12,8 @@ from prior_reinforce.generators.dmp import (
     DynamicMovementPrimitives,
     DynamicMovementPrimitivesConfig,
 )
-from prior_reinforce.generators.regression import UNetRegression, UNetRegressionConfig
+from prior_reinforce.generators.regression import UNetRegression
+from prior_reinforce.generators.regression_config import UNetRegressionConfig
 from prior_reinforce.own_members import make_own
 
 

@@ -34,7 +34,7 @@ class CodedNetwork(Generic[Network]):
     scale: ConditionScale
     network: Network
     """In evaluation mode, on the device to compute on."""
-    device: torch.device
+    device: str
 
     def generate(
         self, conditions: np.ndarray, codes: Callable[[torch.Tensor], torch.Tensor]
@@ -74,7 +74,7 @@ class CodedNetwork(Generic[Network]):
         codec_settings: dict[str, Any],
         tensors: dict[str, np.ndarray],
         build: Callable[[StartTimeCodec, int], Network],
-        device: torch.device,
+        device: str,
     ) -> Self:
         """Rebuild it from what was saved.
 
@@ -105,6 +105,6 @@ class CodedNetwork(Generic[Network]):
         return cls(codec, ConditionScale(low, high), network, device)
 
 
-def as_tensor(values: np.ndarray, device: torch.device) -> torch.Tensor:
+def as_tensor(values: np.ndarray, device: str) -> torch.Tensor:
     """Return numbers as networks compute them: float32, on their device."""
     return torch.as_tensor(values, dtype=torch.float32, device=device)

@@ -1,6 +1,8 @@
 """The paper's generator: a diffusion model of action plans, conditioned on the outcome.
 
 What it generates is a function of the condition, which the adapter needs: see `diffusion_sampling`.
+Torch, and what is built on it, is imported where a network is used: most commands use none, and
+importing torch takes longer than all that they do.
 """
 
 from __future__ import annotations
@@ -8,25 +10,24 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from dataclasses import replace
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-import torch
 from typing_extensions import Self
 
 from prior_reinforce.errors import ConfigurationError, FileFormatError, NotFittedError
 from prior_reinforce.generators.base import FitProgress, Generator
-from prior_reinforce.generators.coded_network import CodedNetwork, as_tensor
 from prior_reinforce.generators.conditions import ConditionScale
 from prior_reinforce.generators.diffusion_config import DiffusionConfig, Preset
-from prior_reinforce.generators.diffusion_sampling import sample
-from prior_reinforce.generators.diffusion_training import train
 from prior_reinforce.generators.representation import Representation
 from prior_reinforce.generators.saving import read_model, write_model
 from prior_reinforce.generators.start_time import StartTimeCodec
 from prior_reinforce.generators.threads import torch_threads
-from prior_reinforce.generators.unet import ConditionalUNet
 from prior_reinforce.motions import Demonstrations
+
+if TYPE_CHECKING:
+    from prior_reinforce.generators.coded_network import CodedNetwork
+    from prior_reinforce.generators.unet import ConditionalUNet
 
 
 class DiffusionGenerator(Generator):
@@ -62,7 +63,7 @@ class DiffusionGenerator(Generator):
         if representation is not None:
             config = replace(config, representation=representation)
         self.config = config
-        self._device = _device(device)
+        self._device = _available(device)
         self._threads = threads
         self._fitted: CodedNetwork[ConditionalUNet] | None = None
         self._seed = 0
@@ -75,6 +76,9 @@ class DiffusionGenerator(Generator):
         progress: Callable[[FitProgress], None] | None = None,
     ) -> Self:
         """Learn from all demonstrations; see `Generator.fit`."""
+        from prior_reinforce.generators.coded_network import CodedNetwork, as_tensor
+        from prior_reinforce.generators.diffusion_training import train
+
         codec, codes = StartTimeCodec.fit(
             demonstrations,
             start_times=self.config.start_times,
@@ -103,6 +107,8 @@ class DiffusionGenerator(Generator):
 
     def generate(self, conditions: np.ndarray) -> np.ndarray:
         """Sample one plan for each condition; see `Generator.generate`."""
+        from prior_reinforce.generators.diffusion_sampling import sample
+
         fitted = self._require()
         shape = (fitted.codec.channels, fitted.codec.length)
         return fitted.generate(
@@ -136,7 +142,10 @@ class DiffusionGenerator(Generator):
             ConfigurationError: The device is not there.
             FileFormatError: Files are missing, truncated, or of another generator.
         """
-        _device(device)
+        from prior_reinforce.generators.coded_network import CodedNetwork
+        from prior_reinforce.generators.unet import ConditionalUNet
+
+        _available(device)
         saved = read_model(folder, expected=cls.name)
         try:
             generator = cls(DiffusionConfig.from_json(saved.settings["config"]), device=device)
@@ -160,13 +169,18 @@ class DiffusionGenerator(Generator):
         return self._fitted
 
 
-def _device(name: str) -> torch.device:
+def _available(device: str) -> str:
+    """The device, if torch can compute there."""
+    if device == "cpu":
+        return device
+    import torch
+
     try:
-        device = torch.device(name)
+        parsed = torch.device(device)
     except RuntimeError as error:
-        raise ConfigurationError(f"no device {name!r}; use 'cpu' or 'cuda'") from error
-    if device.type not in ("cpu", "cuda"):
-        raise ConfigurationError(f"no device {name!r}; use 'cpu' or 'cuda'")
-    if device.type == "cuda" and (device.index or 0) >= torch.cuda.device_count():
-        raise ConfigurationError(f"device {name!r} is not available here; use 'cpu'")
+        raise ConfigurationError(f"no device {device!r}; use 'cpu' or 'cuda'") from error
+    if parsed.type not in ("cpu", "cuda"):
+        raise ConfigurationError(f"no device {device!r}; use 'cpu' or 'cuda'")
+    if parsed.type == "cuda" and (parsed.index or 0) >= torch.cuda.device_count():
+        raise ConfigurationError(f"device {device!r} is not available here; use 'cpu'")
     return device

@@ -8,11 +8,13 @@ from typing import Any, Literal, get_args
 from typing_extensions import Self
 
 from prior_reinforce.errors import ConfigurationError
-from prior_reinforce.generators.noise_schedule import Prediction
 from prior_reinforce.generators.representation import Representation
-from prior_reinforce.generators.unet import UNetSize
+from prior_reinforce.generators.unet_size import UNetSize
 
 Preset = Literal["laptop", "paper"]
+Prediction = Literal["epsilon", "v", "sample"]
+"""What the network is trained to tell from x_t: the noise, the velocity of Salimans and Ho (2022,
+"Progressive Distillation for Fast Sampling of Diffusion Models"), or the clean sample."""
 Sampler = Literal["mean_shift", "ddim", "ddpm"]
 
 

@@ -9,14 +9,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal
 
 import torch
 from typing_extensions import assert_never
 
-Prediction = Literal["epsilon", "v", "sample"]
-"""What the network is trained to tell from x_t: the noise, the velocity of Salimans and Ho (2022,
-"Progressive Distillation for Fast Sampling of Diffusion Models"), or the clean sample."""
+from prior_reinforce.generators.diffusion_config import Prediction
 
 # Nichol and Dhariwal 2021, "Improved Denoising Diffusion Probabilistic Models", section 3.2.
 _COSINE_OFFSET = 0.008

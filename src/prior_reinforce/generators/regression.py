@@ -14,90 +14,26 @@ Notation:
 
 from __future__ import annotations
 
-import math
 import os
-import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, field
-from typing import Any, ClassVar, get_args
+from dataclasses import asdict
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-import torch
-from torch import nn
 from typing_extensions import Self
 
-from prior_reinforce.errors import ConfigurationError, FileFormatError, NotFittedError
+from prior_reinforce.errors import FileFormatError, NotFittedError
 from prior_reinforce.generators.base import FitProgress, Generator
-from prior_reinforce.generators.coded_network import CodedNetwork, as_tensor
 from prior_reinforce.generators.conditions import ConditionScale
-from prior_reinforce.generators.representation import Representation
+from prior_reinforce.generators.regression_config import UNetRegressionConfig
 from prior_reinforce.generators.saving import read_model, write_model
 from prior_reinforce.generators.start_time import StartTimeCodec
 from prior_reinforce.generators.threads import torch_threads
-from prior_reinforce.generators.unet import ConditionalUNet, UNetSize
 from prior_reinforce.motions import Demonstrations
 
-_REPORTS = 200
-"""Progress is told about so often in a fit."""
-_CPU = torch.device("cpu")
-
-
-@dataclass(frozen=True)
-class UNetRegressionConfig:
-    """Everything that decides what `UNetRegression` learns; docs/baselines.md tells what was tried.
-
-    Network and representation default to the diffusion generator's, so that the two differ in
-    nothing but diffusion.
-    """
-
-    representation: Representation = "splines"
-    """Code plans by spline control points where they fit, or by raw frames."""
-    frames_per_point: int = 4
-    """Frames for each spline control point."""
-    start_times: bool = True
-    """Predict when the motion starts as a number of its own, as the diffusion generator does."""
-    margin: float = 0.05
-    """How far plans may leave the demonstrated range of a dimension, as a fraction of it."""
-    network: UNetSize = field(
-        default_factory=lambda: UNetSize(
-            widths=(64, 128, 128), step_width=64, condition_width=64, activation="silu"
-        )
-    )
-    """Size of the U-Net."""
-    training_steps: int = 800
-    """Optimiser steps, each on all demonstrations."""
-    learning_rate: float = 3e-3
-    """Peak of the cosine schedule, which starts there and ends at 0."""
-    weight_decay: float = 2.0
-    """Of AdamW. Large, because a network that meets six demonstrations to a milliradian ripples
-    between them: with next to none the error at new goals was three times as large."""
-
-    def __post_init__(self) -> None:
-        """Check the settings.
-
-        Raises:
-            ConfigurationError: One is outside its range.
-        """
-        if self.representation not in get_args(Representation):
-            raise ConfigurationError(
-                f"representation must be one of {get_args(Representation)}, "
-                f"got {self.representation!r}"
-            )
-        for name in ("frames_per_point", "training_steps"):
-            if getattr(self, name) < 1:
-                raise ConfigurationError(f"{name} must be at least 1, got {getattr(self, name)}")
-        if not self.learning_rate > 0:
-            raise ConfigurationError(f"learning_rate must be positive, got {self.learning_rate}")
-        for name in ("margin", "weight_decay"):
-            if not getattr(self, name) >= 0:
-                raise ConfigurationError(f"{name} must not be negative, got {getattr(self, name)}")
-
-    @classmethod
-    def from_json(cls, values: dict[str, Any]) -> Self:
-        """Rebuild the settings from `dataclasses.asdict`, which JSON turned tuples of to lists."""
-        network = dict(values["network"])
-        network["widths"] = tuple(network["widths"])
-        return cls(**{**values, "network": UNetSize(**network)})
+if TYPE_CHECKING:
+    from prior_reinforce.generators.coded_network import CodedNetwork
+    from prior_reinforce.generators.regression_network import RegressionNetwork
 
 
 class UNetRegression(Generator):
@@ -117,7 +53,7 @@ class UNetRegression(Generator):
         """
         self.config = config or UNetRegressionConfig()
         self._threads = threads
-        self._fitted: CodedNetwork[_Network] | None = None
+        self._fitted: CodedNetwork[RegressionNetwork] | None = None
 
     def fit(
         self,
@@ -127,6 +63,9 @@ class UNetRegression(Generator):
         progress: Callable[[FitProgress], None] | None = None,
     ) -> Self:
         """Learn from all demonstrations; the seed draws initial weights. See `Generator.fit`."""
+        from prior_reinforce.generators.coded_network import CodedNetwork, as_tensor
+        from prior_reinforce.generators.regression_network import train
+
         codec, codes = StartTimeCodec.fit(
             demonstrations,
             start_times=self.config.start_times,
@@ -137,14 +76,14 @@ class UNetRegression(Generator):
         )
         scale = ConditionScale.fit(demonstrations.outcomes_seen)
         with torch_threads(self._threads):
-            network = _train(
-                as_tensor(codes, _CPU),
-                as_tensor(scale.scale(demonstrations.outcomes_seen), _CPU),
+            network = train(
+                as_tensor(codes, "cpu"),
+                as_tensor(scale.scale(demonstrations.outcomes_seen), "cpu"),
                 self.config,
                 seed,
                 progress,
             )
-        self._fitted = CodedNetwork(codec, scale, network, _CPU)
+        self._fitted = CodedNetwork(codec, scale, network, "cpu")
         return self
 
     @property
@@ -170,6 +109,9 @@ class UNetRegression(Generator):
     @classmethod
     def load(cls, folder: str | os.PathLike[str]) -> Self:
         """Read what `save` wrote; see `Generator.load`."""
+        from prior_reinforce.generators.coded_network import CodedNetwork
+        from prior_reinforce.generators.regression_network import RegressionNetwork
+
         saved = read_model(folder, expected=cls.name)
         try:
             generator = cls(UNetRegressionConfig.from_json(saved.settings["config"]))
@@ -177,8 +119,8 @@ class UNetRegression(Generator):
             generator._fitted = CodedNetwork.restore(
                 saved.settings["codec"],
                 saved.tensors,
-                lambda codec, k: _Network(codec.channels, codec.length, k, size),
-                _CPU,
+                lambda codec, k: RegressionNetwork(codec.channels, codec.length, k, size),
+                "cpu",
             )
         except (KeyError, TypeError, ValueError, RuntimeError) as error:
             raise FileFormatError(
@@ -186,55 +128,7 @@ class UNetRegression(Generator):
             ) from error
         return generator
 
-    def _require(self) -> CodedNetwork[_Network]:
+    def _require(self) -> CodedNetwork[RegressionNetwork]:
         if self._fitted is None:
             raise NotFittedError("this UNetRegression has learned nothing yet; call fit first")
         return self._fitted
-
-
-class _Network(nn.Module):
-    """A `ConditionalUNet` fed with a learned constant instead of a noisy code."""
-
-    def __init__(self, channels: int, length: int, condition_dim: int, size: UNetSize) -> None:
-        super().__init__()
-        self.unet = ConditionalUNet(channels, condition_dim, size)
-        self.input = nn.Parameter(torch.randn(1, channels, length))
-
-    def forward(self, conditions: torch.Tensor) -> torch.Tensor:
-        """Codes (B, C, T) for scaled conditions (B, k)."""
-        n = len(conditions)
-        codes: torch.Tensor = self.unet(self.input.expand(n, -1, -1), torch.zeros(n), conditions)
-        return codes
-
-
-def _train(
-    codes: torch.Tensor,
-    conditions: torch.Tensor,
-    config: UNetRegressionConfig,
-    seed: int,
-    progress: Callable[[FitProgress], None] | None,
-) -> _Network:
-    # Torch's layers draw their initial weights from the global generator: lend it, and put it back.
-    with torch.random.fork_rng(devices=[]):
-        torch.manual_seed(seed)
-        network = _Network(codes.shape[1], codes.shape[2], conditions.shape[1], config.network)
-    optimiser = torch.optim.AdamW(
-        network.parameters(),
-        lr=config.learning_rate,
-        weight_decay=config.weight_decay,
-        fused=True,
-    )
-    started = time.monotonic()
-    n_steps = config.training_steps
-    for step in range(n_steps):
-        for group in optimiser.param_groups:
-            group["lr"] = config.learning_rate * 0.5 * (1 + math.cos(math.pi * step / n_steps))
-        loss = nn.functional.mse_loss(network(conditions), codes)
-        optimiser.zero_grad()
-        torch.autograd.backward(loss)
-        optimiser.step()
-        done = step + 1
-        if progress is not None and (done == n_steps or done % max(1, n_steps // _REPORTS) == 0):
-            left = (time.monotonic() - started) / done * (n_steps - done)
-            progress(FitProgress(done, n_steps, loss.item(), left))
-    return network.eval().requires_grad_(False)

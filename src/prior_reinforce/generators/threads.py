@@ -6,8 +6,6 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-import torch
-
 
 @contextmanager
 def torch_threads(n: int | None) -> Iterator[None]:
@@ -16,6 +14,8 @@ def torch_threads(n: int | None) -> Iterator[None]:
     The number is part of a result's last digits: sums are split among threads. So it is set rather
     than inherited from whoever calls.
     """
+    import torch  # here, because it takes seconds and most commands do without
+
     before = torch.get_num_threads()
     torch.set_num_threads(n or available_cores())
     try:
