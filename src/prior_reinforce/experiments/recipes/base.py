@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
+from prior_reinforce.experiments.code_version import commit
 from prior_reinforce.experiments.evaluation import Training
 from prior_reinforce.experiments.methods import family_of
 from prior_reinforce.experiments.recipes.claims import Claim
@@ -64,8 +65,8 @@ class Run:
     """Called with units done, units in all, and the label of the last one."""
     include: tuple[str, ...] = ()
     """One's own members of the recipe's family, each as module:Class."""
-    commits: set[str] = field(default_factory=set)
-    """Code that made the results so far; more than one where a folder was used before."""
+    commits: set[str] = field(default_factory=lambda: {commit()})
+    """What made the figures: this code, and whatever ran units that were found on disk."""
 
     def results(self, units: Sequence[Unit]) -> list[Mapping[str, Any]]:
         """Run units that are not done yet; every unit's result, in order."""
