@@ -1,4 +1,4 @@
-"""Time to sample plans: DDIM as the default does it, the paper's 100-step DDPM beside it.
+"""Time to sample plans: the default's annealed mean shift, the paper's 100-step DDPM beside it.
 
     python benchmarks/sampling.py [--set A] [--plans 1 8] [--rounds 3] [--seed 0]
 

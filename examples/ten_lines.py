@@ -2,7 +2,7 @@
 
     python examples/ten_lines.py
 
-The same lines as in the README, with options. Learning takes a minute or two.
+The same lines as in the README, with options. Learning takes about a minute.
 """
 
 from __future__ import annotations

@@ -25,7 +25,8 @@ from prior_reinforce.perception import VisionLanguageModelConfig
 from prior_reinforce.tasks import make_task
 
 GOAL_SEED = 100
-"""Seed of the reported goals. Nothing was tuned on it (docs/decisions.md)."""
+"""Seed of the reported goals. Curling's tolerance apart, nothing was tuned on it
+(docs/decisions.md)."""
 
 
 @dataclass(frozen=True)

@@ -32,7 +32,7 @@ class Generator(ABC):
     """A conditional motion generator: an outcome that is wished for, a plan that may reach it.
 
     After `fit` it is a function: the same conditions give the same plans, whatever was generated
-    before (docs/decisions.md says why the diffusion model samples from a fixed latent).
+    before (docs/decisions.md says why the diffusion model samples with noise drawn once).
     """
 
     name: ClassVar[str]

@@ -112,7 +112,7 @@ class DiffusionConfig:
         """Return the settings of that name.
 
         `laptop` is the default. `paper` is Diffusion Policy's published low-dimensional training
-        (notes on it in docs/references.md) with the paper's learning rate: raw frames, widths 256,
+        ([Chi2023] in docs/references.md) with the paper's learning rate: raw frames, widths 256,
         512 and 1024, AdamW, cosine with 500 steps of warm-up, EMA, 100-step DDPM on the noise. A
         batch there is one pass over the demonstrations, as they are fewer than its 256; its 5,000
         epochs so are 5,000 steps.

@@ -48,7 +48,7 @@ class VisionLanguageModelConfig:
     """Requests for each object before the operator is asked."""
     spread_gate: float = 0.01
     """More than half of the answers lie within this distance of their median, or they do not
-    agree, in [m]. 1 cm (ours): the finest distance on which the tasks' success depends."""
+    agree, in [m]. 1 cm (ours): the order of the tasks' tolerances."""
     temperature: float = 0.7
     """Of the model's sampling (ours). At 0 all votes are one answer, and voting means nothing."""
     max_tokens: int = 2048
