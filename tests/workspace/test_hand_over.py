@@ -96,6 +96,16 @@ def test_the_time_limit_stops_the_command_and_what_it_started(plan_file):
     assert not running(int(result.output_tail))
 
 
+def test_what_a_shell_leaves_behind_has_time_to_come_to_rest(plan_file, tmp_path):
+    # The shell goes at the polite signal; its driver needs half a second to bring the arm to rest.
+    rested = tmp_path / "rested"
+    driver = f"trap 'sleep 0.5; touch {rested}; exit' TERM; while :; do sleep 0.05; done"
+    script = tmp_path / "drive.sh"
+    script.write_text(f'sh -c "{driver}" &\nwait\n')
+    assert run_with_plan(f"sh {script} {{plan}}", plan_file, time_limit=1.0).timed_out
+    assert rested.exists()
+
+
 def test_a_changed_plan_does_not_run(plan_file, tmp_path):
     plan_file.path.chmod(0o644)
     plan_file.path.write_bytes(b"other")

@@ -27,6 +27,8 @@ _TAIL_BYTES = 4000
 """Kept of the command's output: the last screenful, where a driver says why it stopped."""
 _GRACE = 2.0
 """Between asking a command to stop and killing it, in [s]: time to bring an arm to rest."""
+_LOOK = 0.02
+"""How often it is looked at meanwhile, in [s]."""
 
 
 @dataclass(frozen=True)
@@ -151,11 +153,15 @@ def run_command(
 
 def _stop(process: subprocess.Popen[bytes]) -> None:
     """Stop the command and everything it started: ask, wait, kill; then collect its status."""
-    os.killpg(process.pid, signal.SIGTERM)
-    with contextlib.suppress(subprocess.TimeoutExpired):
-        process.wait(_GRACE)
-    # The group is gone if all of it went by itself (macOS says so by PermissionError).
+    # The group is gone when all of it went by itself (macOS says so by PermissionError). A shell
+    # goes at once and leaves its driver behind: it is the group that is waited for.
     with contextlib.suppress(ProcessLookupError, PermissionError):
+        os.killpg(process.pid, signal.SIGTERM)
+        end = time.monotonic() + _GRACE
+        while time.monotonic() < end:
+            process.poll()  # a process that nobody collected still counts as one of its group
+            os.killpg(process.pid, 0)
+            time.sleep(_LOOK)
         os.killpg(process.pid, signal.SIGKILL)
     process.wait()
 
