@@ -50,6 +50,12 @@ def test_other_words_are_refused_with_the_remedy(words):
         from_words(words, 2)
 
 
+@pytest.mark.parametrize("words", ["0.05 long", "5cm short, 0.02 left"])
+def test_metres_without_their_unit_are_not_taken_for_a_hit(words):
+    with pytest.raises(InvalidFeedbackError, match="has no unit and would be 0"):
+        from_words(words, 2)
+
+
 @given(st.lists(st.integers(-900, 900), min_size=1, max_size=3))
 def test_words_say_tenths_of_centimetres_without_loss(tenths):
     error = np.array(tenths) / 1000

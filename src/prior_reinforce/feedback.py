@@ -22,6 +22,8 @@ from prior_reinforce.errors import InvalidFeedbackError
 WORDS: tuple[tuple[str, str], ...] = (("long", "short"), ("left", "right"), ("high", "low"))
 """For each component of an error: the word where it is positive, the word where it is negative."""
 
+_LEAST_BARE_CM = 0.1
+"""Ours: nobody sees a throw to a millimetre; a smaller number without a unit is in metres."""
 _CM_PER_UNIT = {"cm": 1.0, "m": 100.0, "mm": 0.1, "": 1.0}
 _TERM = re.compile(r"(?P<value>\d+(?:\.\d*)?|\.\d+)\s*(?P<unit>cm|mm|m|)\s*(?P<word>[a-z]+)")
 
@@ -81,6 +83,11 @@ def from_words(text: str, outcome_dim: int) -> np.ndarray:
                 f"{text!r} names {' and '.join(WORDS[component])} twice; give each direction once"
             )
         seen.add(component)
+        if not match["unit"] and 0 < float(match["value"]) < _LEAST_BARE_CM:
+            millimetres = 10 * float(match["value"])
+            raise InvalidFeedbackError(
+                f"{part!r} has no unit and would be {millimetres:g} mm; say m, cm or mm"
+            )
         metres = float(match["value"]) * _CM_PER_UNIT[match["unit"]] / 100
         error[component] = -metres if sign else metres
     return error

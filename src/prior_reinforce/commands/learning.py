@@ -130,6 +130,7 @@ class Learn(Simulated):
         console = Console()
         generator = self._unfitted()
         if self.folder is not None:
+            self._refuse_what_is_a_simulated_tasks()
             with opened(self.folder) as workspace:
                 with fit_progress(console) as progress:
                     model = learn_in_workspace(
@@ -150,6 +151,14 @@ class Learn(Simulated):
             aligned=self.align,
         )
         console.print(f"model of {demonstrations.n} demonstrations saved in {self.out}")
+
+    def _refuse_what_is_a_simulated_tasks(self) -> None:
+        default = Learn()
+        for name in ("task", "demonstrations", "out"):
+            if getattr(self, name) != getattr(default, name):
+                raise ConfigurationError(
+                    f"--{name} is a simulated task's; a workspace has its own, drop one of the two"
+                )
 
     def _unfitted(self) -> Generator:
         if self.generator == DiffusionGenerator.name:

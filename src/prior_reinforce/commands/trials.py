@@ -50,6 +50,10 @@ class Ask:
         own = None if self.generator is None else make_generator(self.generator)
         if self.run_command is not None:
             check_command(self.run_command, time_limit=self.time_limit)
+        if self.rate is not None and self.out is None:
+            raise ConfigurationError(
+                "--rate is of the file that --out writes; --run is given the plan's own frames"
+            )
         with opened(self.folder) as workspace:
             self._check_out(workspace)
             did_not_move = self.arm_did_not_move
