@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-import importlib
+import hashlib
+import importlib.util
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 from prior_reinforce.errors import ConfigurationError
@@ -29,6 +31,29 @@ def make_own(name: str, family: Any, known: Sequence[str]) -> Any:
     if not isinstance(made, family):
         raise ConfigurationError(f"{name} is no {family.__name__}; derive it from that class")
     return made
+
+
+def source_digest(name: str) -> str:
+    """Return a digest of the file that a class of one's own stands in; empty for one of ours.
+
+    Args:
+        name: `module:Class`, or a name of ours.
+
+    Raises:
+        ConfigurationError: The module cannot be found.
+    """
+    module, colon, _ = name.partition(":")
+    if not colon:
+        return ""
+    try:
+        found = importlib.util.find_spec(module)
+    except (ImportError, ValueError):
+        found = None
+    if found is None or found.origin is None:
+        raise ConfigurationError(
+            f"cannot find {name}; it must be importable from here (PYTHONPATH)"
+        )
+    return hashlib.sha256(Path(found.origin).read_bytes()).hexdigest()
 
 
 def import_and_make(name: str) -> Any:

@@ -12,6 +12,7 @@ from quick_units import Ends, Roots, real_units
 
 from prior_reinforce.errors import ConfigurationError, UnitFailedError
 from prior_reinforce.experiments.code_version import commit
+from prior_reinforce.experiments.evaluation import Training, Trials
 from prior_reinforce.experiments.files import in_place, sweep, write_atomically
 from prior_reinforce.experiments.recipes import Run, Scale
 from prior_reinforce.experiments.units import Workers, result_path, run_units
@@ -103,6 +104,27 @@ def test_a_failing_unit_is_named_and_the_others_stay(tmp_path):
     told = Path(message.partition("what happened: ")[2].rstrip(")")).read_text()
     assert "second line" in told
     assert "quick_units.py" in told
+
+
+def test_an_edited_class_of_ones_own_is_run_anew(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(tmp_path)
+    own = tmp_path / "edited_adapter.py"
+    own.write_text("from prior_reinforce.adapters import FrozenAdapter\n")
+    training = Training("basketball-v1", "A", "nearest", seed=0)
+    unit = Trials(training, training.task, "edited_adapter:FrozenAdapter", "exact", goals=1)
+    before, learned = result_path(tmp_path, unit), result_path(tmp_path, training)
+    own.write_text("from prior_reinforce.adapters import FrozenAdapter  # another\n")
+    assert result_path(tmp_path, unit) != before
+    assert result_path(tmp_path, training) == learned
+
+
+def test_without_git_a_result_says_so(monkeypatch):
+    monkeypatch.setenv("PATH", "")
+    commit.cache_clear()
+    try:
+        assert commit() == "not a checkout"
+    finally:
+        commit.cache_clear()
 
 
 @pytest.mark.slow

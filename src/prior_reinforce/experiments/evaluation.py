@@ -21,6 +21,7 @@ from prior_reinforce.experiments.units import Unit
 from prior_reinforce.generators import Generator, load_generator
 from prior_reinforce.generators.alignment import align
 from prior_reinforce.motions import Demonstrations
+from prior_reinforce.own_members import source_digest
 from prior_reinforce.perception import VisionLanguageModelConfig
 from prior_reinforce.tasks import make_task
 
@@ -52,6 +53,11 @@ class Training(Unit):
         aligned = ", aligned" if self.aligned else ""
         return f"learn {self.generator} on {self.task} {self.demonstrations}{aligned}, {self.seed}"
 
+    @property
+    def own_sources(self) -> tuple[str, ...]:
+        """Digests of a task's and a generator's own files; see `Unit`."""
+        return source_digest(self.task), source_digest(self.generator)
+
     def run(self, folder: Path) -> Mapping[str, Any]:
         """Learn, unless it was learned before; the model itself is the result."""
         self.learned(folder)
@@ -73,7 +79,8 @@ class Training(Unit):
 
     def learned(self, folder: Path) -> Generator:
         """The generator: from the folder's models, or learned now and put there."""
-        key = hashlib.sha256(json.dumps(asdict(self)).encode()).hexdigest()[:16]
+        told = json.dumps(asdict(self)) + "".join(self.own_sources)
+        key = hashlib.sha256(told.encode()).hexdigest()[:16]
         home = folder / "models" / key
         if not (home / "config.json").is_file():
             generator = make_generator(self.generator).fit(self.prior(), seed=self.seed)
@@ -111,6 +118,12 @@ class Trials(Unit):
             f"{self.task}: {self.training.generator} + {self.adapter}, {self.perception}, "
             f"set {self.training.demonstrations}, {self.training.seed}"
         )
+
+    @property
+    def own_sources(self) -> tuple[str, ...]:
+        """Digests of the own files behind what is tried; see `Unit`."""
+        own = (self.task, self.adapter, self.perception)
+        return self.training.own_sources + tuple(source_digest(name) for name in own)
 
     def run(self, folder: Path) -> Mapping[str, Any]:
         """Run the protocol."""
@@ -150,6 +163,11 @@ class ZeroShot(Unit):
     def label(self) -> str:
         """What it is, for a progress line."""
         return f"zero shot of {self.training.label.removeprefix('learn ')}"
+
+    @property
+    def own_sources(self) -> tuple[str, ...]:
+        """Digests of the own files behind what was learned; see `Unit`."""
+        return self.training.own_sources
 
     def run(self, folder: Path) -> Mapping[str, Any]:
         """Throw, with execution's disturbances switched off: the generator's error alone."""

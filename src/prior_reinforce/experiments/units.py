@@ -37,6 +37,11 @@ class Unit(ABC):
     def label(self) -> str:
         """What it is, for a progress line."""
 
+    @property
+    def own_sources(self) -> tuple[str, ...]:
+        """Digests of the classes of one's own that it runs: when one is edited, it runs anew."""
+        return ()
+
     @abstractmethod
     def run(self, folder: Path) -> Mapping[str, Any]:
         """Do it and return a JSON-able result; `folder` holds models shared between units."""
@@ -105,7 +110,7 @@ def run_units(
 
 
 def result_path(folder: Path, unit: Unit) -> Path:
-    """Where a unit's result lies: named by its kind and a hash of its fields."""
+    """Where a unit's result lies: named by its kind, and a hash of its fields and own code."""
     return folder / "units" / f"{_name(unit)}.json"
 
 
@@ -131,11 +136,12 @@ def _run(folder: Path, unit: Unit) -> _Outcome:
     """Run a unit and keep its result; or keep how it failed."""
     sweep(folder / "units")
     sweep(folder / "models")
+    made_by = commit()  # before the work: a commit made meanwhile is not what ran
     try:
         # The last digits of a sum depend on how many threads share it.
         with threadpool_limits(1), torch_threads(1):
             result = unit.run(folder)
-        kept = {"unit": asdict(unit), "commit": commit(), "result": result}
+        kept = {"unit": asdict(unit), "commit": made_by, "result": result}
         text = json.dumps(kept, allow_nan=False)
     except Exception as error:
         return _keep_failure(folder, unit, error)
@@ -155,5 +161,6 @@ def _failure_path(folder: Path, unit: Unit) -> Path:
 
 
 def _name(unit: Unit) -> str:
-    digest = hashlib.sha256(json.dumps(asdict(unit), sort_keys=True).encode()).hexdigest()[:16]
+    told = json.dumps(asdict(unit), sort_keys=True) + "".join(unit.own_sources)
+    digest = hashlib.sha256(told.encode()).hexdigest()[:16]
     return f"{type(unit).__name__.lower()}-{digest}"
