@@ -9,6 +9,7 @@ from prior_reinforce.errors import ConfigurationError, FileFormatError
 from prior_reinforce.experiments.evidence import write_evidence
 from prior_reinforce.experiments.provenance import provenance
 from prior_reinforce.experiments.recipes import Run, Scale, Verdict
+from prior_reinforce.experiments.recipes.adapters import Adapters
 from prior_reinforce.experiments.recipes.alignment import TimelineAlignment
 
 ROUNDS = 10
@@ -45,6 +46,15 @@ ADAPTERS = {
 }
 SCALE = Scale()
 MADE_BY = provenance(SCALE, {"abc123"})
+
+
+def test_where_both_reach_every_goal_neither_is_refuted():
+    none = [{"value": 0.0, "low": 0.0, "high": 0.0}] * ROUNDS
+    all_reached = {name: curve(0.5, 1.0) for name in ADAPTERS["success"]}
+    forms = {"gp": {**ADAPTERS["forms"]["gp"], "minus_proportional": none}}
+    claims = Adapters().claims({**ADAPTERS, "success": all_reached, "forms": forms})
+    (lower,) = (claim for claim in claims if claim.paper.endswith("ends lower."))
+    assert lower.verdict is Verdict.OPEN
 
 
 def put(folder, name, figures):
