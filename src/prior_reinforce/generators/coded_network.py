@@ -7,7 +7,7 @@ network makes codes of them, and the codec turns these into plans.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Generic, TypeVar
 
 import numpy as np
@@ -74,15 +74,13 @@ class CodedNetwork(Generic[Network]):
         codec_settings: dict[str, Any],
         tensors: dict[str, np.ndarray],
         build: Callable[[StartTimeCodec, int], Network],
-        device: str,
     ) -> Self:
-        """Rebuild it from what was saved.
+        """Rebuild it from what was saved, on the CPU.
 
         Args:
             codec_settings: `StartTimeCodec.settings`.
             tensors: What `tensors` gave.
             build: Makes the network, of any weights, for a codec and k.
-            device: To compute on.
 
         Raises:
             KeyError, TypeError, ValueError: Something is missing, or does not fit.
@@ -101,8 +99,12 @@ class CodedNetwork(Generic[Network]):
         }:
             raise ValueError("its tensors are not those of the network in its config")
         network.load_state_dict(weights)
-        network.to(device).eval().requires_grad_(False)
-        return cls(codec, ConditionScale(low, high), network, device)
+        network.eval().requires_grad_(False)
+        return cls(codec, ConditionScale(low, high), network, "cpu")
+
+    def to(self, device: str) -> Self:
+        """The same on another device."""
+        return replace(self, network=self.network.to(device), device=device)
 
 
 def as_tensor(values: np.ndarray, device: str) -> torch.Tensor:

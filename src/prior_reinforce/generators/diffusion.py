@@ -154,13 +154,14 @@ class DiffusionGenerator(Generator):
                 saved.settings["codec"],
                 saved.tensors,
                 lambda codec, k: ConditionalUNet(codec.channels, k, size),
-                generator._device,
             )
             generator._seed = int(saved.settings["seed"])
         except (KeyError, TypeError, ValueError, RuntimeError) as error:
             raise FileFormatError(
                 f"{folder} does not hold a complete {cls.name} generator: {error!r}; learn again"
             ) from error
+        # Not within the try: a device that is full is no damaged model.
+        generator._fitted = generator._fitted.to(device)
         return generator
 
     def _require(self) -> CodedNetwork[ConditionalUNet]:

@@ -120,7 +120,6 @@ class UNetRegression(Generator):
                 saved.settings["codec"],
                 saved.tensors,
                 lambda codec, k: RegressionNetwork(codec.channels, codec.length, k, size),
-                "cpu",
             )
         except (KeyError, TypeError, ValueError, RuntimeError) as error:
             raise FileFormatError(

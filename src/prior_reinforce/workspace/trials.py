@@ -37,6 +37,8 @@ def ask(
         RobotLimitError: The plan breaks a limit; nothing is handed out.
         FileFormatError: The plan, the model or the demonstrations are damaged.
     """
+    if workspace.history.open_trial is None:
+        workspace.generator(own)  # imports torch, in seconds: other programs need not wait for that
     with workspace.journal.exclusive():
         trial = workspace.history.open_trial
         if trial is None:

@@ -157,30 +157,29 @@ class Workspace:
         """
         return self.store.demonstrations(self.history.models[model].fitted_to)
 
-    def session(self, own: Generator | None = None) -> Session:
-        """The session of the goal that is worked on, built from what happened.
+    def generator(self, own: Generator | None = None) -> Generator:
+        """The model in use.
 
         Args:
             own: A generator of the class that the model was learned by, where it is none of ours.
 
         Raises:
             ConfigurationError: `own` is missing, or of another class.
-            WorkspaceError: No goal was set, nothing learned, or from other demonstrations.
+            WorkspaceError: Nothing is learned yet, or it was learned from other demonstrations.
             FileFormatError: The model or the demonstrations are damaged.
         """
         history = self.history
-        folder = self.folder
         demonstrations = self.demonstrations
         if history.model is None:
-            raise WorkspaceError(f"nothing is learned yet; run: prior-reinforce learn {folder}")
+            raise WorkspaceError(
+                f"nothing is learned yet; run: prior-reinforce learn {self.folder}"
+            )
         training = history.models[history.model]
         if training.demonstrations != demonstrations.sha256:
             raise WorkspaceError(
                 "other demonstrations were imported since the model was learned; run: "
-                f"prior-reinforce learn {folder}"
+                f"prior-reinforce learn {self.folder}"
             )
-        if history.goal is None:
-            raise WorkspaceError(f"no goal is set; run: prior-reinforce goal {folder} X Y")
         expected = training.generator if training.own else None
         if (None if own is None else name_of(own)) != expected:
             raise ConfigurationError(
@@ -191,8 +190,24 @@ class Workspace:
                     else "drop --generator, or learn anew"
                 )
             )
-        generator = self.store.model(history.model, None if own is None else type(own))
-        return build_session(history, history.goal, generator, demonstrations)
+        return self.store.model(history.model, None if own is None else type(own))
+
+    def session(self, own: Generator | None = None) -> Session:
+        """The session of the goal that is worked on, built from what happened.
+
+        Args:
+            own: As `generator` takes it.
+
+        Raises:
+            WorkspaceError: No goal was set, or what `generator` raises.
+            ConfigurationError: See `generator`.
+            FileFormatError: See `generator`.
+        """
+        generator = self.generator(own)
+        history = self.history
+        if history.goal is None:
+            raise WorkspaceError(f"no goal is set; run: prior-reinforce goal {self.folder} X Y")
+        return build_session(history, history.goal, generator, self.demonstrations)
 
     def plan_path(self, trial: TrialRecord) -> Path:
         """Where a trial's plan file is."""
