@@ -18,8 +18,8 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import Delaunay
 
+from prior_reinforce.cores import available_cores
 from prior_reinforce.generators import DiffusionConfig, DiffusionGenerator
-from prior_reinforce.generators.threads import available_cores
 from prior_reinforce.motions import Demonstrations
 from prior_reinforce.tasks.basketball import BasketballShot
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from prior_reinforce.adapters.base import Adapter
 from prior_reinforce.errors import PerceptionFailedError
+from prior_reinforce.experiments.statistics import reached_by
 from prior_reinforce.generators.base import Generator
 from prior_reinforce.motions import Demonstrations
 from prior_reinforce.perception.base import Perception
@@ -132,5 +133,5 @@ def run_goals(
 
 def success_by_round(results: list[GoalTrials], rounds: int) -> np.ndarray:
     """Fraction of goals reached in at most 1, 2, ..., `rounds` trials, shape (rounds,)."""
-    solved_at = np.array([result.solved_at or rounds + 1 for result in results])
-    return np.array([np.mean(solved_at <= number) for number in range(1, rounds + 1)])
+    solved_at = np.array([result.solved_at or 0 for result in results])
+    return np.array([reached_by(solved_at, number).mean() for number in range(1, rounds + 1)])

@@ -7,7 +7,6 @@ outcome is read from the recorded path; see `curling.py`.
 from __future__ import annotations
 
 import copy
-import os
 from abc import abstractmethod
 from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -20,6 +19,7 @@ import mujoco.rollout
 import numpy as np
 
 from prior_reinforce.arrays import as_plans
+from prior_reinforce.cores import available_cores
 from prior_reinforce.errors import ConfigurationError, InvalidGoalError
 from prior_reinforce.motions import Demonstrations
 from prior_reinforce.rendering import open_renderer
@@ -80,7 +80,7 @@ class PandaTask(Task):
         """Compile the scene."""
         self.model = build_scene(_FOLDER / f"{self.scene}.xml")
         self.model.opt.timestep = STEP
-        self._workers = [mujoco.MjData(self.model) for _ in range(_n_cores())]
+        self._workers = [mujoco.MjData(self.model) for _ in range(available_cores())]
         self._scratch = mujoco.MjData(self.model)  # the workers' are busy while it is used
 
     @abstractmethod
@@ -216,10 +216,3 @@ class PandaTask(Task):
         state = np.empty(mujoco.mj_stateSize(self.model, _FULL))
         mujoco.mj_getState(self.model, data, state, _FULL)
         return state
-
-
-def _n_cores() -> int:
-    """Cores this process may use; the affinity is known on Linux only."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
