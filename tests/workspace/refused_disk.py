@@ -5,6 +5,8 @@
 A program of its own: a limit on written files, and giving up root, cannot be undone.
 """
 
+import contextlib
+import io
 import os
 import resource
 import sys
@@ -18,5 +20,8 @@ if __name__ == "__main__":
         # Writing beyond the limit fails as a full disk does, for root as well.
         resource.setrlimit(resource.RLIMIT_FSIZE, (1024, 1024))
     elif os.geteuid() == 0:
+        # While root may still read an interpreter that lies in its home.
+        with contextlib.suppress(SystemExit), contextlib.redirect_stdout(io.StringIO()):
+            main([sys.argv[2], "--help"])
         os.setuid(NOBODY)
     sys.exit(main(sys.argv[2:]))
