@@ -70,7 +70,7 @@ def main(folder: Path, n_kills: int) -> None:
                 time.sleep(rng.uniform(0.0, 0.5 * whole))
             else:
                 wait_for_a_write(killed, pid)
-                time.sleep(rng.uniform(0.0, WRITING))
+                time.sleep(rng.uniform(0.0, WRITING / 2))
             done, status = os.waitpid(pid, os.WNOHANG)
             if done:
                 assert status == 0

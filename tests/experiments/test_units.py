@@ -18,7 +18,7 @@ from prior_reinforce.experiments.recipes import Run, Scale
 from prior_reinforce.experiments.units import Workers, result_path, run_units
 
 HERE = Path(__file__).parent
-KILLS = 6
+KILLS = 8
 
 
 def silent(done, total, label):
