@@ -66,7 +66,7 @@ def main(folder: Path, n_kills: int) -> None:
         runs += 1
         while True:
             pid = start(killed, WORKERS[kills % len(WORKERS)])
-            if kills % 2:
+            if kills % 4 == 0:
                 time.sleep(rng.uniform(0.0, 0.5 * whole))
             else:
                 wait_for_a_write(killed, pid)
