@@ -38,7 +38,8 @@ def nodes_of(folder, unit):
 
 
 def main(folder: Path) -> None:
-    watched = [Watched(seed, pause=0.5) for seed in range(8)]
+    # They last long enough to be killed in, on a busy machine too.
+    watched = [Watched(seed, pause=2.0) for seed in range(4)]
     units = [*watched, *real_units()]
     reference = folder / "reference"
     run_units(units, reference, Workers(), lambda *_: None)

@@ -106,7 +106,7 @@ def adapt(
         },
         region=task.region,
     )
-    console.print(f"report: {page}")
+    console.print(f"report: {page}", soft_wrap=True)
     if isinstance(sight, VisionLanguageModel):
         console.print(
             f"what the model saw, with boxes, and all that it said: {settings.out / 'seen'}"

@@ -150,7 +150,9 @@ class Learn(Simulated):
             console=console,
             aligned=self.align,
         )
-        console.print(f"model of {demonstrations.n} demonstrations saved in {self.out}")
+        console.print(
+            f"model of {demonstrations.n} demonstrations saved in {self.out}", soft_wrap=True
+        )
 
     def _refuse_what_is_a_simulated_tasks(self) -> None:
         default = Learn()

@@ -56,6 +56,7 @@ class Reproduce:
         included = {recipe.name: self._joining(recipe) for recipe in recipes}
         if self.goals < 1 or self.workers < 1 or not self.seeds:
             raise ConfigurationError("--goals and --workers must be at least 1, and --seeds given")
+        self.out.mkdir(parents=True, exist_ok=True)
         scale = QUICK if self.quick else Scale(goals=self.goals, seeds=self.seeds)
         workers = Workers(self.workers, self.ray)
         console = Console()
@@ -86,7 +87,7 @@ class Reproduce:
                     markup=False,
                 )
         page, _ = write_evidence(self.out)
-        console.print(f"evidence: {page}")
+        console.print(f"evidence: {page}", soft_wrap=True)
 
     def _joining(self, recipe: Recipe) -> tuple[str, ...]:
         joining = recipe.joining(self.include)
