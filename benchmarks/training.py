@@ -6,7 +6,7 @@ Both presets train on the same demonstrations in this process, in turns of a few
 whatever else the machine does hits both. Then the default trains in full and is thrown in
 simulation. The paper preset is extrapolated: its median step times its 5,000 steps, taking for
 granted that these give it at least the default's zero-shot quality. `--paper-full` trains it too,
-which takes hours on a CPU, and throws it as well.
+which takes an hour or more on a CPU, and throws it as well.
 """
 
 from __future__ import annotations
