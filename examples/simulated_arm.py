@@ -28,11 +28,12 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("plan", type=Path, help="NPZ file with t [s], q [rad], dq, ddq")
     parser.add_argument("--goal", type=float, nargs=2, required=True, help="where the hoop is [m]")
+    parser.add_argument("--task", default="basketball-v1", help="hardware: basketball-v1, -v2, -v3")
     parser.add_argument("--call", type=Path, help="write what the operator calls to this file")
     parser.add_argument("--seed", type=int, default=0, help="of the disturbances")
     options = parser.parse_args()
 
-    task = make_task("basketball-v1")
+    task = make_task(options.task)
     rollout = throw(task, options.plan, options.seed)
     if not rollout.valid:
         print("the ball never came down at the hoop's height: void this trial")

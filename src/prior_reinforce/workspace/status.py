@@ -69,7 +69,7 @@ def next_step(workspace: Workspace) -> str:
         tell = f"prior-reinforce tell {folder} {trial.number} {tell_example(workspace)}"
         if trial.stage is TrialStage.EXECUTING and not is_executing(folder):
             return f"if it moved: {tell}; if not: prior-reinforce ask {folder} --arm-did-not-move"
-        return tell
+        return f"{tell} (or --hit)"
     if any(t.hit for t in history.trials_of(history.goal.number)):
         return (
             f"prior-reinforce goal {folder} {_example_goal(workspace)}, "
