@@ -12,9 +12,11 @@ from quick_units import Ends, Roots, real_units
 
 from prior_reinforce.errors import ConfigurationError, UnitFailedError
 from prior_reinforce.experiments.code_version import commit
-from prior_reinforce.experiments.evaluation import Training, Trials
+from prior_reinforce.experiments.displacement import Displacement
+from prior_reinforce.experiments.evaluation import Training, Trials, ZeroShot
 from prior_reinforce.experiments.files import in_place, sweep, write_atomically
 from prior_reinforce.experiments.recipes import Run, Scale
+from prior_reinforce.experiments.recipes.process import Process
 from prior_reinforce.experiments.units import Workers, result_path, run_units
 
 HERE = Path(__file__).parent
@@ -116,6 +118,19 @@ def test_an_edited_class_of_ones_own_is_run_anew(tmp_path, monkeypatch):
     own.write_text("from prior_reinforce.adapters import FrozenAdapter  # another\n")
     assert result_path(tmp_path, unit) != before
     assert result_path(tmp_path, training) == learned
+
+
+def test_what_was_learned_by_an_edited_class_is_thrown_anew(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(tmp_path)
+    own = tmp_path / "edited_generator.py"
+    own.write_text("from prior_reinforce.generators import NearestNeighbours\n")
+    training = Training("basketball-v1", "A", "edited_generator:NearestNeighbours", seed=0)
+    units = [training, ZeroShot(training), Displacement(training), Process(training)]
+    before = [result_path(tmp_path, unit) for unit in units]
+    own.write_text("from prior_reinforce.generators import NearestNeighbours  # another\n")
+    assert all(
+        result_path(tmp_path, unit) != path for unit, path in zip(units, before, strict=True)
+    )
 
 
 def test_without_git_a_result_says_so(monkeypatch):

@@ -78,7 +78,7 @@ def _read_error(workspace: Workspace, given: tuple[str, ...]) -> np.ndarray:
         numbers = [float(word) for word in text.replace(",", " ").split()]
     except ValueError:
         numbers = None
-    if numbers is None or (k > 1 and numbers == [0.0]):  # a lone 0 says: on the goal
+    if numbers is None or (k > 1 and text == "0"):  # a lone 0 says: on the goal
         if manifest.in_words:
             return _sayable(text, from_words(text, k))
         raise InvalidFeedbackError(

@@ -30,11 +30,6 @@ class Displacement(Unit):
         """What it is, for a progress line."""
         return f"displacement of {self.training.label.removeprefix('learn ')}"
 
-    @property
-    def own_sources(self) -> tuple[str, ...]:
-        """Digests of the own files behind what was learned; see `Unit`."""
-        return self.training.own_sources
-
     def run(self, folder: Path) -> Mapping[str, Any]:
         """Throw once for each condition, with execution's disturbances switched off."""
         task = make_task(self.training.task)

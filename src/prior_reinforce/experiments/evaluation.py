@@ -123,7 +123,7 @@ class Trials(Unit):
     def own_sources(self) -> tuple[str, ...]:
         """Digests of the own files behind what is tried; see `Unit`."""
         own = (self.task, self.adapter, self.perception)
-        return self.training.own_sources + tuple(source_digest(name) for name in own)
+        return super().own_sources + tuple(source_digest(name) for name in own)
 
     def run(self, folder: Path) -> Mapping[str, Any]:
         """Run the protocol."""
@@ -163,11 +163,6 @@ class ZeroShot(Unit):
     def label(self) -> str:
         """What it is, for a progress line."""
         return f"zero shot of {self.training.label.removeprefix('learn ')}"
-
-    @property
-    def own_sources(self) -> tuple[str, ...]:
-        """Digests of the own files behind what was learned; see `Unit`."""
-        return self.training.own_sources
 
     def run(self, folder: Path) -> Mapping[str, Any]:
         """Throw, with execution's disturbances switched off: the generator's error alone."""

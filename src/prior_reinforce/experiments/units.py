@@ -13,7 +13,7 @@ import traceback
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures.process import BrokenProcessPool
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -39,8 +39,12 @@ class Unit(ABC):
 
     @property
     def own_sources(self) -> tuple[str, ...]:
-        """Digests of the classes of one's own that it runs: when one is edited, it runs anew."""
-        return ()
+        """Digests of the classes of one's own that it runs: when one is edited, it runs anew.
+
+        Those of the units that are its fields, unless a unit says more.
+        """
+        parts = (getattr(self, field.name) for field in fields(self))
+        return tuple(s for part in parts if isinstance(part, Unit) for s in part.own_sources)
 
     @abstractmethod
     def run(self, folder: Path) -> Mapping[str, Any]:

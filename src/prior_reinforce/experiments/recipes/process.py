@@ -53,11 +53,6 @@ class Process(Unit):
         """What it is, for a progress line."""
         return f"process of {self.training.label.removeprefix('learn ')}"
 
-    @property
-    def own_sources(self) -> tuple[str, ...]:
-        """Digests of the own files behind what was learned; see `Unit`."""
-        return self.training.own_sources
-
     def run(self, folder: Path) -> Mapping[str, Any]:
         """Run the protocol as `Trials` does, and keep everything."""
         task = make_task(self.training.task)
