@@ -42,5 +42,20 @@ def test_nothing_is_seen_further_off_than_half_a_step(error):
     assert Eye().perceive(again, np.zeros(1), np.random.default_rng(0))[0] == pytest.approx(seen)
 
 
+@pytest.mark.parametrize(
+    ("error", "seen"),
+    [
+        ((0.9, 0.8), (2, 0)),
+        ((-0.3, -0.98), (0, -2)),
+        ((0.6, 0.6), (0, 0)),  # 0.85 cm: nearer to nothing than to 2 cm
+        ((1.1, 0.9), (2, 0)),
+    ],
+)
+def test_a_miss_of_a_centimetre_is_never_called_none(error, seen):
+    rollout = Rollout(outcome=np.array(error) / 100, valid=True)
+    told = Eye().perceive(rollout, np.zeros(2), np.random.default_rng(0))
+    np.testing.assert_allclose(100 * told, seen)
+
+
 def test_a_small_miss_to_the_left_is_no_negative_zero():
     assert not np.signbit(seen_cm(-0.5))
