@@ -40,15 +40,16 @@ def trials_to_hit(results: list[GoalTrials], rounds: int) -> np.ndarray:
 def reach(training: Training, outliers: float, arguments: argparse.Namespace) -> list[GoalTrials]:
     """Try all goals of one task with a share of wrong answers."""
     task = make_task(training.task)
+    learned = training.learned(arguments.folder)
     with StandInServer(outlier_rate=outliers, seed=arguments.seed) as server:
         config = VisionLanguageModelConfig(base_url=server.base_url, votes=arguments.votes)
         perception = VisionLanguageModel(scene_of(task.name), config)
         results = run_goals(
             task,
-            training.learned(arguments.folder),
+            learned.generator,
             GaussianProcessAdapter,
             perception,
-            training.prior(),
+            learned.prior,
             task.sample_goals(arguments.goals, np.random.default_rng(GOAL_SEED)),
             rounds=arguments.rounds,
             seed=arguments.seed,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -55,10 +56,12 @@ def test_a_row_counts_what_was_not_reached_as_one_trial_more(tmp_path):
             assert row[name]["trials"]["value"] == pytest.approx(np.mean(needed))
             assert row[name]["sd"] == pytest.approx(np.std(needed, ddof=1))
             assert row[name]["not_reached"] == unit.count(0)
-    frozen = [u for u in units_of(tmp_path, "trials") if u["unit"]["adapter"] == "frozen"]
-    for unit in frozen:
-        share = np.mean([at == 1 for at in unit["result"]["solved_at"]])
-        assert figures["first_throws"][unit["unit"]["task"]]["value"] == pytest.approx(share)
+        (at_once,) = (
+            u["result"]["solved_at"]
+            for u in units_of(tmp_path, "trials")
+            if u["unit"]["task"] == row["task"] and u["unit"]["adapter"] == "frozen"
+        )
+        assert row["first_throws"]["value"] == pytest.approx(np.mean([at == 1 for at in at_once]))
     assert len(recipe.table(figures).rows) == 2
     assert {claim.verdict for claim in recipe.claims(figures)} == {Verdict.OPEN}  # one training
     assert figures["readings_judged_by_eye"] == 0
@@ -68,13 +71,18 @@ def test_a_row_counts_what_was_not_reached_as_one_trial_more(tmp_path):
 
 
 def test_claims_are_judged_by_the_interval():
-    def row(many: tuple[float, float], unseen: tuple[float, float] = (2.0, 2.5)) -> dict:
+    def row(
+        many: tuple[float, float],
+        unseen: tuple[float, float] = (2.0, 2.5),
+        first_throws: float = 0.49,
+    ) -> dict:
         def summary(low: float, high: float) -> dict:
             return {"goals": 60, "trials": {"value": 3.0, "low": low, "high": high}, "sd": 1.0}
 
         return {
             "title": "T", "task": "curling", "by_model": False, "prior": 6, "trials": 2.9,
             "sd": 0.9, "adapter": "gp", "unseen": summary(*unseen), "many": summary(*many),
+            "first_throws": {"value": 0.4, "low": 0.3, "high": first_throws},
         }  # fmt: skip
 
     figures = {
@@ -84,9 +92,8 @@ def test_claims_are_judged_by_the_interval():
             row((2.0, 2.9)),
             row((2.8, 3.0)),
             row((2.95, 3.1)),
-            row((2.0, 2.5), unseen=(2.0, 3.0)),
+            row((2.0, 2.5), unseen=(2.0, 3.0), first_throws=0.6),
         ],
-        "first_throws": {"curling": {"value": 0.4, "low": 0.3, "high": 0.49}},
         "eye_minus_model": {
             "curling": {"value": 0.2, "low": 0.1, "high": 0.3},
             "basketball-v1": {"value": 0.0, "low": -0.1, "high": 0.1},
@@ -98,7 +105,8 @@ def test_claims_are_judged_by_the_interval():
         Verdict.OPEN,
         Verdict.NOT_CONFIRMED,
         Verdict.OPEN,  # not on the unseen goals
-        Verdict.CONFIRMED,
+        *[Verdict.CONFIRMED] * 3,
+        Verdict.OPEN,  # more than half of the first throws may hit
         Verdict.CONFIRMED,
     ]
     # What the stand-in read says nothing of a model.
@@ -143,10 +151,11 @@ def test_the_goal_shown_was_reached_in_about_three_trials():
 
 @pytest.mark.slow
 def test_the_process_is_that_of_the_table_and_its_picture_marks_the_hit(tmp_path):
-    of_table = Trials(TRAINING, "basketball-v1", "gp", "eye", 5, unseen=True, rounds=6)
+    training = replace(TRAINING, perception="eye")
+    of_table = Trials(training, "basketball-v1", "gp", "eye", 5, unseen=True, rounds=6)
     in_table = of_table.run(tmp_path)
     solved_at = in_table["solved_at"]
-    goals = Process(TRAINING, rounds=6).run(tmp_path)["goals"]
+    goals = Process(training, rounds=6).run(tmp_path)["goals"]
     first = [np.subtract(goal["trials"][0]["outcome"], goal["goal"]) for goal in goals]
     np.testing.assert_allclose(np.linalg.norm(first, axis=1), in_table["first_error"])
     assert [len(goal["trials"]) for goal in goals] == [at or 6 for at in solved_at]

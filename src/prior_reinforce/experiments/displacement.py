@@ -37,7 +37,7 @@ class Displacement(Unit):
         counts = np.round((high - low) / self.spacing).astype(int) + 1
         axes = [np.linspace(*ends) for ends in zip(low, high, counts, strict=True)]
         conditions = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-        plans = self.training.learned(folder).generate(conditions.reshape(-1, len(axes)))
+        plans = self.training.learned(folder).generator.generate(conditions.reshape(-1, len(axes)))
         rollouts = task.rollout(plans, None)
         landed = np.array([rollout.outcome for rollout in rollouts]).reshape(conditions.shape)
         return {

@@ -15,7 +15,7 @@ from scipy.spatial import Delaunay
 from prior_reinforce.experiments.files import in_place
 from prior_reinforce.experiments.goals import unseen_goals
 from prior_reinforce.experiments.methods import make_adapter, make_generator
-from prior_reinforce.experiments.protocol import GoalTrials, run_goals
+from prior_reinforce.experiments.protocol import GoalTrials, run_goals, see_demonstrations
 from prior_reinforce.experiments.sight import open_sight
 from prior_reinforce.experiments.units import Unit
 from prior_reinforce.generators import Generator, load_generator
@@ -26,8 +26,7 @@ from prior_reinforce.perception import VisionLanguageModelConfig
 from prior_reinforce.tasks import make_task
 
 GOAL_SEED = 100
-"""Seed of the reported goals. Curling's tolerance apart, nothing was tuned on it
-(docs/decisions.md)."""
+"""Seed of the reported goals; nothing was tuned on it (docs/decisions.md)."""
 
 
 @dataclass(frozen=True)
@@ -46,26 +45,60 @@ class Training(Unit):
     """Whether the demonstrations are aligned in time first."""
     subset: tuple[int, ...] | None = None
     """Which of the demonstrations to learn from; None for all."""
+    perception: str | None = None
+    """How the outcomes of the demonstrations were seen (`sight.SIGHTS`), or module:Class; None for
+    the true ones, as recorded."""
+    model: VisionLanguageModelConfig | None = None
+    """Endpoint to ask where `perception` is vlm."""
 
     @property
     def label(self) -> str:
         """What it is, for a progress line."""
-        aligned = ", aligned" if self.aligned else ""
-        return f"learn {self.generator} on {self.task} {self.demonstrations}{aligned}, {self.seed}"
+        how = ", aligned" if self.aligned else ""
+        how += "" if self.perception is None else f" by {self.perception}"
+        return f"learn {self.generator} on {self.task} {self.demonstrations}{how}, {self.seed}"
 
     @property
     def own_sources(self) -> tuple[str, ...]:
-        """Digests of a task's and a generator's own files; see `Unit`."""
-        return source_digest(self.task), source_digest(self.generator)
+        """Digests of the own files behind what is learned; see `Unit`."""
+        own = (self.task, self.generator, self.perception)
+        return tuple(source_digest(name) for name in own if name is not None)
 
     def run(self, folder: Path) -> Mapping[str, Any]:
         """Learn, unless it was learned before; the model itself is the result."""
         self.learned(folder)
         return {}
 
-    def prior(self) -> Demonstrations:
-        """The demonstrations that are learned from."""
-        demonstrations = make_task(self.task).demonstrations(self.demonstrations)
+    def recorded(self) -> Demonstrations:
+        """The prior set with its true outcomes, whole."""
+        return make_task(self.task).demonstrations(self.demonstrations)
+
+    def learned(self, folder: Path) -> Learned:
+        """What was learned: from the folder's models, or now, and put there."""
+        told = json.dumps(asdict(self)) + "".join(self.own_sources)
+        key = hashlib.sha256(told.encode()).hexdigest()[:16]
+        home = folder / "models" / key
+        if not home.is_dir():
+            prior = self._prior()
+            generator = make_generator(self.generator).fit(prior, seed=self.seed)
+            home.parent.mkdir(parents=True, exist_ok=True)
+            with in_place(home) as unfinished:
+                unfinished.mkdir()
+                generator.save(unfinished / "generator")
+                prior.save(unfinished / "demonstrations.npz")
+        own = ":" in self.generator
+        load = type(make_generator(self.generator)).load if own else load_generator
+        return Learned(load(home / "generator"), Demonstrations.load(home / "demonstrations.npz"))
+
+    def _prior(self) -> Demonstrations:
+        """The demonstrations that are learned from, seen as they are to be."""
+        demonstrations = self.recorded()
+        if self.perception is not None:
+            seed = GOAL_SEED + self.seed
+            with open_sight(self.perception, self.task, self.model, seed=seed) as sight:
+                demonstrations = see_demonstrations(
+                    make_task(self.task), demonstrations, sight, seed=seed
+                )
         if self.aligned:
             demonstrations = align(demonstrations).demonstrations
         if self.subset is not None:
@@ -77,17 +110,15 @@ class Training(Unit):
             )
         return demonstrations
 
-    def learned(self, folder: Path) -> Generator:
-        """The generator: from the folder's models, or learned now and put there."""
-        told = json.dumps(asdict(self)) + "".join(self.own_sources)
-        key = hashlib.sha256(told.encode()).hexdigest()[:16]
-        home = folder / "models" / key
-        if not (home / "config.json").is_file():
-            generator = make_generator(self.generator).fit(self.prior(), seed=self.seed)
-            home.parent.mkdir(parents=True, exist_ok=True)
-            with in_place(home) as unfinished:
-                generator.save(unfinished)
-        return load_generator(home) if ":" not in self.generator else _load(self.generator, home)
+
+@dataclass(frozen=True, eq=False)
+class Learned:
+    """What a training gives."""
+
+    generator: Generator
+    """pi."""
+    prior: Demonstrations
+    """What it was learned from, with the outcomes that were seen."""
 
 
 @dataclass(frozen=True)
@@ -128,10 +159,11 @@ class Trials(Unit):
     def run(self, folder: Path) -> Mapping[str, Any]:
         """Run the protocol."""
         task = make_task(self.task)
-        prior = self.training.prior()
+        learned = self.training.learned(folder)
         rng = np.random.default_rng(GOAL_SEED)
+        # Far from where demonstrations truly went, so that goals are the same for every perception.
         goals = (
-            unseen_goals(task, prior, self.goals, rng)
+            unseen_goals(task, self.training.recorded(), self.goals, rng)
             if self.unseen
             else task.sample_goals(self.goals, rng)
         )
@@ -139,10 +171,10 @@ class Trials(Unit):
         with open_sight(self.perception, self.task, self.model, seed=seed) as perception:
             results = run_goals(
                 task,
-                self.training.learned(folder),
+                learned.generator,
                 lambda: make_adapter(self.adapter),
                 perception,
-                prior,
+                learned.prior,
                 goals,
                 rounds=self.rounds,
                 seed=seed,
@@ -167,8 +199,8 @@ class ZeroShot(Unit):
     def run(self, folder: Path) -> Mapping[str, Any]:
         """Throw, with execution's disturbances switched off: the generator's error alone."""
         task = make_task(self.training.task)
-        prior = self.training.prior()
-        generator = self.training.learned(folder)
+        learned = self.training.learned(folder)
+        generator, prior = learned.generator, learned.prior
         own = generator.generate(prior.outcomes_seen)
         own_rms = np.sqrt(np.mean((own - prior.plans) ** 2, axis=(1, 2)))
         shown = np.array([rollout.outcome for rollout in task.rollout(prior.plans, None)])
@@ -207,7 +239,3 @@ def summary(results: list[GoalTrials]) -> dict[str, Any]:
         "lost": [sum(not rollout.valid for rollout in result.rollouts) for result in results],
         "failed_readings": [result.failed_readings for result in results],
     }
-
-
-def _load(name: str, home: Path) -> Generator:
-    return type(make_generator(name)).load(home)

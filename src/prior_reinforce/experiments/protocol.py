@@ -1,19 +1,19 @@
-"""Many goals at once on a simulated task, in lock step (paper, "Evaluation Protocol").
+"""The paper's two stages on a simulated task: seeing the demonstrations, and trying many goals.
 
-One round is one trial for every goal that is not reached yet: one call of the generator, one
-batched rollout. Whether a goal is reached is decided by the true outcome; adapters only ever
-receive what perception saw.
+Goals are tried in lock step (paper, "Evaluation Protocol"): one round is one trial for every goal
+that is not reached yet, one call of the generator, one batched rollout. Whether a goal is reached
+is decided by the true outcome; adapters only ever receive what perception saw.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from prior_reinforce.adapters.base import Adapter
-from prior_reinforce.errors import PerceptionFailedError
+from prior_reinforce.errors import InvalidDemonstrationsError, PerceptionFailedError
 from prior_reinforce.experiments.statistics import reached_by
 from prior_reinforce.generators.base import Generator
 from prior_reinforce.motions import Demonstrations
@@ -63,6 +63,51 @@ def look_by_eye(
 ) -> np.ndarray:
     """The simulated operator, who estimates by eye (`Eye`)."""
     return Eye().perceive(rollout, goal, rng)
+
+
+def see_demonstrations(
+    task: Task,
+    demonstrations: Demonstrations,
+    perception: Perception,
+    *,
+    seed: int,
+    on_failed_reading: FailedReading = look_by_eye,
+) -> Demonstrations:
+    """Execute every demonstration once and see where it went: D_e of the paper's Stage 1.
+
+    r_seen_i = g_0 + P(rollout(A_i) - g_0), with the reference goal g_0 in the middle of the
+    task's region (ours: the paper names one, but not where). From so far off an estimate by eye
+    is coarse: to 10 cm beyond 7.5 cm.
+
+    Args:
+        task: Where they are executed, with its disturbances.
+        demonstrations: D_prior; their outcomes are not looked at.
+        perception: P.
+        seed: Of the disturbances and of perception; other streams than those of `run_goals`.
+        on_failed_reading: Called where perception gives up.
+
+    Returns:
+        The same plans with the outcomes seen.
+
+    Raises:
+        InvalidDemonstrationsError: An execution was lost, or two outcomes looked the same.
+    """
+    reference = task.region.mean(axis=0)
+    rng = np.random.default_rng([seed, 5])
+    seen = []
+    rollouts = task.rollout(demonstrations.plans, np.random.default_rng([seed, 4]))
+    for number, rollout in enumerate(rollouts):
+        if not rollout.valid:
+            raise InvalidDemonstrationsError(
+                f"demonstration {number} was lost on {task.name} when it was executed to see where "
+                "it goes; choose another seed, or leave it out"
+            )
+        try:
+            error_seen = perception.perceive(rollout, reference, rng)
+        except PerceptionFailedError as failure:
+            error_seen = on_failed_reading(failure, rollout, reference, rng)
+        seen.append(reference + error_seen)
+    return replace(demonstrations, outcomes_seen=np.array(seen))
 
 
 def run_goals(

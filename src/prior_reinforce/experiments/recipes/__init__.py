@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from prior_reinforce.experiments.recipes.adapters import Adapters, AdaptersOnWholePlans
+from prior_reinforce.experiments.recipes.adapters import Adapters
 from prior_reinforce.experiments.recipes.alignment import TimelineAlignment
 from prior_reinforce.experiments.recipes.base import QUICK, Picture, Recipe, Run, Scale, Table
 from prior_reinforce.experiments.recipes.claims import Claim, Verdict
@@ -20,7 +20,6 @@ RECIPES: Mapping[str, Recipe] = {
         ZeroShotErrors(),
         Generators(),
         Adapters(),
-        AdaptersOnWholePlans(),
         TimelineAlignment(),
         DisplacementFields(),
         TrialsTable(),

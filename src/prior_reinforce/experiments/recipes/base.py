@@ -36,6 +36,8 @@ class Scale:
     """Trials a goal at most."""
     variants: bool = True
     """Whether what the paper does not compare is run beside it."""
+    pictures: bool = True
+    """Whether rows whose trials are seen in pictures are run: they take long."""
 
     @property
     def trainings(self) -> int:
@@ -43,8 +45,8 @@ class Scale:
         return len(self.seeds) * len(self.sets)
 
 
-QUICK = Scale(goals=10, seeds=(0,), sets=("A",), variants=False)
-"""One training a method of the paper: shows that everything runs, and decides no claim."""
+QUICK = Scale(goals=10, seeds=(0,), sets=("A",), variants=False, pictures=False)
+"""One training a method of the paper, nothing seen in pictures: decides no claim."""
 
 
 def _silent(done: int, total: int, label: str) -> None:
@@ -104,8 +106,6 @@ class Recipe(ABC):
     """The figure or table of the paper that it answers."""
     family: ClassVar[Family | None] = None
     """Which family's own members `--include` puts beside ours; None where none can join."""
-    variant: ClassVar[bool] = False
-    """Whether the paper does not have it; then a quick run of all recipes leaves it out."""
 
     def trainings(self, scale: Scale, include: Sequence[str]) -> Sequence[Training]:
         """What is to be learned first, so that recipes can share it and learn side by side."""

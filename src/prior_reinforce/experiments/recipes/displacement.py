@@ -46,7 +46,7 @@ class DisplacementFields(Recipe):
     def trainings(self, scale: Scale, include: Sequence[str]) -> Sequence[Training]:
         """The generator from all demonstrations of each set, then from three."""
         full = trainings_of(scale, self.generator)
-        return [*full, *(replace(t, subset=widest_three(t.prior().outcomes_seen)) for t in full)]
+        return [*full, *(replace(t, subset=widest_three(t.recorded().outcomes_seen)) for t in full)]
 
     def run(self, run: Run) -> dict[str, Any]:
         """Throw once for every condition of a grid."""
@@ -56,7 +56,7 @@ class DisplacementFields(Recipe):
         region = make_task(TASK).region
         n = run.scale.trainings
         summed = [
-            measures(result, training.prior().outcomes_seen, region)
+            measures(result, _learned_from(training), region)
             for training, result in zip(trainings, results, strict=True)
         ]
         # The grid is the same for all, so only trainings are resampled.
@@ -64,7 +64,7 @@ class DisplacementFields(Recipe):
         fields = [
             {
                 **result,
-                "outcomes_m": trainings[i].prior().outcomes_seen.tolist(),
+                "outcomes_m": _learned_from(trainings[i]).tolist(),
                 "training": asdict(trainings[i]),
             }
             for i, result in ((0, results[0]), (n, results[n]))
@@ -210,6 +210,12 @@ def measures(
         "outside_m": float(np.mean(errors[~hull])),
         "steepness": float(np.mean(np.concatenate(steps))),
     }
+
+
+def _learned_from(training: Training) -> np.ndarray:
+    """Outcomes of the demonstrations that a training learns from, shape (N, 2), [m]."""
+    outcomes = training.recorded().outcomes_seen
+    return outcomes if training.subset is None else outcomes[list(training.subset)]
 
 
 def _both(mask: np.ndarray, axis: int) -> np.ndarray:

@@ -42,9 +42,7 @@ class Process(Unit):
     """All trials of a training's unseen goals, with what a camera needs to draw them."""
 
     training: Training
-    """What was learned."""
-    perception: str = "eye"
-    """How errors are seen."""
+    """What was learned; trials are seen as its demonstrations were."""
     rounds: int = 10
     """Trials a goal at most."""
 
@@ -56,16 +54,17 @@ class Process(Unit):
     def run(self, folder: Path) -> Mapping[str, Any]:
         """Run the protocol as `Trials` does, and keep everything."""
         task = make_task(self.training.task)
-        prior = self.training.prior()
+        learned = self.training.learned(folder)
         seed = GOAL_SEED + self.training.seed
-        with open_sight(self.perception, task.name, seed=seed) as perception:
+        rng = np.random.default_rng(GOAL_SEED)
+        with open_sight(self.training.perception or "exact", task.name, seed=seed) as perception:
             results = run_goals(
                 task,
-                self.training.learned(folder),
+                learned.generator,
                 lambda: make_adapter("gp"),
                 perception,
-                prior,
-                unseen_goals(task, prior, _GOALS, np.random.default_rng(GOAL_SEED)),
+                learned.prior,
+                unseen_goals(task, self.training.recorded(), _GOALS, rng),
                 rounds=self.rounds,
                 seed=seed,
             )
@@ -88,7 +87,7 @@ class ProcessPictures(Recipe):
     def trainings(self, scale: Scale, include: Sequence[str]) -> Sequence[Training]:
         """One a task: the first set and seed."""
         first = scale.sets[0], self.generator, scale.seeds[0]
-        return [Training(task, *first) for task in self.tasks]
+        return [Training(task, *first, perception="eye") for task in self.tasks]
 
     def run(self, run: Run) -> dict[str, Any]:
         """Try the unseen goals of each task, and choose one of them."""
@@ -99,7 +98,7 @@ class ProcessPictures(Recipe):
             "rows": [
                 {
                     "task": training.task,
-                    "demonstrated": training.prior().outcomes_seen.tolist(),
+                    "demonstrated": training.recorded().outcomes_seen.tolist(),
                     **_chosen(result["goals"]),
                 }
                 for training, result in zip(trainings, results, strict=True)

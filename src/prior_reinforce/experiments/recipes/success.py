@@ -27,10 +27,12 @@ Curve = list[dict[str, float]]
 _ROUNDS_SHOWN = (1, 2, 4, 8, 10)
 
 
-def trainings_of(scale: Scale, generator: str, *, aligned: bool = False) -> list[Training]:
+def trainings_of(
+    scale: Scale, generator: str, *, aligned: bool = False, perception: str | None = None
+) -> list[Training]:
     """One training for each prior set and seed."""
     return [
-        Training(TASK, name, generator, seed, aligned=aligned)
+        Training(TASK, name, generator, seed, aligned=aligned, perception=perception)
         for name in scale.sets
         for seed in scale.seeds
     ]

@@ -1,8 +1,9 @@
 """The paper's table of trials: every task and every sense, on few goals and on many.
 
 A row is run under the paper's protocol (five unseen goals for each prior set) and beside it on
-uniformly drawn goals, both for several training seeds. V2 and V3 use what was learned from V1's
-demonstrations, unchanged. A goal that is not reached counts as one trial more than there were
+uniformly drawn goals, both for several training seeds. Demonstrations are executed once and seen as
+the row's trials are (paper, Stage 1). V2 and V3 use what was learned from V1's demonstrations and
+their outcomes on V1, unchanged. A goal that is not reached counts as one trial more than there were
 rounds: never flattering.
 """
 
@@ -62,27 +63,28 @@ class TrialsTable(Recipe):
     """Endpoint that reads the pictures; None for the stand-in that finds objects by colour."""
 
     def trainings(self, scale: Scale, include: Sequence[str]) -> Sequence[Training]:
-        """One for each task with demonstrations, prior set and seed."""
-        learned = dict.fromkeys(row.learned_on for row in self.rows)
-        return [t for task in learned for t in self._trainings(task, scale)]
+        """One for each task with demonstrations, sense, prior set and seed."""
+        rows = self._rows(scale)
+        return list(dict.fromkeys(t for row in rows for t in self._trainings(row, scale)))
 
     def run(self, run: Run) -> dict[str, Any]:
         """Try the paper's number of goals, and many, through every sense."""
         scale = run.scale
+        rows = self._rows(scale)
         run.results(self.trainings(scale, run.include))
-        tried = [(row, adapter) for row in self.rows for adapter in ("gp", *run.include)]
+        tried = [(row, adapter) for row in rows for adapter in ("gp", *run.include)]
         units: dict[Hashable, list[Trials]] = {}
         for row, adapter in tried:
             for unseen in (True, False):
                 units[row, adapter, unseen] = self._units(row, adapter, scale, unseen=unseen)
-        for row in self.rows:
-            units[row.task] = self._first_throws(row, scale)
+        for row in rows:
+            units[row] = self._first_throws(row, scale)
         # All at once, so that no core waits for one row's last unit.
         results = iter(run.results([unit for some in units.values() for unit in some]))
         got = {key: [next(results) for _ in some] for key, some in units.items()}
         at = {key: np.array([r["solved_at"] for r in some]) for key, some in got.items()}
         solved = {(row, a): (at[row, a, True], at[row, a, False]) for row, a in tried}
-        by_eye = {row.task: row for row in self.rows if not row.by_model}
+        by_eye = {row.task: row for row in rows if not row.by_model}
         return {
             "trainings": scale.trainings,
             "rounds": scale.rounds,
@@ -97,24 +99,21 @@ class TrialsTable(Recipe):
                     "adapter": adapter,
                     "unseen": _summary(unseen, scale.rounds),
                     "many": _summary(many, scale.rounds),
+                    "first_throws": asdict(bootstrap_mean(reached_by(at[row], 1))),
                 }
                 for (row, adapter), (unseen, many) in solved.items()
             ],
-            "first_throws": {
-                row.task: asdict(bootstrap_mean(reached_by(at[row.task], 1))) for row in self.rows
-            },
             "eye_minus_model": {
                 row.task: asdict(
                     _paired(solved[by_eye[row.task], "gp"], solved[row, "gp"], scale.rounds)
                 )
-                for row in self.rows
+                for row in rows
                 if row.by_model and row.task in by_eye
             },
         }
 
     def table(self, figures: Mapping[str, Any]) -> Table:
         """The paper's columns, its own numbers beside them."""
-        first = figures["first_throws"]
         return Table(
             (
                 "task", "sense", "prior", "trials, unseen goals", "trials, many goals", "total",
@@ -130,7 +129,7 @@ class TrialsTable(Recipe):
                     f"{row['prior'] + row['many']['trials']['value']:.1f}",
                     f"{row['unseen']['not_reached'] + row['many']['not_reached']} of "
                     f"{row['unseen']['goals']} + {row['many']['goals']}",
-                    str(interval_of(first[row["task"]])),
+                    str(interval_of(row["first_throws"])),
                     f"{row['trials']:.1f} ± {row['sd']:.1f} ({row['prior'] + row['trials']:.1f})",
                 )
                 for row in figures["rows"]
@@ -178,9 +177,24 @@ class TrialsTable(Recipe):
             "drawn goals a training."
         ]
 
-    def _trainings(self, task: str, scale: Scale) -> list[Training]:
+    def _rows(self, scale: Scale) -> list[PaperRow]:
+        return [row for row in self.rows if scale.pictures or not row.by_model]
+
+    def _seen_by(self, row: PaperRow) -> str:
+        if not row.by_model:
+            return "eye"
+        return STAND_IN if self.model is None else MODEL
+
+    def _trainings(self, row: PaperRow, scale: Scale) -> list[Training]:
         return [
-            Training(task, name, self.generator, seed)
+            Training(
+                row.learned_on,
+                name,
+                self.generator,
+                seed,
+                perception=self._seen_by(row),
+                model=self.model if row.by_model else None,
+            )
             for name in scale.sets
             for seed in scale.seeds
         ]
@@ -188,28 +202,25 @@ class TrialsTable(Recipe):
     def _units(self, row: PaperRow, adapter: str, scale: Scale, *, unseen: bool) -> list[Trials]:
         """One row's units, one a training."""
         goals = min(scale.goals, _MODEL_GOALS) if row.by_model else scale.goals
-        perception = "eye"
-        if row.by_model:
-            perception = STAND_IN if self.model is None else MODEL
         return [
             Trials(
                 training,
                 row.task,
                 adapter,
-                perception,
+                self._seen_by(row),
                 _UNSEEN_GOALS if unseen else goals,
                 unseen=unseen,
                 rounds=scale.rounds,
                 model=self.model if row.by_model else None,
             )
-            for training in self._trainings(row.learned_on, scale)
+            for training in self._trainings(row, scale)
         ]
 
     def _first_throws(self, row: PaperRow, scale: Scale) -> list[Trials]:
         """The first trial alone, of the goal itself as the condition."""
         return [
             Trials(training, row.task, "frozen", "exact", scale.goals, rounds=1)
-            for training in self._trainings(row.learned_on, scale)
+            for training in self._trainings(row, scale)
         ]
 
 

@@ -37,11 +37,12 @@ def trials_claims(figures: Mapping[str, Any]) -> list[Claim]:
     first = [
         Claim(
             "The goal itself as the condition often leads to inaccurate outcomes (here: in "
-            f"more than half of the first attempts at {task}).",
-            f"share reached at once, no adapter: {interval_of(share)}",
-            at_most(interval_of(share), _HALF, n),
+            f"more than half of the first attempts; {row['title']}, {sense_of(row, figures)}).",
+            f"share reached at once, no adapter: {interval_of(row['first_throws'])}",
+            at_most(interval_of(row["first_throws"]), _HALF, n),
         )
-        for task, share in figures["first_throws"].items()
+        for row in figures["rows"]
+        if row["adapter"] == "gp"
     ]
     fewer = {task: interval_of(value) for task, value in figures["eye_minus_model"].items()}
     if not fewer:
