@@ -97,7 +97,7 @@ def adapt(
         title=f"{task.name}: {len(goals)} new goal" + ("s" if len(goals) > 1 else ""),
         facts={
             "Task": f"{task.name}, tolerance {task.tolerance * 100:g} cm",
-            "Demonstrations": f"set {settings.demonstrations}, {demonstrations.n}",
+            "Demonstrations": f"{demonstrations.n}, {_named(settings)}",
             "Generator": generator.name,
             "Adapter": settings.adapter,
             "Perception": _seen_by(settings),
@@ -112,6 +112,11 @@ def adapt(
             f"what the model saw, with boxes, and all that it said: {settings.out / 'seen'}"
         )
     return results
+
+
+def _named(settings: Adaptation) -> str:
+    path = Path(settings.demonstrations)
+    return path.name if path.suffix else f"set {settings.demonstrations}"
 
 
 def _seen_by(settings: Adaptation) -> str:
