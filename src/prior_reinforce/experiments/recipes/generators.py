@@ -64,7 +64,6 @@ METHODS = (
     Method("DMP", "dmp-whole", aligned=False),
     Method("U-Net regression", "regression-whole", aligned=False),
     Method("segmented DMP", "dmp", aligned=False, kind="other"),
-    Method("U-Net regression with start times", "regression", aligned=False, kind="other"),
     Method("nearest neighbours, aligned", "nearest", aligned=True),
     Method("DMP, aligned", "dmp-whole", aligned=True),
     Method("U-Net regression, aligned", "regression-whole", aligned=True),
