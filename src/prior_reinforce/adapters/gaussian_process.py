@@ -35,9 +35,9 @@ class GaussianProcessConfig:
 
     memory_size: int | None = 2
     """m, the number of latest trials kept beside all demonstrations; None keeps every trial."""
-    trial_jitter: float = 3e-3
-    """alpha of the trials, added to the kernel's diagonal: 5 % of the demonstrations' spread,
-    squared, which is 8 mm where 0.25 m x 0.5 m can be reached."""
+    trial_jitter: float = 1e-3
+    """alpha of the trials, added to the kernel's diagonal: 3 % of the demonstrations' spread,
+    squared, which is 5 mm where 0.25 m x 0.5 m can be reached."""
     demonstration_jitter_bounds: tuple[float, float] = (1e-3, 0.3)
     """Least and greatest alpha of the demonstrations. The least is used before any trial, and makes
     the first condition the goal to 0.2 mm inside their hull; the greatest (half of their spread,
