@@ -1,6 +1,6 @@
 """What do the trials of earlier goals save on later ones? Prints a line for each adapter.
 
-    python examples/carry_over.py --models runs/demo/model --sequences 40
+    python examples/carry_over.py --models runs/model --sequences 40
 
 Each sequence is five goals of the simulated task, worked through in order, once from the
 demonstrations alone and once with the trials of the earlier goals; the figures are mean trials on
@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
+import prior_reinforce as pr
 from prior_reinforce.commands.learning import load_learned
 from prior_reinforce.experiments.carry_over import compare, trials_needed
 from prior_reinforce.experiments.methods import make_adapter, make_perception
@@ -25,7 +26,7 @@ GOALS = 5
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--task", default="basketball-v1")
-    parser.add_argument("--set", default="A", help="the prior set that the models learned from")
+    parser.add_argument("--demonstrations", default="A", help="learned from: A, B, or a file")
     parser.add_argument("--models", type=Path, nargs="+", required=True, help="made by `learn`")
     parser.add_argument("--adapters", nargs="+", default=["gp", "gp-all"])
     parser.add_argument("--perception", default="eye")
@@ -35,7 +36,10 @@ def main() -> None:
     options = parser.parse_args()
 
     task = make_task(options.task)
-    demonstrations = task.demonstrations(options.set)
+    if options.demonstrations in task.demonstration_sets:
+        demonstrations = task.demonstrations(options.demonstrations)
+    else:
+        demonstrations = pr.Demonstrations.load(options.demonstrations)
     goals = task.sample_goals(options.sequences * GOALS, np.random.default_rng([options.seed, 4]))
     sequences = goals.reshape(options.sequences, GOALS, -1)
     print("| adapter | without | with earlier goals' trials | saved |")
