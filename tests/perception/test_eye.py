@@ -49,11 +49,14 @@ def test_nothing_is_seen_further_off_than_half_a_step(error):
         ((-0.3, -0.98), (0, -2)),
         ((0.6, 0.6), (0, 0)),  # 0.85 cm: nearer to nothing than to 2 cm
         ((1.1, 0.9), (2, 0)),
+        ((0.6, 0.8), (0, 2)),  # 1 cm: a tie
+        ((-0.8, 0.6), (-2, 0)),
+        ((0.7, 0.3, -0.9), (0, 0, -2)),
     ],
 )
 def test_a_miss_of_a_centimetre_is_never_called_none(error, seen):
     rollout = Rollout(outcome=np.array(error) / 100, valid=True)
-    told = Eye().perceive(rollout, np.zeros(2), np.random.default_rng(0))
+    told = Eye().perceive(rollout, np.zeros(len(error)), np.random.default_rng(0))
     np.testing.assert_allclose(100 * told, seen)
 
 

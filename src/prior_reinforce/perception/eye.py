@@ -14,8 +14,9 @@ _NEAR = np.array([0.0, 0.02, 0.05, 0.10])
 """Distances told apart near the goal, in [m] (paper: 0 cm, 2 cm, 5 cm, multiples of 10 cm)."""
 _BETWEEN_NEAR = (0.01, 0.035, 0.075)
 """Half-way between them; written out, since the float (5 cm + 10 cm) / 2 is not 7.5 cm."""
-_SEEN = _NEAR[1]
-"""A miss from `_BETWEEN_NEAR[0]` on that no component would tell of is called so large."""
+_LEAST_TOLD = _NEAR[1]
+"""What the larger component is called where the miss is `_BETWEEN_NEAR[0]` or more, but every
+component rounds to 0."""
 _STEP = 0.10
 """Distances beyond are multiples of this, in [m]."""
 _RESOLUTION_DECIMALS = 9
@@ -27,9 +28,9 @@ class Eye(Perception):
     """Each component of the error, rounded to the nearest of 0, 2, 5, 10, 20, 30, ... cm.
 
     The sign is kept. A tie (1, 3.5, 7.5, 15, ... cm) counts as the larger: who is in doubt reports
-    the miss. So does who sees something 1.2 cm off, 0.9 cm along one axis and 0.8 cm along the
-    other: the larger component is called 2 cm, not both of them 0 (ours; "no error" would repeat
-    the miss for ever). Nothing is random: the paper describes the rounding and no other error.
+    the miss. Nobody calls a miss of 1.2 cm none because it is 0.9 cm along one axis and 0.8 cm
+    along the other: the larger component is then called 2 cm (ours; "no error" would repeat the
+    miss for ever). Nothing is random: the paper describes the rounding and no other error.
     """
 
     name: ClassVar[str] = "eye"
@@ -41,7 +42,8 @@ class Eye(Perception):
         near = _NEAR[np.searchsorted(_BETWEEN_NEAR, size, side="right")]
         far = _STEP * np.floor(np.round(size / _STEP + 0.5, _RESOLUTION_DECIMALS))
         seen = np.where(size < _NEAR[-1], near, far)
-        if not seen.any() and np.linalg.norm(size) >= _BETWEEN_NEAR[0]:
-            seen[np.argmax(size)] = _SEEN
+        distance = np.round(np.linalg.norm(size), _RESOLUTION_DECIMALS)
+        if not seen.any() and distance >= _BETWEEN_NEAR[0]:
+            seen[np.argmax(size)] = _LEAST_TOLD
         # Adding 0 turns the -0.0 of a small negative error into 0.0.
         return np.sign(error) * seen + 0.0
