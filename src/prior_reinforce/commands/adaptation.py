@@ -10,7 +10,7 @@ import numpy as np
 from rich.console import Console
 
 from prior_reinforce.commands.live import LiveView
-from prior_reinforce.commands.operator import KeptSight, Operator
+from prior_reinforce.commands.operator import Operator, keeping
 from prior_reinforce.commands.task_options import Simulated
 from prior_reinforce.errors import RenderingUnavailableError
 from prior_reinforce.experiments.methods import make_adapter
@@ -21,6 +21,9 @@ from prior_reinforce.motions import Demonstrations
 from prior_reinforce.perception import Perception, VisionLanguageModel, VisionLanguageModelConfig
 from prior_reinforce.report import AdaptationRecord, Film, record_film, write_report
 from prior_reinforce.tasks import Task
+
+SEEN = "seen"
+"""Folder beside the report for what a model saw and said."""
 
 
 @dataclass(frozen=True)
@@ -52,17 +55,20 @@ def adapt(
     sight: Perception,
     goals: np.ndarray,
     console: Console,
+    *,
+    outcomes: str = "as recorded",
 ) -> list[GoalTrials]:
-    """Work through the goals one after another, with a live view, and write the report."""
+    """Work through the goals one after another, with a live view, and write the report.
+
+    `outcomes` says in the report how those of the demonstrations are known.
+    """
     view = LiveView(console, demonstrations.n)
     results: list[GoalTrials] = []
     films: list[tuple[Film | None, str]] = []
     for i, goal in enumerate(goals):
         view.goal(i + 1, len(goals), goal)
         seed = settings.seed + i
-        kept = sight
-        if isinstance(sight, VisionLanguageModel):
-            kept = KeptSight(sight, settings.out / "seen", i + 1)
+        kept = keeping(sight, settings.out / SEEN, f"goal{i + 1}-trial")
         (result,) = run_goals(
             task,
             generator,
@@ -97,7 +103,7 @@ def adapt(
         title=f"{task.name}: {len(goals)} new goal" + ("s" if len(goals) > 1 else ""),
         facts={
             "Task": f"{task.name}, tolerance {task.tolerance * 100:g} cm",
-            "Demonstrations": f"{demonstrations.n}, {_named(settings)}",
+            "Demonstrations": f"{demonstrations.n}, {settings.demonstrations}, outcomes {outcomes}",
             "Generator": generator.name,
             "Adapter": settings.adapter,
             "Perception": _seen_by(settings),
@@ -109,14 +115,9 @@ def adapt(
     console.print(f"report: {page}", soft_wrap=True)
     if isinstance(sight, VisionLanguageModel):
         console.print(
-            f"what the model saw, with boxes, and all that it said: {settings.out / 'seen'}"
+            f"what the model saw, with boxes, and all that it said: {settings.out / SEEN}"
         )
     return results
-
-
-def _named(settings: Adaptation) -> str:
-    path = Path(settings.demonstrations)
-    return path.name if path.suffix else f"set {settings.demonstrations}"
 
 
 def _seen_by(settings: Adaptation) -> str:

@@ -103,7 +103,7 @@ def load_learned(
     if record.demonstrations_sha256 != demonstrations.sha256:
         raise ConfigurationError(
             f"the model in {folder} was learned from other demonstrations; learn anew with "
-            "prior-reinforce learn, or name the set it was learned from"
+            "prior-reinforce learn, or name what it was learned from with --demonstrations"
         )
     return load_generator(folder) if own is None else type(make_generator(own)).load(folder)
 

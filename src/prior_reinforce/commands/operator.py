@@ -9,6 +9,7 @@ from typing import ClassVar
 import numpy as np
 from rich.console import Console
 
+from prior_reinforce.commands.live import place
 from prior_reinforce.errors import InvalidFeedbackError, PerceptionFailedError
 from prior_reinforce.feedback import from_words
 from prior_reinforce.perception import Perception, VisionLanguageModel
@@ -24,23 +25,23 @@ class KeptSight(Perception):
 
     name: ClassVar[str] = "vlm"
 
-    def __init__(self, model: VisionLanguageModel, folder: Path, goal_number: int) -> None:
-        """Keep the readings of one goal's trials.
+    def __init__(self, model: VisionLanguageModel, folder: Path, stem: str) -> None:
+        """Keep the readings of what comes one after another: a goal's trials, or demonstrations.
 
         Args:
             model: Who looks.
             folder: For the pictures; made when there is one.
-            goal_number: From 1, for the files' names.
+            stem: Of the files' names; a number from 1 follows.
         """
         self._model = model
         self._folder = folder
-        self._stem = f"goal{goal_number}-trial"
-        self._n_trials = 0
+        self._stem = stem
+        self._n_readings = 0
         self.latest: Path | None = None
 
     def perceive(self, rollout: Rollout, goal: np.ndarray, rng: np.random.Generator) -> np.ndarray:
         """Look as the model does, and keep what it was shown and said, also where it failed."""
-        self._n_trials += 1
+        self._n_readings += 1
         before, self.latest = self._model.last_reading, None
         try:
             return self._model.perceive(rollout, goal, rng)
@@ -48,9 +49,14 @@ class KeptSight(Perception):
             reading = self._model.last_reading
             if reading is not None and reading is not before:
                 self._folder.mkdir(parents=True, exist_ok=True)
-                stem = f"{self._stem}{self._n_trials}"
+                stem = f"{self._stem}{self._n_readings}"
                 reading.save(self._folder, stem)
                 self.latest = self._folder / f"{stem}.png"
+
+
+def keeping(sight: Perception, folder: Path, stem: str) -> Perception:
+    """The same sight, its readings kept as `KeptSight` says where it is a model's."""
+    return KeptSight(sight, folder, stem) if isinstance(sight, VisionLanguageModel) else sight
 
 
 class Operator:
@@ -64,11 +70,11 @@ class Operator:
     def look(
         self, failure: PerceptionFailedError, rollout: Rollout, goal: np.ndarray, rng: object
     ) -> np.ndarray:
-        """Ask for the error of a trial that perception could not see.
+        """Ask for the error of an execution that perception could not see.
 
         Args:
             failure: Why not.
-            rollout: What came of the trial; not looked at.
+            rollout: What came of it; not looked at.
             goal: g, shape (k,), in [m].
             rng: Not used.
 
@@ -88,7 +94,10 @@ class Operator:
             self._console.print(f"  picture: {self._sight.latest}", highlight=False, markup=False)
         while True:
             try:
-                text = input('  what was the error? for instance "5cm long, 2cm left", or hit: ')
+                text = input(
+                    f"  what was the error, seen from {place(goal)}? for instance "
+                    '"5cm long, 2cm left", or hit: '
+                )
             except EOFError as error:
                 raise PerceptionFailedError(f"{failure}; no answer came") from error
             try:

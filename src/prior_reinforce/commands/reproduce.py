@@ -23,7 +23,7 @@ from prior_reinforce.experiments.files import write_atomically
 from prior_reinforce.experiments.provenance import provenance
 from prior_reinforce.experiments.recipes import QUICK, RECIPES, Recipe, Run, Scale, Table
 from prior_reinforce.experiments.recipes.base import Progress as OnProgress
-from prior_reinforce.experiments.units import Workers, run_units
+from prior_reinforce.experiments.units import Workers
 
 _SLOWEST = "diffusion"
 """Takes twice as long to learn as the next."""
@@ -42,7 +42,7 @@ class Reproduce:
     seeds: tuple[int, ...] = (0, 1, 2)
     """Training seeds."""
     quick: bool = False
-    """Ten goals, one training a method, no variants, no pictures: decides no claim."""
+    """Ten goals, one training a method, no variants, no rows of the VLM: decides no claim."""
     workers: int = 1
     """Processes on this machine."""
     ray: str | None = None
@@ -70,7 +70,7 @@ class Reproduce:
         trainings = sorted(wanted, key=lambda t: _SLOWEST not in t.generator)
         if trainings:
             with _progress(console, "learn") as show:
-                run_units(trainings, self.out, workers, show)
+                Run(self.out, scale, workers, show).learn(trainings)
         for recipe in recipes:
             with _progress(console, recipe.name) as show:
                 run = Run(self.out, scale, workers, show, included[recipe.name])

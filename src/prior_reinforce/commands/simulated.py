@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 from rich.console import Console
 
-from prior_reinforce.commands.adaptation import Adaptation, adapt
+from prior_reinforce.commands.adaptation import SEEN, Adaptation, adapt
 from prior_reinforce.commands.learning import learn, load_learned
-from prior_reinforce.commands.operator import Operator
+from prior_reinforce.commands.operator import Operator, keeping
 from prior_reinforce.commands.task_options import Simulated
 from prior_reinforce.errors import ConfigurationError, InvalidGoalError
 from prior_reinforce.experiments.goals import unseen_goals
@@ -19,7 +19,7 @@ from prior_reinforce.experiments.protocol import is_hit, see_demonstrations
 from prior_reinforce.experiments.sight import open_sight
 from prior_reinforce.generators import DiffusionGenerator, Generator
 from prior_reinforce.motions import Demonstrations
-from prior_reinforce.perception import VisionLanguageModelConfig
+from prior_reinforce.perception import Perception, VisionLanguageModelConfig
 from prior_reinforce.report import record_film
 from prior_reinforce.tasks import Task
 
@@ -109,21 +109,7 @@ class Demo:
         goals = unseen_goals(task, recorded, self.goals, np.random.default_rng([self.seed, 3]))
         unfitted = _unfitted(self.generator)
         with open_sight(self.perception, task.name, self.vlm) as sight:
-            demonstrations = see_demonstrations(
-                task,
-                recorded,
-                sight,
-                seed=self.seed,
-                on_failed_reading=Operator(console, sight).look,
-            )
-            kept = self.out / "demonstrations.npz"
-            kept.parent.mkdir(parents=True, exist_ok=True)
-            demonstrations.save(kept)
-            console.print(
-                f"executed {demonstrations.n} demonstrations once, where they went seen by "
-                f"{self.perception}: {kept}",
-                soft_wrap=True,
-            )
+            demonstrations = self._see(task, recorded, sight, console)
             generator = learn(
                 demonstrations,
                 self.out / "model",
@@ -131,9 +117,32 @@ class Demo:
                 seed=self.seed,
                 console=console,
             )
-            settings = replace(settings, demonstrations=str(kept))
-            results = adapt(settings, task, demonstrations, generator, sight, goals, console)
+            results = adapt(
+                settings,
+                task,
+                demonstrations,
+                generator,
+                sight,
+                goals,
+                console,
+                outcomes=f"seen by {self.perception}",
+            )
         return 0 if all(result.solved_at for result in results) else 1
+
+    def _see(
+        self, task: Task, recorded: Demonstrations, sight: Perception, console: Console
+    ) -> Demonstrations:
+        """Execute the demonstrations once, see where they go, and keep that for `adapt`."""
+        console.print(f"executing {recorded.n} demonstrations once, seen by {self.perception}")
+        kept = keeping(sight, self.out / SEEN, "demonstration")
+        demonstrations = see_demonstrations(
+            task, recorded, kept, seed=self.seed, on_failed_reading=Operator(console, kept).look
+        )
+        path = self.out / "demonstrations.npz"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        demonstrations.save(path)
+        console.print(f"their outcomes, as seen: {path}", soft_wrap=True)
+        return demonstrations
 
 
 @dataclass(frozen=True)

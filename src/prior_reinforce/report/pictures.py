@@ -237,7 +237,9 @@ def _draw_legend(axes: Axes, with_region: bool) -> None:
     """Say what the marks are, below the picture."""
     marks: list[Artist] = [
         axes.plot([], [], "o", color=GOAL, markerfacecolor="none", label="goal")[0],
-        axes.plot([], [], "D", color=DEMONSTRATION, markersize=5, label="demonstration")[0],
+        axes.plot([], [], "D", color=DEMONSTRATION, markersize=5, label="demonstration, as seen")[
+            0
+        ],
         axes.plot([], [], "o", color=trial_colour(0, 1), markersize=5, label="trial")[0],
         axes.plot([], [], "o", color=trial_colour(0, 1, hit=True), markersize=5, label="hit")[0],
     ]
