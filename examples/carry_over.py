@@ -40,7 +40,7 @@ def main() -> None:
         demonstrations = task.demonstrations(options.demonstrations)
     else:
         demonstrations = pr.Demonstrations.load(options.demonstrations)
-    goals = task.sample_goals(options.sequences * GOALS, np.random.default_rng([options.seed, 4]))
+    goals = task.sample_goals(options.sequences * GOALS, np.random.default_rng([options.seed, 6]))
     sequences = goals.reshape(options.sequences, GOALS, -1)
     print("| adapter | without | with earlier goals' trials | saved |")
     print("|---|---|---|---|")

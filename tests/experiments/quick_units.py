@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from prior_reinforce.experiments.evaluation import Training, Trials, ZeroShot
+from prior_reinforce.experiments.evaluation import SeenDemonstrations, Training, Trials, ZeroShot
 from prior_reinforce.experiments.units import Unit
 from prior_reinforce.generators import DiffusionConfig, DiffusionGenerator
 from prior_reinforce.generators.unet_size import UNetSize
@@ -26,14 +26,19 @@ class BriefDiffusion(DiffusionGenerator):
 
 
 def trainings():
-    kinds = ("nearest", "interpolation", "quick_units:BriefDiffusion")
-    return [Training("basketball-v1", "A", kind, seed=0) for kind in kinds]
+    seen = SeenDemonstrations("basketball-v1", "A", "eye", seed=0)
+    return [
+        Training("basketball-v1", "A", "nearest", seed=0),
+        Training("basketball-v1", "A", "interpolation", seed=0, seen=seen),
+        Training("basketball-v1", "A", "quick_units:BriefDiffusion", seed=0),
+    ]
 
 
 def real_units():
     """A generator of each kind is learned, thrown, and adapted."""
     nearest, smooth, diffusion = trainings()
     return [
+        smooth.seen,
         *trainings(),
         Trials(nearest, "basketball-v1", "gp", "amplified", goals=3, rounds=2),
         Trials(smooth, "basketball-v1", "proportional", "eye", goals=2, unseen=True, rounds=1),

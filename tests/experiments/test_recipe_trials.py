@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from prior_reinforce.experiments.evaluation import Training, Trials
+from prior_reinforce.experiments.evaluation import SeenDemonstrations, Training, Trials
 from prior_reinforce.experiments.recipes.base import Run, Scale
 from prior_reinforce.experiments.recipes.claims import Verdict
 from prior_reinforce.experiments.recipes.process import Process, ProcessPictures, _chosen
@@ -68,6 +68,24 @@ def test_a_row_counts_what_was_not_reached_as_one_trial_more(tmp_path):
     assert recipe.remarks(figures) == []  # nobody looked at pictures
     (picture,) = recipe.draw(figures, tmp_path)
     assert picture.path.stat().st_size > 10_000
+
+
+def test_demonstrations_are_seen_as_the_rows_trials_are():
+    model = VisionLanguageModelConfig(model="mine")
+    for recipe, sense in ((TrialsTable(model=model), "vlm"), (TrialsTable(), STAND_IN)):
+        seen = [t.seen for t in recipe.trainings(SMALL, ())]
+        # V2 and V3 share what was seen on V1.
+        assert [(s.task, s.perception) for s in seen] == [
+            ("basketball-v1", "eye"),
+            ("basketball-v1", sense),
+            ("curling", "eye"),
+            ("curling", sense),
+            ("fishing", "eye"),
+        ]
+        assert [s.model for s in seen if s.perception == "eye"] == [None] * 3
+        assert {s.model for s in seen if s.perception != "eye"} == {recipe.model}
+    small = replace(SMALL, read_pictures=False)
+    assert {t.seen.perception for t in TrialsTable().trainings(small, ())} == {"eye"}
 
 
 def test_claims_are_judged_by_the_interval():
@@ -151,7 +169,7 @@ def test_the_goal_shown_was_reached_in_about_three_trials():
 
 @pytest.mark.slow
 def test_the_process_is_that_of_the_table_and_its_picture_marks_the_hit(tmp_path):
-    training = replace(TRAINING, perception="eye")
+    training = replace(TRAINING, seen=SeenDemonstrations("basketball-v1", "A", "eye", 0))
     of_table = Trials(training, "basketball-v1", "gp", "eye", 5, unseen=True, rounds=6)
     in_table = of_table.run(tmp_path)
     solved_at = in_table["solved_at"]

@@ -8,14 +8,27 @@ import numpy as np
 import pytest
 
 from prior_reinforce.errors import InvalidDemonstrationsError, PerceptionFailedError
-from prior_reinforce.experiments.evaluation import GOAL_SEED, Training
-from prior_reinforce.experiments.protocol import see_demonstrations
-from prior_reinforce.perception import Exact, Eye, Perception
+from prior_reinforce.experiments.evaluation import GOAL_SEED, SeenDemonstrations, Training, Trials
+from prior_reinforce.experiments.protocol import look_by_eye, see_demonstrations
+from prior_reinforce.experiments.units import result_of
+from prior_reinforce.perception import Amplified, Exact, Eye, Perception
+from prior_reinforce.rollouts import Rollout
 from prior_reinforce.tasks import make_task
 
 TASK = make_task("basketball-v1")
 RECORDED = TASK.demonstrations("A")
 MIDDLE = np.array([1.05, 0.0])
+
+
+class Blind(Perception):
+    name = "blind"
+
+    def perceive(self, rollout, goal, rng):
+        raise PerceptionFailedError("too dark")
+
+
+def refuse(failure, rollout, goal, rng):
+    raise failure
 
 
 def seen(perception: Perception, seed: int = 0, **kwargs) -> np.ndarray:
@@ -33,20 +46,22 @@ def test_an_execution_of_its_own_is_seen():
 
 
 def test_outcomes_are_seen_from_the_middle_of_the_region():
-    errors = seen(Eye()) - MIDDLE
-    said = {0.0, 0.02, 0.05, 0.1, 0.2, 0.3}
-    assert {round(float(abs(e)), 6) for e in errors.ravel()} <= said
+    rng = np.random.default_rng(0)
+    errors = [Eye().perceive(Rollout(true, True), MIDDLE, rng) for true in seen(Exact())]
+    np.testing.assert_array_equal(seen(Eye()), MIDDLE + errors)
     assert np.abs(seen(Eye()) - seen(Exact())).max() > 0.02  # as coarse as that from far off
 
 
+def test_noise_of_perception_is_drawn_anew_for_each_seed_and_demonstration():
+    noise = [seen(Amplified(1.0, 1.0), seed) - seen(Exact(), seed) for seed in (0, 0, 1)]
+    np.testing.assert_allclose(noise[0], noise[1])
+    assert np.unique(np.round(np.concatenate(noise[1:]), 6)).size == 24
+
+
 def test_somebody_else_looks_where_perception_gives_up():
-    class Blind(Perception):
-        name = "blind"
-
-        def perceive(self, rollout, goal, rng):
-            raise PerceptionFailedError("too dark")
-
-    np.testing.assert_array_equal(seen(Blind()), seen(Eye()))
+    np.testing.assert_array_equal(seen(Blind(), on_failed_reading=look_by_eye), seen(Eye()))
+    with pytest.raises(PerceptionFailedError, match="too dark"):
+        seen(Blind(), on_failed_reading=refuse)
 
 
 def test_a_lost_demonstration_is_named():
@@ -56,13 +71,77 @@ def test_a_lost_demonstration_is_named():
         see_demonstrations(TASK, replace(RECORDED, plans=plans), Exact(), seed=0)
 
 
-def test_a_training_keeps_what_it_saw_beside_what_it_learned(tmp_path):
-    training = Training("basketball-v1", "A", "nearest", 2, perception="eye")
+def test_outcomes_that_look_the_same_are_told_with_what_to_do():
+    class Asleep(Perception):
+        name = "asleep"
+
+        def perceive(self, rollout, goal, rng):
+            return np.zeros(2)
+
+    with pytest.raises(InvalidDemonstrationsError) as raised:
+        seen(Asleep(), seed=7)
+    for told in ("asleep", "basketball-v1", "seed 7", "the same outcome", "choose another seed"):
+        assert told in str(raised.value)
+
+
+@pytest.mark.parametrize("name", ["basketball-v1", "curling", "fishing"])
+@pytest.mark.parametrize("demonstrations", ["A", "B"])
+def test_an_eye_tells_the_shipped_demonstrations_apart(name, demonstrations):
+    task = make_task(name)
+    for seed in range(3):
+        recorded = task.demonstrations(demonstrations)
+        see_demonstrations(task, recorded, Eye(), seed=GOAL_SEED + seed)
+
+
+def test_a_training_learns_from_what_was_seen(tmp_path):
+    seen_by_eye = SeenDemonstrations("basketball-v1", "A", "eye", 2)
+    training = Training("basketball-v1", "A", "nearest", 2, seen=seen_by_eye)
     first, again = training.learned(tmp_path), training.learned(tmp_path)
     np.testing.assert_array_equal(first.prior.outcomes_seen, seen(Eye(), GOAL_SEED + 2))
     np.testing.assert_array_equal(again.prior.outcomes_seen, first.prior.outcomes_seen)
-    np.testing.assert_allclose(  # it was learned from them
+    np.testing.assert_allclose(
         again.generator.generate(first.prior.outcomes_seen), RECORDED.plans, atol=1e-6
     )
-    exact = replace(training, perception=None).learned(tmp_path)
-    np.testing.assert_array_equal(exact.prior.outcomes_seen, RECORDED.outcomes_seen)
+    recorded = replace(training, seen=None).learned(tmp_path)
+    np.testing.assert_array_equal(recorded.prior.outcomes_seen, RECORDED.outcomes_seen)
+
+
+def test_what_was_seen_is_seen_once_for_all_that_learn_from_it(tmp_path):
+    asked = SeenDemonstrations("basketball-v1", "A", f"{__name__}:Counted", 0)
+    Counted.looks = 0
+    priors = [
+        Training("basketball-v1", "A", generator, 0, seen=asked, aligned=aligned).learned(tmp_path)
+        for generator, aligned in (("nearest", False), ("interpolation", True))
+    ]
+    assert Counted.looks == RECORDED.n
+    np.testing.assert_array_equal(priors[0].prior.outcomes_seen, priors[1].prior.outcomes_seen)
+
+
+class Counted(Eye):
+    """An eye that counts how often it looks."""
+
+    name = "counted"
+    looks = 0
+
+    def perceive(self, rollout, goal, rng):
+        Counted.looks += 1
+        return super().perceive(rollout, goal, rng)
+
+
+def test_failed_readings_of_demonstrations_are_counted(tmp_path):
+    result = result_of(tmp_path, SeenDemonstrations("basketball-v1", "A", f"{__name__}:Blind", 0))
+    assert result["failed_readings"] == RECORDED.n
+    np.testing.assert_allclose(result["outcomes_seen"], seen(Eye(), GOAL_SEED))
+
+
+@pytest.mark.slow
+def test_goals_do_not_depend_on_how_the_demonstrations_were_seen(tmp_path):
+    training = Training("basketball-v1", "A", "nearest", 0)
+    by_eye = replace(training, seen=SeenDemonstrations("basketball-v1", "A", "eye", 0))
+    goals = [
+        Trials(t, "basketball-v1", "frozen", "exact", 5, unseen=True, rounds=1).run(tmp_path)[
+            "goals"
+        ]
+        for t in (training, by_eye)
+    ]
+    assert goals[0] == goals[1]

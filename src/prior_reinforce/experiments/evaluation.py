@@ -1,4 +1,4 @@
-"""The units that everything is made of: learn a generator; throw once; try goals with it."""
+"""The units that everything is made of: see demonstrations; learn; throw once; try goals."""
 
 from __future__ import annotations
 
@@ -12,21 +12,79 @@ from typing import Any
 import numpy as np
 from scipy.spatial import Delaunay
 
+from prior_reinforce.errors import PerceptionFailedError
 from prior_reinforce.experiments.files import in_place
 from prior_reinforce.experiments.goals import unseen_goals
 from prior_reinforce.experiments.methods import make_adapter, make_generator
-from prior_reinforce.experiments.protocol import GoalTrials, run_goals, see_demonstrations
+from prior_reinforce.experiments.protocol import (
+    GoalTrials,
+    look_by_eye,
+    run_goals,
+    see_demonstrations,
+)
 from prior_reinforce.experiments.sight import open_sight
-from prior_reinforce.experiments.units import Unit
+from prior_reinforce.experiments.units import Unit, result_of
 from prior_reinforce.generators import Generator, load_generator
 from prior_reinforce.generators.alignment import align
 from prior_reinforce.motions import Demonstrations
 from prior_reinforce.own_members import source_digest
 from prior_reinforce.perception import VisionLanguageModelConfig
+from prior_reinforce.rollouts import Rollout
 from prior_reinforce.tasks import make_task
 
 GOAL_SEED = 100
-"""Seed of the reported goals; nothing was tuned on it (docs/decisions.md)."""
+"""Seed of the reported goals; what was decided looking at them is in docs/decisions.md."""
+
+
+@dataclass(frozen=True)
+class SeenDemonstrations(Unit):
+    """Execute a prior set once and see where it went (paper, Stage 1); whoever learns shares it."""
+
+    task: str
+    """Where it is executed."""
+    demonstrations: str
+    """Prior set, A or B."""
+    perception: str
+    """Perception's name (`sight.SIGHTS`), or module:Class."""
+    seed: int
+    """Seed of the training that it is for."""
+    model: VisionLanguageModelConfig | None = None
+    """Endpoint to ask where `perception` is vlm."""
+
+    @property
+    def label(self) -> str:
+        """What it is, for a progress line."""
+        return f"see {self.task} {self.demonstrations} by {self.perception}, {self.seed}"
+
+    @property
+    def own_sources(self) -> tuple[str, ...]:
+        """Digests of a task's and a perception's own files; see `Unit`."""
+        return source_digest(self.task), source_digest(self.perception)
+
+    def run(self, folder: Path) -> Mapping[str, Any]:
+        """Execute and look."""
+        task = make_task(self.task)
+        failures: list[PerceptionFailedError] = []
+
+        def look(
+            failure: PerceptionFailedError,
+            rollout: Rollout,
+            goal: np.ndarray,
+            rng: np.random.Generator,
+        ) -> np.ndarray:
+            failures.append(failure)
+            return look_by_eye(failure, rollout, goal, rng)
+
+        seed = GOAL_SEED + self.seed
+        with open_sight(self.perception, self.task, self.model, seed=seed) as sight:
+            seen = see_demonstrations(
+                task,
+                task.demonstrations(self.demonstrations),
+                sight,
+                seed=seed,
+                on_failed_reading=look,
+            )
+        return {"outcomes_seen": seen.outcomes_seen.tolist(), "failed_readings": len(failures)}
 
 
 @dataclass(frozen=True)
@@ -45,24 +103,20 @@ class Training(Unit):
     """Whether the demonstrations are aligned in time first."""
     subset: tuple[int, ...] | None = None
     """Which of the demonstrations to learn from; None for all."""
-    perception: str | None = None
-    """How the outcomes of the demonstrations were seen (`sight.SIGHTS`), or module:Class; None for
-    the true ones, as recorded."""
-    model: VisionLanguageModelConfig | None = None
-    """Endpoint to ask where `perception` is vlm."""
+    seen: SeenDemonstrations | None = None
+    """How the outcomes of the demonstrations are seen; None for the true ones, as recorded."""
 
     @property
     def label(self) -> str:
         """What it is, for a progress line."""
         how = ", aligned" if self.aligned else ""
-        how += "" if self.perception is None else f" by {self.perception}"
+        how += "" if self.seen is None else f" by {self.seen.perception}"
         return f"learn {self.generator} on {self.task} {self.demonstrations}{how}, {self.seed}"
 
     @property
     def own_sources(self) -> tuple[str, ...]:
         """Digests of the own files behind what is learned; see `Unit`."""
-        own = (self.task, self.generator, self.perception)
-        return tuple(source_digest(name) for name in own if name is not None)
+        return *super().own_sources, source_digest(self.task), source_digest(self.generator)
 
     def run(self, folder: Path) -> Mapping[str, Any]:
         """Learn, unless it was learned before; the model itself is the result."""
@@ -79,7 +133,7 @@ class Training(Unit):
         key = hashlib.sha256(told.encode()).hexdigest()[:16]
         home = folder / "models" / key
         if not home.is_dir():
-            prior = self._prior()
+            prior = self._prior(folder)
             generator = make_generator(self.generator).fit(prior, seed=self.seed)
             home.parent.mkdir(parents=True, exist_ok=True)
             with in_place(home) as unfinished:
@@ -90,15 +144,12 @@ class Training(Unit):
         load = type(make_generator(self.generator)).load if own else load_generator
         return Learned(load(home / "generator"), Demonstrations.load(home / "demonstrations.npz"))
 
-    def _prior(self) -> Demonstrations:
-        """The demonstrations that are learned from, seen as they are to be."""
+    def _prior(self, folder: Path) -> Demonstrations:
+        """The demonstrations that are learned from."""
         demonstrations = self.recorded()
-        if self.perception is not None:
-            seed = GOAL_SEED + self.seed
-            with open_sight(self.perception, self.task, self.model, seed=seed) as sight:
-                demonstrations = see_demonstrations(
-                    make_task(self.task), demonstrations, sight, seed=seed
-                )
+        if self.seen is not None:
+            outcomes = np.array(result_of(folder, self.seen)["outcomes_seen"])
+            demonstrations = replace(demonstrations, outcomes_seen=outcomes)
         if self.aligned:
             demonstrations = align(demonstrations).demonstrations
         if self.subset is not None:

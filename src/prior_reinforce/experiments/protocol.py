@@ -77,7 +77,7 @@ def see_demonstrations(
 
     r_seen_i = g_0 + P(rollout(A_i) - g_0), with the reference goal g_0 in the middle of the
     task's region (ours: the paper names one, but not where). From so far off an estimate by eye
-    is coarse: to 10 cm beyond 7.5 cm.
+    is coarse: to 10 cm, beyond 7.5 cm.
 
     Args:
         task: Where they are executed, with its disturbances.
@@ -90,7 +90,7 @@ def see_demonstrations(
         The same plans with the outcomes seen.
 
     Raises:
-        InvalidDemonstrationsError: An execution was lost, or two outcomes looked the same.
+        InvalidDemonstrationsError: An execution was lost, or outcomes looked the same.
     """
     reference = task.region.mean(axis=0)
     rng = np.random.default_rng([seed, 5])
@@ -99,15 +99,21 @@ def see_demonstrations(
     for number, rollout in enumerate(rollouts):
         if not rollout.valid:
             raise InvalidDemonstrationsError(
-                f"demonstration {number} was lost on {task.name} when it was executed to see where "
-                "it goes; choose another seed, or leave it out"
+                f"demonstration {number} was lost on {task.name} when it was executed to be seen "
+                f"(seed {seed}); choose another seed"
             )
         try:
             error_seen = perception.perceive(rollout, reference, rng)
         except PerceptionFailedError as failure:
             error_seen = on_failed_reading(failure, rollout, reference, rng)
         seen.append(reference + error_seen)
-    return replace(demonstrations, outcomes_seen=np.array(seen))
+    try:
+        return replace(demonstrations, outcomes_seen=np.array(seen))
+    except InvalidDemonstrationsError as error:
+        raise InvalidDemonstrationsError(
+            f"as {perception.name} saw {task.name} (seed {seed}), {error}; choose another seed or "
+            "a finer perception"
+        ) from error
 
 
 def run_goals(

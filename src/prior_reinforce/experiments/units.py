@@ -113,6 +113,14 @@ def run_units(
     return [json.loads(result_path(folder, unit).read_text()) for unit in units]
 
 
+def result_of(folder: Path, unit: Unit) -> Mapping[str, Any]:
+    """What a unit gave, within another one: kept, or run now and kept."""
+    if not result_path(folder, unit).is_file():
+        run_units([unit], folder, Workers(), lambda done, total, label: None)
+    result: Mapping[str, Any] = json.loads(result_path(folder, unit).read_text())["result"]
+    return result
+
+
 def result_path(folder: Path, unit: Unit) -> Path:
     """Where a unit's result lies: named by its kind, and a hash of its fields and own code."""
     return folder / "units" / f"{_name(unit)}.json"

@@ -1,8 +1,8 @@
 """Adapters under amplified noise, behind the same generators (paper, Figure 7b).
 
 The demonstrations' outcomes are seen by eye, as in the table of trials; the noise of the trials is
-amplified. So the generator learns from outcomes that are up to 5 cm off, and there is something to
-adapt.
+amplified. So the generator learns from outcomes that are off by up to 5 cm along each axis, and
+there is something to adapt.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ class Adapters(Recipe):
         """Try the same goals with every adapter."""
         scale = run.scale
         trainings = self.trainings(scale, run.include)
-        run.results(trainings)
+        run.learn(trainings)
         names = (*ADAPTERS, *run.include)
         units = [
             Trials(t, t.task, name, "amplified", scale.goals, rounds=scale.rounds)

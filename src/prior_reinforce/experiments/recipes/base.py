@@ -36,8 +36,8 @@ class Scale:
     """Trials a goal at most."""
     variants: bool = True
     """Whether what the paper does not compare is run beside it."""
-    pictures: bool = True
-    """Whether rows whose trials are seen in pictures are run: they take long."""
+    read_pictures: bool = True
+    """Whether rows are run whose trials are read from pictures: they take long."""
 
     @property
     def trainings(self) -> int:
@@ -45,8 +45,8 @@ class Scale:
         return len(self.seeds) * len(self.sets)
 
 
-QUICK = Scale(goals=10, seeds=(0,), sets=("A",), variants=False, pictures=False)
-"""One training a method of the paper, nothing seen in pictures: decides no claim."""
+QUICK = Scale(goals=10, seeds=(0,), sets=("A",), variants=False, read_pictures=False)
+"""One training a method of the paper, nothing read from pictures: decides no claim."""
 
 
 def _silent(done: int, total: int, label: str) -> None:
@@ -69,6 +69,16 @@ class Run:
     """One's own members of the recipe's family, each as module:Class."""
     commits: set[str] = field(default_factory=lambda: {commit()})
     """What made the figures: this code, and whatever ran units that were found on disk."""
+
+    def learn(self, trainings: Sequence[Training]) -> int:
+        """Learn what is not learned yet, from demonstrations that are seen first and once.
+
+        Returns:
+            How many demonstrations perception gave up on, so that they were judged by eye.
+        """
+        seen = self.results(list(dict.fromkeys(t.seen for t in trainings if t.seen is not None)))
+        self.results(trainings)
+        return sum(result["failed_readings"] for result in seen)
 
     def results(self, units: Sequence[Unit]) -> list[Mapping[str, Any]]:
         """Run units that are not done yet; every unit's result, in order."""

@@ -51,20 +51,21 @@ class DisplacementFields(Recipe):
     def run(self, run: Run) -> dict[str, Any]:
         """Throw once for every condition of a grid."""
         trainings = self.trainings(run.scale, run.include)
-        run.results(trainings)
+        run.learn(trainings)
         results = run.results([Displacement(training, self.spacing) for training in trainings])
         region = make_task(TASK).region
         n = run.scale.trainings
+        outcomes = [training.learned(run.folder).prior.outcomes_seen for training in trainings]
         summed = [
-            measures(result, _learned_from(training), region)
-            for training, result in zip(trainings, results, strict=True)
+            measures(result, landed, region)
+            for landed, result in zip(outcomes, results, strict=True)
         ]
         # The grid is the same for all, so only trainings are resampled.
         by_name = {name: np.array([m[name] for m in summed]).reshape(2, n, 1) for name in summed[0]}
         fields = [
             {
                 **result,
-                "outcomes_m": _learned_from(trainings[i]).tolist(),
+                "outcomes_m": outcomes[i].tolist(),
                 "training": asdict(trainings[i]),
             }
             for i, result in ((0, results[0]), (n, results[n]))
@@ -210,12 +211,6 @@ def measures(
         "outside_m": float(np.mean(errors[~hull])),
         "steepness": float(np.mean(np.concatenate(steps))),
     }
-
-
-def _learned_from(training: Training) -> np.ndarray:
-    """Outcomes of the demonstrations that a training learns from, shape (N, 2), [m]."""
-    outcomes = training.recorded().outcomes_seen
-    return outcomes if training.subset is None else outcomes[list(training.subset)]
 
 
 def _both(mask: np.ndarray, axis: int) -> np.ndarray:

@@ -98,7 +98,7 @@ class Generators(Recipe):
         scale = run.scale
         methods = self._methods(scale, run.include)
         trainings = self.trainings(scale, run.include)
-        run.results(trainings)
+        run.learn(trainings)
         units = [
             Trials(t, t.task, "gp", "amplified", scale.goals, rounds=scale.rounds)
             for t in trainings

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from prior_reinforce.experiments.evaluation import GOAL_SEED, Training
+from prior_reinforce.experiments.evaluation import GOAL_SEED, SeenDemonstrations, Training
 from prior_reinforce.experiments.goals import unseen_goals
 from prior_reinforce.experiments.methods import make_adapter
 from prior_reinforce.experiments.protocol import GoalTrials, run_goals
@@ -42,7 +42,9 @@ class Process(Unit):
     """All trials of a training's unseen goals, with what a camera needs to draw them."""
 
     training: Training
-    """What was learned; trials are seen as its demonstrations were."""
+    """What was learned."""
+    perception: str = "eye"
+    """How errors are seen."""
     rounds: int = 10
     """Trials a goal at most."""
 
@@ -57,7 +59,7 @@ class Process(Unit):
         learned = self.training.learned(folder)
         seed = GOAL_SEED + self.training.seed
         rng = np.random.default_rng(GOAL_SEED)
-        with open_sight(self.training.perception or "exact", task.name, seed=seed) as perception:
+        with open_sight(self.perception, task.name, seed=seed) as perception:
             results = run_goals(
                 task,
                 learned.generator,
@@ -86,19 +88,24 @@ class ProcessPictures(Recipe):
 
     def trainings(self, scale: Scale, include: Sequence[str]) -> Sequence[Training]:
         """One a task: the first set and seed."""
-        first = scale.sets[0], self.generator, scale.seeds[0]
-        return [Training(task, *first, perception="eye") for task in self.tasks]
+        name, seed = scale.sets[0], scale.seeds[0]
+        return [
+            Training(
+                task, name, self.generator, seed, seen=SeenDemonstrations(task, name, "eye", seed)
+            )
+            for task in self.tasks
+        ]
 
     def run(self, run: Run) -> dict[str, Any]:
         """Try the unseen goals of each task, and choose one of them."""
         trainings = self.trainings(run.scale, run.include)
-        run.results(trainings)
+        run.learn(trainings)
         results = run.results([Process(t, rounds=run.scale.rounds) for t in trainings])
         return {
             "rows": [
                 {
                     "task": training.task,
-                    "demonstrated": training.recorded().outcomes_seen.tolist(),
+                    "demonstrated": training.learned(run.folder).prior.outcomes_seen.tolist(),
                     **_chosen(result["goals"]),
                 }
                 for training, result in zip(trainings, results, strict=True)
@@ -145,10 +152,10 @@ class ProcessPictures(Recipe):
         return [
             Picture(
                 path,
-                "From above, one goal of each task: the whole table with the demonstrations, then "
-                "every trial's key frame close up. The arrow is the error as it was seen by eye, "
-                "from the goal; it guides the next trial. Of five unseen goals the first that took "
-                "three trials is shown, or the nearest to that.",
+                "From above, one goal of each task: the whole table with the demonstrations as "
+                "they were seen, then every trial's key frame close up. The arrow is the error as "
+                "it was seen by eye, from the goal; it guides the next trial. Of five unseen goals "
+                "the first that took three trials is shown, or the nearest to that.",
             )
         ]
 

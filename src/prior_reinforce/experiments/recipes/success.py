@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from prior_reinforce.experiments.evaluation import Training, Trials
+from prior_reinforce.experiments.evaluation import SeenDemonstrations, Training, Trials
 from prior_reinforce.experiments.recipes.base import Run, Scale
 from prior_reinforce.experiments.recipes.claims import Verdict, above, all_of
 from prior_reinforce.experiments.statistics import (
@@ -30,9 +30,13 @@ _ROUNDS_SHOWN = (1, 2, 4, 8, 10)
 def trainings_of(
     scale: Scale, generator: str, *, aligned: bool = False, perception: str | None = None
 ) -> list[Training]:
-    """One training for each prior set and seed."""
+    """One training for each prior set and seed; `perception` sees the demonstrations."""
+
+    def seen(name: str, seed: int) -> SeenDemonstrations | None:
+        return None if perception is None else SeenDemonstrations(TASK, name, perception, seed)
+
     return [
-        Training(TASK, name, generator, seed, aligned=aligned, perception=perception)
+        Training(TASK, name, generator, seed, aligned=aligned, seen=seen(name, seed))
         for name in scale.sets
         for seed in scale.seeds
     ]

@@ -16,7 +16,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from prior_reinforce.experiments.evaluation import Training, Trials
+from prior_reinforce.experiments.evaluation import SeenDemonstrations, Training, Trials
 from prior_reinforce.experiments.recipes.base import (
     Family,
     Picture,
@@ -71,7 +71,7 @@ class TrialsTable(Recipe):
         """Try the paper's number of goals, and many, through every sense."""
         scale = run.scale
         rows = self._rows(scale)
-        run.results(self.trainings(scale, run.include))
+        judged_by_eye = run.learn(self.trainings(scale, run.include))
         tried = [(row, adapter) for row in rows for adapter in ("gp", *run.include)]
         units: dict[Hashable, list[Trials]] = {}
         for row, adapter in tried:
@@ -90,9 +90,8 @@ class TrialsTable(Recipe):
             "rounds": scale.rounds,
             "generator": self.generator,
             "model": STAND_IN if self.model is None else self.model.model,
-            "readings_judged_by_eye": sum(
-                sum(result["failed_readings"]) for some in got.values() for result in some
-            ),
+            "readings_judged_by_eye": judged_by_eye
+            + sum(sum(result["failed_readings"]) for some in got.values() for result in some),
             "rows": [
                 {
                     **asdict(row),
@@ -178,7 +177,7 @@ class TrialsTable(Recipe):
         ]
 
     def _rows(self, scale: Scale) -> list[PaperRow]:
-        return [row for row in self.rows if scale.pictures or not row.by_model]
+        return [row for row in self.rows if scale.read_pictures or not row.by_model]
 
     def _seen_by(self, row: PaperRow) -> str:
         if not row.by_model:
@@ -192,8 +191,13 @@ class TrialsTable(Recipe):
                 name,
                 self.generator,
                 seed,
-                perception=self._seen_by(row),
-                model=self.model if row.by_model else None,
+                seen=SeenDemonstrations(
+                    row.learned_on,
+                    name,
+                    self._seen_by(row),
+                    seed,
+                    model=self.model if row.by_model else None,
+                ),
             )
             for name in scale.sets
             for seed in scale.seeds

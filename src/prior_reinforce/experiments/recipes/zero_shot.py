@@ -26,7 +26,7 @@ class ZeroShotErrors(Recipe):
     def run(self, run: Run) -> dict[str, Any]:
         """Throw once at every point of a grid."""
         trainings = self.trainings(run.scale, run.include)
-        run.results(trainings)
+        run.learn(trainings)
         results = run.results([ZeroShot(training) for training in trainings])
         return {
             "rows": [

@@ -1,0 +1,60 @@
+"""What it costs in trials that demonstrations are seen by eye, and that trials are.
+
+    python benchmarks/seen_demonstrations.py [TASK ...] [--goals 50] [--workers 2]
+
+Both prior sets, training seeds 0, 1 and 2, the goals of `reproduce`, Gaussian process adapter: the
+demonstrations' outcomes as recorded or as seen by eye, the trials seen by eye or exactly. A goal
+that is not reached in ten trials counts as eleven. In brackets 95 % intervals over trainings and
+goals. What was learned is kept in --folder, and not learned again.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+
+from prior_reinforce.experiments.evaluation import SeenDemonstrations, Training, Trials
+from prior_reinforce.experiments.recipes.base import Run, Scale
+from prior_reinforce.experiments.statistics import bootstrap_mean
+from prior_reinforce.experiments.units import Workers
+
+
+def main() -> None:
+    """Print a line for each way of seeing."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("tasks", nargs="*", default=["fishing"], metavar="TASK")
+    parser.add_argument("--goals", type=int, default=50)
+    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--folder", type=Path, default=Path("runs/seen-demonstrations"))
+    arguments = parser.parse_args()
+
+    scale = Scale(goals=arguments.goals)
+    run = Run(arguments.folder, scale, Workers(arguments.workers))
+    draws = [(name, seed) for name in scale.sets for seed in scale.seeds]
+    for task in arguments.tasks:
+        ways = {
+            "as recorded": [None for _ in draws],
+            "by eye": [SeenDemonstrations(task, name, "eye", seed) for name, seed in draws],
+        }
+        for way, seen in ways.items():
+            trainings = [
+                Training(task, name, "diffusion", seed, seen=each)
+                for (name, seed), each in zip(draws, seen, strict=True)
+            ]
+            run.learn(trainings)
+            for perception in ("eye", "exact"):
+                units = [Trials(t, task, "gp", perception, scale.goals) for t in trainings]
+                solved = np.array([result["solved_at"] for result in run.results(units)])
+                needed = np.where(solved > 0, solved, scale.rounds + 1).astype(float)
+                print(
+                    f"{task:14} demonstrations {way:11} trials {perception:5}: "
+                    f"{bootstrap_mean(needed)} trials, first hits "
+                    f"{bootstrap_mean((solved == 1).astype(float))}",
+                    flush=True,
+                )
+
+
+if __name__ == "__main__":
+    main()
