@@ -107,3 +107,13 @@ def test_a_record_checks_what_it_is_given():
         replace(MISSED, outcomes=(GOAL,))
     with pytest.raises(ConfigurationError, match="trial 2"):
         replace(MISSED, outcomes=(None, np.array([np.nan, 0.0])))
+
+
+def test_a_hit_is_drawn_within_its_circle_however_coarsely_it_was_called():
+    missed, called_far, called_near = record([0.05, 0.0], [0.02, 0.0], [0.01, 0.0]).landings
+    np.testing.assert_allclose(missed - GOAL, [0.05, 0.0])
+    np.testing.assert_allclose(called_far - GOAL, [0.02, 0.0])  # a miss
+    np.testing.assert_allclose(called_near - GOAL, [0.01, 0.0])
+    hit = replace(record([0.03, 0.04]).trials[0], hit=True)
+    (drawn,) = AdaptationRecord(DEMOS, GOAL, 0.015, (hit,)).landings
+    np.testing.assert_allclose(drawn - GOAL, [0.009, 0.012])

@@ -112,11 +112,22 @@ class AdaptationRecord:
 
     @property
     def landings(self) -> tuple[np.ndarray | None, ...]:
-        """Perceived outcome r tilde of each trial, shape (k,); None unless told."""
+        """Perceived outcome r tilde of each trial, shape (k,); None unless told.
+
+        A hit that a coarse eye called further off than the tolerance was within it all the same,
+        and is put at its edge.
+        """
         return tuple(
-            None if trial.error_seen is None else self.goal + trial.error_seen
+            None if trial.error_seen is None else self.goal + self._at_most(trial)
             for trial in self.trials
         )
+
+    def _at_most(self, trial: Trial) -> np.ndarray:
+        error = np.asarray(trial.error_seen)
+        distance = np.linalg.norm(error)
+        if not trial.hit or distance <= self.tolerance:
+            return error
+        return error * (self.tolerance / distance)
 
     @property
     def true_outcomes(self) -> tuple[np.ndarray | None, ...]:
