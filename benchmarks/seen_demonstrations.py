@@ -15,9 +15,9 @@ from pathlib import Path
 
 import numpy as np
 
-from prior_reinforce.experiments.evaluation import SeenDemonstrations, Training, Trials
+from prior_reinforce.experiments.evaluation import Training, Trials
 from prior_reinforce.experiments.recipes.base import Run, Scale
-from prior_reinforce.experiments.statistics import bootstrap_mean
+from prior_reinforce.experiments.statistics import bootstrap_mean, reached_by, trials_counted
 from prior_reinforce.experiments.units import Workers
 
 
@@ -32,26 +32,21 @@ def main() -> None:
 
     scale = Scale(goals=arguments.goals)
     run = Run(arguments.folder, scale, Workers(arguments.workers))
-    draws = [(name, seed) for name in scale.sets for seed in scale.seeds]
     for task in arguments.tasks:
-        ways = {
-            "as recorded": [None for _ in draws],
-            "by eye": [SeenDemonstrations(task, name, "eye", seed) for name, seed in draws],
-        }
-        for way, seen in ways.items():
+        for way, seen_by in (("as recorded", None), ("by eye", "eye")):
             trainings = [
-                Training(task, name, "diffusion", seed, seen=each)
-                for (name, seed), each in zip(draws, seen, strict=True)
+                Training(task, name, "diffusion", seed, perception=seen_by)
+                for name in scale.sets
+                for seed in scale.seeds
             ]
             run.learn(trainings)
             for perception in ("eye", "exact"):
                 units = [Trials(t, task, "gp", perception, scale.goals) for t in trainings]
                 solved = np.array([result["solved_at"] for result in run.results(units)])
-                needed = np.where(solved > 0, solved, scale.rounds + 1).astype(float)
                 print(
                     f"{task:14} demonstrations {way:11} trials {perception:5}: "
-                    f"{bootstrap_mean(needed)} trials, first hits "
-                    f"{bootstrap_mean((solved == 1).astype(float))}",
+                    f"{bootstrap_mean(trials_counted(solved, scale.rounds))} trials, first hits "
+                    f"{bootstrap_mean(reached_by(solved, 1))}",
                     flush=True,
                 )
 

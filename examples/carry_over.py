@@ -14,11 +14,10 @@ from pathlib import Path
 
 import numpy as np
 
-import prior_reinforce as pr
 from prior_reinforce.commands.learning import load_learned
+from prior_reinforce.commands.task_options import Simulated
 from prior_reinforce.experiments.carry_over import compare, trials_needed
 from prior_reinforce.experiments.methods import make_adapter, make_perception
-from prior_reinforce.tasks import make_task
 
 GOALS = 5
 
@@ -35,11 +34,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
 
-    task = make_task(options.task)
-    if options.demonstrations in task.demonstration_sets:
-        demonstrations = task.demonstrations(options.demonstrations)
-    else:
-        demonstrations = pr.Demonstrations.load(options.demonstrations)
+    task, demonstrations = Simulated(options.task, options.demonstrations, options.seed).open()
     goals = task.sample_goals(options.sequences * GOALS, np.random.default_rng([options.seed, 6]))
     sequences = goals.reshape(options.sequences, GOALS, -1)
     print("| adapter | without | with earlier goals' trials | saved |")

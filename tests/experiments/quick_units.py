@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from prior_reinforce.experiments.evaluation import SeenDemonstrations, Training, Trials, ZeroShot
+from prior_reinforce.experiments.evaluation import Training, Trials, ZeroShot
 from prior_reinforce.experiments.units import Unit
 from prior_reinforce.generators import DiffusionConfig, DiffusionGenerator
 from prior_reinforce.generators.unet_size import UNetSize
@@ -26,10 +26,9 @@ class BriefDiffusion(DiffusionGenerator):
 
 
 def trainings():
-    seen = SeenDemonstrations("basketball-v1", "A", "eye", seed=0)
     return [
         Training("basketball-v1", "A", "nearest", seed=0),
-        Training("basketball-v1", "A", "interpolation", seed=0, seen=seen),
+        Training("basketball-v1", "A", "interpolation", seed=0, perception="eye"),
         Training("basketball-v1", "A", "quick_units:BriefDiffusion", seed=0),
     ]
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from prior_reinforce.experiments.evaluation import SeenDemonstrations, Training, Trials
+from prior_reinforce.experiments.evaluation import Training, Trials
 from prior_reinforce.experiments.recipes.base import Run, Scale
 from prior_reinforce.experiments.recipes.claims import Verdict
 from prior_reinforce.experiments.recipes.process import Process, ProcessPictures, _chosen
@@ -169,7 +169,7 @@ def test_the_goal_shown_was_reached_in_about_three_trials():
 
 @pytest.mark.slow
 def test_the_process_is_that_of_the_table_and_its_picture_marks_the_hit(tmp_path):
-    training = replace(TRAINING, seen=SeenDemonstrations("basketball-v1", "A", "eye", 0))
+    training = replace(TRAINING, perception="eye")
     of_table = Trials(training, "basketball-v1", "gp", "eye", 5, unseen=True, rounds=6)
     in_table = of_table.run(tmp_path)
     solved_at = in_table["solved_at"]

@@ -94,23 +94,22 @@ def test_an_eye_tells_the_shipped_demonstrations_apart(name, demonstrations):
 
 
 def test_a_training_learns_from_what_was_seen(tmp_path):
-    seen_by_eye = SeenDemonstrations("basketball-v1", "A", "eye", 2)
-    training = Training("basketball-v1", "A", "nearest", 2, seen=seen_by_eye)
+    training = Training("basketball-v1", "A", "nearest", 2, perception="eye")
     first, again = training.learned(tmp_path), training.learned(tmp_path)
     np.testing.assert_array_equal(first.prior.outcomes_seen, seen(Eye(), GOAL_SEED + 2))
     np.testing.assert_array_equal(again.prior.outcomes_seen, first.prior.outcomes_seen)
     np.testing.assert_allclose(
         again.generator.generate(first.prior.outcomes_seen), RECORDED.plans, atol=1e-6
     )
-    recorded = replace(training, seen=None).learned(tmp_path)
+    recorded = replace(training, perception=None).learned(tmp_path)
     np.testing.assert_array_equal(recorded.prior.outcomes_seen, RECORDED.outcomes_seen)
 
 
 def test_what_was_seen_is_seen_once_for_all_that_learn_from_it(tmp_path):
-    asked = SeenDemonstrations("basketball-v1", "A", f"{__name__}:Counted", 0)
     Counted.looks = 0
+    counted = Training("basketball-v1", "A", "nearest", 0, perception=f"{__name__}:Counted")
     priors = [
-        Training("basketball-v1", "A", generator, 0, seen=asked, aligned=aligned).learned(tmp_path)
+        replace(counted, generator=generator, aligned=aligned).learned(tmp_path)
         for generator, aligned in (("nearest", False), ("interpolation", True))
     ]
     assert Counted.looks == RECORDED.n
@@ -137,7 +136,7 @@ def test_failed_readings_of_demonstrations_are_counted(tmp_path):
 @pytest.mark.slow
 def test_goals_do_not_depend_on_how_the_demonstrations_were_seen(tmp_path):
     training = Training("basketball-v1", "A", "nearest", 0)
-    by_eye = replace(training, seen=SeenDemonstrations("basketball-v1", "A", "eye", 0))
+    by_eye = replace(training, perception="eye")
     goals = [
         Trials(t, "basketball-v1", "frozen", "exact", 5, unseen=True, rounds=1).run(tmp_path)[
             "goals"

@@ -103,20 +103,33 @@ class Training(Unit):
     """Whether the demonstrations are aligned in time first."""
     subset: tuple[int, ...] | None = None
     """Which of the demonstrations to learn from; None for all."""
-    seen: SeenDemonstrations | None = None
-    """How the outcomes of the demonstrations are seen; None for the true ones, as recorded."""
+    perception: str | None = None
+    """How the outcomes of the demonstrations are seen (`sight.SIGHTS`), or module:Class; None for
+    the true ones, as recorded."""
+    model: VisionLanguageModelConfig | None = None
+    """Endpoint to ask where `perception` is vlm."""
 
     @property
     def label(self) -> str:
         """What it is, for a progress line."""
         how = ", aligned" if self.aligned else ""
-        how += "" if self.seen is None else f" by {self.seen.perception}"
+        how += "" if self.perception is None else f" by {self.perception}"
         return f"learn {self.generator} on {self.task} {self.demonstrations}{how}, {self.seed}"
 
     @property
     def own_sources(self) -> tuple[str, ...]:
         """Digests of the own files behind what is learned; see `Unit`."""
-        return *super().own_sources, source_digest(self.task), source_digest(self.generator)
+        own = source_digest(self.task), source_digest(self.generator)
+        return own if self.seen is None else (*own, *self.seen.own_sources)
+
+    @property
+    def seen(self) -> SeenDemonstrations | None:
+        """The demonstrations as they are seen, the same for every generator; None: as recorded."""
+        if self.perception is None:
+            return None
+        return SeenDemonstrations(
+            self.task, self.demonstrations, self.perception, self.seed, self.model
+        )
 
     def run(self, folder: Path) -> Mapping[str, Any]:
         """Learn, unless it was learned before; the model itself is the result."""

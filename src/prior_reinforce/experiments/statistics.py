@@ -69,6 +69,16 @@ def bootstrap_difference(a: np.ndarray, b: np.ndarray, *, seed: int = 0) -> Inte
     return bootstrap_mean(np.asarray(a, dtype=float) - np.asarray(b, dtype=float), seed=seed)
 
 
+def trials_counted(solved_at: np.ndarray, rounds: int) -> np.ndarray:
+    """Trials that each goal took, one more than there were rounds where it was not reached.
+
+    Args:
+        solved_at: Number of the trial that reached each goal; 0 where none did.
+        rounds: Trials a goal at most.
+    """
+    return np.where(solved_at > 0, solved_at, rounds + 1).astype(float)
+
+
 def reached_by(solved_at: np.ndarray, round_number: int) -> np.ndarray:
     """1 where a goal was reached within that many trials, else 0; same shape.
 

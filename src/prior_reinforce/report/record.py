@@ -118,11 +118,11 @@ class AdaptationRecord:
         and is put at its edge.
         """
         return tuple(
-            None if trial.error_seen is None else self.goal + self._at_most(trial)
+            None if trial.error_seen is None else self.goal + self._error_drawn(trial)
             for trial in self.trials
         )
 
-    def _at_most(self, trial: Trial) -> np.ndarray:
+    def _error_drawn(self, trial: Trial) -> np.ndarray:
         error = np.asarray(trial.error_seen)
         distance = np.linalg.norm(error)
         if not trial.hit or distance <= self.tolerance:

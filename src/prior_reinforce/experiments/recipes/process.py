@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from prior_reinforce.experiments.evaluation import GOAL_SEED, SeenDemonstrations, Training
+from prior_reinforce.experiments.evaluation import GOAL_SEED, Training
 from prior_reinforce.experiments.goals import unseen_goals
 from prior_reinforce.experiments.methods import make_adapter
 from prior_reinforce.experiments.protocol import GoalTrials, run_goals
@@ -88,13 +88,8 @@ class ProcessPictures(Recipe):
 
     def trainings(self, scale: Scale, include: Sequence[str]) -> Sequence[Training]:
         """One a task: the first set and seed."""
-        name, seed = scale.sets[0], scale.seeds[0]
-        return [
-            Training(
-                task, name, self.generator, seed, seen=SeenDemonstrations(task, name, "eye", seed)
-            )
-            for task in self.tasks
-        ]
+        first = scale.sets[0], self.generator, scale.seeds[0]
+        return [Training(task, *first, perception="eye") for task in self.tasks]
 
     def run(self, run: Run) -> dict[str, Any]:
         """Try the unseen goals of each task, and choose one of them."""

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from prior_reinforce.experiments.evaluation import SeenDemonstrations, Training, Trials
+from prior_reinforce.experiments.evaluation import Training, Trials
 from prior_reinforce.experiments.recipes.base import Run, Scale
 from prior_reinforce.experiments.recipes.claims import Verdict, above, all_of
 from prior_reinforce.experiments.statistics import (
@@ -31,12 +31,8 @@ def trainings_of(
     scale: Scale, generator: str, *, aligned: bool = False, perception: str | None = None
 ) -> list[Training]:
     """One training for each prior set and seed; `perception` sees the demonstrations."""
-
-    def seen(name: str, seed: int) -> SeenDemonstrations | None:
-        return None if perception is None else SeenDemonstrations(TASK, name, perception, seed)
-
     return [
-        Training(TASK, name, generator, seed, aligned=aligned, seen=seen(name, seed))
+        Training(TASK, name, generator, seed, aligned=aligned, perception=perception)
         for name in scale.sets
         for seed in scale.seeds
     ]

@@ -16,7 +16,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from prior_reinforce.experiments.evaluation import SeenDemonstrations, Training, Trials
+from prior_reinforce.experiments.evaluation import Training, Trials
 from prior_reinforce.experiments.recipes.base import (
     Family,
     Picture,
@@ -36,6 +36,7 @@ from prior_reinforce.experiments.statistics import (
     bootstrap_difference,
     bootstrap_mean,
     reached_by,
+    trials_counted,
 )
 from prior_reinforce.perception import VisionLanguageModelConfig
 
@@ -191,13 +192,8 @@ class TrialsTable(Recipe):
                 name,
                 self.generator,
                 seed,
-                seen=SeenDemonstrations(
-                    row.learned_on,
-                    name,
-                    self._seen_by(row),
-                    seed,
-                    model=self.model if row.by_model else None,
-                ),
+                perception=self._seen_by(row),
+                model=self.model if row.by_model else None,
             )
             for name in scale.sets
             for seed in scale.seeds
@@ -237,17 +233,12 @@ def _paired(
     """
     shared = eye[0], eye[1][:, : model[1].shape[1]]
     return bootstrap_difference(
-        _needed(np.hstack(shared), rounds), _needed(np.hstack(model), rounds)
+        trials_counted(np.hstack(shared), rounds), trials_counted(np.hstack(model), rounds)
     )
 
 
-def _needed(solved: np.ndarray, rounds: int) -> np.ndarray:
-    """Trials needed, one more than there were rounds where a goal was not reached."""
-    return np.where(solved > 0, solved, rounds + 1).astype(float)
-
-
 def _summary(solved: np.ndarray, rounds: int) -> dict[str, Any]:
-    trials = _needed(solved, rounds)
+    trials = trials_counted(solved, rounds)
     return {
         "goals": int(solved.size),
         "trials": asdict(bootstrap_mean(trials)),
