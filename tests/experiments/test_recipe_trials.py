@@ -86,6 +86,11 @@ def test_demonstrations_are_seen_as_the_rows_trials_are():
         assert {s.model for s in seen if s.perception != "eye"} == {recipe.model}
     small = replace(SMALL, read_pictures=False)
     assert {t.seen.perception for t in TrialsTable().trainings(small, ())} == {"eye"}
+    # The process is shown of what the table's eye saw.
+    shown = ProcessPictures().trainings(SMALL, ())
+    assert [(t.task, t.perception) for t in shown] == [
+        (task, "eye") for task in ("basketball-v1", "curling", "fishing")
+    ]
 
 
 def test_claims_are_judged_by_the_interval():

@@ -122,3 +122,8 @@ def test_verdicts_and_remarks_follow_the_figures():
     (remark,) = recipe.remarks(figures)
     assert "U-Net regression" in remark
     assert "nearest" not in remark
+
+
+def test_adapters_learn_from_what_an_eye_saw_and_generators_from_what_was_recorded():
+    for recipe, perception in ((Adapters(), "eye"), (Generators(), None)):
+        assert {t.perception for t in recipe.trainings(Scale(), ())} == {perception}
