@@ -22,14 +22,18 @@ def trials_claims(figures: Mapping[str, Any]) -> list[Claim]:
     Args:
         figures: Of `trials.TrialsTable`.
     """
-    n = figures["trainings"]
     means = [
         Claim(
             f"{row['title']}, {sense_of(row, figures)}: {row['trials']:.1f} trials on average "
             "(here: at most).",
             f"{interval_of(row['unseen']['trials'])} on {row['unseen']['goals']} unseen goals, "
             f"{interval_of(row['many']['trials'])} on {row['many']['goals']} uniform ones",
-            all_of([at_most(interval_of(row[g]["trials"]), row["trials"], n) for g in _GOALS]),
+            all_of(
+                [
+                    at_most(interval_of(row[g]["trials"]), row["trials"], row["trainings"])
+                    for g in _GOALS
+                ]
+            ),
         )
         for row in figures["rows"]
         if row["adapter"] == "gp"
@@ -38,8 +42,8 @@ def trials_claims(figures: Mapping[str, Any]) -> list[Claim]:
         Claim(
             "The goal itself as the condition often leads to inaccurate outcomes (here: in "
             f"more than half of the first attempts; {row['title']}, {sense_of(row, figures)}).",
-            f"share reached at once, no adapter: {interval_of(row['first_throws'])}",
-            at_most(interval_of(row["first_throws"]), _HALF, n),
+            f"share reached at the first trial: {interval_of(row['first_throws'])}",
+            at_most(interval_of(row["first_throws"]), _HALF, row["trainings"]),
         )
         for row in figures["rows"]
         if row["adapter"] == "gp"
@@ -47,6 +51,7 @@ def trials_claims(figures: Mapping[str, Any]) -> list[Claim]:
     fewer = {task: interval_of(value) for task, value in figures["eye_minus_model"].items()}
     if not fewer:
         return [*means, *first]
+    n = min(row["trainings"] for row in figures["rows"] if row["task"] in fewer)
     verdicts = [
         # What a stand-in reads says nothing of a model.
         Verdict.OPEN if figures["model"] == STAND_IN else above(interval, 0.0, n)
