@@ -17,7 +17,7 @@ import numpy as np
 
 from prior_reinforce.experiments.evaluation import Training, Trials
 from prior_reinforce.experiments.recipes.base import Run, Scale
-from prior_reinforce.experiments.statistics import bootstrap_mean, reached_by, trials_counted
+from prior_reinforce.experiments.statistics import SHARE, bootstrap_mean, reached_by, trials_counted
 from prior_reinforce.experiments.units import Workers
 
 
@@ -46,7 +46,7 @@ def main() -> None:
                 print(
                     f"{task:14} demonstrations {way:11} trials {perception:5}: "
                     f"{bootstrap_mean(trials_counted(solved, scale.rounds))} trials, first hits "
-                    f"{bootstrap_mean(reached_by(solved, 1))}",
+                    f"{bootstrap_mean(reached_by(solved, 1), within=SHARE)}",
                     flush=True,
                 )
 

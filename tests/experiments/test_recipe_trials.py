@@ -14,7 +14,7 @@ from prior_reinforce.experiments.evaluation import Training, Trials
 from prior_reinforce.experiments.recipes.base import Run, Scale
 from prior_reinforce.experiments.recipes.claims import Verdict
 from prior_reinforce.experiments.recipes.process import Process, ProcessPictures, _chosen
-from prior_reinforce.experiments.recipes.trials import TrialsTable
+from prior_reinforce.experiments.recipes.trials import TrialsTable, first_throws_that_hit
 from prior_reinforce.experiments.recipes.trials_rows import ROWS
 from prior_reinforce.experiments.sight import STAND_IN
 from prior_reinforce.perception import VisionLanguageModelConfig
@@ -56,9 +56,6 @@ def test_a_row_counts_what_was_not_reached_as_one_trial_more(tmp_path):
             assert row[name]["trials"]["value"] == pytest.approx(np.mean(needed))
             assert row[name]["sd"] == pytest.approx(np.std(needed, ddof=1))
             assert row[name]["not_reached"] == unit.count(0)
-        # `unit` is of the many goals here. Nothing is told before the first trial: the goal itself
-        # is its condition, but for what the demonstrations make of it.
-        assert row["first_throws"]["value"] == pytest.approx(unit.count(1) / 3)
     assert len(recipe.table(figures).rows) == 2
     assert {claim.verdict for claim in recipe.claims(figures)} == {Verdict.OPEN}  # one training
     assert figures["readings_judged_by_eye"] == 0
@@ -88,6 +85,11 @@ def test_demonstrations_are_seen_as_the_rows_trials_are():
     assert [(t.task, t.perception) for t in shown] == [
         (task, "eye") for task in ("basketball-v1", "curling", "fishing")
     ]
+
+
+def test_first_throws_are_the_trials_that_reached_a_goal_at_once():
+    hit = first_throws_that_hit(np.array([[1, 2, 0, 1], [1, 10, 3, 4]]))
+    assert hit.value == 3 / 8
 
 
 def test_an_eye_is_compared_with_pictures_on_the_same_trainings_and_goals():
@@ -145,9 +147,14 @@ def test_claims_are_judged_by_the_interval():
         Verdict.OPEN,  # more than half of the first throws may hit
         Verdict.CONFIRMED,
     ]
+    # Fewer than three trainings decide nothing, however many other rows have.
+    few = [{**row, "trainings": 2} for row in figures["rows"][:1]] + figures["rows"][1:]
+    assert TrialsTable().claims({**figures, "rows": few})[0].verdict is Verdict.OPEN
     # What the stand-in read says nothing of a model.
-    stood_in = TrialsTable().claims({**figures, "model": STAND_IN})
-    assert [claim.verdict for claim in stood_in] == [*verdicts[:-1], Verdict.OPEN]
+    read = [{**row, "by_model": True} for row in figures["rows"]]
+    for model, expected in (("mine", verdicts), (STAND_IN, [Verdict.OPEN] * len(verdicts))):
+        claims = TrialsTable().claims({**figures, "rows": read, "model": model})
+        assert [claim.verdict for claim in claims] == expected
 
 
 @pytest.mark.slow

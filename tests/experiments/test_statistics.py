@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
+from prior_reinforce.experiments.recipes.claims import Verdict, above
 from prior_reinforce.experiments.statistics import (
+    SHARE,
     bootstrap_difference,
     bootstrap_mean,
     reached_by,
@@ -31,11 +33,31 @@ def test_what_all_trainings_share_is_uncertain_through_the_goals_alone():
     assert (interval.high - interval.low) / 2 == pytest.approx(half, rel=0.15)
 
 
-def test_an_interval_stays_within_what_was_seen():
+@pytest.mark.parametrize("n", [3, 4])
+def test_the_interval_holds_the_truth_over_so_few_trainings_and_nothing_else(n):
+    rng = np.random.default_rng(3)
+    held = 0
+    for number in range(200):
+        interval = bootstrap_mean(rng.normal(0.0, 1.0, (n, 1)), seed=number)
+        held += interval.low <= 0.0 <= interval.high
+    assert held >= 0.9 * 200  # the smallest to the largest holds it in 75 % and 87.5 %
+
+
+def test_an_interval_ends_where_the_quantity_does():
     certain = bootstrap_mean(np.ones((3, 5)))
     assert (certain.value, certain.low, certain.high) == (1.0, 1.0, 1.0)
-    seen = bootstrap_mean(np.array([[1.0, 1.0, 0.0], [1.0, 1.0, 1.0]]))
-    assert 0.0 <= seen.low <= seen.value <= seen.high <= 1.0
+    shares = np.array([[1.0, 1.0, 0.0], [1.0, 1.0, 1.0]])
+    assert bootstrap_mean(shares).high > 1.0
+    seen = bootstrap_mean(shares, within=SHARE)
+    assert 0.0 <= seen.low <= seen.value < seen.high == 1.0
+
+
+def test_one_goal_that_differs_leaves_open_which_is_above():
+    a = np.ones((6, 100))
+    a[0, 0] = 0.0
+    difference = bootstrap_difference(a, np.ones((6, 100)), within=SHARE)
+    assert difference.low < difference.value < 0.0 < difference.high
+    assert above(difference, 0.0, 6) is Verdict.OPEN
 
 
 def test_a_paired_difference_does_not_know_what_both_share():

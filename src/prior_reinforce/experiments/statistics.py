@@ -15,6 +15,9 @@ from scipy import stats
 
 _RESAMPLES = 2000
 _CONFIDENCE = 0.95
+_ANYWHERE = (-np.inf, np.inf)
+SHARE = (0.0, 1.0)
+"""What a share can be."""
 
 
 @dataclass(frozen=True)
@@ -35,11 +38,15 @@ class Interval:
         return f"{self.value:{spec}} [{self.low:{spec}}, {self.high:{spec}}]"
 
 
-def bootstrap_mean(values: np.ndarray, *, seed: int = 0) -> Interval:
+def bootstrap_mean(
+    values: np.ndarray, *, within: tuple[float, float] = _ANYWHERE, seed: int = 0
+) -> Interval:
     """Mean over groups and members, resampling both.
 
     Args:
         values: Shape (groups, members): a row a training (prior set and seed), a column a goal.
+        within: What such a mean can be at all, `SHARE` for instance; the interval ends there. What
+            was seen is no such bound: one goal that differs would decide on which side zero lies.
         seed: Of the resampling.
     """
     values = np.asarray(values, dtype=float)
@@ -51,7 +58,7 @@ def bootstrap_mean(values: np.ndarray, *, seed: int = 0) -> Interval:
     value = values.mean()
     tail = (1 - _CONFIDENCE) / 2
     ends = value + _widening(groups) * (np.quantile(means, [tail, 1 - tail]) - value)
-    low, high = np.clip(ends, values.min(), values.max())
+    low, high = np.clip(ends, *within)
     return Interval(float(value), float(low), float(high))
 
 
@@ -64,9 +71,16 @@ def _widening(groups: int) -> float:
     return float(student * np.sqrt(groups / (groups - 1)))
 
 
-def bootstrap_difference(a: np.ndarray, b: np.ndarray, *, seed: int = 0) -> Interval:
-    """Mean of a - b, paired by group and member; shapes (groups, members) as above."""
-    return bootstrap_mean(np.asarray(a, dtype=float) - np.asarray(b, dtype=float), seed=seed)
+def bootstrap_difference(
+    a: np.ndarray, b: np.ndarray, *, within: tuple[float, float] = _ANYWHERE, seed: int = 0
+) -> Interval:
+    """Mean of a - b, paired by group and member; shapes (groups, members) as above.
+
+    `within` is what either mean can be.
+    """
+    low, high = within
+    difference = np.asarray(a, dtype=float) - np.asarray(b, dtype=float)
+    return bootstrap_mean(difference, within=(low - high, high - low), seed=seed)
 
 
 def trials_counted(solved_at: np.ndarray, rounds: int) -> np.ndarray:

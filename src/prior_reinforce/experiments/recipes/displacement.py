@@ -22,7 +22,7 @@ from prior_reinforce.experiments.recipes.base import Picture, Recipe, Run, Scale
 from prior_reinforce.experiments.recipes.claims import Claim, above
 from prior_reinforce.experiments.recipes.displacement_picture import Field, draw_fields
 from prior_reinforce.experiments.recipes.success import TASK, interval_of, trainings_of
-from prior_reinforce.experiments.statistics import bootstrap_difference, bootstrap_mean
+from prior_reinforce.experiments.statistics import SHARE, bootstrap_difference, bootstrap_mean
 from prior_reinforce.tasks import make_task
 
 HIGH_ERROR = 0.05
@@ -77,12 +77,16 @@ class DisplacementFields(Recipe):
             "rows": [
                 {
                     "demonstrations": len(fields[i]["outcomes_m"]),
-                    **{name: asdict(bootstrap_mean(v[i])) for name, v in by_name.items()},
+                    **{
+                        name: asdict(bootstrap_mean(v[i], within=_within(name)))
+                        for name, v in by_name.items()
+                    },
                 }
                 for i in range(2)
             ],
             "three_minus_six": {
-                name: asdict(bootstrap_difference(v[1], v[0])) for name, v in by_name.items()
+                name: asdict(bootstrap_difference(v[1], v[0], within=_within(name)))
+                for name, v in by_name.items()
             },
             "outside_minus_inside_m": asdict(
                 bootstrap_difference(by_name["outside_m"][0], by_name["inside_m"][0])
@@ -115,7 +119,7 @@ class DisplacementFields(Recipe):
         )
 
     def draw(self, figures: Mapping[str, Any], folder: Path) -> list[Picture]:
-        """Two fields side by side, of the first prior set and seed."""
+        """Two fields, one above the other, of the first prior set and seed."""
         fields = [
             Field(
                 f"{len(field['outcomes_m'])} demonstrations",
@@ -147,7 +151,7 @@ class DisplacementFields(Recipe):
         return [
             Claim(
                 "With six demonstrations errors are small within the demonstrated region and "
-                "grow towards the boundary.",
+                "grow towards the boundary (here: larger outside the hull than inside).",
                 f"mean error inside {_cm(six['inside_m'])} cm, outside "
                 f"{_cm(six['outside_m'])} cm; difference {outside:+.2f} cm",
                 above(outside, 0.0, trainings),
@@ -211,6 +215,11 @@ def measures(
         "outside_m": float(np.mean(errors[~hull])),
         "steepness": float(np.mean(np.concatenate(steps))),
     }
+
+
+def _within(name: str) -> tuple[float, float]:
+    """What one of the `measures` can be."""
+    return SHARE if name == "high_error_area" else (0.0, np.inf)
 
 
 def _both(mask: np.ndarray, axis: int) -> np.ndarray:

@@ -12,6 +12,7 @@ from prior_reinforce.experiments.evaluation import Training, Trials
 from prior_reinforce.experiments.recipes.base import Run, Scale
 from prior_reinforce.experiments.recipes.claims import Verdict, above, all_of
 from prior_reinforce.experiments.statistics import (
+    SHARE,
     Interval,
     bootstrap_difference,
     bootstrap_mean,
@@ -45,13 +46,15 @@ def solved_at(run: Run, units: Sequence[Trials]) -> np.ndarray:
 
 def success_curve(solved: np.ndarray, rounds: int) -> Curve:
     """Share of goals reached within 1, 2, ... rounds, with its interval."""
-    return [asdict(bootstrap_mean(reached_by(solved, r))) for r in range(1, rounds + 1)]
+    return [
+        asdict(bootstrap_mean(reached_by(solved, r), within=SHARE)) for r in range(1, rounds + 1)
+    ]
 
 
 def difference_curve(solved: np.ndarray, other: np.ndarray, rounds: int) -> Curve:
     """Share reached minus the other's, paired by training and goal, with its interval."""
     return [
-        asdict(bootstrap_difference(reached_by(solved, r), reached_by(other, r)))
+        asdict(bootstrap_difference(reached_by(solved, r), reached_by(other, r), within=SHARE))
         for r in range(1, rounds + 1)
     ]
 
@@ -66,7 +69,7 @@ def mean_success_difference(solved: np.ndarray, other: np.ndarray, rounds: int) 
     a, b = (
         np.mean([reached_by(at, r) for r in range(1, rounds + 1)], axis=0) for at in (solved, other)
     )
-    return bootstrap_difference(a, b)
+    return bootstrap_difference(a, b, within=SHARE)
 
 
 def rounds_shown(rounds: int) -> list[int]:
