@@ -1,11 +1,15 @@
 """The command `reproduce`, as a user types it."""
 
 import json
+from dataclasses import dataclass
 
 import pytest
 
 from prior_reinforce.cli import main
-from prior_reinforce.experiments.recipes import RECIPES
+from prior_reinforce.commands.reproduce import Reproduce
+from prior_reinforce.experiments.recipes import RECIPES, Recipe
+from prior_reinforce.experiments.units import Unit
+from prior_reinforce.perception import VisionLanguageModelConfig
 
 GENERATOR = "prior_reinforce.generators:SmoothInterpolation"
 ADAPTER = "prior_reinforce.adapters:FrozenAdapter"
@@ -39,6 +43,9 @@ def test_units_in_brackets_are_printed(tmp_path, capsys):
         (["all", "--include", "nowhere:Thing"], "cannot make nowhere:Thing"),
         (["all", "--include", "prior_reinforce.perception:Exact"], "neither"),
         (["all", "--goals", "0"], "at least 1"),
+        (["all", "--seeds", "0", "0", "1"], "different"),
+        (["all", "--seeds", "-1"], "not negative"),
+        (["all", "--quick", "--goals", "50"], "leave out either"),
     ],
 )
 def test_wrong_input_is_one_line_and_writes_nothing(tmp_path, capsys, arguments, said):
@@ -48,6 +55,43 @@ def test_wrong_input_is_one_line_and_writes_nothing(tmp_path, capsys, arguments,
     assert said in printed
     assert printed.count("\n") == 1
     assert not folder.exists()
+
+
+def test_a_model_reads_the_pictures_of_the_table_of_trials_alone():
+    model = VisionLanguageModelConfig(model="mine")
+    recipes = {r.name: r for r in Reproduce("all", reader="vlm", vlm=model)._recipes()}
+    assert list(recipes) == list(RECIPES)
+    assert recipes["trials"].model is model
+    assert all(recipes[name] is RECIPES[name] for name in RECIPES if name != "trials")
+    assert Reproduce("trials")._recipes() == [RECIPES["trials"]]
+
+
+@dataclass(frozen=True)
+class Broken(Unit):
+    label = "broken"
+
+    def run(self, folder):
+        raise ValueError("no such luck")
+
+
+class BrokenRecipe(Recipe):
+    name = "broken"
+    title = "Broken"
+    paper = "none"
+
+    def run(self, run):
+        return run.results([Broken()])
+
+    def table(self, figures):
+        raise NotImplementedError
+
+
+def test_a_recipe_that_fails_costs_no_other_its_figures(tmp_path, capsys, monkeypatch):
+    recipes = {"broken": BrokenRecipe(), "alignment": RECIPES["alignment"]}
+    monkeypatch.setattr("prior_reinforce.commands.reproduce.RECIPES", recipes)
+    assert main(["reproduce", "all", "--quick", "--out", str(tmp_path)]) == 2
+    assert "no such luck" in capsys.readouterr().err
+    assert "Timeline alignment" in (tmp_path / "evidence.html").read_text()
 
 
 def test_with_all_everyone_joins_the_recipes_of_their_family():

@@ -5,9 +5,9 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import tyro
 from rich import box
@@ -17,13 +17,16 @@ from rich.table import Column
 from rich.table import Table as TerminalTable
 from rich.text import Text
 
-from prior_reinforce.errors import ConfigurationError
+from prior_reinforce.errors import ConfigurationError, UnitFailedError
 from prior_reinforce.experiments.evidence import claims_table, write_evidence
 from prior_reinforce.experiments.files import write_atomically
+from prior_reinforce.experiments.methods import make_generator
 from prior_reinforce.experiments.provenance import provenance
 from prior_reinforce.experiments.recipes import QUICK, RECIPES, Recipe, Run, Scale, Table
 from prior_reinforce.experiments.recipes.base import Progress as OnProgress
+from prior_reinforce.experiments.recipes.trials import TrialsTable
 from prior_reinforce.experiments.units import Workers
+from prior_reinforce.perception import VisionLanguageModelConfig
 
 _SLOWEST = "diffusion"
 """Takes twice as long to learn as the next."""
@@ -43,6 +46,11 @@ class Reproduce:
     """Training seeds."""
     quick: bool = False
     """Ten goals, one training a method, no variants, no rows of the VLM: decides no claim."""
+    reader: Literal["stand-in", "vlm"] = "stand-in"
+    """Who reads the pictures of the VLM rows: a stand-in that finds objects by colour, or a model
+    (--vlm.*; docs/perception.md)."""
+    vlm: VisionLanguageModelConfig = field(default_factory=VisionLanguageModelConfig)
+    """Endpoint and model for --reader vlm."""
     workers: int = 1
     """Processes on this machine."""
     ray: str | None = None
@@ -52,12 +60,9 @@ class Reproduce:
 
     def run(self) -> None:
         """Run, save, print, and write the page of evidence."""
-        recipes = _chosen(self.recipe)
+        recipes = self._recipes()
         included = {recipe.name: self._joining(recipe) for recipe in recipes}
-        if self.goals < 1 or self.workers < 1 or not self.seeds:
-            raise ConfigurationError("--goals and --workers must be at least 1, and --seeds given")
-        self.out.mkdir(parents=True, exist_ok=True)
-        scale = QUICK if self.quick else Scale(goals=self.goals, seeds=self.seeds)
+        scale = self._scale()
         workers = Workers(self.workers, self.ray)
         console = Console()
         # All that has to be learned comes first, the slowest of it before the rest, so that no core
@@ -68,13 +73,21 @@ class Reproduce:
             for training in recipe.trainings(scale, included[recipe.name])
         )
         trainings = sorted(wanted, key=lambda t: _SLOWEST not in t.generator)
+        for name in dict.fromkeys(training.generator for training in trainings):
+            make_generator(name)  # a library that is not installed is told now, not after an hour
+        self.out.mkdir(parents=True, exist_ok=True)
         if trainings:
             with _progress(console, "learn") as show:
                 Run(self.out, scale, workers, show).learn(trainings)
+        failures: list[UnitFailedError] = []
         for recipe in recipes:
-            with _progress(console, recipe.name) as show:
-                run = Run(self.out, scale, workers, show, included[recipe.name])
-                figures = recipe.run(run)
+            try:
+                with _progress(console, recipe.name) as show:
+                    run = Run(self.out, scale, workers, show, included[recipe.name])
+                    figures = recipe.run(run)
+            except UnitFailedError as error:
+                failures.append(error)  # the others do not need it
+                continue
             text = json.dumps({**provenance(scale, run.commits), **figures}, indent=1)
             write_atomically(self.out / f"{recipe.name}.json", text + "\n")
             console.print(_terminal(recipe.table(figures), recipe.title))
@@ -86,8 +99,34 @@ class Reproduce:
                     "all of it runs anew",
                     markup=False,
                 )
-        page, _ = write_evidence(self.out)
-        console.print(f"evidence: {page}", soft_wrap=True)
+        if len(failures) < len(recipes):
+            page, _ = write_evidence(self.out)
+            console.print(f"evidence: {page}", soft_wrap=True)
+        if failures:
+            raise failures[0]
+
+    def _scale(self) -> Scale:
+        whole = Scale(goals=self.goals, seeds=self.seeds)
+        if self.goals < 1 or self.workers < 1 or not self.seeds:
+            raise ConfigurationError("--goals and --workers must be at least 1, and --seeds given")
+        if min(self.seeds) < 0 or len(set(self.seeds)) < len(self.seeds):
+            raise ConfigurationError("--seeds must be different and not negative")
+        if self.quick and whole != Scale():
+            raise ConfigurationError("--quick has its own goals and seeds; leave out either")
+        return QUICK if self.quick else whole
+
+    def _recipes(self) -> Sequence[Recipe]:
+        if self.recipe not in (*RECIPES, "all"):
+            raise ConfigurationError(
+                f"no recipe {self.recipe!r}; recipes are {', '.join(RECIPES)}, or all"
+            )
+        chosen = [recipe for name, recipe in RECIPES.items() if self.recipe in (name, "all")]
+        if self.reader == "stand-in":
+            return chosen
+        return [
+            replace(recipe, model=self.vlm) if isinstance(recipe, TrialsTable) else recipe
+            for recipe in chosen
+        ]
 
     def _joining(self, recipe: Recipe) -> tuple[str, ...]:
         joining = recipe.joining(self.include)
@@ -99,14 +138,6 @@ class Reproduce:
                 f"{', '.join(fitting)}, or in all"
             )
         return joining
-
-
-def _chosen(name: str) -> Sequence[Recipe]:
-    if name == "all":
-        return list(RECIPES.values())
-    if name not in RECIPES:
-        raise ConfigurationError(f"no recipe {name!r}; recipes are {', '.join(RECIPES)}, or all")
-    return [RECIPES[name]]
 
 
 @contextmanager
