@@ -5,7 +5,11 @@ import re
 
 import pytest
 
-from prior_reinforce.errors import ConfigurationError, FileFormatError
+from prior_reinforce.errors import (
+    ConfigurationError,
+    FileFormatError,
+    RenderingUnavailableError,
+)
 from prior_reinforce.experiments.evidence import write_evidence
 from prior_reinforce.experiments.provenance import provenance
 from prior_reinforce.experiments.recipes import Run, Scale, Verdict
@@ -74,13 +78,25 @@ def test_the_page_holds_claims_tables_and_pictures_in_one_file(tmp_path):
         assert f"## {heading}" in plain
     # Over 0.9 within 4 rounds, above proportional and above none: confirmed; by a margin: not;
     # forgetting: the interval holds zero.
-    assert "Of 6 claims of the paper: 4 confirmed, 1 not confirmed, 1 open." in plain
+    assert "Of 6 tests of the paper's claims: 4 confirmed, 1 not confirmed, 1 open." in plain
     for counted in ("4 confirmed", "1 not confirmed", "1 open"):
         assert f">{counted}</span>" in text
     assert "commit abc123" in text
     pictures = re.findall(r"!\[.*\]\((.*)\)", plain)
     assert pictures
     assert all((tmp_path / picture).is_file() for picture in pictures)
+
+
+def test_a_picture_that_cannot_be_drawn_costs_no_figures(tmp_path, monkeypatch):
+    def draw(self, figures, folder):
+        raise RenderingUnavailableError("no OpenGL here")
+
+    monkeypatch.setattr(Adapters, "draw", draw)
+    put(tmp_path, "adapters", ADAPTERS)
+    for path in write_evidence(tmp_path):
+        text = path.read_text()
+        assert "no OpenGL here" in text
+        assert "more than 90 %" in text.replace("\N{NO-BREAK SPACE}", " ")
 
 
 def test_the_summary_comes_before_every_figure(tmp_path):

@@ -274,7 +274,6 @@ class ZeroShot(Unit):
         errors = np.linalg.norm([r.outcome for r in rollouts] - grid, axis=1)
         return {
             "own_rms_rad": own_rms.tolist(),
-            "own_landing_m": np.linalg.norm(landed - prior.outcomes_seen, axis=1).tolist(),
             "own_landing_from_demonstrated_m": np.linalg.norm(landed - shown, axis=1).tolist(),
             "grid_points": len(grid),
             "grid_median_m": float(np.median(errors)),

@@ -14,7 +14,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from prior_reinforce.errors import ConfigurationError, FileFormatError
+from prior_reinforce.errors import (
+    ConfigurationError,
+    FileFormatError,
+    RenderingUnavailableError,
+)
 from prior_reinforce.experiments.recipes import RECIPES, Claim, Picture, Recipe, Table, Verdict
 from prior_reinforce.report.html import data_uri, render, write_text
 
@@ -31,7 +35,7 @@ class Section:
     title: str
     paper: str
     made_by: str
-    """Command, scale, seeds, version and commit in one line."""
+    """The command with its scale, the code that ran it, and its version, in one line."""
     table: Table
     claims: list[Claim]
     remarks: list[str]
@@ -89,6 +93,11 @@ def claims_table(claims: Sequence[Claim]) -> Table:
 def _section(recipe: Recipe, path: Path, pictures: Path) -> Section:
     try:
         figures: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        remarks = recipe.remarks(figures)
+        try:
+            drawn = recipe.draw(figures, pictures)
+        except RenderingUnavailableError as error:
+            drawn, remarks = [], [*remarks, f"{recipe.title}: {error}."]
         return Section(
             name=recipe.name,
             title=recipe.title,
@@ -96,8 +105,8 @@ def _section(recipe: Recipe, path: Path, pictures: Path) -> Section:
             made_by=_made_by(recipe.name, figures),
             table=recipe.table(figures),
             claims=recipe.claims(figures),
-            remarks=recipe.remarks(figures),
-            pictures=recipe.draw(figures, pictures),
+            remarks=remarks,
+            pictures=drawn,
         )
     except (KeyError, IndexError, TypeError, ValueError) as error:
         raise FileFormatError(
@@ -108,18 +117,20 @@ def _section(recipe: Recipe, path: Path, pictures: Path) -> Section:
 
 def _made_by(name: str, figures: dict[str, Any]) -> str:
     scale = figures["scale"]
+    seeds = " ".join(map(str, scale["seeds"]))
+    how = f"--goals {scale['goals']} --seeds {seeds}"
+    if not scale["variants"]:
+        how = "--quick"
     return (
-        f"prior-reinforce reproduce {name}; {scale['goals']} goals a training (seed "
-        f"{figures['goal_seed']}), prior sets {', '.join(scale['sets'])}, training seeds "
-        f"{', '.join(map(str, scale['seeds']))}; version {figures['version']}, "
-        f"commit {figures['commit']}"
+        f"prior-reinforce reproduce {name} {how}; goals of seed {figures['goal_seed']}; "
+        f"version {figures['version']}, commit {figures['commit']}"
     )
 
 
 def _summary(counts: Counter[Verdict]) -> str:
     """How many claims came out how, in a sentence."""
     counted = ", ".join(f"{counts[verdict]} {verdict.value}" for verdict in Verdict)
-    return f"Of {counts.total()} claims of the paper: {counted}."
+    return f"Of {counts.total()} tests of the paper's claims: {counted}."
 
 
 def _unbroken(text: str) -> str:

@@ -22,7 +22,13 @@ from prior_reinforce.experiments.recipes.base import (
     Scale,
     Table,
 )
-from prior_reinforce.experiments.recipes.claims import Claim, Verdict, above, all_of
+from prior_reinforce.experiments.recipes.claims import (
+    LEAST_TRAININGS,
+    Claim,
+    Verdict,
+    above,
+    all_of,
+)
 from prior_reinforce.experiments.recipes.success import (
     difference_curve,
     interval_of,
@@ -223,6 +229,8 @@ class Generators(Recipe):
 
     def remarks(self, figures: Mapping[str, Any]) -> list[str]:
         """Name every generator that is above ours."""
+        if figures["trainings"] < LEAST_TRAININGS:
+            return []
         ours, *others = figures["rows"]
         better = [
             f"{row['label']} ({interval_of(row['mean_minus'][ours['label']]):+.2f})"
