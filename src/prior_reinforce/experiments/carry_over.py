@@ -14,16 +14,16 @@ from typing import Literal
 import numpy as np
 
 from prior_reinforce.adapters.base import Adapter
-from prior_reinforce.experiments.protocol import is_hit
+from prior_reinforce.experiments.protocol import GoalTrials, run_goals
 from prior_reinforce.experiments.statistics import (
     Interval,
     bootstrap_difference,
     bootstrap_mean,
+    trials_counted,
 )
 from prior_reinforce.generators.base import Generator
 from prior_reinforce.motions import Demonstrations
 from prior_reinforce.perception.base import Perception
-from prior_reinforce.session import Session, TrialState, ask_all
 from prior_reinforce.tasks.base import Task
 
 Memory = Literal["goal", "workspace"]
@@ -65,44 +65,29 @@ def trials_needed(
         sequences: Goals, shape (sequences, goals, k), [m].
         memory: Whether earlier goals' trials of the same sequence serve a later one.
         rounds: Largest number of trials a goal.
-        seed: Of the disturbances (a stream a goal and round) and of perception (one a sequence).
+        seed: Of the disturbances and of perception: other streams for each goal of a sequence.
 
     Returns:
         Trials needed, shape (sequences, goals); `rounds` + 1 where a goal was not reached.
     """
-    n, n_goals, _ = sequences.shape
-    seers = [np.random.default_rng([seed, 1, i]) for i in range(n)]
-    earlier: list[list[Pair]] = [[] for _ in range(n)]
-    needed = np.full((n, n_goals), rounds + 1)
-    for j in range(n_goals):
-        sessions = [
-            Session(
-                generator,
-                make_adapter(),
-                demonstrations,
-                sequences[i, j],
-                task.tolerance,
-                earlier=earlier[i] if memory == "workspace" else (),
-            )
-            for i in range(n)
-        ]
-        for number in range(1, rounds + 1):
-            active = [i for i in range(n) if not sessions[i].solved]
-            if not active:
-                break
-            trials = ask_all([sessions[i] for i in active])
-            plans = np.stack([trial.plan for trial in trials])
-            executed = task.rollout(plans, np.random.default_rng([seed, 0, j, number]))
-            for i, trial, rollout in zip(active, trials, executed, strict=True):
-                goal = sessions[i].goal
-                hit = is_hit(rollout, goal, task.tolerance)
-                error_seen = perception.perceive(rollout, goal, seers[i])
-                sessions[i].tell(trial.number, error_seen, hit=hit)
-                if hit:
-                    needed[i, j] = number
-        for i, session in enumerate(sessions):
-            earlier[i] += _seen(session)
-    return needed
+    earlier: list[list[Pair]] = [[] for _ in sequences]
+    needed = []
+    for j in range(sequences.shape[1]):
+        results = run_goals(
+            task,
+            generator,
+            make_adapter,
+            perception,
+            demonstrations,
+            sequences[:, j],
+            rounds=rounds,
+            seed=int(np.random.SeedSequence([seed, j]).generate_state(1)[0]),
+            earlier=earlier if memory == "workspace" else None,
+        )
+        needed.append(trials_counted(np.array([r.solved_at or 0 for r in results]), rounds))
+        for pairs, result in zip(earlier, results, strict=True):
+            pairs += _seen(result)
+    return np.stack(needed, axis=1)
 
 
 def compare(without: np.ndarray, with_earlier: np.ndarray) -> CarryOver:
@@ -117,9 +102,9 @@ def compare(without: np.ndarray, with_earlier: np.ndarray) -> CarryOver:
     return CarryOver(bootstrap_mean(a), bootstrap_mean(b), bootstrap_difference(a, b))
 
 
-def _seen(session: Session) -> list[Pair]:
+def _seen(result: GoalTrials) -> list[Pair]:
     return [
-        (trial.condition, session.goal + trial.error_seen)
-        for trial in session.trials
-        if trial.state is TrialState.TOLD and trial.error_seen is not None
+        (trial.condition, result.goal + trial.error_seen)
+        for trial in result.trials
+        if trial.error_seen is not None
     ]

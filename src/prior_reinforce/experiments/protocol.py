@@ -7,7 +7,7 @@ is decided by the true outcome; adapters only ever receive what perception saw.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -126,6 +126,7 @@ def run_goals(
     *,
     rounds: int,
     seed: int,
+    earlier: Sequence[Sequence[tuple[np.ndarray, np.ndarray]]] | None = None,
     on_round: Callable[[int, list[GoalTrials]], None] | None = None,
     on_failed_reading: FailedReading = look_by_eye,
 ) -> list[GoalTrials]:
@@ -140,6 +141,7 @@ def run_goals(
         goals: Shape (n, k), [m].
         rounds: Largest number of trials a goal.
         seed: Of the disturbances (a stream a round) and of perception (a stream a goal).
+        earlier: For each goal what its session remembers of earlier goals; see `Session`.
         on_round: Called after every round with its number and the results so far.
         on_failed_reading: Called for the error of a trial in which perception gave up.
 
@@ -147,7 +149,8 @@ def run_goals(
         One result a goal, in order.
     """
     sessions = [
-        Session(generator, make_adapter(), demonstrations, goal, task.tolerance) for goal in goals
+        Session(generator, make_adapter(), demonstrations, goal, task.tolerance, earlier=pairs)
+        for goal, pairs in zip(goals, earlier or [()] * len(goals), strict=True)
     ]
     seers = [np.random.default_rng([seed, 1, i]) for i in range(len(goals))]
     rollouts: list[list[Rollout]] = [[] for _ in goals]
