@@ -40,11 +40,14 @@ def in_place(path: Path) -> Iterator[Path]:
     around = Path(tempfile.mkdtemp(dir=path.parent, prefix=owner))
     try:
         yield around / path.name
+        for file in (around / path.name).glob("**/*"):
+            _keep(file)
         try:
             os.replace(around / path.name, path)
         except OSError:
             if not path.is_dir():
                 raise
+        _keep(path.parent)
     finally:
         shutil.rmtree(around, ignore_errors=True)
 
@@ -61,6 +64,17 @@ def sweep(folder: Path) -> None:
         pid = left.name.removeprefix(mine).partition("-")[0]
         if not (pid.isdecimal() and _lives(int(pid))):
             shutil.rmtree(left, ignore_errors=True)
+
+
+def _keep(path: Path) -> None:
+    """Have a file, or the names in a folder, survive a power cut."""
+    if os.name != "posix":
+        return  # elsewhere a folder cannot be opened
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
 
 
 def _lives(pid: int) -> bool:
