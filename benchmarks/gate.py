@@ -34,7 +34,7 @@ def main() -> None:
     limits = robot_limits("panda")
     for task in map(make_task, options.tasks):
         rng = np.random.default_rng(options.seed)
-        goals = rng.uniform(*task.region, (options.goals, task.region.shape[1]))
+        goals = task.sample_goals(options.goals, rng)
         for name in options.sets:
             demonstrations = task.demonstrations(name)
             if options.model is not None:

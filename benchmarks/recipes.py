@@ -15,7 +15,7 @@ import time
 from pathlib import Path
 
 from prior_reinforce.experiments.recipes import RECIPES, Run, Scale
-from prior_reinforce.experiments.units import Workers, run_units
+from prior_reinforce.experiments.units import Workers
 
 
 def main() -> None:
@@ -33,7 +33,7 @@ def main() -> None:
             recipe = RECIPES[name]
             trainings = list(recipe.trainings(scale, ()))
             start = time.perf_counter()
-            run_units(trainings, folder, workers, lambda *_: None)
+            Run(folder, scale, workers).learn(trainings)
             learned = time.perf_counter()
             recipe.run(Run(folder, scale, workers))
             done = time.perf_counter()

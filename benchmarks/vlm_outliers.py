@@ -24,27 +24,26 @@ import numpy as np
 from prior_reinforce.adapters import GaussianProcessAdapter
 from prior_reinforce.experiments.evaluation import Training
 from prior_reinforce.experiments.protocol import GoalTrials, run_goals
-from prior_reinforce.experiments.statistics import bootstrap_difference, bootstrap_mean
-from prior_reinforce.perception import VisionLanguageModel, VisionLanguageModelConfig, scene_of
-from prior_reinforce.perception.stand_in_server import StandInServer
+from prior_reinforce.experiments.sight import STAND_IN, open_sight
+from prior_reinforce.experiments.statistics import (
+    bootstrap_difference,
+    bootstrap_mean,
+    trials_counted,
+)
+from prior_reinforce.perception import VisionLanguageModelConfig
 from prior_reinforce.tasks import make_task
 
 GOAL_SEED = 500  # of the goals; no other measurement uses them
-
-
-def trials_to_hit(results: list[GoalTrials], rounds: int) -> np.ndarray:
-    """Trials to the hit of each goal, shape (n,); `rounds` + 1 where there was none."""
-    return np.array([result.solved_at or rounds + 1 for result in results], dtype=float)
 
 
 def reach(training: Training, outliers: float, arguments: argparse.Namespace) -> list[GoalTrials]:
     """Try all goals of one task with a share of wrong answers."""
     task = make_task(training.task)
     learned = training.learned(arguments.folder)
-    with StandInServer(outlier_rate=outliers, seed=arguments.seed) as server:
-        config = VisionLanguageModelConfig(base_url=server.base_url, votes=arguments.votes)
-        perception = VisionLanguageModel(scene_of(task.name), config)
-        results = run_goals(
+    config = VisionLanguageModelConfig(votes=arguments.votes)
+    sight = open_sight(STAND_IN, task.name, config, outlier_rate=outliers, seed=arguments.seed)
+    with sight as perception:
+        return run_goals(
             task,
             learned.generator,
             GaussianProcessAdapter,
@@ -54,8 +53,6 @@ def reach(training: Training, outliers: float, arguments: argparse.Namespace) ->
             rounds=arguments.rounds,
             seed=arguments.seed,
         )
-        perception.close()
-    return results
 
 
 def main() -> None:
@@ -79,7 +76,8 @@ def main() -> None:
         trials = []
         for outliers in (0.0, arguments.outliers):
             results = reach(training, outliers, arguments)
-            trials.append(trials_to_hit(results, arguments.rounds)[None])
+            solved_at = np.array([[result.solved_at or 0 for result in results]])
+            trials.append(trials_counted(solved_at, arguments.rounds))
             by_eye = sum(result.failed_readings for result in results)
             n_readings = sum(len(result.trials) for result in results)
             print(
