@@ -45,6 +45,10 @@ class PerceptionFailedError(PriorReinforceError, RuntimeError):
     """Perception gives no number; an operator has to be asked instead of inventing one."""
 
 
+class EndpointError(PerceptionFailedError):
+    """The endpoint of a model does not answer, or refuses; no picture is to blame."""
+
+
 class RenderingUnavailableError(PriorReinforceError, RuntimeError):
     """This machine has no OpenGL to draw with; the remedy is in the message."""
 

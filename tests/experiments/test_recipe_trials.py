@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from prior_reinforce.errors import EndpointError
 from prior_reinforce.experiments.evaluation import Training, Trials
 from prior_reinforce.experiments.recipes.base import Run, Scale
 from prior_reinforce.experiments.recipes.claims import Verdict
@@ -180,6 +181,13 @@ def test_a_real_endpoint_is_asked_in_place_of_the_stand_in(tmp_path):
         unit = Trials(TRAINING, "basketball-v1", "gp", "vlm", 1, rounds=1, model=model)
         assert unit.run(tmp_path)["failed_readings"] == [0]
     assert asked == ["mine", "mine"]
+
+
+def test_an_endpoint_that_does_not_answer_is_no_eye(tmp_path):
+    nobody = VisionLanguageModelConfig(base_url="http://127.0.0.1:9/v1", max_retries=0)
+    unit = Trials(TRAINING, "basketball-v1", "gp", "vlm", 1, rounds=1, model=nobody)
+    with pytest.raises(EndpointError, match="is the server running"):
+        unit.run(tmp_path)
 
 
 def test_the_goal_shown_was_reached_in_about_three_trials():

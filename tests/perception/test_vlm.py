@@ -10,7 +10,7 @@ from slanted_table import RIM_HEIGHT
 from vision_server import VisionServer
 
 from prior_reinforce.adapters import GaussianProcessAdapter
-from prior_reinforce.errors import ConfigurationError, PerceptionFailedError
+from prior_reinforce.errors import ConfigurationError, EndpointError, PerceptionFailedError
 from prior_reinforce.experiments.protocol import run_goals
 from prior_reinforce.generators.alignment import align
 from prior_reinforce.generators.interpolation import SmoothInterpolation
@@ -267,7 +267,7 @@ def test_a_lasting_failure_asks_the_operator(
 ):
     with VisionServer(faults=[fault] * 20) as server:
         perception = looking(server, timeout=0.3, max_retries=1)
-        with pytest.raises(PerceptionFailedError, match=message) as failure:
+        with pytest.raises(EndpointError, match=message) as failure:
             perception.perceive(Rollout(BALL, True, frame_with_ball_at(*BALL)), GOAL, RNG)
         assert len(server.requests) == n_requests
     assert "the orange ball" in str(failure.value)
@@ -297,8 +297,11 @@ def test_a_lost_ball_is_named(looking, frame_with_ball_at):
         perception = looking(server)
         for place in [(3.0, 0.0, 0.03), (0.95, 0.2, -0.3)]:  # out of the picture; under the table
             rollout = Rollout(np.array([3.0, 0.0]), False, frame_with_ball_at(*place))
-            with pytest.raises(PerceptionFailedError, match="the orange ball is not in the pic"):
+            with pytest.raises(
+                PerceptionFailedError, match="orange ball is not in the pic"
+            ) as told:
                 perception.perceive(rollout, GOAL, RNG)
+            assert not isinstance(told.value, EndpointError)  # it answered
         assert len(server.requests) == 6
 
 

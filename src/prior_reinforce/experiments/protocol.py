@@ -13,7 +13,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from prior_reinforce.adapters.base import Adapter
-from prior_reinforce.errors import InvalidDemonstrationsError, PerceptionFailedError
+from prior_reinforce.errors import (
+    EndpointError,
+    InvalidDemonstrationsError,
+    PerceptionFailedError,
+)
 from prior_reinforce.experiments.statistics import reached_by
 from prior_reinforce.generators.base import Generator
 from prior_reinforce.motions import Demonstrations
@@ -61,7 +65,14 @@ def is_hit(rollout: Rollout, goal: np.ndarray, tolerance: float) -> bool:
 def look_by_eye(
     failure: PerceptionFailedError, rollout: Rollout, goal: np.ndarray, rng: np.random.Generator
 ) -> np.ndarray:
-    """The simulated operator, who estimates by eye (`Eye`)."""
+    """The simulated operator, who estimates by eye (`Eye`) what could not be read.
+
+    Raises:
+        EndpointError: Nothing was asked of a picture: what a person sees is no result of a model
+            that never answered.
+    """
+    if isinstance(failure, EndpointError):
+        raise failure
     return Eye().perceive(rollout, goal, rng)
 
 

@@ -13,7 +13,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from prior_reinforce.errors import ConfigurationError, PerceptionFailedError
+from prior_reinforce.errors import ConfigurationError, EndpointError, PerceptionFailedError
 from prior_reinforce.perception.base import Perception
 from prior_reinforce.perception.calibration import TableCalibration
 from prior_reinforce.perception.camera import Camera
@@ -72,6 +72,7 @@ class VisionLanguageModel(Perception):
         The randomness is the model's own; `rng` is not used.
 
         Raises:
+            EndpointError: The endpoint does not answer, or refuses.
             PerceptionFailedError: There is no picture, or no error can be read from it.
             ConfigurationError: The goal is not (x, y).
             RenderingUnavailableError: There is no OpenGL on this machine.
@@ -89,7 +90,8 @@ class VisionLanguageModel(Perception):
         self._calibrate_in(rollout.key_frame)
         reading = self.read(self._camera.picture(rollout.key_frame, goal))
         if reading.error_seen is None:
-            raise PerceptionFailedError(f"{reading.problem}; ask the operator for the error")
+            kind = EndpointError if reading.unanswered else PerceptionFailedError
+            raise kind(f"{reading.problem}; ask the operator for the error")
         return reading.error_seen
 
     def read(self, picture: np.ndarray) -> Reading:
@@ -145,8 +147,9 @@ class VisionLanguageModel(Perception):
         for _ in range(self.config.most_requests):
             try:
                 answer = self._client.ask(words, picture)
-            except PerceptionFailedError as error:
-                return Sighting(words, tuple(answers), problem=f"looking for {words}: {error}")
+            except EndpointError as error:
+                problem = f"looking for {words}: {error}"
+                return Sighting(words, tuple(answers), problem=problem, unanswered=True)
             answers.append(_of_right_size(answer, wanted.size, calibration))
             boxes = [answer.box for answer in answers if answer.box is not None]
             absent = sum(answer.absent for answer in answers)

@@ -11,7 +11,7 @@ from urllib.parse import urlsplit
 
 import numpy as np
 
-from prior_reinforce.errors import ConfigurationError, MissingExtraError, PerceptionFailedError
+from prior_reinforce.errors import ConfigurationError, EndpointError, MissingExtraError
 from prior_reinforce.perception.vlm_formats import (
     FORMATS,
     Family,
@@ -153,7 +153,7 @@ class ModelClient:
             What came back, readable or not; a box is in pixels of the picture as taken.
 
         Raises:
-            PerceptionFailedError: Nothing came back, and trying again at once will not help.
+            EndpointError: Nothing came back, and trying again at once will not help.
         """
         text, thinking, reason = self._request(words, picture.url)
         try:
@@ -195,11 +195,11 @@ class ModelClient:
                 extra_body=_extra_body(self.config),
             )
         except (openai.OpenAIError, ValueError) as error:
-            raise PerceptionFailedError(_what_failed(error, self.config)) from error
+            raise EndpointError(_what_failed(error, self.config)) from error
         # The client's types promise choices; servers do not (a web page with status 200).
         choices: Any = getattr(completion, "choices", None)
         if not choices:
-            raise PerceptionFailedError(
+            raise EndpointError(
                 f"{self.config.base_url} answers, but not with a chat completion; the address of "
                 "an OpenAI-compatible endpoint mostly ends in /v1"
             )

@@ -54,6 +54,8 @@ class Sighting:
     """Centre of `box` on the calibrated plane, table frame, shape (2,), in [m]."""
     problem: str | None = None
     """Why there is no place."""
+    unanswered: bool = False
+    """Whether that is for want of an answer, and not of a readable one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,6 +78,11 @@ class Reading:
     def problem(self) -> str | None:
         """Why there is no error to report; None where there is one."""
         return self.reached.problem or (self.goal.problem if self.goal else None)
+
+    @property
+    def unanswered(self) -> bool:
+        """Whether the endpoint gave no answer about one of them."""
+        return self.reached.unanswered or (self.goal is not None and self.goal.unanswered)
 
     @property
     def error_seen(self) -> np.ndarray | None:
