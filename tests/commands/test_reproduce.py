@@ -1,14 +1,16 @@
 """The command `reproduce`, as a user types it."""
 
 import json
+import shlex
 from dataclasses import dataclass
 
 import pytest
+import tyro
 
 from prior_reinforce.cli import main
 from prior_reinforce.commands.reproduce import Reproduce
-from prior_reinforce.experiments.recipes import RECIPES, Recipe
-from prior_reinforce.experiments.units import Unit
+from prior_reinforce.experiments.evaluation import Training
+from prior_reinforce.experiments.recipes import RECIPES, Recipe, Run, Scale
 from prior_reinforce.perception import VisionLanguageModelConfig
 
 GENERATOR = "prior_reinforce.generators:SmoothInterpolation"
@@ -46,6 +48,9 @@ def test_units_in_brackets_are_printed(tmp_path, capsys):
         (["all", "--seeds", "0", "0", "1"], "different"),
         (["all", "--seeds", "-1"], "not negative"),
         (["all", "--quick", "--goals", "50"], "leave out either"),
+        (["all", "--quick", "--reader", "vlm"], "without --quick"),
+        (["adapters", "--reader", "vlm"], "the pictures of `trials`"),
+        (["trials", "--vlm.model", "mine"], "with --reader vlm"),
     ],
 )
 def test_wrong_input_is_one_line_and_writes_nothing(tmp_path, capsys, arguments, said):
@@ -66,10 +71,31 @@ def test_a_model_reads_the_pictures_of_the_table_of_trials_alone():
     assert Reproduce("trials")._recipes() == [RECIPES["trials"]]
 
 
-@dataclass(frozen=True)
-class Broken(Unit):
-    label = "broken"
+def test_figures_name_the_command_that_makes_them_again(tmp_path):
+    model = VisionLanguageModelConfig(model="my model", votes=1, enable_thinking=True)
+    reproduce = Reproduce("all", goals=7, seeds=(0, 3), reader="vlm", vlm=model)
+    commands = {
+        recipe.name: reproduce._command(recipe, Run(tmp_path, Scale(), include=included))
+        for recipe, included in zip(reproduce._recipes(), [(GENERATOR,)] + [()] * 6, strict=True)
+    }
+    assert commands["zero-shot"] == (
+        f"prior-reinforce reproduce zero-shot --goals 7 --seeds 0 3 --include {GENERATOR}"
+    )
+    assert commands["trials"] == (
+        "prior-reinforce reproduce trials --goals 7 --seeds 0 3 --reader vlm "
+        "--vlm.model 'my model' --vlm.enable-thinking --vlm.votes 1"
+    )
+    for name in ("zero-shot", "trials"):
+        again = tyro.cli(Reproduce, args=shlex.split(commands[name])[2:])
+        assert again.goals == 7
+        assert again.seeds == (0, 3)
+    assert again.vlm == model
+    quick = Reproduce("all", quick=True)._command(RECIPES["adapters"], Run(tmp_path, Scale()))
+    assert quick == "prior-reinforce reproduce adapters --quick"
 
+
+@dataclass(frozen=True)
+class BrokenTraining(Training):
     def run(self, folder):
         raise ValueError("no such luck")
 
@@ -79,8 +105,12 @@ class BrokenRecipe(Recipe):
     title = "Broken"
     paper = "none"
 
+    def trainings(self, scale, include):
+        return [BrokenTraining("basketball-v1", "A", "nearest", 0)]
+
     def run(self, run):
-        return run.results([Broken()])
+        run.learn(self.trainings(run.scale, run.include))
+        raise AssertionError("what failed was not told")
 
     def table(self, figures):
         raise NotImplementedError

@@ -49,7 +49,7 @@ ADAPTERS = {
     "proportional_mean_minus_frozen": curve(0.2)[0],
 }
 SCALE = Scale()
-MADE_BY = provenance(SCALE, {"abc123"})
+MADE_BY = provenance("prior-reinforce reproduce this", SCALE, {"abc123"})
 
 
 def test_where_both_reach_every_goal_neither_is_refuted():
@@ -81,6 +81,7 @@ def test_the_page_holds_claims_tables_and_pictures_in_one_file(tmp_path):
     assert "Of 6 tests of the paper's claims: 4 confirmed, 1 not confirmed, 1 open." in plain
     for counted in ("4 confirmed", "1 not confirmed", "1 open"):
         assert f">{counted}</span>" in text
+    assert "prior-reinforce reproduce this; goals of seed 100;" in text
     assert "commit abc123" in text
     pictures = re.findall(r"!\[.*\]\((.*)\)", plain)
     assert pictures

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import json
+import shlex
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -77,7 +78,8 @@ class Reproduce:
             make_generator(name)  # a library that is not installed is told now, not after an hour
         self.out.mkdir(parents=True, exist_ok=True)
         if trainings:
-            with _progress(console, "learn") as show:
+            # What fails here fails again in the recipes that need it, and is told there.
+            with suppress(UnitFailedError), _progress(console, "learn") as show:
                 Run(self.out, scale, workers, show).learn(trainings)
         failures: list[UnitFailedError] = []
         for recipe in recipes:
@@ -86,9 +88,11 @@ class Reproduce:
                     run = Run(self.out, scale, workers, show, included[recipe.name])
                     figures = recipe.run(run)
             except UnitFailedError as error:
-                failures.append(error)  # the others do not need it
+                failures.append(error)  # the other recipes do not need it
+                console.print(f"{recipe.name}: {error}", markup=False, soft_wrap=True)
                 continue
-            text = json.dumps({**provenance(scale, run.commits), **figures}, indent=1)
+            made_by = provenance(self._command(recipe, run), scale, run.commits)
+            text = json.dumps({**made_by, **figures}, indent=1)
             write_atomically(self.out / f"{recipe.name}.json", text + "\n")
             console.print(_terminal(recipe.table(figures), recipe.title))
             if claims := recipe.claims(figures):
@@ -113,7 +117,31 @@ class Reproduce:
             raise ConfigurationError("--seeds must be different and not negative")
         if self.quick and whole != Scale():
             raise ConfigurationError("--quick has its own goals and seeds; leave out either")
+        asked = self.reader == "vlm"
+        if asked and (self.quick or self.recipe not in (TrialsTable.name, "all")):
+            raise ConfigurationError("--reader vlm reads the pictures of `trials`, without --quick")
+        if self.vlm != VisionLanguageModelConfig() and not asked:
+            raise ConfigurationError("--vlm.* say whom to ask with --reader vlm; give that as well")
         return QUICK if self.quick else whole
+
+    def _command(self, recipe: Recipe, run: Run) -> str:
+        """What makes the figures of one recipe again."""
+        words = ["prior-reinforce", "reproduce", recipe.name]
+        if self.quick:
+            words.append("--quick")
+        else:
+            words += ["--goals", str(self.goals), "--seeds", *map(str, self.seeds)]
+        for own in run.include:
+            words += ["--include", own]
+        if isinstance(recipe, TrialsTable) and recipe.model is not None:
+            words += ["--reader", "vlm"]
+            for setting in fields(recipe.model):
+                value, flag = getattr(recipe.model, setting.name), setting.name.replace("_", "-")
+                if isinstance(value, bool):
+                    words += [f"--vlm.{flag}"] if value else []
+                elif value != setting.default:
+                    words += [f"--vlm.{flag}", str(value)]
+        return shlex.join(words)
 
     def _recipes(self) -> Sequence[Recipe]:
         if self.recipe not in (*RECIPES, "all"):

@@ -102,7 +102,7 @@ def _section(recipe: Recipe, path: Path, pictures: Path) -> Section:
             name=recipe.name,
             title=recipe.title,
             paper=recipe.paper,
-            made_by=_made_by(recipe.name, figures),
+            made_by=_made_by(figures),
             table=recipe.table(figures),
             claims=recipe.claims(figures),
             remarks=remarks,
@@ -115,15 +115,10 @@ def _section(recipe: Recipe, path: Path, pictures: Path) -> Section:
         ) from error
 
 
-def _made_by(name: str, figures: dict[str, Any]) -> str:
-    scale = figures["scale"]
-    seeds = " ".join(map(str, scale["seeds"]))
-    how = f"--goals {scale['goals']} --seeds {seeds}"
-    if not scale["variants"]:
-        how = "--quick"
+def _made_by(figures: dict[str, Any]) -> str:
     return (
-        f"prior-reinforce reproduce {name} {how}; goals of seed {figures['goal_seed']}; "
-        f"version {figures['version']}, commit {figures['commit']}"
+        f"{figures['command']}; goals of seed {figures['goal_seed']}; version "
+        f"{figures['version']}, commit {figures['commit']}"
     )
 
 

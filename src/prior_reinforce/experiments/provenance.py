@@ -11,9 +11,10 @@ from prior_reinforce.experiments.evaluation import GOAL_SEED
 from prior_reinforce.experiments.recipes.base import Scale
 
 
-def provenance(scale: Scale, commits: Collection[str]) -> dict[str, Any]:
-    """Version, commits of the units, scale and seeds, JSON-able."""
+def provenance(command: str, scale: Scale, commits: Collection[str]) -> dict[str, Any]:
+    """What makes the figures again, version, commits of the units, scale and seeds, JSON-able."""
     return {
+        "command": command,
         "version": version("prior-reinforce"),
         "commit": ", ".join(sorted(commits)),
         "scale": asdict(scale),
