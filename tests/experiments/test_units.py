@@ -52,6 +52,15 @@ def test_any_number_of_workers_gives_the_same_files_bit_for_bit(tmp_path):
     assert results(tmp_path / "3") == one
 
 
+def test_a_model_of_which_nobody_says_what_made_it_is_learned_anew(tmp_path):
+    training = Training("basketball-v1", "A", "nearest", 0)
+    training.learned(tmp_path)
+    (left,) = tmp_path.glob("models/*/generator/config.json")
+    left.write_text("{}")
+    run_units([training], tmp_path, Workers(), silent)
+    training.learned(tmp_path)  # reads it
+
+
 @pytest.mark.slow
 def test_runs_killed_at_any_moment_end_with_the_same_files(tmp_path):
     text = printed_by("killed_runs.py", tmp_path, KILLS)
@@ -169,6 +178,17 @@ def test_a_file_is_replaced_whole_or_not_at_all(tmp_path):
     with pytest.raises(KeyboardInterrupt):
         interrupted()
     assert results(tmp_path) == {"result.json": b"old"}
+
+
+def test_all_of_a_finished_folder_is_kept_before_it_has_its_name(tmp_path, monkeypatch):
+    kept = []
+    monkeypatch.setattr(os, "fsync", lambda handle: kept.append(os.fstat(handle).st_ino))
+    with in_place(tmp_path / "model") as unfinished:
+        (unfinished / "generator").mkdir(parents=True)
+        (unfinished / "generator" / "weights").write_text("1")
+    model = tmp_path / "model"
+    parts = [model, model / "generator", model / "generator" / "weights", tmp_path]
+    assert sorted(kept) == sorted(part.stat().st_ino for part in parts)
 
 
 def test_the_slower_of_two_leaves_the_quickers_folder(tmp_path):

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
+import shutil
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +22,7 @@ from prior_reinforce.experiments.protocol import (
     see_demonstrations,
 )
 from prior_reinforce.experiments.sight import open_sight
-from prior_reinforce.experiments.units import Unit, result_of
+from prior_reinforce.experiments.units import Unit, digest_of, result_of
 from prior_reinforce.generators import Generator, load_generator
 from prior_reinforce.generators.alignment import align
 from prior_reinforce.motions import Demonstrations
@@ -132,7 +131,12 @@ class Training(Unit):
         )
 
     def run(self, folder: Path) -> Mapping[str, Any]:
-        """Learn, unless it was learned before; the model itself is the result."""
+        """Learn; the model itself is the result.
+
+        A model that lies there already was left by a run that ended before it could say what code
+        had made it.
+        """
+        shutil.rmtree(self._home(folder), ignore_errors=True)
         self.learned(folder)
         return {}
 
@@ -142,9 +146,7 @@ class Training(Unit):
 
     def learned(self, folder: Path) -> Learned:
         """What was learned: from the folder's models, or now, and put there."""
-        told = json.dumps(asdict(self)) + "".join(self.own_sources)
-        key = hashlib.sha256(told.encode()).hexdigest()[:16]
-        home = folder / "models" / key
+        home = self._home(folder)
         if not home.is_dir():
             prior = self._prior(folder)
             generator = make_generator(self.generator).fit(prior, seed=self.seed)
@@ -156,6 +158,9 @@ class Training(Unit):
         own = ":" in self.generator
         load = type(make_generator(self.generator)).load if own else load_generator
         return Learned(load(home / "generator"), Demonstrations.load(home / "demonstrations.npz"))
+
+    def _home(self, folder: Path) -> Path:
+        return folder / "models" / digest_of(self)
 
     def _prior(self, folder: Path) -> Demonstrations:
         """The demonstrations that are learned from."""

@@ -7,6 +7,7 @@ stand, and is moved there in one step. What a killed process leaves under such a
 
 from __future__ import annotations
 
+import errno
 import os
 import shutil
 import socket
@@ -40,10 +41,11 @@ def in_place(path: Path) -> Iterator[Path]:
     around = Path(tempfile.mkdtemp(dir=path.parent, prefix=owner))
     try:
         yield around / path.name
-        for file in (around / path.name).glob("**/*"):
+        finished = around / path.name
+        for file in (finished, *finished.rglob("*")):
             _keep(file)
         try:
-            os.replace(around / path.name, path)
+            os.replace(finished, path)
         except OSError:
             if not path.is_dir():
                 raise
@@ -73,6 +75,10 @@ def _keep(path: Path) -> None:
     handle = os.open(path, os.O_RDONLY)
     try:
         os.fsync(handle)
+    except OSError as error:
+        # Some shared file systems keep folders in their own way, and say so.
+        if error.errno not in (errno.EINVAL, errno.ENOTSUP):
+            raise
     finally:
         os.close(handle)
 

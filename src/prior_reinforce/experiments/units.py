@@ -126,6 +126,12 @@ def result_path(folder: Path, unit: Unit) -> Path:
     return folder / "units" / f"{_name(unit)}.json"
 
 
+def digest_of(unit: Unit) -> str:
+    """What tells a unit from others of its kind: its fields, and one's own code behind it."""
+    told = json.dumps(asdict(unit), sort_keys=True) + "".join(unit.own_sources)
+    return hashlib.sha256(told.encode()).hexdigest()[:16]
+
+
 def _outcomes(units: Sequence[Unit], folder: Path, workers: Workers) -> Iterator[_Outcome]:
     """Run units and yield what became of each, as they come."""
     if not units:
@@ -173,6 +179,4 @@ def _failure_path(folder: Path, unit: Unit) -> Path:
 
 
 def _name(unit: Unit) -> str:
-    told = json.dumps(asdict(unit), sort_keys=True) + "".join(unit.own_sources)
-    digest = hashlib.sha256(told.encode()).hexdigest()[:16]
-    return f"{type(unit).__name__.lower()}-{digest}"
+    return f"{type(unit).__name__.lower()}-{digest_of(unit)}"
