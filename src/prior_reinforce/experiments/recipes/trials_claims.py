@@ -40,8 +40,8 @@ def trials_claims(figures: Mapping[str, Any]) -> list[Claim]:
     ]
     first = [
         Claim(
-            "The goal itself as the condition often leads to inaccurate outcomes (here: in "
-            f"more than half of the first attempts; {row['title']}, {sense_of(row, figures)}).",
+            "The goal itself as the condition often leads to inaccurate outcomes (here: the first "
+            f"trial, in more than half of the cases; {row['title']}, {sense_of(row, figures)}).",
             f"share reached at the first trial: {interval_of(row['first_throws'])}",
             at_most(interval_of(row["first_throws"]), _HALF, _trainings(row, figures)),
         )
