@@ -63,7 +63,8 @@ class Reproduce:
         """Run, save, print, and write the page of evidence."""
         recipes = self._recipes()
         included = {recipe.name: self._joining(recipe) for recipe in recipes}
-        scale = self._scale()
+        self._check()
+        scale = QUICK if self.quick else Scale(goals=self.goals, seeds=self.seeds)
         workers = Workers(self.workers, self.ray)
         console = Console()
         # All that has to be learned comes first, the slowest of it before the rest, so that no core
@@ -109,20 +110,19 @@ class Reproduce:
         if failures:
             raise failures[0]
 
-    def _scale(self) -> Scale:
-        whole = Scale(goals=self.goals, seeds=self.seeds)
+    def _check(self) -> None:
+        """Refuse settings out of range, and those that would be passed over in silence."""
         if self.goals < 1 or self.workers < 1 or not self.seeds:
             raise ConfigurationError("--goals and --workers must be at least 1, and --seeds given")
         if min(self.seeds) < 0 or len(set(self.seeds)) < len(self.seeds):
             raise ConfigurationError("--seeds must be different and not negative")
-        if self.quick and whole != Scale():
+        if self.quick and Scale(goals=self.goals, seeds=self.seeds) != Scale():
             raise ConfigurationError("--quick has its own goals and seeds; leave out either")
         asked = self.reader == "vlm"
         if asked and (self.quick or self.recipe not in (TrialsTable.name, "all")):
             raise ConfigurationError("--reader vlm reads the pictures of `trials`, without --quick")
         if self.vlm != VisionLanguageModelConfig() and not asked:
             raise ConfigurationError("--vlm.* say whom to ask with --reader vlm; give that as well")
-        return QUICK if self.quick else whole
 
     def _command(self, recipe: Recipe, run: Run) -> str:
         """What makes the figures of one recipe again."""
