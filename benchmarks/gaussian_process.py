@@ -20,7 +20,7 @@ from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel
 
 from prior_reinforce.adapters import GaussianProcessAdapter
-from prior_reinforce.motions import Demonstrations, PlanFormat
+from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 
 N_DEMONSTRATIONS, N_TRIALS, OUTCOME_DIM = 6, 2, 2
 REGION = np.array([0.25, 0.50])  # [m]

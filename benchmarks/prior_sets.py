@@ -14,9 +14,9 @@ import argparse
 import numpy as np
 from scipy.spatial import Delaunay
 
-from prior_reinforce.generators.alignment import align
 from prior_reinforce.generators.interpolation import SmoothInterpolation
-from prior_reinforce.motions import Demonstrations
+from prior_reinforce.plans.alignment import align
+from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.tasks import make_task
 from prior_reinforce.tasks.base import Task
 

@@ -20,7 +20,7 @@ from scipy.spatial import Delaunay
 
 from prior_reinforce.cores import available_cores
 from prior_reinforce.generators import DiffusionConfig, DiffusionGenerator
-from prior_reinforce.motions import Demonstrations
+from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.tasks.basketball import BasketballShot
 
 N_TURNS = 3

@@ -27,7 +27,6 @@ import numpy as np
 
 from prior_reinforce.errors import PerceptionFailedError
 from prior_reinforce.generators import Generator
-from prior_reinforce.generators.alignment import align
 from prior_reinforce.generators.interpolation import SmoothInterpolation
 from prior_reinforce.perception import (
     Camera,
@@ -36,6 +35,7 @@ from prior_reinforce.perception import (
     scene_of,
 )
 from prior_reinforce.perception.stand_in_server import StandInServer
+from prior_reinforce.plans.alignment import align
 from prior_reinforce.rollouts import Rollout
 from prior_reinforce.tasks import FAMILY, make_task
 from prior_reinforce.tasks.base import Task

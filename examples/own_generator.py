@@ -33,7 +33,7 @@ from prior_reinforce.generators import (
 )
 from prior_reinforce.generators.conditions import as_conditions
 from prior_reinforce.generators.saving import read_model, write_model
-from prior_reinforce.motions import Demonstrations
+from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.tasks import make_task
 
 

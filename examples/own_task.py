@@ -28,8 +28,8 @@ from prior_reinforce.arrays import as_plans
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.experiments.protocol import run_goals, success_by_round
 from prior_reinforce.generators import SmoothInterpolation
-from prior_reinforce.motions import Demonstrations, PlanFormat
 from prior_reinforce.perception import Eye
+from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 from prior_reinforce.rollouts import Rollout
 from prior_reinforce.tasks import Task
 

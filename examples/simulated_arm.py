@@ -17,8 +17,8 @@ from pathlib import Path
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
-from prior_reinforce.feedback import to_words
 from prior_reinforce.tasks import make_task
+from prior_reinforce.wording import to_words
 
 CALLED_TO = 0.005
 """What an eye can tell apart, in [m]."""

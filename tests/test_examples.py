@@ -12,7 +12,7 @@ import pytest
 
 from prior_reinforce.cli import main
 from prior_reinforce.experiments.methods import make_adapter, make_generator, make_perception
-from prior_reinforce.motions import Demonstrations, PlanFormat
+from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 from prior_reinforce.rollouts import Rollout
 from prior_reinforce.tasks import make_task
 

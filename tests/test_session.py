@@ -11,7 +11,7 @@ from prior_reinforce.errors import (
     TrialStateError,
 )
 from prior_reinforce.generators.base import Generator
-from prior_reinforce.motions import Demonstrations, PlanFormat
+from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 from prior_reinforce.session import Session, TrialState, ask_all
 
 DEMOS = Demonstrations(

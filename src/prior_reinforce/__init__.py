@@ -15,8 +15,8 @@ from prior_reinforce.generators import (
     Generator,
     load_generator,
 )
-from prior_reinforce.motions import Demonstrations, Plan, PlanFormat
 from prior_reinforce.perception import Amplified, Exact, Eye, Perception
+from prior_reinforce.plans.motions import Demonstrations, Plan, PlanFormat
 from prior_reinforce.rollouts import KeyFrame, Rollout
 from prior_reinforce.session import Session, Trial, TrialState
 from prior_reinforce.tasks import Task, make_task

@@ -26,7 +26,7 @@ from prior_reinforce.adapters.base import Adapter
 from prior_reinforce.arrays import as_error
 from prior_reinforce.errors import ConfigurationError, TrialStateError
 from prior_reinforce.generators.base import Generator
-from prior_reinforce.motions import Demonstrations
+from prior_reinforce.plans.motions import Demonstrations
 
 
 class TrialState(Enum):

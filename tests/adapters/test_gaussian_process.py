@@ -10,7 +10,7 @@ from sklearn.gaussian_process.kernels import RBF, ConstantKernel
 from prior_reinforce.adapters import GaussianProcessAdapter, GaussianProcessConfig
 from prior_reinforce.adapters.gp_posterior import GPPosterior
 from prior_reinforce.errors import ConfigurationError
-from prior_reinforce.motions import Demonstrations, PlanFormat
+from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 
 DATA_SETS = int(os.environ.get("DATA_SETS", "50"))  # docs/decisions-adapter.md: 200
 REGION = np.array([[0.80, -0.25], [1.05, 0.25]])

@@ -3,7 +3,7 @@ import pytest
 
 from prior_reinforce.adapters import ProportionalAdapter
 from prior_reinforce.errors import ConfigurationError
-from prior_reinforce.motions import Demonstrations, PlanFormat
+from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 
 DEMONSTRATIONS = Demonstrations(
     np.random.default_rng(0).normal(size=(3, 4, 1)),

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from prior_reinforce.cli import main
-from prior_reinforce.motions import Demonstrations
 from prior_reinforce.perception.stand_in_server import StandInServer
+from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.tasks import make_task
 
 

@@ -12,9 +12,9 @@ import pytest
 
 from prior_reinforce.cli import main
 from prior_reinforce.commands.learning import TrainingRecord
-from prior_reinforce.generators.alignment import align
 from prior_reinforce.generators.interpolation import SmoothInterpolation
 from prior_reinforce.perception.stand_in_server import StandInServer
+from prior_reinforce.plans.alignment import align
 from prior_reinforce.tasks import make_task
 
 GOAL = ("1.0", "0.05")

@@ -13,7 +13,7 @@ from prior_reinforce.adapters import (
     ProportionalAdapter,
 )
 from prior_reinforce.errors import InvalidFeedbackError, InvalidGoalError, NotFittedError
-from prior_reinforce.motions import Demonstrations, PlanFormat
+from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 
 FACTORIES: list[Callable[[], Adapter]] = [
     GaussianProcessAdapter,

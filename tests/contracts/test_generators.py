@@ -25,7 +25,7 @@ from prior_reinforce.generators import (
 )
 from prior_reinforce.generators.saving import CONFIG_FILE, TENSOR_FILE
 from prior_reinforce.generators.unet_size import UNetSize
-from prior_reinforce.motions import Demonstrations, PlanFormat
+from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 
 # Trained for a moment only: these tests are about the contract, not about quality.
 _TINY = UNetSize(widths=(8, 16), groups=2, step_width=8, condition_width=8)

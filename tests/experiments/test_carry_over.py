@@ -6,8 +6,8 @@ import pytest
 from prior_reinforce.adapters import GaussianProcessAdapter
 from prior_reinforce.experiments.carry_over import compare, trials_needed
 from prior_reinforce.generators import Generator
-from prior_reinforce.motions import Demonstrations, PlanFormat
 from prior_reinforce.perception import Exact
+from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 from prior_reinforce.rollouts import Rollout
 from prior_reinforce.tasks import Task
 

@@ -14,10 +14,10 @@ from prior_reinforce.errors import ConfigurationError, UnitFailedError
 from prior_reinforce.experiments.code_version import commit
 from prior_reinforce.experiments.displacement import Displacement
 from prior_reinforce.experiments.evaluation import Training, Trials, ZeroShot
-from prior_reinforce.experiments.files import in_place, sweep, write_atomically
 from prior_reinforce.experiments.recipes import Run, Scale
 from prior_reinforce.experiments.recipes.process import Process
 from prior_reinforce.experiments.units import Workers, result_path, run_units
+from prior_reinforce.files import in_place, sweep, write_atomically
 
 HERE = Path(__file__).parent
 KILLS = 8

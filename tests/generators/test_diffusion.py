@@ -12,7 +12,7 @@ from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.generators import DiffusionConfig, DiffusionGenerator, load_generator
 from prior_reinforce.generators.diffusion_training import draw_batch, learning_rate_factor
 from prior_reinforce.generators.unet_size import UNetSize
-from prior_reinforce.motions import Demonstrations
+from prior_reinforce.plans.motions import Demonstrations
 
 SMALL = DiffusionConfig(
     network=UNetSize(

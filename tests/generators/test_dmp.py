@@ -14,7 +14,7 @@ from prior_reinforce.generators.dmp import (
     motion_span,
 )
 from prior_reinforce.generators.interpolation import SmoothInterpolation
-from prior_reinforce.motions import Demonstrations, PlanFormat
+from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 
 pytest.importorskip("movement_primitives")
 

@@ -9,7 +9,7 @@ from prior_reinforce.generators.interpolation import (
     SmoothInterpolationConfig,
 )
 from prior_reinforce.generators.nearest import NearestNeighbours, NearestNeighboursConfig
-from prior_reinforce.motions import Demonstrations, PlanFormat
+from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 
 FORMAT = PlanFormat(("joint1", "gripper"), ("rad", "1"), 0.02)
 

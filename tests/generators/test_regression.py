@@ -13,7 +13,7 @@ from prior_reinforce.generators.regression import UNetRegression
 from prior_reinforce.generators.regression_config import UNetRegressionConfig
 from prior_reinforce.generators.unet import ConditionalUNet
 from prior_reinforce.generators.unet_size import UNetSize
-from prior_reinforce.motions import Demonstrations, PlanFormat
+from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 
 SMALL = UNetRegressionConfig(
     network=UNetSize(widths=(8, 16), groups=2, step_width=8, condition_width=16),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from prior_reinforce.motions import Demonstrations, PlanFormat
+from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 
 
 def swing(times: np.ndarray, start: float, duration: float) -> np.ndarray:

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from prior_reinforce.errors import ConfigurationError
-from prior_reinforce.generators.alignment import align
 from prior_reinforce.generators.interpolation import SmoothInterpolation
 from prior_reinforce.perception.camera import Camera
 from prior_reinforce.perception.colour_finder import find_by_colour
-from prior_reinforce.perception.scenes import scene_of
+from prior_reinforce.plans.alignment import align
 from prior_reinforce.rollouts import KeyFrame
+from prior_reinforce.scene import scene_of
 from prior_reinforce.tasks import FAMILY, Curling, Fishing
 
 

@@ -12,14 +12,14 @@ from vision_server import VisionServer
 from prior_reinforce.adapters import GaussianProcessAdapter
 from prior_reinforce.errors import ConfigurationError, EndpointError, PerceptionFailedError
 from prior_reinforce.experiments.protocol import run_goals
-from prior_reinforce.generators.alignment import align
 from prior_reinforce.generators.interpolation import SmoothInterpolation
 from prior_reinforce.perception.camera import Camera, CameraConfig
-from prior_reinforce.perception.scenes import SeenObject, TableScene, scene_of
 from prior_reinforce.perception.stand_in_server import StandInServer
 from prior_reinforce.perception.vlm import VisionLanguageModel
 from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
+from prior_reinforce.plans.alignment import align
 from prior_reinforce.rollouts import Rollout
+from prior_reinforce.scene import SeenObject, TableScene, scene_of
 from prior_reinforce.tasks import FAMILY, BasketballShotV3
 
 SCENE = TableScene(

@@ -8,7 +8,7 @@ import numpy as np
 
 from prior_reinforce.adapters.base import Adapter
 from prior_reinforce.generators.base import Generator
-from prior_reinforce.motions import Demonstrations, PlanFormat
+from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 from prior_reinforce.report import AdaptationRecord
 from prior_reinforce.session import Session
 

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from prior_reinforce.errors import ConfigurationError, InvalidPlanError, RobotLimitError
-from prior_reinforce.motions import Demonstrations, Plan, PlanFormat
+from prior_reinforce.plans.motions import Demonstrations, Plan, PlanFormat
 from prior_reinforce.robots import GateSettings, RobotLimits, check_plan, robot_limits
 
 HOME = np.array([0.0, -0.4, 0.0, -2.0, 0.0, 1.8, 0.8])

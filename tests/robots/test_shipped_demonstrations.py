@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 import prior_reinforce.tasks
-from prior_reinforce.motions import Demonstrations, Plan
+from prior_reinforce.plans.motions import Demonstrations, Plan
 from prior_reinforce.robots import check_plan, robot_limits
 
 SETS = sorted((Path(prior_reinforce.tasks.__file__).parent / "demonstrations").glob("*.npz"))

@@ -4,7 +4,7 @@ import numpy as np
 
 from prior_reinforce.generators import DiffusionConfig
 from prior_reinforce.generators.unet_size import UNetSize
-from prior_reinforce.motions import Demonstrations, PlanFormat
+from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 from prior_reinforce.workspace.manifest_template import TEMPLATE
 
 FORMAT = PlanFormat(("joint1", "joint2"), ("rad", "rad"), 0.02)

@@ -19,7 +19,7 @@ from prior_reinforce.errors import (
     WorkspaceError,
 )
 from prior_reinforce.generators import DiffusionGenerator, SmoothInterpolation, align
-from prior_reinforce.motions import Demonstrations, PlanFormat
+from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 from prior_reinforce.session import Session
 from prior_reinforce.workspace.execution import execute
 from prior_reinforce.workspace.history import TrialStage

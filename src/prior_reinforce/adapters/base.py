@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from prior_reinforce.motions import Demonstrations
+from prior_reinforce.plans.motions import Demonstrations
 
 
 class Adapter(ABC):

@@ -8,7 +8,7 @@ import numpy as np
 
 from prior_reinforce.adapters.base import Adapter
 from prior_reinforce.adapters.vectors import as_goal_seen, as_trial, not_started
-from prior_reinforce.motions import Demonstrations
+from prior_reinforce.plans.motions import Demonstrations
 
 
 class FrozenAdapter(Adapter):

@@ -14,7 +14,7 @@ from prior_reinforce.adapters.memory import Memory
 from prior_reinforce.adapters.normalisation import Normalisation
 from prior_reinforce.adapters.vectors import as_goal_seen, as_trial, not_started
 from prior_reinforce.errors import ConfigurationError
-from prior_reinforce.motions import Demonstrations
+from prior_reinforce.plans.motions import Demonstrations
 
 # Below this, the rounding of a kernel matrix of amplitude 1e5 comes near the diagonal term, and
 # the likelihood loses its fifth decimal.

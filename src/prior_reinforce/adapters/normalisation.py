@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from prior_reinforce.motions import Demonstrations
+from prior_reinforce.plans.motions import Demonstrations
 
 
 @dataclass(frozen=True, eq=False)

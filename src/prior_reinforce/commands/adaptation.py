@@ -17,8 +17,8 @@ from prior_reinforce.experiments.methods import make_adapter
 from prior_reinforce.experiments.protocol import GoalTrials, run_goals
 from prior_reinforce.experiments.sight import MODEL
 from prior_reinforce.generators import Generator
-from prior_reinforce.motions import Demonstrations
 from prior_reinforce.perception import Perception, VisionLanguageModel, VisionLanguageModelConfig
+from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.report import AdaptationRecord, Film, record_film, write_report
 from prior_reinforce.tasks import Task
 

@@ -12,13 +12,13 @@ import tyro
 
 from prior_reinforce.commands.outcome_questions import ask_for_outcomes, keep_typed
 from prior_reinforce.commands.workspace import Folder, opened, print_next
-from prior_reinforce.workspace.importing import (
+from prior_reinforce.files import named_disk_errors
+from prior_reinforce.importing import (
     Preprocessing,
     RecordingFormat,
     import_demonstrations,
     read_recordings,
 )
-from prior_reinforce.workspace.store import named_disk_errors
 from prior_reinforce.workspace.workspace import Workspace
 
 _PICTURE = "demonstrations.png"

@@ -23,7 +23,7 @@ from prior_reinforce.generators import (
 )
 from prior_reinforce.generators.base import Generator
 from prior_reinforce.generators.by_name import make_generator
-from prior_reinforce.motions import Demonstrations
+from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.workspace.learning import learn as learn_in_workspace
 
 _RECORD = "training.json"

@@ -6,7 +6,7 @@ import numpy as np
 from rich.console import Console
 
 from prior_reinforce.experiments.protocol import GoalTrials
-from prior_reinforce.feedback import to_words
+from prior_reinforce.wording import to_words
 
 
 class LiveView:

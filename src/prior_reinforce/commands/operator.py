@@ -11,9 +11,9 @@ from rich.console import Console
 
 from prior_reinforce.commands.live import place
 from prior_reinforce.errors import InvalidFeedbackError, PerceptionFailedError
-from prior_reinforce.feedback import from_words
 from prior_reinforce.perception import Perception, VisionLanguageModel
 from prior_reinforce.rollouts import Rollout
+from prior_reinforce.wording import from_words
 
 
 class KeptSight(Perception):

@@ -14,9 +14,9 @@ from prior_reinforce.errors import (
     InvalidDemonstrationsError,
     InvalidFeedbackError,
 )
-from prior_reinforce.feedback import from_words
-from prior_reinforce.workspace.importing import Recording
-from prior_reinforce.workspace.importing.outcomes import (
+from prior_reinforce.files import named_disk_errors
+from prior_reinforce.importing import Recording
+from prior_reinforce.importing.outcomes import (
     OUTCOMES_FILE,
     Outcomes,
     find_outcomes,
@@ -24,8 +24,8 @@ from prior_reinforce.workspace.importing.outcomes import (
     outcomes_of,
     read_outcomes,
 )
+from prior_reinforce.wording import from_words
 from prior_reinforce.workspace.manifest import Manifest
-from prior_reinforce.workspace.store import named_disk_errors
 
 _PLACES = {"ahead": "long", "behind": "short", "up": "high", "down": "low", "to the ": ""}
 """A place seen from the robot's base, in the words of an error seen from the goal."""

@@ -12,7 +12,6 @@ import numpy as np
 import tyro
 
 from prior_reinforce.errors import ConfigurationError, FileFormatError, PerceptionFailedError
-from prior_reinforce.feedback import to_words
 from prior_reinforce.perception import (
     SeenObject,
     TableCalibration,
@@ -20,6 +19,7 @@ from prior_reinforce.perception import (
     VisionLanguageModel,
     VisionLanguageModelConfig,
 )
+from prior_reinforce.wording import to_words
 
 _COLUMNS = ("x", "y", "u", "v")
 

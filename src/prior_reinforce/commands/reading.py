@@ -10,7 +10,7 @@ import tyro
 
 from prior_reinforce.commands.workspace import Folder
 from prior_reinforce.errors import ConfigurationError, InvalidFeedbackError
-from prior_reinforce.feedback import from_words
+from prior_reinforce.wording import from_words
 from prior_reinforce.workspace.status import tell_example
 from prior_reinforce.workspace.workspace import Workspace
 

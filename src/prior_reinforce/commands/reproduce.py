@@ -20,13 +20,13 @@ from rich.text import Text
 
 from prior_reinforce.errors import ConfigurationError, UnitFailedError
 from prior_reinforce.experiments.evidence import claims_table, write_evidence
-from prior_reinforce.experiments.files import write_atomically
 from prior_reinforce.experiments.methods import make_generator
 from prior_reinforce.experiments.provenance import provenance
 from prior_reinforce.experiments.recipes import QUICK, RECIPES, Recipe, Run, Scale, Table
 from prior_reinforce.experiments.recipes.base import Progress as OnProgress
 from prior_reinforce.experiments.recipes.trials import TrialsTable
 from prior_reinforce.experiments.units import Workers
+from prior_reinforce.files import write
 from prior_reinforce.perception import VisionLanguageModelConfig
 
 _SLOWEST = "diffusion"
@@ -94,7 +94,7 @@ class Reproduce:
                 continue
             made_by = provenance(self._command(recipe, run), scale, run.commits)
             text = json.dumps({**made_by, **figures}, indent=1)
-            write_atomically(self.out / f"{recipe.name}.json", text + "\n")
+            write(self.out / f"{recipe.name}.json", text + "\n")
             console.print(_terminal(recipe.table(figures), recipe.title))
             if claims := recipe.claims(figures):
                 console.print(_terminal(claims_table(claims), f"{recipe.title}: claims"))

@@ -18,8 +18,8 @@ from prior_reinforce.experiments.methods import make_adapter, make_generator
 from prior_reinforce.experiments.protocol import is_hit, see_demonstrations
 from prior_reinforce.experiments.sight import open_sight
 from prior_reinforce.generators import DiffusionGenerator, Generator
-from prior_reinforce.motions import Demonstrations
 from prior_reinforce.perception import Perception, VisionLanguageModelConfig
+from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.report import record_film
 from prior_reinforce.tasks import Task
 

@@ -13,11 +13,11 @@ from prior_reinforce.commands.reading import Number, Reading
 from prior_reinforce.commands.workspace import Folder, opened, print_next
 from prior_reinforce.errors import ConfigurationError, FileFormatError
 from prior_reinforce.generators.by_name import make_generator
-from prior_reinforce.workspace.executing_lock import is_executing
+from prior_reinforce.plans.files import check_plan_path, write_plan
+from prior_reinforce.robots.executors.command import check_command
+from prior_reinforce.robots.executors.lock import is_executing
 from prior_reinforce.workspace.execution import execute
-from prior_reinforce.workspace.hand_over import check_command
 from prior_reinforce.workspace.history import TrialRecord, TrialStage
-from prior_reinforce.workspace.plan_files import check_plan_path, write_plan
 from prior_reinforce.workspace.status import say_trial
 from prior_reinforce.workspace.trials import amend, ask, tell, void
 from prior_reinforce.workspace.wording import say_place

@@ -22,8 +22,8 @@ from prior_reinforce.experiments.statistics import (
     trials_counted,
 )
 from prior_reinforce.generators.base import Generator
-from prior_reinforce.motions import Demonstrations
 from prior_reinforce.perception.base import Perception
+from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.tasks.base import Task
 
 Memory = Literal["goal", "workspace"]

@@ -12,7 +12,6 @@ import numpy as np
 from scipy.spatial import Delaunay
 
 from prior_reinforce.errors import PerceptionFailedError
-from prior_reinforce.experiments.files import in_place
 from prior_reinforce.experiments.goals import unseen_goals
 from prior_reinforce.experiments.methods import make_adapter, make_generator
 from prior_reinforce.experiments.protocol import (
@@ -23,11 +22,12 @@ from prior_reinforce.experiments.protocol import (
 )
 from prior_reinforce.experiments.sight import open_sight
 from prior_reinforce.experiments.units import Unit, digest_of, result_of
+from prior_reinforce.files import in_place
 from prior_reinforce.generators import Generator, load_generator
-from prior_reinforce.generators.alignment import align
-from prior_reinforce.motions import Demonstrations
-from prior_reinforce.own_members import source_digest
 from prior_reinforce.perception import VisionLanguageModelConfig
+from prior_reinforce.plans.alignment import align
+from prior_reinforce.plans.motions import Demonstrations
+from prior_reinforce.registry import source_digest
 from prior_reinforce.rollouts import Rollout
 from prior_reinforce.tasks import make_task
 

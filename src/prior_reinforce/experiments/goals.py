@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from prior_reinforce.motions import Demonstrations
+from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.tasks.base import Task
 
 # Ours: how many candidates are weighed for each goal that is taken.

@@ -16,8 +16,8 @@ from prior_reinforce.adapters import (
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.generators import Generator
 from prior_reinforce.generators.by_name import make_generator
-from prior_reinforce.own_members import import_and_make, make_own
 from prior_reinforce.perception import Amplified, Exact, Eye, Perception
+from prior_reinforce.registry import import_and_make, make_own
 
 __all__ = ["family_of", "make_adapter", "make_generator", "make_perception"]
 

@@ -20,9 +20,9 @@ from prior_reinforce.errors import (
 )
 from prior_reinforce.experiments.statistics import reached_by
 from prior_reinforce.generators.base import Generator
-from prior_reinforce.motions import Demonstrations
 from prior_reinforce.perception.base import Perception
 from prior_reinforce.perception.eye import Eye
+from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.rollouts import Rollout
 from prior_reinforce.session import Session, Trial, ask_all
 from prior_reinforce.tasks.base import Task

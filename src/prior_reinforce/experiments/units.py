@@ -24,7 +24,7 @@ from threadpoolctl import threadpool_limits
 from prior_reinforce.errors import UnitFailedError
 from prior_reinforce.experiments.cluster import run_on_ray
 from prior_reinforce.experiments.code_version import commit
-from prior_reinforce.experiments.files import sweep, write_atomically
+from prior_reinforce.files import sweep, write
 from prior_reinforce.generators.threads import torch_threads
 
 
@@ -163,13 +163,13 @@ def _run(folder: Path, unit: Unit) -> _Outcome:
         text = json.dumps(kept, allow_nan=False)
     except Exception as error:
         return _keep_failure(folder, unit, error)
-    write_atomically(result_path(folder, unit), text)
+    write(result_path(folder, unit), text)
     _failure_path(folder, unit).unlink(missing_ok=True)
     return unit, None
 
 
 def _keep_failure(folder: Path, unit: Unit, error: Exception) -> _Outcome:
-    write_atomically(_failure_path(folder, unit), "".join(traceback.format_exception(error)))
+    write(_failure_path(folder, unit), "".join(traceback.format_exception(error)))
     first_line = str(error).partition("\n")[0]
     return unit, f"{type(error).__name__}: {first_line}"
 

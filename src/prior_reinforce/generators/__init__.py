@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 
 from prior_reinforce.errors import ConfigurationError, FileFormatError
-from prior_reinforce.generators.alignment import Alignment, AlignmentConfig, align
 from prior_reinforce.generators.base import FitProgress, Generator
 from prior_reinforce.generators.diffusion import DiffusionGenerator
 from prior_reinforce.generators.diffusion_config import DiffusionConfig
@@ -21,6 +20,7 @@ from prior_reinforce.generators.nearest import NearestNeighbours, NearestNeighbo
 from prior_reinforce.generators.regression import UNetRegression
 from prior_reinforce.generators.regression_config import UNetRegressionConfig
 from prior_reinforce.generators.saving import read_model
+from prior_reinforce.plans.alignment import Alignment, AlignmentConfig, align
 
 FAMILY: tuple[type[Generator], ...] = (
     DiffusionGenerator,

@@ -11,7 +11,7 @@ from typing import ClassVar
 import numpy as np
 from typing_extensions import Self
 
-from prior_reinforce.motions import Demonstrations
+from prior_reinforce.plans.motions import Demonstrations
 
 
 @dataclass(frozen=True)

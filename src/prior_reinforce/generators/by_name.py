@@ -14,7 +14,7 @@ from prior_reinforce.generators.dmp import (
 )
 from prior_reinforce.generators.regression import UNetRegression
 from prior_reinforce.generators.regression_config import UNetRegressionConfig
-from prior_reinforce.own_members import make_own
+from prior_reinforce.registry import make_own
 
 
 def make_generator(name: str) -> Generator:

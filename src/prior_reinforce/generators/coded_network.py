@@ -16,8 +16,8 @@ from torch import nn
 from typing_extensions import Self
 
 from prior_reinforce.generators.conditions import ConditionScale, as_conditions
-from prior_reinforce.generators.start_time import StartTimeCodec
 from prior_reinforce.generators.threads import torch_threads
+from prior_reinforce.generators.timed import StartTimeCodec
 
 _CHUNK = 128
 """Plans generated at once; bounds the memory of a dense grid of conditions."""

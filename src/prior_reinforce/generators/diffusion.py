@@ -19,11 +19,11 @@ from prior_reinforce.errors import ConfigurationError, FileFormatError, NotFitte
 from prior_reinforce.generators.base import FitProgress, Generator
 from prior_reinforce.generators.conditions import ConditionScale
 from prior_reinforce.generators.diffusion_config import DiffusionConfig, Preset
-from prior_reinforce.generators.representation import Representation
 from prior_reinforce.generators.saving import read_model, write_model
-from prior_reinforce.generators.start_time import StartTimeCodec
 from prior_reinforce.generators.threads import torch_threads
-from prior_reinforce.motions import Demonstrations
+from prior_reinforce.generators.timed import StartTimeCodec
+from prior_reinforce.plans.codec import Representation
+from prior_reinforce.plans.motions import Demonstrations
 
 if TYPE_CHECKING:
     from prior_reinforce.generators.coded_network import CodedNetwork

@@ -8,8 +8,8 @@ from typing import Any, Literal, get_args
 from typing_extensions import Self
 
 from prior_reinforce.errors import ConfigurationError
-from prior_reinforce.generators.representation import Representation
 from prior_reinforce.generators.unet_size import UNetSize
+from prior_reinforce.plans.codec import Representation
 
 Preset = Literal["laptop", "paper"]
 Prediction = Literal["epsilon", "v", "sample"]

@@ -45,8 +45,8 @@ from prior_reinforce.generators.base import FitProgress, Generator
 from prior_reinforce.generators.conditions import as_conditions
 from prior_reinforce.generators.outcome_weights import smooth_weights
 from prior_reinforce.generators.saving import read_model, write_model
-from prior_reinforce.generators.velocity import velocity_profiles
-from prior_reinforce.motions import Demonstrations
+from prior_reinforce.plans.motions import Demonstrations
+from prior_reinforce.plans.timing import velocity_profiles
 
 _INTEGRATION_STEPS = 1000
 """Runge-Kutta steps over a motion. The library evaluates the forcing one step late, which at its

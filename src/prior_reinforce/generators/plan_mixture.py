@@ -25,7 +25,7 @@ from prior_reinforce.errors import FileFormatError, NotFittedError
 from prior_reinforce.generators.base import FitProgress, Generator
 from prior_reinforce.generators.conditions import as_conditions
 from prior_reinforce.generators.saving import read_model, write_model
-from prior_reinforce.motions import Demonstrations
+from prior_reinforce.plans.motions import Demonstrations
 
 
 class PlanMixture(Generator):

@@ -27,9 +27,9 @@ from prior_reinforce.generators.base import FitProgress, Generator
 from prior_reinforce.generators.conditions import ConditionScale
 from prior_reinforce.generators.regression_config import UNetRegressionConfig
 from prior_reinforce.generators.saving import read_model, write_model
-from prior_reinforce.generators.start_time import StartTimeCodec
 from prior_reinforce.generators.threads import torch_threads
-from prior_reinforce.motions import Demonstrations
+from prior_reinforce.generators.timed import StartTimeCodec
+from prior_reinforce.plans.motions import Demonstrations
 
 if TYPE_CHECKING:
     from prior_reinforce.generators.coded_network import CodedNetwork

@@ -6,9 +6,9 @@ from prior_reinforce.perception.calibration import TableCalibration
 from prior_reinforce.perception.camera import Camera, CameraConfig
 from prior_reinforce.perception.exact import Exact
 from prior_reinforce.perception.eye import Eye
-from prior_reinforce.perception.scenes import SeenObject, TableScene, scene_of
 from prior_reinforce.perception.vlm import VisionLanguageModel
 from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
+from prior_reinforce.scene import SeenObject, TableScene, scene_of
 
 __all__ = [
     "Amplified",

@@ -17,7 +17,6 @@ from prior_reinforce.errors import ConfigurationError, EndpointError, Perception
 from prior_reinforce.perception.base import Perception
 from prior_reinforce.perception.calibration import TableCalibration
 from prior_reinforce.perception.camera import Camera
-from prior_reinforce.perception.scenes import SeenObject, TableScene
 from prior_reinforce.perception.vlm_client import (
     ModelClient,
     SentPicture,
@@ -26,6 +25,7 @@ from prior_reinforce.perception.vlm_client import (
 from prior_reinforce.perception.vlm_formats import Box
 from prior_reinforce.perception.vlm_reading import Answer, Reading, Sighting
 from prior_reinforce.rollouts import KeyFrame, Rollout
+from prior_reinforce.scene import SeenObject, TableScene
 
 
 class VisionLanguageModel(Perception):

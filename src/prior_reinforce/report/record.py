@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from prior_reinforce.errors import ConfigurationError, InvalidGoalError
-from prior_reinforce.feedback import WORDS
-from prior_reinforce.motions import Demonstrations
+from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.report.film import Film
 from prior_reinforce.session import Session, Trial, TrialState
+from prior_reinforce.wording import WORDS
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from prior_reinforce.feedback import WORDS, to_words
 from prior_reinforce.report.record import AdaptationRecord
+from prior_reinforce.wording import WORDS, to_words
 
 _PLACE_WORDS = (("ahead", "behind"), ("to the left", "to the right"), ("up", "down"))
 """A place, not an error: where it lies as seen from the robot's base."""

@@ -6,8 +6,8 @@ safety function: torques, collisions and people in reach are not its business.
 
 from __future__ import annotations
 
-from prior_reinforce.motions import Demonstrations, Plan
-from prior_reinforce.robots.interpolation import interpolate
+from prior_reinforce.plans.interpolation import interpolate
+from prior_reinforce.plans.motions import Demonstrations, Plan
 from prior_reinforce.robots.joint_checks import JointChecks, check_joints, check_rest
 from prior_reinforce.robots.limits import RobotLimits
 from prior_reinforce.robots.matching import match_joints

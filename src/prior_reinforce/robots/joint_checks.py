@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from prior_reinforce.motions import Plan
-from prior_reinforce.robots.interpolation import FineMotion
+from prior_reinforce.plans.interpolation import FineMotion
+from prior_reinforce.plans.motions import Plan
 from prior_reinforce.robots.limits import RobotLimits
 from prior_reinforce.robots.matching import missing_joints
 from prior_reinforce.robots.report import LimitLine, Status, unchecked

@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 
 from prior_reinforce.errors import ConfigurationError, InvalidPlanError
-from prior_reinforce.motions import PlanFormat
+from prior_reinforce.plans.motions import PlanFormat
 from prior_reinforce.robots.limits import RobotLimits
 
 

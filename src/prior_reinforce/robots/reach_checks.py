@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from prior_reinforce.errors import InvalidPlanError
-from prior_reinforce.motions import Demonstrations, Plan
-from prior_reinforce.robots.interpolation import FineMotion
+from prior_reinforce.plans.interpolation import FineMotion
+from prior_reinforce.plans.motions import Demonstrations, Plan
 from prior_reinforce.robots.kinematics import tool_tip
 from prior_reinforce.robots.limits import RobotLimits
 from prior_reinforce.robots.report import LimitLine, Status, unchecked

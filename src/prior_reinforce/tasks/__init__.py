@@ -1,6 +1,6 @@
 """Env: dynamic manipulation tasks in contact physics. Each a `.py` with its `.xml`."""
 
-from prior_reinforce.own_members import make_own
+from prior_reinforce.registry import make_own
 from prior_reinforce.tasks.base import Task
 from prior_reinforce.tasks.basketball import BasketballShot
 from prior_reinforce.tasks.basketball_v2 import BasketballShotV2

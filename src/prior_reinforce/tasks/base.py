@@ -12,7 +12,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from prior_reinforce.motions import Demonstrations, PlanFormat
+from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 from prior_reinforce.rollouts import Rollout
 
 

@@ -14,7 +14,7 @@ from typing import ClassVar
 import mujoco
 import numpy as np
 
-from prior_reinforce.motions import PlanFormat
+from prior_reinforce.plans.motions import PlanFormat
 from prior_reinforce.rollouts import KeyFrame, Rollout
 from prior_reinforce.tasks.panda import JOINT_NAMES, N_JOINTS, STEP
 from prior_reinforce.tasks.panda_task import Draws, PandaTask

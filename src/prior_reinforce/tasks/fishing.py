@@ -16,7 +16,7 @@ from typing import ClassVar
 import mujoco
 import numpy as np
 
-from prior_reinforce.motions import PlanFormat
+from prior_reinforce.plans.motions import PlanFormat
 from prior_reinforce.rollouts import KeyFrame, Rollout
 from prior_reinforce.tasks.inverse_kinematics import POSE_NAMES, POSE_UNITS, joint_paths
 from prior_reinforce.tasks.panda import STEP

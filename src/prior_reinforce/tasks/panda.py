@@ -13,7 +13,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from prior_reinforce.robots.interpolation import join_frames
+from prior_reinforce.plans.interpolation import join_frames
 from prior_reinforce.robots.limits import PANDA as LIMITS
 
 N_JOINTS = 7

@@ -21,7 +21,7 @@ import numpy as np
 from prior_reinforce.arrays import as_plans
 from prior_reinforce.cores import available_cores
 from prior_reinforce.errors import ConfigurationError, InvalidGoalError
-from prior_reinforce.motions import Demonstrations
+from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.rendering import open_renderer
 from prior_reinforce.rollouts import Rollout
 from prior_reinforce.tasks.base import Task

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from prior_reinforce.errors import ConfigurationError, FileFormatError, TrialStateError
-from prior_reinforce.workspace.executing_lock import executing_lock
-from prior_reinforce.workspace.hand_over import HandOver, check_command
+from prior_reinforce.plans.files import PlanFile, run_with_plan
+from prior_reinforce.robots.executors.command import HandOver, check_command
+from prior_reinforce.robots.executors.lock import executing_lock
 from prior_reinforce.workspace.history import TrialStage
-from prior_reinforce.workspace.plan_files import PlanFile, run_with_plan
 from prior_reinforce.workspace.workspace import Workspace
 
 

@@ -16,8 +16,7 @@ from typing import Any
 import numpy as np
 
 from prior_reinforce.errors import ConfigurationError, FileFormatError, PriorReinforceError
-from prior_reinforce.feedback import WORDS
-from prior_reinforce.motions import PlanFormat
+from prior_reinforce.plans.motions import PlanFormat
 from prior_reinforce.robots import (
     GateSettings,
     RobotLimits,
@@ -25,6 +24,7 @@ from prior_reinforce.robots import (
     missing_joints,
     robot_limits,
 )
+from prior_reinforce.wording import WORDS
 
 if sys.version_info >= (3, 11):
     import tomllib

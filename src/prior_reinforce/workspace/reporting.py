@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from prior_reinforce.errors import FileFormatError, WorkspaceError
+from prior_reinforce.files import named_disk_errors
 from prior_reinforce.report import AdaptationRecord, write_report
 from prior_reinforce.session import Trial, TrialState
 from prior_reinforce.workspace.history import GoalRecord, History, TrialRecord, TrialStage
-from prior_reinforce.workspace.store import named_disk_errors
 from prior_reinforce.workspace.workspace import Workspace
 
 

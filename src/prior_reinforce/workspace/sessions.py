@@ -6,7 +6,7 @@ import numpy as np
 
 from prior_reinforce.adapters import GaussianProcessAdapter
 from prior_reinforce.generators import Generator
-from prior_reinforce.motions import Demonstrations
+from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.session import Session, Trial, TrialState
 from prior_reinforce.workspace.history import GoalRecord, History, TrialRecord, TrialStage
 

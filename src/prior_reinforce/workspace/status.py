@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from prior_reinforce.workspace.executing_lock import is_executing
+from prior_reinforce.robots.executors.lock import is_executing
 from prior_reinforce.workspace.history import GoalRecord, History, TrialRecord, TrialStage
 from prior_reinforce.workspace.wording import say_error, say_place
 from prior_reinforce.workspace.workspace import Workspace

@@ -11,17 +11,15 @@ leaves at worst a file that nothing names.
 from __future__ import annotations
 
 import hashlib
-import os
 import shutil
 import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
-from prior_reinforce.errors import FileFormatError, WorkspaceError
+from prior_reinforce.errors import FileFormatError
+from prior_reinforce.files import in_place, named_disk_errors, sha256_of_folder
 from prior_reinforce.generators import Generator, load_generator
-from prior_reinforce.motions import Demonstrations, Plan
-from prior_reinforce.workspace.plan_files import PlanFile, read_plan, write_plan
+from prior_reinforce.plans.files import PlanFile, read_plan, write_plan
+from prior_reinforce.plans.motions import Demonstrations, Plan
 
 _DIGITS = 16
 """Of a hash in a name: no two of a workspace's files will ever share 64 bits."""
@@ -41,11 +39,8 @@ class Store:
             WorkspaceError: The disk is full, or the folder read-only.
         """
         path = self._demonstrations_path(demonstrations.sha256)
-        with named_disk_errors(self._folder), _unfinished(path.parent) as unfinished:
-            demonstrations.save(unfinished / path.name)
-            _settle(unfinished)
-            os.replace(unfinished / path.name, path)
-            _sync(path.parent)
+        with named_disk_errors(self._folder), in_place(path) as unfinished:
+            demonstrations.save(unfinished)
 
     def demonstrations(self, sha256: str) -> Demonstrations:
         """Read what was kept.
@@ -68,13 +63,11 @@ class Store:
             WorkspaceError: The disk is full, or the folder read-only.
         """
         models = self._folder / "models"
-        with named_disk_errors(self._folder), _unfinished(models) as unfinished:
-            generator.save(unfinished / "model")
-            _settle(unfinished / "model")
-            model = _hash_folder(unfinished / "model")
-            if not (models / model).exists():
-                os.replace(unfinished / "model", models / model)
-                _sync(models)
+        with named_disk_errors(self._folder), tempfile.TemporaryDirectory() as scratch:
+            generator.save(Path(scratch) / "model")
+            model = sha256_of_folder(Path(scratch) / "model")[:_DIGITS]
+            with in_place(models / model) as unfinished:
+                shutil.copytree(Path(scratch) / "model", unfinished)
         return model
 
     def model(self, model: str, kind: type[Generator] | None = None) -> Generator:
@@ -89,7 +82,7 @@ class Store:
             FileFormatError: Its files are missing, damaged, or others.
         """
         folder = self._folder / "models" / model
-        if not folder.is_dir() or _hash_folder(folder) != model:
+        if not folder.is_dir() or sha256_of_folder(folder)[:_DIGITS] != model:
             raise FileFormatError(
                 f"the model in {folder} is not the one that was learned; restore it from a copy, "
                 f"or run: prior-reinforce learn {self._folder}"
@@ -122,54 +115,3 @@ class Store:
 
     def _demonstrations_path(self, sha256: str) -> Path:
         return self._folder / "demonstrations" / f"{sha256[:_DIGITS]}.npz"
-
-
-@contextmanager
-def named_disk_errors(folder: Path) -> Iterator[None]:
-    """Turn a full disk or a read-only folder into one line."""
-    try:
-        yield
-    except OSError as error:
-        raise WorkspaceError(
-            f"cannot write to {folder} ({error.strerror}); free some disk space, or make the "
-            "folder writable; what was told before is safe"
-        ) from error
-
-
-@contextmanager
-def _unfinished(folder: Path) -> Iterator[Path]:
-    """A folder beside the final place; gone afterwards, whatever happens."""
-    folder.mkdir(parents=True, exist_ok=True)
-    temporary = Path(tempfile.mkdtemp(dir=folder, prefix=".unfinished-"))
-    try:
-        yield temporary
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
-
-
-def _settle(folder: Path) -> None:
-    """Wait until a folder and the files in it are on the disk."""
-    for path in folder.iterdir():
-        _sync(path)
-    _sync(folder)
-
-
-def _sync(path: Path) -> None:
-    handle = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
-
-
-def _hash_folder(folder: Path) -> str:
-    digest = hashlib.sha256()
-    try:
-        for path in sorted(folder.iterdir()):
-            digest.update(path.name.encode())
-            digest.update(path.read_bytes())
-    except OSError as error:
-        raise FileFormatError(
-            f"cannot read {error.filename} ({error.strerror}); restore it from a copy"
-        ) from error
-    return digest.hexdigest()[:_DIGITS]

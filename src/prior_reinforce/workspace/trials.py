@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike
 from prior_reinforce.arrays import as_error
 from prior_reinforce.errors import RobotLimitError, TrialStateError, WorkspaceError
 from prior_reinforce.generators import Generator
-from prior_reinforce.motions import Plan
-from prior_reinforce.workspace.executing_lock import is_executing
+from prior_reinforce.plans.motions import Plan
+from prior_reinforce.robots.executors.lock import is_executing
 from prior_reinforce.workspace.history import TrialRecord, TrialStage
 from prior_reinforce.workspace.workspace import Workspace
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from prior_reinforce.feedback import to_words
+from prior_reinforce.wording import to_words
 from prior_reinforce.workspace.manifest import Manifest
 
 

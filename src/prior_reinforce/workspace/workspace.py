@@ -26,7 +26,7 @@ from prior_reinforce.errors import (
 )
 from prior_reinforce.generators import Generator
 from prior_reinforce.generators.by_name import name_of
-from prior_reinforce.motions import Demonstrations, Plan
+from prior_reinforce.plans.motions import Demonstrations, Plan
 from prior_reinforce.robots import LimitReport, check_plan
 from prior_reinforce.session import Session
 from prior_reinforce.workspace.history import GoalRecord, History, TrialRecord, fold

@@ -16,7 +16,7 @@ from prior_reinforce.experiments.recipes.alignment_picture import draw_alignment
 from prior_reinforce.experiments.recipes.base import Picture, Recipe, Run, Table
 from prior_reinforce.experiments.recipes.success import TASK
 from prior_reinforce.generators import align
-from prior_reinforce.motions import Demonstrations
+from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.tasks import make_task
 
 _TASKS = (TASK, "curling", "fishing")

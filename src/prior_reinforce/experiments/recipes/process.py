@@ -21,8 +21,8 @@ from prior_reinforce.experiments.recipes.process_picture import (
 )
 from prior_reinforce.experiments.sight import open_sight
 from prior_reinforce.experiments.units import Unit
-from prior_reinforce.feedback import to_words
 from prior_reinforce.tasks import make_task
+from prior_reinforce.wording import to_words
 
 TASKS = {
     "basketball-v1": "Basketball Shot",

@@ -11,11 +11,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import FancyArrowPatch, Rectangle
 
-from prior_reinforce.feedback import to_words
 from prior_reinforce.perception import Camera, CameraConfig, TableCalibration, TableScene, scene_of
 from prior_reinforce.report.style import GOAL, HIT, INK, drawing, new_figure, save_png
 from prior_reinforce.rollouts import KeyFrame
 from prior_reinforce.tasks import Task
+from prior_reinforce.wording import to_words
 
 _PIXELS = 1344
 """Side of a picture as it is taken, in [px]: finer than a model's, to be looked at close up."""

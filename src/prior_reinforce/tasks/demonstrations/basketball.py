@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 from scipy.special import betainc
 
-from prior_reinforce.motions import Demonstrations
+from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.tasks.basketball import BasketballShot
 
 HORIZON = 140

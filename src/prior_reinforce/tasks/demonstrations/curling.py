@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from prior_reinforce.motions import Demonstrations
+from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.tasks.curling import FRICTION, STONE_RADIUS, STONE_START, Curling
 from prior_reinforce.tasks.demonstrations.teleoperation import Teleoperation, record, smoothstep
 from prior_reinforce.tasks.inverse_kinematics import joint_paths, to_rotation_vector

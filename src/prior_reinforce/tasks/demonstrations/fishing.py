@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from prior_reinforce.motions import Demonstrations
+from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.tasks.demonstrations.teleoperation import Teleoperation, record, smoothstep
 from prior_reinforce.tasks.fishing import Fishing
 

@@ -1,0 +1,201 @@
+"""Files that are there whole or not at all, durable, and known by their hash: the one writer.
+
+What is being written has a name of its own, `.unfinished-<host>-<pid>-...`, beside where it will
+stand, and is moved there in one step once it is on the disk. What a killed process leaves under such
+a name is never read; `sweep` removes it. The name says whose it is, so that runs can share a folder.
+"""
+
+from __future__ import annotations
+
+import errno
+import hashlib
+import os
+import shutil
+import socket
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from prior_reinforce.errors import FileFormatError, WorkspaceError
+
+_PREFIX = ".unfinished-"
+
+
+def sha256(content: bytes) -> str:
+    """Return the hash of some bytes, 64 hexadecimal digits."""
+    return hashlib.sha256(content).hexdigest()
+
+
+def sha256_of_folder(folder: Path) -> str:
+    """Return the hash of the names and contents of a folder's files; hidden files do not count.
+
+    Raises:
+        FileFormatError: A file cannot be read.
+    """
+    digest = hashlib.sha256()
+    try:
+        for path in sorted(folder.iterdir()):
+            if not path.name.startswith("."):
+                digest.update(path.name.encode())
+                digest.update(path.read_bytes())
+    except OSError as error:
+        raise FileFormatError(
+            f"cannot read {error.filename} ({error.strerror}); restore it from a copy"
+        ) from error
+    return digest.hexdigest()
+
+
+@contextmanager
+def in_place(path: Path) -> Iterator[Path]:
+    """Give a place to write a file or a folder to, and move it to `path` when it is complete.
+
+    A file that stands there is replaced. A folder that stands there stays: another process was
+    quicker, and who writes folders here names them by what is in them.
+
+    Args:
+        path: Where it shall stand; the folder around it is made if need be.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with _unfinished(path) as unfinished:
+        yield unfinished
+        for file in (unfinished, *unfinished.rglob("*")):
+            _sync(file)
+        try:
+            os.replace(unfinished, path)
+        except OSError:
+            if not path.is_dir():
+                raise
+        _sync(path.parent)
+
+
+def write(path: Path, content: str | bytes) -> Path:
+    """Put a text (UTF-8) or bytes in place, whole or not at all; a file that is there is replaced.
+
+    Returns:
+        The path.
+    """
+    with in_place(path) as unfinished:
+        unfinished.write_bytes(content.encode() if isinstance(content, str) else content)
+    return path
+
+
+def write_once(path: Path, content: bytes) -> Path:
+    """Put bytes in place as a read-only file that is never replaced.
+
+    Args:
+        path: An existing file with the same content is kept; the folder around it must exist.
+        content: Of the file.
+
+    Returns:
+        The path.
+
+    Raises:
+        FileFormatError: Another file is there already.
+        WorkspaceError: The disk is full or the folder read-only; nothing is left behind.
+    """
+    if not path.parent.is_dir():
+        raise WorkspaceError(f"cannot write {path}, there is no such folder; make the folder first")
+    try:
+        with named_disk_errors(path.parent), _unfinished(path) as unfinished:
+            unfinished.write_bytes(content)
+            unfinished.chmod(unfinished.stat().st_mode & 0o444)
+            _sync(unfinished)
+            _link(unfinished, path)
+            _sync(path.parent)
+    except FileExistsError:
+        if not (path.is_file() and path.read_bytes() == content):
+            raise FileFormatError(
+                f"{path} is there already with another content and is never overwritten; choose "
+                "another name"
+            ) from None
+    return path
+
+
+@contextmanager
+def named_disk_errors(folder: Path) -> Iterator[None]:
+    """Turn a full disk or a read-only folder into one line; an existing file stays what it is.
+
+    Raises:
+        WorkspaceError: The disk is full, or the folder cannot be written to.
+    """
+    try:
+        yield
+    except FileExistsError:
+        raise
+    except OSError as error:
+        remedy = "make the folder writable, or choose another"
+        if error.errno in (errno.ENOSPC, errno.EDQUOT):
+            remedy = "free some disk space"
+        raise WorkspaceError(
+            f"cannot write to {folder} ({error.strerror}); {remedy}; what was written before is safe"
+        ) from error
+
+
+def sweep(folder: Path) -> None:
+    """Remove from a folder what processes of this machine left when they were killed.
+
+    Elsewhere than on POSIX systems nothing tells whether a process lives, and all of it stays.
+    """
+    if os.name != "posix":
+        return
+    mine = f"{_PREFIX}{socket.gethostname()}-"
+    for left in folder.glob(f"{mine}*"):
+        pid = left.name.removeprefix(mine).partition("-")[0]
+        if not (pid.isdecimal() and _lives(int(pid))):
+            shutil.rmtree(left, ignore_errors=True)
+
+
+@contextmanager
+def _unfinished(path: Path) -> Iterator[Path]:
+    """A place of the same name in a folder beside it, which is gone afterwards."""
+    owner = f"{_PREFIX}{socket.gethostname()}-{os.getpid()}-"
+    around = Path(tempfile.mkdtemp(dir=path.parent, prefix=owner))
+    try:
+        yield around / path.name
+    finally:
+        shutil.rmtree(around, ignore_errors=True)
+
+
+def _link(finished: Path, path: Path) -> None:
+    """Give a finished file its name; unlike renaming, this fails where a file is there already.
+
+    Raises:
+        FileExistsError: A file of that name is there.
+    """
+    try:
+        os.link(finished, path)
+    except FileExistsError:
+        raise
+    except OSError as error:
+        # Memory sticks (FAT) have no links.
+        if error.errno not in (errno.EPERM, errno.EOPNOTSUPP, errno.ENOSYS):
+            raise
+        if path.exists():
+            raise FileExistsError(errno.EEXIST, "File exists", str(path)) from error
+        os.rename(finished, path)
+
+
+def _sync(path: Path) -> None:
+    """Have a file, or the names in a folder, survive a power cut."""
+    if os.name != "posix":
+        return  # elsewhere a folder cannot be opened
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    except OSError as error:
+        # Some shared file systems keep folders in their own way, and say so.
+        if error.errno not in (errno.EINVAL, errno.ENOTSUP):
+            raise
+    finally:
+        os.close(handle)
+
+
+def _lives(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    except PermissionError:
+        pass
+    return True

@@ -1,0 +1,20 @@
+"""Demonstrations from the format they were recorded in: read, trim, resample, look at, use."""
+
+from prior_reinforce.importing.importer import (
+    ImportResult,
+    import_demonstrations,
+    read_recordings,
+)
+from prior_reinforce.importing.preprocessing import Preprocessing
+from prior_reinforce.importing.preview import Preview
+from prior_reinforce.importing.recording import Recording, RecordingFormat
+
+__all__ = [
+    "ImportResult",
+    "Preprocessing",
+    "Preview",
+    "Recording",
+    "RecordingFormat",
+    "import_demonstrations",
+    "read_recordings",
+]

@@ -1,0 +1,202 @@
+"""From recordings of any rate and length to plans of one time step and one horizon."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import CubicSpline, PchipInterpolator
+
+from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
+from prior_reinforce.importing.recording import Recording
+
+_STILL_SHARE = 0.005
+"""A channel counts as still within this share of the largest range of any channel of its unit.
+Ours: above encoder noise, and reached by a smooth start within its first tenth."""
+_STILL_FLOOR = {"rad": 1e-3, "m": 5e-4}
+"""Never less than this. Ours: several counts of a joint encoder or a gripper."""
+_ON_GRID = 0.02
+"""A frame within this share of a time step of where it should be is taken as recorded. Ours: at
+2 rad/s and 100 Hz that is 0.4 mrad, below the servo's own error."""
+_OVERSHOOT = 0.01
+"""A spline that leaves a channel's recorded range by more than this share of it is refused."""
+_MOST_FRAMES = 100_000
+"""Longest plan that is made; more is a wrong time step far more often than a motion."""
+
+
+@dataclass(frozen=True)
+class Preprocessing:
+    """How recordings become plans. Time is never stretched: a retimed throw is another throw."""
+
+    dt: float | None = None
+    """Time between two frames of a plan, in [s]; None takes the recordings' median period."""
+    horizon: int | None = None
+    """Frames of every plan; None takes the longest recording's. Shorter ones hold their last pose;
+    a longer one is an error, never cut."""
+    trim: bool = True
+    """Drop the still time before the first and after the last movement of each recording."""
+    margin: float = 0.1
+    """Still time that trimming keeps at either end, in [s]. Ours: enough for the plan to start
+    and end at rest at 30 frames a second."""
+
+    def __post_init__(self) -> None:
+        """Check the settings.
+
+        Raises:
+            ConfigurationError: A value outside its range.
+        """
+        if self.dt is not None and not (math.isfinite(self.dt) and self.dt > 0):
+            raise ConfigurationError(f"dt must be a positive number of seconds, got {self.dt}")
+        if self.horizon is not None and self.horizon < 2:
+            raise ConfigurationError(f"horizon must be at least 2 frames, got {self.horizon}")
+        if not (math.isfinite(self.margin) and self.margin >= 0):
+            raise ConfigurationError(f"margin must be 0 s or more, got {self.margin}")
+
+
+@dataclass(frozen=True, eq=False)
+class Preprocessed:
+    """Plans, and what was done to get them."""
+
+    plans: np.ndarray
+    """Shape (N, H, D)."""
+    dt: float
+    """Time between two frames, in [s]."""
+    starts: tuple[float, ...]
+    """Where in its recording each plan starts, in [s]."""
+    ends: tuple[float, ...]
+    """Where in its recording each plan ends, in [s], before the last pose is held."""
+    held: int
+    """How many plans hold their last pose to reach the horizon."""
+    remarks: tuple[str, ...]
+    """What a person should look at."""
+
+
+def preprocess(
+    recordings: Sequence[Recording], units: Sequence[str], settings: Preprocessing
+) -> Preprocessed:
+    """Trim, resample and bring to one horizon.
+
+    Args:
+        recordings: N of them, each with the same D channels.
+        units: Of the D channels.
+        settings: How.
+
+    Raises:
+        InvalidDemonstrationsError: An episode that never moves, or is longer than the horizon.
+    """
+    dt = settings.dt or _common_dt(recordings)
+    remarks: list[str] = [remark for r in recordings for remark in r.remarks]
+    spans = _moving_spans(recordings, units, settings)
+    pieces = []
+    for recording, (start, end) in zip(recordings, spans, strict=True):
+        if (end - start) / dt > _MOST_FRAMES:
+            raise InvalidDemonstrationsError(
+                f"episode {recording.episode} makes {(end - start) / dt:.0f} frames at dt {dt:g} s;"
+                " give a larger dt, or cut the recording"
+            )
+        piece, smoothed = _resample(recording, start, end, dt)
+        pieces.append(piece)
+        remarks += _gaps(recording, start, end)
+        if smoothed:
+            remarks.append(f"{recording.episode}: {', '.join(smoothed)} stepwise, no spline")
+    longest = max(len(piece) for piece in pieces)
+    horizon = settings.horizon or longest
+    for recording, piece in zip(recordings, pieces, strict=True):
+        if len(piece) > horizon:
+            raise InvalidDemonstrationsError(
+                f"episode {recording.episode} has {len(piece)} frames, more than the horizon "
+                f"{horizon}; give a horizon of {longest}, or a larger dt (motions are never cut)"
+            )
+        if len(piece) < horizon and _ends_in_motion(piece):
+            remarks.append(f"{recording.episode}: ends in motion, then holds its last pose")
+    if horizon > 400:
+        remarks.append(f"{horizon} frames are many; dt {dt * horizon / 140:.2g} s would make 140")
+    plans = np.stack(
+        [np.concatenate([p, np.repeat(p[-1:], horizon - len(p), axis=0)]) for p in pieces]
+    )
+    return Preprocessed(
+        plans,
+        dt,
+        tuple(start for start, _ in spans),
+        tuple(end for _, end in spans),
+        sum(len(piece) < horizon for piece in pieces),
+        tuple(dict.fromkeys(remarks)),
+    )
+
+
+def _common_dt(recordings: Sequence[Recording]) -> float:
+    """Median period, snapped to a whole rate that is within half a per cent of it."""
+    period = float(np.median([recording.period for recording in recordings]))
+    rate = round(1 / period)
+    return 1 / rate if rate > 0 and abs(rate * period - 1) < 0.005 else period
+
+
+def _moving_spans(
+    recordings: Sequence[Recording], units: Sequence[str], settings: Preprocessing
+) -> list[tuple[float, float]]:
+    """From where to where each recording is kept, in [s]."""
+    if not settings.trim:
+        return [(0.0, recording.duration) for recording in recordings]
+    ranges = np.max([np.ptp(recording.positions, axis=0) for recording in recordings], axis=0)
+    largest = {
+        unit: max(r for r, u in zip(ranges, units, strict=True) if u == unit) for unit in set(units)
+    }
+    still = np.array([max(_STILL_SHARE * largest[u], _STILL_FLOOR.get(u, 0.0)) for u in units])
+    spans = []
+    for recording in recordings:
+        q, t = recording.positions, recording.times
+        left = np.flatnonzero(np.any(np.abs(q - q[0]) > still, axis=1))
+        ahead = np.flatnonzero(np.any(np.abs(q - q[-1]) > still, axis=1))
+        if not left.size:
+            raise InvalidDemonstrationsError(
+                f"episode {recording.episode} never moves by more than {still.max():.2g} from its "
+                "first pose; leave it out, or import without trimming"
+            )
+        # The last frame within the still band before the motion, and the first one after it. A
+        # motion that returns to where it began has frames of both kinds all the same.
+        last_moving = ahead[-1] if ahead.size else left[-1]
+        first = np.searchsorted(t, t[left[0] - 1] - settings.margin, side="right") - 1
+        last = np.searchsorted(t, t[min(last_moving + 1, len(t) - 1)] + settings.margin)
+        spans.append((float(t[max(first, 0)]), float(t[min(last, len(t) - 1)])))
+    return spans
+
+
+def _resample(
+    recording: Recording, start: float, end: float, dt: float
+) -> tuple[np.ndarray, list[str]]:
+    """Frames (n, D) at start, start + dt, ... until the end is covered, and stepwise channels."""
+    t, q = recording.times, recording.positions
+    count = max(2, math.ceil((end - start) / dt - _ON_GRID) + 1)
+    grid = start + np.arange(count) * dt
+    nearest = np.clip(np.searchsorted(t, grid - dt / 2), 0, len(t) - 1)
+    if np.all(np.abs(t[nearest] - grid) <= _ON_GRID * dt):
+        return q[nearest], []
+    at = np.clip(grid, t[0], t[-1])
+    frames = CubicSpline(t, q)(at) if len(t) > 3 else PchipInterpolator(t, q)(at)
+    low, high = q.min(axis=0), q.max(axis=0)
+    beyond = np.maximum(low - frames.min(axis=0), frames.max(axis=0) - high)
+    stepwise = beyond > _OVERSHOOT * (high - low)
+    if np.any(stepwise):
+        # PCHIP never leaves the range of its neighbours: right for grippers and switches.
+        frames[:, stepwise] = PchipInterpolator(t, q[:, stepwise])(at)
+    return frames, [n for n, s in zip(recording.names, stepwise, strict=True) if s]
+
+
+def _gaps(recording: Recording, start: float, end: float) -> list[str]:
+    steps = np.diff(recording.times)
+    inside = (recording.times[1:] > start) & (recording.times[:-1] < end)
+    worst = int(np.argmax(np.where(inside, steps, 0.0)))
+    if steps[worst] <= 3 * recording.period:
+        return []
+    return [
+        f"{recording.episode}: nothing recorded for {steps[worst]:.3f} s at "
+        f"{recording.times[worst]:.2f} s"
+    ]
+
+
+def _ends_in_motion(piece: np.ndarray) -> bool:
+    """Whether the last step of a channel is over 5 % of its largest step."""
+    steps = np.abs(np.diff(piece, axis=0))
+    return bool(np.any(steps[-1] > 0.05 * np.maximum(steps.max(axis=0), 1e-9)))

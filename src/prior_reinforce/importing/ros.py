@@ -1,0 +1,137 @@
+"""ROS 1 bags, ROS 2 sqlite bags and MCAP, read with rosbags (no ROS needed).
+
+A sensor_msgs/JointState topic gives one episode a bag; a trajectory_msgs/JointTrajectory topic one
+a message. Joints are matched by name in every message, because nothing fixes their order.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from prior_reinforce.errors import FileFormatError
+from prior_reinforce.importing.files import load_extra, named_damage, natural_order
+from prior_reinforce.importing.recording import Reading, Recording
+
+SUFFIXES = (".bag", ".mcap", ".db3")
+_STATE, _TRAJECTORY = "sensor_msgs/msg/JointState", "trajectory_msgs/msg/JointTrajectory"
+
+
+def bags_at(source: Path) -> list[Path]:
+    """The bags a path stands for: itself, or those of its folder; empty if there are none."""
+    if not source.is_dir():
+        return [source] if source.suffix.lower() in SUFFIXES else []
+    if (source / "metadata.yaml").is_file():
+        return [source]
+    found = [
+        path
+        for path in source.iterdir()
+        if (path.is_dir() and (path / "metadata.yaml").is_file())
+        or (path.is_file() and path.suffix.lower() in SUFFIXES)
+    ]
+    return sorted(found, key=lambda path: natural_order(path.name))
+
+
+def read_ros(source: Path, reading: Reading) -> list[Recording]:
+    """Read a bag, or every bag of a folder."""
+    highlevel = load_extra("rosbags.highlevel", "ros")
+    typesys = load_extra("rosbags.typesys", "ros")
+    bags = bags_at(source)
+    if not bags:
+        raise FileFormatError(
+            f"{source} is no bag and holds none; expected .bag, .mcap, .db3 or a ROS 2 bag's folder"
+        )
+    recordings: list[Recording] = []
+    for bag in bags:
+        name = bag.name if bag.is_dir() else bag.stem
+        if not any(e == name or e.startswith(f"{name}-") for e in reading.episodes or (name,)):
+            continue
+        with named_damage(bag, "a ROS bag"):
+            # Bags from before ROS 2 Iron carry no definitions; these two messages never changed.
+            definitions = typesys.get_typestore(typesys.Stores.LATEST)
+            with highlevel.AnyReader([bag], default_typestore=definitions) as reader:
+                connections, kind = _topic(bag, reader, reading.key)
+                messages = [
+                    (stamp, reader.deserialize(raw, connection.msgtype))
+                    for connection, stamp, raw in reader.messages(connections=connections)
+                ]
+            if not messages:
+                raise FileFormatError(f"{bag}: topic {connections[0].topic} has no messages")
+            if kind == _STATE:
+                recordings.append(_states(bag, name, messages, reading.joints))
+            else:
+                recordings.extend(_trajectories(name, [message for _, message in messages]))
+    return [recording for recording in recordings if reading.wants(recording.episode)]
+
+
+def _topic(bag: Path, reader: Any, key: str | None) -> tuple[list[Any], str]:
+    usable = {c.topic: c.msgtype for c in reader.connections if c.msgtype in (_STATE, _TRAJECTORY)}
+    if key is None and len(usable) == 1:
+        key = next(iter(usable))
+    if key not in usable:
+        listed = ", ".join(f"{topic} ({kind})" for topic, kind in sorted(usable.items()))
+        raise FileFormatError(
+            f"{bag}: {'no joint topic ' + key if key else f'{len(usable)} joint topics'}; topics "
+            f"of JointState or JointTrajectory are {listed or 'none'}: say which with the key"
+        )
+    return [c for c in reader.connections if c.topic == key], usable[key]
+
+
+def _states(
+    bag: Path, name: str, messages: list[tuple[int, Any]], joints: tuple[str, ...] | None
+) -> Recording:
+    """One episode of JointStates; messages that lack a wanted joint are another publisher's."""
+    kinds = Counter(tuple(sorted(message.name)) for _, message in messages)
+    wanted = joints
+    if wanted is None:
+        common = kinds.most_common(1)[0][0]
+        wanted = next(tuple(m.name) for _, m in messages if tuple(sorted(m.name)) == common)
+    kept = [(stamp, m) for stamp, m in messages if set(wanted) <= set(m.name)]
+    if not kept:
+        found = sorted({joint for names in kinds for joint in names})
+        raise FileFormatError(
+            f"{bag}: no message holds all of {list(wanted)}; joints in it are {found}: name those"
+        )
+    remarks = []
+    if len(kept) < len(messages):
+        remarks.append(f"{name}: {len(messages) - len(kept)} messages without all joints skipped")
+    # Everything else a message holds, such as fingers, stays available by name.
+    names = tuple(n for n in kept[0][1].name if all(n in m.name for _, m in kept))
+    rows = [[dict(zip(m.name, m.position, strict=True))[n] for n in names] for _, m in kept]
+    positions = np.array(rows, dtype=np.float64)
+    stamps = [m.header.stamp.sec * 10**9 + m.header.stamp.nanosec for _, m in kept]
+    if stamps[0] > 0 and stamps[-1] > stamps[0] and sorted(stamps) == stamps:
+        times = _seconds(stamps)
+    else:
+        times = _seconds([stamp for stamp, _ in kept])
+        remarks.append(f"{name}: header stamps unusable, times are those of the recorder")
+    # The same state may be published twice under one stamp; a second, different one is an error.
+    repeated = np.concatenate(
+        [[False], (np.diff(times) == 0) & np.all(np.diff(positions, axis=0) == 0, axis=1)]
+    )
+    return Recording(name, times[~repeated], positions[~repeated], names, remarks=tuple(remarks))
+
+
+def _seconds(stamps: list[int]) -> np.ndarray:
+    """Nanoseconds since 1970 to seconds since the first; as floats they would be 0.2 us coarse."""
+    return np.array([stamp - stamps[0] for stamp in stamps]) * 1e-9
+
+
+def _trajectories(name: str, messages: list[Any]) -> list[Recording]:
+    recordings = []
+    for index, message in enumerate(messages):
+        times = [p.time_from_start.sec + p.time_from_start.nanosec * 1e-9 for p in message.points]
+        positions = np.array([p.positions for p in message.points], dtype=np.float64)
+        episode = name if len(messages) == 1 else f"{name}-{index}"
+        recordings.append(
+            Recording(
+                episode,
+                np.array(times),
+                positions.reshape(len(times), -1),
+                tuple(message.joint_names),
+            )
+        )
+    return recordings

@@ -1,0 +1,233 @@
+"""The members of a family by name: what can be chosen, what it is set to, how it is made.
+
+A family's `__init__` holds its one `Registry`. The command line's choices and help texts,
+`reproduce`, saving and loading, and anyone's own `module:Class` follow from it. A member is named by
+its module, so that a list of names imports none of them.
+
+A class with settings takes a `config`, a frozen dataclass that its `config_type` names; one without
+may take plain arguments. A choice is written `name`, or `name,setting=value,...`: `gp`, `gp,memory_size=none`,
+`my_module:MyAdapter,gain=0.5`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import inspect
+import pkgutil
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+from prior_reinforce.errors import ConfigurationError
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Member:
+    """One name of a family."""
+
+    target: str
+    """`module:Class`."""
+    summary: str
+    """What it is, in a few words, for help texts."""
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    """Where it differs from the defaults of its class."""
+
+
+class Registry(Generic[T]):
+    """All members of one family."""
+
+    def __init__(self, family: str, base: str, members: Mapping[str, Member]) -> None:
+        """Name a family.
+
+        Args:
+            family: What a member is called, for messages: `adapter`.
+            base: `module:Class` that every member derives from.
+            members: By name, in the order of help texts.
+        """
+        self.family = family
+        self.members = dict(members)
+        self._base = base
+
+    @property
+    def help(self) -> str:
+        """The choices in one sentence, for help texts."""
+        ours = ", ".join(f"{name} ({m.summary})" for name, m in self.members.items())
+        return f"{ours}, or your own as module:Class; settings as NAME,setting=value"
+
+    def make(self, choice: str, **context: Any) -> T:
+        """Make a member.
+
+        Args:
+            choice: `name` or `module:Class`, each with settings if need be: `gp,memory_size=4`.
+            context: What a member may need beside its settings; given to those that take it.
+
+        Raises:
+            ConfigurationError: There is no such member, a setting that it does not have, or a value
+                that the setting cannot have.
+        """
+        name, given = parse_choice(choice)
+        kind, settings = self.kind(name), {**self._preset(name), **given}
+        takes = inspect.signature(kind).parameters
+        context = {key: value for key, value in context.items() if key in takes}
+        config = getattr(kind, "config_type", None)
+        try:
+            if config is None:
+                return kind(**context, **_checked_names(settings, takes, choice))
+            if settings:
+                context["config"] = build(config, settings, choice)
+            return kind(**context)
+        except (TypeError, ValueError) as error:
+            if isinstance(error, ConfigurationError):
+                raise
+            raise ConfigurationError(f"cannot make {choice}: {error}") from error
+
+    def kind(self, choice: str) -> type[T]:
+        """Return the class of a member; it is imported now.
+
+        Raises:
+            ConfigurationError: It is unknown, cannot be imported, or is of another family.
+        """
+        name, _ = parse_choice(choice)
+        member = self.members.get(name)
+        if member is None and ":" not in name:
+            raise ConfigurationError(
+                f"no {self.family} {name!r}; known are {', '.join(self.members)}, or give your own "
+                "as module:Class"
+            )
+        kind = _resolve(name if member is None else member.target)
+        base = pkgutil.resolve_name(self._base)
+        if not (isinstance(kind, type) and issubclass(kind, base)):
+            raise ConfigurationError(
+                f"{name} is not a {base.__name__}; derive it from {self._base.replace(':', '.')}"
+            )
+        return kind
+
+    def owns(self, choice: str) -> bool:
+        """Whether a choice is one of ours, by name."""
+        return parse_choice(choice)[0] in self.members
+
+    def name_of(self, made: T) -> str:
+        """Return the name of a member's class, or `module:Class` where it is not ours."""
+        target = f"{type(made).__module__}:{type(made).__qualname__}"
+        return next((n for n, m in self.members.items() if m.target == target), target)
+
+    def _preset(self, name: str) -> Mapping[str, Any]:
+        return self.members[name].settings if name in self.members else {}
+
+
+def parse_choice(choice: str) -> tuple[str, dict[str, str]]:
+    """Split `name,setting=value,...` into the name and its settings.
+
+    Raises:
+        ConfigurationError: A setting without a value, or given twice.
+    """
+    name, *parts = choice.split(",")
+    settings: dict[str, str] = {}
+    for part in parts:
+        key, equals, value = part.partition("=")
+        key = key.strip().replace("-", "_")
+        if not (equals and key) or key in settings:
+            raise ConfigurationError(
+                f"cannot read {part!r} in {choice!r}; write each setting once, as setting=value"
+            )
+        settings[key] = value.strip()
+    return name.strip(), settings
+
+
+def build(config: type[Any], settings: Mapping[str, Any], choice: str = "") -> Any:
+    """Make a dataclass of settings from plain values: numbers as text, lists for tuples.
+
+    Args:
+        config: Frozen dataclass whose fields all have defaults.
+        settings: By name; a field that is a dataclass takes a mapping.
+        choice: What was asked for, for messages.
+
+    Raises:
+        ConfigurationError: An unknown setting, or a value of a wrong type or out of range.
+    """
+    import msgspec
+
+    unknown = set(settings) - {f for f in config.__dataclass_fields__}
+    if unknown:
+        raise ConfigurationError(
+            f"{choice or config.__name__} has no setting {sorted(unknown)[0]!r}; it has "
+            f"{', '.join(config.__dataclass_fields__)}"
+        )
+    plain = {k: None if v in ("none", "None") else v for k, v in settings.items()}
+    try:
+        return msgspec.convert(plain, config, strict=False)
+    except msgspec.ValidationError as error:
+        raise ConfigurationError(f"{choice or config.__name__}: {error}") from error
+
+
+def source_digest(choice: str) -> str:
+    """Return a hash of the file that a class of one's own stands in; empty for one of ours.
+
+    Raises:
+        ConfigurationError: The module cannot be found.
+    """
+    name, _ = parse_choice(choice)
+    module, colon, _ = name.partition(":")
+    if not colon:
+        return ""
+    try:
+        found = importlib.util.find_spec(module)
+    except (ImportError, ValueError):
+        found = None
+    if found is None or found.origin is None:
+        raise ConfigurationError(
+            f"cannot find {name}; it must be importable from here (PYTHONPATH)"
+        )
+    return hashlib.sha256(Path(found.origin).read_bytes()).hexdigest()
+
+
+def _resolve(target: str) -> Any:
+    try:
+        return pkgutil.resolve_name(target)
+    except (ImportError, AttributeError, ValueError) as error:
+        raise ConfigurationError(
+            f"cannot import {target}: {error}; it must be importable from here (PYTHONPATH)"
+        ) from error
+
+
+def _checked_names(
+    settings: Mapping[str, Any], takes: Mapping[str, inspect.Parameter], choice: str
+) -> dict[str, Any]:
+    """Plain arguments of a constructor, read from text by the type of their default."""
+    arguments: dict[str, Any] = {}
+    for name, value in settings.items():
+        if name not in takes:
+            raise ConfigurationError(
+                f"{choice} has no setting {name!r}; it has {', '.join(takes) or 'none'}"
+            )
+        default = takes[name].default
+        arguments[name] = type(default)(value) if isinstance(default, (int, float, str)) else value
+    return arguments
+
+
+# --- to be removed: the callers move to registries ---
+def make_own(name: str, family: Any, known: Sequence[str]) -> Any:
+    if ":" not in name:
+        raise ConfigurationError(
+            f"no {family.__name__.lower()} {name!r}; known are {', '.join(known)}, or give your "
+            "own as module:Class"
+        )
+    made = import_and_make(name)
+    if not isinstance(made, family):
+        raise ConfigurationError(f"{name} is no {family.__name__}; derive it from that class")
+    return made
+
+
+def import_and_make(name: str) -> Any:
+    module, _, attribute = name.partition(":")
+    try:
+        return getattr(importlib.import_module(module), attribute)()
+    except (ImportError, AttributeError, TypeError, ValueError) as error:
+        raise ConfigurationError(
+            f"cannot make {name}: {error}; it must be importable from here (PYTHONPATH) and need "
+            "no arguments"
+        ) from error

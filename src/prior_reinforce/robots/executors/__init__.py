@@ -1,0 +1,1 @@
+"""Ways of executing a plan on an arm."""

@@ -1,0 +1,113 @@
+"""Outcomes beside a recording: matched, converted, and every one that is missing is named."""
+
+import numpy as np
+import pytest
+from recorded import OUTCOMES, write_csv, write_outcomes
+
+from prior_reinforce.errors import (
+    ConfigurationError,
+    FileFormatError,
+    InvalidDemonstrationsError,
+)
+from prior_reinforce.importing import import_demonstrations
+from prior_reinforce.importing.outcomes import read_outcomes
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory):
+    """Six CSV throws without outcomes; copy nothing into it."""
+    return write_csv(tmp_path_factory.mktemp("throws"))
+
+
+def table(tmp_path, text):
+    path = tmp_path / "outcomes.csv"
+    path.write_text(text)
+    return path
+
+
+def test_without_outcomes_every_episode_is_named(recording):
+    with pytest.raises(InvalidDemonstrationsError, match=r"episodes 0, 1, 2, 3, 4, 5.*outcomes.cs"):
+        import_demonstrations(recording)
+
+
+def test_those_that_are_missing_are_named(recording, tmp_path):
+    path = table(tmp_path, "episode,x,y\n0,0.8,0.1\n1,0.9,0.2\n3,0.9,-0.1\n4,,\n5,1,0\n")
+    with pytest.raises(InvalidDemonstrationsError, match="no outcome for episodes 2, 4 in"):
+        import_demonstrations(recording, outcomes=path)
+
+
+def test_those_of_no_episode_are_named(recording, tmp_path):
+    path = write_outcomes(tmp_path, OUTCOMES | {"17": (1.0, 1.0)})
+    with pytest.raises(InvalidDemonstrationsError, match="names episodes 17 that were not found"):
+        import_demonstrations(recording, outcomes=path)
+
+
+def test_given_numbers(recording):
+    result = import_demonstrations(recording, outcomes=OUTCOMES)
+    np.testing.assert_array_equal(result.demonstrations.outcomes_seen, list(OUTCOMES.values()))
+    with pytest.raises(ConfigurationError, match="must be numbers"):
+        import_demonstrations(recording, outcomes={"0": ["far", 1]})
+    with pytest.raises(InvalidDemonstrationsError, match="finite numbers"):
+        import_demonstrations(recording, outcomes=OUTCOMES | {"2": (float("nan"), 0.0)})
+    with pytest.raises(InvalidDemonstrationsError, match="components"):
+        import_demonstrations(recording, outcomes=OUTCOMES | {"2": (1.0,)})
+
+
+def test_centimetres_in_a_columns_name_are_converted(tmp_path):
+    path = table(tmp_path, "episode,x_cm,y_mm,z_m,t,source\n0,92,-50,0.3,1.5,tape\n")
+    outcomes = read_outcomes(path)
+    assert outcomes.names == ("x", "y", "z", "t")
+    np.testing.assert_allclose(outcomes.values["0"], (0.92, -0.05, 0.3, 1.5))
+
+
+def test_columns_in_another_order_are_matched_by_name(recording, tmp_path):
+    lines = ["y,episode,x"] + [f"{y},{name},{x}" for name, (x, y) in OUTCOMES.items()]
+    path = table(tmp_path, "\n".join(lines))
+    named = import_demonstrations(recording, outcomes=path, outcome_names=("x", "y"))
+    np.testing.assert_allclose(named.demonstrations.outcomes_seen, list(OUTCOMES.values()))
+    as_written = import_demonstrations(recording, outcomes=path).demonstrations
+    assert as_written.outcome_names == ("y", "x")
+    one = import_demonstrations(recording, outcomes=path, outcome_names=("x",)).demonstrations
+    np.testing.assert_allclose(one.outcomes_seen[:, 0], [x for x, _ in OUTCOMES.values()])
+    with pytest.raises(InvalidDemonstrationsError, match="no column z; it has y, x"):
+        import_demonstrations(recording, outcomes=path, outcome_names=("x", "z"))
+
+
+def test_episodes_are_matched_by_their_number(recording, tmp_path):
+    named = {f"demo_{int(name):04d}": values for name, values in OUTCOMES.items()}
+    result = import_demonstrations(recording, outcomes=write_outcomes(tmp_path, named))
+    np.testing.assert_allclose(result.demonstrations.outcomes_seen, list(OUTCOMES.values()))
+
+
+def test_numbers_that_two_names_share_match_nothing(recording, tmp_path):
+    named = {f"a{name}": values for name, values in OUTCOMES.items()} | {"b3": (2.0, 2.0)}
+    with pytest.raises(InvalidDemonstrationsError, match="no outcome for episodes 3 in"):
+        import_demonstrations(recording, outcomes=write_outcomes(tmp_path, named))
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("", "expected column names"),
+        ("a,b\n1,2\n", "expected column names"),
+        ("episode\n1\n", "expected column names"),
+        ("episode,x,x\n1,2,3\n", "expected column names"),
+        ("episode,x,y\n1,2\n", "line 2: 2 cells for 3 columns"),
+        ("episode,x,y\n1,2,3\n1,2,4\n", "line 3: episode 1 again"),
+        ("episode,x,y\n1,5cm,3\n", "line 2: '5cm' is no finite number"),
+        ("episode,x,y\n1,inf,3\n", "line 2: 'inf' is no finite number"),
+        ("episode,x,y\n1,2,\n", "line 2: '' is no finite number"),
+    ],
+)
+def test_tables_that_cannot_be_read(tmp_path, text, says):
+    with pytest.raises(FileFormatError, match=says):
+        read_outcomes(table(tmp_path, text))
+
+
+def test_a_table_in_another_encoding(tmp_path):
+    path = tmp_path / "outcomes.csv"
+    path.write_bytes(b"episode,x\n\xff\xfe,1\n")
+    with pytest.raises(FileFormatError, match="CSV in UTF-8"):
+        read_outcomes(path)
+    with pytest.raises(FileFormatError, match="no outcomes at"):
+        read_outcomes(tmp_path / "missing.csv")

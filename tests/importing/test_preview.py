@@ -1,0 +1,110 @@
+"""The preview says what was found, in about ten lines and one picture."""
+
+import numpy as np
+import pytest
+from matplotlib.image import imread
+from recorded import JOINTS, OUTCOMES, write_bags, write_csv, write_npz, write_outcomes
+
+from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
+from prior_reinforce.importing import Preprocessing, import_demonstrations
+from prior_reinforce.importing.picture import hull_corners
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = write_npz(tmp_path_factory.mktemp("preview"))
+    write_outcomes(folder)
+    return folder
+
+
+def test_the_text(folder):
+    lines = import_demonstrations(folder).preview.text.splitlines()
+    assert 8 <= len(lines) <= 12
+    rows = {line[:11].strip(): line[12:] for line in lines}
+    assert rows["episodes"].startswith(f"6 from {folder.name} (npz): throw_0, throw_1")
+    assert rows["rate"] == "recorded at 100 Hz, plans at 100 Hz (dt 0.01 s)"
+    assert rows["still ends"].startswith("dropped 0.2")
+    assert "5 hold their last pose" in rows["length"]
+    # Joint 6 of the largest throw: 0.9 * 1.25 rad; the fastest is 0.9 * 1.15 * 15/8 in 1.0 s.
+    assert "joint6 moves most, over 1.12 rad" in rows["motion"]
+    assert "joint6 of throw_3, 1.94 rad/s" in rows["motion"]
+    assert rows["outcomes"] == "x 0.8 to 1.05 m, y -0.09 to 0.14 m, from outcomes.csv"
+    assert rows["remarks"] == "none"
+
+
+def test_the_hull_has_its_area(folder):
+    # The corners 0, 1, 5, 4 by the shoelace formula.
+    x, y = np.array([OUTCOMES[i] for i in "0154"]).T
+    area = 0.5 * abs(sum(x[i - 1] * y[i] - x[i] * y[i - 1] for i in range(4)))
+    text = import_demonstrations(folder).preview.text
+    assert f"hull in x and y of {area:.3g} m^2 by 4 of 6" in text
+    assert "nearest two are throw_0 and throw_2, 0.102 apart" in text
+
+
+def test_the_picture_is_drawn(folder, tmp_path):
+    result = import_demonstrations(folder)
+    result.preview.draw(tmp_path / "preview.png")
+    picture = imread(tmp_path / "preview.png")
+    assert picture.shape[1] > 1000
+    # Each of six colours is drawn in more than the outcomes' dots.
+    for colour in ([31, 119, 180], [140, 86, 75]):
+        assert np.sum(np.abs(picture[..., :3] * 255 - colour).sum(axis=-1) < 6) > 200
+
+
+@pytest.mark.parametrize("k", [1, 3])
+def test_outcomes_of_other_dimensions(folder, tmp_path, k):
+    rng = np.random.default_rng(0)
+    outcomes = {name: rng.uniform(0, 1, k) for name in OUTCOMES}
+    result = import_demonstrations(folder, outcomes=outcomes)
+    assert result.demonstrations.outcome_dim == k
+    assert ("hull" in result.preview.text) == (k > 1)
+    result.preview.draw(tmp_path / "preview.png")
+
+
+def test_points_on_a_line_have_no_hull():
+    assert hull_corners(np.array([[0.0, 0], [1, 1], [2, 2]])).size == 0
+
+
+def test_many_remarks_are_counted(tmp_path):
+    write_bags(tmp_path, kind="mcap", gripper_apart=True, rate=20)
+    write_outcomes(tmp_path)
+    preview = import_demonstrations(tmp_path, joints=JOINTS).preview
+    assert len(preview.remarks) == 6
+    assert preview.text.splitlines()[-1] == "  - and 2 more"
+
+
+def test_joints_are_picked_renamed_and_converted(tmp_path):
+    write_outcomes(write_csv(tmp_path))
+    plain = import_demonstrations(tmp_path, preprocessing=Preprocessing(trim=False))
+    result = import_demonstrations(
+        tmp_path,
+        joints=["joint6", "joint4"],
+        names=["wrist", "elbow"],
+        units=["deg", "rad"],
+        preprocessing=Preprocessing(trim=False),
+    ).demonstrations
+    assert result.format.names == ("wrist", "elbow")
+    assert result.format.units == ("rad", "rad")
+    np.testing.assert_allclose(result.plans[..., 0], np.deg2rad(plain.demonstrations.plans[..., 5]))
+    np.testing.assert_array_equal(result.plans[..., 1], plain.demonstrations.plans[..., 3])
+
+
+def test_joints_that_do_not_fit(folder):
+    with pytest.raises(InvalidDemonstrationsError, match=r"no joint elbow; it has joint1, joint2"):
+        import_demonstrations(folder, joints=["elbow"])
+    with pytest.raises(ConfigurationError, match="need as many names"):
+        import_demonstrations(folder, names=["a"])
+    with pytest.raises(ConfigurationError, match="must be names that differ"):
+        import_demonstrations(folder, joints=["joint1", "joint1"])
+
+
+def test_columns_without_names(tmp_path):
+    plans = np.random.default_rng(0).normal(size=(6, 20, 3))
+    np.savez(tmp_path / "all.npz", q=plans, rate=20)
+    options = {"outcomes": OUTCOMES, "preprocessing": Preprocessing(trim=False)}
+    made_up = import_demonstrations(tmp_path / "all.npz", **options).demonstrations
+    assert made_up.format.names == ("joint1", "joint2", "joint3")
+    named = import_demonstrations(tmp_path / "all.npz", joints="xyz", **options).demonstrations
+    assert named.format.names == ("x", "y", "z")
+    with pytest.raises(InvalidDemonstrationsError, match="3 columns without names, but 2"):
+        import_demonstrations(tmp_path / "all.npz", joints="xy", **options)

@@ -1,0 +1,179 @@
+"""Plan files: what is in them, that they never change, and what damaged ones say."""
+
+import csv
+import errno
+import hashlib
+import json
+import os
+import stat
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from prior_reinforce.errors import (
+    ConfigurationError,
+    FileFormatError,
+    PriorReinforceError,
+    WorkspaceError,
+)
+from prior_reinforce.plans.encoding import encode_plan
+from prior_reinforce.plans.files import PlanFile, read_plan, write_plan
+from prior_reinforce.plans.motions import Plan, PlanFormat
+from prior_reinforce.workspace import write_once
+
+DT = 0.01
+
+
+@pytest.fixture
+def plan():
+    s = np.linspace(0, 1, 101)[:, None]
+    rise = 10 * s**3 - 15 * s**4 + 6 * s**5
+    names = tuple(f"joint{i}" for i in range(1, 8))
+    return Plan(0.1 + rise * np.linspace(-1, 1, 7), PlanFormat(names, ("rad",) * 7, DT))
+
+
+def test_npz_holds_positions_and_their_derivatives(plan, tmp_path):
+    file = write_plan(plan, tmp_path / "plan.npz")
+    with np.load(file.path, allow_pickle=False) as archive:
+        np.testing.assert_array_equal(archive["q"], plan.actions)
+        np.testing.assert_allclose(archive["t"], np.arange(101) * DT)
+        # Half way a minimum-jerk swing has speed 15/8 and no acceleration; the ends rest.
+        assert archive["dq"][50, 6] == pytest.approx(15 / 8, rel=1e-4)
+        assert archive["ddq"][50, 6] == pytest.approx(0, abs=1e-9)
+        np.testing.assert_allclose(archive["dq"][[0, -1]], 0, atol=1e-12)
+
+
+def test_npz_reads_back_the_same_plan(plan, tmp_path):
+    file = write_plan(plan, tmp_path / "plan.npz")
+    back = read_plan(file.path, sha256=file.sha256)
+    np.testing.assert_array_equal(back.actions, plan.actions)
+    assert back.format == plan.format
+
+
+def test_a_finer_rate(plan, tmp_path):
+    file = write_plan(plan, tmp_path / "fine.npz", rate=1000)
+    back = read_plan(file.path)
+    assert back.horizon == 1001
+    assert back.format.dt == 0.001
+    np.testing.assert_allclose(back.actions[::10], plan.actions, atol=1e-12)
+
+
+def test_csv_reads_back_exactly(plan, tmp_path):
+    write_plan(plan, tmp_path / "plan.csv")
+    with open(tmp_path / "plan.csv", newline="") as file:
+        rows = list(csv.reader(file))
+    assert rows[0][:3] == ["t", "joint1", "joint2"]
+    assert rows[0][8] == "d_joint1"
+    assert rows[0][-1] == "dd_joint7"
+    np.testing.assert_array_equal(np.array(rows[1:], dtype=float)[:, 1:8], plan.actions)
+
+
+def test_json_has_the_field_order_of_a_joint_trajectory(plan, tmp_path):
+    write_plan(plan, tmp_path / "plan.json")
+    message = json.loads((tmp_path / "plan.json").read_text())
+    assert list(message) == ["header", "joint_names", "points"]
+    assert list(message["header"]) == ["stamp", "frame_id"]
+    point = message["points"][-1]
+    assert list(point) == [
+        "positions",
+        "velocities",
+        "accelerations",
+        "effort",
+        "time_from_start",
+    ]
+    assert point["time_from_start"] == {"sec": 1, "nanosec": 0}
+    assert message["points"][29]["time_from_start"] == {"sec": 0, "nanosec": 290_000_000}
+    np.testing.assert_array_equal([p["positions"] for p in message["points"]], plan.actions)
+
+
+@pytest.mark.parametrize("kind", ["npz", "csv", "json"])
+def test_the_same_plan_is_the_same_bytes(plan, tmp_path, kind):
+    first = write_plan(plan, tmp_path / f"a.{kind}")
+    second = write_plan(Plan(plan.actions, plan.format), tmp_path / f"b.{kind}")
+    assert first.sha256 == second.sha256
+    assert first.sha256 == hashlib.sha256(first.path.read_bytes()).hexdigest()
+
+
+def test_a_plan_is_written_once(plan, tmp_path):
+    file = write_plan(plan, tmp_path / "plan.npz")
+    assert not stat.S_IMODE(file.path.stat().st_mode) & 0o222
+    assert write_plan(plan, file.path) == file
+    other = Plan(plan.actions + 0.001, plan.format)
+    with pytest.raises(FileFormatError, match="never overwritten"):
+        write_plan(other, file.path)
+    file.verify()
+    assert [entry.name for entry in tmp_path.iterdir()] == ["plan.npz"]
+
+
+def test_a_changed_plan_is_noticed(plan, tmp_path):
+    file = write_plan(plan, tmp_path / "plan.npz")
+    file.path.chmod(0o644)
+    file.path.write_bytes(encode_plan(Plan(plan.actions * 1.0001, plan.format), "npz"))
+    with pytest.raises(FileFormatError, match="put the original back"):
+        file.verify()
+    with pytest.raises(FileFormatError, match="never change"):
+        read_plan(file.path, sha256=file.sha256)
+    file.path.unlink()
+    with pytest.raises(FileFormatError, match="cannot read"):
+        file.verify()
+
+
+@pytest.mark.parametrize("code", [errno.ENOSPC, errno.EROFS])
+def test_a_disk_that_refuses_leaves_nothing(plan, tmp_path, monkeypatch, code):
+    def refuse(descriptor):
+        raise OSError(code, os.strerror(code))
+
+    monkeypatch.setattr(write_once.os, "fsync", refuse)
+    with pytest.raises(WorkspaceError, match=os.strerror(code)):
+        write_plan(plan, tmp_path / "plan.npz")
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_disk_without_links(plan, tmp_path, monkeypatch):
+    def refuse(source, target):
+        raise PermissionError(errno.EPERM, "Operation not permitted")
+
+    monkeypatch.setattr(write_once.os, "link", refuse)
+    file = write_plan(plan, tmp_path / "plan.npz")
+    file.verify()
+    with pytest.raises(FileFormatError, match="never overwritten"):
+        write_plan(Plan(plan.actions + 1, plan.format), file.path)
+
+
+def test_no_such_folder(plan, tmp_path):
+    with pytest.raises(WorkspaceError, match="make the folder first"):
+        write_plan(plan, tmp_path / "missing" / "plan.npz")
+
+
+def test_unknown_suffix(plan, tmp_path):
+    with pytest.raises(ConfigurationError, match=r"\.npz, \.csv or \.json"):
+        write_plan(plan, tmp_path / "plan.xlsx")
+    assert write_plan(plan, tmp_path / "plan", format="csv").path.name == "plan"
+
+
+def test_missing_plan(tmp_path):
+    with pytest.raises(FileFormatError, match="no plan at"):
+        read_plan(tmp_path / "plan.npz")
+
+
+@settings(max_examples=60, deadline=None)
+@given(cut=st.booleans(), where=st.floats(0, 1, exclude_max=True), bit=st.integers(0, 7))
+def test_damaged_files_are_named_errors_or_noticed_by_the_hash(cut, where, bit, tmp_path_factory):
+    frames = np.cumsum(np.ones((20, 2)), axis=0)
+    plan = Plan(frames, PlanFormat(("a", "b"), ("rad", "rad"), DT))
+    content = encode_plan(plan, "npz")
+    damaged = bytearray(content)
+    position = int(where * len(content))
+    damaged[position] ^= 1 << bit
+    path = tmp_path_factory.mktemp("plans") / "plan.npz"
+    path.write_bytes(content[:position] if cut else damaged)
+    with pytest.raises(FileFormatError):
+        PlanFile(path, hashlib.sha256(content).hexdigest()).verify()
+    try:
+        back = read_plan(path)
+    except PriorReinforceError:
+        return
+    # The flipped bit lies outside what is read, such as a stored date.
+    np.testing.assert_array_equal(back.actions, plan.actions)

@@ -1,0 +1,144 @@
+"""Motions: what is checked once, and what comes back from disk."""
+
+import json
+import re
+import warnings
+
+import numpy as np
+import pytest
+
+from prior_reinforce.errors import FileFormatError, InvalidDemonstrationsError, InvalidPlanError
+from prior_reinforce.plans.motions import Demonstrations, Plan, PlanFormat
+
+FORMAT = PlanFormat(names=("joint1", "joint2"), units=("rad", "rad"), dt=0.01)
+RNG_SEED = 0
+
+
+def make(n=4, horizon=5, **changes):
+    rng = np.random.default_rng(RNG_SEED)
+    given = {
+        "plans": rng.normal(size=(n, horizon, 2)),
+        "outcomes_seen": rng.uniform(0.5, 1.0, size=(n, 2)),
+        "format": FORMAT,
+    }
+    return Demonstrations(**(given | changes))
+
+
+def test_round_trip_keeps_every_bit_and_the_meaning(tmp_path):
+    demos = make(outcome_names=("x", "t"), outcome_units=("m", "s"))
+    demos.save(tmp_path / "demos.npz")
+    loaded = Demonstrations.load(tmp_path / "demos.npz")
+    np.testing.assert_array_equal(loaded.plans, demos.plans)
+    np.testing.assert_array_equal(loaded.outcomes_seen, demos.outcomes_seen)
+    assert loaded.format == FORMAT
+    assert loaded.outcome_names == ("x", "t")
+    assert loaded.outcome_units == ("m", "s")
+
+
+def test_saving_twice_gives_the_same_arrays_and_no_pickle(tmp_path):
+    make().save(tmp_path / "demos.npz")
+    with np.load(tmp_path / "demos.npz", allow_pickle=False) as archive:
+        assert set(archive.files) == {"plans", "outcomes_seen", "metadata"}
+        assert json.loads(str(archive["metadata"]))["format"]["dt"] == 0.01
+
+
+def test_arrays_are_own_copies_and_read_only():
+    plans = np.zeros((2, 3, 2))
+    plans[1] = 1
+    demos = make(plans=plans, outcomes_seen=[[0.1, 0.2], [0.3, 0.1]])
+    plans += 5
+    assert demos.plans.max() == 1
+    with pytest.raises(ValueError, match="read-only"):
+        demos.plans[0, 0, 0] = 9
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"plans": np.zeros((4, 5, 3))}, "3 action dimensions"),
+        ({"plans": np.zeros((4, 5))}, "shape"),
+        ({"plans": np.full((4, 5, 2), np.nan)}, "finite"),
+        ({"plans": [np.zeros((5, 2))] * 3 + [np.zeros((6, 2))]}, r"mixed horizons \[5, 6\]"),
+        ({"outcomes_seen": np.zeros((3, 2))}, "4 plans need as many outcomes"),
+        ({"outcomes_seen": np.full((4, 2), np.inf)}, "finite"),
+        ({"outcomes_seen": [[0.1, 0.2]] * 4}, "same outcome"),
+        ({"outcomes_seen": [[0.1 * i, 0.2 * i] for i in range(4)]}, "one line"),
+        ({"outcomes_seen": [[0.1 * i, 0.2] for i in range(4)]}, "component 1"),
+        ({"plans": np.zeros((1, 5, 2)), "outcomes_seen": [[0.1, 0.2]]}, "at least two"),
+        ({"outcome_names": ("x",)}, "2 components"),
+    ],
+)
+def test_bad_demonstrations_are_named(changes, message):
+    with pytest.raises(InvalidDemonstrationsError, match=message):
+        make(**changes)
+
+
+@pytest.mark.parametrize(
+    ("names", "units", "dt", "message"),
+    [
+        ((), (), 0.1, "at least one"),
+        (("a", "a"), ("rad", "rad"), 0.1, "differ"),
+        (("a", "b"), ("rad",), 0.1, "as many units"),
+        (("a",), ("rad",), 0.0, "positive"),
+        (("a",), ("rad",), float("nan"), "positive"),
+    ],
+)
+def test_bad_formats_are_named(names, units, dt, message):
+    with pytest.raises(InvalidPlanError, match=message):
+        PlanFormat(names, units, dt)
+
+
+def test_plan_times_follow_dt():
+    plan = Plan(np.zeros((4, 2)), FORMAT)
+    np.testing.assert_allclose(plan.times, [0, 0.01, 0.02, 0.03])
+
+
+def test_units_that_look_wrong_are_only_warned_about():
+    with pytest.warns(UserWarning, match="centimetres"):
+        make(outcomes_seen=np.random.default_rng(0).uniform(50, 100, (4, 2)))
+    with pytest.warns(UserWarning, match="degrees"):
+        make(plans=np.random.default_rng(0).normal(size=(4, 5, 2)) * 90)
+
+
+def test_goal_far_outside_warns_and_says_how_far_and_a_near_one_is_silent():
+    demos = make(outcomes_seen=[[0.8, -0.2], [1.0, -0.2], [0.8, 0.2], [1.0, 0.2]])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        np.testing.assert_array_equal(demos.check_goal([1.05, 0.0]), [1.05, 0.0])
+    with pytest.warns(UserWarning, match=r"0\.5.*outside"):
+        demos.check_goal([1.5, 0.0])
+
+
+@pytest.mark.parametrize("value", [3e304, -1.7e308])
+def test_how_far_outside_a_goal_is_can_be_said_however_far(value):
+    with pytest.warns(UserWarning, match=re.escape(f"goal [{value:.4g}")) as warned:
+        make().check_goal([value, 0.7])
+    assert len(warned) == 1
+
+
+def test_missing_truncated_flipped_and_foreign_files_are_named(tmp_path):
+    with pytest.raises(FileFormatError, match="no demonstrations at"):
+        Demonstrations.load(tmp_path / "none.npz")
+    make().save(tmp_path / "demos.npz")
+    whole = (tmp_path / "demos.npz").read_bytes()
+    bad = tmp_path / "bad.npz"
+    for size in (0, 10, len(whole) // 2, len(whole) - 3):
+        bad.write_bytes(whole[:size])
+        with pytest.raises(FileFormatError, match="not a demonstrations file"):
+            Demonstrations.load(bad)
+    rng = np.random.default_rng(1)
+    for position in rng.integers(0, len(whole), 100):
+        flipped = bytearray(whole)
+        flipped[position] ^= 1 << int(rng.integers(8))
+        bad.write_bytes(flipped)
+        try:
+            loaded = Demonstrations.load(bad)
+        except (FileFormatError, InvalidDemonstrationsError):
+            continue
+        np.testing.assert_array_equal(loaded.plans, make().plans)
+    np.savez(bad, other=np.zeros(3))
+    with pytest.raises(FileFormatError):
+        Demonstrations.load(bad)
+    np.savez(bad, plans=np.array([{}], dtype=object), outcomes_seen=[1], metadata="{}")
+    with pytest.raises(FileFormatError):
+        Demonstrations.load(bad)
