@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from jaxtyping import Float
 from numpy.typing import ArrayLike
 
 from prior_reinforce.errors import (
@@ -17,6 +18,15 @@ from prior_reinforce.errors import (
     InvalidGoalError,
     InvalidPlanError,
 )
+
+Plans = Float[np.ndarray, "n H D"]
+"""Action plans A, one for each of n conditions, in the units of their `PlanFormat`."""
+Frames = Float[np.ndarray, "H D"]
+"""One action plan: H frames of D numbers."""
+Points = Float[np.ndarray, "n k"]
+"""Outcomes, conditions, goals or errors, one a row, in the outcomes' units, mostly [m]."""
+Point = Float[np.ndarray, " k"]
+"""One outcome, condition, goal or error."""
 
 
 def as_plans(
