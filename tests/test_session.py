@@ -8,11 +8,14 @@ from prior_reinforce.errors import (
     ConfigurationError,
     InvalidFeedbackError,
     InvalidGoalError,
+    RobotLimitError,
     TrialStateError,
+    WorkspaceError,
 )
 from prior_reinforce.generators.base import Generator
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
-from prior_reinforce.session import Session, TrialState, ask_all
+from prior_reinforce.session import Session, ask_all
+from prior_reinforce.trials import MemoryLog, Stage
 
 DEMOS = Demonstrations(
     plans=np.arange(2 * 3 * 2, dtype=float).reshape(2, 3, 2),
@@ -77,7 +80,7 @@ def test_a_constant_offset_is_corrected_in_the_second_trial(session):
     np.testing.assert_allclose(session.trials[1].condition, GOAL - offset)
     assert session.solved
     assert [trial.hit for trial in session.trials] == [False, True]
-    assert (session.n_trials, session.total_trials) == (2, 4)
+    assert session.n_trials == 2
 
 
 def test_the_first_condition_is_m_of_the_goal_and_the_plan_is_pi_of_it(session):
@@ -90,7 +93,7 @@ def test_the_first_condition_is_m_of_the_goal_and_the_plan_is_pi_of_it(session):
 def test_ask_is_idempotent_until_told(session):
     first = session.ask()
     assert session.ask() is first
-    assert session._generator.calls == 1
+    assert session.generator.calls == 1
     session.tell(1, [0.05, 0.0])
     assert session.ask().number == 2
 
@@ -142,23 +145,112 @@ def test_voiding_a_told_trial_forgets_it(session):
     np.testing.assert_allclose(session.ask().condition, GOAL - [0.05, 0.0])
 
 
-def test_a_session_goes_on_from_its_trials(session):
+def test_a_session_goes_on_from_its_log(session):
     session.tell(session.ask().number, [0.05, 0.0])
     session.ask()
-    again = Session(
-        RepeatingGenerator(), FullStepAdapter(), DEMOS, GOAL, 0.015, trials=session.trials
-    )
-    assert again.pending is session.pending
+    again = Session(RepeatingGenerator(), FullStepAdapter(), DEMOS, log=session.log)
+    np.testing.assert_array_equal(again.goal, GOAL)
+    assert again.open_trial.number == session.open_trial.number == 2
     again.tell(2, [0.01, 0.02])
-    session.tell(2, [0.01, 0.02])
-    np.testing.assert_array_equal(again.ask().condition, session.ask().condition)
+    assert session.ask().number == 3
+    np.testing.assert_array_equal(again.ask().condition, GOAL - [0.05, 0.0] - [0.01, 0.02])
 
 
-def test_earlier_trials_reach_the_adapter_before_its_own():
-    earlier = [(np.array([0.8, 0.0]), np.array([0.85, 0.0]))]
-    session = Session(RepeatingGenerator(), FullStepAdapter(), DEMOS, GOAL, 0.015, earlier=earlier)
-    np.testing.assert_allclose(session.ask().condition, [0.8, 0.0] - (np.array([0.85, 0.0]) - GOAL))
-    assert session.n_trials == 0
+def test_two_sessions_on_one_log_tell_a_trial_once(session):
+    other = Session(RepeatingGenerator(), FullStepAdapter(), DEMOS, log=session.log)
+    assert other.ask().number == session.ask().number == 1
+    other.tell(1, [0.05, 0.0])
+    with pytest.raises(TrialStateError, match="already told"):
+        session.tell(1, [0.0, 0.0])
+
+
+@pytest.mark.parametrize("carry_over", [False, True])
+def test_trials_of_earlier_goals_reach_the_adapter_where_they_are_carried_over(carry_over):
+    session = Session(
+        RepeatingGenerator(), FullStepAdapter(), DEMOS, [0.8, 0.0], 0.015, carry_over=carry_over
+    )
+    session.tell(session.ask().number, [0.05, 0.0])
+    session.set_goal(GOAL)
+    expected = [0.8, 0.0] - (np.array([0.85, 0.0]) - GOAL) if carry_over else GOAL
+    trial = session.ask()
+    np.testing.assert_allclose(trial.condition, expected)
+    assert (trial.number, trial.goal_number, session.n_trials) == (2, 2, 0)
+
+
+def test_trials_of_another_model_teach_nothing(session):
+    session.tell(session.ask().number, [0.05, 0.0])
+    other = Session(
+        RepeatingGenerator(), FullStepAdapter(), DEMOS, log=session.log, model="another"
+    )
+    np.testing.assert_array_equal(other.ask().condition, GOAL)
+
+
+def test_a_goal_waits_for_the_open_trial(session):
+    session.ask()
+    with pytest.raises(TrialStateError, match="tell or void it"):
+        session.set_goal([0.8, 0.0])
+    session.void(1, "")
+    assert session.set_goal([0.8, 0.0], 0.02).tolerance == 0.02
+
+
+class Gate:
+    """Refuses plans that go beyond a limit, which may change."""
+
+    limit = 10.0
+
+    def __call__(self, plan):
+        self.largest = float(np.abs(plan).max())
+        return self
+
+    def require(self):
+        if self.largest > self.limit:
+            raise RobotLimitError(f"{self.largest} is beyond {self.limit}")
+
+    def as_json(self):
+        return {"largest": self.largest}
+
+
+def test_a_refused_plan_never_leaves_whenever_it_is_asked_for():
+    gate = Gate()
+    session = Session(RepeatingGenerator(), FullStepAdapter(), DEMOS, GOAL, 0.015, gate=gate)
+    gate.limit = 0.5
+    with pytest.raises(RobotLimitError, match="no plan for the condition"):
+        session.ask()
+    assert session.trials == ()
+    gate.limit = 10.0
+    assert session.ask().kept["gate"] == {"largest": 0.9}
+    gate.limit = 0.5
+    with pytest.raises(RobotLimitError, match="void it and ask again"):
+        session.ask()
+    session.void(1, "refused")
+
+
+def test_a_plan_is_executed_once_and_what_was_cut_off_is_for_a_person_to_say(session):
+    session.ask()
+    session.begin_execution(1, "arm {plan}")
+    with pytest.raises(TrialStateError, match="did the arm move"):
+        session.ask()
+    assert session.ask(arm_did_not_move=True).stage is Stage.ASKED
+    session.begin_execution(1, "arm {plan}")
+    assert session.end_execution(1, {"exit_status": 0}).stage is Stage.EXECUTED
+    with pytest.raises(TrialStateError, match="a plan runs once"):
+        session.begin_execution(1, "arm {plan}")
+    assert session.tell(1, [0.0, 0.0]).hit
+
+
+def test_told_while_it_executes_it_stays_told(session):
+    session.ask()
+    session.begin_execution(1, "arm {plan}")
+    session.tell(1, [0.05, 0.0])
+    assert session.end_execution(1, {"exit_status": 0}).stage is Stage.TOLD
+
+
+@pytest.mark.parametrize("hit", ["no", 1, [True]])
+def test_a_hit_is_yes_or_no(session, hit):
+    session.ask()
+    with pytest.raises(InvalidFeedbackError, match="hit must be"):
+        session.tell(1, [0.0, 0.0], hit=hit)
+    assert session.tell(1, [0.5, 0.0], hit=np.True_).hit is True
 
 
 @pytest.mark.parametrize("error", [[0.1], [np.nan, 0.0], [0.1, np.inf], "x", [[1], [1, 2]]])
@@ -166,8 +258,8 @@ def test_bad_feedback_changes_nothing(session, error):
     trial = session.ask()
     with pytest.raises(InvalidFeedbackError):
         session.tell(1, error)
-    assert session.pending is trial
-    assert session._adapter.seen == []
+    assert session.open_trial is trial
+    assert session.n_trials == 0
 
 
 def test_wrong_numbers_and_states_are_named_and_change_nothing(session):
@@ -185,7 +277,7 @@ def test_wrong_numbers_and_states_are_named_and_change_nothing(session):
     session.void(1, "slipped")
     with pytest.raises(TrialStateError, match="already voided"):
         session.void(1, "again")
-    assert [trial.state for trial in session.trials] == [TrialState.VOIDED]
+    assert [trial.stage for trial in session.trials] == [Stage.VOIDED]
 
 
 @pytest.mark.parametrize("number", [1.0, "1", None, True, [1]])
@@ -209,12 +301,13 @@ def test_a_goal_of_the_wrong_dimension_is_named():
         Session(RepeatingGenerator(), FullStepAdapter(), DEMOS, [0.9], 0.01)
 
 
-def test_trials_out_of_order_are_refused(session):
+def test_a_log_that_does_not_fit_together_is_refused(session):
     session.tell(session.ask().number, [0.05, 0.0])
-    session.ask()
-    for wrong in (session.trials[1:], session.trials[::-1]):
-        with pytest.raises(TrialStateError, match="cannot stand"):
-            Session(RepeatingGenerator(), FullStepAdapter(), DEMOS, GOAL, 0.015, trials=wrong)
+    log = MemoryLog()
+    for event in reversed(session.log.events()):
+        log.append(event.kind, event.data)
+    with pytest.raises(WorkspaceError, match="does not fit the ones before"):
+        Session(RepeatingGenerator(), FullStepAdapter(), DEMOS, log=log)
 
 
 def test_asking_many_sessions_calls_the_generator_once_and_agrees_with_asking_each():

@@ -18,7 +18,8 @@ from prior_reinforce.generators import (
 from prior_reinforce.perception import Amplified, Exact, Eye, Perception
 from prior_reinforce.plans.motions import Demonstrations, Plan, PlanFormat
 from prior_reinforce.rollouts import KeyFrame, Rollout
-from prior_reinforce.session import Session, Trial, TrialState
+from prior_reinforce.session import Session
+from prior_reinforce.trials import Event, Goal, Stage, Trial
 from prior_reinforce.tasks import Task, make_task
 
 __version__ = version("prior-reinforce")
@@ -44,7 +45,7 @@ __all__ = [
     "Session",
     "Task",
     "Trial",
-    "TrialState",
+    "Stage",
     "load_generator",
     "make_task",
 ]

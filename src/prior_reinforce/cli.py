@@ -1,12 +1,13 @@
 """The `prior-reinforce` command: parse to a dataclass, call once, print.
 
-Each command is a class in `commands/`; this file lists them. What a user did wrong is one line on
+Each command is a class in `commands/`; this file lists them, and imports the one that is called. What a user did wrong is one line on
 standard error and exit status 2.
 """
 
 from __future__ import annotations
 
 import os
+import pkgutil
 import sys
 import warnings
 from collections.abc import Sequence
@@ -14,13 +15,6 @@ from typing import Protocol
 
 import tyro
 
-from prior_reinforce.commands.importing import Import
-from prior_reinforce.commands.learning import Learn
-from prior_reinforce.commands.photographs import Calibrate, Look
-from prior_reinforce.commands.reproduce import Reproduce
-from prior_reinforce.commands.simulated import Adapt, Demo, Rollout
-from prior_reinforce.commands.trials import Amend, Ask, Export, Tell, Void
-from prior_reinforce.commands.workspace import Goal, Log, New, Report, Status
 from prior_reinforce.errors import PriorReinforceError
 
 
@@ -31,26 +25,28 @@ class Command(Protocol):
         """Do it; the exit status, None for 0."""
 
 
-COMMANDS: dict[str, type[Command]] = {
-    "demo": Demo,
-    "learn": Learn,
-    "adapt": Adapt,
-    "rollout": Rollout,
-    "reproduce": Reproduce,
-    "new": New,
-    "import": Import,
-    "goal": Goal,
-    "ask": Ask,
-    "tell": Tell,
-    "void": Void,
-    "amend": Amend,
-    "status": Status,
-    "log": Log,
-    "report": Report,
-    "export": Export,
-    "calibrate": Calibrate,
-    "look": Look,
+_HERE = "prior_reinforce.commands"
+COMMANDS = {
+    "demo": f"{_HERE}.simulated:Demo",
+    "learn": f"{_HERE}.learning:Learn",
+    "adapt": f"{_HERE}.simulated:Adapt",
+    "rollout": f"{_HERE}.simulated:Rollout",
+    "reproduce": f"{_HERE}.reproduce:Reproduce",
+    "new": f"{_HERE}.workspace:New",
+    "import": f"{_HERE}.importing:Import",
+    "goal": f"{_HERE}.workspace:Goal",
+    "ask": f"{_HERE}.trials:Ask",
+    "tell": f"{_HERE}.trials:Tell",
+    "void": f"{_HERE}.trials:Void",
+    "amend": f"{_HERE}.trials:Amend",
+    "status": f"{_HERE}.workspace:Status",
+    "log": f"{_HERE}.workspace:Log",
+    "report": f"{_HERE}.workspace:Report",
+    "export": f"{_HERE}.trials:Export",
+    "calibrate": f"{_HERE}.photographs:Calibrate",
+    "look": f"{_HERE}.photographs:Look",
 }
+"""Where each command's class is: only the one that is called is imported."""
 _NOBODY_READS = 141
 """Exit status where the reader of our output left before the end: a shell's for SIGPIPE (128 + 13),
 since what the command still had to do was not done."""
@@ -67,12 +63,7 @@ def main(args: Sequence[str] | None = None) -> int:
     """
     warnings.showwarning = _print_warning
     try:
-        command = tyro.extras.subcommand_cli_from_dict(
-            COMMANDS,  # type: ignore[arg-type]
-            prog="prior-reinforce",
-            description="Hit a goal a robot arm has never hit, in about ten real trials.",
-            args=args,
-        )
+        command = _parse(list(sys.argv[1:] if args is None else args))
         status = command.run() or 0
         return status if _flushed() else _NOBODY_READS
     except BrokenPipeError:
@@ -85,6 +76,23 @@ def main(args: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("prior-reinforce: interrupted", file=sys.stderr)
         return 130
+
+
+def _parse(args: list[str]) -> Command:
+    """Make the command that was called; all of them are imported only to list them."""
+    name = args[0] if args else ""
+    if name in COMMANDS:
+        kind = pkgutil.resolve_name(COMMANDS[name])
+        command: Command = tyro.cli(kind, prog=f"prior-reinforce {name}", args=args[1:])
+        return command
+    kinds = {name: pkgutil.resolve_name(target) for name, target in COMMANDS.items()}
+    chosen: Command = tyro.extras.subcommand_cli_from_dict(
+        kinds,
+        prog="prior-reinforce",
+        description="Hit a goal a robot arm has never hit, in about ten real trials.",
+        args=args,
+    )
+    return chosen
 
 
 def _flushed() -> bool:

@@ -85,6 +85,15 @@ class Registry(Generic[T]):
                 raise
             raise ConfigurationError(f"cannot make {choice}: {error}") from error
 
+    def check(self, choice: str) -> None:
+        """Do nothing if a choice can be made; a bare name of ours is not imported for that.
+
+        Raises:
+            ConfigurationError: As `make` does.
+        """
+        if choice not in self.members:
+            self.make(choice)
+
     def kind(self, choice: str) -> type[T]:
         """Return the class of a member; it is imported now.
 

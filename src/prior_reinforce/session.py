@@ -1,8 +1,9 @@
-"""Algorithm 1 of the paper as an ask/tell state machine: the one place where pi and M meet.
+"""Algorithm 1 of the paper as the one state machine of trials: the one place where pi and M meet.
 
 A trial is asked for, executed by anything at all (an arm, a simulator, a person), and told. Between
-`ask` and `tell` a session can wait for an afternoon. Everything it knows follows from its list of
-trials, so a journal that keeps that list can bring it back (`trials=`).
+`ask` and `tell` a session can wait for an afternoon. Every rule of a trial stands here; what
+happened stands in a log, a list in memory or a workspace's journal, from which a session is brought
+back.
 
 Notation (docs/notation.md):
     g tilde  `goal`        (k,)    [m], table frame
@@ -14,144 +15,237 @@ Notation (docs/notation.md):
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from enum import Enum
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import replace
+from functools import cached_property
 from numbers import Integral, Real
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from prior_reinforce.adapters.base import Adapter
-from prior_reinforce.arrays import as_error
-from prior_reinforce.errors import ConfigurationError, TrialStateError
-from prior_reinforce.generators.base import Generator
-from prior_reinforce.plans.motions import Demonstrations
+from prior_reinforce.arrays import Frames, Point, as_error
+from prior_reinforce.errors import (
+    ConfigurationError,
+    InvalidFeedbackError,
+    RobotLimitError,
+    TrialStateError,
+    WorkspaceError,
+)
+from prior_reinforce.trials import Goal, History, Log, MemoryLog, Stage, Trial
+
+if TYPE_CHECKING:
+    from prior_reinforce.adapters.base import Adapter
+    from prior_reinforce.generators.base import Generator
+    from prior_reinforce.plans.motions import Demonstrations
 
 
-class TrialState(Enum):
-    """Where a trial stands."""
+class Verdict(Protocol):
+    """What a gate says of a plan."""
 
-    PENDING = "pending"
-    """Asked for; its error has not been told yet."""
-    TOLD = "told"
-    """Executed, its error seen and told."""
-    VOIDED = "voided"
-    """Not data: the ball slipped, the arm stopped, nothing was seen."""
+    def require(self) -> None:
+        """Do nothing if the plan may be executed.
 
+        Raises:
+            RobotLimitError: It may not.
+        """
 
-@dataclass(frozen=True, eq=False)
-class Trial:
-    """One Stage-2 trial. Never changed; the session replaces it by another as it proceeds."""
-
-    number: int
-    """From 1, in the order in which trials were asked for."""
-    condition: np.ndarray
-    """c = M(g), shape (k,), [m]; read-only."""
-    plan: np.ndarray
-    """A = pi(c), shape (H, D); read-only."""
-    state: TrialState = TrialState.PENDING
-    error_seen: np.ndarray | None = None
-    """e tilde, shape (k,), [m]; None unless told."""
-    hit: bool = False
-    """Whether the goal was reached: as reported, or judged from `error_seen`."""
-    note: str = ""
-    """Why it was voided."""
+    def as_json(self) -> Mapping[str, Any]:
+        """The same as plain data, for the log."""
 
 
 class Session:
-    """Reaching one goal, trial by trial (paper, Algorithm 1, Stage 2)."""
+    """Reaching goals, one after another, trial by trial (paper, Algorithm 1, Stage 2)."""
 
     def __init__(
         self,
-        generator: Generator,
-        adapter: Adapter,
-        demonstrations: Demonstrations,
-        goal: ArrayLike,
-        tolerance: float,
+        generator: Generator | Callable[[], Generator],
+        adapter: Adapter | Callable[[], Adapter],
+        demonstrations: Demonstrations | Callable[[], Demonstrations],
+        goal: ArrayLike | None = None,
+        tolerance: float | None = None,
         *,
-        trials: Sequence[Trial] = (),
-        earlier: Sequence[tuple[np.ndarray, np.ndarray]] = (),
+        carry_over: bool = False,
+        log: Log | None = None,
+        gate: Callable[[Frames], Verdict | None] | None = None,
+        model: str = "",
     ) -> None:
-        """Begin, or go on with, the trials for one goal.
+        """Begin, or go on where a log ends.
+
+        The first three may be functions that load them, called when first needed: telling, voiding
+        and amending need neither generator nor adapter.
 
         Args:
             generator: pi, fitted to `demonstrations`.
-            adapter: M; started here, and owned by this session from now on.
+            adapter: M; owned by this session from now on.
             demonstrations: D_prior with its perceived outcomes.
-            goal: g tilde, shape (k,), in the outcomes' units.
+            goal: g tilde, shape (k,), in the outcomes' units; the log's latest goal if not given.
             tolerance: epsilon, largest perceived error that counts as reached, in the same units.
-            trials: Trials so far, numbered 1, 2, ...; at most the last one pending.
-            earlier: Pairs (condition, outcome_seen) of trials for earlier goals, oldest first, for
-                the adapter to take in before this goal's own.
+            carry_over: Let the adapter learn from the trials of earlier goals too.
+            log: What happened so far, and where to write what happens; in memory if not given.
+            gate: Holds a plan against a robot's limits whenever it is to leave; None checks nothing.
+            model: Name of the generator's model in the log; trials of others teach nothing, since
+                their conditions mean other motions.
 
         Raises:
             InvalidGoalError: The goal has a wrong shape, or is not finite.
             ConfigurationError: The tolerance is not a positive number.
-            TrialStateError: `trials` are not numbered in order, or a pending one is not the last.
+            TrialStateError: A goal is given, and a trial for the one before waits to be told.
         """
-        number = isinstance(tolerance, Real) and not isinstance(tolerance, bool)
-        if not (number and math.isfinite(tolerance) and tolerance > 0):
-            raise ConfigurationError(
-                f"tolerance must be a positive number in the outcomes' units, got {tolerance!r}"
-            )
-        self.demonstrations = demonstrations
-        self.goal: np.ndarray = _frozen(demonstrations.check_goal(goal))
-        self.tolerance = float(tolerance)
-        self._generator = generator
-        self._adapter = adapter
-        self._earlier = [(np.array(c, float), np.array(r, float)) for c, r in earlier]
-        self._trials = list(trials)
-        for i, trial in enumerate(self._trials):
-            last = i == len(self._trials) - 1
-            if trial.number != i + 1 or (trial.state is TrialState.PENDING and not last):
-                raise TrialStateError(
-                    f"trial {trial.number} ({trial.state.value}) cannot stand at place {i + 1} of "
-                    f"{len(self._trials)}; trials are numbered 1, 2, ... and only the last may be "
-                    "pending"
-                )
-        self._restart_adapter()
+        self.log: Log = MemoryLog() if log is None else log
+        self._load = generator, adapter, demonstrations
+        self._gate = gate
+        self._model = model
+        self._carry_over = carry_over
+        self._tolerance = tolerance
+        self._history = History()
+        self._observed: list[Trial] | None = None
+        self._refresh()
+        if goal is not None:
+            self.set_goal(goal)
+
+    @cached_property
+    def generator(self) -> Generator:
+        """pi."""
+        given: Any = self._load[0]
+        return given() if callable(given) else given
+
+    @cached_property
+    def adapter(self) -> Adapter:
+        """M."""
+        given: Any = self._load[1]
+        return given() if callable(given) else given
+
+    @cached_property
+    def demonstrations(self) -> Demonstrations:
+        """D_prior."""
+        given: Any = self._load[2]
+        return given() if callable(given) else given
+
+    @property
+    def goals(self) -> tuple[Goal, ...]:
+        """All goals so far, in order."""
+        return tuple(self._history.goals)
+
+    @property
+    def goal(self) -> Point:
+        """g tilde of the goal that is worked on: the latest."""
+        return self._current_goal().goal
+
+    @property
+    def tolerance(self) -> float:
+        """epsilon of the goal that is worked on."""
+        return self._current_goal().tolerance
 
     @property
     def trials(self) -> tuple[Trial, ...]:
-        """All trials so far, in order."""
-        return tuple(self._trials)
+        """All trials for the goal that is worked on, in order."""
+        return self.trials_of(len(self._history.goals))
+
+    def trials_of(self, goal_number: int) -> tuple[Trial, ...]:
+        """All trials for one goal, in order."""
+        return self._history.trials_of(goal_number)
 
     @property
-    def pending(self) -> Trial | None:
+    def open_trial(self) -> Trial | None:
         """The trial that waits to be told, if any."""
-        if self._trials and self._trials[-1].state is TrialState.PENDING:
-            return self._trials[-1]
-        return None
+        return self._history.open_trial
 
     @property
     def solved(self) -> bool:
-        """Whether a told trial reached the goal."""
-        return any(trial.hit for trial in self._trials)
+        """Whether a told trial reached the goal that is worked on."""
+        return any(trial.hit for trial in self.trials)
 
     @property
     def n_trials(self) -> int:
-        """Stage-2 trials told so far; voided ones are not counted."""
-        return sum(trial.state is TrialState.TOLD for trial in self._trials)
+        """Trials told so far for the goal that is worked on; voided ones are not counted."""
+        return sum(trial.stage is Stage.TOLD for trial in self.trials)
 
     @property
-    def total_trials(self) -> int:
-        """N of the paper: Stage-1 rollouts plus Stage-2 trials."""
-        return self.demonstrations.n + self.n_trials
+    def n_trials_asked(self) -> int:
+        """Trials asked for so far, for all goals: the number of the latest."""
+        return len(self._history.trials)
 
-    def ask(self) -> Trial:
-        """Return the trial to execute next: the pending one, or a new one.
+    def trial(self, number: int) -> Trial:
+        """Return a trial of any goal as it stands.
+
+        Raises:
+            TrialStateError: There is no such trial.
+        """
+        if not isinstance(number, Integral) or isinstance(number, bool):
+            raise TrialStateError(
+                f"a trial's number is a whole number, got {number!r}; give .number"
+            )
+        trials = self._history.trials
+        if not 1 <= number <= len(trials):
+            known = f"give a number from 1 to {len(trials)}" if trials else "ask for one first"
+            raise TrialStateError(f"there is no trial {number}; {known}")
+        return trials[number - 1]
+
+    def set_goal(
+        self,
+        goal: ArrayLike,
+        tolerance: float | None = None,
+        *,
+        carry_over: bool | None = None,
+        adapter: str = "",
+    ) -> Goal:
+        """Set the goal that the next trials are for.
+
+        Args:
+            goal: g tilde, shape (k,), in the outcomes' units.
+            tolerance: epsilon; the session's own if not given.
+            carry_over: As in the constructor; the session's own if not given.
+            adapter: Name of the adapter, for a log that is gone on with later.
+
+        Raises:
+            InvalidGoalError: Wrong shape, or not finite.
+            ConfigurationError: The tolerance is not a positive number.
+            TrialStateError: A trial for the goal before waits to be told.
+        """
+        checked = self.demonstrations.check_goal(goal)
+        tolerance = _as_tolerance(self._tolerance if tolerance is None else tolerance)
+        carried = self._carry_over if carry_over is None else carry_over
+        with self._exclusive():
+            self.refuse_open_trial("setting a goal")
+            data = {
+                "goal": checked.tolist(),
+                "tolerance": tolerance,
+                "memory": "workspace" if carried else "goal",
+                "adapter": adapter,
+            }
+            self.log.append("goal_set", data)
+        self._refresh()
+        return self._history.goals[-1]
+
+    def ask(self, *, arm_did_not_move: bool = False) -> Trial:
+        """Return the trial to execute next: the open one, or a new one.
 
         Asking again changes nothing until that trial is told or voided. Asking goes on after the
-        goal is reached, for whoever wants to repeat or to measure.
+        goal is reached, for whoever wants to repeat or to measure. A plan that the gate refuses now
+        is not returned, whatever the gate said before.
+
+        Args:
+            arm_did_not_move: What a person saw of a trial that was executing when the program died:
+                nothing moved, it may be executed after all.
+
+        Raises:
+            RobotLimitError: The plan breaks a limit of the robot.
+            TrialStateError: The open trial is executing, or was when the program died and nobody
+                said yet whether the arm moved.
+            WorkspaceError: No goal is set, or the log cannot be written.
         """
+        trial = self.open_trial
+        if trial is not None and trial.stage is Stage.EXECUTING:
+            self._settle(trial, arm_did_not_move)
         return ask_all([self])[0]
 
     def tell(self, number: int, error_seen: ArrayLike, *, hit: bool | None = None) -> Trial:
-        """Report what was seen of the pending trial.
+        """Report what was seen of the open trial.
 
         Args:
-            number: The pending trial's number.
+            number: The open trial's number.
             error_seen: e tilde, outcome minus goal as perceived, shape (k,), in the outcomes'
                 units.
             hit: Whether the goal was reached, where that is seen directly (the ball is in the
@@ -161,115 +255,235 @@ class Session:
             The trial as it stands now.
 
         Raises:
-            TrialStateError: There is no such trial, or it is not pending.
+            TrialStateError: There is no such trial, or it is not open.
             InvalidFeedbackError: Wrong shape, or not finite.
         """
-        trial = self._trial(number)
-        if trial.state is not TrialState.PENDING:
-            raise TrialStateError(
-                f"trial {number} is already {trial.state.value}; amend it to correct what was seen"
-            )
-        told = self._told(trial, error_seen, hit)
-        self._trials[number - 1] = told
-        self._observe(told)
-        return told
-
-    def void(self, number: int, reason: str) -> Trial:
-        """Declare that a trial is not data; the adapter forgets it.
-
-        Raises:
-            TrialStateError: There is no such trial, or it is voided already.
-        """
-        trial = self._trial(number)
-        if trial.state is TrialState.VOIDED:
-            raise TrialStateError(f"trial {number} is already voided ({trial.note})")
-        was_told = trial.state is TrialState.TOLD
-        voided = replace(trial, state=TrialState.VOIDED, error_seen=None, hit=False, note=reason)
-        self._trials[number - 1] = voided
-        if was_told:
-            self._restart_adapter()
-        return voided
+        with self._exclusive():
+            trial = self.trial(number)
+            if not trial.open:
+                raise TrialStateError(
+                    f"trial {number} is already {trial.stage.value}; "
+                    + ("amend it to correct it" if trial.stage is Stage.TOLD else "ask for another")
+                )
+            self._append_reading("told", trial, error_seen, hit)
+        return self._now(number)
 
     def amend(self, number: int, error_seen: ArrayLike, *, hit: bool | None = None) -> Trial:
-        """Correct what was told of a trial. A pending trial keeps the plan it has.
+        """Correct what was told of a trial, of any goal. An open trial keeps the plan it has.
 
         Raises:
             TrialStateError: There is no such trial, or it has not been told.
             InvalidFeedbackError: Wrong shape, or not finite.
         """
-        trial = self._trial(number)
-        if trial.state is not TrialState.TOLD:
+        with self._exclusive():
+            trial = self.trial(number)
+            if trial.stage is not Stage.TOLD:
+                raise TrialStateError(
+                    f"trial {number} is {trial.stage.value}, only a told trial can be amended; "
+                    + ("tell it" if trial.open else "ask for another")
+                )
+            self._append_reading("amended", trial, error_seen, hit)
+        return self._now(number)
+
+    def void(self, number: int, reason: str) -> Trial:
+        """Declare that a trial, open or told, is not data; the adapter forgets it.
+
+        Raises:
+            TrialStateError: There is no such trial, or it is voided already.
+        """
+        with self._exclusive():
+            trial = self.trial(number)
+            if trial.stage is Stage.VOIDED:
+                raise TrialStateError(f"trial {number} is already voided; ask for another")
+            # What a terminal could not decode cannot be printed again.
+            text = reason.encode(errors="replace").decode()
+            self.log.append("voided", {"trial": trial.number, "reason": text})
+        return self._now(number)
+
+    def begin_execution(self, number: int, command: str) -> Trial:
+        """Note that a trial's plan is given to a command now: a plan is executed once.
+
+        Raises:
+            TrialStateError: There is no such trial, or it was executed already.
+        """
+        with self._exclusive():
+            trial = self.trial(number)
+            if trial.stage is not Stage.ASKED:
+                raise TrialStateError(
+                    f"trial {number} is {trial.stage.value} already; a plan runs once: tell it or "
+                    "void it, then ask for the next"
+                )
+            self.log.append("executing", {"trial": trial.number, "command": command})
+        return self._now(number)
+
+    def end_execution(self, number: int, result: Mapping[str, Any] | None) -> Trial:
+        """Note how the command ended; None if it was never started, so that nothing moved."""
+        with self._exclusive():
+            if self.trial(number).stage is Stage.EXECUTING:  # it may have been told meanwhile
+                if result is None:
+                    self.log.append("not_executed", {"trial": number})
+                else:
+                    self.log.append("executed", {"trial": number, **result})
+        return self._now(number)
+
+    def refuse_open_trial(self, doing: str) -> None:
+        """Do nothing unless a trial waits to be told.
+
+        Raises:
+            TrialStateError: One does.
+        """
+        trial = self.open_trial
+        if trial is not None:
             raise TrialStateError(
-                f"trial {number} is {trial.state.value}; only a told trial can be amended"
+                f"trial {trial.number} waits to be told; tell or void it before {doing}"
             )
-        amended = self._told(trial, error_seen, hit)
-        self._trials[number - 1] = amended
-        self._restart_adapter()
-        return amended
 
-    def _trial(self, number: int) -> Trial:
-        if not isinstance(number, Integral) or isinstance(number, bool):
+    def _current_goal(self) -> Goal:
+        goal = self._history.goal
+        if goal is None:
+            raise WorkspaceError(
+                "no goal is set; set one (Session.set_goal, or: prior-reinforce goal)"
+            )
+        return goal
+
+    def _refresh(self) -> None:
+        self._history.update(self.log.events())
+
+    def _now(self, number: int) -> Trial:
+        self._refresh()
+        return self._history.trials[number - 1]
+
+    def _exclusive(self) -> ExitStack:
+        """Hold the log, and know all that it says."""
+        with ExitStack() as stack:
+            stack.enter_context(self.log.exclusive())
+            self._refresh()
+            return stack.pop_all()
+
+    def _append_reading(
+        self, kind: str, trial: Trial, error_seen: ArrayLike, hit: bool | None
+    ) -> None:
+        goal = self._history.goals[trial.goal_number - 1]
+        error = as_error(error_seen, goal.goal.size)
+        if not (hit is None or isinstance(hit, (bool, np.bool_))):
+            raise InvalidFeedbackError(f"hit must be True, False or None, got {hit!r}")
+        reached = np.linalg.norm(error) <= goal.tolerance if hit is None else hit
+        data = {"trial": trial.number, "error_seen": error.tolist(), "hit": bool(reached)}
+        self.log.append(kind, data)
+
+    def _settle(self, trial: Trial, arm_did_not_move: bool) -> None:
+        """Find out whether a trial that was executing may be executed after all."""
+        if self.log.is_executing():
+            raise TrialStateError(f"trial {trial.number} is executing now; wait for it")
+        if not arm_did_not_move:
             raise TrialStateError(
-                f"a trial's number is a whole number, got {number!r}; give .number"
+                f"trial {trial.number} was executing when the program stopped; did the arm move? "
+                f"If it did, tell or void trial {trial.number}; if it did not, ask again with "
+                "--arm-did-not-move"
             )
-        if not 1 <= number <= len(self._trials):
-            raise TrialStateError(
-                f"there is no trial {number}; "
-                + (f"trials are 1 to {len(self._trials)}" if self._trials else "ask for one first")
-            )
-        return self._trials[number - 1]
+        self.end_execution(trial.number, None)
 
-    def _told(self, trial: Trial, error_seen: ArrayLike, hit: bool | None) -> Trial:
-        error = as_error(error_seen, self.demonstrations.outcome_dim)
-        reached = bool(np.linalg.norm(error) <= self.tolerance) if hit is None else hit
-        return replace(trial, state=TrialState.TOLD, error_seen=_frozen(error), hit=reached)
+    def _propose(self) -> Point:
+        """M(g), after the adapter has seen every reading that counts."""
+        readings = self._readings()
+        seen = self._observed
+        if seen is None or any(a is not b for a, b in zip(seen, readings, strict=False)) or len(
+            seen
+        ) > len(readings):
+            self.adapter.start(self.demonstrations)
+            seen = []
+        for trial in readings[len(seen) :]:
+            goal = self._history.goals[trial.goal_number - 1].goal
+            self.adapter.observe(trial.condition, goal + np.asarray(trial.error_seen))
+        self._observed = readings
+        return self.adapter.propose(self.goal)
 
-    def _observe(self, trial: Trial) -> None:
-        assert trial.error_seen is not None
-        self._adapter.observe(trial.condition, self.goal + trial.error_seen)
+    def _readings(self) -> list[Trial]:
+        """Told trials of this goal, and of earlier ones if they are carried over, oldest first."""
+        goal = self._current_goal()
+        return [
+            trial
+            for trial in self._history.trials
+            if trial.stage is Stage.TOLD
+            and trial.model == self._model
+            and (goal.carry_over or trial.goal_number == goal.number)
+        ]
 
-    def _restart_adapter(self) -> None:
-        self._adapter.start(self.demonstrations)
-        for condition, outcome_seen in self._earlier:
-            self._adapter.observe(condition, outcome_seen)
-        for trial in self._trials:
-            if trial.state is TrialState.TOLD:
-                self._observe(trial)
+    def _open(self, condition: Point, plan: Frames) -> None:
+        """Write a new trial down, if its plan may be executed."""
+        verdict = None if self._gate is None else self._gate(plan)
+        if verdict is not None:
+            try:
+                verdict.require()
+            except RobotLimitError as error:
+                at = (np.round(condition, 4) + 0.0).tolist()  # -0 is 0
+                raise RobotLimitError(f"no plan for the condition {at}: {error}") from error
+        number = len(self._history.trials) + 1
+        data = {
+            "trial": number,
+            "goal": self._current_goal().number,
+            "condition": condition.tolist(),
+            "model": self._model,
+            "gate": None if verdict is None else verdict.as_json(),
+            **self.log.keep_plan(number, plan),
+        }
+        self.log.append("asked", data)
 
-    def _propose(self) -> np.ndarray:
-        return self._adapter.propose(self.goal)
-
-    def _open(self, condition: np.ndarray, plan: np.ndarray) -> None:
-        number = len(self._trials) + 1
-        self._trials.append(Trial(number, _frozen(condition), _frozen(plan)))
+    def _hand_out(self, *, is_new: bool) -> Trial:
+        """The open trial with its plan, unless the gate refuses it now."""
+        trial = self.open_trial
+        assert trial is not None
+        if trial.plan is None:
+            trial = replace(trial, plan=self.log.plan(trial))
+        if not is_new and self._gate is not None and trial.stage is Stage.ASKED:
+            verdict = self._gate(np.asarray(trial.plan))
+            try:
+                if verdict is not None:
+                    verdict.require()
+            except RobotLimitError as error:
+                raise RobotLimitError(
+                    f"trial {trial.number} may no longer be executed, void it and ask again: {error}"
+                ) from error
+        return trial
 
 
 def ask_all(sessions: Sequence[Session]) -> list[Trial]:
-    """Ask many sessions at once: one call of the generator for all that have nothing pending.
+    """Ask many sessions at once: one call of the generator for all that have no open trial.
 
     Args:
         sessions: Sessions that share one fitted generator.
 
     Returns:
-        The pending trial of each, in order.
+        The open trial of each, in order.
 
     Raises:
         ConfigurationError: The sessions have different generators.
     """
-    new = [session for session in sessions if session.pending is None]
-    if new:
-        generator = new[0]._generator
-        if any(session._generator is not generator for session in new):
-            raise ConfigurationError("sessions asked together must share one generator object")
-        conditions = np.stack([session._propose() for session in new])
-        for session, condition, plan in zip(
-            new, conditions, generator.generate(conditions), strict=True
-        ):
-            session._open(condition, plan)
-    return [session._trials[-1] for session in sessions]
+    for session in sessions:
+        if session.open_trial is None:
+            session.generator, session.goal  # noqa: B018  (loaded before the log is held)
+    new: list[Session] = []
+    with ExitStack() as logs:
+        for session in sessions:
+            logs.enter_context(session._exclusive())
+        new = [session for session in sessions if session.open_trial is None]
+        if new:
+            generator = new[0].generator
+            if any(session.generator is not generator for session in new):
+                raise ConfigurationError("sessions asked together must share one generator object")
+            conditions = np.stack([session._propose() for session in new])
+            plans = generator.generate(conditions)
+            for session, condition, plan in zip(new, conditions, plans, strict=True):
+                session._open(condition, plan)
+    for session in new:
+        session._refresh()
+    return [session._hand_out(is_new=session in new) for session in sessions]
 
 
-def _frozen(values: np.ndarray) -> np.ndarray:
-    array = np.array(values, dtype=np.float64)
-    array.setflags(write=False)
-    return array
+def _as_tolerance(tolerance: Any) -> float:
+    number = isinstance(tolerance, Real) and not isinstance(tolerance, bool)
+    if not (number and math.isfinite(tolerance) and tolerance > 0):
+        raise ConfigurationError(
+            f"tolerance must be a positive number in the outcomes' units, got {tolerance!r}"
+        )
+    return float(tolerance)

@@ -91,3 +91,22 @@ def from_words(text: str, outcome_dim: int) -> np.ndarray:
         metres = float(match["value"]) * _CM_PER_UNIT[match["unit"]] / 100
         error[component] = -metres if sign else metres
     return error
+
+
+def in_words(units) -> bool:
+    return len(units) <= len(WORDS) and set(units) == {"m"}
+
+
+def say_error(error, names, units) -> str:
+    return to_words(error) if in_words(units) else _components(error, names, units, "+.4g")
+
+
+def say_place(place, names, units) -> str:
+    return _components(place, names, units, ".4g")
+
+
+def _components(values, names, units, form):
+    return ", ".join(
+        f"{name} {round(float(value), 4) + 0.0:{form}} {unit}"
+        for name, value, unit in zip(names, values, units, strict=True)
+    )

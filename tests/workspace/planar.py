@@ -1,18 +1,11 @@
-"""A small workspace that learns in a second: planar throws, two joints, no robot limits."""
+"""A small workspace: planar throws, two joints, no robot limits."""
 
 import numpy as np
 
-from prior_reinforce.generators import DiffusionConfig
-from prior_reinforce.generators.unet_size import UNetSize
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
-from prior_reinforce.workspace.manifest_template import TEMPLATE
+from prior_reinforce.workspace.manifest import TEMPLATE
 
 FORMAT = PlanFormat(("joint1", "joint2"), ("rad", "rad"), 0.02)
-SMALL = DiffusionConfig(
-    network=UNetSize(widths=(8, 8), step_width=8, condition_width=8),
-    training_steps=3,
-    sampling_steps=2,
-)
 
 
 def demonstrations():

@@ -2,7 +2,7 @@
 
     python tests/workspace/power_cut.py FOLDER KILLS
 
-A program of its own, because a process that has used torch's threads cannot be forked.
+A program of its own, because a process that has used other libraries' threads cannot be forked.
 """
 
 import os
@@ -13,11 +13,8 @@ import time
 from pathlib import Path
 
 import numpy as np
-from planar import SMALL, demonstrations, manifest
+from planar import demonstrations, manifest
 
-from prior_reinforce.generators import DiffusionGenerator
-from prior_reinforce.workspace.learning import learn
-from prior_reinforce.workspace.trials import amend, ask, tell, void
 from prior_reinforce.workspace.workspace import Workspace
 
 TRIALS = 20
@@ -30,16 +27,16 @@ def script():
     for number in range(1, TRIALS + 1):
         if number % 5 == 1:
             goal = rng.uniform([0.82, -0.15], [0.98, 0.15]).tolist()
-            memory = "workspace" if number > 10 else "goal"
-            steps.append(lambda w, g=goal, m=memory: w.set_goal(g, memory=m))
-        steps.append(lambda w: ask(w))
+            carried = number > 10
+            steps.append(lambda w, g=goal, c=carried: w.set_goal(g, carry_over=c))
+        steps.append(lambda w: w.session().ask())
         error = rng.normal(0, 0.03, 2).round(3).tolist()
         if number % 7 == 0:
-            steps.append(lambda w, n=number: void(w, n, "ball slipped"))
+            steps.append(lambda w, n=number: w.session().void(n, "ball slipped"))
         else:
-            steps.append(lambda w, n=number, e=error: tell(w, n, e))
+            steps.append(lambda w, n=number, e=error: w.session().tell(n, e))
         if number % 6 == 0:
-            steps.append(lambda w, n=number - 1, e=error: amend(w, n, e))
+            steps.append(lambda w, n=number - 1, e=error: w.session().amend(n, e))
     return steps
 
 
@@ -70,7 +67,7 @@ def learn_in_child(folder):
     if pid == 0:
         workspace = Workspace.create(folder, manifest())
         workspace.import_demonstrations(demonstrations(), "made up")
-        learn(workspace, DiffusionGenerator(SMALL), seed=0)
+        workspace.learn("diffusion,training_steps=3,sampling_steps=2")
         workspace.close()
         os._exit(0)
     assert os.waitpid(pid, 0)[1] == 0
@@ -81,7 +78,8 @@ def check(folder, told_before):
     workspace = Workspace(folder)
     told = sum(event.kind in {"told", "voided"} for event in workspace.events)
     assert told >= told_before, "a told trial is missing"
-    trials = workspace.history.trials
+    session = workspace.session()
+    trials = [trial for goal in session.goals for trial in session.trials_of(goal.number)]
     assert [trial.number for trial in trials] == list(range(1, len(trials) + 1))
     for trial in trials:
         workspace.plan(trial)

@@ -15,7 +15,6 @@ from planar import demonstrations, manifest
 from prior_reinforce.cli import main
 from prior_reinforce.errors import PriorReinforceError
 from prior_reinforce.workspace.manifest import parse_manifest
-from prior_reinforce.workspace.trials import ask
 from prior_reinforce.workspace.workspace import Workspace
 
 many = settings(
@@ -41,7 +40,7 @@ def asked(learned_folder, tmp_path_factory):
     shutil.copytree(learned_folder, folder)
     workspace = Workspace(folder)
     workspace.set_goal([0.9, 0.05])
-    ask(workspace)
+    workspace.session().ask()
     workspace.close()
     return folder
 

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 
-from prior_reinforce.workspace.trials import ask, tell
 from prior_reinforce.workspace.workspace import Workspace
 
 pytestmark = pytest.mark.slow
@@ -23,7 +22,7 @@ def folder(learned_folder):
         shutil.copytree(learned_folder, folder)
         workspace = Workspace(folder)
         workspace.set_goal([0.9, 0.05])
-        ask(workspace)
+        workspace.session().ask()
         workspace.close()
         yield folder
 
@@ -51,10 +50,10 @@ def test_a_full_disk_is_named_and_the_journal_goes_on(folder):
     assert "free some disk space" in message
     workspace = Workspace(folder)
     assert [event.kind for event in workspace.events][-1] == "asked"
-    tell(workspace, 1, [0.05, 0.0])
+    workspace.session().tell(1, [0.05, 0.0])
     workspace.close()
     assert "cannot write" in refused("full", "ask", folder)
     workspace = Workspace(folder)
     assert [event.kind for event in workspace.events][-1] == "told"
-    assert ask(workspace).number == 2
+    assert workspace.session().ask().number == 2
     workspace.close()

@@ -5,9 +5,9 @@ import sqlite3
 
 import numpy as np
 import pytest
-from planar import SMALL, demonstrations, manifest
+from planar import demonstrations, manifest
 
-from prior_reinforce.adapters import GaussianProcessAdapter
+from prior_reinforce.adapters.gaussian_process import GaussianProcessAdapter
 from prior_reinforce.errors import (
     ConfigurationError,
     FileFormatError,
@@ -18,37 +18,34 @@ from prior_reinforce.errors import (
     TrialStateError,
     WorkspaceError,
 )
-from prior_reinforce.generators import DiffusionGenerator, SmoothInterpolation, align
+from prior_reinforce.generators import make_generator
+from prior_reinforce.generators.interpolation import SmoothInterpolation
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 from prior_reinforce.session import Session
-from prior_reinforce.workspace.execution import execute
-from prior_reinforce.workspace.history import TrialStage
-from prior_reinforce.workspace.learning import learn
+from prior_reinforce.trials import Stage
 from prior_reinforce.workspace.status import describe
-from prior_reinforce.workspace.trials import amend, ask, tell, void
 from prior_reinforce.workspace.workspace import Workspace
 
 GOAL = [0.9, 0.05]
+SLOW = (
+    'model = "given"\njoint_names = ["joint1", "joint2"]\nlower = [-3, -3]\nupper = [3, 3]\n'
+    "velocity = [0.1, 0.1]\nacceleration = [100, 100]\njerk = [10000, 10000]\n"
+)
 
 
 class OwnInterpolation(SmoothInterpolation):
-    """None of ours, as far as the package knows."""
+    """Not one of ours, as far as the package knows."""
 
     name = "own-interpolation"
 
 
-@pytest.fixture
-def folder(learned_folder, tmp_path):
-    shutil.copytree(learned_folder, tmp_path / "planar")
-    return tmp_path / "planar"
+OWN = f"{__name__}:OwnInterpolation"
 
 
 @pytest.fixture
-def workspace(folder):
-    workspace = Workspace(folder)
-    workspace.set_goal(GOAL)
-    yield workspace
+def folder(workspace):
     workspace.close()
+    return workspace.folder
 
 
 def reopened(workspace):
@@ -56,12 +53,33 @@ def reopened(workspace):
     return Workspace(workspace.folder)
 
 
+def ask(workspace, own=None, **how):
+    return workspace.session(own).ask(**how)
+
+
+def tell(workspace, number, error, **how):
+    return workspace.session().tell(number, error, **how)
+
+
+def amend(workspace, number, error, **how):
+    return workspace.session().amend(number, error, **how)
+
+
+def void(workspace, number, reason):
+    return workspace.session().void(number, reason)
+
+
+def trials(workspace):
+    session = workspace.session()
+    return [trial for goal in session.goals for trial in session.trials_of(goal.number)]
+
+
 def test_a_told_trial_is_there_when_the_program_starts_again(workspace):
     trial = ask(workspace)
     tell(workspace, trial.number, [0.05, -0.02])
     again = reopened(workspace)
-    (kept,) = again.history.trials
-    assert kept.stage is TrialStage.TOLD
+    (kept,) = trials(again)
+    assert kept.stage is Stage.TOLD
     np.testing.assert_array_equal(kept.error_seen, [0.05, -0.02])
     np.testing.assert_array_equal(kept.condition, trial.condition)
     again.close()
@@ -71,14 +89,15 @@ def test_ask_gives_the_same_plan_also_from_another_program(workspace):
     first = ask(workspace)
     again = reopened(workspace)
     second = ask(again)
-    assert (second.number, second.plan_sha256) == (first.number, first.plan_sha256)
+    assert (second.number, second.kept["plan_sha256"]) == (first.number, first.kept["plan_sha256"])
     assert len(list((workspace.folder / "plans").glob("*.npz"))) == 1
     again.close()
 
 
 def test_the_next_condition_is_the_sessions(workspace):
     """The workspace adds nothing to Algorithm 1: a session in memory goes the same way."""
-    session = workspace.session()
+    generator = workspace.session().generator
+    session = Session(generator, GaussianProcessAdapter(), demonstrations(), GOAL, 0.015)
     for error in ([0.05, 0.0], [0.01, -0.02]):
         trial = session.ask()
         session.tell(trial.number, error)
@@ -92,73 +111,90 @@ def test_numbers_run_over_all_goals_and_an_earlier_goals_trial_can_be_amended(wo
     workspace.set_goal([0.95, 0.0])
     assert ask(workspace).number == 2
     amend(workspace, 1, [0.03, 0.0])
-    assert not workspace.history.trials[0].hit
-    np.testing.assert_array_equal(workspace.history.trials[0].error_seen, [0.03, 0.0])
+    assert not trials(workspace)[0].hit
+    np.testing.assert_array_equal(trials(workspace)[0].error_seen, [0.03, 0.0])
 
 
-@pytest.mark.parametrize("memory", ["goal", "workspace"])
-def test_earlier_goals_serve_a_later_one_only_when_asked_to(workspace, memory):
+@pytest.mark.parametrize("carry_over", [False, True])
+def test_earlier_goals_serve_a_later_one_only_when_asked_to(workspace, carry_over):
     tell(workspace, ask(workspace).number, [0.06, 0.03])
-    workspace.set_goal([0.91, 0.05], memory=memory)
-    session = workspace.session()
-    alone = Session(
-        session._generator, GaussianProcessAdapter(), demonstrations(), [0.91, 0.05], 0.015
-    )
+    workspace.set_goal([0.91, 0.05], carry_over=carry_over)
+    generator = workspace.session().generator
+    alone = Session(generator, GaussianProcessAdapter(), demonstrations(), [0.91, 0.05], 0.015)
     moved = np.linalg.norm(ask(workspace).condition - alone.ask().condition)
-    assert moved > 0.01 if memory == "workspace" else moved == 0.0
+    assert moved > 0.01 if carry_over else moved == 0.0
+
+
+def test_the_adapter_is_the_goals(workspace):
+    workspace.set_goal(GOAL, adapter="proportional,gain=0.5")
+    tell(workspace, ask(workspace).number, [0.06, 0.03])
+    again = reopened(workspace)
+    np.testing.assert_allclose(ask(again).condition, np.subtract(GOAL, [0.03, 0.015]))
+    assert "adapter proportional,gain=0.5" in describe(again)
+    before = again.events
+    for wrong in ("spline", "gp,size=2"):
+        with pytest.raises(ConfigurationError):
+            again.set_goal(GOAL, adapter=wrong)
+    assert again.events == before
+    again.close()
 
 
 def test_a_trial_of_another_model_is_left_out(workspace):
     first = ask(workspace)
     tell(workspace, first.number, [0.06, 0.03])
-    learn(workspace, DiffusionGenerator(SMALL), seed=1)
-    fresh = workspace.session()
-    assert fresh.n_trials == 0
+    workspace.learn("nearest")
     np.testing.assert_array_equal(ask(workspace).condition, first.condition)
 
 
-@pytest.mark.parametrize("aligned", [False, True])
-def test_any_generator_can_be_learned_from_aligned_demonstrations_too(tmp_path, aligned):
-    """A workspace whose recordings start at different times plans as the generator by itself."""
+@pytest.mark.parametrize("choice", ["interpolation", "interpolation,timing=align"])
+def test_a_workspace_plans_as_its_generator_does_by_itself(tmp_path, choice):
+    """Recordings that start at different times, aligned or not."""
     demos = demonstrations()
     late = [
         np.concatenate([p[:1].repeat(n, 0), p[: len(p) - n]]) for n, p in enumerate(demos.plans)
     ]
     rest = np.repeat(np.array(late)[:, -1:], 4, axis=1)
     demos = Demonstrations(np.concatenate([late, rest], axis=1), demos.outcomes_seen, demos.format)
-    workspace = Workspace.create(tmp_path / "planar", manifest())
-    workspace.import_demonstrations(demos, "made up")
-    model = learn(workspace, SmoothInterpolation(), seed=0, aligned=aligned)
-    workspace.set_goal(GOAL)
-    fitted_to = align(demos).demonstrations if aligned else demos
-    alone = SmoothInterpolation().fit(fitted_to, seed=0)
-    trial = ask(workspace)
-    np.testing.assert_array_equal(
-        workspace.plan(trial).actions, alone.generate(trial.condition[None])[0]
-    )
-    np.testing.assert_array_equal(workspace.demonstrations_of(model).plans, fitted_to.plans)
-    said = describe(workspace)
-    assert f"{model}, interpolation" in said
-    assert ("demonstrations aligned" in said) == aligned
-    assert workspace.events[1].data["generator"] == "interpolation"
-    workspace.close()
+    with Workspace.create(tmp_path / "planar", manifest()) as workspace:
+        workspace.import_demonstrations(demos, "made up")
+        model = workspace.learn(choice).model
+        workspace.set_goal(GOAL)
+        trial = ask(workspace)
+        alone = make_generator(choice).fit(demos, seed=0)
+        expected = alone.generate(trial.condition[None])[0]
+        np.testing.assert_array_equal(workspace.plan(trial).actions, expected)
+        assert f"{model}, {choice}" in describe(workspace)
+
+
+def test_what_a_fit_could_not_do_is_kept_and_shown(tmp_path):
+    """Demonstrations that end in mid-swing: start times cannot be learned apart."""
+    demos = demonstrations()
+    cut = np.stack([np.roll(p, n, axis=0) for n, p in enumerate(demos.plans[:, :16])])
+    for n, plan in enumerate(cut):
+        plan[:n] = plan[n]
+    with Workspace.create(tmp_path / "planar", manifest()) as workspace:
+        workspace.import_demonstrations(
+            Demonstrations(cut, demos.outcomes_seen, demos.format), "made up"
+        )
+        training = workspace.learn("interpolation,timing=start")
+        assert training.remarks
+        assert training.remarks[0] in describe(workspace)
 
 
 def test_ones_own_generator_is_named_by_a_person_not_by_the_journal(workspace):
-    learn(workspace, OwnInterpolation(), seed=0)
-    name = f"{__name__}:OwnInterpolation"
-    assert f"prior-reinforce ask {workspace.folder} --generator {name}" in describe(workspace)
+    workspace.learn(OWN)
+    assert f"prior-reinforce ask {workspace.folder} --generator {OWN}" in describe(workspace)
     before = workspace.events
-    with pytest.raises(ConfigurationError, match=f"--generator {name}"):
+    with pytest.raises(ConfigurationError, match=f"--generator {OWN}"):
         ask(workspace)
     with pytest.raises(ConfigurationError, match="learned by"):
-        ask(workspace, own=SmoothInterpolation())
+        ask(workspace, own="examples:Another")
     assert workspace.events == before
-    assert ask(workspace, own=OwnInterpolation()).number == 1
+    assert ask(workspace, own=OWN).number == 1
     void(workspace, 1, "")
-    learn(workspace, SmoothInterpolation(), seed=0)
+    workspace.learn("interpolation")
     with pytest.raises(ConfigurationError, match="drop --generator"):
-        ask(workspace, own=OwnInterpolation())
+        ask(workspace, own=OWN)
 
 
 def test_bad_feedback_changes_nothing(workspace):
@@ -171,12 +207,10 @@ def test_bad_feedback_changes_nothing(workspace):
         lambda: tell(workspace, 7, [0.0, 0.0]),
         lambda: amend(workspace, number, [0.0, 0.0]),
         lambda: workspace.set_goal([0.9, 0.0]),
-        lambda: learn(workspace, DiffusionGenerator(SMALL), seed=0),
+        lambda: workspace.learn("interpolation"),
     ):
         with pytest.raises(TrialStateError):
             call()
-    with pytest.raises(ConfigurationError):
-        workspace.set_goal([0.9, 0.0], memory="all")
     assert workspace.events == before
 
 
@@ -195,7 +229,7 @@ def test_the_order_of_things_is_told(tmp_path):
     workspace.import_demonstrations(demonstrations(), "made up")
     with pytest.raises(WorkspaceError, match="prior-reinforce learn"):
         ask(workspace)
-    learn(workspace, DiffusionGenerator(SMALL), seed=0)
+    workspace.learn("interpolation")
     with pytest.raises(WorkspaceError, match="prior-reinforce goal"):
         ask(workspace)
     workspace.close()
@@ -236,11 +270,7 @@ def test_a_damaged_plan_or_model_is_never_handed_out(workspace):
 
 def test_a_plan_that_breaks_a_limit_is_refused_and_nothing_is_written(folder):
     text = (folder / "workspace.toml").read_text()
-    slow = (
-        'model = "given"\njoint_names = ["joint1", "joint2"]\nlower = [-3, -3]\nupper = [3, 3]\n'
-        "velocity = [0.1, 0.1]\nacceleration = [100, 100]\njerk = [10000, 10000]\n"
-    )
-    (folder / "workspace.toml").write_text(text.replace('model = "none"', slow, 1))
+    (folder / "workspace.toml").write_text(text.replace('model = "none"', SLOW, 1))
     workspace = Workspace(folder)
     workspace.set_goal(GOAL)
     before = workspace.events
@@ -253,20 +283,37 @@ def test_a_plan_that_breaks_a_limit_is_refused_and_nothing_is_written(folder):
 
 def test_a_command_runs_once_and_its_end_is_kept(workspace):
     number = ask(workspace).number
-    done = execute(workspace, number, "cat {plan}", time_limit=20)
+    done = workspace.execute(number, "cat {plan}", time_limit=20)
     assert done.succeeded
-    assert workspace.history.trials[0].stage is TrialStage.EXECUTED
+    assert trials(workspace)[0].stage is Stage.EXECUTED
     with pytest.raises(TrialStateError, match="a plan runs once"):
-        execute(workspace, number, "cat {plan}", time_limit=20)
+        workspace.execute(number, "cat {plan}", time_limit=20)
     tell(workspace, number, [0.02, 0.0])
     assert workspace.events[-2].data["exit_status"] == 0
+
+
+def test_a_plan_that_the_limits_refuse_by_now_is_neither_given_out_nor_executed(workspace):
+    """The verdict counts at the moment of leaving, whatever it was when the plan was made."""
+    number = ask(workspace).number
+    path = workspace.folder / "workspace.toml"
+    path.write_text(path.read_text().replace('model = "none"', SLOW, 1))
+    narrow = reopened(workspace)
+    before = narrow.events
+    ran = workspace.folder / "ran"
+    with pytest.raises(RobotLimitError, match="void it and ask again"):
+        ask(narrow)
+    with pytest.raises(RobotLimitError, match="velocity"):
+        narrow.execute(number, f"touch {ran} {{plan}}", time_limit=20)
+    assert narrow.events == before
+    assert not ran.exists()
+    narrow.close()
 
 
 def test_a_program_that_is_not_there_leaves_the_trial_to_be_executed(workspace):
     number = ask(workspace).number
     with pytest.raises(ConfigurationError):
-        execute(workspace, number, "no-such-controller {plan}", time_limit=5)
-    assert workspace.history.trials[0].stage is TrialStage.ASKED
+        workspace.execute(number, "no-such-controller {plan}", time_limit=5)
+    assert trials(workspace)[0].stage is Stage.ASKED
 
 
 def test_an_execution_that_was_cut_off_is_never_repeated_by_itself(workspace):
@@ -274,11 +321,11 @@ def test_an_execution_that_was_cut_off_is_never_repeated_by_itself(workspace):
     with workspace.journal.exclusive():  # what execute writes before the program dies
         workspace.journal.append("executing", {"trial": number, "command": "arm {plan}"})
     again = reopened(workspace)
-    with pytest.raises(WorkspaceError, match="did the arm move"):
+    with pytest.raises(TrialStateError, match="did the arm move"):
         ask(again)
     assert "did the arm move" in describe(again)
-    assert ask(again, arm_did_not_move=True).stage is TrialStage.ASKED
-    execute(again, number, "cat {plan}", time_limit=20)
+    assert ask(again, arm_did_not_move=True).stage is Stage.ASKED
+    again.execute(number, "cat {plan}", time_limit=20)
     again.close()
 
 
@@ -298,7 +345,7 @@ def test_two_programs_exclude_each_other(workspace, monkeypatch):
         ask(other)
     ask(other)
     other.close()
-    assert len(workspace.history.trials) == 1
+    assert len(trials(workspace)) == 1
 
 
 def test_a_workspace_that_was_copied_goes_on(workspace, tmp_path):
@@ -318,7 +365,7 @@ def test_a_refused_disk_is_named_and_the_journal_stays_good(workspace):
     with pytest.raises(WorkspaceError, match="free some disk space"):
         void(workspace, number, "x" * 100_000)
     connection.execute("PRAGMA max_page_count = 1000000")
-    assert workspace.history.trials[0].stage is TrialStage.ASKED
+    assert trials(workspace)[0].stage is Stage.ASKED
     tell(workspace, number, [0.0, 0.0])
 
 
@@ -358,7 +405,7 @@ def test_a_trial_is_told_once_and_voided_once(workspace):
         lambda: tell(workspace, number, [0.0, 0.0]),
         lambda: amend(workspace, number, [0.0, 0.0]),
     ):
-        with pytest.raises(TrialStateError, match="ask anew"):
+        with pytest.raises(TrialStateError, match="ask for another"):
             call()
     assert workspace.events == before
 
@@ -372,7 +419,7 @@ def test_a_reading_that_was_damaged_on_the_disk_is_never_believed(workspace):
     path.write_bytes(content.replace(b"0.0512", b"0.0112"))
     again = Workspace(workspace.folder)
     with pytest.raises(WorkspaceError, match="not what was written; restore"):
-        _ = again.history
+        _ = again.events
     again.close()
 
 

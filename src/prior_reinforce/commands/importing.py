@@ -11,7 +11,7 @@ from typing import Annotated
 import tyro
 
 from prior_reinforce.commands.outcome_questions import ask_for_outcomes, keep_typed
-from prior_reinforce.commands.workspace import Folder, opened, print_next
+from prior_reinforce.commands.workspace import Folder, print_next
 from prior_reinforce.files import named_disk_errors
 from prior_reinforce.importing import (
     Preprocessing,
@@ -57,9 +57,9 @@ class Import:
 
     def run(self) -> None:
         """Read, preview, take in."""
-        with opened(self.folder) as workspace:
+        with Workspace(self.folder) as workspace:
             manifest = workspace.manifest
-            workspace.refuse_open_trial("importing demonstrations")
+            workspace.session().refuse_open_trial("importing demonstrations")
             names = manifest.format.names
             result = import_demonstrations(
                 self.source,

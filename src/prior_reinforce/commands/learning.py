@@ -12,7 +12,8 @@ from rich.console import Console
 
 from prior_reinforce.commands.progress import fit_progress
 from prior_reinforce.commands.task_options import Simulated
-from prior_reinforce.commands.workspace import opened, print_next
+from prior_reinforce.commands.workspace import print_next
+from prior_reinforce.workspace.workspace import Workspace
 from prior_reinforce.errors import ConfigurationError, FileFormatError
 from prior_reinforce.generators import (
     DiffusionConfig,
@@ -24,7 +25,6 @@ from prior_reinforce.generators import (
 from prior_reinforce.generators.base import Generator
 from prior_reinforce.generators.by_name import make_generator
 from prior_reinforce.plans.motions import Demonstrations
-from prior_reinforce.workspace.learning import learn as learn_in_workspace
 
 _RECORD = "training.json"
 
@@ -131,11 +131,9 @@ class Learn(Simulated):
         generator = self._unfitted()
         if self.folder is not None:
             self._refuse_what_is_a_simulated_tasks()
-            with opened(self.folder) as workspace:
+            with Workspace(self.folder) as workspace:
                 with fit_progress(console) as progress:
-                    model = learn_in_workspace(
-                        workspace, generator, seed=self.seed, aligned=self.align, progress=progress
-                    )
+                    model = workspace.learn(self.generator, seed=self.seed, progress=progress).model
                 if (note := whole_plans_note(generator)) is not None:
                     print(note)
                 print(f"model {model} is in use")

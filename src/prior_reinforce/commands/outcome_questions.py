@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import io
 import math
-import os
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -14,7 +13,7 @@ from prior_reinforce.errors import (
     InvalidDemonstrationsError,
     InvalidFeedbackError,
 )
-from prior_reinforce.files import named_disk_errors
+from prior_reinforce.files import named_disk_errors, write
 from prior_reinforce.importing import Recording
 from prior_reinforce.importing.outcomes import (
     OUTCOMES_FILE,
@@ -24,7 +23,7 @@ from prior_reinforce.importing.outcomes import (
     outcomes_of,
     read_outcomes,
 )
-from prior_reinforce.wording import from_words
+from prior_reinforce.wording import from_words, in_words
 from prior_reinforce.workspace.manifest import Manifest
 
 _PLACES = {"ahead": "long", "behind": "short", "up": "high", "down": "low", "to the ": ""}
@@ -89,7 +88,7 @@ def read_place(text: str, manifest: Manifest) -> tuple[float, ...]:
                 f"{text!r} is not {k} finite numbers: {', '.join(manifest.outcome_names)}"
             )
         return numbers
-    if not manifest.in_words:
+    if not in_words(manifest.outcome_units):
         raise InvalidFeedbackError(
             f"cannot read {text!r}; give {k} numbers: {', '.join(manifest.outcome_names)}"
         )
@@ -112,10 +111,8 @@ def keep_typed(
     writer.writerow(["episode", *names])
     writer.writerows([episode, *map(repr, values)] for episode, values in outcomes.items())
     path = folder / OUTCOMES_FILE
-    unfinished = path.with_name(f".{OUTCOMES_FILE}.unfinished")
     with named_disk_errors(folder):
-        unfinished.write_text(text.getvalue(), encoding="utf-8")
-        os.replace(unfinished, path)
+        write(path, text.getvalue())
     return path
 
 
@@ -134,7 +131,7 @@ def _explanation(manifest: Manifest, missing: Sequence[str]) -> str:
     names = " ".join(manifest.outcome_names)
     units = ", ".join(dict.fromkeys(manifest.outcome_units))
     words = ""
-    if manifest.in_words:
+    if in_words(manifest.outcome_units):
         example = ("92cm ahead", "10cm left", "5cm up")[: len(manifest.outcome_names)]
         words = f', or words such as "{", ".join(example)}"'
     return (

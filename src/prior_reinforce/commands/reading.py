@@ -10,7 +10,8 @@ import tyro
 
 from prior_reinforce.commands.workspace import Folder
 from prior_reinforce.errors import ConfigurationError, InvalidFeedbackError
-from prior_reinforce.wording import from_words
+from prior_reinforce.session import Session
+from prior_reinforce.wording import from_words, in_words
 from prior_reinforce.workspace.status import tell_example
 from prior_reinforce.workspace.workspace import Workspace
 
@@ -39,7 +40,7 @@ class Reading:
     miss: bool = False
     """The goal was not reached, whatever the distance says."""
 
-    def read(self, workspace: Workspace) -> tuple[np.ndarray, bool | None]:
+    def read(self, workspace: Workspace, session: Session) -> tuple[np.ndarray, bool | None]:
         """The error seen, and whether it was a hit if that was said."""
         given = [self.error is not None, self.outcome is not None]
         if sum(given) > 1 or not (any(given) or self.hit) or (self.hit and self.miss):
@@ -48,8 +49,7 @@ class Reading:
                 "as well, or --hit alone"
             )
         hit = True if self.hit else False if self.miss else None
-        goal_number = workspace.record(self.number).goal_number
-        goal = workspace.history.goals[goal_number - 1].goal
+        goal = session.goals[session.trial(self.number).goal_number - 1].goal
         if self.outcome is not None:
             if len(self.outcome) != goal.size:
                 raise InvalidFeedbackError(
@@ -59,37 +59,33 @@ class Reading:
             return _plausible(workspace, np.array(self.outcome) - goal), hit
         if self.error is None:
             return np.zeros(goal.size), hit
-        return _read_error(workspace, self.error), hit
+        return _read_error(workspace, " ".join(self.error)), hit
 
 
-def _read_error(workspace: Workspace, given: tuple[str, ...]) -> np.ndarray:
-    """Read an error from words or numbers.
-
-    Returns:
-        Outcome minus goal, shape (k,), in the outcome's units.
+def _read_error(workspace: Workspace, text: str) -> np.ndarray:
+    """Read outcome minus goal, shape (k,), in the outcome's units, from words or numbers.
 
     Raises:
-        InvalidFeedbackError: It is neither, or as many numbers as components are missing.
+        InvalidFeedbackError: It is neither, or another number of numbers.
     """
-    manifest = workspace.manifest
-    k = len(manifest.outcome_names)
-    text = " ".join(given)
+    names, units = workspace.manifest.outcome_names, workspace.manifest.outcome_units
+    k = len(names)
     try:
         numbers = [float(word) for word in text.replace(",", " ").split()]
     except ValueError:
         numbers = None
     if numbers is None or (k > 1 and text == "0"):  # a lone 0 says: on the goal
-        if manifest.in_words:
+        if in_words(units):
             return _sayable(text, from_words(text, k))
         raise InvalidFeedbackError(
             f"cannot read {text!r}; this task's outcomes have no words, give {k} numbers: "
             f"{tell_example(workspace)}"
         )
     if len(numbers) != k:
-        words = ", or words" if manifest.in_words else ""
+        words = ", or words" if in_words(units) else ""
         raise InvalidFeedbackError(
             f"--error needs {k} numbers, got {len(numbers)}: outcome minus goal in "
-            f"{', '.join(manifest.outcome_names)}{words}: {tell_example(workspace)}"
+            f"{', '.join(names)}{words}: {tell_example(workspace)}"
         )
     return _plausible(workspace, np.array(numbers))
 
@@ -107,7 +103,8 @@ def _sayable(text: str, error: np.ndarray) -> np.ndarray:
 def _plausible(workspace: Workspace, error: np.ndarray) -> np.ndarray:
     """The error, unless it looks like centimetres where words could say it as well."""
     largest = np.abs(error).max(initial=0.0)
-    if workspace.manifest.in_words and _LARGEST_PLAUSIBLE_METRES <= largest < np.inf:
+    words = in_words(workspace.manifest.outcome_units)
+    if words and _LARGEST_PLAUSIBLE_METRES <= largest < np.inf:
         raise InvalidFeedbackError(
             f"an error of {largest:g} m looks like centimetres; numbers are metres, or say it in "
             f"words: {tell_example(workspace)}"

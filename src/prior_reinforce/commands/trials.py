@@ -10,17 +10,14 @@ from typing import Annotated
 import tyro
 
 from prior_reinforce.commands.reading import Number, Reading
-from prior_reinforce.commands.workspace import Folder, opened, print_next
+from prior_reinforce.commands.workspace import Folder, print_next
 from prior_reinforce.errors import ConfigurationError, FileFormatError
-from prior_reinforce.generators.by_name import make_generator
 from prior_reinforce.plans.files import check_plan_path, write_plan
-from prior_reinforce.robots.executors.command import check_command
-from prior_reinforce.robots.executors.lock import is_executing
-from prior_reinforce.workspace.execution import execute
-from prior_reinforce.workspace.history import TrialRecord, TrialStage
+from prior_reinforce.plans.motions import Plan
+from prior_reinforce.session import Session
+from prior_reinforce.trials import Stage, Trial
+from prior_reinforce.wording import say_place
 from prior_reinforce.workspace.status import say_trial
-from prior_reinforce.workspace.trials import amend, ask, tell, void
-from prior_reinforce.workspace.wording import say_place
 from prior_reinforce.workspace.workspace import Workspace
 
 
@@ -43,49 +40,54 @@ class Ask:
     arm_did_not_move: bool = False
     """After a crash while executing: a person saw that nothing moved."""
     generator: str | None = None
-    """The generator that the model was learned by, where it is one's own: module:Class."""
+    """The generator that the model was learned by, where it is your own: module:Class."""
 
     def run(self) -> int:
-        """Hand the plan out."""
-        own = None if self.generator is None else make_generator(self.generator)
+        """Show the plan, write it, execute it."""
+        from prior_reinforce.robots.executors.command import check_command
+
         if self.run_command is not None:
             check_command(self.run_command, time_limit=self.time_limit)
         if self.rate is not None and self.out is None:
             raise ConfigurationError(
                 "--rate is of the file that --out writes; --run is given the plan's own frames"
             )
-        with opened(self.folder) as workspace:
-            self._check_out(workspace)
+        with Workspace(self.folder) as workspace:
+            session = workspace.session(self.generator)
+            self._check_out(session)
             did_not_move = self.arm_did_not_move
-            if not did_not_move and _should_ask_whether_it_moved(workspace):
-                moved = _ask_whether_it_moved(workspace)
-                if moved:
+            if not did_not_move and _was_cut_off(workspace, session) and sys.stdin.isatty():
+                if _ask_whether_it_moved(session):
                     print_next(workspace)
                     return 1
                 did_not_move = True
-            trial = ask(workspace, arm_did_not_move=did_not_move, own=own)
-            plan = workspace.plan(trial)
-            print(
-                f"trial {trial.number}: aimed at {say_place(workspace.manifest, trial.condition)}"
-            )
-            if _reached_before(workspace, trial):
-                print("the goal is reached already: this trial repeats it")
-            report = workspace.gate(plan)
-            print(
-                "no robot in the manifest, no limits checked" if report is None else report.text()
-            )
-            print(f"plan: {workspace.plan_path(trial)}")
-            out = self._out_of(trial.number)
-            if out is not None:
-                print(f"written: {write_plan(plan, out, rate=self.rate).path}")
+            reached_before = session.solved
+            trial = session.ask(arm_did_not_move=did_not_move)
+            self._show(workspace, trial, reached_before)
             if self.run_command is not None:
-                return self._execute(workspace, trial, self.run_command)
-            if trial.stage is TrialStage.EXECUTED:
+                return self._execute(workspace, trial.number, self.run_command)
+            if trial.stage is Stage.EXECUTED:
                 print("it was executed already")
             else:
                 print("execute it, then say where the object went:")
             print_next(workspace)
             return 0
+
+    def _show(self, workspace: Workspace, trial: Trial, reached_before: bool) -> None:
+        """Print where the trial aims and what the gate says, and write --out."""
+        manifest = workspace.manifest
+        place = say_place(trial.condition, manifest.outcome_names, manifest.outcome_units)
+        print(f"trial {trial.number}: aimed at {place}")
+        if reached_before:
+            print("the goal is reached already: this trial repeats it")
+        assert trial.plan is not None
+        report = workspace.gate(trial.plan)
+        print("no robot in the manifest, no limits checked" if report is None else report.text())
+        print(f"plan: {workspace.plan_path(trial)}")
+        out = self._out_of(trial.number)
+        if out is not None:
+            plan = Plan(trial.plan, manifest.format)
+            print(f"written: {write_plan(plan, out, rate=self.rate).path}")
 
     def _out_of(self, number: int) -> Path | None:
         """Where --out puts the plan of a trial."""
@@ -94,34 +96,33 @@ class Ask:
         out = self.out / "trial-{trial}.npz" if self.out.is_dir() else self.out
         return Path(str(out).replace("{trial}", str(number)))
 
-    def _check_out(self, workspace: Workspace) -> None:
+    def _check_out(self, session: Session) -> None:
         """Say what --out cannot do before a trial is made."""
-        history = workspace.history
-        new = history.open_trial is None
-        number = len(history.trials) + 1 if new else history.trials[-1].number
+        trial = session.open_trial
+        number = session.n_trials_asked + 1 if trial is None else trial.number
         out = self._out_of(number)
         if out is None:
             return
         check_plan_path(out, rate=self.rate)
         # The open trial's plan may be there from the last time it was asked for.
-        if new and out.exists():
+        if trial is None and out.exists():
             raise FileFormatError(
                 f"{out} is there already, and plans are never overwritten; choose another name, "
                 'for instance with the trial\'s number: --out "plan-{trial}.npz"'
             )
 
-    def _execute(self, workspace: Workspace, trial: TrialRecord, command: str) -> int:
-        hand_over = execute(workspace, trial.number, command, time_limit=self.time_limit)
-        if hand_over.output_tail:
-            print(hand_over.output_tail.rstrip())
-        if hand_over.succeeded:
+    def _execute(self, workspace: Workspace, number: int, command: str) -> int:
+        result = workspace.execute(number, command, time_limit=self.time_limit)
+        if result.output_tail:
+            print(result.output_tail.rstrip())
+        if result.succeeded:
             print_next(workspace)
             return 0
-        ended = f"ended with status {hand_over.exit_status}"
-        why = "was stopped at its time limit" if hand_over.timed_out else ended
+        ended = f"ended with status {result.exit_status}"
+        why = "was stopped at its time limit" if result.timed_out else ended
         print(
-            f"prior-reinforce: the command {why}; if the object flew, tell trial {trial.number}; "
-            f"if not, void it: prior-reinforce void {self.folder} {trial.number} --reason WHY",
+            f"prior-reinforce: the command {why}; if the object flew, tell trial {number}; "
+            f"if not, void it: prior-reinforce void {self.folder} {number} --reason WHY",
             file=sys.stderr,
         )
         return 1
@@ -133,9 +134,10 @@ class Tell(Reading):
 
     def run(self) -> None:
         """Write it down."""
-        with opened(self.folder) as workspace:
-            error, hit = self.read(workspace)
-            trial = tell(workspace, self.number, error, hit=hit)
+        with Workspace(self.folder) as workspace:
+            session = workspace.session()
+            error, hit = self.read(workspace, session)
+            trial = session.tell(self.number, error, hit=hit)
             print(f"trial {trial.number}: {say_trial(workspace, trial)}")
             print_next(workspace)
 
@@ -146,9 +148,10 @@ class Amend(Reading):
 
     def run(self) -> None:
         """Write it down."""
-        with opened(self.folder) as workspace:
-            error, hit = self.read(workspace)
-            trial = amend(workspace, self.number, error, hit=hit)
+        with Workspace(self.folder) as workspace:
+            session = workspace.session()
+            error, hit = self.read(workspace, session)
+            trial = session.amend(self.number, error, hit=hit)
             print(f"trial {trial.number}, corrected: {say_trial(workspace, trial)}")
             print_next(workspace)
 
@@ -166,8 +169,8 @@ class Void:
 
     def run(self) -> None:
         """Write it down."""
-        with opened(self.folder) as workspace:
-            trial = void(workspace, self.number, self.reason)
+        with Workspace(self.folder) as workspace:
+            trial = workspace.session().void(self.number, self.reason)
             print(
                 f"trial {trial.number}: {say_trial(workspace, trial)}; nothing is learned from it"
             )
@@ -188,37 +191,31 @@ class Export:
     """Samples a second; the plan's own frames if not given."""
 
     def run(self) -> None:
-        """Write it."""
-        with opened(self.folder) as workspace:
-            plan = workspace.plan(workspace.record(self.number))
+        """Write it, if it may still be executed."""
+        with Workspace(self.folder) as workspace:
+            plan = workspace.plan(workspace.session().trial(self.number))
+            verdict = workspace.gate(plan.actions)
+            if verdict is not None:
+                verdict.require()
             written = write_plan(plan, self.out, rate=self.rate)
         print(f"written: {written.path}  sha256 {written.sha256}")
 
 
-def _reached_before(workspace: Workspace, trial: TrialRecord) -> bool:
-    return any(other.hit for other in workspace.history.trials_of(trial.goal_number))
+def _was_cut_off(workspace: Workspace, session: Session) -> bool:
+    trial = session.open_trial
+    executing = trial is not None and trial.stage is Stage.EXECUTING
+    return executing and not workspace.is_executing()
 
 
-def _should_ask_whether_it_moved(workspace: Workspace) -> bool:
-    trial = workspace.history.open_trial
-    cut_off = trial is not None and trial.stage is TrialStage.EXECUTING
-    return cut_off and sys.stdin.isatty() and not is_executing(workspace.folder)
-
-
-def _ask_whether_it_moved(workspace: Workspace) -> bool:
-    trial = workspace.history.open_trial
-    assert trial is not None
-    print(f"trial {trial.number} was executing when the program stopped")
+def _ask_whether_it_moved(session: Session) -> bool:
+    assert session.open_trial is not None
+    print(f"trial {session.open_trial.number} was executing when the program stopped")
     while True:
-        answer = _answer("did the arm move? (yes/no) ").lower()
+        try:
+            answer = input("did the arm move? (yes/no) ").strip().lower()
+        except EOFError as error:
+            raise ConfigurationError(
+                "no answer; ask again, with --arm-did-not-move if it did not"
+            ) from error
         if answer in {"y", "yes", "n", "no"}:
             return answer.startswith("y")
-
-
-def _answer(question: str) -> str:
-    try:
-        return input(question).strip()
-    except EOFError as error:
-        raise ConfigurationError(
-            "no answer; ask again, with --arm-did-not-move if it did not"
-        ) from error

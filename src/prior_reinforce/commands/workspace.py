@@ -3,36 +3,24 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
 import tyro
 
-from prior_reinforce.workspace.manifest_template import TEMPLATE
-from prior_reinforce.workspace.reporting import report_workspace
+from prior_reinforce.adapters import ADAPTERS
+from prior_reinforce.wording import say_place
+from prior_reinforce.workspace.manifest import TEMPLATE
 from prior_reinforce.workspace.status import describe, next_step
-from prior_reinforce.workspace.wording import say_place
 from prior_reinforce.workspace.workspace import Workspace
 
 Folder = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="WORKSPACE")]
 
 
-@contextmanager
-def opened(folder: Path) -> Iterator[Workspace]:
-    """Open a workspace for one command."""
-    workspace = Workspace(folder)
-    try:
-        yield workspace
-    finally:
-        workspace.close()
-
-
 def print_next(workspace: Workspace) -> None:
     """Say which command comes next."""
-    print(f"next: {next_step(workspace)}")
+    print(f"next: {next_step(workspace, workspace.session())}")
 
 
 @dataclass(frozen=True)
@@ -70,10 +58,9 @@ class New:
             tolerance=self.tolerance,
             robot=self.robot,
         )
-        workspace = Workspace.create(self.folder, manifest)
-        print(f"workspace made in {self.folder}; look through {self.folder / 'workspace.toml'}")
-        print_next(workspace)
-        workspace.close()
+        with Workspace.create(self.folder, manifest) as workspace:
+            print(f"workspace made in {self.folder}; look through {self.folder / 'workspace.toml'}")
+            print_next(workspace)
 
 
 @dataclass(frozen=True)
@@ -86,12 +73,19 @@ class Goal:
     """Its place in the outcome's units, for instance 0.92 0.10 (metres ahead, metres left)."""
     memory: Literal["goal", "workspace"] = "goal"
     """Which trials the adapter learns from: this goal's, or earlier goals' as well."""
+    adapter: Annotated[str, tyro.conf.arg(help=f"How the condition is corrected: {ADAPTERS.help}.")] = (
+        "gp"
+    )
 
     def run(self) -> None:
         """Set it."""
-        with opened(self.folder) as workspace:
-            record = workspace.set_goal(self.goal, memory=self.memory)
-            print(f"goal {record.number}: {say_place(workspace.manifest, record.goal)}")
+        with Workspace(self.folder) as workspace:
+            goal = workspace.set_goal(
+                self.goal, carry_over=self.memory == "workspace", adapter=self.adapter
+            )
+            manifest = workspace.manifest
+            place = say_place(goal.goal, manifest.outcome_names, manifest.outcome_units)
+            print(f"goal {goal.number}: {place}")
             print_next(workspace)
 
 
@@ -104,7 +98,7 @@ class Status:
 
     def run(self) -> None:
         """Print ten lines."""
-        with opened(self.folder) as workspace:
+        with Workspace(self.folder) as workspace:
             print(describe(workspace))
 
 
@@ -117,10 +111,10 @@ class Log:
 
     def run(self) -> None:
         """Print it."""
-        with opened(self.folder) as workspace:
+        with Workspace(self.folder) as workspace:
             events = workspace.events
         for event in events:
-            print(event.as_json())
+            print(json.dumps({"id": event.id, "time": event.time, "kind": event.kind, **event.data}))
 
 
 @dataclass(frozen=True)
@@ -134,7 +128,9 @@ class Report:
 
     def run(self) -> None:
         """Write it."""
-        with opened(self.folder) as workspace:
+        from prior_reinforce.workspace.report import report_workspace
+
+        with Workspace(self.folder) as workspace:
             page = report_workspace(workspace, self.out or self.folder / "report")
         print(f"report: {page}")
 

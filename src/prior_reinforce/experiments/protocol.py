@@ -24,7 +24,8 @@ from prior_reinforce.perception.base import Perception
 from prior_reinforce.perception.eye import Eye
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.rollouts import Rollout
-from prior_reinforce.session import Session, Trial, ask_all
+from prior_reinforce.session import Session, ask_all
+from prior_reinforce.trials import Trial
 from prior_reinforce.tasks.base import Task
 
 FailedReading = Callable[
@@ -160,8 +161,8 @@ def run_goals(
         One result a goal, in order.
     """
     sessions = [
-        Session(generator, make_adapter(), demonstrations, goal, task.tolerance, earlier=pairs)
-        for goal, pairs in zip(goals, earlier or [()] * len(goals), strict=True)
+        Session(generator, make_adapter(), demonstrations, goal, task.tolerance)
+        for goal in goals
     ]
     seers = [np.random.default_rng([seed, 1, i]) for i in range(len(goals))]
     rollouts: list[list[Rollout]] = [[] for _ in goals]

@@ -32,7 +32,7 @@ FAMILY: tuple[type[Generator], ...] = (
 """Every generator that can be loaded from disk."""
 
 
-def load_generator(folder: str | os.PathLike[str], *, device: str = "cpu") -> Generator:
+def load_generator(folder: str | os.PathLike[str], *, own=None, device: str = "cpu") -> Generator:
     """Read a saved generator of any kind.
 
     Args:
@@ -76,3 +76,9 @@ __all__ = [
     "align",
     "load_generator",
 ]
+
+from prior_reinforce.generators.base import Generator as _G
+_G.remarks = ()
+def make_generator(choice):
+    from prior_reinforce.generators.by_name import make_generator as make
+    return make(choice)

@@ -1,15 +1,23 @@
-"""Plans on disk: written once, read-only, known by their SHA-256 hash."""
+"""Plans on disk: written once, read-only, known by their SHA-256 hash.
+
+`npz` and `csv` hold t, q, dq, ddq; `json` has the field order of ROS 2's
+trajectory_msgs/JointTrajectory. Velocities and accelerations go with the positions because a ROS 2
+joint trajectory controller interpolates positions alone linearly, and all three by quintics
+(control.ros.org, joint_trajectory_controller).
+"""
 
 from __future__ import annotations
 
-import hashlib
+import csv
+import io
 import json
+import math
 import os
 import zipfile
 import zlib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import cast, get_args
+from typing import TYPE_CHECKING, Any, Literal, cast, get_args
 
 import numpy as np
 
@@ -20,16 +28,15 @@ from prior_reinforce.errors import (
     PriorReinforceError,
     WorkspaceError,
 )
-from prior_reinforce.files import write_once
-from prior_reinforce.plans.encoding import (
-    FILE_FORMAT,
-    FILE_VERSION,
-    PlanFileFormat,
-    encode_plan,
-)
+from prior_reinforce.files import sha256, write_once
 from prior_reinforce.plans.motions import Plan, PlanFormat
-from prior_reinforce.robots.executors.command import HandOver, run_command
 
+if TYPE_CHECKING:
+    from prior_reinforce.plans.interpolation import FineMotion
+
+PlanFileFormat = Literal["npz", "csv", "json"]
+_FILE_FORMAT = "prior-reinforce plan"
+_FILE_VERSION = 1
 _HIGHEST_RATE = 1e5
 """Samples a second; ours: a hundred times what the fastest arms are sent, in a file still small."""
 
@@ -50,7 +57,7 @@ class PlanFile:
             FileFormatError: It is gone, unreadable, or its bytes have another hash.
         """
         try:
-            found = hashlib.sha256(self.path.read_bytes()).hexdigest()
+            found = sha256(self.path.read_bytes())
         except OSError as error:
             raise FileFormatError(
                 f"cannot read the plan {self.path} ({error.strerror}); put the file back"
@@ -86,9 +93,9 @@ def write_plan(
         WorkspaceError: The disk is full or the folder read-only; nothing is left behind.
     """
     path = Path(path)
-    content = encode_plan(plan, check_plan_path(path, format=format, rate=rate), rate=rate)
+    content = _encode(plan, check_plan_path(path, format=format, rate=rate), rate=rate)
     write_once(path, content)
-    return PlanFile(path, hashlib.sha256(content).hexdigest())
+    return PlanFile(path, sha256(content))
 
 
 def check_plan_path(
@@ -132,7 +139,7 @@ def read_plan(path: str | os.PathLike[str], *, sha256: str | None = None) -> Pla
         with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
             q = np.array(archive["q"])
             metadata = json.loads(str(archive["metadata"]))
-        if metadata["file_format"] != FILE_FORMAT or metadata["version"] != FILE_VERSION:
+        if metadata["file_format"] != _FILE_FORMAT or metadata["version"] != _FILE_VERSION:
             raise ValueError(f"written as {metadata['file_format']} {metadata['version']}")
         names, units = tuple(metadata["joint_names"]), tuple(metadata["units"])
         return Plan(q, PlanFormat(names, units, float(metadata["dt"])))
@@ -155,21 +162,72 @@ def read_plan(path: str | os.PathLike[str], *, sha256: str | None = None) -> Pla
         ) from error
 
 
-def run_with_plan(
-    command: str, plan_file: PlanFile, *, time_limit: float, keep_open: tuple[int, ...] = ()
-) -> HandOver:
-    """Run `mycontroller {plan}` in a process of its own, once the plan's hash is checked.
+def _encode(plan: Plan, format: PlanFileFormat, *, rate: float | None = None) -> bytes:
+    """The bytes of a plan's file, the same for the same plan."""
+    from prior_reinforce.plans.interpolation import FineMotion, interpolate
 
-    Args:
-        command: Program and arguments, `{plan}` among them; no shell sees it.
-        plan_file: What is to be executed.
-        time_limit: In [s]; then the command and everything it started are stopped.
-        keep_open: File descriptors that the command inherits.
+    fine = interpolate(plan.actions, plan.format.dt, rate=rate or 1 / plan.format.dt)
+    if rate is None:
+        # On the frames themselves the spline is exact to rounding; write them as they are.
+        fine = FineMotion(plan.times, np.array(plan.actions), fine.dq, fine.ddq, fine.dddq)
+    if format == "npz":
+        return _as_npz(plan, fine, 1 / rate if rate else plan.format.dt)
+    return _as_csv(plan.format, fine) if format == "csv" else _as_json(plan.format, fine)
 
-    Raises:
-        ConfigurationError: A command or a limit that cannot be used, or a program that cannot be
-            started; nothing has run then.
-        FileFormatError: The plan is no longer what its hash says; nothing has run.
-    """
-    plan_file.verify()
-    return run_command(command, plan_file.path, time_limit=time_limit, keep_open=keep_open)
+
+def _as_npz(plan: Plan, fine: FineMotion, dt: float) -> bytes:
+    metadata = {
+        "file_format": _FILE_FORMAT,
+        "version": _FILE_VERSION,
+        "joint_names": plan.format.names,
+        "units": plan.format.units,
+        "dt": dt,
+    }
+    buffer = io.BytesIO()
+    # numpy stamps every member with the same date, so the bytes depend on the plan alone.
+    np.savez(
+        buffer,
+        t=fine.t,
+        q=fine.q,
+        dq=fine.dq,
+        ddq=fine.ddq,
+        metadata=np.array(json.dumps(metadata)),
+    )
+    return buffer.getvalue()
+
+
+def _as_csv(format: PlanFormat, fine: FineMotion) -> bytes:
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    prefixes = ("", "d_", "dd_")
+    writer.writerow(["t", *(prefix + name for prefix in prefixes for name in format.names)])
+    # repr of a float is the shortest text that reads back as the same number.
+    writer.writerows(
+        [repr(float(value)) for value in row]
+        for row in np.column_stack([fine.t, fine.q, fine.dq, fine.ddq])
+    )
+    return text.getvalue().encode()
+
+
+def _as_json(format: PlanFormat, fine: FineMotion) -> bytes:
+    message: dict[str, Any] = {
+        "header": {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""},
+        "joint_names": list(format.names),
+        "points": [
+            {
+                "positions": q.tolist(),
+                "velocities": dq.tolist(),
+                "accelerations": ddq.tolist(),
+                "effort": [],
+                "time_from_start": _duration(float(t)),
+            }
+            for t, q, dq, ddq in zip(fine.t, fine.q, fine.dq, fine.ddq, strict=True)
+        ],
+    }
+    return (json.dumps(message, indent=1) + "\n").encode()
+
+
+def _duration(seconds: float) -> dict[str, int]:
+    nanoseconds = round(seconds * 1e9)
+    whole = math.floor(nanoseconds / 1_000_000_000)
+    return {"sec": whole, "nanosec": nanoseconds - whole * 1_000_000_000}

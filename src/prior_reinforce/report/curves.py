@@ -18,7 +18,7 @@ from prior_reinforce.report.style import (
 )
 from prior_reinforce.report.views import shown
 from prior_reinforce.report.wording import display_unit, say_length
-from prior_reinforce.session import TrialState
+from prior_reinforce.trials import Stage
 
 _COLUMNS = 4
 
@@ -64,9 +64,9 @@ def draw_errors(record: AdaptationRecord) -> Figure:
             color=INK,
         )
     for trial in record.trials:
-        if trial.state is not TrialState.TOLD:
+        if trial.stage is not Stage.TOLD:
             axes.annotate(
-                trial.state.value,
+                trial.stage.value,
                 (trial.number, tolerance),
                 (0, 12),
                 textcoords="offset points",
@@ -114,7 +114,7 @@ def draw_plans(record: AdaptationRecord) -> Figure:
                 trial.plan[:, j],
                 color=trial_colour(i, n, hit=trial.hit),
                 linewidth=1.7,
-                linestyle="--" if trial.state is TrialState.VOIDED else "-",
+                linestyle="--" if trial.stage is Stage.VOIDED else "-",
             )
         unit = demonstrations.format.units[j]
         name = demonstrations.format.names[j]
@@ -126,7 +126,7 @@ def draw_plans(record: AdaptationRecord) -> Figure:
     keys = [panels[0].plot([], [], color=DEMONSTRATION, label="demonstrations")[0]]
     for i, trial in enumerate(record.trials):
         label = f"trial {trial.number}" + (" (hit)" if trial.hit else "")
-        style = "--" if trial.state is TrialState.VOIDED else "-"
+        style = "--" if trial.stage is Stage.VOIDED else "-"
         colour = trial_colour(i, n, hit=trial.hit)
         keys.append(panels[0].plot([], [], style, color=colour, linewidth=1.7, label=label)[0])
     figure.legend(

@@ -15,7 +15,8 @@ import numpy as np
 from prior_reinforce.errors import ConfigurationError, InvalidGoalError
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.report.film import Film
-from prior_reinforce.session import Session, Trial, TrialState
+from prior_reinforce.session import Session
+from prior_reinforce.trials import Stage, Trial
 from prior_reinforce.wording import WORDS
 
 
@@ -135,7 +136,7 @@ class AdaptationRecord:
         if self.outcomes is None:
             return (None,) * len(self.trials)
         return tuple(
-            outcome if trial.state is TrialState.TOLD else None
+            outcome if trial.stage is Stage.TOLD else None
             for trial, outcome in zip(self.trials, self.outcomes, strict=True)
         )
 
@@ -145,7 +146,7 @@ class AdaptationRecord:
 
         Voided trials are not counted (paper, Evaluation Protocol: N counts trials to first reach).
         """
-        told = [trial for trial in self.trials if trial.state is TrialState.TOLD]
+        told = [trial for trial in self.trials if trial.stage is Stage.TOLD]
         for count, trial in enumerate(told, start=1):
             if trial.hit:
                 return count
@@ -154,4 +155,4 @@ class AdaptationRecord:
     @property
     def n_told(self) -> int:
         """Trials that count so far."""
-        return sum(trial.state is TrialState.TOLD for trial in self.trials)
+        return sum(trial.stage is Stage.TOLD for trial in self.trials)

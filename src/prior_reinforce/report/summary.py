@@ -9,7 +9,7 @@ import numpy as np
 
 from prior_reinforce.report.record import AdaptationRecord
 from prior_reinforce.report.wording import say_aim, say_error, say_length, say_place
-from prior_reinforce.session import Trial, TrialState
+from prior_reinforce.trials import Stage, Trial
 
 
 @dataclass(frozen=True)
@@ -108,10 +108,10 @@ def describe(record: AdaptationRecord) -> str:
 def _row(record: AdaptationRecord, i: int, trial: Trial) -> TrialRow:
     aim = say_aim(record, trial.condition)
     if trial.error_seen is None:
-        voided = trial.state is TrialState.VOIDED
+        voided = trial.stage is Stage.VOIDED
         note = f"voided: {trial.note}" if trial.note else "voided"
         seen, result = (note, "not counted") if voided else ("not executed yet", "pending")
-        return TrialRow(trial.number, trial.state.value, aim, seen, "–", "", result)
+        return TrialRow(trial.number, trial.stage.value, aim, seen, "–", "", result)
     off = float(np.linalg.norm(trial.error_seen))
     truth = record.true_outcomes[i]
     truly_off = None if truth is None else float(np.linalg.norm(truth - record.goal))

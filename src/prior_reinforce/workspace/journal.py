@@ -1,7 +1,7 @@
 """The trial journal: append-only events in SQLite, each durable before a command returns.
 
 Nothing is ever changed or deleted; what happened is the list of events, and everything else is a
-fold over it (`history.py`). One program at a time may read-then-append (`Journal.exclusive`). Every
+fold over it (`trials.py`). One program at a time may read-then-append (`Journal.exclusive`). Every
 event carries a digest of itself and of all before it, so that a damaged copy is an error rather
 than a reading that is slightly another one.
 """
@@ -11,14 +11,14 @@ from __future__ import annotations
 import hashlib
 import json
 import sqlite3
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
 
 from prior_reinforce.errors import WorkspaceError
+from prior_reinforce.trials import Event
 
 JOURNAL_FILE = "journal.sqlite"
 _VERSION = 1
@@ -40,25 +40,6 @@ BEGIN SELECT RAISE(ABORT, 'the journal is append-only'); END;
 """
 
 
-@dataclass(frozen=True)
-class Event:
-    """Something that happened, and will always have happened."""
-
-    id: int
-    """Order of events, from 1."""
-    time: str
-    """When it was written, ISO 8601, UTC."""
-    kind: str
-    """`demonstrations_imported`, `model_trained`, `goal_set`, `asked`, `executing`, `executed`,
-    `not_executed`, `told`, `voided` or `amended`."""
-    data: Mapping[str, Any]
-    """What it says, as plain JSON data."""
-
-    def as_json(self) -> str:
-        """The event as one line of JSON."""
-        return json.dumps({"id": self.id, "time": self.time, "kind": self.kind, **self.data})
-
-
 class Journal:
     """Events of one workspace."""
 
@@ -69,6 +50,8 @@ class Journal:
             WorkspaceError: It cannot be opened, is damaged, or was written by a newer version.
         """
         self._path = path
+        self._events: list[Event] = []
+        self._last_digest = ""
         with self._named_errors():
             self._connection = sqlite3.connect(path, timeout=_LOCK_TIMEOUT_S, isolation_level=None)
             # A commit returns only when the rollback journal and its folder are on the disk.
@@ -88,33 +71,34 @@ class Journal:
         """Close the file."""
         self._connection.close()
 
-    def events(self) -> list[Event]:
-        """All events, in order.
+    def events(self) -> Sequence[Event]:
+        """All events, in order; only what came since the last time is read from the disk.
 
         Raises:
             WorkspaceError: The file is damaged.
         """
-        events: list[Event] = []
-        digest = ""
         with self._named_errors():
             rows = self._connection.execute(
-                "SELECT id, time, kind, data, digest FROM events ORDER BY id"
+                "SELECT id, time, kind, data, digest FROM events WHERE id > ? ORDER BY id",
+                (self._events[-1].id if self._events else 0,),
             )
             for id_, time, kind, data, written in rows:
-                digest = _digest(digest, time, kind, data)
+                digest = _digest(self._last_digest, time, kind, data)
                 if digest != written:
                     raise WorkspaceError(
                         f"{self._path}: event {id_} is not what was written; restore the journal "
                         "from a copy"
                     )
-                events.append(Event(id_, time, kind, json.loads(data)))
-        return events
+                self._events.append(Event(id_, kind, json.loads(data), time))
+                self._last_digest = digest
+        return self._events
 
     @contextmanager
     def exclusive(self) -> Iterator[None]:
         """Hold the journal for reading and then appending; others wait, and then say so.
 
-        Appends inside become durable together when the block ends; none does if it raises.
+        Appends inside become durable together when the block ends; none does if it raises. Read
+        before the first append: what is not durable yet is no event.
 
         Raises:
             WorkspaceError: Another program holds it, or the disk refuses.

@@ -25,6 +25,7 @@ from prior_reinforce.robots import (
     robot_limits,
 )
 from prior_reinforce.wording import WORDS
+from prior_reinforce.workspace.manifest_template import TEMPLATE  # noqa: F401
 
 if sys.version_info >= (3, 11):
     import tomllib

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from prior_reinforce.robots.executors.lock import is_executing
-from prior_reinforce.workspace.history import GoalRecord, History, TrialRecord, TrialStage
-from prior_reinforce.workspace.wording import say_error, say_place
+import shlex
+
+from prior_reinforce.session import Session
+from prior_reinforce.trials import Goal, Stage, Trial
+from prior_reinforce.wording import in_words, say_error, say_place
 from prior_reinforce.workspace.workspace import Workspace
 
 _TRIALS_SHOWN = 3
@@ -12,11 +14,11 @@ _EXAMPLE = ("5cm long", "2cm left", "1cm high")
 
 
 def describe(workspace: Workspace) -> str:
-    """Say where a workspace stands: ten lines at most."""
-    history = workspace.history
-    manifest = workspace.manifest
+    """Say where a workspace stands: ten lines at most, and one for each remark on the model."""
+    session, manifest = workspace.session(), workspace.manifest
     robot = manifest.robot.robot if manifest.robot is not None else "none, no limits are checked"
-    n = 0 if history.demonstrations is None else workspace.demonstrations.n
+    n = 0 if workspace.demonstrations_sha256 is None else workspace.demonstrations.n
+    training = workspace.training
     rows = [
         ("task", f"{manifest.name}, tolerance {manifest.tolerance:g} {manifest.outcome_units[0]}"),
         (
@@ -25,89 +27,87 @@ def describe(workspace: Workspace) -> str:
             f"{manifest.format.dt * 1000:g} ms; robot: {robot}",
         ),
         ("demonstrations", str(n or "none yet")),
-        ("model", _say_model(history)),
+        ("model", _say_model(workspace)),
+        *(("  note", remark) for remark in (training.remarks if training is not None else ())),
     ]
-    goal = history.goal
-    if goal is not None:
-        rows.append((f"goal {goal.number}", _say_goal(workspace, history, goal, n)))
+    if session.goals:
+        goal = session.goals[-1]
+        rows.append((f"goal {goal.number}", _say_goal(workspace, session, goal, n)))
         rows += [
             (f"  trial {trial.number}", say_trial(workspace, trial))
-            for trial in history.trials_of(goal.number)[-_TRIALS_SHOWN:]
+            for trial in session.trials[-_TRIALS_SHOWN:]
         ]
-    rows.append(("next", next_step(workspace)))
+    rows.append(("next", next_step(workspace, session)))
     return "\n".join(f"{name:<15} {text}" for name, text in rows)
 
 
-def say_trial(workspace: Workspace, trial: TrialRecord) -> str:
+def say_trial(workspace: Workspace, trial: Trial) -> str:
     """Say what became of a trial."""
-    if trial.stage is TrialStage.TOLD and trial.error_seen is not None:
-        seen = say_error(workspace.manifest, trial.error_seen)
+    if trial.error_seen is not None:
+        manifest = workspace.manifest
+        seen = say_error(trial.error_seen, manifest.outcome_names, manifest.outcome_units)
         return f"reached ({seen})" if trial.hit else seen
-    if trial.stage is TrialStage.VOIDED:
+    if trial.stage is Stage.VOIDED:
         return f"void: {trial.note}" if trial.note else "void"
-    if trial.stage is TrialStage.EXECUTING:
-        if is_executing(workspace.folder):
+    if trial.stage is Stage.EXECUTING:
+        if workspace.is_executing():
             return "is executing now"
         return "was executing when the program stopped: did the arm move?"
-    if trial.stage is TrialStage.EXECUTED:
+    if trial.stage is Stage.EXECUTED:
         return "executed, waits to be told"
-    return "plan handed out, waits to be executed and told"
+    return "asked for, waits to be executed and told"
 
 
-def next_step(workspace: Workspace) -> str:
+def next_step(workspace: Workspace, session: Session) -> str:
     """The command that comes next."""
-    folder = workspace.folder
-    history = workspace.history
-    trial = history.open_trial
-    if history.demonstrations is None:
+    folder = shlex.quote(str(workspace.folder))
+    if workspace.demonstrations_sha256 is None:
         return f"prior-reinforce import {folder} RECORDINGS"
-    if history.stale:
+    if workspace.stale:
         return f"prior-reinforce learn {folder}"
-    if history.goal is None:
-        return f"prior-reinforce goal {folder} {_example_goal(workspace)}"
+    new_goal = f"prior-reinforce goal {folder} {_goal_example(workspace)}"
+    if not session.goals:
+        return new_goal
+    trial = session.open_trial
     if trial is not None:
         tell = f"prior-reinforce tell {folder} {trial.number} {tell_example(workspace)}"
-        if trial.stage is TrialStage.EXECUTING and not is_executing(folder):
+        if trial.stage is Stage.EXECUTING and not workspace.is_executing():
             return f"if it moved: {tell}; if not: prior-reinforce ask {folder} --arm-did-not-move"
         return f"{tell} (or --hit)"
-    if any(t.hit for t in history.trials_of(history.goal.number)):
-        return (
-            f"prior-reinforce goal {folder} {_example_goal(workspace)}, "
-            f"or prior-reinforce report {folder}"
-        )
-    training = history.training
-    own = f" --generator {training.generator}" if training is not None and training.own else ""
-    return f"prior-reinforce ask {folder}{own}"
+    if session.solved:
+        return f"{new_goal}, or prior-reinforce report {folder}"
+    training = workspace.training
+    own = training.own if training is not None else None
+    return f"prior-reinforce ask {folder}" + (f" --generator {own}" if own else "")
 
 
 def tell_example(workspace: Workspace) -> str:
     """How an error of this task can be told."""
-    manifest = workspace.manifest
-    if manifest.in_words:
-        words = ", ".join(_EXAMPLE[: len(manifest.outcome_names)])
-        return f'--error "{words}"'
-    return "--error " + " ".join(f"D{name.upper()}" for name in manifest.outcome_names)
+    names, units = workspace.manifest.outcome_names, workspace.manifest.outcome_units
+    if in_words(units):
+        return f'--error "{", ".join(_EXAMPLE[: len(names)])}"'
+    return "--error " + " ".join(f"D{name.upper()}" for name in names)
 
 
-def _example_goal(workspace: Workspace) -> str:
+def _goal_example(workspace: Workspace) -> str:
     return " ".join(name.upper() for name in workspace.manifest.outcome_names)
 
 
-def _say_model(history: History) -> str:
-    training = history.training
+def _say_model(workspace: Workspace) -> str:
+    training = workspace.training
     if training is None:
         return "none yet"
-    aligned = ", demonstrations aligned" if training.aligned else ""
-    said = f"{training.model}, {training.generator}{aligned}"
-    return f"{said}, of other demonstrations" if history.stale else said
+    said = f"{training.model}, {training.generator}"
+    return f"{said}, of other demonstrations" if workspace.stale else said
 
 
-def _say_goal(workspace: Workspace, history: History, goal: GoalRecord, n: int) -> str:
-    trials = history.trials_of(goal.number)
-    place = say_place(workspace.manifest, goal.goal)
-    told = [trial for trial in trials if trial.stage is TrialStage.TOLD]
+def _say_goal(workspace: Workspace, session: Session, goal: Goal, n: int) -> str:
+    manifest = workspace.manifest
+    place = say_place(goal.goal, manifest.outcome_names, manifest.outcome_units)
+    told = [trial for trial in session.trials if trial.stage is Stage.TOLD]
     hits = [count for count, trial in enumerate(told, start=1) if trial.hit]
     if hits:
         return f"{place}: reached, N = {n} demonstrations + {hits[0]} trials = {n + hits[0]}"
-    memory = ", helped by earlier goals' trials" if goal.memory == "workspace" else ""
-    return f"{place}: not reached yet, {len(told)} trials told{memory}"
+    carried = ", with earlier goals' trials" if goal.carry_over else ""
+    trials = "1 trial" if len(told) == 1 else f"{len(told)} trials"
+    return f"{place}: not reached yet, {trials} told; adapter {goal.adapter}{carried}"

@@ -10,16 +10,18 @@ leaves at worst a file that nothing names.
 
 from __future__ import annotations
 
-import hashlib
 import shutil
 import tempfile
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from prior_reinforce.errors import FileFormatError
-from prior_reinforce.files import in_place, named_disk_errors, sha256_of_folder
-from prior_reinforce.generators import Generator, load_generator
+from prior_reinforce.files import in_place, named_disk_errors, sha256, sha256_of_folder
 from prior_reinforce.plans.files import PlanFile, read_plan, write_plan
 from prior_reinforce.plans.motions import Demonstrations, Plan
+
+if TYPE_CHECKING:
+    from prior_reinforce.generators.base import Generator
 
 _DIGITS = 16
 """Of a hash in a name: no two of a workspace's files will ever share 64 bits."""
@@ -62,32 +64,34 @@ class Store:
         Raises:
             WorkspaceError: The disk is full, or the folder read-only.
         """
-        models = self._folder / "models"
         with named_disk_errors(self._folder), tempfile.TemporaryDirectory() as scratch:
-            generator.save(Path(scratch) / "model")
-            model = sha256_of_folder(Path(scratch) / "model")[:_DIGITS]
-            with in_place(models / model) as unfinished:
-                shutil.copytree(Path(scratch) / "model", unfinished)
+            saved = Path(scratch) / "model"
+            generator.save(saved)
+            model = sha256_of_folder(saved)[:_DIGITS]
+            with in_place(self._folder / "models" / model) as unfinished:
+                shutil.copytree(saved, unfinished)
         return model
 
-    def model(self, model: str, kind: type[Generator] | None = None) -> Generator:
+    def model(self, model: str, own: str | None = None) -> Generator:
         """Load a generator that was kept.
 
         Args:
             model: Its hash.
-            kind: Its class, where it is none of ours. It is never taken from the folder: a model
-                is data, and names no code to run.
+            own: `module:Class` of a generator of one's own. It is never taken from the folder: a
+                model is data, and names no code to run.
 
         Raises:
             FileFormatError: Its files are missing, damaged, or others.
         """
+        from prior_reinforce.generators import load_generator
+
         folder = self._folder / "models" / model
         if not folder.is_dir() or sha256_of_folder(folder)[:_DIGITS] != model:
             raise FileFormatError(
                 f"the model in {folder} is not the one that was learned; restore it from a copy, "
                 f"or run: prior-reinforce learn {self._folder}"
             )
-        return load_generator(folder) if kind is None else kind.load(folder)
+        return load_generator(folder, own=own)
 
     def save_plan(self, plan: Plan, number: int) -> PlanFile:
         """Keep a trial's plan.
@@ -95,8 +99,7 @@ class Store:
         Raises:
             WorkspaceError: The disk is full, or the folder read-only.
         """
-        digest = hashlib.sha256(plan.actions.tobytes()).hexdigest()[:8]
-        path = self.plan_path(f"trial-{number:03d}-{digest}.npz")
+        path = self.plan_path(f"trial-{number:03d}-{sha256(plan.actions.tobytes())[:8]}.npz")
         with named_disk_errors(self._folder):
             path.parent.mkdir(exist_ok=True)
         return write_plan(plan, path)
@@ -106,10 +109,10 @@ class Store:
         return self._folder / "plans" / name
 
     def plan(self, name: str, sha256: str) -> Plan:
-        """Read a plan that was handed out.
+        """Read a trial's plan.
 
         Raises:
-            FileFormatError: The file is missing, or not what was handed out.
+            FileFormatError: The file is missing, or not what was written.
         """
         return read_plan(self.plan_path(name), sha256=sha256)
 

@@ -1,46 +1,76 @@
-"""A task's folder on disk: what stands in it, and what is learned from.
+"""A task's folder on disk: a manifest, a journal and a store. Its trials are a `Session` over them.
 
     workspace.toml     manifest, written by a person
     journal.sqlite     everything that happened
     demonstrations/    what was imported      files that events name, written
     models/            what was learned       once and never changed (`store.py`)
-    plans/             what was handed out
+    plans/             what was executed
 
 Every change is one journal event, appended while no other program may. What stands is a fold over
-the events, made anew each time, so closing the program, or a power cut, loses nothing.
+the events, so closing the program, or a power cut, loses nothing. Here are the events that are not
+a session's: demonstrations imported, a model trained.
 """
 
 from __future__ import annotations
 
 import os
-from numbers import Integral
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from numpy.typing import ArrayLike
+from typing_extensions import Self
 
+from prior_reinforce.arrays import Frames
 from prior_reinforce.errors import (
     ConfigurationError,
+    FileFormatError,
     InvalidDemonstrationsError,
-    TrialStateError,
     WorkspaceError,
 )
-from prior_reinforce.generators import Generator
-from prior_reinforce.generators.by_name import name_of
+from prior_reinforce.files import named_disk_errors
+from prior_reinforce.plans.files import PlanFile
 from prior_reinforce.plans.motions import Demonstrations, Plan
-from prior_reinforce.robots import LimitReport, check_plan
+from prior_reinforce.registry import parse_choice
 from prior_reinforce.session import Session
-from prior_reinforce.workspace.history import GoalRecord, History, TrialRecord, fold
-from prior_reinforce.workspace.journal import JOURNAL_FILE, Event, Journal
+from prior_reinforce.trials import KINDS, Event, Goal, Trial
+from prior_reinforce.workspace.journal import JOURNAL_FILE, Journal
 from prior_reinforce.workspace.manifest import (
     MANIFEST_FILE,
     Manifest,
     load_manifest,
     parse_manifest,
 )
-from prior_reinforce.workspace.sessions import build_session
 from prior_reinforce.workspace.store import Store
 
-MEMORIES = ("goal", "workspace")
+if TYPE_CHECKING:
+    from prior_reinforce.generators.base import FitProgress, Generator
+    from prior_reinforce.robots.executors.command import CommandResult
+    from prior_reinforce.robots.report import LimitReport
+
+
+@dataclass(frozen=True)
+class Training:
+    """One training."""
+
+    model: str
+    """Hash of the model, the name of its folder."""
+    demonstrations: str
+    """SHA-256 of the demonstrations as they were imported."""
+    fitted_to: str
+    """SHA-256 of what the generator was fitted to; the first journals name aligned copies here."""
+    generator: str
+    """Its choice, for instance `diffusion`, or `module:Class` of one's own."""
+    remarks: tuple[str, ...] = ()
+    """What the fit could not do."""
+
+    @property
+    def own(self) -> str | None:
+        """`module:Class` where the generator is one's own; None where it is ours."""
+        name, _ = parse_choice(self.generator)
+        return name if ":" in name else None
 
 
 class Workspace:
@@ -63,9 +93,10 @@ class Workspace:
         self.manifest: Manifest = load_manifest(folder / MANIFEST_FILE)
         self.journal = Journal(folder / JOURNAL_FILE)
         self.store = Store(folder)
+        self._read: dict[str, Demonstrations] = {}
 
     @classmethod
-    def create(cls, folder: str | os.PathLike[str], manifest: str) -> Workspace:
+    def create(cls, folder: str | os.PathLike[str], manifest: str) -> Self:
         """Make a workspace from the text of its manifest; nothing is made if that is wrong.
 
         Raises:
@@ -75,60 +106,76 @@ class Workspace:
         """
         folder = Path(folder)
         parse_manifest(manifest, folder / MANIFEST_FILE)
-        try:
-            if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        with named_disk_errors(folder):
+            if folder.is_file() or (folder.is_dir() and any(folder.iterdir())):
                 raise WorkspaceError(f"{folder} exists and is not empty; choose a new folder")
             folder.mkdir(parents=True, exist_ok=True)
             (folder / MANIFEST_FILE).write_text(manifest, encoding="utf-8")
-        except OSError as error:
-            raise WorkspaceError(
-                f"cannot write to {folder} ({error.strerror}); choose a folder that is yours"
-            ) from error
         return cls(folder)
 
     def close(self) -> None:
         """Close the journal."""
         self.journal.close()
 
-    @property
-    def events(self) -> list[Event]:
-        """The journal."""
-        return self.journal.events()
+    def __enter__(self) -> Self:
+        """Use it for the length of a block."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close the journal."""
+        self.close()
 
     @property
-    def history(self) -> History:
-        """What the journal adds up to.
+    def events(self) -> Sequence[Event]:
+        """The journal.
 
         Raises:
-            WorkspaceError: The journal is damaged.
-            ConfigurationError: The manifest has another number of outcomes than the goals so far.
+            WorkspaceError: The journal is damaged, or a newer version wrote it.
         """
-        history = fold(self.journal.events())
-        k = len(self.manifest.outcome_names)
-        if any(goal.goal.size != k for goal in history.goals):
-            raise ConfigurationError(
-                f"{self.folder / MANIFEST_FILE} names {k} outcomes, but goals were set with "
-                f"{history.goals[0].goal.size}; put it back, or make another workspace"
-            )
-        return history
+        events = self.journal.events()
+        known = KINDS | {"demonstrations_imported", "model_trained"}
+        for event in events:
+            if event.kind not in known:
+                raise WorkspaceError(
+                    f"event {event.id} is a {event.kind!r}, which this version does not know; use "
+                    "the version that wrote it, or restore the journal from a copy"
+                )
+        return events
 
-    def record(self, number: int) -> TrialRecord:
-        """A trial as it stands.
+    @property
+    def trainings(self) -> Mapping[str, Training]:
+        """Every training, by the model's hash; the last is in use."""
+        trainings: dict[str, Training] = {}
+        for event in self.events:
+            if event.kind == "model_trained":
+                data = event.data
+                sha256 = data["demonstrations_sha256"]
+                trainings.pop(data["model"], None)
+                trainings[data["model"]] = Training(
+                    data["model"],
+                    sha256,
+                    data.get("fitted_to_sha256", sha256),
+                    data.get("generator", "diffusion"),  # the first journals knew no other
+                    tuple(data.get("remarks", ())),
+                )
+        return trainings
 
-        Raises:
-            TrialStateError: There is no such trial.
-        """
-        if not isinstance(number, Integral) or isinstance(number, bool):
-            raise TrialStateError(
-                f"a trial's number is a whole number, got {number!r}; give .number"
-            )
-        trials = self.history.trials
-        if not 1 <= number <= len(trials):
-            known = f"trials are 1 to {len(trials)}" if trials else "none was asked for yet"
-            raise TrialStateError(
-                f"there is no trial {number}; {known}, see: prior-reinforce status {self.folder}"
-            )
-        return trials[number - 1]
+    @property
+    def training(self) -> Training | None:
+        """The training of the model in use; None before the first."""
+        return next(reversed(self.trainings.values()), None)
+
+    @property
+    def stale(self) -> bool:
+        """Whether there is no model, or demonstrations were imported since it was learned."""
+        training = self.training
+        return training is None or training.demonstrations != self.demonstrations_sha256
+
+    @property
+    def demonstrations_sha256(self) -> str | None:
+        """SHA-256 of the demonstrations in use; None before the first import."""
+        imported = [e for e in self.events if e.kind == "demonstrations_imported"]
+        return imported[-1].data["sha256"] if imported else None
 
     @property
     def demonstrations(self) -> Demonstrations:
@@ -139,100 +186,99 @@ class Workspace:
             FileFormatError: The file is damaged.
             InvalidDemonstrationsError: The manifest says otherwise since they were imported.
         """
-        sha256 = self.history.demonstrations
+        sha256 = self.demonstrations_sha256
         if sha256 is None:
             raise WorkspaceError(
                 f"{self.folder} has no demonstrations yet; bring them in with: prior-reinforce "
                 f"import {self.folder} RECORDINGS"
             )
-        demonstrations = self.store.demonstrations(sha256)
-        self._check_fit(demonstrations, "what was imported")
-        return demonstrations
+        return self._demonstrations(sha256)
 
     def demonstrations_of(self, model: str) -> Demonstrations:
-        """The demonstrations that a model was fitted to, aligned if it was learned so.
+        """The demonstrations that a model was fitted to.
 
         Raises:
             FileFormatError: The file is missing or damaged.
         """
-        return self.store.demonstrations(self.history.models[model].fitted_to)
+        return self._demonstrations(self.trainings[model].fitted_to)
 
-    def generator(self, own: Generator | None = None) -> Generator:
-        """The model in use.
+    def session(self, own: str | None = None) -> Session:
+        """The trials of this workspace. Telling needs no model; asking loads it.
 
         Args:
-            own: A generator of the class that the model was learned by, where it is none of ours.
+            own: `module:Class` that the model was learned by, where it is one's own: nothing in the
+                folder may start code.
 
         Raises:
-            ConfigurationError: `own` is missing, or of another class.
-            WorkspaceError: Nothing is learned yet, or it was learned from other demonstrations.
-            FileFormatError: The model or the demonstrations are damaged.
+            WorkspaceError: The journal is damaged.
+            ConfigurationError: The manifest has another number of outcomes than the goals so far.
         """
-        history = self.history
-        demonstrations = self.demonstrations
-        if history.model is None:
-            raise WorkspaceError(
-                f"nothing is learned yet; run: prior-reinforce learn {self.folder}"
-            )
-        training = history.models[history.model]
-        if training.demonstrations != demonstrations.sha256:
-            raise WorkspaceError(
-                "other demonstrations were imported since the model was learned; run: "
-                f"prior-reinforce learn {self.folder}"
-            )
-        expected = training.generator if training.own else None
-        if (None if own is None else name_of(own)) != expected:
+        from prior_reinforce.adapters import make_adapter
+
+        training = self.training
+        session = Session(
+            lambda: self._generator(own),
+            lambda: make_adapter(session.goals[-1].adapter),
+            lambda: self.demonstrations,
+            tolerance=self.manifest.tolerance,
+            log=_Log(self),
+            gate=self.gate,
+            model="" if training is None else training.model,
+        )
+        k = len(self.manifest.outcome_names)
+        if any(goal.goal.size != k for goal in session.goals):
             raise ConfigurationError(
-                f"the model was learned by {training.generator}; "
-                + (
-                    f"name it, for the journal starts no code: --generator {training.generator}"
-                    if training.own
-                    else "drop --generator, or learn anew"
-                )
+                f"{self.folder / MANIFEST_FILE} names {k} outcomes, but goals were set with "
+                f"{session.goals[0].goal.size}; put it back, or make another workspace"
             )
-        return self.store.model(history.model, None if own is None else type(own))
+        return session
 
-    def session(self, own: Generator | None = None) -> Session:
-        """The session of the goal that is worked on, built from what happened.
+    def set_goal(
+        self, goal: ArrayLike, *, carry_over: bool = False, adapter: str = "gp"
+    ) -> Goal:
+        """Set the goal that the next trials are for.
 
         Args:
-            own: As `generator` takes it.
+            goal: g, shape (k,), in the outcome's units.
+            carry_over: Let earlier goals' trials serve this one.
+            adapter: Choice of the adapter, for instance `gp` or `proportional,gain=0.6`.
 
         Raises:
-            WorkspaceError: No goal was set, or what `generator` raises.
-            ConfigurationError: See `generator`.
-            FileFormatError: See `generator`.
+            InvalidGoalError: Wrong shape, or not finite.
+            ConfigurationError: There is no such adapter.
+            TrialStateError: A trial for the goal before waits to be told.
         """
-        generator = self.generator(own)
-        history = self.history
-        if history.goal is None:
-            raise WorkspaceError(f"no goal is set; run: prior-reinforce goal {self.folder} X Y")
-        return build_session(history, history.goal, generator, self.demonstrations)
+        from prior_reinforce.adapters import ADAPTERS
 
-    def plan_path(self, trial: TrialRecord) -> Path:
-        """Where a trial's plan file is."""
-        return self.store.plan_path(trial.plan_file)
+        ADAPTERS.check(adapter)
+        return self.session().set_goal(goal, carry_over=carry_over, adapter=adapter)
 
-    def plan(self, trial: TrialRecord) -> Plan:
-        """A trial's plan, checked against the hash in the journal.
-
-        Raises:
-            FileFormatError: The file is missing, or not what was handed out.
-        """
-        return self.store.plan(trial.plan_file, trial.plan_sha256)
-
-    def gate(self, plan: Plan) -> LimitReport | None:
-        """Hold a plan against the robot's limits; None where the manifest names no robot.
+    def gate(self, frames: Frames) -> LimitReport | None:
+        """Hold a plan against the robot's limits of now; None where the manifest names no robot.
 
         Raises:
             InvalidDemonstrationsError: The manifest says otherwise since they were imported.
         """
         if self.manifest.robot is None:
             return None
-        model = self.history.model
-        shown = self.demonstrations if model is None else self.demonstrations_of(model)
-        self._check_fit(shown, "what was imported")
+        from prior_reinforce.robots import check_plan
+
+        training = self.training
+        shown = self.demonstrations if training is None else self.demonstrations_of(training.model)
+        plan = Plan(frames, shown.format)
         return check_plan(plan, self.manifest.robot, shown, self.manifest.gate)
+
+    def plan_path(self, trial: Trial) -> Path:
+        """Where a trial's plan file is."""
+        return self.store.plan_path(trial.kept["plan_file"])
+
+    def plan(self, trial: Trial) -> Plan:
+        """A trial's plan, checked against the hash in the journal.
+
+        Raises:
+            FileFormatError: The file is missing, or not what was written.
+        """
+        return self.store.plan(trial.kept["plan_file"], trial.kept["plan_sha256"])
 
     def import_demonstrations(self, demonstrations: Demonstrations, source: str) -> None:
         """Take in demonstrations, in place of earlier ones.
@@ -243,13 +289,13 @@ class Workspace:
         """
         self._check_fit(demonstrations, source)
         with self.journal.exclusive():
-            self.refuse_open_trial("importing demonstrations")
-            history = self.history
-            if history.trials and history.demonstrations is not None:
-                before = self.store.demonstrations(history.demonstrations).format.names
-                if before != demonstrations.format.names:
+            self.session().refuse_open_trial("importing demonstrations")
+            before = self.demonstrations_sha256
+            if before is not None and any(event.kind == "asked" for event in self.events):
+                names = self._demonstrations(before).format.names
+                if names != demonstrations.format.names:
                     raise InvalidDemonstrationsError(
-                        f"trials were made with {before}, but {source} has "
+                        f"trials were made with {names}, but {source} has "
                         f"{demonstrations.format.names}; make another workspace for it"
                     )
             self.store.save_demonstrations(demonstrations)
@@ -258,40 +304,121 @@ class Workspace:
                 {"n": demonstrations.n, "sha256": demonstrations.sha256, "source": source},
             )
 
-    def set_goal(self, goal: ArrayLike, *, memory: str = "goal") -> GoalRecord:
-        """Set the goal that the next trials are for.
+    def learn(
+        self,
+        generator: str = "diffusion",
+        *,
+        seed: int = 0,
+        progress: Callable[[FitProgress], None] | None = None,
+    ) -> Training:
+        """Fit a generator to the demonstrations and put it in use.
 
         Args:
-            goal: g, shape (k,), in the outcome's units.
-            memory: `goal`, or `workspace` to let earlier goals' trials serve this one.
+            generator: Choice of the generator, for instance `diffusion`,
+                `interpolation,timing=align` or `module:Class`.
+            seed: Of the fit.
+            progress: Called now and then while fitting.
 
         Raises:
-            InvalidGoalError: Wrong shape, or not finite.
-            ConfigurationError: An unknown memory.
-            TrialStateError: A trial for the goal before waits to be told.
+            ConfigurationError: There is no such generator.
+            TrialStateError: A trial waits to be told.
+            WorkspaceError: No demonstrations were imported yet.
+            InvalidDemonstrationsError: They cannot be learned from.
         """
-        if memory not in MEMORIES:
-            raise ConfigurationError(f"memory must be one of {MEMORIES}, got {memory!r}")
-        checked = self.demonstrations.check_goal(goal)
-        tolerance = self.manifest.tolerance
+        from prior_reinforce.generators import make_generator
+
+        self.session().refuse_open_trial("learning")
+        demonstrations = self.demonstrations
+        fitted = make_generator(generator).fit(demonstrations, seed=seed, progress=progress)
+        data = {
+            "model": self.store.save_model(fitted),
+            "generator": generator,
+            "seed": seed,
+            "demonstrations_sha256": demonstrations.sha256,
+            "remarks": list(fitted.remarks),
+        }
         with self.journal.exclusive():
-            self.refuse_open_trial("setting a goal")
-            self.journal.append(
-                "goal_set", {"goal": checked.tolist(), "tolerance": tolerance, "memory": memory}
-            )
-            return self.history.goals[-1]
+            self.session().refuse_open_trial("learning")
+            self.journal.append("model_trained", data)
+        training = self.training
+        assert training is not None
+        return training
 
-    def refuse_open_trial(self, doing: str) -> None:
-        """Do nothing unless a trial waits to be told.
+    def execute(self, number: int, command: str, *, time_limit: float) -> CommandResult:
+        """Execute a trial's plan by a command, once.
+
+        The journal says `executing` before the command starts and `executed` after it ended, so a
+        program that dies in between leaves a trial of which only a person knows what moved. While
+        the command it left behind goes on, the trial still counts as executing.
+
+        Args:
+            number: The open trial.
+            command: For instance `mycontroller {plan}`.
+            time_limit: Of the command, in [s].
 
         Raises:
-            TrialStateError: One does.
+            TrialStateError: The trial was executed already, is not open, or another program
+                executes one.
+            RobotLimitError: The plan breaks a limit of now; nothing moved.
+            ConfigurationError: The command could not be started; nothing moved, and the journal
+                says so.
+            FileFormatError: The plan's file is not what was written; nothing moved.
         """
-        trial = self.history.open_trial
-        if trial is not None:
-            raise TrialStateError(
-                f"trial {trial.number} waits to be told; tell or void it before {doing}"
+        from prior_reinforce.robots.executors.command import check_command, run_command
+        from prior_reinforce.robots.executors.lock import executing_lock
+
+        check_command(command, time_limit=time_limit)
+        with executing_lock(self.folder) as lock:
+            session = self.session()
+            trial = session.trial(number)
+            verdict = self.gate(self.plan(trial).actions)
+            if verdict is not None:
+                verdict.require()
+            session.begin_execution(number, command)
+            plan_file = PlanFile(self.plan_path(trial), trial.kept["plan_sha256"])
+            try:
+                result = run_command(command, plan_file, time_limit=time_limit, keep_open=(lock,))
+            except (ConfigurationError, FileFormatError):
+                session.end_execution(number, None)  # never started: nothing moved
+                raise
+            session.end_execution(number, result.as_json())
+        return result
+
+    def is_executing(self) -> bool:
+        """Whether a trial is being executed right now, by any program.
+
+        Raises:
+            WorkspaceError: The lock cannot be read, or the file system has no locks.
+        """
+        from prior_reinforce.robots.executors.lock import is_executing
+
+        return is_executing(self.folder)
+
+    def _generator(self, own: str | None) -> Generator:
+        """The model in use."""
+        demonstrations = self.demonstrations
+        training = self.training
+        if training is None:
+            raise WorkspaceError(
+                f"nothing is learned yet; run: prior-reinforce learn {self.folder}"
             )
+        if training.demonstrations != demonstrations.sha256:
+            raise WorkspaceError(
+                "other demonstrations were imported since the model was learned; run: "
+                f"prior-reinforce learn {self.folder}"
+            )
+        if own != training.own:
+            remedy = "drop --generator, or learn again"
+            if training.own:
+                remedy = f"name it, for the journal starts no code: --generator {training.own}"
+            raise ConfigurationError(f"the model was learned by {training.generator}; {remedy}")
+        return self.store.model(training.model, own)
+
+    def _demonstrations(self, sha256: str) -> Demonstrations:
+        if sha256 not in self._read:
+            self._read[sha256] = self.store.demonstrations(sha256)
+        self._check_fit(self._read[sha256], "what was imported")
+        return self._read[sha256]
 
     def _check_fit(self, demonstrations: Demonstrations, source: str) -> None:
         manifest = self.manifest
@@ -309,3 +436,31 @@ class Workspace:
                     f"{source} has {what} {given}, but {self.folder / MANIFEST_FILE} says "
                     f"{expected}; change the manifest, or import again"
                 )
+
+
+class _Log:
+    """The journal and the store as the log of a session."""
+
+    def __init__(self, workspace: Workspace) -> None:
+        self._workspace = workspace
+
+    def events(self) -> Sequence[Event]:
+        return self._workspace.events
+
+    def exclusive(self) -> AbstractContextManager[None]:
+        return self._workspace.journal.exclusive()
+
+    def append(self, kind: str, data: Mapping[str, Any]) -> None:
+        self._workspace.journal.append(kind, data)
+
+    def keep_plan(self, number: int, plan: Frames) -> Mapping[str, Any]:
+        """Write the plan's file, before the event that names it."""
+        workspace = self._workspace
+        file = workspace.store.save_plan(Plan(plan, workspace.demonstrations.format), number)
+        return {"plan_file": file.path.name, "plan_sha256": file.sha256}
+
+    def plan(self, trial: Trial) -> Frames:
+        return self._workspace.plan(trial).actions
+
+    def is_executing(self) -> bool:
+        return self._workspace.is_executing()

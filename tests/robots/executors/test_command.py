@@ -1,4 +1,4 @@
-"""The command hand-over: real processes, no shell, a time limit that holds."""
+"""Executing by a command: real processes, no shell, a time limit that holds."""
 
 import json
 import os
@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from prior_reinforce.errors import ConfigurationError, FileFormatError
-from prior_reinforce.plans.files import run_with_plan, write_plan
+from prior_reinforce.plans.files import write_plan
 from prior_reinforce.plans.motions import Plan, PlanFormat
-from prior_reinforce.robots.executors.command import split_command
+from prior_reinforce.robots.executors.command import run_command, split_command
 
 PYTHON = sys.executable
 
@@ -26,7 +26,7 @@ def plan_file(tmp_path):
 
 def test_a_controller_reads_the_plan(plan_file):
     code = "import sys, numpy; print(numpy.load(sys.argv[1])['q'].shape)"
-    result = run_with_plan(f'{PYTHON} -c "{code}" {{plan}}', plan_file, time_limit=30)
+    result = run_command(f'{PYTHON} -c "{code}" {{plan}}', plan_file, time_limit=30)
     assert result.succeeded
     assert result.exit_status == 0
     assert result.output_tail.strip() == "(5, 2)"
@@ -40,7 +40,7 @@ def test_the_path_stays_one_argument_whatever_is_in_it(plan_file):
 
 def test_no_shell_is_asked(plan_file, tmp_path):
     code = "import sys; print(sys.argv[1:])"
-    result = run_with_plan(
+    result = run_command(
         f'{PYTHON} -c "{code}" {{plan}} "; touch {tmp_path}/made" "$HOME"', plan_file, time_limit=30
     )
     assert "$HOME" in result.output_tail
@@ -49,7 +49,7 @@ def test_no_shell_is_asked(plan_file, tmp_path):
 
 def test_exit_status_and_output_of_a_failure(plan_file):
     code = "import sys; print('joint 4', flush=True); sys.exit('reflex: velocity')"
-    result = run_with_plan(f'{PYTHON} -c "{code}" {{plan}}', plan_file, time_limit=30)
+    result = run_command(f'{PYTHON} -c "{code}" {{plan}}', plan_file, time_limit=30)
     assert result.exit_status == 1
     assert not result.succeeded
     assert result.output_tail == "joint 4\nreflex: velocity\n"
@@ -58,13 +58,13 @@ def test_exit_status_and_output_of_a_failure(plan_file):
 def test_a_signal_is_recorded(plan_file):
     code = "import os; os.kill(os.getpid(), 9)"
     assert (
-        run_with_plan(f'{PYTHON} -c "{code}" {{plan}}', plan_file, time_limit=30).exit_status == -9
+        run_command(f'{PYTHON} -c "{code}" {{plan}}', plan_file, time_limit=30).exit_status == -9
     )
 
 
 def test_only_the_end_of_long_output_is_kept(plan_file):
     code = "print('x' * 100000 + 'last')"
-    result = run_with_plan(f'{PYTHON} -c "{code}" {{plan}}', plan_file, time_limit=30)
+    result = run_command(f'{PYTHON} -c "{code}" {{plan}}', plan_file, time_limit=30)
     assert len(result.output_tail) == 4000
     assert result.output_tail.endswith("last\n")
 
@@ -85,7 +85,7 @@ def test_the_time_limit_stops_the_command_and_what_it_started(plan_file):
     # time limit, however busy the machine.
     code = "(trap '' TERM; exec sleep 60) & echo $!; exec sleep 60"
     start = time.monotonic()
-    result = run_with_plan(f'sh -c "{code}" {{plan}}', plan_file, time_limit=1.0)
+    result = run_command(f'sh -c "{code}" {{plan}}', plan_file, time_limit=1.0)
     assert result.timed_out
     assert not result.succeeded
     assert result.exit_status == -15
@@ -102,7 +102,7 @@ def test_what_a_shell_leaves_behind_has_time_to_come_to_rest(plan_file, tmp_path
     driver = f"trap 'sleep 0.5; touch {rested}; exit' TERM; while :; do sleep 0.05; done"
     script = tmp_path / "drive.sh"
     script.write_text(f'sh -c "{driver}" &\nwait\n')
-    assert run_with_plan(f"sh {script} {{plan}}", plan_file, time_limit=1.0).timed_out
+    assert run_command(f"sh {script} {{plan}}", plan_file, time_limit=1.0).timed_out
     assert rested.exists()
 
 
@@ -110,7 +110,7 @@ def test_a_changed_plan_does_not_run(plan_file, tmp_path):
     plan_file.path.chmod(0o644)
     plan_file.path.write_bytes(b"other")
     with pytest.raises(FileFormatError, match="SHA-256"):
-        run_with_plan(f"touch {tmp_path}/ran {{plan}}", plan_file, time_limit=30)
+        run_command(f"touch {tmp_path}/ran {{plan}}", plan_file, time_limit=30)
     assert not (tmp_path / "ran").exists()
 
 
@@ -126,10 +126,10 @@ def test_a_changed_plan_does_not_run(plan_file, tmp_path):
 )
 def test_commands_that_cannot_run(plan_file, command, says):
     with pytest.raises(ConfigurationError, match=says):
-        run_with_plan(command, plan_file, time_limit=1)
+        run_command(command, plan_file, time_limit=1)
 
 
 @pytest.mark.parametrize("limit", [0.0, -1.0, float("nan"), float("inf")])
 def test_the_time_limit_is_checked(plan_file, limit):
     with pytest.raises(ConfigurationError, match="time limit"):
-        run_with_plan("true {plan}", plan_file, time_limit=limit)
+        run_command("true {plan}", plan_file, time_limit=limit)

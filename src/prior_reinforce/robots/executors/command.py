@@ -1,4 +1,4 @@
-"""Handing a plan to whatever drives the arm, in a process of its own.
+"""Executing a plan by a command: whatever drives the arm, in a process of its own.
 
 Bindings of robot libraries exclude each other in one process, and the session must outlive a
 driver that crashes or hangs; so the plan's file is given to a command, and its exit status and the
@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from prior_reinforce.errors import ConfigurationError
+from prior_reinforce.plans.files import PlanFile
 
 _PLAN = "{plan}"
 _TAIL_BYTES = 4000
@@ -32,8 +33,8 @@ _LOOK = 0.02
 
 
 @dataclass(frozen=True)
-class HandOver:
-    """What became of a command that was given a plan."""
+class CommandResult:
+    """How a command that was given a plan ended."""
 
     command: tuple[str, ...]
     """Program and arguments as they were started."""
@@ -97,8 +98,8 @@ def check_command(command: str, *, time_limit: float) -> None:
 
 
 def run_command(
-    command: str, plan: Path, *, time_limit: float, keep_open: tuple[int, ...] = ()
-) -> HandOver:
+    command: str, plan: PlanFile, *, time_limit: float, keep_open: tuple[int, ...] = ()
+) -> CommandResult:
     """Run `mycontroller {plan}` in a process of its own and wait for it.
 
     At the time limit the command and everything it started are asked to stop (SIGTERM), and killed
@@ -106,7 +107,7 @@ def run_command(
 
     Args:
         command: Program and arguments, `{plan}` among them.
-        plan: File of the plan to be executed.
+        plan: What is to be executed; its hash is checked first.
         time_limit: In [s].
         keep_open: File descriptors that the command inherits, so that a lock on them lasts as long
             as it runs.
@@ -114,9 +115,11 @@ def run_command(
     Raises:
         ConfigurationError: A command or a limit that cannot be used, or a program that cannot be
             started; nothing has run then.
+        FileFormatError: The plan is no longer what its hash says; nothing has run.
     """
     check_command(command, time_limit=time_limit)
-    arguments = split_command(command, plan)
+    plan.verify()
+    arguments = split_command(command, plan.path)
     with tempfile.TemporaryFile() as output:
         start = time.monotonic()
         try:
@@ -142,7 +145,7 @@ def run_command(
             # Ctrl-C: a driver must not go on without its session.
             _stop(process)
             raise
-        return HandOver(
+        return CommandResult(
             command=arguments,
             exit_status=process.returncode,
             timed_out=timed_out,

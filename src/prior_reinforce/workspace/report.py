@@ -1,0 +1,78 @@
+"""The report of a workspace: every goal with its trials, from the journal and the plan files."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+
+from prior_reinforce.errors import FileFormatError, WorkspaceError
+from prior_reinforce.files import named_disk_errors
+from prior_reinforce.report import AdaptationRecord, write_report
+from prior_reinforce.session import Session
+from prior_reinforce.trials import Goal, Trial
+from prior_reinforce.workspace.workspace import Workspace
+
+
+def report_workspace(workspace: Workspace, folder: Path) -> Path:
+    """Write the page and its pictures.
+
+    Args:
+        workspace: With a goal that a trial was asked for.
+        folder: Where to write; made if need be.
+
+    Returns:
+        Path of the page.
+
+    Raises:
+        WorkspaceError: There is nothing to report yet, or the folder cannot be written.
+        FileFormatError: The demonstrations are damaged. A plan that is lost or damaged stops
+            nothing: it is not drawn, and named.
+    """
+    session = workspace.session()
+    goals = [goal for goal in session.goals if session.trials_of(goal.number)]
+    if not goals:
+        raise WorkspaceError(
+            f"there is no trial to report yet; run: prior-reinforce ask {workspace.folder}"
+        )
+    records = [_record(workspace, session, goal) for goal in goals]
+    robot, training = workspace.manifest.robot, workspace.training
+    models = (trial.model for goal in goals for trial in session.trials_of(goal.number))
+    facts = {
+        "Task": workspace.manifest.name,
+        "Demonstrations": str(records[-1].demonstrations.n),
+        "Model": ", ".join(dict.fromkeys(models)),
+        "Adapter": ", ".join(dict.fromkeys(goal.adapter for goal in goals)),
+        "Robot": "none, no limits checked" if robot is None else robot.robot,
+        "Earlier goals' trials used": ", ".join(
+            f"goal {goal.number}" for goal in goals if goal.carry_over
+        )
+        or "by no goal",
+        "Version": version("prior-reinforce"),
+    }
+    if training is not None and training.remarks:
+        facts["Remarks"] = "; ".join(training.remarks)
+    title = f"{workspace.manifest.name}: {len(goals)} goal" + "s" * (len(goals) > 1)
+    with named_disk_errors(folder):
+        return write_report(folder, records, title=title, facts=facts)
+
+
+def _record(workspace: Workspace, session: Session, goal: Goal) -> AdaptationRecord:
+    trials: list[Trial] = []
+    remarks: list[str] = []
+    for trial in session.trials_of(goal.number):
+        try:
+            trials.append(replace(trial, plan=workspace.plan(trial).actions))
+        except FileFormatError as error:
+            trials.append(replace(trial, plan=np.empty((0, workspace.manifest.format.action_dim))))
+            remarks.append(f"the plan of trial {trial.number} is not drawn: {error}")
+    return AdaptationRecord(
+        demonstrations=workspace.demonstrations_of(trials[-1].model),
+        goal=goal.goal,
+        tolerance=goal.tolerance,
+        trials=tuple(trials),
+        title=f"Goal {goal.number}",
+        film_caption="; ".join(remarks),
+    )
