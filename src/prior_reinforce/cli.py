@@ -1,7 +1,7 @@
 """The `prior-reinforce` command: parse to a dataclass, call once, print.
 
-Each command is a class in `commands/`; this file lists them, and imports the one that is called. What a user did wrong is one line on
-standard error and exit status 2.
+Each command is a class in `commands/`; this file lists them, and imports the one that is called.
+What a user did wrong is one line on standard error and exit status 2.
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
 """Files that are there whole or not at all, durable, and known by their hash: the one writer.
 
 What is being written has a name of its own, `.unfinished-<host>-<pid>-...`, beside where it will
-stand, and is moved there in one step once it is on the disk. What a killed process leaves under such
-a name is never read; `sweep` removes it. The name says whose it is, so that runs can share a folder.
+stand, and is moved there in one step once it is on the disk. What a killed process leaves under
+such a name is never read; `sweep` removes it. The name says whose it is, so that runs can share a
+folder.
 """
 
 from __future__ import annotations
@@ -128,7 +129,8 @@ def named_disk_errors(folder: Path) -> Iterator[None]:
         if error.errno in (errno.ENOSPC, errno.EDQUOT):
             remedy = "free some disk space"
         raise WorkspaceError(
-            f"cannot write to {folder} ({error.strerror}); {remedy}; what was written before is safe"
+            f"cannot write to {folder} ({error.strerror}); {remedy}; what was written before is "
+            "safe"
         ) from error
 
 

@@ -1,12 +1,12 @@
 """The members of a family by name: what can be chosen, what it is set to, how it is made.
 
 A family's `__init__` holds its one `Registry`. The command line's choices and help texts,
-`reproduce`, saving and loading, and anyone's own `module:Class` follow from it. A member is named by
-its module, so that a list of names imports none of them.
+`reproduce`, saving and loading, and anyone's own `module:Class` follow from it. A member is named
+by its module, so that a list of names imports none of them.
 
 A class with settings takes a `config`, a frozen dataclass that its `config_type` names; one without
-may take plain arguments. A choice is written `name`, or `name,setting=value,...`: `gp`, `gp,memory_size=none`,
-`my_module:MyAdapter,gain=0.5`.
+may take plain arguments. A choice is written `name`, or `name,setting=value,...`: `gp`,
+`gp,memory_size=none`, `my_module:MyAdapter,gain=0.5`.
 """
 
 from __future__ import annotations

@@ -42,14 +42,10 @@ if TYPE_CHECKING:
 
 
 class Verdict(Protocol):
-    """What a gate says of a plan."""
+    """What a gate says of a plan; see `robots.report.LimitReport`."""
 
     def require(self) -> None:
-        """Do nothing if the plan may be executed.
-
-        Raises:
-            RobotLimitError: It may not.
-        """
+        """Raise RobotLimitError unless the plan may be executed."""
 
     def as_json(self) -> Mapping[str, Any]:
         """The same as plain data, for the log."""
@@ -84,7 +80,7 @@ class Session:
             tolerance: epsilon, largest perceived error that counts as reached, in the same units.
             carry_over: Let the adapter learn from the trials of earlier goals too.
             log: What happened so far, and where to write what happens; in memory if not given.
-            gate: Holds a plan against a robot's limits whenever it is to leave; None checks nothing.
+            gate: Holds a plan against a robot's limits whenever it is to leave; none by default.
             model: Name of the generator's model in the log; trials of others teach nothing, since
                 their conditions mean other motions.
 
@@ -94,7 +90,7 @@ class Session:
             TrialStateError: A goal is given, and a trial for the one before waits to be told.
         """
         self.log: Log = MemoryLog() if log is None else log
-        self._load = generator, adapter, demonstrations
+        self._given: Any = (generator, adapter, demonstrations)
         self._gate = gate
         self._model = model
         self._carry_over = carry_over
@@ -107,21 +103,18 @@ class Session:
 
     @cached_property
     def generator(self) -> Generator:
-        """pi."""
-        given: Any = self._load[0]
-        return given() if callable(given) else given
+        """Pi."""
+        return _loaded(self._given[0])
 
     @cached_property
     def adapter(self) -> Adapter:
         """M."""
-        given: Any = self._load[1]
-        return given() if callable(given) else given
+        return _loaded(self._given[1])
 
     @cached_property
     def demonstrations(self) -> Demonstrations:
         """D_prior."""
-        given: Any = self._load[2]
-        return given() if callable(given) else given
+        return _loaded(self._given[2])
 
     @property
     def goals(self) -> tuple[Goal, ...]:
@@ -130,12 +123,12 @@ class Session:
 
     @property
     def goal(self) -> Point:
-        """g tilde of the goal that is worked on: the latest."""
+        """G tilde of the goal that is worked on: the latest."""
         return self._current_goal().goal
 
     @property
     def tolerance(self) -> float:
-        """epsilon of the goal that is worked on."""
+        """Epsilon of the goal that is worked on."""
         return self._current_goal().tolerance
 
     @property
@@ -387,9 +380,7 @@ class Session:
         """M(g), after the adapter has seen every reading that counts."""
         readings = self._readings()
         seen = self._observed
-        if seen is None or any(a is not b for a, b in zip(seen, readings, strict=False)) or len(
-            seen
-        ) > len(readings):
+        if seen is None or seen != readings[: len(seen)]:  # one was voided or amended: start again
             self.adapter.start(self.demonstrations)
             seen = []
         for trial in readings[len(seen) :]:
@@ -411,13 +402,8 @@ class Session:
 
     def _open(self, condition: Point, plan: Frames) -> None:
         """Write a new trial down, if its plan may be executed."""
-        verdict = None if self._gate is None else self._gate(plan)
-        if verdict is not None:
-            try:
-                verdict.require()
-            except RobotLimitError as error:
-                at = (np.round(condition, 4) + 0.0).tolist()  # -0 is 0
-                raise RobotLimitError(f"no plan for the condition {at}: {error}") from error
+        at = (np.round(condition, 4) + 0.0).tolist()  # -0 is 0
+        verdict = self._check(plan, f"no plan for the condition {at}")
         number = len(self._history.trials) + 1
         data = {
             "trial": number,
@@ -429,22 +415,26 @@ class Session:
         }
         self.log.append("asked", data)
 
-    def _hand_out(self, *, is_new: bool) -> Trial:
+    def _with_plan(self, *, is_new: bool) -> Trial:
         """The open trial with its plan, unless the gate refuses it now."""
         trial = self.open_trial
         assert trial is not None
-        if trial.plan is None:
-            trial = replace(trial, plan=self.log.plan(trial))
-        if not is_new and self._gate is not None and trial.stage is Stage.ASKED:
-            verdict = self._gate(np.asarray(trial.plan))
-            try:
-                if verdict is not None:
-                    verdict.require()
-            except RobotLimitError as error:
-                raise RobotLimitError(
-                    f"trial {trial.number} may no longer be executed, void it and ask again: {error}"
-                ) from error
-        return trial
+        plan = self.log.plan(trial) if trial.plan is None else trial.plan
+        if not is_new and trial.stage is Stage.ASKED:
+            self._check(
+                plan, f"trial {trial.number} may not be executed now, void it and ask again"
+            )
+        return trial if trial.plan is not None else replace(trial, plan=plan)
+
+    def _check(self, plan: Frames, refusal: str) -> Verdict | None:
+        """What the gate says of a plan; an error that begins with `refusal` if it refuses."""
+        verdict = None if self._gate is None else self._gate(plan)
+        try:
+            if verdict is not None:
+                verdict.require()
+        except RobotLimitError as error:
+            raise RobotLimitError(f"{refusal}: {error}") from error
+        return verdict
 
 
 def ask_all(sessions: Sequence[Session]) -> list[Trial]:
@@ -477,7 +467,11 @@ def ask_all(sessions: Sequence[Session]) -> list[Trial]:
                 session._open(condition, plan)
     for session in new:
         session._refresh()
-    return [session._hand_out(is_new=session in new) for session in sessions]
+    return [session._with_plan(is_new=session in new) for session in sessions]
+
+
+def _loaded(given: Any) -> Any:
+    return given() if callable(given) else given
 
 
 def _as_tolerance(tolerance: Any) -> float:

@@ -284,8 +284,8 @@ def test_a_command_that_fails_is_told_by_the_status(run, folder, tmp_path):
 
 def cut_off(folder):
     workspace = Workspace(folder)
-    with workspace.journal.exclusive():  # what is written before the program dies
-        workspace.journal.append("executing", {"trial": 1, "command": "arm {plan}"})
+    with workspace.log.journal.exclusive():  # what is written before the program dies
+        workspace.log.journal.append("executing", {"trial": 1, "command": "arm {plan}"})
     workspace.close()
 
 

@@ -55,7 +55,7 @@ def test_a_controller_that_outlives_our_program_keeps_the_arm_to_itself(workspac
         workspace.execute(2, command, time_limit=1)
 
     (tmp_path / "stop").touch()
-    wait_for(lambda: not workspace.is_executing())
+    wait_for(lambda: not workspace.log.is_executing())
     assert (tmp_path / "runs").read_text() == "moved\n"
     assert workspace.execute(2, command, time_limit=60).succeeded
     assert workspace.session().trial(2).stage is Stage.EXECUTED

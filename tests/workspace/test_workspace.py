@@ -318,8 +318,8 @@ def test_a_program_that_is_not_there_leaves_the_trial_to_be_executed(workspace):
 
 def test_an_execution_that_was_cut_off_is_never_repeated_by_itself(workspace):
     number = ask(workspace).number
-    with workspace.journal.exclusive():  # what execute writes before the program dies
-        workspace.journal.append("executing", {"trial": number, "command": "arm {plan}"})
+    with workspace.log.journal.exclusive():  # what execute writes before the program dies
+        workspace.log.journal.append("executing", {"trial": number, "command": "arm {plan}"})
     again = reopened(workspace)
     with pytest.raises(TrialStateError, match="did the arm move"):
         ask(again)
@@ -341,7 +341,7 @@ def test_the_journal_is_append_only(workspace):
 def test_two_programs_exclude_each_other(workspace, monkeypatch):
     monkeypatch.setattr("prior_reinforce.workspace.journal._LOCK_TIMEOUT_S", 0.1)
     other = Workspace(workspace.folder)
-    with workspace.journal.exclusive(), pytest.raises(WorkspaceError, match="another command"):
+    with workspace.log.journal.exclusive(), pytest.raises(WorkspaceError, match="another command"):
         ask(other)
     ask(other)
     other.close()
@@ -359,7 +359,7 @@ def test_a_workspace_that_was_copied_goes_on(workspace, tmp_path):
 def test_a_refused_disk_is_named_and_the_journal_stays_good(workspace):
     """A page limit stands for the full disk: SQLite then says `database or disk is full`."""
     number = ask(workspace).number
-    connection = workspace.journal._connection
+    connection = workspace.log.journal._connection
     pages = connection.execute("PRAGMA page_count").fetchone()[0]
     connection.execute(f"PRAGMA max_page_count = {pages}")
     with pytest.raises(WorkspaceError, match="free some disk space"):

@@ -16,9 +16,13 @@ __all__ = [
 from prior_reinforce.registry import Member, Registry
 
 _GP = "prior_reinforce.adapters.gaussian_process:GaussianProcessAdapter"
-ADAPTERS = Registry("adapter", "prior_reinforce.adapters.base:Adapter", {
-    "gp": Member(_GP, "m = 2"),
-    "proportional": Member("prior_reinforce.adapters.proportional:ProportionalAdapter", "p"),
-    "frozen": Member("prior_reinforce.adapters.frozen:FrozenAdapter", "f"),
-})
+ADAPTERS = Registry(
+    "adapter",
+    "prior_reinforce.adapters.base:Adapter",
+    {
+        "gp": Member(_GP, "m = 2"),
+        "proportional": Member("prior_reinforce.adapters.proportional:ProportionalAdapter", "p"),
+        "frozen": Member("prior_reinforce.adapters.frozen:FrozenAdapter", "f"),
+    },
+)
 make_adapter = ADAPTERS.make

@@ -204,7 +204,7 @@ class Export:
 def _was_cut_off(workspace: Workspace, session: Session) -> bool:
     trial = session.open_trial
     executing = trial is not None and trial.stage is Stage.EXECUTING
-    return executing and not workspace.is_executing()
+    return executing and not workspace.log.is_executing()
 
 
 def _ask_whether_it_moved(session: Session) -> bool:

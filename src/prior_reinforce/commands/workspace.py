@@ -73,9 +73,9 @@ class Goal:
     """Its place in the outcome's units, for instance 0.92 0.10 (metres ahead, metres left)."""
     memory: Literal["goal", "workspace"] = "goal"
     """Which trials the adapter learns from: this goal's, or earlier goals' as well."""
-    adapter: Annotated[str, tyro.conf.arg(help=f"How the condition is corrected: {ADAPTERS.help}.")] = (
-        "gp"
-    )
+    adapter: Annotated[
+        str, tyro.conf.arg(help=f"How the condition is corrected: {ADAPTERS.help}.")
+    ] = "gp"
 
     def run(self) -> None:
         """Set it."""
@@ -114,7 +114,9 @@ class Log:
         with Workspace(self.folder) as workspace:
             events = workspace.events
         for event in events:
-            print(json.dumps({"id": event.id, "time": event.time, "kind": event.kind, **event.data}))
+            print(
+                json.dumps({"id": event.id, "time": event.time, "kind": event.kind, **event.data})
+            )
 
 
 @dataclass(frozen=True)

@@ -161,8 +161,7 @@ def run_goals(
         One result a goal, in order.
     """
     sessions = [
-        Session(generator, make_adapter(), demonstrations, goal, task.tolerance)
-        for goal in goals
+        Session(generator, make_adapter(), demonstrations, goal, task.tolerance) for goal in goals
     ]
     seers = [np.random.default_rng([seed, 1, i]) for i in range(len(goals))]
     rollouts: list[list[Rollout]] = [[] for _ in goals]

@@ -78,7 +78,11 @@ __all__ = [
 ]
 
 from prior_reinforce.generators.base import Generator as _G
+
 _G.remarks = ()
+
+
 def make_generator(choice):
     from prior_reinforce.generators.by_name import make_generator as make
+
     return make(choice)

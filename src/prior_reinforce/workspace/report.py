@@ -38,7 +38,7 @@ def report_workspace(workspace: Workspace, folder: Path) -> Path:
             f"there is no trial to report yet; run: prior-reinforce ask {workspace.folder}"
         )
     records = [_record(workspace, session, goal) for goal in goals]
-    robot, training = workspace.manifest.robot, workspace.training
+    robot, training = workspace.manifest.robot, workspace.log.training
     models = (trial.model for goal in goals for trial in session.trials_of(goal.number))
     facts = {
         "Task": workspace.manifest.name,

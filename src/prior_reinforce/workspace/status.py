@@ -17,8 +17,8 @@ def describe(workspace: Workspace) -> str:
     """Say where a workspace stands: ten lines at most, and one for each remark on the model."""
     session, manifest = workspace.session(), workspace.manifest
     robot = manifest.robot.robot if manifest.robot is not None else "none, no limits are checked"
-    n = 0 if workspace.demonstrations_sha256 is None else workspace.demonstrations.n
-    training = workspace.training
+    n = 0 if workspace.log.demonstrations is None else workspace.demonstrations.n
+    training = workspace.log.training
     rows = [
         ("task", f"{manifest.name}, tolerance {manifest.tolerance:g} {manifest.outcome_units[0]}"),
         (
@@ -50,7 +50,7 @@ def say_trial(workspace: Workspace, trial: Trial) -> str:
     if trial.stage is Stage.VOIDED:
         return f"void: {trial.note}" if trial.note else "void"
     if trial.stage is Stage.EXECUTING:
-        if workspace.is_executing():
+        if workspace.log.is_executing():
             return "is executing now"
         return "was executing when the program stopped: did the arm move?"
     if trial.stage is Stage.EXECUTED:
@@ -61,9 +61,9 @@ def say_trial(workspace: Workspace, trial: Trial) -> str:
 def next_step(workspace: Workspace, session: Session) -> str:
     """The command that comes next."""
     folder = shlex.quote(str(workspace.folder))
-    if workspace.demonstrations_sha256 is None:
+    if workspace.log.demonstrations is None:
         return f"prior-reinforce import {folder} RECORDINGS"
-    if workspace.stale:
+    if workspace.log.stale:
         return f"prior-reinforce learn {folder}"
     new_goal = f"prior-reinforce goal {folder} {_goal_example(workspace)}"
     if not session.goals:
@@ -71,12 +71,12 @@ def next_step(workspace: Workspace, session: Session) -> str:
     trial = session.open_trial
     if trial is not None:
         tell = f"prior-reinforce tell {folder} {trial.number} {tell_example(workspace)}"
-        if trial.stage is Stage.EXECUTING and not workspace.is_executing():
+        if trial.stage is Stage.EXECUTING and not workspace.log.is_executing():
             return f"if it moved: {tell}; if not: prior-reinforce ask {folder} --arm-did-not-move"
         return f"{tell} (or --hit)"
     if session.solved:
         return f"{new_goal}, or prior-reinforce report {folder}"
-    training = workspace.training
+    training = workspace.log.training
     own = training.own if training is not None else None
     return f"prior-reinforce ask {folder}" + (f" --generator {own}" if own else "")
 
@@ -94,11 +94,11 @@ def _goal_example(workspace: Workspace) -> str:
 
 
 def _say_model(workspace: Workspace) -> str:
-    training = workspace.training
+    training = workspace.log.training
     if training is None:
         return "none yet"
     said = f"{training.model}, {training.generator}"
-    return f"{said}, of other demonstrations" if workspace.stale else said
+    return f"{said}, of other demonstrations" if workspace.log.stale else said
 
 
 def _say_goal(workspace: Workspace, session: Session, goal: Goal, n: int) -> str:

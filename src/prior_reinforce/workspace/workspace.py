@@ -14,11 +14,9 @@ a session's: demonstrations imported, a model trained.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from numpy.typing import ArrayLike
 from typing_extensions import Self
@@ -33,10 +31,9 @@ from prior_reinforce.errors import (
 from prior_reinforce.files import named_disk_errors
 from prior_reinforce.plans.files import PlanFile
 from prior_reinforce.plans.motions import Demonstrations, Plan
-from prior_reinforce.registry import parse_choice
 from prior_reinforce.session import Session
-from prior_reinforce.trials import KINDS, Event, Goal, Trial
-from prior_reinforce.workspace.journal import JOURNAL_FILE, Journal
+from prior_reinforce.trials import Event, Goal, Trial
+from prior_reinforce.workspace.log import Training, WorkspaceLog
 from prior_reinforce.workspace.manifest import (
     MANIFEST_FILE,
     Manifest,
@@ -49,28 +46,6 @@ if TYPE_CHECKING:
     from prior_reinforce.generators.base import FitProgress, Generator
     from prior_reinforce.robots.executors.command import CommandResult
     from prior_reinforce.robots.report import LimitReport
-
-
-@dataclass(frozen=True)
-class Training:
-    """One training."""
-
-    model: str
-    """Hash of the model, the name of its folder."""
-    demonstrations: str
-    """SHA-256 of the demonstrations as they were imported."""
-    fitted_to: str
-    """SHA-256 of what the generator was fitted to; the first journals name aligned copies here."""
-    generator: str
-    """Its choice, for instance `diffusion`, or `module:Class` of one's own."""
-    remarks: tuple[str, ...] = ()
-    """What the fit could not do."""
-
-    @property
-    def own(self) -> str | None:
-        """`module:Class` where the generator is one's own; None where it is ours."""
-        name, _ = parse_choice(self.generator)
-        return name if ":" in name else None
 
 
 class Workspace:
@@ -91,8 +66,8 @@ class Workspace:
                 f"prior-reinforce new {folder}"
             )
         self.manifest: Manifest = load_manifest(folder / MANIFEST_FILE)
-        self.journal = Journal(folder / JOURNAL_FILE)
         self.store = Store(folder)
+        self.log = WorkspaceLog(folder, self.store, self.manifest.format)
         self._read: dict[str, Demonstrations] = {}
 
     @classmethod
@@ -115,7 +90,7 @@ class Workspace:
 
     def close(self) -> None:
         """Close the journal."""
-        self.journal.close()
+        self.log.journal.close()
 
     def __enter__(self) -> Self:
         """Use it for the length of a block."""
@@ -132,50 +107,7 @@ class Workspace:
         Raises:
             WorkspaceError: The journal is damaged, or a newer version wrote it.
         """
-        events = self.journal.events()
-        known = KINDS | {"demonstrations_imported", "model_trained"}
-        for event in events:
-            if event.kind not in known:
-                raise WorkspaceError(
-                    f"event {event.id} is a {event.kind!r}, which this version does not know; use "
-                    "the version that wrote it, or restore the journal from a copy"
-                )
-        return events
-
-    @property
-    def trainings(self) -> Mapping[str, Training]:
-        """Every training, by the model's hash; the last is in use."""
-        trainings: dict[str, Training] = {}
-        for event in self.events:
-            if event.kind == "model_trained":
-                data = event.data
-                sha256 = data["demonstrations_sha256"]
-                trainings.pop(data["model"], None)
-                trainings[data["model"]] = Training(
-                    data["model"],
-                    sha256,
-                    data.get("fitted_to_sha256", sha256),
-                    data.get("generator", "diffusion"),  # the first journals knew no other
-                    tuple(data.get("remarks", ())),
-                )
-        return trainings
-
-    @property
-    def training(self) -> Training | None:
-        """The training of the model in use; None before the first."""
-        return next(reversed(self.trainings.values()), None)
-
-    @property
-    def stale(self) -> bool:
-        """Whether there is no model, or demonstrations were imported since it was learned."""
-        training = self.training
-        return training is None or training.demonstrations != self.demonstrations_sha256
-
-    @property
-    def demonstrations_sha256(self) -> str | None:
-        """SHA-256 of the demonstrations in use; None before the first import."""
-        imported = [e for e in self.events if e.kind == "demonstrations_imported"]
-        return imported[-1].data["sha256"] if imported else None
+        return self.log.events()
 
     @property
     def demonstrations(self) -> Demonstrations:
@@ -186,7 +118,7 @@ class Workspace:
             FileFormatError: The file is damaged.
             InvalidDemonstrationsError: The manifest says otherwise since they were imported.
         """
-        sha256 = self.demonstrations_sha256
+        sha256 = self.log.demonstrations
         if sha256 is None:
             raise WorkspaceError(
                 f"{self.folder} has no demonstrations yet; bring them in with: prior-reinforce "
@@ -200,7 +132,7 @@ class Workspace:
         Raises:
             FileFormatError: The file is missing or damaged.
         """
-        return self._demonstrations(self.trainings[model].fitted_to)
+        return self._demonstrations(self.log.trainings[model].fitted_to)
 
     def session(self, own: str | None = None) -> Session:
         """The trials of this workspace. Telling needs no model; asking loads it.
@@ -215,13 +147,13 @@ class Workspace:
         """
         from prior_reinforce.adapters import make_adapter
 
-        training = self.training
+        training = self.log.training
         session = Session(
             lambda: self._generator(own),
             lambda: make_adapter(session.goals[-1].adapter),
             lambda: self.demonstrations,
             tolerance=self.manifest.tolerance,
-            log=_Log(self),
+            log=self.log,
             gate=self.gate,
             model="" if training is None else training.model,
         )
@@ -233,9 +165,7 @@ class Workspace:
             )
         return session
 
-    def set_goal(
-        self, goal: ArrayLike, *, carry_over: bool = False, adapter: str = "gp"
-    ) -> Goal:
+    def set_goal(self, goal: ArrayLike, *, carry_over: bool = False, adapter: str = "gp") -> Goal:
         """Set the goal that the next trials are for.
 
         Args:
@@ -263,7 +193,7 @@ class Workspace:
             return None
         from prior_reinforce.robots import check_plan
 
-        training = self.training
+        training = self.log.training
         shown = self.demonstrations if training is None else self.demonstrations_of(training.model)
         plan = Plan(frames, shown.format)
         return check_plan(plan, self.manifest.robot, shown, self.manifest.gate)
@@ -288,9 +218,9 @@ class Workspace:
             TrialStateError: A trial waits to be told.
         """
         self._check_fit(demonstrations, source)
-        with self.journal.exclusive():
+        with self.log.exclusive():
             self.session().refuse_open_trial("importing demonstrations")
-            before = self.demonstrations_sha256
+            before = self.log.demonstrations
             if before is not None and any(event.kind == "asked" for event in self.events):
                 names = self._demonstrations(before).format.names
                 if names != demonstrations.format.names:
@@ -299,7 +229,7 @@ class Workspace:
                         f"{demonstrations.format.names}; make another workspace for it"
                     )
             self.store.save_demonstrations(demonstrations)
-            self.journal.append(
+            self.log.append(
                 "demonstrations_imported",
                 {"n": demonstrations.n, "sha256": demonstrations.sha256, "source": source},
             )
@@ -337,10 +267,10 @@ class Workspace:
             "demonstrations_sha256": demonstrations.sha256,
             "remarks": list(fitted.remarks),
         }
-        with self.journal.exclusive():
+        with self.log.exclusive():
             self.session().refuse_open_trial("learning")
-            self.journal.append("model_trained", data)
-        training = self.training
+            self.log.append("model_trained", data)
+        training = self.log.training
         assert training is not None
         return training
 
@@ -384,20 +314,10 @@ class Workspace:
             session.end_execution(number, result.as_json())
         return result
 
-    def is_executing(self) -> bool:
-        """Whether a trial is being executed right now, by any program.
-
-        Raises:
-            WorkspaceError: The lock cannot be read, or the file system has no locks.
-        """
-        from prior_reinforce.robots.executors.lock import is_executing
-
-        return is_executing(self.folder)
-
     def _generator(self, own: str | None) -> Generator:
         """The model in use."""
         demonstrations = self.demonstrations
-        training = self.training
+        training = self.log.training
         if training is None:
             raise WorkspaceError(
                 f"nothing is learned yet; run: prior-reinforce learn {self.folder}"
@@ -436,31 +356,3 @@ class Workspace:
                     f"{source} has {what} {given}, but {self.folder / MANIFEST_FILE} says "
                     f"{expected}; change the manifest, or import again"
                 )
-
-
-class _Log:
-    """The journal and the store as the log of a session."""
-
-    def __init__(self, workspace: Workspace) -> None:
-        self._workspace = workspace
-
-    def events(self) -> Sequence[Event]:
-        return self._workspace.events
-
-    def exclusive(self) -> AbstractContextManager[None]:
-        return self._workspace.journal.exclusive()
-
-    def append(self, kind: str, data: Mapping[str, Any]) -> None:
-        self._workspace.journal.append(kind, data)
-
-    def keep_plan(self, number: int, plan: Frames) -> Mapping[str, Any]:
-        """Write the plan's file, before the event that names it."""
-        workspace = self._workspace
-        file = workspace.store.save_plan(Plan(plan, workspace.demonstrations.format), number)
-        return {"plan_file": file.path.name, "plan_sha256": file.sha256}
-
-    def plan(self, trial: Trial) -> Frames:
-        return self._workspace.plan(trial).actions
-
-    def is_executing(self) -> bool:
-        return self._workspace.is_executing()

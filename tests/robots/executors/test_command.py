@@ -57,9 +57,7 @@ def test_exit_status_and_output_of_a_failure(plan_file):
 
 def test_a_signal_is_recorded(plan_file):
     code = "import os; os.kill(os.getpid(), 9)"
-    assert (
-        run_command(f'{PYTHON} -c "{code}" {{plan}}', plan_file, time_limit=30).exit_status == -9
-    )
+    assert run_command(f'{PYTHON} -c "{code}" {{plan}}', plan_file, time_limit=30).exit_status == -9
 
 
 def test_only_the_end_of_long_output_is_kept(plan_file):

@@ -1,0 +1,43 @@
+# The public face: what `import prior_reinforce as pr` offers.
+from .adapters.base import Adapter as Adapter
+from .adapters.frozen import FrozenAdapter as FrozenAdapter
+from .adapters.gaussian_process import GaussianProcessAdapter as GaussianProcessAdapter
+from .adapters.gaussian_process import GaussianProcessConfig as GaussianProcessConfig
+from .adapters.proportional import ProportionalAdapter as ProportionalAdapter
+from .adapters import make_adapter as make_adapter
+from .errors import PriorReinforceError as PriorReinforceError
+from .experiments.protocol import GoalTrials as GoalTrials
+from .experiments.protocol import perceive_demonstrations as perceive_demonstrations
+from .experiments.protocol import run_goals as run_goals
+from .experiments.protocol import success_by_round as success_by_round
+from .generators import load_generator as load_generator
+from .generators import make_generator as make_generator
+from .generators.base import FitProgress as FitProgress
+from .generators.base import Generator as Generator
+from .generators.timed import Timed as Timed
+from .perception import make_perception as make_perception
+from .perception.amplified import Amplified as Amplified
+from .perception.base import Perception as Perception
+from .perception.calibration import TableCalibration as TableCalibration
+from .perception.camera import Camera as Camera
+from .perception.exact import Exact as Exact
+from .perception.eye import Eye as Eye
+from .plans.alignment import Alignment as Alignment
+from .plans.alignment import align as align
+from .plans.files import read_plan as read_plan
+from .plans.files import write_plan as write_plan
+from .plans.motions import Demonstrations as Demonstrations
+from .plans.motions import Plan as Plan
+from .plans.motions import PlanFormat as PlanFormat
+from .rollouts import Rollout as Rollout
+from .session import Session as Session
+from .session import ask_all as ask_all
+from .tasks import make_task as make_task
+from .tasks.base import Task as Task
+from .trials import Stage as Stage
+from .trials import Trial as Trial
+from .wording import from_words as from_words
+from .wording import to_words as to_words
+from .workspace.workspace import Workspace as Workspace
+
+__version__: str
