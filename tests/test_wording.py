@@ -1,4 +1,4 @@
-"""Words for errors: said and read back."""
+"""Errors, places and lengths: said in words or numbers, and read back."""
 
 import contextlib
 
@@ -8,7 +8,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from prior_reinforce.errors import InvalidFeedbackError
-from prior_reinforce.wording import from_words, to_words
+from prior_reinforce.wording import (
+    from_words,
+    in_words,
+    read_place,
+    say_error,
+    say_length,
+    say_place,
+    to_words,
+)
+
+XY, METRES = ("x", "y"), ("m", "m")
+XT, MIXED = ("x", "t"), ("m", "s")
 
 
 @pytest.mark.parametrize(
@@ -66,3 +77,90 @@ def test_words_say_tenths_of_centimetres_without_loss(tenths):
 def test_no_text_causes_anything_but_the_named_error(text):
     with contextlib.suppress(InvalidFeedbackError):
         assert from_words(text, 2).shape == (2,)
+
+
+@pytest.mark.parametrize(
+    ("units", "expected"),
+    [(["m"], True), (["m"] * 3, True), (["m"] * 4, False), (["m", "s"], False), (["cm"], False)],
+)
+def test_words_are_for_three_lengths_at_most(units, expected):
+    assert in_words(units) == expected
+
+
+def test_what_has_no_words_is_said_by_names_and_units():
+    error = np.array([0.0123456, -0.5])
+    assert say_error(error, XT, MIXED) == "x +0.0123 m, t -0.5 s"
+    assert say_error(error, XY, METRES) == "1.2 cm long, 50 cm right"
+    assert say_error([-0.00001, 0.0], XT, MIXED) == "x +0 m, t +0 s"
+    assert say_place([0.92, 0.3], XT, MIXED) == "x 0.92 m, t 0.3 s"
+    assert say_place([0.1, -0.2, 0.3, 0.4], "abcd", "mmmm") == "a 0.1 m, b -0.2 m, c 0.3 m, d 0.4 m"
+
+
+@pytest.mark.parametrize(
+    ("place", "said"),
+    [
+        ([0.9204, -0.1], "92 cm ahead, 10 cm right"),
+        ([1.0, 0.0], "100 cm ahead, 0 cm left"),
+        ([-0.0004, -0.0004], "0 cm ahead, 0 cm left"),
+        ([-0.1, 0.25, -0.051], "10 cm behind, 25 cm left, 5.1 cm down"),
+        ([0.653], "65.3 cm ahead"),
+    ],
+)
+def test_places_are_said_as_seen_from_the_base(place, said):
+    k = len(place)
+    assert say_place(place, "xyz"[:k], ["m"] * k) == said
+
+
+@pytest.mark.parametrize(
+    ("length", "units", "said"),
+    [
+        (0.015, METRES, "1.5 cm"),
+        (0.0, METRES, "0 cm"),
+        (0.2, ["rad", "rad"], "0.2 rad"),
+        (0.25, MIXED, "0.25"),
+        (0.12345, MIXED, "0.123"),
+    ],
+)
+def test_lengths(length, units, said):
+    assert say_length(length, units) == said
+
+
+@given(st.lists(st.integers(-9000, 9000), min_size=1, max_size=3))
+def test_a_place_that_was_said_is_read_again_to_a_millimetre(millimetres):
+    place = np.array(millimetres) / 1000
+    names, units = "xyz"[: len(place)], ["m"] * len(place)
+    np.testing.assert_allclose(
+        read_place(say_place(place, names, units), names, units), place, atol=1e-12
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "place"),
+    [
+        ("0.92 0.10", [0.92, 0.10]),
+        ("0.92, -1e-1", [0.92, -0.1]),
+        ("92cm ahead, 10cm to the left", [0.92, 0.10]),
+        ("10 cm right and 1 m behind", [-1.0, -0.1]),
+        ("92cm ahead", [0.92, 0.0]),
+    ],
+)
+def test_places_are_read_from_numbers_or_words(text, place):
+    np.testing.assert_allclose(read_place(text, XY, METRES), place, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("text", "units", "message"),
+    [
+        ("0.92", METRES, "2 finite numbers: x, y"),
+        ("nan 0.1", METRES, "2 finite numbers: x, y"),
+        ("", METRES, "2 finite numbers"),
+        ("far away", METRES, "one of ahead, behind, left, right"),
+        ("hit", METRES, "one of ahead"),
+        ("5cm up", METRES, "one of ahead"),
+        ("5cm ahead", MIXED, "give 2 finite numbers"),
+        (f"{'9' * 400}cm ahead", METRES, "cannot read"),
+    ],
+)
+def test_other_places_are_refused_with_the_remedy(text, units, message):
+    with pytest.raises(InvalidFeedbackError, match=message):
+        read_place(text, XY, units)

@@ -6,7 +6,7 @@ import numpy as np
 from rich.console import Console
 
 from prior_reinforce.experiments.protocol import GoalTrials
-from prior_reinforce.wording import to_words
+from prior_reinforce.wording import say_place, to_words
 
 
 class LiveView:
@@ -20,7 +20,8 @@ class LiveView:
     def goal(self, number: int, n_goals: int, goal: np.ndarray) -> None:
         """Announce a goal."""
         of_all = f" {number} of {n_goals}" if n_goals > 1 else ""
-        self._console.print(f"\n[bold]goal{of_all}[/bold] at {place(goal)}")
+        place = say_place(goal, "xyz", ["m"] * len(goal))
+        self._console.print(f"\n[bold]goal{of_all}[/bold] at {place}")
 
     def trial(self, result: GoalTrials) -> None:
         """Print the latest trial: how the condition moved, what was seen, solved or not."""
@@ -64,11 +65,3 @@ class LiveView:
             f"N = {n} + {np.mean(solved):.1f} = {n + np.mean(solved):.1f} trials",
             highlight=False,
         )
-
-
-def place(point: np.ndarray) -> str:
-    """Say a place on the table, in the table frame."""
-    if len(point) != 2:
-        return "(" + ", ".join(f"{value:.3f}" for value in point) + ")"
-    side = "left" if point[1] >= 0 else "right"
-    return f"{point[0]:.2f} m ahead, {abs(point[1]):.2f} m {side}"

@@ -9,11 +9,10 @@ from typing import ClassVar
 import numpy as np
 from rich.console import Console
 
-from prior_reinforce.commands.live import place
 from prior_reinforce.errors import InvalidFeedbackError, PerceptionFailedError
 from prior_reinforce.perception import Perception, VisionLanguageModel
 from prior_reinforce.rollouts import Rollout
-from prior_reinforce.wording import from_words
+from prior_reinforce.wording import from_words, say_place
 
 
 class KeptSight(Perception):
@@ -92,10 +91,11 @@ class Operator:
         self._console.print(f"  not seen: {failure}", highlight=False, markup=False)
         if isinstance(self._sight, KeptSight) and self._sight.latest is not None:
             self._console.print(f"  picture: {self._sight.latest}", highlight=False, markup=False)
+        place = say_place(goal, "xyz", ["m"] * len(goal))
         while True:
             try:
                 text = input(
-                    f"  what was the error, seen from {place(goal)}? for instance "
+                    f"  what was the error, seen from {place}? for instance "
                     '"5cm long, 2cm left", or hit: '
                 )
             except EOFError as error:

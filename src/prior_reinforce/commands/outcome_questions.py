@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-import math
-import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -23,11 +21,8 @@ from prior_reinforce.importing.outcomes import (
     outcomes_of,
     read_outcomes,
 )
-from prior_reinforce.wording import from_words, in_words
+from prior_reinforce.wording import in_words, read_place
 from prior_reinforce.workspace.manifest import Manifest
-
-_PLACES = {"ahead": "long", "behind": "short", "up": "high", "down": "low", "to the ": ""}
-"""A place seen from the robot's base, in the words of an error seen from the goal."""
 
 
 def ask_for_outcomes(
@@ -64,38 +59,6 @@ def ask_for_outcomes(
     for number, episode in enumerate(missing, start=1):
         outcomes[episode] = _ask(f"{episode} ({number} of {len(missing)}): ", episode, manifest)
     return {recording.episode: outcomes[recording.episode] for recording in recordings}
-
-
-def read_place(text: str, manifest: Manifest) -> tuple[float, ...]:
-    """Read where an object landed, from numbers in the outcome's units, or from words.
-
-    Args:
-        text: For instance `0.92 0.10`, or `92cm ahead, 10cm left`.
-        manifest: What an outcome is.
-
-    Raises:
-        InvalidFeedbackError: It is neither.
-    """
-    k = len(manifest.outcome_names)
-    parts = text.replace(",", " ").split()
-    try:
-        numbers = tuple(float(part) for part in parts)
-    except ValueError:
-        numbers = None
-    if numbers is not None:
-        if len(numbers) != k or not all(math.isfinite(number) for number in numbers):
-            raise InvalidFeedbackError(
-                f"{text!r} is not {k} finite numbers: {', '.join(manifest.outcome_names)}"
-            )
-        return numbers
-    if not in_words(manifest.outcome_units):
-        raise InvalidFeedbackError(
-            f"cannot read {text!r}; give {k} numbers: {', '.join(manifest.outcome_names)}"
-        )
-    words = text.lower()
-    for place, error in _PLACES.items():
-        words = re.sub(rf"\b{place}", error, words)
-    return tuple(from_words(words, k).tolist())
 
 
 def keep_typed(
@@ -150,6 +113,7 @@ def _ask(question: str, episode: str, manifest: Manifest) -> tuple[float, ...]:
                 "leave it out with --episodes"
             ) from error
         try:
-            return read_place(text, manifest)
+            place = read_place(text, manifest.outcome_names, manifest.outcome_units)
+            return tuple(place.tolist())
         except InvalidFeedbackError as error:
             print(error)

@@ -24,7 +24,6 @@ from prior_reinforce.robots import (
     missing_joints,
     robot_limits,
 )
-from prior_reinforce.wording import WORDS
 from prior_reinforce.workspace.manifest_template import TEMPLATE  # noqa: F401
 
 if sys.version_info >= (3, 11):
@@ -75,11 +74,6 @@ class Manifest:
     """Limits that every plan is held against; None where the manifest says `none`."""
     gate: GateSettings
     """The gate's own lines."""
-
-    @property
-    def in_words(self) -> bool:
-        """Whether the words of `feedback` (long, left, high) describe this task's outcomes."""
-        return len(self.outcome_names) <= len(WORDS) and set(self.outcome_units) == {"m"}
 
 
 def load_manifest(path: Path) -> Manifest:
