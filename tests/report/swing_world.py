@@ -6,11 +6,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from prior_reinforce.adapters.base import Adapter
-from prior_reinforce.generators.base import Generator
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 from prior_reinforce.report import AdaptationRecord
 from prior_reinforce.session import Session
+from prior_reinforce.trials import Stage, Trial
 
 HORIZON = 60
 DT = 0.02
@@ -24,29 +23,18 @@ def motion(conditions: np.ndarray, action_dim: int) -> np.ndarray:
     return size * np.sin(phase * (1 + joints / 5) + joints / 3) * np.cos(phase / 2)
 
 
-class Swing(Generator):
-    name = "swing"
+class Swing:
+    """A generator whose plans say their condition."""
 
     def __init__(self, action_dim: int) -> None:
         self.action_dim = action_dim
 
-    def fit(self, demonstrations, *, seed, progress=None):
-        return self
-
-    def generate(self, conditions):
+    def generate(self, conditions: np.ndarray) -> np.ndarray:
         return motion(conditions, self.action_dim)
 
-    def save(self, folder): ...
 
-    @classmethod
-    def load(cls, folder):
-        return cls(1)
-
-
-class FullStep(Adapter):
-    """Subtracts the whole last error."""
-
-    name = "full-step"
+class FullStep:
+    """An adapter that subtracts the whole last error."""
 
     def start(self, demonstrations):
         self.last = None
@@ -87,7 +75,7 @@ def bend(condition: np.ndarray) -> np.ndarray:
 
 def adaptation(
     goal=None,
-    adapter: Adapter | None = None,
+    adapter: FullStep | None = None,
     *,
     seed: int = 0,
     k: int = 2,
@@ -114,7 +102,32 @@ def adaptation(
         outcomes.append(outcome)
         seen = np.round(error / 0.01) * 0.01
         session.tell(trial.number, seen, hit=bool(np.linalg.norm(error) <= 0.015))
-    return AdaptationRecord.from_session(session, outcomes=tuple(outcomes))
+    return AdaptationRecord(demos, goal, 0.015, session.trials, outcomes=tuple(outcomes))
+
+
+def told(
+    *errors: list[float] | None,
+    goal: tuple[float, float] = (0.92, -0.10),
+    tolerance: float = 0.015,
+    outcomes: tuple[np.ndarray | None, ...] | None = None,
+    first_number: int = 1,
+) -> AdaptationRecord:
+    """Trials aimed 3 cm beyond the goal, with these errors seen; None voids a trial."""
+    condition = np.add(goal, [0.03, 0.0])
+    plan = motion(condition[None], 7)[0]
+    trials = []
+    for number, error in enumerate(errors, start=first_number):
+        trial = Trial(number, 1, condition, plan=plan, stage=Stage.VOIDED, note="the arm stopped")
+        if error is not None:
+            seen = np.array(error)
+            hit = bool(np.linalg.norm(seen) <= tolerance)
+            trial = Trial(
+                number, 1, condition, plan=plan, stage=Stage.TOLD, error_seen=seen, hit=hit
+            )
+        trials.append(trial)
+    return AdaptationRecord(
+        demonstrations(), np.array(goal), tolerance, tuple(trials), outcomes=outcomes
+    )
 
 
 def pictures(n: int, height: int = 240, width: int = 320) -> Iterator[np.ndarray]:

@@ -20,7 +20,8 @@ from prior_reinforce.errors import (
     RenderingUnavailableError,
 )
 from prior_reinforce.experiments.recipes import RECIPES, Claim, Picture, Recipe, Table, Verdict
-from prior_reinforce.report.html import data_uri, render, write_text
+from prior_reinforce.files import write
+from prior_reinforce.report.html import data_uri, render
 
 _PACKAGE = "prior_reinforce.experiments"
 _TITLE = "The paper's evidence, measured on our tasks"
@@ -77,8 +78,8 @@ def write_evidence(folder: Path) -> tuple[Path, Path]:
     )
     markdown = _markdown(sections, _summary(counts), folder)
     return (
-        write_text(folder / "evidence.html", page),
-        write_text(folder / "evidence.md", markdown),
+        write(folder / "evidence.html", page),
+        write(folder / "evidence.md", markdown),
     )
 
 

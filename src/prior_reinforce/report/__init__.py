@@ -1,14 +1,7 @@
-"""The report of one or more adaptations: pictures, films and one self-contained page."""
+"""The report of one or more goals: pictures, films and one self-contained page."""
 
-from prior_reinforce.report.film import Film, film_strip, record_film, write_film
+from prior_reinforce.report.film import record_film
 from prior_reinforce.report.page import write_report
-from prior_reinforce.report.record import AdaptationRecord
+from prior_reinforce.report.record import AdaptationRecord, Film
 
-__all__ = [
-    "AdaptationRecord",
-    "Film",
-    "film_strip",
-    "record_film",
-    "write_film",
-    "write_report",
-]
+__all__ = ["AdaptationRecord", "Film", "record_film", "write_report"]

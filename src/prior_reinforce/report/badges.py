@@ -1,4 +1,4 @@
-"""Numbered badges beside points, moved apart where they would cover each other.
+"""Labels beside points, moved apart where they would cover each other.
 
 By eye, errors are rounded, so two trials are often seen at the very same place.
 """
@@ -8,57 +8,68 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from jaxtyping import Float
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from prior_reinforce.report.style import text_on
 
-_SIZE = 15.0  # [points], diameter of a badge
-_DISTANCE = 15.0  # [points], from a point to the middle of its badge, on the innermost ring
-_DIRECTIONS = np.linspace(0, 2 * np.pi, 16, endpoint=False)
+_Place = Float[np.ndarray, "2"]
+
+_HEIGHT = 15.0  # [points], of a badge
+_LETTER = 6.0  # [points], by which each further letter widens it
+_RINGS = (1.0, 1.6, 2.2, 2.8)
+_TURNS = np.linspace(0, 2 * np.pi, 16, endpoint=False)
 
 
 def draw_badges(
-    figure: Figure,
     axes: Axes,
-    points: np.ndarray,
+    places: Sequence[_Place],
     labels: Sequence[str],
     colours: Sequence[str],
     *,
-    away_from: np.ndarray,
-    avoid: np.ndarray | None = None,
+    away_from: _Place,
+    avoid: Sequence[_Place] = (),
 ) -> None:
-    """Draw a numbered badge near each point.
+    """Draw a label near each place.
 
     Args:
-        figure: The figure of `axes`.
-        axes: Prepared axes; their limits must not change afterwards.
-        points: Shape (n, 2), in data coordinates.
-        labels: One a point.
-        colours: One a point.
-        away_from: Where badges should not point to (the goal), shape (2,), data coordinates.
-        avoid: Other marks that badges should not cover, shape (m, 2), data coordinates.
+        axes: Of a figure that is laid out; its limits must not change afterwards.
+        places: In data coordinates.
+        labels: One a place.
+        colours: One a place.
+        away_from: Where badges should not point to (the goal), in data coordinates.
+        avoid: Other marks that badges should not cover, in data coordinates.
     """
-    if not len(points):
-        return
-    # Lay out now, so that data coordinates have a place on paper, and leave it at that.
-    figure.draw_without_rendering()
-    figure.set_layout_engine("none")
-    points_per_pixel = 72 / figure.dpi
-    pixels = axes.transData.transform(points) * points_per_pixel
-    centre = axes.transData.transform(away_from) * points_per_pixel
-    marks = pixels
-    if avoid is not None and len(avoid):
-        marks = np.concatenate([pixels, axes.transData.transform(avoid) * points_per_pixel])
-    box = axes.get_window_extent()
-    frame = np.array([[box.x0, box.y0], [box.x1, box.y1]]) * points_per_pixel
-    taken: list[np.ndarray] = []
-    for place, point, label, colour in zip(points, pixels, labels, colours, strict=True):
-        offset = _offset(point, centre, marks, taken, frame)
-        taken.append(point + offset)
+    longest = max(map(len, labels), default=1)
+    size = np.array([_HEIGHT + _LETTER * (longest - 1), _HEIGHT])
+    radii = (size + _HEIGHT) / 2
+    to_points = 72 / axes.figure.dpi
+    centre = axes.transData.transform(away_from) * to_points
+    marks = axes.transData.transform(np.array([*places, *avoid]).reshape(-1, 2)) * to_points
+    low, high = axes.get_window_extent().get_points() * to_points
+    taken: list[_Place] = []
+
+    def cost(mark: _Place, offset: _Place, detour: float) -> float:
+        place = mark + offset
+        outside = np.any(place < low + size / 2) or np.any(place > high - size / 2)
+        covered = np.linalg.norm((marks - place) / size, axis=1) < 0.7
+        clashes = [np.linalg.norm((place - other) / size) < 1.1 for other in taken]
+        return detour + 100 * sum(clashes) + 50 * bool(outside) + 3 * float(covered.sum())
+
+    for place, mark, label, colour in zip(places, marks, labels, colours, strict=False):
+        away = mark - centre
+        angle = np.arctan2(away[1], away[0]) if np.linalg.norm(away) > 1 else np.pi / 4
+        choices = [
+            (ring * radii * [np.cos(angle + turn), np.sin(angle + turn)], 4 * ring - np.cos(turn))
+            for ring in _RINGS
+            for turn in _TURNS
+        ]
+        offset, _ = min(choices, key=lambda choice: cost(mark, *choice))
+        taken.append(mark + offset)
+        shape = "circle,pad=0.28" if longest == 1 else "round,pad=0.25,rounding_size=0.7"
         axes.annotate(
             label,
-            xy=(float(place[0]), float(place[1])),
+            xy=tuple(place),
             xytext=tuple(offset),
             textcoords="offset points",
             ha="center",
@@ -66,31 +77,6 @@ def draw_badges(
             fontsize=8.5,
             fontweight="bold",
             color=text_on(colour),
-            bbox={"boxstyle": "circle,pad=0.28", "facecolor": colour, "edgecolor": "white"},
+            bbox={"boxstyle": shape, "facecolor": colour, "edgecolor": "white"},
             zorder=8,
         )
-
-
-def _offset(
-    point: np.ndarray,
-    centre: np.ndarray,
-    marks: np.ndarray,
-    taken: list[np.ndarray],
-    frame: np.ndarray,
-) -> np.ndarray:
-    """Find the free place that points best away from the centre, all in [points] of the page."""
-    away = point - centre
-    angle = np.arctan2(away[1], away[0]) if np.linalg.norm(away) > 1 else np.pi / 4
-    best, best_cost = np.zeros(2), np.inf
-    for ring in (1.0, 1.6, 2.2, 2.8):
-        for direction in _DIRECTIONS + angle:
-            offset = ring * _DISTANCE * np.array([np.cos(direction), np.sin(direction)])
-            place = point + offset
-            cost = 4 * (ring - 1) + 1 - np.cos(direction - angle)
-            cost += 100 * sum(np.linalg.norm(place - other) < 1.1 * _SIZE for other in taken)
-            cost += 3 * float(np.sum(np.linalg.norm(marks - place, axis=1) < 0.7 * _SIZE))
-            outside = np.any(place < frame[0] + _SIZE / 2) or np.any(place > frame[1] - _SIZE / 2)
-            cost += 50 * bool(outside)
-            if cost < best_cost:
-                best, best_cost = offset, cost
-    return best

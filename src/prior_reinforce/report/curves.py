@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from prior_reinforce.arrays import Frames
+from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.report.record import AdaptationRecord
 from prior_reinforce.report.style import (
     DEMONSTRATION,
@@ -16,11 +21,14 @@ from prior_reinforce.report.style import (
     new_figure,
     trial_colour,
 )
-from prior_reinforce.report.views import shown
-from prior_reinforce.report.wording import display_unit, say_length
+from prior_reinforce.report.summary import say_tolerance
 from prior_reinforce.trials import Stage
+from prior_reinforce.wording import say_length
 
 _COLUMNS = 4
+_LEAST_TRIALS = 3  # that the error's axis has room for
+_LEAST_SHARE = 0.02
+"""Ours: a joint that moves less than this share of what moves most is drawn as nearly at rest."""
 
 
 @drawing()
@@ -30,107 +38,78 @@ def draw_errors(record: AdaptationRecord) -> Figure:
     axes = figure.subplots()
     calm_axes(axes)
     axes.grid(visible=False, axis="x")
-    n = len(record.trials)
-    tolerance = float(shown(record, np.array(record.tolerance)))
-    numbers = np.array([trial.number for trial in record.trials])
-    told = [i for i, t in enumerate(record.trials) if t.error_seen is not None]
-    seen = np.array([_size(record, record.trials[i].error_seen) for i in told])
-    true = np.array(
-        [np.nan if r is None else _size(record, r - record.goal) for r in record.true_outcomes]
-    )
-    known = np.isfinite(true)
+    n, tolerance = len(record.trials), record.tolerance * record.scale
     axes.axhspan(0, tolerance, color=GOAL, alpha=0.13, linewidth=0)
     axes.axhline(tolerance, color=GOAL, linewidth=1.4)
-    axes.plot(numbers[told], seen, "-", color=DEMONSTRATION, linewidth=1.5, zorder=3)
-    axes.plot(
-        numbers[known],
-        true[known],
-        "o",
-        markersize=6,
-        markerfacecolor="white",
-        markeredgecolor=INK_SOFT,
-        zorder=4,
-        label="true error",
-    )
-    for i, size in zip(told, seen, strict=True):
-        trial, colour = record.trials[i], trial_colour(i, n, hit=record.trials[i].hit)
-        axes.plot(trial.number, size, "o", color=colour, markersize=10, clip_on=False, zorder=5)
-        axes.annotate(
-            say_length(record, size / float(shown(record, np.array(1.0)))),
-            (trial.number, size),
-            (9, 7),
-            textcoords="offset points",
-            fontsize=9.5,
-            color=INK,
-        )
-    for trial in record.trials:
-        if trial.stage is not Stage.TOLD:
-            axes.annotate(
-                trial.stage.value,
-                (trial.number, tolerance),
-                (0, 12),
-                textcoords="offset points",
-                rotation=90,
-                ha="center",
-                va="bottom",
-                fontsize=9.5,
-                color=INK_SOFT,
-            )
-    top = max([3 * tolerance, *(1.18 * seen), *(1.1 * true[known])])
-    axes.set_ylim(0, top)
-    axes.set_xlim(0.5, max(n, 3) + 0.7)
-    axes.text(
-        max(n, 3) + 0.68, tolerance, "reached", color=GOAL, fontsize=9.5, ha="right", va="bottom"
-    )
-    axes.set_xticks(np.arange(1, max(n, 3) + 1))
-    axes.set_xlabel("trial")
-    unit = display_unit(record)
-    axes.set_ylabel("distance from the goal" + (f" [{unit}]" if unit else ""))
-    if known.any():
+    seen: dict[int, float] = {}
+    true: dict[int, float] = {}
+    for x, (trial, truth) in enumerate(zip(record.trials, record.true_outcomes, strict=True), 1):
+        if truth is not None:
+            true[x] = float(np.linalg.norm(truth - record.goal)) * record.scale
+        if trial.error_seen is None:
+            _write(axes, trial.stage.value, (x, tolerance), (0, 12), rotation=90, ha="center")
+            continue
+        off = float(np.linalg.norm(trial.error_seen))
+        seen[x] = off * record.scale
+        colour = trial_colour(x - 1, n, hit=trial.hit)
+        axes.plot(x, seen[x], "o", color=colour, markersize=10, clip_on=False, zorder=5)
+        said = say_length(off, record.demonstrations.outcome_units)
+        _write(axes, said, (x, seen[x]), (9, 7), color=INK)
+    axes.plot(list(seen), list(seen.values()), "-", color=DEMONSTRATION, linewidth=1.5, zorder=3)
+    if true:
+        hollow: Any = {"markersize": 6, "markerfacecolor": "white", "markeredgecolor": INK_SOFT}
+        axes.plot(list(true), list(true.values()), "o", **hollow, zorder=4, label="true error")
         axes.legend(frameon=False, fontsize=9, labelcolor=INK_SOFT, loc="upper right")
+    room = max(n, _LEAST_TRIALS)
+    reached = f"reached: within {say_tolerance(record)}"
+    _write(axes, reached, (room + 0.68, tolerance), (0, 2), color=GOAL, ha="right")
+    axes.set_ylim(0, 1.18 * max([2.5 * tolerance, *seen.values(), *true.values()]))
+    axes.set_xlim(0.5, room + 0.7)
+    axes.set_xticks(range(1, n + 1), [str(trial.number) for trial in record.trials])
+    axes.set_xlabel("trial")
+    axes.set_ylabel("distance from the goal" + (f" [{record.unit()}]" if record.unit() else ""))
     return figure
 
 
 @drawing()
 def draw_plans(record: AdaptationRecord) -> Figure:
     """Draw the plans of all trials, one panel an action dimension, demonstrations behind."""
-    demonstrations = record.demonstrations
-    d, n = demonstrations.action_dim, len(record.trials)
+    plan_format, d = record.demonstrations.format, record.demonstrations.action_dim
     columns = min(_COLUMNS, d)
     rows = -(-d // columns)
     figure = new_figure(max(2.75 * columns, 5.4), 1.9 * rows + 0.45)
     panels = figure.subplots(rows, columns, squeeze=False, sharex=True).ravel()
-    for axes in panels[d:]:
-        axes.set_axis_off()
-    for j, axes in enumerate(panels[:d]):
+    lines: list[tuple[str, Frames, dict[str, Any]]] = [
+        ("demonstrations", plan, {"color": DEMONSTRATION, "alpha": 0.45, "linewidth": 1})
+        for plan in record.demonstrations.plans
+    ]
+    for i, trial in enumerate(record.trials):
+        style = {
+            "color": trial_colour(i, len(record.trials), hit=trial.hit),
+            "linewidth": 1.7,
+            "linestyle": "--" if trial.stage is Stage.VOIDED else "-",
+        }
+        plan = np.empty((0, d)) if trial.plan is None else trial.plan
+        lines.append((f"trial {trial.number}" + (" (hit)" if trial.hit else ""), plan, style))
+    for j, axes in enumerate(panels):
+        if j >= d:
+            axes.set_axis_off()
+            continue
         calm_axes(axes)
         axes.tick_params(labelsize=8.5)
-        times = np.arange(demonstrations.horizon) * demonstrations.format.dt
-        for plan in demonstrations.plans:
-            axes.plot(times, plan[:, j], color=DEMONSTRATION, alpha=0.45, linewidth=1)
-        for i, trial in enumerate(record.trials):
-            axes.plot(
-                np.arange(trial.plan.shape[0]) * demonstrations.format.dt,
-                trial.plan[:, j],
-                color=trial_colour(i, n, hit=trial.hit),
-                linewidth=1.7,
-                linestyle="--" if trial.stage is Stage.VOIDED else "-",
-            )
-        unit = demonstrations.format.units[j]
-        name = demonstrations.format.names[j]
-        axes.set_title(f"{name} [{unit}]", loc="left", fontsize=9.5, color=INK)
+        for label, plan, style in lines:
+            axes.plot(np.arange(len(plan)) * plan_format.dt, plan[:, j], label=label, **style)
+        _widen(axes, record.demonstrations, j)
+        title = f"{plan_format.names[j]} [{plan_format.units[j]}]"
+        axes.set_title(title, loc="left", fontsize=9.5, color=INK)
         if j + columns >= d:
             axes.tick_params(labelbottom=True)
-            if j // columns == rows - 1:
-                axes.set_xlabel("time [s]", fontsize=9)
-    keys = [panels[0].plot([], [], color=DEMONSTRATION, label="demonstrations")[0]]
-    for i, trial in enumerate(record.trials):
-        label = f"trial {trial.number}" + (" (hit)" if trial.hit else "")
-        style = "--" if trial.stage is Stage.VOIDED else "-"
-        colour = trial_colour(i, n, hit=trial.hit)
-        keys.append(panels[0].plot([], [], style, color=colour, linewidth=1.7, label=label)[0])
+            axes.set_xlabel("time [s]", fontsize=9)
+    handles, labels = panels[0].get_legend_handles_labels()
+    keys = dict(zip(labels, handles, strict=True))
     figure.legend(
-        handles=keys,
+        list(keys.values()),
+        list(keys),
         loc="outside upper left",
         ncols=max(3, 2 * columns),
         frameon=False,
@@ -142,7 +121,23 @@ def draw_plans(record: AdaptationRecord) -> Figure:
     return figure
 
 
-def _size(record: AdaptationRecord, error: np.ndarray | None) -> float:
-    """Length of an error in the unit shown."""
-    assert error is not None
-    return float(np.linalg.norm(shown(record, error)))
+def _widen(axes: Axes, demonstrations: Demonstrations, j: int) -> None:
+    """Leave room around a joint that hardly moves, so that a sensor's noise does not look wild."""
+    units = np.array(demonstrations.format.units)
+    spans = np.ptp(demonstrations.plans, axis=(0, 1))
+    least = _LEAST_SHARE * spans[units == units[j]].max()
+    low, high = axes.get_ylim()
+    if high - low < least:
+        axes.set_ylim((low + high - least) / 2, (low + high + least) / 2)
+
+
+def _write(
+    axes: Axes,
+    text: str,
+    place: tuple[float, float],
+    offset: tuple[float, float],
+    color: str = INK_SOFT,
+    **more: Any,
+) -> None:
+    points: Any = {"textcoords": "offset points", "fontsize": 9.5, "va": "bottom"}
+    axes.annotate(text, place, offset, color=color, **points, **more)

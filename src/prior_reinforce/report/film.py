@@ -2,46 +2,41 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
-from itertools import pairwise
+from itertools import chain, pairwise
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-import imageio.v2 as imageio
 import numpy as np
-from matplotlib.figure import Figure
+from jaxtyping import UInt8
 
 from prior_reinforce.errors import ConfigurationError
-from prior_reinforce.report.style import INK, drawing, new_figure, save_png
+from prior_reinforce.files import in_place
+from prior_reinforce.report.record import Film
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_Picture = UInt8[np.ndarray, "height width 3"]
+_Thumbnail = UInt8[np.ndarray, "rows columns 3"]
 _THUMBNAIL_WIDTH = 320  # [pixels]; six of them fill a page at twice its resolution.
 _COLUMNS = 3
+_PANEL_WIDTH = 2.2  # [inch]
 _STILLNESS_SHARE = 0.25
 # Ours: of the distance between two key moments, the share that mere time contributes; the rest is
 # motion in the picture, so that a second of standing still takes one place in the strip, not three.
 
 
-@dataclass(frozen=True)
-class Film:
-    """Where a film lies on disk."""
-
-    video: Path
-    """The mp4."""
-    strip: Path
-    """PNG of its key moments."""
-
-
 def record_film(
     pictures: Iterable[np.ndarray], folder: Path, stem: str, *, fps: int = 30, moments: int = 6
 ) -> Film:
-    """Write a film and its strip in one pass over the pictures.
+    """Write `<stem>.mp4` and, as one picture, its key moments to `<stem>-film.png`.
 
     Nothing is left behind when `pictures` raises, for instance RenderingUnavailableError.
 
     Args:
-        pictures: Each of shape (height, width, 3), dtype uint8, all of one size.
-        folder: Where to write `<stem>.mp4` and `<stem>-film.png`; made if need be.
+        pictures: Each (height, width, 3) of uint8, all of one size; taken one by one.
+        folder: Where to write; made if need be.
         stem: Beginning of the files' names.
         fps: Pictures a second.
         moments: Key moments in the strip.
@@ -49,120 +44,22 @@ def record_film(
     Raises:
         ConfigurationError: No pictures, or of wrong or different shape or type.
     """
-    folder = Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
-    thumbnails: list[np.ndarray] = []
+    from prior_reinforce.report.style import save_png
 
-    def watched() -> Iterator[np.ndarray]:
-        for picture in pictures:
+    thumbnails: list[_Thumbnail] = []
+
+    def watched() -> Iterator[_Picture]:
+        for picture in _checked(pictures):
             yield picture
             thumbnails.append(_thumbnail(picture))
 
-    video = write_film(watched(), folder / f"{stem}.mp4", fps=fps)
-    strip = folder / f"{stem}-film.png"
-    save_png(film_strip(thumbnails, moments, fps=fps), strip)
-    return Film(video, strip)
+    video = _write_video(watched(), folder / f"{stem}.mp4", fps)
+    strip = _draw_strip(thumbnails, moments, fps)
+    return Film(video, save_png(strip, folder / f"{stem}-film.png"))
 
 
-def write_film(pictures: Iterable[np.ndarray], path: Path, *, fps: int = 30) -> Path:
-    """Write an mp4 (H.264, 4:2:0) that any browser plays; the file appears only when complete.
-
-    Args:
-        pictures: Each of shape (height, width, 3), dtype uint8, all of one size.
-        path: The file to write.
-        fps: Pictures a second.
-
-    Returns:
-        The path.
-
-    Raises:
-        ConfigurationError: No pictures, or of wrong or different shape or type.
-    """
-    if fps < 1:
-        raise ConfigurationError(f"fps must be at least 1 picture a second, got {fps}")
-    path = Path(path)
-    partial = path.with_name(f".{path.name}.partial.mp4")
-    writer = None
-    shape: tuple[int, ...] = ()
-    try:
-        for i, picture in enumerate(pictures):
-            _check_picture(picture, i, shape)
-            if writer is None:
-                shape = picture.shape
-                writer = imageio.get_writer(
-                    partial,
-                    format="FFMPEG",
-                    mode="I",
-                    fps=fps,
-                    codec="libx264",
-                    pixelformat="yuv420p",
-                    macro_block_size=1,
-                    ffmpeg_log_level="error",
-                    output_params=["-crf", "23", "-movflags", "+faststart"],
-                )
-            # 4:2:0 colour needs even sizes: an odd last row or column is repeated.
-            even = np.pad(picture, ((0, shape[0] % 2), (0, shape[1] % 2), (0, 0)), mode="edge")
-            writer.append_data(even)
-        if writer is None:
-            raise ConfigurationError("a film needs at least one picture, got none")
-        writer.close()
-        writer = None
-        os.replace(partial, path)
-    finally:
-        if writer is not None:
-            writer.close()
-        partial.unlink(missing_ok=True)
-    return path
-
-
-@drawing()
-def film_strip(pictures: Sequence[np.ndarray], moments: int = 6, *, fps: int = 30) -> Figure:
-    """Draw the key moments of a film in rows of three, each with its time.
-
-    Args:
-        pictures: All pictures of the film, each of shape (height, width, 3), dtype uint8.
-        moments: Number of key moments; fewer pictures than that are all shown.
-        fps: Pictures a second.
-
-    Raises:
-        ConfigurationError: No pictures, or of wrong or different shape or type.
-    """
-    if not pictures or moments < 1:
-        raise ConfigurationError(
-            f"a film strip needs pictures and moments, got {len(pictures)} and {moments}"
-        )
-    for i, picture in enumerate(pictures):
-        _check_picture(picture, i, pictures[0].shape)
-    chosen = key_moments(pictures, moments)
-    height, width = pictures[0].shape[:2]
-    columns = min(_COLUMNS, len(chosen))
-    rows = -(-len(chosen) // columns)
-    panel = 2.2  # [inch]
-    figure = new_figure(panel * columns, panel * height / width * rows, laid_out=False)
-    figure.subplots_adjust(0, 0, 1, 1, wspace=0.02, hspace=0.02 * width / height)
-    panels = figure.subplots(rows, columns, squeeze=False).ravel()
-    for axes in panels:
-        axes.set_axis_off()
-    for axes, i in zip(panels, chosen, strict=False):
-        axes.imshow(pictures[i], interpolation="lanczos", aspect="auto")
-        axes.text(
-            0.035,
-            0.04,
-            f"{i / fps:.2f} s",
-            transform=axes.transAxes,
-            fontsize=9,
-            color=INK,
-            bbox={"boxstyle": "round,pad=0.25", "facecolor": "white", "linewidth": 0},
-        )
-    return figure
-
-
-def key_moments(pictures: Sequence[np.ndarray], moments: int) -> list[int]:
+def key_moments(pictures: Sequence[_Picture], moments: int) -> list[int]:
     """Choose pictures that are about equally far apart, counting motion more than time.
-
-    Args:
-        pictures: Each of shape (height, width, 3), dtype uint8.
-        moments: How many to choose.
 
     Returns:
         Rising indices, the first and the last picture among them.
@@ -185,7 +82,52 @@ def key_moments(pictures: Sequence[np.ndarray], moments: int) -> list[int]:
     return chosen
 
 
-def _thumbnail(picture: np.ndarray) -> np.ndarray:
+def _write_video(pictures: Iterator[_Picture], path: Path, fps: int) -> Path:
+    """Write an mp4 (H.264, 4:2:0) that any browser plays, whole or not at all."""
+    import imageio.v2 as imageio
+
+    first = next(pictures)
+    height, width = first.shape[:2]
+    options: Any = {
+        "codec": "libx264",
+        "pixelformat": "yuv420p",
+        "macro_block_size": 1,
+        "ffmpeg_log_level": "error",
+        "output_params": ["-crf", "23", "-movflags", "+faststart"],
+    }
+    with in_place(path) as unfinished:
+        writer: Any = imageio.get_writer(unfinished, "FFMPEG", mode="I", fps=fps, **options)
+        with writer:
+            for picture in chain([first], pictures):
+                # 4:2:0 colour needs even sizes: an odd last row or column is repeated.
+                even = ((0, height % 2), (0, width % 2), (0, 0))
+                writer.append_data(np.pad(picture, even, "edge"))
+    return path
+
+
+def _draw_strip(film: Sequence[_Picture], moments: int, fps: int) -> Figure:
+    """Draw key moments in rows of three, each with its time."""
+    from prior_reinforce.report.style import INK, drawing, new_figure
+
+    chosen = key_moments(film, moments)
+    height, width = film[0].shape[:2]
+    columns = min(_COLUMNS, len(chosen))
+    rows = -(-len(chosen) // columns)
+    size = _PANEL_WIDTH * columns, _PANEL_WIDTH * height / width * rows
+    with drawing():
+        figure = new_figure(*size, laid_out=False)
+        figure.subplots_adjust(0, 0, 1, 1, wspace=0.02, hspace=0.02 * width / height)
+        for k, i in enumerate(chosen, start=1):
+            axes = figure.add_subplot(rows, columns, k)
+            axes.set_axis_off()
+            axes.imshow(film[i], interpolation="lanczos", aspect="auto")
+            box = {"boxstyle": "round,pad=0.25", "facecolor": "white", "linewidth": 0}
+            time = f"{i / fps:.2f} s"
+            axes.text(0.035, 0.04, time, transform=axes.transAxes, fontsize=9, color=INK, bbox=box)
+    return figure
+
+
+def _thumbnail(picture: _Picture) -> _Thumbnail:
     """Shrink by a whole factor, averaging, to no less than the strip's width."""
     factor = max(1, picture.shape[1] // _THUMBNAIL_WIDTH)
     height, width = (side // factor * factor for side in picture.shape[:2])
@@ -193,14 +135,17 @@ def _thumbnail(picture: np.ndarray) -> np.ndarray:
     return np.asarray(blocks.mean(axis=(1, 3)).round(), dtype=np.uint8)
 
 
-def _check_picture(picture: np.ndarray, i: int, shape: tuple[int, ...]) -> None:
-    if picture.dtype != np.uint8 or picture.ndim != 3 or picture.shape[2] != 3:
-        raise ConfigurationError(
-            f"picture {i} of a film must be (height, width, 3) of uint8, got {picture.shape} of "
-            f"{picture.dtype}"
-        )
-    if shape and picture.shape != shape:
-        raise ConfigurationError(
-            f"picture {i} of a film has shape {picture.shape}, the first has {shape}; all must "
-            "be of one size"
-        )
+def _checked(pictures: Iterable[np.ndarray]) -> Iterator[_Picture]:
+    """The pictures of a film, at least one, each checked as it comes."""
+    shape: tuple[int, ...] = ()
+    for i, picture in enumerate(pictures):
+        colours = picture.ndim == 3 and picture.shape[2] == 3 and picture.dtype == np.uint8
+        if not colours or picture.shape != (shape or picture.shape):
+            raise ConfigurationError(
+                f"picture {i} of a film must be {shape or '(height, width, 3)'} of uint8, got "
+                f"{picture.shape} of {picture.dtype}; all must be of one size"
+            )
+        shape = picture.shape
+        yield picture
+    if not shape:
+        raise ConfigurationError("a film needs at least one picture, got none")

@@ -3,12 +3,8 @@
 from __future__ import annotations
 
 import base64
-import os
 from importlib import resources
 from pathlib import Path
-
-from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
-from markupsafe import Markup
 
 _PACKAGE = "prior_reinforce.report"
 _MIME_TYPES = {".png": "image/png", ".mp4": "video/mp4"}
@@ -22,9 +18,11 @@ def render(template: str, *, package: str = _PACKAGE, **context: object) -> str:
         package: Python package whose folder holds it.
         context: What the template names.
     """
-    loaders = [PackageLoader(name, ".") for name in dict.fromkeys([package, _PACKAGE])]
+    from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
+    from markupsafe import Markup
+
     environment = Environment(
-        loader=ChoiceLoader(loaders),
+        loader=ChoiceLoader([PackageLoader(name, ".") for name in (package, _PACKAGE)]),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
@@ -38,19 +36,3 @@ def data_uri(path: Path) -> str:
     """Return a PNG or mp4 as a `data:` address that carries the whole file."""
     encoded = base64.b64encode(path.read_bytes()).decode("ascii")
     return f"data:{_MIME_TYPES[path.suffix.lower()]};base64,{encoded}"
-
-
-def write_text(path: Path, text: str) -> Path:
-    """Write a file that appears only when complete.
-
-    Returns:
-        The path.
-    """
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(f".{path.name}.partial")
-    try:
-        partial.write_text(text, encoding="utf-8")
-        os.replace(partial, path)
-    finally:
-        partial.unlink(missing_ok=True)
-    return path

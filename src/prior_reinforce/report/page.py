@@ -1,64 +1,35 @@
-"""The report of adaptations: pictures drawn, numbers put into words, one page written."""
+"""The report of goals: pictures drawn, numbers put into words, one page written."""
 
 from __future__ import annotations
 
 import os
 import shutil
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
 from prior_reinforce.errors import ConfigurationError
-from prior_reinforce.report.curves import draw_errors, draw_plans
-from prior_reinforce.report.html import data_uri, render, write_text
-from prior_reinforce.report.pictures import draw_aims, draw_landings, draw_overview, draw_table
-from prior_reinforce.report.record import AdaptationRecord
-from prior_reinforce.report.style import save_png, trial_colour
+from prior_reinforce.files import write
+from prior_reinforce.report.html import data_uri, render
+from prior_reinforce.report.record import AdaptationRecord, Box
 from prior_reinforce.report.summary import (
-    TrialRow,
-    describe,
     headline,
-    knows_truth,
     outcome_line,
-    title_of,
+    say_goal,
+    say_tolerance,
+    titles,
     trial_rows,
 )
-from prior_reinforce.report.wording import say_length, say_place
+from prior_reinforce.wording import in_words
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 LARGEST_INLINE_VIDEO = 3_000_000
 """[bytes]; a larger film lies beside the page instead of inside it, so that the page opens fast."""
-
-
-@dataclass(frozen=True)
-class Picture:
-    """A picture on the page."""
-
-    source: str
-    alt: str
-    caption: str
-    wide: bool = False
-
-
-@dataclass(frozen=True)
-class GoalSection:
-    """All that the page shows of one goal."""
-
-    anchor: str
-    title: str
-    place: str
-    tolerance: str
-    outcome: str
-    reached: bool
-    rows: list[TrialRow]
-    colours: list[str]
-    pictures: list[Picture]
-    strip: str
-    video: str
-    film_caption: str
 
 
 def write_report(
@@ -76,8 +47,8 @@ def write_report(
             large to go into the page.
         adaptations: Goals in the order to be shown, at least one.
         title: Of the page.
-        facts: What made these results: generator, adapter, perception, seeds, version.
-        region: Reachable region of goals, lower and upper corner, shape (2, k).
+        facts: What made these results: generator with its remarks, adapter, perception, seeds.
+        region: Region of goals, lower and upper corner, shape (2, k).
 
     Returns:
         Path of the page.
@@ -85,115 +56,85 @@ def write_report(
     Raises:
         ConfigurationError: No adaptations, or a region of wrong shape.
     """
+    from prior_reinforce.report.pictures import draw_table
+
     if not adaptations:
         raise ConfigurationError("a report needs at least one adaptation, got none")
     box = None if region is None else np.array(region, dtype=float)
     for record in adaptations:
-        if box is not None and box.shape != (2, record.outcome_dim):
+        if box is not None and box.shape != (2, record.goal.size):
             raise ConfigurationError(
-                f"region must have shape (2, {record.outcome_dim}), lower and upper corner, got "
+                f"region must have shape (2, {record.goal.size}), lower and upper corner, got "
                 f"{box.shape}"
             )
     folder = Path(folder)
-    sections = [
-        _section(folder, record, number, box) for number, record in enumerate(adaptations, start=1)
-    ]
+    first = adaptations[0].demonstrations
+    one_table = len(adaptations) > 1 and all(r.demonstrations is first for r in adaptations)
     page = render(
         "page.html",
         title=title,
         headline=headline(adaptations),
-        overview=_overview(folder, adaptations, box),
-        sections=sections,
-        any_truth=any(knows_truth(record) for record in adaptations),
+        overview=_picture(draw_table(adaptations, box), folder / "overview.png")
+        if one_table
+        else None,
+        sections=[
+            _section(folder, record, f"goal-{number}", called, box)
+            for number, (record, called) in enumerate(
+                zip(adaptations, titles(adaptations), strict=True), start=1
+            )
+        ],
+        from_behind=first.outcome_dim > 1 and in_words(first.outcome_units),
+        any_truth=any(_knows_truth(record) for record in adaptations),
         facts=dict(facts or {}),
     )
-    return write_text(folder / "report.html", page)
-
-
-def _overview(
-    folder: Path, records: Sequence[AdaptationRecord], region: np.ndarray | None
-) -> Picture | None:
-    """Draw all goals on one table; None where they have no table in common."""
-    demonstrations = records[0].demonstrations
-    if len(records) == 1 or any(r.demonstrations is not demonstrations for r in records):
-        return None
-    return _picture(
-        draw_overview(records, region),
-        folder / "overview.png",
-        alt=" ".join(
-            f"{title_of(r, i)}: {outcome_line(r)}." for i, r in enumerate(records, start=1)
-        ),
-        caption="The table as seen from behind the robot. An arrow leads from each goal to where "
-        "a trial was seen to land.",
-    )
+    return write(folder / "report.html", page)
 
 
 def _section(
-    folder: Path, record: AdaptationRecord, number: int, region: np.ndarray | None
-) -> GoalSection:
-    title = title_of(record, number)
-    stem = f"goal-{number}"
-    story = describe(record)
-    truth = " Hollow marks: where it truly landed." if knows_truth(record) else ""
-    tolerance = say_length(record, record.tolerance)
-    pictures = [
-        _picture(
-            draw_table(record, region),
-            folder / f"{stem}-table.png",
-            alt=f"The whole table. {story}",
-            caption="The whole table, as seen from behind the robot.",
-        ),
-        _picture(
-            draw_landings(record),
-            folder / f"{stem}-landings.png",
-            alt=f"Close-up of the goal with all landing points. {story}",
-            caption="Close up: where each trial was seen to land. Arrows are the errors; the "
-            f"circle is {tolerance} around the goal.{truth}",
-        ),
-        _picture(
-            draw_aims(record),
-            folder / f"{stem}-aims.png",
-            alt="Where each trial was aimed. "
-            + " ".join(f"Trial {row.number}: {row.aim}." for row in trial_rows(record)),
-            caption="On the same scale: where each trial was aimed. This is the condition given "
-            "to the generator, moved after every trial.",
-        ),
-        _picture(
-            draw_errors(record),
-            folder / f"{stem}-errors.png",
-            alt="Distance from the goal by trial. "
-            + " ".join(f"Trial {row.number}: {row.off}." for row in trial_rows(record)),
-            caption="Distance from the goal, trial by trial.",
-        ),
-        _picture(
-            draw_plans(record),
-            folder / f"{stem}-plans.png",
-            alt=f"Plans of all trials over time, {record.demonstrations.action_dim} action "
-            f"dimensions: {', '.join(record.demonstrations.format.names)}.",
-            caption="The plans of all trials, over those demonstrated. Small changes of the whole "
-            "motion move the landing point.",
-            wide=True,
-        ),
-    ]
+    folder: Path, record: AdaptationRecord, stem: str, title: str, region: Box | None
+) -> Mapping[str, Any]:
+    """All that the page shows of one goal; see `page.html`."""
+    from prior_reinforce.report.curves import draw_errors, draw_plans
+    from prior_reinforce.report.pictures import draw_close_up, draw_table
+    from prior_reinforce.report.style import trial_colour
+
     n = len(record.trials)
-    return GoalSection(
-        anchor=stem,
-        title=title,
-        place=say_place(record, record.goal),
-        tolerance=tolerance,
-        outcome=outcome_line(record),
-        reached=record.trials_to_hit is not None,
-        rows=trial_rows(record),
-        colours=[trial_colour(i, n, hit=t.hit) for i, t in enumerate(record.trials)],
-        pictures=pictures,
-        strip="" if record.film is None else data_uri(record.film.strip),
-        video="" if record.film is None else _video(folder, record.film.video),
-        film_caption=record.film_caption,
-    )
+    figures = {
+        "table": draw_table([record], region),
+        "landings": draw_close_up(record),
+        "aims": draw_close_up(record, aims=True),
+        "errors": draw_errors(record),
+        "plans": draw_plans(record),
+    }
+    return {
+        "anchor": stem,
+        "title": title,
+        "place": say_goal(record),
+        "tolerance": say_tolerance(record),
+        "outcome": outcome_line(record),
+        "reached": record.trials_to_hit is not None,
+        "rows": trial_rows(record),
+        "colours": [trial_colour(i, n, hit=trial.hit) for i, trial in enumerate(record.trials)],
+        "joints": record.demonstrations.format.names,
+        "knows_truth": _knows_truth(record),
+        "strip": record.film and data_uri(record.film.strip),
+        "video": record.film and _video(folder, record.film.video),
+        "film_caption": record.film_caption,
+        **{
+            name: _picture(figure, folder / f"{stem}-{name}.png")
+            for name, figure in figures.items()
+        },
+    }
 
 
-def _picture(figure: Figure, path: Path, *, alt: str, caption: str, wide: bool = False) -> Picture:
-    return Picture(data_uri(save_png(figure, path)), alt, caption, wide)
+def _picture(figure: Figure, path: Path) -> Mapping[str, Any]:
+    from prior_reinforce.report.style import save_png
+
+    return {"source": data_uri(save_png(figure, path)), "wide": figure.get_figwidth() > 6}
+
+
+def _knows_truth(record: AdaptationRecord) -> bool:
+    return any(outcome is not None for outcome in record.true_outcomes)
 
 
 def _video(folder: Path, video: Path) -> str:

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
-from matplotlib.artist import Artist
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle, FancyArrowPatch, Rectangle
+from matplotlib.legend_handler import HandlerTuple
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 
-from prior_reinforce.report.badges import draw_badges
-from prior_reinforce.report.record import AdaptationRecord
+from prior_reinforce.arrays import Point
+from prior_reinforce.report.panels import Panel, views_of
+from prior_reinforce.report.record import AdaptationRecord, Box
 from prior_reinforce.report.style import (
     DEMONSTRATION,
     GOAL,
+    HIT,
     INK_SOFT,
     LINE,
     REGION,
@@ -22,237 +25,124 @@ from prior_reinforce.report.style import (
     new_figure,
     trial_colour,
 )
-from prior_reinforce.report.views import View, extent_of, prepare_axes, shown, views_of
+from prior_reinforce.report.summary import say_tolerance
 
 _WIDTH, _HEIGHT = 5.4, 4.5  # [inch], one of two beside each other on a page
-_LABELS = (0.65, 0.6)  # [inch], what labels take of a panel's width and height
-_SHORT_ARROW = 16.0  # [points]; below this a head hides more than it says
-_LEGEND = 0.3  # [inch], what a legend takes of its height
+_LABELS = (0.7, 0.72)  # [inch], what labels take of a panel's width and height
+_LEGEND = 0.5  # [inch], what a legend takes of a figure's height
+_LEAST_HEIGHT = 1.6  # [inch], of a panel inside its labels
+_ROW = 0.45  # [inch], of a trial where k = 1
 
 
 @drawing()
-def draw_table(record: AdaptationRecord, region: np.ndarray | None = None) -> Figure:
-    """Draw the whole table from above: region, demonstrations, goal, landings as seen.
+def draw_table(records: Sequence[AdaptationRecord], region: Box | None = None) -> Figure:
+    """Draw the whole table: demonstrations, goals, and what was seen of every trial.
 
     Args:
-        record: The goal and its trials.
-        region: Reachable region of goals, lower and upper corner, shape (2, k), or None.
+        records: Goals of one set of demonstrations. The trials of a single one are numbered; of
+            several, the goals are named.
+        region: Region of goals, or None.
     """
-    return draw_overview([record], region, numbered_trials=True)
-
-
-@drawing()
-def draw_overview(
-    records: Sequence[AdaptationRecord],
-    region: np.ndarray | None = None,
-    *,
-    numbered_trials: bool = False,
-) -> Figure:
-    """Draw all goals on one table, with what was seen of every trial.
-
-    Args:
-        records: Goals of one set of demonstrations, at least one.
-        region: Reachable region of goals, lower and upper corner, shape (2, k), or None.
-        numbered_trials: Number the trials of the only goal, instead of numbering the goals.
-    """
-    first = records[0]
-    demonstrated = shown(first, first.demonstrations.outcomes_seen)
-    box = None if region is None else shown(first, region)
-    everything = [demonstrated, *([] if box is None else [box])]
+    first, single = records[0], len(records) == 1
+    legend = _legend(first)
+    seen = [*first.demonstrations.outcomes_seen]
+    if region is not None:
+        legend["region of goals"] = Patch(facecolor=REGION, edgecolor=LINE)
+        seen += [*region]
     for record in records:
-        everything += [shown(record, record.goal), *_landings(record)[1]]
-    least = 4 * shown(first, np.array(first.tolerance))
-    extent = extent_of(everything, 0.06, float(least))
-    figure = new_figure(_WIDTH * len(views_of(first)), _HEIGHT)
-    n_rows = 1 + max(len(record.trials) if numbered_trials else 1 for record in records)
-    for axes, view in _panels(figure, first, extent, n_rows, with_legend=True):
-        if box is not None:
-            corners = view.project(box)
-            low, size = corners[0], corners[1] - corners[0]
-            if view.vertical is None:
-                low, size = np.array([low[0], -n_rows + 0.4]), np.array([size[0], n_rows + 0.4])
-            axes.add_patch(Rectangle(tuple(low), *size, facecolor=REGION, edgecolor=LINE, zorder=0))
-        _draw_demonstrations(axes, view, demonstrated)
-        _draw_legend(axes, box is not None)
+        seen += [record.goal, *(point for point in record.landings if point is not None)]
+    n_rows = 1 + len(first.trials) if single else 2
+    figure, panels = _panels(first, seen, margin=0.06, least=4, n_rows=n_rows, legend=legend)
+    for panel in panels:
+        if region is not None:
+            panel.draw_region(region)
+        panel.draw_demonstrations()
         for record in records:
-            _draw_goal(axes, view, record)
-            _draw_landings(figure, axes, view, record, badges=numbered_trials, with_truth=False)
-        if not numbered_trials:
-            goals = view.project(np.stack([shown(r, r.goal) for r in records]), 1.0)
-            labels = [str(i + 1) for i in range(len(records))]
-            draw_badges(
-                figure, axes, goals, labels, [GOAL] * len(records), away_from=goals.mean(axis=0)
-            )
+            panel.draw_goal(record)
+            panel.draw_trials(record, numbered=single)
+        if not single:
+            panel.name_goals(records)
     return figure
 
 
 @drawing()
-def draw_landings(record: AdaptationRecord) -> Figure:
-    """Draw close up where each trial was seen to land, with its error as an arrow from the goal."""
-    figure = new_figure(_WIDTH * len(views_of(record)), _HEIGHT)
-    for axes, view in _panels(figure, record, _close_extent(record), 1 + len(record.trials)):
-        _draw_demonstrations(axes, view, shown(record, record.demonstrations.outcomes_seen))
-        _draw_goal(axes, view, record)
-        _draw_landings(figure, axes, view, record, badges=True, with_truth=True)
-    return figure
-
-
-@drawing()
-def draw_aims(record: AdaptationRecord) -> Figure:
-    """Draw on the same scale where each trial was aimed: the way of the condition."""
-    figure = new_figure(_WIDTH * len(views_of(record)), _HEIGHT)
-    n = len(record.trials)
-    conditions = np.array([shown(record, t.condition) for t in record.trials]).reshape(
-        n, record.outcome_dim
-    )
-    for axes, view in _panels(figure, record, _close_extent(record), 1 + n):
-        _draw_demonstrations(axes, view, shown(record, record.demonstrations.outcomes_seen))
-        _draw_goal(axes, view, record)
-        places = view.project(conditions, np.arange(1, n + 1))
-        colours = [trial_colour(i, n, hit=t.hit) for i, t in enumerate(record.trials)]
-        for i in range(1, n):
-            _draw_arrow(axes, places[i - 1], places[i], colours[i], dashed=True)
-        for (x, y), colour in zip(places, colours, strict=True):
-            axes.plot(x, y, "s", color=colour, markersize=5.5, markeredgecolor="white", zorder=6)
-        labels = [str(t.number) for t in record.trials]
-        goal = view.project(shown(record, record.goal), 1.0)
-        draw_badges(figure, axes, places, labels, colours, away_from=goal)
+def draw_close_up(record: AdaptationRecord, *, aims: bool = False) -> Figure:
+    """Draw where each trial was seen to land, or, on the same scale, where it was aimed."""
+    seen = [record.goal, *(point for point in record.landings if point is not None)]
+    seen += [trial.condition for trial in record.trials]
+    n_rows = 1 + len(record.trials)
+    figure, panels = _panels(record, seen, margin=0.14, least=3, n_rows=n_rows)
+    for panel in panels:
+        panel.draw_demonstrations()
+        panel.draw_goal(record)
+        panel.draw_trials(record, aims=aims, with_truth=not aims)
     return figure
 
 
 def _panels(
-    figure: Figure,
     record: AdaptationRecord,
-    extent: np.ndarray,
+    seen: Sequence[Point],
+    *,
+    margin: float,
+    least: float,
     n_rows: int,
-    *,
-    with_legend: bool = False,
-) -> list[tuple[Axes, View]]:
-    views = views_of(record)
-    height = figure.get_figheight() - _LABELS[1] - (_LEGEND if with_legend else 0.0)
-    ratio = (figure.get_figwidth() / len(views) - _LABELS[0]) / height
-    panels = list(zip(figure.subplots(1, len(views), squeeze=False)[0], views, strict=True))
-    for axes, view in panels:
-        prepare_axes(axes, view, record, extent, ratio=ratio, n_rows=n_rows)
-    return panels
+    legend: Mapping[str, Any] | None = None,
+) -> tuple[Figure, list[Panel]]:
+    """Make a figure with one panel a view, laid out and ready to be drawn in.
 
-
-def _close_extent(record: AdaptationRecord) -> np.ndarray:
-    points = [shown(record, record.goal), *_landings(record)[1]]
-    points += [shown(record, trial.condition) for trial in record.trials]
-    least = 3 * float(shown(record, np.array(record.tolerance)))
-    return extent_of(points, 0.14, least)
-
-
-def _landings(record: AdaptationRecord) -> tuple[list[int], list[np.ndarray]]:
-    """Places in the list of trials that landed somewhere, and where, in the unit shown."""
-    told = [(i, r) for i, r in enumerate(record.landings) if r is not None]
-    return [i for i, _ in told], [shown(record, r) for _, r in told]
-
-
-def _draw_demonstrations(axes: Axes, view: View, outcomes: np.ndarray) -> None:
-    places = view.project(outcomes)
-    axes.plot(*places.T, "D", markersize=5, color=DEMONSTRATION, zorder=3)
-
-
-def _draw_goal(axes: Axes, view: View, record: AdaptationRecord) -> None:
-    goal = view.project(shown(record, record.goal))
-    radius = float(shown(record, np.array(record.tolerance)))
-    if view.vertical is None:
-        axes.axvspan(goal[0] - radius, goal[0] + radius, color=GOAL, alpha=0.13, linewidth=0)
-        axes.axvline(goal[0], color=GOAL, linewidth=1.6, zorder=2)
-        return
-    axes.add_patch(Circle(tuple(goal), radius, facecolor=GOAL, alpha=0.13, zorder=1))
-    axes.add_patch(
-        Circle(tuple(goal), radius, facecolor="none", edgecolor=GOAL, linewidth=1.6, zorder=4)
-    )
-    axes.plot(*goal, "+", color=GOAL, markersize=7, markeredgewidth=1.6, zorder=4)
-
-
-def _draw_landings(
-    figure: Figure,
-    axes: Axes,
-    view: View,
-    record: AdaptationRecord,
-    *,
-    badges: bool,
-    with_truth: bool,
-) -> None:
-    order, landings = _landings(record)
-    if not landings:
-        return
-    n = len(record.trials)
-    rows = np.array(order) + 1.0 if badges else np.ones(len(order))
-    places = view.project(np.array(landings), rows)
-    goals = view.project(
-        np.broadcast_to(shown(record, record.goal), (len(order), record.outcome_dim)), rows
-    )
-    colours = [trial_colour(i, n, hit=record.trials[i].hit) for i in order]
-    true_places: list[np.ndarray] = []
-    for i, place, goal, row, colour in zip(order, places, goals, rows, colours, strict=True):
-        _draw_arrow(axes, goal, place, colour)
-        axes.plot(*place, "o", color=colour, markersize=6.5, markeredgecolor="white", zorder=6)
-        truth = record.true_outcomes[i]
-        if with_truth and truth is not None:
-            true_place = view.project(shown(record, truth), row)
-            true_places.append(true_place)
-            axes.plot(*np.stack([place, true_place]).T, ":", color=INK_SOFT, linewidth=1, zorder=5)
-            axes.plot(
-                *true_place,
-                "o",
-                markersize=5.5,
-                markerfacecolor="white",
-                zorder=5,
-                markeredgecolor=INK_SOFT,
-                markeredgewidth=1.0,
-            )
-    if badges:
-        labels = [str(record.trials[i].number) for i in order]
-        avoid = np.array(true_places).reshape(-1, 2)
-        draw_badges(figure, axes, places, labels, colours, away_from=goals[0], avoid=avoid)
-
-
-def _draw_arrow(
-    axes: Axes, start: np.ndarray, end: np.ndarray, colour: str, *, dashed: bool = False
-) -> None:
-    paper = axes.transData.transform(np.stack([start, end])) * 72 / axes.figure.dpi
-    short = np.linalg.norm(paper[1] - paper[0]) < _SHORT_ARROW
-    axes.add_patch(
-        FancyArrowPatch(
-            tuple(start),
-            tuple(end),
-            arrowstyle="-" if short else "-|>",
-            mutation_scale=9,
-            shrinkA=0,
-            shrinkB=3.5,
-            color=colour,
-            linewidth=1.5,
-            linestyle=(0, (2, 1.5)) if dashed else "-",
-            zorder=5,
-        )
-    )
-
-
-def _draw_legend(axes: Axes, with_region: bool) -> None:
-    """Say what the marks are, below the picture."""
-    marks: list[Artist] = [
-        axes.plot([], [], "o", color=GOAL, markerfacecolor="none", label="goal")[0],
-        axes.plot([], [], "D", color=DEMONSTRATION, markersize=5, label="demonstration, as seen")[
-            0
-        ],
-        axes.plot([], [], "o", color=trial_colour(0, 1), markersize=5, label="trial")[0],
-        axes.plot([], [], "o", color=trial_colour(0, 1, hit=True), markersize=5, label="hit")[0],
+    Args:
+        record: Names and units of the components, and the demonstrations.
+        seen: All that must be seen.
+        margin: Share of its size that is left free on each side.
+        least: Least half size, in tolerances.
+        n_rows: Rows of a line.
+        legend: Marks by what they mean; with them, the figure is only as high as what is seen.
+    """
+    views = views_of(record.demonstrations.outcome_units)
+    points = np.stack(seen) * record.scale
+    middle = (points.min(axis=0) + points.max(axis=0)) / 2
+    half = np.ptp(points, axis=0) * (0.5 + margin)
+    half = np.maximum(half, least * record.tolerance * record.scale)
+    around = _LABELS[1] + (_LEGEND if legend else 0)
+    wanted = _HEIGHT
+    if views[0].up is None:
+        wanted = _ROW * (n_rows + 1)
+    elif legend and record.unit():
+        wanted = (_WIDTH - _LABELS[0]) * max(half[view.up] / half[view.across] for view in views)
+    height = np.clip(wanted, _LEAST_HEIGHT, _HEIGHT - around) + around
+    figure = new_figure(_WIDTH * len(views), height)
+    panels = [
+        Panel(axes, view, record, np.stack([middle - half, middle + half]), n_rows)
+        for axes, view in zip(figure.subplots(1, len(views), squeeze=False)[0], views, strict=True)
     ]
-    if with_region:
-        marks.append(Rectangle((0, 0), 1, 1, facecolor=REGION, edgecolor=LINE, label="reachable"))
-    axes.legend(
-        handles=marks,
-        loc="lower center",
-        bbox_to_anchor=(0.5, 1.0),
-        ncols=len(marks),
-        frameon=False,
-        fontsize=9,
-        labelcolor=INK_SOFT,
-        handletextpad=0.3,
-        columnspacing=1.2,
-    )
+    if legend:
+        figure.legend(
+            list(legend.values()),
+            list(legend),
+            handler_map={tuple: HandlerTuple(ndivide=None)},
+            loc="outside upper center",
+            ncols=3,
+            frameon=False,
+            fontsize=9,
+            labelcolor=INK_SOFT,
+        )
+    # Laid out now and never again, so that data coordinates have their place on paper.
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")
+    for panel in panels:
+        panel.equalise()
+    return figure, panels
+
+
+def _legend(record: AdaptationRecord) -> dict[str, Any]:
+    """Marks by what they mean; a tuple of marks stands side by side."""
+
+    def mark(colour: str, marker: str = "o", **more: Any) -> Line2D:
+        return Line2D([], [], linestyle="", marker=marker, markersize=5, color=colour, **more)
+
+    return {
+        f"goal ± {say_tolerance(record)}": mark(GOAL, markerfacecolor="none"),
+        "demonstrations": mark(DEMONSTRATION, "D"),
+        "misses, first to last": tuple(mark(trial_colour(i, 3)) for i in range(3)),
+        "hits": mark(HIT),
+    }

@@ -9,15 +9,28 @@ Notation (docs/notation.md):
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
+from jaxtyping import Float
 
-from prior_reinforce.errors import ConfigurationError, InvalidGoalError
+from prior_reinforce.arrays import Point, as_goal
+from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.plans.motions import Demonstrations
-from prior_reinforce.report.film import Film
-from prior_reinforce.session import Session
 from prior_reinforce.trials import Stage, Trial
-from prior_reinforce.wording import WORDS
+
+Box = Float[np.ndarray, "2 k"]
+"""Lower and upper corner of a region of outcomes."""
+
+
+@dataclass(frozen=True)
+class Film:
+    """Where a film lies on disk."""
+
+    video: Path
+    """The mp4."""
+    strip: Path
+    """PNG of its key moments."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,133 +39,77 @@ class AdaptationRecord:
 
     demonstrations: Demonstrations
     """D_prior, what the generator was fitted to."""
-    goal: np.ndarray
-    """g tilde, shape (k,), in the outcomes' units."""
+    goal: Point
+    """g tilde, in the outcomes' units."""
     tolerance: float
     """epsilon, in the same units."""
     trials: tuple[Trial, ...]
-    """All trials in order, voided and pending ones too."""
+    """All trials in order, voided and open ones too; one without a plan is not drawn over time."""
     title: str = ""
     """What to call this goal; `Goal 1`, `Goal 2`, ... where empty."""
-    outcomes: tuple[np.ndarray | None, ...] | None = None
-    """True outcome of each trial, shape (k,), where known; None as a whole on a real arm."""
+    outcomes: tuple[Point | None, ...] | None = None
+    """True outcome of each trial where known; None as a whole on a real arm."""
     film: Film | None = None
     """Film of a trial, usually of the one that reached the goal."""
     film_caption: str = ""
     """What the film shows; or, without a film, the one line that says why there is none."""
 
     def __post_init__(self) -> None:
-        """Copy the arrays and check that everything fits together.
+        """Check that everything fits together.
 
         Raises:
             InvalidGoalError: The goal has a wrong shape, or is not finite.
-            ConfigurationError: As many outcomes as trials are needed, each of shape (k,).
+            ConfigurationError: There are not as many outcomes as trials.
         """
-        goal = np.array(self.goal, dtype=float)
-        if goal.shape != (self.outcome_dim,) or not np.all(np.isfinite(goal)):
-            raise InvalidGoalError(
-                f"a goal must be {self.outcome_dim} finite numbers, as the demonstrations' "
-                f"outcomes, got {goal.tolist()}"
-            )
-        object.__setattr__(self, "goal", goal)
-        object.__setattr__(self, "trials", tuple(self.trials))
-        if self.outcomes is None:
-            return
-        outcomes = tuple(None if r is None else np.array(r, dtype=float) for r in self.outcomes)
-        if len(outcomes) != len(self.trials):
+        object.__setattr__(self, "goal", as_goal(self.goal, self.demonstrations.outcome_names))
+        if self.outcomes is not None and len(self.outcomes) != len(self.trials):
             raise ConfigurationError(
-                f"{len(self.trials)} trials need as many true outcomes, got {len(outcomes)}; "
+                f"{len(self.trials)} trials need as many true outcomes, got {len(self.outcomes)}; "
                 "give None where one is not known"
             )
-        for trial, outcome in zip(self.trials, outcomes, strict=True):
-            if outcome is None:
-                continue
-            if outcome.shape != goal.shape or not np.all(np.isfinite(outcome)):
-                raise ConfigurationError(
-                    f"true outcome of trial {trial.number} must be {goal.size} finite numbers, "
-                    f"got {outcome.tolist()}; give None where it is not known"
-                )
-        object.__setattr__(self, "outcomes", outcomes)
-
-    @classmethod
-    def from_session(
-        cls,
-        session: Session,
-        *,
-        title: str = "",
-        outcomes: tuple[np.ndarray | None, ...] | None = None,
-        film: Film | None = None,
-        film_caption: str = "",
-    ) -> AdaptationRecord:
-        """Take down how a session stands now."""
-        return cls(
-            demonstrations=session.demonstrations,
-            goal=session.goal,
-            tolerance=session.tolerance,
-            trials=session.trials,
-            title=title,
-            outcomes=outcomes,
-            film=film,
-            film_caption=film_caption,
-        )
 
     @property
-    def outcome_dim(self) -> int:
-        """k, the number of components of an outcome."""
-        return self.demonstrations.outcome_dim
+    def told(self) -> tuple[Trial, ...]:
+        """The trials that count; voided ones do not (paper, Evaluation Protocol)."""
+        return tuple(trial for trial in self.trials if trial.stage is Stage.TOLD)
 
     @property
-    def in_metres(self) -> bool:
-        """Whether all components are lengths, so that centimetres can be shown."""
-        return all(unit == "m" for unit in self.demonstrations.outcome_units)
+    def trials_to_hit(self) -> int | None:
+        """Stage-2 trials up to and with the first hit; None while the goal is not reached."""
+        return next((n for n, trial in enumerate(self.told, start=1) if trial.hit), None)
 
     @property
-    def in_words(self) -> bool:
-        """Whether the words of `feedback` (long, left, high) describe these outcomes."""
-        return self.in_metres and self.outcome_dim <= len(WORDS)
-
-    @property
-    def landings(self) -> tuple[np.ndarray | None, ...]:
-        """Perceived outcome r tilde of each trial, shape (k,); None unless told.
+    def landings(self) -> tuple[Point | None, ...]:
+        """Perceived outcome r tilde of each trial; None unless told.
 
         A hit that a coarse eye called further off than the tolerance was within it all the same,
         and is put at its edge.
         """
-        return tuple(
-            None if trial.error_seen is None else self.goal + self._error_drawn(trial)
-            for trial in self.trials
-        )
-
-    def _error_drawn(self, trial: Trial) -> np.ndarray:
-        error = np.asarray(trial.error_seen)
-        distance = np.linalg.norm(error)
-        if not trial.hit or distance <= self.tolerance:
-            return error
-        return error * (self.tolerance / distance)
+        return tuple(self._landing(trial) for trial in self.trials)
 
     @property
-    def true_outcomes(self) -> tuple[np.ndarray | None, ...]:
-        """True outcome of each trial that counts, shape (k,); None where not known or voided."""
-        if self.outcomes is None:
-            return (None,) * len(self.trials)
+    def true_outcomes(self) -> tuple[Point | None, ...]:
+        """True outcome of each trial that counts; None where not known or not told."""
+        outcomes = self.outcomes or (None,) * len(self.trials)
         return tuple(
             outcome if trial.stage is Stage.TOLD else None
-            for trial, outcome in zip(self.trials, self.outcomes, strict=True)
+            for trial, outcome in zip(self.trials, outcomes, strict=True)
         )
 
     @property
-    def trials_to_hit(self) -> int | None:
-        """Stage-2 trials up to and with the first hit; None while the goal is not reached.
+    def scale(self) -> float:
+        """Number that turns the outcomes' unit into the one drawn: metres become centimetres."""
+        return 100.0 if set(self.demonstrations.outcome_units) == {"m"} else 1.0
 
-        Voided trials are not counted (paper, Evaluation Protocol: N counts trials to first reach).
-        """
-        told = [trial for trial in self.trials if trial.stage is Stage.TOLD]
-        for count, trial in enumerate(told, start=1):
-            if trial.hit:
-                return count
-        return None
+    def unit(self, *components: int) -> str:
+        """Unit drawn for some components, or for distances over all; empty where they differ."""
+        units = self.demonstrations.outcome_units
+        drawn = {units[i] for i in components or range(len(units))}
+        return "cm" if self.scale == 100 else drawn.pop() if len(drawn) == 1 else ""
 
-    @property
-    def n_told(self) -> int:
-        """Trials that count so far."""
-        return sum(trial.stage is Stage.TOLD for trial in self.trials)
+    def _landing(self, trial: Trial) -> Point | None:
+        if trial.error_seen is None:
+            return None
+        distance = float(np.linalg.norm(trial.error_seen))
+        share = self.tolerance / distance if trial.hit and distance > self.tolerance else 1.0
+        return self.goal + share * trial.error_seen

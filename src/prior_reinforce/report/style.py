@@ -7,7 +7,6 @@ nothing is said by colour alone.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -18,6 +17,8 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_hex, to_rgb
 from matplotlib.figure import Figure
+
+from prior_reinforce.files import in_place
 
 INK = "#1f2933"
 INK_SOFT = "#616e7c"
@@ -61,7 +62,7 @@ def trial_colour(position: int, n: int, *, hit: bool = False) -> str:
 def text_on(colour: str) -> str:
     """Ink or white, whichever is easier to read on a colour."""
     red, green, blue = to_rgb(colour)
-    return INK if 0.299 * red + 0.587 * green + 0.114 * blue > 0.6 else "white"
+    return INK if 0.299 * red + 0.587 * green + 0.114 * blue > 0.55 else "white"
 
 
 def new_figure(width: float, height: float, *, laid_out: bool = True) -> Figure:
@@ -93,18 +94,11 @@ def calm_axes(axes: Axes, *, grid: bool = True) -> None:
 
 
 def save_png(figure: Figure, path: Path) -> Path:
-    """Write a PNG; the same figure gives the same bytes, and the file appears only when complete.
+    """Write a PNG, whole or not at all; the same figure gives the same bytes.
 
     Returns:
         The path.
     """
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(f".{path.name}.partial")
-    try:
-        with drawing():
-            figure.savefig(partial, format="png", dpi=PICTURE_DPI, metadata={"Software": None})
-        os.replace(partial, path)
-    finally:
-        partial.unlink(missing_ok=True)
+    with drawing(), in_place(path) as unfinished:
+        figure.savefig(unfinished, format="png", dpi=PICTURE_DPI, metadata={"Software": None})
     return path

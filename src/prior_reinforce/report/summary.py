@@ -8,8 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from prior_reinforce.report.record import AdaptationRecord
-from prior_reinforce.report.wording import say_aim, say_error, say_length, say_place
 from prior_reinforce.trials import Stage, Trial
+from prior_reinforce.wording import in_words, say_error, say_length, say_place, to_words
+
+_OPEN = {
+    Stage.ASKED: "not executed yet",
+    Stage.EXECUTING: "executing",
+    Stage.EXECUTED: "executed, not told yet",
+}
 
 
 @dataclass(frozen=True)
@@ -18,7 +24,7 @@ class TrialRow:
 
     number: int
     state: str
-    """`hit`, `miss`, `voided` or `pending`."""
+    """`hit`, `miss`, `voided` or `open`."""
     aim: str
     seen: str
     off: str
@@ -39,34 +45,28 @@ class Headline:
     explanation: str
 
 
-def title_of(record: AdaptationRecord, number: int) -> str:
-    """Return the goal's title."""
-    return record.title or f"Goal {number}"
-
-
 def headline(records: Sequence[AdaptationRecord]) -> Headline:
     """Say how many goals were reached, and at what cost.
 
     N counts demonstrations plus the mean of the Stage-2 trials until each goal was first reached
     (paper, Evaluation Protocol), over the goals that were reached.
     """
+    several = len(records) > 1
     counts = [c for c in (record.trials_to_hit for record in records) if c is not None]
-    demonstrated = {record.demonstrations.n for record in records}
-    tolerances = list(dict.fromkeys(say_length(r, r.tolerance) for r in records))
-    if len(records) == 1:
-        text = "Goal reached" if counts else "Goal not reached yet"
-    else:
+    text = "Goal reached" if counts else "Goal not reached yet"
+    if several:
         text = f"{len(counts)} of {len(records)} goals reached"
+    tolerances = dict.fromkeys(say_tolerance(record) for record in records)
     within = f"A goal counts as reached within {' or '.join(tolerances)}."
     if not counts:
-        tried = sum(record.n_told for record in records)
+        tried = sum(len(record.told) for record in records)
         return Headline(text, "", f"{_trials(tried)} so far. {within}")
+    demonstrated = {record.demonstrations.n for record in records}
     if len(demonstrated) > 1:
         return Headline(text, "", within)
-    n = demonstrated.pop()
-    mean = float(np.mean(counts))
-    count = f"N = {n} + {mean:.1f} trials" if len(records) > 1 else f"N = {n} + {counts[0]} trials"
-    if len(records) == 1:
+    n, mean = demonstrated.pop(), float(np.mean(counts))
+    count = f"N = {n} + {mean:.1f} trials" if several else f"N = {n} + {counts[0]} trials"
+    if not several:
         spent = f"{_trials(counts[0])} on the arm to reach the goal"
     elif min(counts) == max(counts):
         spent = f"{_trials(counts[0])} to reach each goal"
@@ -80,12 +80,17 @@ def headline(records: Sequence[AdaptationRecord]) -> Headline:
     return Headline(text, count, f"{n} demonstrations, then {spent}.{left_out} {within}")
 
 
+def titles(records: Sequence[AdaptationRecord]) -> list[str]:
+    """What the goals are called."""
+    return [record.title or f"Goal {number}" for number, record in enumerate(records, start=1)]
+
+
 def outcome_line(record: AdaptationRecord) -> str:
     """Say in one line how it went for one goal."""
     count = record.trials_to_hit
     if count is not None:
         return f"reached in {_trials(count)}"
-    return f"not reached in {_trials(record.n_told)}" if record.n_told else "not tried yet"
+    return f"not reached in {_trials(len(record.told))}" if record.told else "not tried yet"
 
 
 def trial_rows(record: AdaptationRecord) -> list[TrialRow]:
@@ -93,44 +98,43 @@ def trial_rows(record: AdaptationRecord) -> list[TrialRow]:
     return [_row(record, i, trial) for i, trial in enumerate(record.trials)]
 
 
-def knows_truth(record: AdaptationRecord) -> bool:
-    """Whether any true outcome is known."""
-    return any(outcome is not None for outcome in record.true_outcomes)
+def say_goal(record: AdaptationRecord) -> str:
+    """Say where the goal is."""
+    demonstrations = record.demonstrations
+    return say_place(record.goal, demonstrations.outcome_names, demonstrations.outcome_units)
 
 
-def describe(record: AdaptationRecord) -> str:
-    """Say the goal and all trials in a sentence, for readers who do not see the pictures."""
-    parts = [f"Goal at {say_place(record, record.goal)}."]
-    parts += [f"Trial {row.number}: {row.seen}." for row in trial_rows(record)]
-    return " ".join(parts)
+def say_tolerance(record: AdaptationRecord) -> str:
+    """Say how near counts as reached."""
+    return say_length(record.tolerance, record.demonstrations.outcome_units)
 
 
 def _row(record: AdaptationRecord, i: int, trial: Trial) -> TrialRow:
-    aim = say_aim(record, trial.condition)
+    names, units = record.demonstrations.outcome_names, record.demonstrations.outcome_units
+    aim = say_place(trial.condition, names, units)
+    if in_words(units):
+        aim = to_words(trial.condition - record.goal).replace("on the goal", "at the goal")
     if trial.error_seen is None:
-        voided = trial.stage is Stage.VOIDED
-        note = f"voided: {trial.note}" if trial.note else "voided"
-        seen, result = (note, "not counted") if voided else ("not executed yet", "pending")
-        return TrialRow(trial.number, trial.stage.value, aim, seen, "–", "", result)
-    off = float(np.linalg.norm(trial.error_seen))
+        if trial.stage is Stage.VOIDED:
+            seen, state, result = "voided", "voided", "not counted"
+            seen += f": {trial.note}" if trial.note else ""
+        else:
+            seen, state, result = _OPEN[trial.stage], "open", "open"
+        return TrialRow(trial.number, state, aim, seen, "–", "", result)
     truth = record.true_outcomes[i]
     truly_off = None if truth is None else float(np.linalg.norm(truth - record.goal))
+    result = "hit" if trial.hit else "miss"
+    # The truth, once known, is admitted where it disagrees.
+    disagrees = truly_off is not None and (truly_off <= record.tolerance) != trial.hit
     return TrialRow(
-        number=trial.number,
-        state="hit" if trial.hit else "miss",
+        trial.number,
+        state=result,
         aim=aim,
-        seen=say_error(record, trial.error_seen),
-        off=say_length(record, off),
-        truly_off="" if truly_off is None else say_length(record, truly_off),
-        result=_result(record, trial.hit, truly_off),
+        seen=say_error(trial.error_seen, names, units),
+        off=say_length(float(np.linalg.norm(trial.error_seen)), units),
+        truly_off="" if truly_off is None else say_length(truly_off, units),
+        result=f"taken for a {result}" if disagrees else result,
     )
-
-
-def _result(record: AdaptationRecord, hit: bool, truly_off: float | None) -> str:
-    """Say hit or miss, and admit where the truth, once known, disagrees."""
-    if truly_off is None or (truly_off <= record.tolerance) == hit:
-        return "hit" if hit else "miss"
-    return "taken for a hit" if hit else "taken for a miss"
 
 
 def _trials(n: int) -> str:

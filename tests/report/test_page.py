@@ -1,18 +1,25 @@
 """The page: whole in one file, numbers as told, nothing of the outside world."""
 
 import re
+import subprocess
+import sys
 from dataclasses import replace
 from html.parser import HTMLParser
 
 import numpy as np
 import pytest
 from PIL import Image
-from swing_world import FullStep, adaptation, demonstrations, pictures
 
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.report import page, record_film, write_report
 from prior_reinforce.report.style import PICTURE_DPI
+from tests.report.swing_world import FullStep, adaptation, demonstrations, pictures
 
+FACTS = {
+    "Seeds": "training 0, goals 1",
+    "Made by": "a <b>generator</b> & $x$",
+    "Remarks": "demonstration 3 never rests, so start times are not learned",
+}
 REGION = [[0.80, -0.32], [1.08, 0.32]]
 _VOID_TAGS = {"meta", "img", "br", "link", "input", "hr"}
 
@@ -68,8 +75,7 @@ def records(tmp_path_factory):
 @pytest.fixture(scope="module")
 def report(records, tmp_path_factory):
     folder = tmp_path_factory.mktemp("report")
-    facts = {"Seeds": "training 0, goals 1", "Made by": "a <b>generator</b> & $x$"}
-    path = write_report(folder, records, title="Two & two", facts=facts, region=REGION)
+    path = write_report(folder, records, title="Two & two", facts=FACTS, region=REGION)
     return path, read(path)
 
 
@@ -86,11 +92,12 @@ def test_numbers_appear_as_told(report, records):
     counts = [r.trials_to_hit for r in records]
     assert "2 of 2 goals reached" in words
     assert f"N = 6 + {np.mean(counts):.1f} trials" in words
-    assert "92 cm ahead, 10 cm to the left" in words
-    assert "100 cm ahead, 22 cm to the right" in words
+    assert "92 cm ahead, 10 cm left" in words
+    assert "100 cm ahead, 22 cm right" in words
     assert "voided: ball slipped" in words
     assert "No film: this machine has no OpenGL." in words
     assert "training 0, goals 1" in words
+    assert "Remarks demonstration 3 never rests, so start times are not learned" in words
     first = records[0].trials[0]
     long, left = first.error_seen * 100
     said = f"{abs(long):g} cm {'long' if long > 0 else 'short'}"
@@ -118,19 +125,21 @@ def test_every_picture_says_what_it_shows(report):
 
 def test_pictures_lie_beside_the_page_at_print_size(report):
     folder = report[0].parent
-    for name in ("table", "landings", "aims", "errors"):
+    for name in ("landings", "aims", "errors"):
         with Image.open(folder / f"goal-1-{name}.png") as image:
             assert image.size == (round(5.4 * PICTURE_DPI), round(4.5 * PICTURE_DPI))
     with Image.open(folder / "goal-1-plans.png") as image:
         assert image.size[0] == round(4 * 2.75 * PICTURE_DPI)
-    assert (folder / "overview.png").is_file()
+    for name in ("goal-1-table", "overview"):  # as high as what they show
+        with Image.open(folder / f"{name}.png") as image:
+            assert image.size[0] == round(5.4 * PICTURE_DPI)
+            assert image.size[1] < 3.5 * PICTURE_DPI
     assert not list(folder.glob(".*"))
 
 
 @pytest.mark.slow
 def test_the_same_trials_give_the_same_bytes(records, report, tmp_path):
-    facts = {"Seeds": "training 0, goals 1", "Made by": "a <b>generator</b> & $x$"}
-    again = write_report(tmp_path, records, title="Two & two", facts=facts, region=REGION)
+    again = write_report(tmp_path, records, title="Two & two", facts=FACTS, region=REGION)
     assert again.read_bytes() == report[0].read_bytes()
 
 
@@ -148,6 +157,22 @@ def test_other_outcomes_and_plans_are_reported_too(k, units, action_dim, tmp_pat
         assert "cm" not in reader.words
     else:
         assert "90 cm ahead" in reader.words
+
+
+def test_captions_speak_of_a_table_only_where_there_is_one(report, tmp_path):
+    table = "The whole table, as seen from behind the robot."
+    assert table in report[1].words
+    record = adaptation(seed=1, k=1, units=("m",), action_dim=1, most=1)
+    assert table not in read(write_report(tmp_path, [record], title="line")).words
+
+
+def test_nothing_is_loaded_to_draw_with_before_anything_is_drawn():
+    code = (
+        "import sys, prior_reinforce.report as r; r.write_report, r.record_film;"
+        "print(*sorted({'matplotlib', 'jinja2', 'imageio', 'PIL'} & set(sys.modules)))"
+    )
+    run = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+    assert run.stdout == "\n"
 
 
 def test_a_goal_not_tried_yet_has_a_report(tmp_path):

@@ -1,0 +1,225 @@
+"""A panel that outcomes are drawn in: a line for k = 1, from above for 2, also from the side for 3.
+
+From above, the picture is what an operator behind the robot sees: x forward is up, y left is left.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from jaxtyping import Float
+from matplotlib.axes import Axes
+from matplotlib.patches import Circle, FancyArrowPatch, Rectangle
+from matplotlib.ticker import MaxNLocator
+
+from prior_reinforce.arrays import Point
+from prior_reinforce.report.badges import draw_badges
+from prior_reinforce.report.record import AdaptationRecord, Box
+from prior_reinforce.report.style import (
+    DEMONSTRATION,
+    GOAL,
+    INK_SOFT,
+    LINE,
+    REGION,
+    calm_axes,
+    trial_colour,
+)
+from prior_reinforce.report.summary import titles
+from prior_reinforce.wording import WORDS, in_words
+
+_Place = Float[np.ndarray, "2"]
+_SHORT_ARROW = 16.0  # [points]; below this a head hides more than it says
+
+
+class View(NamedTuple):
+    """A projection of outcomes onto paper."""
+
+    across: int
+    """Component drawn to the right, or to the left if `mirrored`."""
+    up: int | None
+    """Component drawn upwards; None for a line, where trials stand below each other instead."""
+    mirrored: bool = False
+    title: str = ""
+
+
+def views_of(units: Sequence[str]) -> list[View]:
+    """Choose the views that together show all components of outcomes of these units."""
+    if len(units) == 1:
+        return [View(0, None)]
+    if not in_words(units):
+        return [View(i, i + 1) for i in range(len(units) - 1)]
+    above = View(1, 0, mirrored=True, title="from above")
+    return [above] if len(units) == 2 else [above, View(0, 2, title="from the side")]
+
+
+class Panel:
+    """One view of outcomes; all that is to be drawn is given in their units."""
+
+    def __init__(
+        self, axes: Axes, view: View, record: AdaptationRecord, extent: Box, n_rows: int
+    ) -> None:
+        """Label axes, and limit them to what is to be seen.
+
+        Args:
+            axes: To draw in.
+            view: What they show.
+            record: Names and units of the components, and the demonstrations.
+            extent: What is to be seen, in the units drawn.
+            n_rows: Rows that stand below each other on a line.
+        """
+        self._axes, self._view, self._record = axes, view, record
+        calm_axes(axes, grid=view.up is not None)
+        axes.set_title(view.title, fontsize=10, loc="left", color=INK_SOFT)
+        axes.set_xlim(*extent[:: -1 if view.mirrored else 1, view.across])
+        axes.set_xlabel(self._axis_label(view.across))
+        axes.xaxis.set_major_locator(MaxNLocator(9, steps=[1, 2, 5, 10]))
+        if view.up is None:
+            axes.set_ylim(-n_rows + 0.4, 0.8)
+            axes.set_yticks([])
+            axes.spines["left"].set_visible(False)
+        else:
+            axes.set_ylim(*extent[:, view.up])
+            axes.set_ylabel(self._axis_label(view.up))
+            axes.yaxis.set_major_locator(MaxNLocator(9, steps=[1, 2, 5, 10]))
+
+    def equalise(self) -> None:
+        """Widen the limits until both directions have one scale, if they have one unit.
+
+        The figure must be laid out, and must not be laid out again.
+        """
+        view, axes, box = self._view, self._axes, self._axes.get_window_extent()
+        if view.up is None or not self._record.unit(view.across, view.up):
+            return
+        (left, right), (low, high) = axes.get_xbound(), axes.get_ybound()
+        half = max((right - left) / box.width, (high - low) / box.height) / 2
+        across, up = (left + right) / 2, (low + high) / 2
+        axes.set_xbound(across - half * box.width, across + half * box.width)
+        axes.set_ybound(up - half * box.height, up + half * box.height)
+
+    def draw_region(self, region: Box) -> None:
+        """Shade the region of goals."""
+        low, high = (self._place(corner) for corner in region)
+        if self._view.up is None:
+            low[1], high[1] = self._axes.get_ylim()
+        self._axes.add_patch(
+            Rectangle(tuple(low), *(high - low), facecolor=REGION, edgecolor=LINE, zorder=0)
+        )
+
+    def draw_demonstrations(self) -> None:
+        """Draw where the demonstrations ended."""
+        for outcome in self._record.demonstrations.outcomes_seen:
+            self._mark(self._place(outcome), "D", DEMONSTRATION, zorder=3)
+
+    def draw_goal(self, record: AdaptationRecord) -> None:
+        """Draw a goal and all that counts as reached."""
+        x, y = self._place(record.goal)
+        radius = record.tolerance * record.scale
+        if self._view.up is None:
+            self._axes.axvspan(x - radius, x + radius, color=GOAL, alpha=0.13, linewidth=0)
+            self._axes.axvline(x, color=GOAL, linewidth=1.6, zorder=2)
+            return
+        edge: Any = {"facecolor": "none", "edgecolor": GOAL, "linewidth": 1.6, "zorder": 4}
+        self._axes.add_patch(Circle((x, y), radius, facecolor=GOAL, alpha=0.13, zorder=1))
+        self._axes.add_patch(Circle((x, y), radius, **edge))
+        self._axes.plot(x, y, "+", color=GOAL, markersize=7, markeredgewidth=1.6, zorder=4)
+
+    def draw_trials(
+        self,
+        record: AdaptationRecord,
+        *,
+        aims: bool = False,
+        numbered: bool = True,
+        with_truth: bool = False,
+    ) -> None:
+        """Draw where trials were seen to land, each with its error as an arrow from the goal.
+
+        Args:
+            record: The goal and its trials.
+            aims: Draw where they were aimed instead, each with an arrow from the aim before.
+            numbered: Number the trials; on a line, give each a row.
+            with_truth: Draw where they truly landed, too, as far as that is known.
+        """
+        places: list[_Place] = []
+        true_places: list[_Place] = []
+        labels: list[str] = []
+        colours: list[str] = []
+        for i, trial in enumerate(record.trials):
+            point = trial.condition if aims else record.landings[i]
+            if point is None:
+                continue
+            row = 1 + i if numbered else 1
+            place = self._place(point, row)
+            colour = trial_colour(i, len(record.trials), hit=trial.hit)
+            start = self._place(record.goal, row)
+            if aims:
+                start = places[-1] if places else place
+            if start is not place:
+                self._draw_arrow(start, place, colour, dashed=aims)
+            self._mark(place, "s" if aims else "o", colour, zorder=6)
+            truth = record.true_outcomes[i]
+            if with_truth and truth is not None:
+                true_places.append(self._place(truth, row))
+                dotted = np.stack([place, true_places[-1]]).T
+                self._axes.plot(*dotted, ":", color=INK_SOFT, linewidth=1, zorder=5)
+                self._mark(true_places[-1], "o", "white", edge=INK_SOFT, zorder=5)
+            places.append(place)
+            labels.append(str(trial.number))
+            colours.append(colour)
+        if numbered:
+            goal = self._place(record.goal, 1)
+            draw_badges(self._axes, places, labels, colours, away_from=goal, avoid=true_places)
+
+    def name_goals(self, records: Sequence[AdaptationRecord]) -> None:
+        """Call the goals what the page calls them."""
+        goals = [self._place(record.goal) for record in records]
+        landings = [point for r in records for point in r.landings if point is not None]
+        draw_badges(
+            self._axes,
+            goals,
+            titles(records),
+            [GOAL] * len(records),
+            away_from=np.mean(goals, axis=0),
+            avoid=[
+                self._place(point)
+                for point in (*self._record.demonstrations.outcomes_seen, *landings)
+            ],
+        )
+
+    def _place(self, point: Point, row: int = 0) -> _Place:
+        """Where an outcome stands on paper; on a line, in a row from the top."""
+        view, drawn = self._view, point * self._record.scale
+        return np.array([drawn[view.across], -row if view.up is None else drawn[view.up]])
+
+    def _axis_label(self, component: int) -> str:
+        demonstrations = self._record.demonstrations
+        label = f"{demonstrations.outcome_names[component]} [{self._record.unit(component)}]"
+        if not in_words(demonstrations.outcome_units):
+            return label
+        mirrored = self._view.mirrored and component == self._view.across
+        low, high = WORDS[component][:: 1 if mirrored else -1]
+        return f"← {low}      {label}      {high} →"
+
+    def _mark(
+        self, place: _Place, marker: str, colour: str, *, edge: str = "white", zorder: int
+    ) -> None:
+        self._axes.plot(*place, marker, color=colour, ms=6, mec=edge, zorder=zorder)
+
+    def _draw_arrow(self, start: _Place, end: _Place, colour: str, *, dashed: bool) -> None:
+        pixels = np.diff(self._axes.transData.transform([start, end]), axis=0)
+        short = np.linalg.norm(pixels) * 72 / self._axes.figure.dpi < _SHORT_ARROW
+        self._axes.add_patch(
+            FancyArrowPatch(
+                tuple(start),
+                tuple(end),
+                arrowstyle="-" if short else "-|>",
+                mutation_scale=9,
+                shrinkA=0,
+                shrinkB=3.5,
+                color=colour,
+                linewidth=1.5,
+                linestyle=(0, (2, 1.5)) if dashed else "-",
+                zorder=5,
+            )
+        )

@@ -1,0 +1,75 @@
+"""Curves: errors as long as they are, plans as they were, noise no larger than it is."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from prior_reinforce.report.curves import draw_errors, draw_plans
+from tests.report.swing_world import told
+
+GOAL = np.array([0.92, -0.10])
+
+
+def test_errors_are_drawn_in_centimetres_over_the_trials_own_numbers():
+    record = told([0.03, 0.04], None, [0.0, 0.01], first_number=4)
+    (axes,) = draw_errors(record).axes
+    (way,) = [line for line in axes.lines if line.get_linestyle() == "-" and line.get_zorder() == 3]
+    np.testing.assert_allclose(way.get_xydata(), [[1, 5.0], [3, 1.0]])
+    assert [label.get_text() for label in axes.get_xticklabels()] == ["4", "5", "6"]
+    said = [text.get_text() for text in axes.texts]
+    assert said == ["5 cm", "voided", "1 cm", "reached: within 1.5 cm"]
+    assert axes.get_ylim()[1] > 5.0
+
+
+def test_true_errors_are_hollow():
+    record = told([0.03, 0.04], outcomes=(np.add(GOAL, [0.0, 0.06]),))
+    (axes,) = draw_errors(record).axes
+    (true,) = [line for line in axes.lines if line.get_label() == "true error"]
+    np.testing.assert_allclose(true.get_xydata(), [[1, 6.0]])
+
+
+def test_a_goal_not_tried_yet_has_axes_all_the_same():
+    (axes,) = draw_errors(told()).axes
+    assert axes.get_ylim()[1] > 1.5
+
+
+def test_every_joint_shows_the_demonstrations_and_each_trial():
+    record = told([0.03, 0.04], None)
+    figure = draw_plans(record)
+    panels = [axes for axes in figure.axes if axes.axison]
+    assert [axes.get_title(loc="left") for axes in panels] == [
+        f"joint{i} [rad]" for i in range(1, 8)
+    ]
+    for j, axes in enumerate(panels):
+        drawn = [line.get_ydata() for line in axes.lines]
+        plans = [*record.demonstrations.plans, *(trial.plan for trial in record.trials)]
+        np.testing.assert_array_equal(drawn, [plan[:, j] for plan in plans])
+    (legend,) = figure.legends
+    assert [text.get_text() for text in legend.get_texts()] == [
+        "demonstrations",
+        "trial 1",
+        "trial 2",
+    ]
+    assert panels[0].lines[-1].get_linestyle() == "--"  # voided
+
+
+@pytest.mark.parametrize("plan", [None, np.empty((0, 7))])
+def test_a_plan_that_is_lost_is_left_out(plan):
+    record = told([0.03, 0.04])
+    lost = replace(record, trials=(replace(record.trials[0], plan=plan),))
+    lines = draw_plans(lost).axes[0].lines
+    assert sum(len(line.get_xdata()) > 0 for line in lines) == 6
+
+
+def test_a_joint_at_rest_is_not_blown_up_to_its_noise():
+    record = told([0.03, 0.04])
+    plans = record.demonstrations.plans.copy()
+    plans[:, :, 3] = 0.5 + 1e-5 * np.random.default_rng(0).normal(size=plans.shape[:2])
+    trial = replace(record.trials[0], plan=plans[0])
+    held = replace(
+        record, demonstrations=replace(record.demonstrations, plans=plans), trials=(trial,)
+    )
+    figure = draw_plans(held)
+    assert np.ptp(figure.axes[3].get_ylim()) > 0.02
+    assert sum(figure.axes[3].get_ylim()) / 2 == pytest.approx(0.5, abs=1e-4)

@@ -1,0 +1,54 @@
+"""What is known of a goal: what counts, where trials landed, in which unit that is drawn."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from prior_reinforce.errors import ConfigurationError, InvalidGoalError
+from tests.report.swing_world import adaptation, told
+
+GOAL = np.array([0.92, -0.10])
+
+
+def test_voided_trials_and_those_after_the_hit_are_not_counted():
+    assert told([0.05, 0.0], None, [0.0, 0.01]).trials_to_hit == 2
+    assert told([0.0, 0.0], [0.05, 0.0], [0.0, 0.0]).trials_to_hit == 1
+    assert told([0.05, 0.0], None).trials_to_hit is None
+    assert [trial.number for trial in told([0.05, 0.0], None, [0.0, 0.01]).told] == [1, 3]
+
+
+def test_a_hit_is_drawn_within_its_circle_however_coarsely_it_was_called():
+    record = told([0.05, 0.0], [0.02, 0.0], [0.01, 0.0], None)
+    missed, called_far, called_near, voided = record.landings
+    np.testing.assert_allclose(missed - GOAL, [0.05, 0.0])
+    np.testing.assert_allclose(called_far - GOAL, [0.02, 0.0])  # a miss
+    np.testing.assert_allclose(called_near - GOAL, [0.01, 0.0])
+    assert voided is None
+    hit = replace(told([0.03, 0.04]).trials[0], hit=True)
+    (drawn,) = replace(record, trials=(hit,)).landings
+    np.testing.assert_allclose(drawn - GOAL, [0.009, 0.012])
+
+
+def test_the_true_outcome_of_a_voided_trial_does_not_count():
+    outcomes = (GOAL + 0.01, GOAL + 0.02)
+    first, second = told([0.01, 0.01], None, outcomes=outcomes).true_outcomes
+    np.testing.assert_array_equal(first, outcomes[0])
+    assert second is None
+    assert told([0.01, 0.01]).true_outcomes == (None,)
+
+
+def test_metres_are_drawn_in_centimetres_and_other_units_as_they_are():
+    metres = told([0.05, 0.0])
+    assert (metres.scale, metres.unit(), metres.unit(0)) == (100.0, "cm", "cm")
+    mixed = adaptation(seed=1, units=("m", "s"), most=0)
+    assert (mixed.scale, mixed.unit(), mixed.unit(0, 1)) == (1.0, "", "")
+    assert (mixed.unit(0), mixed.unit(1)) == ("m", "s")
+
+
+def test_a_record_checks_what_it_is_given():
+    record = told([0.05, 0.0], [0.03, 0.04])
+    with pytest.raises(InvalidGoalError, match="2 components"):
+        replace(record, goal=np.array([0.9]))
+    with pytest.raises(ConfigurationError, match="2 trials need as many"):
+        replace(record, outcomes=(GOAL,))

@@ -1,0 +1,65 @@
+"""Colours and files: told apart, readable, the same bytes each time, whole or not at all."""
+
+import matplotlib
+import numpy as np
+import pytest
+from matplotlib.colors import to_rgb
+
+from prior_reinforce.report.style import (
+    HIT,
+    calm_axes,
+    drawing,
+    new_figure,
+    save_png,
+    text_on,
+    trial_colour,
+)
+
+
+def luminance(colour):
+    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in to_rgb(colour)]
+    return float(np.dot([0.2126, 0.7152, 0.0722], linear))
+
+
+def test_trials_go_from_light_to_dark_and_hits_are_green():
+    light = [luminance(trial_colour(i, 5)) for i in range(5)]
+    assert light == sorted(light, reverse=True)
+    assert trial_colour(3, 5, hit=True) == HIT
+    assert trial_colour(0, 1) == trial_colour(4, 5)
+
+
+@pytest.mark.parametrize("colour", [trial_colour(i, 5) for i in range(5)] + [HIT, "#d55e00"])
+def test_text_on_a_badge_has_the_contrast_of_large_text(colour):
+    dark, light = sorted([luminance(colour), luminance(text_on(colour))])
+    assert (light + 0.05) / (dark + 0.05) >= 3.0  # WCAG 2.2, 1.4.3, large text
+
+
+def test_pictures_are_the_same_bytes_whatever_matplotlib_is_set_to(tmp_path):
+    @drawing()
+    def draw():
+        figure = new_figure(2, 1)
+        axes = figure.subplots()
+        calm_axes(axes)
+        axes.set_title("dollars: $5 and $6")
+        return figure
+
+    first = save_png(draw(), tmp_path / "new" / "first.png")
+    with matplotlib.rc_context({"font.size": 30, "text.color": "red"}):
+        second = save_png(draw(), tmp_path / "second.png")
+        assert matplotlib.rcParams["font.size"] == 30
+    assert first.read_bytes() == second.read_bytes()
+
+
+def test_a_picture_that_cannot_be_drawn_leaves_the_one_before(tmp_path, monkeypatch):
+    path, figure = tmp_path / "picture.png", new_figure(2, 1)
+    path.write_bytes(b"before")
+
+    def fail(to, **_):
+        to.write_bytes(b"half a pic")
+        raise ValueError("cannot be drawn")
+
+    monkeypatch.setattr(figure, "savefig", fail)
+    with pytest.raises(ValueError, match="cannot be drawn"):
+        save_png(figure, path)
+    assert path.read_bytes() == b"before"
+    assert [p.name for p in tmp_path.iterdir()] == ["picture.png"]

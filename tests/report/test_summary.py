@@ -1,0 +1,96 @@
+"""Headline, counts and words, against values worked by hand."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from prior_reinforce.report.summary import (
+    headline,
+    outcome_line,
+    say_goal,
+    say_tolerance,
+    titles,
+    trial_rows,
+)
+from prior_reinforce.trials import Stage
+from tests.report.swing_world import adaptation
+from tests.report.swing_world import told as record
+
+GOAL = np.array([0.92, -0.10])
+REACHED_IN_2 = record([0.05, 0.0], None, [0.0, 0.01])
+REACHED_IN_1 = record([0.0, 0.0])
+MISSED = record([0.05, 0.0], [0.03, 0.04])
+
+
+def test_voided_trials_are_not_counted():
+    assert outcome_line(REACHED_IN_2) == "reached in 2 trials"
+    assert outcome_line(MISSED) == "not reached in 2 trials"
+
+
+def test_the_headline_counts_as_the_paper_does():
+    said = headline([REACHED_IN_1, REACHED_IN_2])
+    assert (said.text, said.count) == ("2 of 2 goals reached", "N = 6 + 1.5 trials")
+    assert "from 1 to 2" in said.explanation
+
+
+def test_the_headline_admits_goals_that_were_not_reached():
+    said = headline([REACHED_IN_2, MISSED])
+    assert (said.text, said.count) == ("1 of 2 goals reached", "N = 6 + 2.0 trials")
+    assert "leaves out the 1 goal that was not reached" in said.explanation
+
+
+def test_one_goal_has_a_headline_of_its_own():
+    assert headline([REACHED_IN_2]).text == "Goal reached"
+    assert headline([REACHED_IN_2]).count == "N = 6 + 2 trials"
+    assert headline([MISSED]).count == ""
+
+
+def test_rows_say_each_trial_in_words():
+    first, second, third = trial_rows(REACHED_IN_2)
+    assert (first.aim, first.seen, first.off) == ("3 cm long", "5 cm long", "5 cm")
+    assert (first.state, first.result) == ("miss", "miss")
+    assert (second.seen, second.off) == ("voided: the arm stopped", "–")
+    assert (third.seen, third.state) == ("1 cm left", "hit")
+
+
+@pytest.mark.parametrize(
+    ("seen", "true_error", "result"),
+    [
+        ([0.0, 0.0], [0.01, 0.0], "hit"),
+        ([0.0, 0.0], [0.02, 0.0], "taken for a hit"),
+        ([0.02, 0.0], [0.01, 0.0], "taken for a miss"),
+        ([0.02, 0.0], [0.02, 0.0], "miss"),
+    ],
+)
+def test_the_truth_is_told_where_it_disagrees(seen, true_error, result):
+    (row,) = trial_rows(record(seen, outcomes=(GOAL + true_error,)))
+    assert row.result == result
+    assert row.truly_off == f"{np.linalg.norm(true_error) * 100:g} cm"
+
+
+def test_a_trial_that_hits_is_aimed_where_its_condition_lies():
+    at_goal = replace(MISSED, trials=(replace(MISSED.trials[0], condition=GOAL),))
+    assert trial_rows(at_goal)[0].aim == "at the goal"
+
+
+@pytest.mark.parametrize(
+    ("stage", "seen"),
+    [
+        (Stage.ASKED, "not executed yet"),
+        (Stage.EXECUTING, "executing"),
+        (Stage.EXECUTED, "executed, not told yet"),
+    ],
+)
+def test_open_trials_say_what_they_wait_for(stage, seen):
+    trial = replace(MISSED.trials[0], stage=stage, error_seen=None)
+    (row,) = trial_rows(replace(MISSED, trials=(trial,)))
+    assert (row.seen, row.state, row.result, row.off) == (seen, "open", "open", "–")
+
+
+def test_goals_say_where_they_are_and_how_near_is_near_enough():
+    assert (say_goal(MISSED), say_tolerance(MISSED)) == ("92 cm ahead, 10 cm right", "1.5 cm")
+    mixed = adaptation(seed=1, units=("m", "s"), most=1)
+    assert (say_goal(mixed), say_tolerance(mixed)) == ("distance 0.9 m, duration 0.1 s", "0.015")
+    assert trial_rows(mixed)[0].aim == "distance 0.9 m, duration 0.1 s"
+    assert titles([MISSED, replace(MISSED, title="the far hoop")]) == ["Goal 1", "the far hoop"]
