@@ -1,7 +1,7 @@
 """What a caller's numbers must be: plans, outcomes, goals and errors become checked arrays.
 
 Each function returns a copy, so that nobody's later change reaches it, and says in one line what
-is wrong and how to mend it.
+is wrong and how to mend it. The shapes of the package's arrays have their names here.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from prior_reinforce.errors import (
     InvalidFeedbackError,
     InvalidGoalError,
     InvalidPlanError,
+    PriorReinforceError,
 )
 
 Plans = Float[np.ndarray, "n H D"]
@@ -31,8 +32,8 @@ Point = Float[np.ndarray, " k"]
 
 def as_plans(
     values: ArrayLike, action_dim: int, *, name: str = "plans", single: bool = False
-) -> np.ndarray:
-    """Return plans as a fresh, read-only float64 array of checked shape.
+) -> Float[np.ndarray, "*n H D"]:
+    """Return plans as a fresh, read-only float64 array.
 
     Args:
         values: Shape (n, H, D), or (H, D) if `single`.
@@ -44,10 +45,7 @@ def as_plans(
         InvalidPlanError: Wrong shape, fewer than two frames, or values that are not finite.
     """
     expected = "(H, D)" if single else "(n, H, D)"
-    try:
-        array = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise InvalidPlanError(f"{name} must be an array {expected} of numbers: {error}") from error
+    array = _as_numbers(values, InvalidPlanError, f"{name} must be an array {expected} of numbers")
     if array.ndim != (2 if single else 3):
         raise InvalidPlanError(f"{name} must have shape {expected}, got {array.shape}")
     if array.shape[-1] != action_dim:
@@ -67,8 +65,8 @@ def as_plans(
     return array
 
 
-def as_outcomes(values: ArrayLike, n_plans: int) -> np.ndarray:
-    """Return the outcomes of demonstrations as a fresh, read-only float64 array, shape (N, k).
+def as_outcomes(values: ArrayLike, n_plans: int) -> Points:
+    """Return the outcomes of demonstrations as a fresh, read-only float64 array.
 
     Args:
         values: Shape (N, k).
@@ -78,10 +76,9 @@ def as_outcomes(values: ArrayLike, n_plans: int) -> np.ndarray:
         InvalidDemonstrationsError: Wrong shape, fewer than two, repeated outcomes, outcomes in a
             subspace (on one line when k = 2), or values that are not finite.
     """
-    try:
-        outcomes = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise InvalidDemonstrationsError(f"outcomes must be an array (N, k): {error}") from error
+    outcomes = _as_numbers(
+        values, InvalidDemonstrationsError, "outcomes must be an array (N, k) of numbers"
+    )
     if outcomes.ndim != 2 or outcomes.shape[1] < 1:
         raise InvalidDemonstrationsError(f"outcomes must have shape (N, k), got {outcomes.shape}")
     n, k = outcomes.shape
@@ -90,7 +87,7 @@ def as_outcomes(values: ArrayLike, n_plans: int) -> np.ndarray:
     if n < 2:
         raise InvalidDemonstrationsError(f"at least two demonstrations are needed, got {n}")
     if not np.all(np.isfinite(outcomes)):
-        row = int(np.argwhere(~np.isfinite(outcomes))[0][0])
+        row = _first_not_finite(outcomes)
         raise InvalidDemonstrationsError(
             f"outcomes must be finite, but demonstration {row} has {outcomes[row].tolist()}; "
             "measure it again, or drop that demonstration"
@@ -120,8 +117,30 @@ def as_outcomes(values: ArrayLike, n_plans: int) -> np.ndarray:
     return outcomes
 
 
-def as_goal(values: ArrayLike, outcome_names: Sequence[str]) -> np.ndarray:
-    """Return a goal as a fresh float array, shape (k,), k the number of names.
+def as_conditions(values: ArrayLike, outcome_dim: int) -> Points:
+    """Return conditions, shape (n, k), any n, as a fresh float64 array.
+
+    Raises:
+        InvalidGoalError: Wrong shape, or not finite.
+    """
+    conditions = _as_numbers(
+        values, InvalidGoalError, "conditions must be an array (n, k) of numbers"
+    )
+    if conditions.ndim != 2 or conditions.shape[1] != outcome_dim:
+        raise InvalidGoalError(
+            f"conditions must have shape (n, {outcome_dim}), one row for each plan, "
+            f"got {conditions.shape}"
+        )
+    if not np.all(np.isfinite(conditions)):
+        row = _first_not_finite(conditions)
+        raise InvalidGoalError(
+            f"conditions must be finite, but row {row} is {conditions[row].tolist()}"
+        )
+    return conditions
+
+
+def as_goal(values: ArrayLike, outcome_names: Sequence[str]) -> Point:
+    """Return a goal as a fresh float array, of as many components as there are names.
 
     Raises:
         InvalidGoalError: Wrong shape, or not finite.
@@ -137,8 +156,8 @@ def as_goal(values: ArrayLike, outcome_names: Sequence[str]) -> np.ndarray:
     )
 
 
-def as_error(values: ArrayLike, outcome_dim: int) -> np.ndarray:
-    """Return a perceived error as a fresh float array, shape (k,).
+def as_error(values: ArrayLike, outcome_dim: int) -> Point:
+    """Return a perceived error, outcome minus goal, as a fresh float array.
 
     Raises:
         InvalidFeedbackError: Wrong shape, or not finite.
@@ -161,8 +180,8 @@ def as_vector(
     name: str,
     size: str,
     remedy: str,
-) -> np.ndarray:
-    """Return one vector as a fresh float array, shape (length,).
+) -> Point:
+    """Return one vector as a fresh float array.
 
     Args:
         values: Shape (length,).
@@ -175,12 +194,22 @@ def as_vector(
     Raises:
         InvalidGoalError, InvalidFeedbackError: As `problem` says: wrong shape, or not finite.
     """
-    try:
-        vector = np.array(values, dtype=float)
-    except (TypeError, ValueError) as error:
-        raise problem(f"{name} must be {length} numbers, got {values!r}") from error
+    vector = _as_numbers(values, problem, f"{name} must be {length} numbers")
     if vector.shape != (length,):
         raise problem(f"{name} has shape {vector.shape}, but {size}; give that many numbers")
     if not np.all(np.isfinite(vector)):
         raise problem(f"{name} must be finite, got {vector.tolist()}; {remedy}")
     return vector
+
+
+def _as_numbers(
+    values: ArrayLike, problem: type[PriorReinforceError], expected: str
+) -> Float[np.ndarray, ...]:
+    try:
+        return np.array(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise problem(f"{expected}, got {values!r:.80}: {error}") from error
+
+
+def _first_not_finite(rows: Points) -> int:
+    return int(np.argwhere(~np.isfinite(rows))[0][0])

@@ -14,8 +14,7 @@ from prior_reinforce.adapters import (
     ProportionalAdapter,
 )
 from prior_reinforce.errors import ConfigurationError
-from prior_reinforce.generators import Generator
-from prior_reinforce.generators.by_name import make_generator
+from prior_reinforce.generators import Generator, make_generator
 from prior_reinforce.perception import Amplified, Exact, Eye, Perception
 from prior_reinforce.registry import import_and_make, make_own
 

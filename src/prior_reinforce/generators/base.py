@@ -1,16 +1,25 @@
-"""The interface of pi: conditions in, whole action plans out (paper, Stage 1)."""
+"""The interface of pi: conditions in, whole action plans out (paper, Stage 1).
+
+A member says how it learns (`_fit`), how it generates (`_generate`), and what it keeps on disk
+(`state`, `from_state`). What all have in common is here: checked conditions, saving and loading.
+"""
 
 from __future__ import annotations
 
 import os
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from pathlib import Path
+from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 from typing_extensions import Self
 
+from prior_reinforce.arrays import Plans, Points, as_conditions
+from prior_reinforce.errors import ConfigurationError, FileFormatError, NotFittedError
+from prior_reinforce.generators.saving import SavedModel, Tensors, read_model, write_model
 from prior_reinforce.plans.motions import Demonstrations
 
 
@@ -28,6 +37,9 @@ class FitProgress:
     """Estimated, in [s]."""
 
 
+Report = Callable[[FitProgress], None]
+
+
 class Generator(ABC):
     """A conditional motion generator: an outcome that is wished for, a plan that may reach it.
 
@@ -37,50 +49,164 @@ class Generator(ABC):
 
     name: ClassVar[str]
     """Name on the command line, in results and in a saved model's `config.json`."""
+    remarks: tuple[str, ...] = ()
+    """What `fit` could not do, in sentences; kept with the model."""
+    _outcome_dim: int | None = None
+    """k of the demonstrations; None before `fit`."""
 
-    @abstractmethod
     def fit(
-        self,
-        demonstrations: Demonstrations,
-        *,
-        seed: int,
-        progress: Callable[[FitProgress], None] | None = None,
+        self, demonstrations: Demonstrations, *, seed: int, progress: Report | None = None
     ) -> Self:
         """Learn outcome -> plan from all demonstrations (none is held out).
 
         Args:
-            demonstrations: N plans (N, H, D) with their perceived outcomes (N, k).
+            demonstrations: N plans with their perceived outcomes.
             seed: Of everything random in the fit.
             progress: Called now and then while fitting.
 
         Returns:
-            This generator, fitted.
+            This generator, fitted; `remarks` says what could not be done.
         """
+        self.remarks = ()
+        self._fit(demonstrations, seed, progress or _silent)
+        self._outcome_dim = demonstrations.outcome_dim
+        return self
 
-    @abstractmethod
-    def generate(self, conditions: np.ndarray) -> np.ndarray:
+    def generate(self, conditions: ArrayLike) -> Plans:
         """Generate one plan for each condition.
 
         Args:
             conditions: c, shape (n, k), in the units of the outcomes. Any n, also 0.
 
         Returns:
-            Plans, shape (n, H, D), float64, in the demonstrations' units.
+            Plans, float64, in the demonstrations' units.
 
         Raises:
             NotFittedError: Before `fit`.
             InvalidGoalError: Wrong shape, or not finite.
         """
+        return self._generate(as_conditions(conditions, self._fitted_to()))
 
-    @abstractmethod
     def save(self, folder: str | os.PathLike[str]) -> None:
-        """Write `config.json` and `model.safetensors` into a folder, made if need be."""
+        """Write `config.json` and `model.safetensors` into a folder, made if need be.
+
+        Raises:
+            NotFittedError: Before `fit`.
+        """
+        write_model(Path(folder), self.pack())
 
     @classmethod
-    @abstractmethod
     def load(cls, folder: str | os.PathLike[str]) -> Self:
         """Read what `save` wrote; loading runs no code from the files.
 
         Raises:
             FileFormatError: Files are missing, truncated, or of another generator.
         """
+        return cls.unpack(read_model(Path(folder), expected=cls.name))
+
+    def to(self, device: str) -> Self:
+        """Compute on another device from now on.
+
+        Args:
+            device: `cpu`, or `cuda` where the generator runs there.
+
+        Raises:
+            ConfigurationError: The device is not there, or the generator does not run on it.
+        """
+        if device != "cpu":
+            raise ConfigurationError(
+                f"a {self.name} generator runs on the CPU only, got device {device!r}"
+            )
+        return self
+
+    def pack(self) -> SavedModel:
+        """Return all that was learned, as data.
+
+        Raises:
+            NotFittedError: Before `fit`.
+        """
+        common = {"outcome_dim": self._fitted_to(), "remarks": list(self.remarks)}
+        settings, tensors = self.state()
+        return SavedModel(self.name, {**common, **settings}, tensors)
+
+    @classmethod
+    def unpack(cls, saved: SavedModel, **context: Any) -> Self:
+        """Rebuild a fitted generator from what `pack` gave.
+
+        Args:
+            saved: All that was learned.
+            context: What its `from_state` takes beside that.
+
+        Raises:
+            FileFormatError: Something is missing, or does not fit.
+        """
+        try:
+            generator = cls.from_state(saved.settings, saved.tensors, **context)
+            generator.remarks = tuple(map(str, saved.settings["remarks"]))
+            generator._outcome_dim = int(saved.settings["outcome_dim"])
+        except FileFormatError:
+            raise
+        except (KeyError, TypeError, ValueError, RuntimeError) as error:
+            raise FileFormatError(
+                f"this is no complete {cls.name} generator ({error!r}); learn it again"
+            ) from error
+        return generator
+
+    @abstractmethod
+    def _fit(self, demonstrations: Demonstrations, seed: int, progress: Report) -> None:
+        """Learn; called by `fit`."""
+
+    @abstractmethod
+    def _generate(self, conditions: Points) -> Plans:
+        """Generate one plan for each checked condition; called by `generate` once fitted."""
+
+    def state(self) -> tuple[dict[str, Any], Tensors]:
+        """Return what was learned: settings of JSON types, and arrays by name.
+
+        Only a generator with `state` and `from_state` can be saved.
+        """
+        raise NotImplementedError(f"{type(self).__name__} has no state(), so it cannot be saved")
+
+    @classmethod
+    def from_state(cls, settings: Mapping[str, Any], tensors: Tensors) -> Self:
+        """Rebuild it from what `state` gave.
+
+        Raises:
+            KeyError, TypeError, ValueError, RuntimeError: Something is missing, or does not fit.
+        """
+        raise NotImplementedError(f"{cls.__name__} has no from_state(), so it cannot be loaded")
+
+    def _fitted_to(self) -> int:
+        """Return k of what was learned."""
+        if self._outcome_dim is None:
+            raise NotFittedError(
+                f"this {type(self).__name__} has learned nothing yet; call fit first"
+            )
+        return self._outcome_dim
+
+
+def at_once(progress: Report, loss: float) -> None:
+    """Report a fit that is a single step."""
+    progress(FitProgress(step=1, n_steps=1, loss=loss, seconds_left=0.0))
+
+
+def _silent(progress: FitProgress) -> None: ...
+
+
+@dataclass(frozen=True, eq=False)
+class ConditionScale:
+    """Maps the demonstrated range of each outcome component to [-1, 1], whatever its unit."""
+
+    range: Points
+    """Least and greatest outcome seen, two rows, the second above the first in every component."""
+
+    @classmethod
+    def fit(cls, outcomes: Points) -> Self:
+        """Take the range of outcomes; `Demonstrations` has none of zero width."""
+        return cls(np.stack([outcomes.min(axis=0), outcomes.max(axis=0)]))
+
+    def scale(self, conditions: Points) -> Points:
+        """Scale conditions that are in their own units."""
+        low, high = self.range
+        scaled: np.ndarray = 2 * (conditions - low) / (high - low) - 1
+        return scaled

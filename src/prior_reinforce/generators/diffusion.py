@@ -1,39 +1,121 @@
 """The paper's generator: a diffusion model of action plans, conditioned on the outcome.
 
-What it generates is a function of the condition, which the adapter needs: see `diffusion_sampling`.
-Torch, and what is built on it, is imported where a network is used: most commands use none, and
-importing torch takes longer than all that they do.
+What it generates is a function of the condition, which the adapter needs: see `denoiser`.
 """
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable
-from dataclasses import replace
-from typing import TYPE_CHECKING, ClassVar
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
-import numpy as np
+import msgspec
 from typing_extensions import Self
 
-from prior_reinforce.errors import ConfigurationError, FileFormatError, NotFittedError
-from prior_reinforce.generators.base import FitProgress, Generator
-from prior_reinforce.generators.conditions import ConditionScale
-from prior_reinforce.generators.diffusion_config import DiffusionConfig, Preset
-from prior_reinforce.generators.saving import read_model, write_model
-from prior_reinforce.generators.threads import torch_threads
-from prior_reinforce.generators.timed import StartTimeCodec
+from prior_reinforce.errors import ConfigurationError
+from prior_reinforce.generators.base import Report
+from prior_reinforce.generators.config import Count, NonNegative, UNetConfig
+from prior_reinforce.generators.network import Learned, NetworkGenerator
 from prior_reinforce.plans.codec import Representation
-from prior_reinforce.plans.motions import Demonstrations
+from prior_reinforce.registry import build
 
 if TYPE_CHECKING:
-    from prior_reinforce.generators.coded_network import CodedNetwork
+    import torch
+
     from prior_reinforce.generators.unet import ConditionalUNet
 
+Preset = Literal["laptop", "paper"]
+Prediction = Literal["epsilon", "v", "sample"]
+"""What the network is trained to tell from x_t: the noise, the velocity of Salimans and Ho (2022,
+"Progressive Distillation for Fast Sampling of Diffusion Models"), or the clean sample."""
+Sampler = Literal["mean_shift", "ddim", "ddpm"]
 
-class DiffusionGenerator(Generator):
+
+PAPER: dict[str, Any] = {
+    "representation": "frames",
+    "margin": 0.0,
+    "network": {},  # the reference's
+    "prediction": "epsilon",
+    "sampler": "ddpm",
+    "sampling_steps": 100,
+    "training_steps": 5000,
+    "batch_size": 256,
+    "fill_batch": False,
+    "stratified": False,
+    "learning_rate": 2e-4,
+    "warmup_steps": 500,
+    "ema_limit": 0.9999,
+}
+"""Where the paper's settings differ from the laptop's.
+
+Diffusion Policy's published low-dimensional training ([Chi2023] in docs/references.md) with the
+paper's learning rate: raw frames, widths 256, 512 and 1024, AdamW, cosine with 500 steps of warm-up,
+EMA, 100-step DDPM on the noise. A batch there is one pass over the demonstrations, as they are
+fewer than its 256; its 5,000 epochs so are 5,000 steps.
+"""
+
+
+@dataclass(frozen=True)
+class DiffusionConfig(UNetConfig):
+    """Everything that decides what `DiffusionGenerator` learns; the defaults are the laptop's.
+
+    docs/decisions-generator.md tells what was tried for each, with figures.
+    """
+
+    prediction: Prediction = "v"
+    """What the network predicts."""
+    noise_levels: Count = 100
+    """T, steps of the squared-cosine noise schedule."""
+    sampler: Sampler = "mean_shift"
+    """How codes are generated, see `denoiser`."""
+    sampling_steps: Count = 6
+    """Noise levels visited by mean shift or DDIM; DDPM visits all."""
+    noise_draws: Annotated[int, msgspec.Meta(ge=2, multiple_of=2)] = 8
+    """K, noise draws over which a step of mean shift averages; even: a draw and its opposite."""
+    batch_size: Count = 24
+    """Samples a step, at least one of each demonstration where there is room."""
+    fill_batch: bool = True
+    """Repeat demonstrations, at other noise levels, until the batch is full."""
+    stratified: bool = True
+    """Spread a batch's noise levels evenly, instead of drawing them independently."""
+    warmup_steps: Annotated[int, msgspec.Meta(ge=0)] = 50
+    """Steps in which the learning rate rises linearly."""
+    ema_power: NonNegative = 0.75
+    """After n steps the averaged weights decay by 1 - (1 + n) ** -power a step."""
+    ema_limit: Annotated[float, msgspec.Meta(ge=0, lt=1)] = 0.995
+    """Upper bound of that decay."""
+
+    def __post_init__(self) -> None:
+        """Check the settings.
+
+        Raises:
+            ConfigurationError: One is outside its range.
+        """
+        super().__post_init__()
+        if self.sampling_steps > self.noise_levels:
+            raise ConfigurationError(
+                f"sampling_steps must be at most noise_levels ({self.noise_levels}), "
+                f"got {self.sampling_steps}"
+            )
+
+    @classmethod
+    def preset(cls, name: Preset) -> Self:
+        """Return the settings of that name: `laptop`, the default, or `paper`, see `PAPER`.
+
+        Raises:
+            ConfigurationError: There is no such preset.
+        """
+        if name not in ("laptop", "paper"):
+            raise ConfigurationError(f"no preset {name!r}; use 'laptop' or 'paper'")
+        made: Self = build(cls, PAPER if name == "paper" else {})
+        return made
+
+
+class DiffusionGenerator(NetworkGenerator):
     """Conditional diffusion over whole plans (paper, Stage 1)."""
 
     name: ClassVar[str] = "diffusion"
+    config_type: ClassVar[type[DiffusionConfig]] = DiffusionConfig
+    config: DiffusionConfig
 
     def __init__(
         self,
@@ -42,7 +124,7 @@ class DiffusionGenerator(Generator):
         preset: Preset | None = None,
         representation: Representation | None = None,
         device: str = "cpu",
-        threads: int | None = None,
+        threads: int = 1,
     ) -> None:
         """Choose settings.
 
@@ -50,9 +132,8 @@ class DiffusionGenerator(Generator):
             config: All settings; the laptop's when neither this nor `preset` is given.
             preset: Settings by name instead.
             representation: Replaces the one of the settings.
-            device: Where torch computes, `cpu` or `cuda`.
-            threads: Cores to train on; all when None. The last digits depend on it. Sampling is
-                on one core, so that a model means the same plans on any number.
+            device: See `NetworkGenerator`.
+            threads: See `NetworkGenerator`.
 
         Raises:
             ConfigurationError: Both `config` and `preset`, or a device that is not there.
@@ -62,126 +143,27 @@ class DiffusionGenerator(Generator):
         config = config or DiffusionConfig.preset(preset or "laptop")
         if representation is not None:
             config = replace(config, representation=representation)
-        self.config = config
-        self._device = _available(device)
-        self._threads = threads
-        self._fitted: CodedNetwork[ConditionalUNet] | None = None
-        self._seed = 0
+        super().__init__(config, device=device, threads=threads)
 
-    def fit(
-        self,
-        demonstrations: Demonstrations,
-        *,
-        seed: int,
-        progress: Callable[[FitProgress], None] | None = None,
-    ) -> Self:
-        """Learn from all demonstrations; see `Generator.fit`."""
-        from prior_reinforce.generators.coded_network import CodedNetwork, as_tensor
-        from prior_reinforce.generators.diffusion_training import train
-
-        codec, codes = StartTimeCodec.fit(
-            demonstrations,
-            start_times=self.config.start_times,
-            representation=self.config.representation,
-            frames_per_point=self.config.frames_per_point,
-            length_multiple=self.config.network.length_multiple,
-            margin=self.config.margin,
-        )
-        scale = ConditionScale.fit(demonstrations.outcomes_seen)
-        with torch_threads(self._threads):
-            network = train(
-                as_tensor(codes, self._device),
-                as_tensor(scale.scale(demonstrations.outcomes_seen), self._device),
-                self.config,
-                seed=seed,
-                progress=progress,
-            )
-        self._fitted = CodedNetwork(codec, scale, network, self._device)
-        self._seed = seed
-        return self
-
-    @property
-    def codec(self) -> StartTimeCodec:
-        """How plans are coded, decided by `fit`."""
-        return self._require().codec
-
-    def generate(self, conditions: np.ndarray) -> np.ndarray:
-        """Sample one plan for each condition; see `Generator.generate`."""
-        from prior_reinforce.generators.diffusion_sampling import sample
-
-        fitted = self._require()
-        shape = (fitted.codec.channels, fitted.codec.length)
-        return fitted.generate(
-            conditions,
-            lambda scaled: sample(fitted.network, scaled, shape, self.config, seed=self._seed),
-        )
-
-    def save(self, folder: str | os.PathLike[str]) -> None:
-        """Write `config.json` and `model.safetensors`; see `Generator.save`."""
-        fitted = self._require()
-        write_model(
-            folder,
-            self.name,
-            {
-                "config": self.config.to_json(),
-                "codec": fitted.codec.settings(),
-                "seed": self._seed,
-            },
-            fitted.tensors(),
-        )
-
-    @classmethod
-    def load(cls, folder: str | os.PathLike[str], *, device: str = "cpu") -> Self:
-        """Read what `save` wrote, on whichever device it was learned; see `Generator.load`.
-
-        Args:
-            folder: Of the model.
-            device: Where torch computes, `cpu` or `cuda`.
-
-        Raises:
-            ConfigurationError: The device is not there.
-            FileFormatError: Files are missing, truncated, or of another generator.
-        """
-        from prior_reinforce.generators.coded_network import CodedNetwork
+    def _build(self, channels: int, length: int, outcome_dim: int) -> ConditionalUNet:
         from prior_reinforce.generators.unet import ConditionalUNet
 
-        _available(device)
-        saved = read_model(folder, expected=cls.name)
-        try:
-            generator = cls(DiffusionConfig.from_json(saved.settings["config"]), device=device)
-            size = generator.config.network
-            generator._fitted = CodedNetwork.restore(
-                saved.settings["codec"],
-                saved.tensors,
-                lambda codec, k: ConditionalUNet(codec.channels, k, size),
-            )
-            generator._seed = int(saved.settings["seed"])
-        except (KeyError, TypeError, ValueError, RuntimeError) as error:
-            raise FileFormatError(
-                f"{folder} does not hold a complete {cls.name} generator: {error!r}; learn again"
-            ) from error
-        # Not within the try: a device that is full is no damaged model.
-        generator._fitted = generator._fitted.to(device)
-        return generator
+        return ConditionalUNet(channels, outcome_dim, self.config.network)
 
-    def _require(self) -> CodedNetwork[ConditionalUNet]:
-        if self._fitted is None:
-            raise NotFittedError("this DiffusionGenerator has learned nothing yet; call fit first")
-        return self._fitted
+    def _train(
+        self,
+        network: torch.nn.Module,
+        codes: torch.Tensor,
+        conditions: torch.Tensor,
+        seed: int,
+        progress: Report,
+    ) -> torch.nn.Module:
+        from prior_reinforce.generators.denoiser import train
 
+        return train(network, codes, conditions, self.config, seed, progress)
 
-def _available(device: str) -> str:
-    """The device, if torch can compute there."""
-    if device == "cpu":
-        return device
-    import torch
+    def _codes(self, learned: Learned, conditions: torch.Tensor) -> torch.Tensor:
+        from prior_reinforce.generators.denoiser import sample
 
-    try:
-        parsed = torch.device(device)
-    except RuntimeError as error:
-        raise ConfigurationError(f"no device {device!r}; use 'cpu' or 'cuda'") from error
-    if parsed.type not in ("cpu", "cuda"):
-        raise ConfigurationError(f"no device {device!r}; use 'cpu' or 'cuda'")
-    if parsed.type == "cuda" and (parsed.index or 0) >= torch.cuda.device_count():
-        raise ConfigurationError(f"device {device!r} is not available here; use 'cpu'")
-    return device
+        shape = learned.codec.channels, learned.codec.length
+        return sample(learned.network, conditions, shape, self.config, seed=learned.seed)

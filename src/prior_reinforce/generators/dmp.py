@@ -26,71 +26,52 @@ Notation:
 from __future__ import annotations
 
 import math
-import os
-from collections.abc import Callable
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
+import msgspec
 import numpy as np
-from scipy.interpolate import CubicSpline
+from jaxtyping import Float
 from typing_extensions import Self
 
-from prior_reinforce.errors import (
-    ConfigurationError,
-    FileFormatError,
-    MissingExtraError,
-    NotFittedError,
-)
-from prior_reinforce.generators.base import FitProgress, Generator
-from prior_reinforce.generators.conditions import as_conditions
+from prior_reinforce.arrays import Frames, Plans, Points
+from prior_reinforce.errors import MissingExtraError
+from prior_reinforce.generators.base import Generator, Report, at_once
+from prior_reinforce.generators.config import Checked, Positive
 from prior_reinforce.generators.outcome_weights import smooth_weights
-from prior_reinforce.generators.saving import read_model, write_model
+from prior_reinforce.generators.saving import Tensors
 from prior_reinforce.plans.motions import Demonstrations
-from prior_reinforce.plans.timing import velocity_profiles
+from prior_reinforce.plans.timing import motion_span, speeds
+from prior_reinforce.registry import build
 
 _INTEGRATION_STEPS = 1000
 """Runge-Kutta steps over a motion. The library evaluates the forcing one step late, which at its
 default of one step a frame delays a motion by a frame; here it is a thousandth of the motion."""
-_SMOOTHING = 0.03
-"""Standard deviation of the Gaussian that smooths velocities, in [s]; as in `alignment`."""
-_MOVING = 0.05
-"""A motion begins and ends where its speed crosses this part of its peak; ours, the usual 5 %."""
-_EDGE = 0.1
-"""A fit includes the rest next to a motion for this part of its duration, so that nothing slower
-than the threshold is lost."""
+
+_Phases = Float[np.ndarray, " H"]
+"""t / tau of each frame, in [0, 1]."""
 
 
 @dataclass(frozen=True)
-class DynamicMovementPrimitivesConfig:
+class DynamicMovementPrimitivesConfig(Checked):
     """Size of the primitives; docs/baselines.md tells what was tried."""
 
-    frames_per_weight: float = 2.0
+    frames_per_weight: Annotated[float, msgspec.Meta(ge=1)] = 2.0
     """Frames for each forcing weight of a dimension."""
-    ridge: float = 1e-10
+    ridge: Positive = 1e-10
     """Ridge penalty of the fit, relative to the squared response of each weight [-]."""
     segmented: bool = True
     """Fit each demonstration from where its motion begins to where it ends, and interpolate onset
     and duration too, as is usual for DMPs. If not, every plan is one motion over its whole horizon,
     rests and all (the paper does not say)."""
 
-    def __post_init__(self) -> None:
-        """Check the settings.
-
-        Raises:
-            ConfigurationError: One is outside its range.
-        """
-        if not (math.isfinite(self.frames_per_weight) and self.frames_per_weight >= 1):
-            raise ConfigurationError(
-                f"frames_per_weight must be at least 1, got {self.frames_per_weight}"
-            )
-        if not (math.isfinite(self.ridge) and self.ridge > 0):
-            raise ConfigurationError(f"ridge must be a positive number, got {self.ridge}")
-
 
 class DynamicMovementPrimitives(Generator):
     """Interpolated discrete DMPs (paper, "DMP"); the variant is in this module's head."""
 
     name: ClassVar[str] = "dmp"
+    config_type: ClassVar[type[DynamicMovementPrimitivesConfig]] = DynamicMovementPrimitivesConfig
 
     def __init__(self, config: DynamicMovementPrimitivesConfig | None = None) -> None:
         """Choose settings; the defaults when None.
@@ -100,22 +81,13 @@ class DynamicMovementPrimitives(Generator):
         """
         _library()
         self.config = config or DynamicMovementPrimitivesConfig()
-        self._fitted: _Fitted | None = None
 
-    def fit(
-        self,
-        demonstrations: Demonstrations,
-        *,
-        seed: int,
-        progress: Callable[[FitProgress], None] | None = None,
-    ) -> Self:
-        """Fit one DMP to each demonstration; nothing is random. See `Generator.fit`."""
+    def _fit(self, demonstrations: Demonstrations, seed: int, progress: Report) -> None:
+        """Fit one DMP to each demonstration; nothing is random."""
         plans, horizon = demonstrations.plans, demonstrations.horizon
         spans = np.tile([0.0, horizon - 1.0], (demonstrations.n, 1))
         if self.config.segmented:
-            smoothing = _SMOOTHING / demonstrations.format.dt
-            profiles = velocity_profiles(plans, demonstrations.format.units, smoothing)
-            spans = np.stack([motion_span(np.linalg.norm(p, axis=1)) for p in profiles])
+            spans = np.stack([motion_span(speed) for speed in speeds(demonstrations)])
         n_weights = max(2, min(horizon, round(horizon / self.config.frames_per_weight)))
         response = _Response(n_weights)
         parameters = np.stack(
@@ -125,93 +97,48 @@ class DynamicMovementPrimitives(Generator):
             ]
         )
         outcomes = demonstrations.outcomes_seen.copy()
-        self._fitted = _Fitted(response, parameters, spans, outcomes, horizon)
-        if progress is not None:
-            loss = float(np.mean((self.generate(outcomes) - plans) ** 2))
-            progress(FitProgress(step=1, n_steps=1, loss=loss, seconds_left=0.0))
-        return self
+        self._primitives = _Primitives(response, parameters, spans, outcomes, horizon)
+        at_once(progress, loss=float(np.mean((self._generate(outcomes) - plans) ** 2)))
 
-    def generate(self, conditions: np.ndarray) -> np.ndarray:
-        """Interpolate the primitives and roll each out; see `Generator.generate`."""
-        fitted = self._require()
-        conditions = as_conditions(conditions, fitted.outcomes.shape[1])
-        weights = smooth_weights(conditions, fitted.outcomes, kernel="thin-plate")
-        parameters = np.tensordot(weights, fitted.parameters, axes=1)
+    def _generate(self, conditions: Points) -> Plans:
+        """Interpolate the primitives and roll each out."""
+        known = self._primitives
+        weights = smooth_weights(conditions, known.outcomes, kernel="thin-plate")
+        parameters = np.tensordot(weights, known.parameters, axes=1)
         # Far outside the demonstrations an extrapolated motion could end before it begins.
-        least = fitted.spans[:, 1] - fitted.spans[:, 0]
-        onsets, durations = weights @ fitted.spans[:, 0], weights @ least
+        least = known.spans[:, 1] - known.spans[:, 0]
+        onsets, durations = weights @ known.spans[:, 0], weights @ least
         durations = np.maximum(durations, least.min() / 2)
-        plans = np.empty((len(conditions), fitted.horizon, fitted.parameters.shape[2]))
+        plans = np.empty((len(conditions), known.horizon, known.parameters.shape[2]))
         for i, theta in enumerate(parameters):
             span = np.array([onsets[i], onsets[i] + durations[i]])
-            plans[i] = fitted.response(_phases(fitted.horizon, span)) @ theta
+            plans[i] = known.response(_phases(known.horizon, span)) @ theta
         return plans
 
-    def save(self, folder: str | os.PathLike[str]) -> None:
-        """Write `config.json` and `model.safetensors`; see `Generator.save`."""
-        fitted = self._require()
-        write_model(
-            folder,
-            self.name,
-            {"config": asdict(self.config), "horizon": fitted.horizon},
-            {
-                "parameters": fitted.parameters,
-                "spans": fitted.spans,
-                "outcomes": fitted.outcomes,
-            },
+    def state(self) -> tuple[dict[str, Any], Tensors]:
+        """The primitives; see `Generator.state`."""
+        known = self._primitives
+        return (
+            {"config": asdict(self.config), "horizon": known.horizon},
+            {"parameters": known.parameters, "spans": known.spans, "outcomes": known.outcomes},
         )
 
     @classmethod
-    def load(cls, folder: str | os.PathLike[str]) -> Self:
-        """Read what `save` wrote; see `Generator.load`."""
-        saved = read_model(folder, expected=cls.name)
-        try:
-            generator = cls(DynamicMovementPrimitivesConfig(**saved.settings["config"]))
-            parameters = saved.tensors["parameters"]
-            generator._fitted = _Fitted(
-                _Response(parameters.shape[1] - 2),
-                parameters,
-                saved.tensors["spans"],
-                saved.tensors["outcomes"],
-                int(saved.settings["horizon"]),
-            )
-        except (KeyError, TypeError, ValueError) as error:
-            raise FileFormatError(
-                f"{folder} holds no complete {cls.name} generator ({error!r}); learn it again"
-            ) from error
+    def from_state(cls, settings: Mapping[str, Any], tensors: Tensors) -> Self:
+        """Rebuild it; see `Generator.from_state`."""
+        generator = cls(build(cls.config_type, settings["config"]))
+        parameters, spans, outcomes = (tensors[n] for n in ("parameters", "spans", "outcomes"))
+        if not len(parameters) == len(spans) == len(outcomes):
+            raise ValueError("parameters, spans and outcomes do not fit")
+        response = _Response(parameters.shape[1] - 2)
+        generator._primitives = _Primitives(
+            response, parameters, spans, outcomes, int(settings["horizon"])
+        )
         return generator
 
-    def _require(self) -> _Fitted:
-        if self._fitted is None:
-            raise NotFittedError(
-                "this DynamicMovementPrimitives has learned nothing yet; call fit first"
-            )
-        return self._fitted
 
-
-def motion_span(speed: np.ndarray) -> np.ndarray:
-    """Return where a motion begins and ends, shape (2,), in frames, from its speed (H,).
-
-    Crossings of the threshold are interpolated between frames and widened by `_EDGE`; an end at
-    which the plan does not rest is the plan's own. A plan that never moves is one motion.
-    """
-    last = len(speed) - 1
-    threshold = _MOVING * speed.max()
-    moving = np.flatnonzero(speed > threshold)
-    if not moving.size:
-        return np.array([0.0, float(last)])
-    a, b = int(moving[0]), int(moving[-1])
-    start, end = float(a), float(b)
-    if a > 0:
-        start -= (speed[a] - threshold) / (speed[a] - speed[a - 1])
-    if b < last:
-        end += (speed[b] - threshold) / (speed[b] - speed[b + 1])
-    edge = _EDGE * (end - start)
-    return np.array([start - edge * (a > 0), end + edge * (b < last)])
-
-
-def _phases(horizon: int, span: np.ndarray) -> np.ndarray:
-    """Phase t / tau of every frame, shape (H,), held at 0 before the motion and at 1 after it."""
+def _phases(horizon: int, span: Float[np.ndarray, 2]) -> _Phases:
+    """Phase of every frame, held at 0 before the motion and at 1 after it."""
     return np.asarray(np.clip((np.arange(horizon) - span[0]) / (span[1] - span[0]), 0.0, 1.0))
 
 
@@ -219,6 +146,8 @@ class _Response:
     """Phi: the motion that one unit of each parameter makes, as a function of phase."""
 
     def __init__(self, n_weights: int) -> None:
+        from scipy.interpolate import CubicSpline
+
         n = 2 + n_weights
         # One dimension of the library's DMP for each parameter, all integrated at once.
         dmp = _library()(
@@ -231,12 +160,12 @@ class _Response:
         phases = np.linspace(0.0, 1.0, _INTEGRATION_STEPS + 1)
         self._spline = CubicSpline(phases, motions[: _INTEGRATION_STEPS + 1])
 
-    def __call__(self, phases: np.ndarray) -> np.ndarray:
-        """Phi at phases (H,), shape (H, 2 + B)."""
+    def __call__(self, phases: _Phases) -> Float[np.ndarray, "H P"]:
+        """Phi at each phase."""
         return np.asarray(self._spline(phases))
 
-    def fit(self, plan: np.ndarray, phases: np.ndarray, ridge: float) -> np.ndarray:
-        """Fit theta (2 + B, D) to a plan (H, D): its end points, then ridge regression."""
+    def fit(self, plan: Frames, phases: _Phases, ridge: float) -> Float[np.ndarray, "P D"]:
+        """Fit theta to a plan: its end points, then ridge regression."""
         response = self(phases)
         ends, forced = response[:, :2], response[:, 2:]
         boundary = plan[[0, -1]]
@@ -249,24 +178,17 @@ class _Response:
         return np.vstack([boundary, weights])
 
 
-class _Fitted:
-    """What `fit` makes and `save` keeps."""
+@dataclass(frozen=True, eq=False)
+class _Primitives:
+    """What is learned."""
 
-    def __init__(
-        self,
-        response: _Response,
-        parameters: np.ndarray,
-        spans: np.ndarray,
-        outcomes: np.ndarray,
-        horizon: int,
-    ) -> None:
-        if not len(parameters) == len(spans) == len(outcomes):
-            raise ValueError("parameters, spans and outcomes do not fit")
-        self.response = response
-        self.parameters = parameters  # theta_i, (N, 2 + B, D), in the plan's units
-        self.spans = spans  # begin and end of each motion, (N, 2), in frames
-        self.outcomes = outcomes  # r_i, (N, k)
-        self.horizon = horizon
+    response: _Response
+    parameters: Float[np.ndarray, "N P D"]
+    """theta_i, in the plan's units."""
+    spans: Float[np.ndarray, "N 2"]
+    """Begin and end of each motion, in frames."""
+    outcomes: Float[np.ndarray, "N k"]
+    horizon: int
 
 
 def _library() -> Any:

@@ -1,57 +1,131 @@
-"""Smooth interpolation of plans over outcomes: the strongest way to mix demonstrations we know.
+"""Generators that keep the demonstrations and mix them, frame by frame.
 
-    A(c) = sum_i w_i(c) A_i,    w_i the cardinal weights of a polyharmonic spline, affine tail
+    A(c) = sum_i w_i(c) A_i
 
-Not in the paper; ours, because it asks how much of a generator's work is done by the assumption
-that plans depend smoothly on outcomes. On aligned demonstrations it is hard to beat
-(docs/baselines.md); on misaligned ones it blurs motions, as every frame-by-frame mixture does.
+- `NearestNeighbours`: the paper's simplest baseline, "I.N.N.", w_i proportional to |c - r_i|^-p over
+  the m nearest outcomes.
+- `SmoothInterpolation`: w the cardinal weights of a polyharmonic spline with an affine tail, the
+  strongest way to mix demonstrations we know. Not in the paper; ours, because it asks how much of a
+  generator's work is done by the assumption that plans depend smoothly on outcomes.
+
+Demonstrations that begin their motion at different times give a blur of two motions rather than one
+in between; on aligned ones the second is hard to beat (`alignment`, docs/baselines.md).
 
 Notation:
-    A_i  plans       (N, H, D)  in their units
-    r_i  outcomes    (N, k)     in their units
-    c    conditions  (n, k)     in the outcomes' units
+    A_i  plans       in their units
+    r_i  outcomes    in their units
+    c    conditions  in the outcomes' units
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import ClassVar, get_args
+from abc import abstractmethod
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any, ClassVar
 
 import numpy as np
+from jaxtyping import Float
+from typing_extensions import Self
 
-from prior_reinforce.errors import ConfigurationError
-from prior_reinforce.generators.outcome_weights import Kernel, smooth_weights
-from prior_reinforce.generators.plan_mixture import PlanMixture
+from prior_reinforce.arrays import Plans, Points
+from prior_reinforce.generators.base import Generator, Report, at_once
+from prior_reinforce.generators.config import Checked, Count, Positive
+from prior_reinforce.generators.outcome_weights import (
+    Kernel,
+    inverse_distance_weights,
+    smooth_weights,
+)
+from prior_reinforce.generators.saving import Tensors
+from prior_reinforce.plans.motions import Demonstrations
+from prior_reinforce.registry import build
 
 
 @dataclass(frozen=True)
-class SmoothInterpolationConfig:
+class NearestNeighboursConfig(Checked):
+    """How neighbours are weighted; docs/baselines.md tells what was tried."""
+
+    neighbours: Count = 3
+    """m, how many of the nearest demonstrations take part; all where there are fewer."""
+    power: Positive = 2.0
+    """p, how fast a demonstration's weight falls with the distance of its outcome."""
+
+
+@dataclass(frozen=True)
+class SmoothInterpolationConfig(Checked):
     """How plans are interpolated; docs/baselines.md tells what was tried."""
 
     kernel: Kernel = "thin-plate"
     """Radial function: of least bending (`thin-plate`), or of distance itself (`linear`)."""
 
-    def __post_init__(self) -> None:
-        """Check the settings.
 
-        Raises:
-            ConfigurationError: There is no such kernel.
-        """
-        if self.kernel not in get_args(Kernel):
-            raise ConfigurationError(f"no kernel {self.kernel!r}; use one of {get_args(Kernel)}")
+class _Mixture(Generator):
+    """Weighted sums of the demonstrated plans; a member says what the weights are."""
+
+    config_type: ClassVar[type[Any]]
+    _plans: Plans
+    _outcomes: Points
+
+    def __init__(self, config: Any = None) -> None:
+        """Choose settings; the defaults when None."""
+        self.config = config or self.config_type()
+
+    @abstractmethod
+    def weights(
+        self, conditions: Points, outcomes: Float[np.ndarray, "N k"]
+    ) -> Float[np.ndarray, "n N"]:
+        """How much of each plan goes into the plan for each condition."""
+
+    def _fit(self, demonstrations: Demonstrations, seed: int, progress: Report) -> None:
+        """Keep the demonstrations; nothing is random and nothing takes time."""
+        self._plans = demonstrations.plans.copy()
+        self._outcomes = demonstrations.outcomes_seen.copy()
+        at_once(progress, loss=0.0)
+
+    def _generate(self, conditions: Points) -> Plans:
+        weights = self.weights(conditions, self._outcomes)
+        return np.tensordot(weights, self._plans, axes=1)
+
+    def state(self) -> tuple[dict[str, Any], Tensors]:
+        """The demonstrations; see `Generator.state`."""
+        return {"config": asdict(self.config)}, {"plans": self._plans, "outcomes": self._outcomes}
+
+    @classmethod
+    def from_state(cls, settings: Mapping[str, Any], tensors: Tensors) -> Self:
+        """Rebuild it; see `Generator.from_state`."""
+        generator = cls(build(cls.config_type, settings["config"]))
+        plans, outcomes = tensors["plans"], tensors["outcomes"]
+        if plans.ndim != 3 or outcomes.ndim != 2 or len(plans) != len(outcomes):
+            raise ValueError(f"plans {plans.shape} and outcomes {outcomes.shape} do not fit")
+        generator._plans, generator._outcomes = plans, outcomes
+        return generator
 
 
-class SmoothInterpolation(PlanMixture):
+class NearestNeighbours(_Mixture):
+    """Inverse-distance interpolation of the nearest plans (paper, "I.N.N.")."""
+
+    name: ClassVar[str] = "nearest"
+    config_type: ClassVar[type[NearestNeighboursConfig]] = NearestNeighboursConfig
+    config: NearestNeighboursConfig
+
+    def weights(
+        self, conditions: Points, outcomes: Float[np.ndarray, "N k"]
+    ) -> Float[np.ndarray, "n N"]:
+        """Weigh the nearest plans; at a demonstration's outcome, its own alone."""
+        return inverse_distance_weights(
+            conditions, outcomes, neighbours=self.config.neighbours, power=self.config.power
+        )
+
+
+class SmoothInterpolation(_Mixture):
     """Polyharmonic-spline interpolation of plans over outcomes (ours)."""
 
     name: ClassVar[str] = "interpolation"
     config_type: ClassVar[type[SmoothInterpolationConfig]] = SmoothInterpolationConfig
     config: SmoothInterpolationConfig
 
-    def __init__(self, config: SmoothInterpolationConfig | None = None) -> None:
-        """Choose settings; the defaults when None."""
-        super().__init__(config or SmoothInterpolationConfig())
-
-    def weights(self, conditions: np.ndarray, outcomes: np.ndarray) -> np.ndarray:
+    def weights(
+        self, conditions: Points, outcomes: Float[np.ndarray, "N k"]
+    ) -> Float[np.ndarray, "n N"]:
         """Weigh all plans; at a demonstration's outcome its own alone, to rounding."""
         return smooth_weights(conditions, outcomes, kernel=self.config.kernel)

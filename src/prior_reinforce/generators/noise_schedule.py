@@ -10,22 +10,27 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import torch
+from jaxtyping import Float, Int
 from typing_extensions import assert_never
 
-from prior_reinforce.generators.diffusion_config import Prediction
+from prior_reinforce.generators.diffusion import Prediction
+from prior_reinforce.generators.threads import torch
 
 # Nichol and Dhariwal 2021, "Improved Denoising Diffusion Probabilistic Models", section 3.2.
 _COSINE_OFFSET = 0.008
 _LARGEST_BETA = 0.999
+
+Codes = Float[torch.Tensor, "B C T"]
+Steps = Int[torch.Tensor, " B"]
+"""t of each sample of a batch."""
 
 
 @dataclass(frozen=True, eq=False)
 class NoiseSchedule:
     """How much of the sample is left at every step."""
 
-    signal: torch.Tensor
-    """abar_t, the share of the variance that is signal, shape (T,), float64, falling."""
+    signal: Float[torch.Tensor, " T"]
+    """abar_t, the share of the variance that is signal, float64, falling."""
 
     @classmethod
     def squared_cosine(cls, n_steps: int) -> NoiseSchedule:
@@ -48,23 +53,13 @@ class NoiseSchedule:
         """Return abar of one step; 1 for the clean sample, step -1."""
         return 1.0 if step < 0 else float(self.signal[step])
 
-    def add_noise(
-        self, clean: torch.Tensor, noise: torch.Tensor, steps: torch.Tensor
-    ) -> torch.Tensor:
-        """Return x_t, shape (B, C, T), for clean samples and unit noise of that shape.
-
-        Args:
-            clean: x_0, shape (B, C, T).
-            noise: eps, shape (B, C, T).
-            steps: t of each sample, integers, shape (B,).
-        """
+    def add_noise(self, clean: Codes, noise: Codes, steps: Steps) -> Codes:
+        """Return x_t for clean samples x_0 and unit noise eps."""
         keep, add = self._mix(steps, clean)
         return keep * clean + add * noise
 
-    def target(
-        self, clean: torch.Tensor, noise: torch.Tensor, steps: torch.Tensor, prediction: Prediction
-    ) -> torch.Tensor:
-        """Return what the network has to predict at x_t; shapes as in `add_noise`."""
+    def target(self, clean: Codes, noise: Codes, steps: Steps, prediction: Prediction) -> Codes:
+        """Return what the network has to predict at x_t."""
         if prediction == "epsilon":
             return noise
         if prediction == "sample":
@@ -75,13 +70,13 @@ class NoiseSchedule:
         assert_never(prediction)
 
     def clean_estimate(
-        self, noisy: torch.Tensor, predicted: torch.Tensor, step: int, prediction: Prediction
-    ) -> torch.Tensor:
+        self, noisy: Codes, predicted: Codes, step: int, prediction: Prediction
+    ) -> Codes:
         """Return the estimate of x_0 that a prediction at x_t amounts to.
 
         Args:
-            noisy: x_t, shape (B, C, T).
-            predicted: The network's answer, shape (B, C, T).
+            noisy: x_t.
+            predicted: The network's answer.
             step: t, one for the whole batch.
             prediction: What the answer means.
         """
@@ -95,13 +90,11 @@ class NoiseSchedule:
             return (noisy - add * predicted) / keep
         assert_never(prediction)
 
-    def ddim_step(
-        self, noisy: torch.Tensor, clean: torch.Tensor, step: int, next_step: int
-    ) -> torch.Tensor:
+    def ddim_step(self, noisy: Codes, clean: Codes, step: int, next_step: int) -> Codes:
         """Go from x_t to x_s, s < t, without fresh noise (Song et al., equation 12, sigma = 0).
 
         Args:
-            noisy: x_t, shape (B, C, T).
+            noisy: x_t.
             clean: The (clipped) estimate of x_0; the noise direction is recomputed from it.
             step: t.
             next_step: s; -1 gives the clean sample itself.
@@ -111,17 +104,17 @@ class NoiseSchedule:
         return math.sqrt(next_signal) * clean + math.sqrt(1 - next_signal) * noise
 
     def ddpm_step(
-        self, noisy: torch.Tensor, clean: torch.Tensor, step: int, noise: torch.Tensor
-    ) -> torch.Tensor:
+        self, noisy: Codes, clean: Codes, step: int, noise: Float[torch.Tensor, "#B C T"]
+    ) -> Codes:
         """Draw x_{t-1} given x_t (Ho et al., equations 6 and 7).
 
         The variance is the posterior's ("fixed small"); the last step, t = 0, adds none.
 
         Args:
-            noisy: x_t, shape (B, C, T).
+            noisy: x_t.
             clean: The (clipped) estimate of x_0.
             step: t.
-            noise: Unit Gaussian noise that broadcasts to x_t.
+            noise: Unit Gaussian noise, one for all or one each.
         """
         signal, previous = self.signal_at(step), self.signal_at(step - 1)
         alpha = signal / previous
@@ -134,7 +127,9 @@ class NoiseSchedule:
             return mean
         return mean + math.sqrt(beta * (1 - previous) / (1 - signal)) * noise
 
-    def _mix(self, steps: torch.Tensor, like: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+    def _mix(
+        self, steps: Steps, like: Codes
+    ) -> tuple[Float[torch.Tensor, "B 1 1"], Float[torch.Tensor, "B 1 1"]]:
         signal = self.signal.to(steps.device)[steps].view(-1, 1, 1)
         return signal.sqrt().to(like.dtype), (1 - signal).sqrt().to(like.dtype)
 

@@ -14,120 +14,65 @@ Notation:
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
-import numpy as np
-from typing_extensions import Self
-
-from prior_reinforce.errors import FileFormatError, NotFittedError
-from prior_reinforce.generators.base import FitProgress, Generator
-from prior_reinforce.generators.conditions import ConditionScale
-from prior_reinforce.generators.regression_config import UNetRegressionConfig
-from prior_reinforce.generators.saving import read_model, write_model
-from prior_reinforce.generators.threads import torch_threads
-from prior_reinforce.generators.timed import StartTimeCodec
-from prior_reinforce.plans.motions import Demonstrations
+from prior_reinforce.generators.base import Report
+from prior_reinforce.generators.config import Count, NonNegative, Positive, UNetConfig
+from prior_reinforce.generators.network import Learned, NetworkGenerator
 
 if TYPE_CHECKING:
-    from prior_reinforce.generators.coded_network import CodedNetwork
-    from prior_reinforce.generators.regression_network import RegressionNetwork
+    import torch
+
+    from prior_reinforce.generators.unet import RegressionNetwork
 
 
-class UNetRegression(Generator):
+@dataclass(frozen=True)
+class UNetRegressionConfig(UNetConfig):
+    """Everything that decides what `UNetRegression` learns; docs/baselines.md tells what was tried.
+
+    Network and representation default to the diffusion generator's, so that the two differ in
+    nothing but diffusion.
+    """
+
+    training_steps: Count = 800
+    """Optimiser steps, each on all demonstrations."""
+    learning_rate: Positive = 3e-3
+    """Peak of the cosine schedule, which ends at 0."""
+    weight_decay: NonNegative = 2.0
+    """Of AdamW. Large, because a network that meets six demonstrations to a milliradian ripples
+    between them: with next to none the error at new goals was three times as large."""
+
+
+class UNetRegression(NetworkGenerator):
     """Supervised regression of plans on outcomes by a U-Net (paper, "UNet")."""
 
     name: ClassVar[str] = "regression"
+    config_type: ClassVar[type[UNetRegressionConfig]] = UNetRegressionConfig
+    config: UNetRegressionConfig
 
-    def __init__(
-        self, config: UNetRegressionConfig | None = None, *, threads: int | None = None
-    ) -> None:
-        """Choose settings.
+    def _build(self, channels: int, length: int, outcome_dim: int) -> RegressionNetwork:
+        from prior_reinforce.generators.unet import RegressionNetwork
 
-        Args:
-            config: All settings; the defaults when None.
-            threads: Cores to train on; all when None. The last digits depend on it. Plans are
-                generated on one core, so that a model means the same ones on any number.
-        """
-        self.config = config or UNetRegressionConfig()
-        self._threads = threads
-        self._fitted: CodedNetwork[RegressionNetwork] | None = None
+        return RegressionNetwork(channels, length, outcome_dim, self.config.network)
 
-    def fit(
+    def _train(
         self,
-        demonstrations: Demonstrations,
-        *,
+        network: torch.nn.Module,
+        codes: torch.Tensor,
+        conditions: torch.Tensor,
         seed: int,
-        progress: Callable[[FitProgress], None] | None = None,
-    ) -> Self:
-        """Learn from all demonstrations; the seed draws initial weights. See `Generator.fit`."""
-        from prior_reinforce.generators.coded_network import CodedNetwork, as_tensor
-        from prior_reinforce.generators.regression_network import train
+        progress: Report,
+    ) -> torch.nn.Module:
+        """Fit to all demonstrations at every step; the seed has drawn the initial weights."""
+        from torch.nn.functional import mse_loss
 
-        codec, codes = StartTimeCodec.fit(
-            demonstrations,
-            start_times=self.config.start_times,
-            representation=self.config.representation,
-            frames_per_point=self.config.frames_per_point,
-            length_multiple=self.config.network.length_multiple,
-            margin=self.config.margin,
-        )
-        scale = ConditionScale.fit(demonstrations.outcomes_seen)
-        with torch_threads(self._threads):
-            network = train(
-                as_tensor(codes, "cpu"),
-                as_tensor(scale.scale(demonstrations.outcomes_seen), "cpu"),
-                self.config,
-                seed,
-                progress,
-            )
-        self._fitted = CodedNetwork(codec, scale, network, "cpu")
-        return self
+        from prior_reinforce.generators.training import optimise
 
-    @property
-    def codec(self) -> StartTimeCodec:
-        """How plans are coded, decided by `fit`."""
-        return self._require().codec
-
-    def generate(self, conditions: np.ndarray) -> np.ndarray:
-        """One forward pass for each condition; see `Generator.generate`."""
-        fitted = self._require()
-        return fitted.generate(conditions, fitted.network)
-
-    def save(self, folder: str | os.PathLike[str]) -> None:
-        """Write `config.json` and `model.safetensors`; see `Generator.save`."""
-        fitted = self._require()
-        write_model(
-            folder,
-            self.name,
-            {"config": asdict(self.config), "codec": fitted.codec.settings()},
-            fitted.tensors(),
+        return optimise(
+            network, lambda: mse_loss(network(conditions), codes), self.config, progress
         )
 
-    @classmethod
-    def load(cls, folder: str | os.PathLike[str]) -> Self:
-        """Read what `save` wrote; see `Generator.load`."""
-        from prior_reinforce.generators.coded_network import CodedNetwork
-        from prior_reinforce.generators.regression_network import RegressionNetwork
-
-        saved = read_model(folder, expected=cls.name)
-        try:
-            generator = cls(UNetRegressionConfig.from_json(saved.settings["config"]))
-            size = generator.config.network
-            generator._fitted = CodedNetwork.restore(
-                saved.settings["codec"],
-                saved.tensors,
-                lambda codec, k: RegressionNetwork(codec.channels, codec.length, k, size),
-            )
-        except (KeyError, TypeError, ValueError, RuntimeError) as error:
-            raise FileFormatError(
-                f"{folder} holds no complete {cls.name} generator ({error!r}); learn it again"
-            ) from error
-        return generator
-
-    def _require(self) -> CodedNetwork[RegressionNetwork]:
-        if self._fitted is None:
-            raise NotFittedError("this UNetRegression has learned nothing yet; call fit first")
-        return self._fitted
+    def _codes(self, learned: Learned, conditions: torch.Tensor) -> torch.Tensor:
+        codes: torch.Tensor = learned.network(conditions)
+        return codes

@@ -6,25 +6,25 @@ Both are data; reading them runs no code. A SHA-256 of either file's content is 
 
 from __future__ import annotations
 
-import hashlib
 import json
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from safetensors import SafetensorError
-from safetensors.numpy import load as load_tensors
-from safetensors.numpy import save as dump_tensors
+from jaxtyping import Shaped
 
 from prior_reinforce.errors import FileFormatError
+from prior_reinforce.files import sha256, write
 
 _FILE_FORMAT = "prior-reinforce generator"
-_FILE_VERSION = 2
+_FILE_VERSION = 3
+"""3: start times and alignment are a `timed` generator around another, no setting of its own."""
 CONFIG_FILE = "config.json"
 TENSOR_FILE = "model.safetensors"
+
+Tensors = Mapping[str, Shaped[np.ndarray, "..."]]
 
 
 @dataclass(frozen=True)
@@ -33,41 +33,29 @@ class SavedModel:
 
     generator: str
     """`Generator.name` of what was saved."""
-    settings: dict[str, Any]
+    settings: Mapping[str, Any]
     """JSON types."""
-    tensors: dict[str, np.ndarray]
+    tensors: Tensors
 
 
-def write_model(
-    folder: str | os.PathLike[str],
-    generator: str,
-    settings: Mapping[str, Any],
-    tensors: Mapping[str, np.ndarray],
-) -> None:
-    """Write both files, `config.json` last, each by renaming a finished one into place.
+def write_model(folder: Path, model: SavedModel) -> None:
+    """Write both files, `config.json` last; files of these names in the folder are replaced."""
+    from safetensors.numpy import save
 
-    Args:
-        folder: Made if need be; files of these names in it are replaced.
-        generator: `Generator.name`.
-        settings: JSON types only.
-        tensors: Arrays by name.
-    """
-    folder = Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
-    packed = dump_tensors({name: np.ascontiguousarray(array) for name, array in tensors.items()})
+    packed = save({name: np.ascontiguousarray(array) for name, array in model.tensors.items()})
     content = {
         "file_format": _FILE_FORMAT,
         "version": _FILE_VERSION,
-        "generator": generator,
-        "settings": dict(settings),
-        "tensors_sha256": hashlib.sha256(packed).hexdigest(),
+        "generator": model.generator,
+        "settings": dict(model.settings),
+        "tensors_sha256": sha256(packed),
     }
     content["config_sha256"] = _digest(content)
-    _replace(folder / TENSOR_FILE, packed)
-    _replace(folder / CONFIG_FILE, (json.dumps(content, indent=2) + "\n").encode())
+    write(folder / TENSOR_FILE, packed)
+    write(folder / CONFIG_FILE, json.dumps(content, indent=2) + "\n")
 
 
-def read_model(folder: str | os.PathLike[str], expected: str | None = None) -> SavedModel:
+def read_model(folder: Path, expected: str | None = None) -> SavedModel:
     """Read what `write_model` wrote.
 
     Args:
@@ -77,7 +65,9 @@ def read_model(folder: str | os.PathLike[str], expected: str | None = None) -> S
     Raises:
         FileFormatError: Files are missing, truncated, damaged, or of another generator.
     """
-    folder = Path(folder)
+    from safetensors import SafetensorError
+    from safetensors.numpy import load
+
     content = _read_config(folder / CONFIG_FILE)
     generator = content["generator"]
     if expected is not None and generator != expected:
@@ -85,18 +75,17 @@ def read_model(folder: str | os.PathLike[str], expected: str | None = None) -> S
             f"{folder} holds a {generator} generator, not {expected}; load it with load_generator"
         )
     packed = _read(folder / TENSOR_FILE)
-    if hashlib.sha256(packed).hexdigest() != content["tensors_sha256"]:
+    if sha256(packed) != content["tensors_sha256"]:
         raise FileFormatError(
             f"{folder / TENSOR_FILE} is damaged or belongs to another model: its checksum is not "
             f"the one in {CONFIG_FILE}; copy the folder again, or learn the model again"
         )
     try:
-        tensors = load_tensors(packed)
+        return SavedModel(generator, content["settings"], load(packed))
     except SafetensorError as error:
         raise FileFormatError(
             f"{folder / TENSOR_FILE} is not a safetensors file: {error}"
         ) from error
-    return SavedModel(generator, content["settings"], tensors)
 
 
 def _read_config(path: Path) -> dict[str, Any]:
@@ -119,7 +108,7 @@ def _read_config(path: Path) -> dict[str, Any]:
 
 
 def _digest(content: Mapping[str, Any]) -> str:
-    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+    return sha256(json.dumps(content, sort_keys=True).encode())
 
 
 def _read(path: Path) -> bytes:
@@ -129,9 +118,3 @@ def _read(path: Path) -> bytes:
         raise FileFormatError(
             f"cannot read {path} ({error.strerror}); give the folder that a generator was saved to"
         ) from error
-
-
-def _replace(path: Path, content: bytes) -> None:
-    unfinished = path.with_name(path.name + ".unfinished")
-    unfinished.write_bytes(content)
-    os.replace(unfinished, path)

@@ -1,24 +1,30 @@
-"""How many cores torch computes on, changed for a while and put back."""
+"""Torch, imported in this one place with threads that sleep while they wait, and how many it uses.
+
+OpenMP's threads spin by default: two of one training, beside other work, made it take over ten
+times as long. How they wait is read once, when torch is loaded, so it has to be set before.
+"""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from prior_reinforce.cores import available_cores
+os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
+
+import torch as torch
+from torch import nn as nn
 
 
 @contextmanager
-def torch_threads(n: int | None) -> Iterator[None]:
-    """Let torch compute on n threads inside the block; as many as there are cores where None.
+def torch_threads(n: int) -> Iterator[None]:
+    """Let torch compute on n threads inside the block.
 
     The number is part of a result's last digits: sums are split among threads. So it is set rather
     than inherited from whoever calls.
     """
-    import torch  # here, because it takes seconds and most commands do without
-
     before = torch.get_num_threads()
-    torch.set_num_threads(n or available_cores())
+    torch.set_num_threads(n)
     try:
         # On CUDA, the same seed gives the same numbers only with deterministic kernels.
         with torch.backends.cudnn.flags(enabled=True, benchmark=False, deterministic=True):

@@ -1,276 +1,157 @@
-"""When a motion starts, coded as one number beside the motion itself.
+"""Any generator, relieved of timing: it learns motions that all begin at the same frame.
 
-Demonstrations of one throw start at different times. Code them frame by frame and a network that
-is asked for something between two of them averages a swing that has begun with one that has not,
-which slows it: a throw 0.1 s too early and one 0.1 s too late average to one that lands 8 cm short
-(docs/tasks/basketball.md). Here every plan is cut out of its own resting ends and its start time
-becomes an extra channel of the code, so that the diffusion model generates both together. Whole
-frames are moved, so nothing is lost: plans come back as recorded.
+Demonstrations of one throw start at different times. A generator that is asked for something
+between two of them averages a swing that has begun with one that has not, which slows it: a throw
+0.1 s too early and one 0.1 s too late average to one that lands 8 cm short
+(docs/tasks/basketball.md). Two remedies, for every generator:
 
-Ours; the paper leaves the misalignment to the network, or removes it by hand ("Timeline Aligned
-Variants"). Start time and duration are parameters of their own in movement primitives as well
-[Ijspeert2013]. Only where all demonstrations start and end at rest; else nothing is cut out, and
-`StartTimeCodec.whole_because` says why.
+- `start`: every plan is cut out of its own resting ends, and the frame at which it starts becomes
+  one more dimension of the plan, constant over it, which the generator learns with the motion.
+  Whole frames are moved, so nothing is lost: plans come back as recorded. Ours; start time and
+  duration are parameters of their own in movement primitives as well [Ijspeert2013]. Only where all
+  demonstrations start and end at rest; else it learns whole plans, and `remarks` says why.
+- `align`: the demonstrations are aligned first (`plans.alignment`), so that all generated plans
+  start together (paper, "Timeline Aligned Variants").
 """
 
 from __future__ import annotations
 
-from contextlib import suppress
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any, ClassVar, Literal, get_args
 
 import numpy as np
-from scipy.special import betainc
 from typing_extensions import Self
 
-from prior_reinforce.plans.alignment import AlignmentConfig, NotAtRestError, align
-from prior_reinforce.plans.codec import PlanCodec, Representation
+from prior_reinforce.arrays import Plans, Points
+from prior_reinforce.errors import ConfigurationError
+from prior_reinforce.generators.base import Generator, Report
+from prior_reinforce.generators.saving import SavedModel, Tensors
+from prior_reinforce.plans.alignment import align
 from prior_reinforce.plans.motions import Demonstrations
-from prior_reinforce.plans.timing import velocity_profiles
+from prior_reinforce.plans.timing import CannotShiftError, Cut, cut_out, shift
 
-_PADDING = 4
-"""Resting frames kept at either end of the cut-out motion, if there are as many: about one control
-point, which a spline needs to come to rest."""
-_TREMOR = 0.05
-"""Where a hand's tremor never rests, slower than this part of a demonstration's peak speed counts
-as rest. Ours: tremor of the shipped tele-operated sets reaches 0.03, their motions start within two
-frames of it."""
-_TREMOR_LOST = 0.01
-"""What holding may change of any demonstration, rms: this part of the largest range among the
-dimensions of that unit. Ours: the shipped tele-operated sets lose at most 0.008, and land within
-5 mm of where they did."""
-_TREMOR_PADDING = 12
-"""`_PADDING` where rest is told from speed: a motion's slow onset is then kept well inside."""
+Timing = Literal["start", "align"]
+_START = "start"
+"""Name of the dimension that says when a motion starts, in frames."""
 
 
-@dataclass(frozen=True, eq=False)
-class StartTimeCodec:
-    """Turns plans into codes of a motion and its start, and back; made by `fit`."""
+class Timed(Generator):
+    """A generator that learns when motions start apart from the motions, or learns aligned ones."""
 
-    motion: PlanCodec
-    """Codec of the cut-out motions, or of whole plans where `starts` is None."""
-    horizon: int
-    """H, frames of a whole plan."""
-    starts: tuple[int, int] | None
-    """Earliest and latest frame at which a demonstration's cut-out begins; None where start times
-    are not coded."""
-    whole_because: str | None = None
-    """What kept start times from being coded although they differ, as a clause: which demonstration
-    and which end. None where they are coded, or all the same, or were not to be."""
+    name: ClassVar[str] = "timed"
 
-    @classmethod
-    def fit(
-        cls,
-        demonstrations: Demonstrations,
-        *,
-        start_times: bool,
-        representation: Representation,
-        frames_per_point: int,
-        length_multiple: int,
-        margin: float,
-    ) -> tuple[Self, np.ndarray]:
-        """Choose a code, and code the demonstrations.
+    def __init__(self, generator: Generator, timing: Timing = "start") -> None:
+        """Wrap a generator.
 
         Args:
-            demonstrations: N plans (N, H, D).
-            start_times: Code start times as a channel of their own, where that is possible.
-            representation: See `PlanCodec.fit`, and so are the next three.
-            frames_per_point: Frames for each control point.
-            length_multiple: T will be a multiple of this.
-            margin: How far generated plans may leave the demonstrated range.
+            generator: Learns the motions; it is fitted with this one.
+            timing: `start` or `align`, see the module.
 
-        Returns:
-            The codec, and codes of the demonstrations, shape (N, C, T).
+        Raises:
+            ConfigurationError: There is no such timing, or the generator is timed already.
         """
-        plans = demonstrations.plans
-        cut, whole_because = None, None
-        if start_times:
-            try:
-                cut = _cut(demonstrations)
-            except NotAtRestError as error:
-                whole_because = error.where
-            except _CannotCutError as error:
-                whole_because = str(error)
-        if cut is not None:
-            plans = _settled(_moved(plans, -cut.begins, cut.length), cut.before, cut.after)
-        motion = PlanCodec.fit(
-            plans,
-            representation=representation,
-            frames_per_point=frames_per_point,
-            length_multiple=length_multiple,
-            margin=margin,
-        )
-        codes = motion.encode(plans)
-        if cut is None:
-            return cls(motion, demonstrations.horizon, None, whole_because), codes
-        codec = cls(motion, demonstrations.horizon, (int(cut.begins.min()), int(cut.begins.max())))
-        centre, half = codec._scale()
-        start = ((cut.begins - centre) / half)[:, None, None]
-        channel = np.broadcast_to(start, (len(codes), 1, codes.shape[2]))
-        return codec, np.concatenate([codes, channel], axis=1)
+        if timing not in get_args(Timing):
+            raise ConfigurationError(f"timing must be one of {get_args(Timing)}, got {timing!r}")
+        if isinstance(generator, Timed):
+            raise ConfigurationError("this generator is timed already; wrap it once")
+        self.generator = generator
+        self.timing = timing
+        self._horizon = 0
+        self._starts: tuple[int, int] | None = None
 
     @property
-    def channels(self) -> int:
-        """C, the numbers of a code at one position."""
-        return self.motion.channels + (self.starts is not None)
+    def starts(self) -> tuple[int, int] | None:
+        """Earliest and latest frame at which a demonstration starts; None if not learned."""
+        return self._starts
 
-    @property
-    def length(self) -> int:
-        """T, the positions of a code."""
-        return self.motion.length
+    def _fit(self, demonstrations: Demonstrations, seed: int, progress: Report) -> None:
+        self._horizon, self._starts = demonstrations.horizon, None
+        if self.timing == "align":
+            learned = align(demonstrations).demonstrations
+        else:
+            learned = self._started_together(demonstrations)
+        self.generator.fit(learned, seed=seed, progress=progress)
+        self.remarks = (*self.remarks, *self.generator.remarks)
 
-    @property
-    def action_dim(self) -> int:
-        """D."""
-        return len(self.motion.smooth)
+    def _generate(self, conditions: Points) -> Plans:
+        plans = self.generator.generate(conditions)
+        if self._starts is None:
+            return plans
+        begins = np.clip(np.round(plans[:, 0, -1]), *self._starts).astype(int)
+        return shift(plans[:, :, :-1], begins, self._horizon)
 
-    def decode(self, codes: np.ndarray) -> np.ndarray:
-        """Return plans (n, H, D) of codes (n, C, T)."""
-        if self.starts is None:
-            return self.motion.decode(codes)
-        centre, half = self._scale()
-        begins = codes[:, -1].mean(axis=1) * half + centre
-        whole = np.clip(np.round(begins), *self.starts).astype(int)
-        return _moved(self.motion.decode(codes[:, :-1]), whole, self.horizon)
+    def to(self, device: str) -> Self:
+        """Compute on another device from now on; see `Generator.to`."""
+        self.generator.to(device)
+        return self
 
-    def settings(self) -> dict[str, Any]:
-        """Everything but the arrays, as JSON types."""
-        starts = None if self.starts is None else list(self.starts)
-        return {
-            "motion": self.motion.settings(),
-            "horizon": self.horizon,
-            "starts": starts,
-            "whole_because": self.whole_because,
+    def state(self) -> tuple[dict[str, Any], Tensors]:
+        """What the wrapped generator learned, and where motions start; see `Generator.state`."""
+        inner = self.generator.pack()
+        settings = {
+            "timing": self.timing,
+            "horizon": self._horizon,
+            "starts": None if self._starts is None else list(self._starts),
+            "generator": inner.generator,
+            "settings": dict(inner.settings),
         }
+        return settings, inner.tensors
 
     @classmethod
-    def restore(
-        cls, settings: dict[str, Any], plan_range: np.ndarray, code_range: np.ndarray
+    def from_state(
+        cls, settings: Mapping[str, Any], tensors: Tensors, kind: type[Generator] | None = None
     ) -> Self:
-        """Rebuild a codec from its `settings` and the motion codec's arrays."""
-        starts = settings["starts"]
-        return cls(
-            PlanCodec.restore(settings["motion"], plan_range, code_range),
-            int(settings["horizon"]),
-            None if starts is None else (int(starts[0]), int(starts[1])),
-            # Not in models that were saved before it was kept; they generate the same.
-            settings.get("whole_because"),
+        """Rebuild it; see `Generator.from_state`.
+
+        Args:
+            settings: From `state`.
+            tensors: From `state`.
+            kind: Class of the wrapped generator, where it is not one of ours.
+        """
+        from prior_reinforce.generators import class_named
+
+        inner = SavedModel(settings["generator"], settings["settings"], tensors)
+        timed = cls((kind or class_named(inner.generator)).unpack(inner), settings["timing"])
+        timed._horizon = int(settings["horizon"])
+        if settings["starts"] is not None:
+            earliest, latest = settings["starts"]
+            timed._starts = int(earliest), int(latest)
+        return timed
+
+    def _started_together(self, demonstrations: Demonstrations) -> Demonstrations:
+        """The motions alone, with their start as one more dimension; whole plans if that fails."""
+        try:
+            cut = _cut(demonstrations)
+        except CannotShiftError as error:
+            self.remarks = (
+                "start times are not learned apart from the motion, which costs accuracy: "
+                f"{error.reason}; record from rest to rest, with rest enough at both ends",
+            )
+            return demonstrations
+        if cut is None:
+            return demonstrations
+        self._starts = int(cut.begins.min()), int(cut.begins.max())
+        motions = cut.motions(demonstrations.plans)
+        starts = np.broadcast_to(cut.begins[:, None, None], (*motions.shape[:2], 1))
+        start = _unused_name(demonstrations.format.names)
+        motion_format = replace(
+            demonstrations.format,
+            names=(*demonstrations.format.names, start),
+            units=(*demonstrations.format.units, "frame"),
+            per_plan=(*demonstrations.format.per_plan, start),
         )
-
-    def _scale(self) -> tuple[float, float]:
-        assert self.starts is not None
-        earliest, latest = self.starts
-        return (latest + earliest) / 2, (latest - earliest) / 2
+        return demonstrations.with_plans(np.concatenate([motions, starts], axis=2), motion_format)
 
 
-class _CannotCutError(Exception):
-    """Start times differ and cannot be coded; the message says why, as a clause."""
-
-
-@dataclass(frozen=True, eq=False)
-class _Cut:
-    """Where the motions are cut out."""
-
-    begins: np.ndarray
-    """Frame at which each demonstration's cut-out begins, shape (N,)."""
-    length: int
-    """Frames of every cut-out; outside it a demonstration holds its ends."""
-    before: int
-    """Frames of it before the first motion begins."""
-    after: int
-    """Frames of it after the last motion has ended."""
-
-
-def _cut(demonstrations: Demonstrations) -> _Cut | None:
-    """Find the cut-outs; None where start times do not differ.
-
-    They cannot be told where a demonstration moves at an end that would have to be held, nor moved
-    where the longest motion with the latest start would not end within the plan. Where hands
-    tremble to the very ends, no frame rests exactly; what is slow there is held instead.
-
-    Raises:
-        NotAtRestError: They cannot be told.
-        _CannotCutError: They cannot be moved, or the tremor is too large to be held.
-    """
+def _cut(demonstrations: Demonstrations) -> Cut | None:
+    """Where motions are cut out; None where all start together."""
     delays = -np.round(align(demonstrations).shifts / demonstrations.format.dt).astype(int)
-    if np.ptp(delays) == 0:
-        return None
-    plans = demonstrations.plans
-    moving = [np.flatnonzero(np.any(plan[1:] != plan[:-1], axis=1)) for plan in plans]
-    with suppress(_CannotCutError):
-        return _window(moving, delays, demonstrations.horizon, _PADDING)
-    smoothing = AlignmentConfig().smoothing / demonstrations.format.dt
-    profiles = velocity_profiles(plans, demonstrations.format.units, smoothing)
-    speeds = np.linalg.norm(profiles, axis=2)
-    moving = [np.flatnonzero(speed > _TREMOR * speed.max()) for speed in speeds]
-    cut = _window(moving, delays, demonstrations.horizon, _TREMOR_PADDING)
-    _check_held(cut, demonstrations)
-    return cut
+    return None if np.ptp(delays) == 0 else cut_out(demonstrations, delays)
 
 
-def _check_held(cut: _Cut, demonstrations: Demonstrations) -> None:
-    """Refuse to hold ends that do not tremble but move."""
-    plans, plan_format = demonstrations.plans, demonstrations.format
-    motions = _settled(_moved(plans, -cut.begins, cut.length), cut.before, cut.after)
-    squares = (_moved(motions, cut.begins, demonstrations.horizon) - plans) ** 2
-    ranges, units = np.ptp(plans, axis=(0, 1)), np.array(plan_format.units)
-    largest = np.array([ranges[units == unit].max() for unit in units])
-    lost = np.sqrt(np.mean(squares, axis=1))
-    if np.all(lost <= _TREMOR_LOST * largest):
-        return
-    share = lost / np.where(largest > 0, largest, 1.0)
-    i, d = np.unravel_index(share.argmax(), share.shape)
-    middle = int(cut.begins[i]) + cut.length // 2
-    end = "before" if squares[i, :middle, d].sum() > squares[i, middle:, d].sum() else "after"
-    raise _CannotCutError(
-        f"demonstration {i} does not rest {end} its motion: holding {plan_format.names[d]} still "
-        f"there would change it by {share[i, d]:.1%} of the largest range, rms (at most "
-        f"{_TREMOR_LOST:.0%} counts as tremor)"
-    )
-
-
-def _window(moving: list[np.ndarray], delays: np.ndarray, horizon: int, padding: int) -> _Cut:
-    """The shortest common cut-out that holds every motion, if it fits into the plan at any start.
-
-    A slower motion may be generated with a later start than any demonstrated pair of the two: the
-    cut-out has to lie within the plan at every start, so that no rest is ever cut off.
-
-    Raises:
-        _CannotCutError: It does not fit.
-    """
-    some = [i for i, frames in enumerate(moving) if frames.size]
-    firsts = {i: int(moving[i][0] - delays[i]) for i in some}
-    lasts = {i: int(moving[i][-1]) + 1 - int(delays[i]) for i in some}
-    first, last = min(firsts.values()), max(lasts.values())
-    before = min(padding, int(delays.min()) + first)
-    after = min(padding, horizon - 1 - int(delays.max()) - last)
-    if before < 0:
-        raise _CannotCutError(
-            f"demonstration {min(firsts, key=firsts.__getitem__)}'s motion, begun as early as "
-            f"demonstration {int(delays.argmin())}'s, would begin {-before} frames before the plan"
-        )
-    if after < 0:
-        raise _CannotCutError(
-            f"demonstration {max(lasts, key=lasts.__getitem__)}'s motion, begun as late as "
-            f"demonstration {int(delays.argmax())}'s, would end {-after} frames after the plan"
-        )
-    return _Cut(delays + first - before, last - first + 1 + before + after, before, after)
-
-
-def _moved(plans: np.ndarray, by: np.ndarray, length: int) -> np.ndarray:
-    """Plans (n, H, D) that many frames later, their ends held, cut to a length; (n, length, D)."""
-    frames = np.clip(np.arange(length) - by[:, None], 0, plans.shape[1] - 1)
-    return plans[np.arange(len(plans))[:, None], frames]
-
-
-def _settled(motions: np.ndarray, before: int, after: int) -> np.ndarray:
-    """Motions (n, L, D) that grow out of their first frame and die down to their last, smoothly.
-
-    Where ends rest exactly nothing changes; tremor that is cut in mid-swing would jerk the arm.
-    """
-    frames = np.arange(motions.shape[1])
-    rise = betainc(3, 3, np.minimum(1.0, frames / max(1, before)))[:, None]
-    fall = betainc(3, 3, np.minimum(1.0, frames[::-1] / max(1, after)))[:, None]
-    first, last = motions[:, :1], motions[:, -1:]
-    settled = first + rise * (motions - first)
-    return np.asarray(last + fall * (settled - last))
+def _unused_name(names: tuple[str, ...]) -> str:
+    start = _START
+    while start in names:
+        start += "_"
+    return start

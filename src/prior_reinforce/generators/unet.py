@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import math
 
-import torch
-from torch import nn
+from jaxtyping import Float, Shaped
 
-from prior_reinforce.generators.unet_size import UNetSize
+from prior_reinforce.generators.config import UNetSize
+from prior_reinforce.generators.threads import nn, torch
 
 
 class ConditionalUNet(nn.Module):
@@ -56,17 +56,17 @@ class ConditionalUNet(nn.Module):
         )
 
     def forward(
-        self, noisy: torch.Tensor, steps: torch.Tensor, conditions: torch.Tensor
-    ) -> torch.Tensor:
+        self,
+        noisy: Float[torch.Tensor, "B C T"],
+        steps: Shaped[torch.Tensor, " B"],
+        conditions: Float[torch.Tensor, "B k"],
+    ) -> Float[torch.Tensor, "B C T"]:
         """Predict for each sample of a batch.
 
         Args:
-            noisy: x_t, shape (B, C, T); T a multiple of `UNetSize.length_multiple`.
-            steps: t, shape (B,).
-            conditions: Normalised conditions, shape (B, k).
-
-        Returns:
-            The prediction, shape (B, C, T).
+            noisy: x_t; T a multiple of `UNetSize.length_multiple`.
+            steps: t.
+            conditions: Normalised conditions.
         """
         context = torch.cat(
             [self.step_embedding(steps), self.condition_embedding(conditions)], dim=-1
@@ -83,6 +83,22 @@ class ConditionalUNet(nn.Module):
             x = grow(pair(torch.cat([x, skips.pop()], dim=1), context))
         prediction: torch.Tensor = self.head(x)
         return prediction
+
+
+class RegressionNetwork(nn.Module):
+    """A `ConditionalUNet` fed with a learned constant instead of a noisy code."""
+
+    def __init__(self, channels: int, length: int, condition_dim: int, size: UNetSize) -> None:
+        super().__init__()
+        self.unet = ConditionalUNet(channels, condition_dim, size)
+        self.input = nn.Parameter(torch.randn(1, channels, length))
+
+    def forward(self, conditions: Float[torch.Tensor, "B k"]) -> Float[torch.Tensor, "B C T"]:
+        """Predict codes for scaled conditions."""
+        n = len(conditions)
+        steps = torch.zeros(n, device=conditions.device)
+        codes: torch.Tensor = self.unet(self.input.expand(n, -1, -1), steps, conditions)
+        return codes
 
 
 class _StepEmbedding(nn.Module):

@@ -11,6 +11,7 @@ from scipy.interpolate import CubicSpline, PchipInterpolator
 
 from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
 from prior_reinforce.importing.recording import Recording
+from prior_reinforce.plans.timing import ends_in_motion
 
 _STILL_SHARE = 0.005
 """A channel counts as still within this share of the largest range of any channel of its unit.
@@ -109,7 +110,7 @@ def preprocess(
                 f"episode {recording.episode} has {len(piece)} frames, more than the horizon "
                 f"{horizon}; give a horizon of {longest}, or a larger dt (motions are never cut)"
             )
-        if len(piece) < horizon and _ends_in_motion(piece):
+        if len(piece) < horizon and ends_in_motion(piece):
             remarks.append(f"{recording.episode}: ends in motion, then holds its last pose")
     if horizon > 400:
         remarks.append(f"{horizon} frames are many; dt {dt * horizon / 140:.2g} s would make 140")

@@ -3,24 +3,33 @@
 A smooth dimension is coded by the control points of a cubic B-spline, about one for every four
 frames; one that a spline cannot follow (a gripper that opens, recorded jitter) by its frames,
 folded so that several consecutive frames share one position of the code. Which it is, is decided
-for each dimension when the codec is fitted, from the demonstrations alone.
-
-Notation:
-    plans  (n, H, D)   in their units
-    codes  (n, C, T)   scaled; T positions in time; C = D, or more where frames are folded
+for each dimension when the codec is fitted, from the demonstrations alone. A dimension that is one
+number a plan is coded by that number at every position, and decoded by their mean.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
-from scipy.interpolate import BSpline
+from jaxtyping import Float
 from typing_extensions import Self
 
+from prior_reinforce.arrays import Plans
+from prior_reinforce.plans.timing import resting_dimensions
+
 Representation = Literal["splines", "frames"]
+"""Splines where they fit, or frames for every dimension."""
+Kind = Literal["spline", "frames", "number"]
+"""How one dimension is coded: by control points, by frames, or by one number a plan."""
+Codes = Float[np.ndarray, "n C T"]
+"""Coded plans: C numbers at each of T positions in time, those of demonstrations in [-1, 1]."""
+_Values = Float[np.ndarray, "n H"]
+"""One dimension of some plans."""
+_Matrix = Float[np.ndarray, "_ _"]
 
 _DEGREE = 3
 _LARGEST_SPLINE_RESIDUAL = 2e-3
@@ -30,8 +39,6 @@ Ours: minimum-jerk throws are missed by 1e-5 to 1e-4, a step by 3e-2 or more; 2e
 1.2 rad is 2.4 mrad, about what moves a landing point by its measuring noise."""
 _MOST_LEVELS = 4
 """A dimension that is not smooth and takes no more values than these is a switch."""
-_REST = 0.01
-"""A dimension rests at an end if its step there is below this fraction of its largest step."""
 _TIED = 3
 """Equal control points at a resting end: velocity and acceleration vanish there."""
 _STIFFNESS = 0.3
@@ -50,25 +57,26 @@ class PlanCodec:
     """H."""
     length: int
     """T."""
-    smooth: tuple[bool, ...]
-    """For each of the D dimensions: coded by control points, else by frames."""
+    kinds: tuple[Kind, ...]
+    """For each of the D dimensions, how it is coded."""
     rest_start: tuple[bool, ...]
     """For each dimension: every demonstration starts at rest."""
     rest_end: tuple[bool, ...]
     """For each dimension: every demonstration ends at rest."""
     levels: tuple[tuple[float, ...], ...]
     """For each dimension: the values of a switch; empty where it is none."""
-    plan_range: np.ndarray
-    """Least and greatest value a dimension may take, shape (2, D): the demonstrations' range,
-    widened by the margin."""
-    code_range: np.ndarray
-    """The values that are scaled to -1 and 1, shape (2, C)."""
+    plan_range: Float[np.ndarray, "2 D"]
+    """Least and greatest value a dimension may take: the demonstrations' range, widened by the
+    margin."""
+    code_range: Float[np.ndarray, "2 C"]
+    """The values that are scaled to -1 and 1."""
 
     @classmethod
     def fit(
         cls,
-        plans: np.ndarray,
+        plans: Plans,
         *,
+        per_plan: Sequence[bool] | None = None,
         representation: Representation,
         frames_per_point: int,
         length_multiple: int,
@@ -77,49 +85,55 @@ class PlanCodec:
         """Choose a code for plans like these.
 
         Args:
-            plans: Demonstrations, shape (N, H, D).
+            plans: Of the demonstrations.
+            per_plan: Which of the D dimensions are one number a plan; none by default.
             representation: `splines` where they fit, or `frames` for every dimension.
             frames_per_point: Frames for each control point.
             length_multiple: T will be a multiple of this.
             margin: How far generated plans may leave the demonstrated range of a dimension, as a
                 fraction of that range.
         """
-        horizon = plans.shape[1]
+        _, horizon, action_dim = plans.shape
         if representation == "frames":
             length = math.ceil(horizon / length_multiple) * length_multiple
         else:
             length = max(1, round(horizon / frames_per_point / length_multiple)) * length_multiple
-        rest = _rest(plans)
-        smooth = [False] * plans.shape[2]
-        if representation == "splines" and _DEGREE < length < horizon:
-            smooth = _smooth(plans, length, *rest)
+        starts, ends = resting_dimensions(plans)
+        splines = representation == "splines" and _DEGREE < length < horizon
+        kinds: list[Kind] = []
+        for d in range(action_dim):
+            if per_plan is not None and per_plan[d]:
+                kinds.append("number")
+            else:
+                fits = splines and _is_smooth(plans[:, :, d], length, starts[d], ends[d])
+                kinds.append("spline" if fits else "frames")
         low, high = plans.min(axis=(0, 1)), plans.max(axis=(0, 1))
         slack = margin * (high - low)
         raw = cls(
             horizon=horizon,
             length=length,
-            smooth=tuple(smooth),
-            rest_start=rest[0],
-            rest_end=rest[1],
+            kinds=tuple(kinds),
+            rest_start=starts,
+            rest_end=ends,
             levels=tuple(
-                () if is_smooth else _levels(plans[:, :, d]) for d, is_smooth in enumerate(smooth)
+                _levels(plans[:, :, d]) if kind == "frames" else () for d, kind in enumerate(kinds)
             ),
             plan_range=np.stack([low - slack, high + slack]),
             code_range=np.array([[-1.0], [1.0]]),
         )
-        per_dimension = [raw._code(plans[:, :, d], d) for d in range(plans.shape[2])]
+        per_dimension = [raw._code(plans[:, :, d], d) for d in range(action_dim)]
         ranges = [
             np.repeat([[code.min()], [code.max()]], code.shape[1], axis=1) for code in per_dimension
         ]
-        return cls(**{**raw.__dict__, "code_range": np.concatenate(ranges, axis=1)})
+        return replace(raw, code_range=np.concatenate(ranges, axis=1))
 
     @property
     def channels(self) -> int:
         """C, the numbers of a code at one position."""
         return self.code_range.shape[1]
 
-    def encode(self, plans: np.ndarray) -> np.ndarray:
-        """Return codes (n, C, T) of plans (n, H, D); demonstrations land in [-1, 1]."""
+    def encode(self, plans: Plans) -> Codes:
+        """Code plans; demonstrations land in [-1, 1]."""
         codes = np.concatenate(
             [self._code(plans[:, :, d], d) for d in range(plans.shape[2])], axis=1
         )
@@ -127,17 +141,21 @@ class PlanCodec:
         scaled: np.ndarray = (codes - centre) / half
         return scaled
 
-    def decode(self, codes: np.ndarray) -> np.ndarray:
-        """Return plans (n, H, D) of codes (n, C, T), at rest and in range as demonstrated."""
+    def decode(self, codes: Codes) -> Plans:
+        """Turn codes into plans, at rest and in range as demonstrated."""
         centre, half = self._scale()
         raw = codes * half + centre
-        plans = np.empty((len(codes), self.horizon, len(self.smooth)))
+        plans = np.empty((len(codes), self.horizon, len(self.kinds)))
         channel = 0
-        for d, is_smooth in enumerate(self.smooth):
-            if is_smooth:
+        for d, kind in enumerate(self.kinds):
+            if kind == "spline":
                 ends = _ends(self.length, self.rest_start[d], self.rest_end[d])
                 free = raw[:, channel] @ np.linalg.pinv(ends).T
                 plans[:, :, d] = free @ _synthesis(self.horizon, ends).T
+                channel += 1
+            elif kind == "number":
+                number = codes[:, channel].mean(axis=1) * half[channel] + centre[channel]
+                plans[:, :, d] = number[:, None]
                 channel += 1
             else:
                 folded = raw[:, channel : channel + self._fold].transpose(0, 2, 1)
@@ -156,21 +174,26 @@ class PlanCodec:
         return {
             "horizon": self.horizon,
             "length": self.length,
-            "smooth": list(self.smooth),
-            "rest_start": list(self.rest_start),
-            "rest_end": list(self.rest_end),
+            **{name: list(getattr(self, name)) for name in ("kinds", "rest_start", "rest_end")},
             "levels": [list(values) for values in self.levels],
         }
 
     @classmethod
     def restore(
-        cls, settings: dict[str, Any], plan_range: np.ndarray, code_range: np.ndarray
+        cls,
+        settings: Mapping[str, Any],
+        plan_range: Float[np.ndarray, "2 D"],
+        code_range: Float[np.ndarray, "2 C"],
     ) -> Self:
-        """Rebuild a codec from its `settings` and arrays."""
+        """Rebuild a codec from its `settings` and arrays.
+
+        Raises:
+            KeyError, TypeError, ValueError: Something is missing, or does not fit.
+        """
         return cls(
             horizon=int(settings["horizon"]),
             length=int(settings["length"]),
-            smooth=tuple(settings["smooth"]),
+            kinds=tuple(settings["kinds"]),
             rest_start=tuple(settings["rest_start"]),
             rest_end=tuple(settings["rest_end"]),
             levels=tuple(tuple(values) for values in settings["levels"]),
@@ -182,24 +205,28 @@ class PlanCodec:
     def _fold(self) -> int:
         return math.ceil(self.horizon / self.length)
 
-    def _scale(self) -> tuple[np.ndarray, np.ndarray]:
+    def _scale(self) -> tuple[Float[np.ndarray, "C 1"], Float[np.ndarray, "C 1"]]:
         low, high = self.code_range
         half = (high - low) / 2
         centre = (high + low) / 2
         constant = half <= _CONSTANT * np.maximum(np.abs(centre), 1.0)
         return centre[:, None], np.where(constant, 1.0, half)[:, None]
 
-    def _code(self, values: np.ndarray, d: int) -> np.ndarray:
-        """Unscaled code (n, 1 or fold, T) of one dimension (n, H)."""
-        if self.smooth[d]:
+    def _code(self, values: _Values, d: int) -> Float[np.ndarray, "n c T"]:
+        """Unscaled code of one dimension; c = 1, or the fold."""
+        if self.kinds[d] == "number":
+            return np.repeat(values[:, :1, None], self.length, axis=2)
+        if self.kinds[d] == "spline":
             return _fit_spline(values, self.length, self.rest_start[d], self.rest_end[d])[:, None]
         missing = self.length * self._fold - self.horizon
         padded = np.pad(values, ((0, 0), (0, missing)), mode="edge")
         return padded.reshape(len(values), self.length, self._fold).transpose(0, 2, 1)
 
 
-def _basis(horizon: int, n_points: int) -> np.ndarray:
-    """Value of every basis function at every frame, shape (H, n_points); clamped, uniform knots."""
+def _basis(horizon: int, n_points: int) -> _Matrix:
+    """Value of every basis function (columns) at every frame; clamped, uniform knots."""
+    from scipy.interpolate import BSpline
+
     inner = np.linspace(0, horizon - 1, n_points - _DEGREE + 1)
     knots = np.concatenate([[inner[0]] * _DEGREE, inner, [inner[-1]] * _DEGREE])
     matrix: np.ndarray = BSpline.design_matrix(
@@ -208,16 +235,18 @@ def _basis(horizon: int, n_points: int) -> np.ndarray:
     return matrix
 
 
-def _fit_spline(values: np.ndarray, n_points: int, at_start: bool, at_end: bool) -> np.ndarray:
-    """Least-squares control points (n, n_points) of (n, H), equal at a resting end."""
+def _fit_spline(
+    values: _Values, n_points: int, at_start: bool, at_end: bool
+) -> Float[np.ndarray, "n p"]:
+    """Least-squares control points, equal at a resting end."""
     ends = _ends(n_points, at_start, at_end)
     free = np.linalg.lstsq(_synthesis(values.shape[1], ends), values.T, rcond=None)[0]
     points: np.ndarray = (ends @ free).T
     return points
 
 
-def _ends(n_points: int, at_start: bool, at_end: bool) -> np.ndarray:
-    """Which free point each control point is, shape (n_points, n_free): one for all at a rest."""
+def _ends(n_points: int, at_start: bool, at_end: bool) -> _Matrix:
+    """Which free point (columns) each control point is: one for all at a resting end."""
     free = np.arange(n_points)
     if at_start:
         free = np.maximum(free - (_TIED - 1), 0)
@@ -226,14 +255,14 @@ def _ends(n_points: int, at_start: bool, at_end: bool) -> np.ndarray:
     return np.eye(free[-1] + 1)[free]
 
 
-def _synthesis(horizon: int, ends: np.ndarray) -> np.ndarray:
-    """Frames of a plan from its free control points, shape (H, n_free)."""
+def _synthesis(horizon: int, ends: _Matrix) -> _Matrix:
+    """Frames of a plan (rows) from its free control points."""
     matrix: np.ndarray = _basis(horizon, len(ends)) @ ends @ _smoother(ends.shape[1])
     return matrix
 
 
-def _smoother(n: int) -> np.ndarray:
-    """Whittaker's smoother (n, n): what alternates between control points hardly reaches a plan.
+def _smoother(n: int) -> _Matrix:
+    """Whittaker's smoother: what alternates between control points hardly reaches a plan.
 
     An arm's acceleration limits are met by motions and broken by ripple: a milliradian from point
     to point is several rad/s^2. Codes are fitted through the smoother, so that what demonstrations
@@ -244,7 +273,7 @@ def _smoother(n: int) -> np.ndarray:
     return matrix
 
 
-def _tie(values: np.ndarray, n_tied: int, at_start: bool, at_end: bool) -> np.ndarray:
+def _tie(values: _Values, n_tied: int, at_start: bool, at_end: bool) -> _Values:
     if at_start:
         values[:, :n_tied] = values[:, :n_tied].mean(axis=1, keepdims=True)
     if at_end:
@@ -252,30 +281,15 @@ def _tie(values: np.ndarray, n_tied: int, at_start: bool, at_end: bool) -> np.nd
     return values
 
 
-def _rest(plans: np.ndarray) -> tuple[tuple[bool, ...], tuple[bool, ...]]:
-    steps = np.abs(np.diff(plans, axis=1))
-    slow = _REST * steps.max(axis=(0, 1))
-    return (
-        tuple((steps[:, 0] <= slow).all(axis=0).tolist()),
-        tuple((steps[:, -1] <= slow).all(axis=0).tolist()),
-    )
+def _is_smooth(values: _Values, n_points: int, at_start: bool, at_end: bool) -> bool:
+    matrix = _synthesis(values.shape[1], _ends(n_points, at_start, at_end))
+    residual = matrix @ np.linalg.lstsq(matrix, values.T, rcond=None)[0] - values.T
+    rms = np.sqrt(np.mean(residual**2, axis=0)).max()
+    constant = np.ptp(values) <= _CONSTANT * max(1.0, float(np.abs(values).max()))
+    return bool(constant or rms <= _LARGEST_SPLINE_RESIDUAL * np.ptp(values))
 
 
-def _smooth(
-    plans: np.ndarray, n_points: int, at_start: tuple[bool, ...], at_end: tuple[bool, ...]
-) -> list[bool]:
-    result = []
-    for d in range(plans.shape[2]):
-        values = plans[:, :, d]
-        ends = _ends(n_points, at_start[d], at_end[d])
-        matrix = _synthesis(values.shape[1], ends)
-        residual = matrix @ np.linalg.lstsq(matrix, values.T, rcond=None)[0] - values.T
-        rms = np.sqrt(np.mean(residual**2, axis=0)).max()
-        constant = np.ptp(values) <= _CONSTANT * max(1.0, float(np.abs(values).max()))
-        result.append(bool(constant or rms <= _LARGEST_SPLINE_RESIDUAL * np.ptp(values)))
-    return result
-
-
-def _levels(values: np.ndarray) -> tuple[float, ...]:
+def _levels(values: _Values) -> tuple[float, ...]:
+    """The values of a switch; empty where there are too many for one."""
     distinct = np.unique(values)
     return tuple(distinct.tolist()) if distinct.size <= _MOST_LEVELS else ()

@@ -10,11 +10,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+from jaxtyping import Float
+from numpy.typing import ArrayLike
 
 from prior_reinforce.errors import InvalidPlanError
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
 
 RATE = 1000.0
 """Control cycles a second of the Franka arms' interface (frankarobotics/docs,
@@ -23,22 +28,22 @@ robot_specifications.rst: limits hold for the command stream at 1 kHz)."""
 
 @dataclass(frozen=True, eq=False)
 class FineMotion:
-    """A plan sampled evenly in time; every array but `t` has shape (T, D)."""
+    """A plan sampled evenly in time."""
 
-    t: np.ndarray
-    """Time from the plan's first frame, shape (T,), in [s]; negative during the hold before."""
-    q: np.ndarray
+    t: Float[np.ndarray, " T"]
+    """Time from the plan's first frame, in [s]; negative during the hold before."""
+    q: Float[np.ndarray, "T D"]
     """Positions, in the plan's unit, mostly [rad]."""
-    dq: np.ndarray
+    dq: Float[np.ndarray, "T D"]
     """Velocities, unit/s: the spline's exact derivative."""
-    ddq: np.ndarray
+    ddq: Float[np.ndarray, "T D"]
     """Accelerations, unit/s^2: the spline's exact second derivative, 0 while a pose is held."""
-    dddq: np.ndarray
+    dddq: Float[np.ndarray, "T D"]
     """Jerks, unit/s^3: backward differences of `ddq`, as a controller sees them, so that the step
     of acceleration where a hold meets the motion counts too."""
 
 
-def join_frames(frames: np.ndarray, dt: float) -> CubicSpline:
+def join_frames(frames: ArrayLike, dt: float) -> CubicSpline:
     """The spline through the frames, at rest at both ends, over [0, (H - 1) dt].
 
     Args:
@@ -48,6 +53,8 @@ def join_frames(frames: np.ndarray, dt: float) -> CubicSpline:
     Raises:
         InvalidPlanError: Another shape, values that are not finite, or a dt that is not positive.
     """
+    from scipy.interpolate import CubicSpline
+
     frames = np.asarray(frames, dtype=np.float64)
     if frames.ndim != 2 or frames.shape[0] < 2 or not np.all(np.isfinite(frames)):
         raise InvalidPlanError(
@@ -59,7 +66,7 @@ def join_frames(frames: np.ndarray, dt: float) -> CubicSpline:
 
 
 def interpolate(
-    frames: np.ndarray,
+    frames: ArrayLike,
     dt: float,
     *,
     rate: float = RATE,

@@ -3,11 +3,11 @@
 Shapes, units and values are checked once, here; the rest of the package relies on it.
 
 Notation (docs/notation.md):
-    A        `plan`           (H, D)     unit of its `PlanFormat`, mostly [rad]
-    H        `horizon`        frames
-    D        `action_dim`     numbers a frame
-    r tilde  `outcomes_seen`  (N, k)     mostly [m], table frame
-    D_prior  `Demonstrations`            N plans with the N outcomes that were perceived
+    A        `plan`            unit of its `PlanFormat`, mostly [rad]
+    H        `horizon`         frames
+    D        `action_dim`      numbers a frame
+    r tilde  `outcomes_seen`   mostly [m], table frame
+    D_prior  `Demonstrations`  N plans with the N outcomes that were perceived
 """
 
 from __future__ import annotations
@@ -17,14 +17,16 @@ import json
 import math
 import os
 import warnings
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 from numpy.typing import ArrayLike
+from typing_extensions import Self
 
-from prior_reinforce.arrays import as_goal, as_outcomes, as_plans
+from prior_reinforce.arrays import Frames, Plans, Point, Points, as_goal, as_outcomes, as_plans
 from prior_reinforce.errors import FileFormatError, InvalidDemonstrationsError, InvalidPlanError
 
 _FILE_FORMAT = "prior-reinforce demonstrations"
@@ -45,6 +47,9 @@ class PlanFormat:
     """Unit of each dimension: `rad`, `m`, `1` for pure numbers, or any other word."""
     dt: float
     """Time between two frames, in [s]."""
+    per_plan: tuple[str, ...] = ()
+    """Names of the dimensions that are one number a plan, the same at every frame: when a motion
+    starts, for instance."""
 
     def __post_init__(self) -> None:
         """Check the format.
@@ -52,8 +57,8 @@ class PlanFormat:
         Raises:
             InvalidPlanError: No names, repeated names, or another number of units than of names.
         """
-        object.__setattr__(self, "names", tuple(self.names))
-        object.__setattr__(self, "units", tuple(self.units))
+        for field in ("names", "units", "per_plan"):
+            object.__setattr__(self, field, tuple(getattr(self, field)))
         if not self.names:
             raise InvalidPlanError("a plan format needs at least one action name, got none")
         if len(set(self.names)) != len(self.names):
@@ -65,6 +70,8 @@ class PlanFormat:
             )
         if not (math.isfinite(self.dt) and self.dt > 0):
             raise InvalidPlanError(f"dt must be a positive number of seconds, got {self.dt}")
+        if unknown := set(self.per_plan) - set(self.names):
+            raise InvalidPlanError(f"per_plan names {sorted(unknown)}, but actions {self.names}")
 
     @property
     def action_dim(self) -> int:
@@ -76,8 +83,8 @@ class PlanFormat:
 class Plan:
     """One open-loop action plan A with its meaning."""
 
-    actions: np.ndarray
-    """Frames, shape (H, D), float64, read-only."""
+    actions: Frames
+    """float64, read-only."""
     format: PlanFormat
 
     def __post_init__(self) -> None:
@@ -95,8 +102,8 @@ class Plan:
         return self.actions.shape[0]
 
     @property
-    def times(self) -> np.ndarray:
-        """Time of each frame from the first, shape (H,), in [s]."""
+    def times(self) -> Float[np.ndarray, " H"]:
+        """Time of each frame from the first, in [s]."""
         return np.arange(self.horizon) * self.format.dt
 
 
@@ -104,10 +111,10 @@ class Plan:
 class Demonstrations:
     """D_prior with its perceived outcomes: N plans of one horizon, N outcomes (paper, Stage 1)."""
 
-    plans: np.ndarray
-    """A_i, shape (N, H, D), float64, read-only."""
-    outcomes_seen: np.ndarray
-    """r tilde_i, shape (N, k), mostly [m] in the table frame, float64, read-only."""
+    plans: Plans
+    """A_i, N of them, float64, read-only."""
+    outcomes_seen: Points
+    """r tilde_i, mostly [m] in the table frame, float64, read-only."""
     format: PlanFormat
     outcome_names: tuple[str, ...] = ()
     """Names of the k components; `x`, `y`, `z` where none are given."""
@@ -132,6 +139,11 @@ class Demonstrations:
             plans = as_plans(self.plans, self.format.action_dim, name="plans")
         except InvalidPlanError as error:
             raise InvalidDemonstrationsError(str(error)) from error
+        for name in self.format.per_plan:
+            if np.any(np.ptp(plans[:, :, self.format.names.index(name)], axis=1)):
+                raise InvalidDemonstrationsError(
+                    f"{name} is one number a plan, but changes within a demonstration"
+                )
         outcomes = as_outcomes(self.outcomes_seen, plans.shape[0])
         k = outcomes.shape[1]
         names = tuple(self.outcome_names) or tuple("xyz"[:k] if k <= 3 else map(str, range(k)))
@@ -175,14 +187,17 @@ class Demonstrations:
             digest.update(array.tobytes())
         return digest.hexdigest()
 
-    def check_goal(self, goal: ArrayLike) -> np.ndarray:
+    def with_plans(self, plans: Plans, format: PlanFormat | None = None) -> Self:
+        """Return the same outcomes with other plans; odd units were warned about already."""
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            return replace(self, plans=plans, format=format or self.format)
+
+    def check_goal(self, goal: ArrayLike) -> Point:
         """Return the goal as a fresh float array, warning when it lies far outside the outcomes.
 
         Args:
-            goal: g tilde, shape (k,), in the outcomes' units.
-
-        Returns:
-            The goal, shape (k,), float64.
+            goal: g tilde, in the outcomes' units.
 
         Raises:
             InvalidGoalError: Wrong shape, or not finite.
@@ -220,7 +235,7 @@ class Demonstrations:
             np.savez_compressed(file, **arrays)
 
     @classmethod
-    def load(cls, path: str | os.PathLike[str]) -> Demonstrations:
+    def load(cls, path: str | os.PathLike[str]) -> Self:
         """Read what `save` wrote.
 
         Raises:
@@ -264,6 +279,6 @@ class Demonstrations:
             )
 
 
-def _say(values: np.ndarray) -> str:
+def _say(values: Point) -> str:
     """Numbers in four digits, however large."""
     return "[" + ", ".join(f"{value:.4g}" for value in values) + "]"

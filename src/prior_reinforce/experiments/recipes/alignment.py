@@ -15,14 +15,13 @@ import numpy as np
 from prior_reinforce.experiments.recipes.alignment_picture import draw_alignment
 from prior_reinforce.experiments.recipes.base import Picture, Recipe, Run, Table
 from prior_reinforce.experiments.recipes.success import TASK
-from prior_reinforce.generators import align
+from prior_reinforce.plans.alignment import align
 from prior_reinforce.plans.motions import Demonstrations
+from prior_reinforce.plans.timing import middle, onset, recorded_speeds
 from prior_reinforce.tasks import make_task
 
 _TASKS = (TASK, "curling", "fishing")
 """Hardware variants have the demonstrations of the first."""
-_MOVING = 0.05
-"""A motion has begun where its speed crosses this part of its peak, as for DMPs."""
 
 
 class TimelineAlignment(Recipe):
@@ -45,8 +44,8 @@ class TimelineAlignment(Recipe):
                         "task": task,
                         "set": name,
                         "shifts_s": alignment.shifts.tolist(),
-                        "start_sd_s": [_spread(_starts, d) for d in (recorded, aligned)],
-                        "middle_sd_s": [_spread(_middles, d) for d in (recorded, aligned)],
+                        "start_sd_s": [_spread(onset, d) for d in (recorded, aligned)],
+                        "middle_sd_s": [_spread(middle, d) for d in (recorded, aligned)],
                     }
                 )
         recorded = make_task(TASK).demonstrations(run.scale.sets[0])
@@ -103,23 +102,5 @@ class TimelineAlignment(Recipe):
 
 def _spread(times: Any, demonstrations: Demonstrations) -> float:
     """Standard deviation over demonstrations of a moment of their motion, in [s]."""
-    speeds = np.linalg.norm(np.gradient(_scaled(demonstrations), axis=1), axis=-1)
-    return float(np.std([times(speed) for speed in speeds]) * demonstrations.format.dt)
-
-
-def _scaled(demonstrations: Demonstrations) -> np.ndarray:
-    """Plans with every unit's dimensions divided by that unit's largest range."""
-    plans = demonstrations.plans
-    ranges = np.ptp(plans, axis=1).max(axis=0)
-    units = np.array(demonstrations.format.units)
-    return np.asarray(plans / [max(ranges[units == unit].max(), 1e-12) for unit in units])
-
-
-def _starts(speed: np.ndarray) -> float:
-    """First frame faster than a part of the peak."""
-    return float(np.argmax(speed > _MOVING * speed.max()))
-
-
-def _middles(speed: np.ndarray) -> float:
-    """Mean frame, weighted by squared speed: the middle of the dynamic phase."""
-    return float(np.average(np.arange(len(speed)), weights=speed**2))
+    moments = [times(speed) for speed in recorded_speeds(demonstrations)]
+    return float(np.std(moments) * demonstrations.format.dt)

@@ -1,46 +1,121 @@
-"""From a condition to a code: three ways to run a trained denoiser, each a function.
+"""The denoising network, trained on a handful of codes, and three ways to run it.
 
 The adapter needs the same plan for the same condition, and near plans for near conditions. So
 nothing is drawn while sampling: what noise there is comes from the fit's seed and is shared by all
 conditions.
+
+Notation:
+    B  batch    C  numbers of a code at one position    T  positions    n  conditions    k  outcome
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import torch
+from jaxtyping import Float, Int
 
-from prior_reinforce.generators.diffusion_config import DiffusionConfig
+from prior_reinforce.generators.base import Report
+from prior_reinforce.generators.diffusion import DiffusionConfig
 from prior_reinforce.generators.noise_schedule import (
     NoiseSchedule,
     inference_steps,
     mean_shift_levels,
 )
-from prior_reinforce.generators.unet import ConditionalUNet
+from prior_reinforce.generators.threads import torch
+from prior_reinforce.generators.training import Network, optimise
+
+# Diffusion Policy's optimiser (real-stanford/diffusion_policy, commit 5ba07ac).
+_BETAS = (0.95, 0.999)
+
+Denoise = Callable[[torch.Tensor, torch.Tensor, torch.Tensor], torch.Tensor]
+"""A trained network: noisy codes (B, C, T), levels (B,) and conditions (B, k) to a prediction."""
+
+
+def train(
+    network: Network,
+    codes: Float[torch.Tensor, "N C T"],
+    conditions: Float[torch.Tensor, "N k"],
+    config: DiffusionConfig,
+    seed: int,
+    progress: Report,
+) -> Network:
+    """Fit a network to all codes.
+
+    Args:
+        network: As initialised, on the device to train on.
+        codes: x_0 of the demonstrations, on the same device.
+        conditions: Scaled outcomes, on the same device.
+        config: Optimiser and so on.
+        seed: Of noise and noise levels.
+        progress: Called some 200 times.
+
+    Returns:
+        The network with exponentially averaged weights, in evaluation mode.
+    """
+    rng = torch.Generator().manual_seed(seed)
+    schedule = NoiseSchedule.squared_cosine(config.noise_levels)
+
+    def loss_of_step() -> torch.Tensor:
+        rows, levels = draw_batch(len(codes), config, rng)
+        noise = torch.randn((len(rows), *codes.shape[1:]), generator=rng).to(codes.device)
+        rows, levels = rows.to(codes.device), levels.to(codes.device)
+        clean = codes[rows]
+        noisy = schedule.add_noise(clean, noise, levels)
+        target = schedule.target(clean, noise, levels, config.prediction)
+        return torch.nn.functional.mse_loss(network(noisy, levels, conditions[rows]), target)
+
+    return optimise(
+        network,
+        loss_of_step,
+        config,
+        progress,
+        betas=_BETAS,
+        decay=lambda n: min(1 - (1 + n) ** -config.ema_power, config.ema_limit),
+    )
+
+
+def draw_batch(
+    n: int, config: DiffusionConfig, rng: torch.Generator
+) -> tuple[Int[torch.Tensor, " B"], Int[torch.Tensor, " B"]]:
+    """Draw which demonstrations and which noise levels make a batch.
+
+    Args:
+        n: N, demonstrations there are.
+        config: Batch size and how it is filled.
+        rng: Source of both.
+
+    Returns:
+        Rows in 0 ... N-1, each as often as any other to within one, and levels.
+    """
+    size = config.batch_size if config.fill_batch else min(config.batch_size, n)
+    passes = math.ceil(size / n)
+    rows = torch.cat([torch.randperm(n, generator=rng) for _ in range(passes)])[:size]
+    if not config.stratified:
+        return rows, torch.randint(config.noise_levels, (size,), generator=rng)
+    strata = torch.randperm(size, generator=rng)
+    position = (strata + torch.rand(size, generator=rng)) / size
+    return rows, (position * config.noise_levels).long().clamp(max=config.noise_levels - 1)
 
 
 @torch.no_grad()
 def sample(
-    network: ConditionalUNet,
-    conditions: torch.Tensor,
+    network: Denoise,
+    conditions: Float[torch.Tensor, "n k"],
     shape: tuple[int, int],
     config: DiffusionConfig,
     *,
     seed: int,
-) -> torch.Tensor:
+) -> Float[torch.Tensor, "n C T"]:
     """Return one code for each condition.
 
     Args:
         network: Trained by `train` with the same config.
-        conditions: Scaled conditions, shape (n, k), on the network's device.
+        conditions: Scaled conditions, on the network's device.
         shape: (C, T) of a code.
         config: Sampler and its settings.
         seed: Of the shared noise.
-
-    Returns:
-        Codes, shape (n, C, T).
     """
     schedule = NoiseSchedule.squared_cosine(config.noise_levels)
     denoiser = _Denoiser(network, conditions, shape, config, schedule)
@@ -51,27 +126,28 @@ def sample(
 class _Denoiser:
     """A trained network with the conditions it is asked about."""
 
-    network: ConditionalUNet
-    conditions: torch.Tensor
-    """Shape (n, k)."""
+    network: Denoise
+    conditions: Float[torch.Tensor, "n k"]
     shape: tuple[int, int]
     """(C, T) of a code."""
     config: DiffusionConfig
     schedule: NoiseSchedule
 
-    def mean(self) -> torch.Tensor:
-        """The mean of all latents, which is zero, for each condition; shape (n, C, T)."""
+    def mean(self) -> Float[torch.Tensor, "n C T"]:
+        """The mean of all latents, which is zero, for each condition."""
         return torch.zeros((len(self.conditions), *self.shape), device=self.conditions.device)
 
-    def noise(self, count: int, rng: torch.Generator) -> torch.Tensor:
-        """Draws that all conditions share; shape (count, C, T)."""
+    def noise(self, count: int, rng: torch.Generator) -> Float[torch.Tensor, "{count} C T"]:
+        """Draws that all conditions share."""
         return torch.randn((count, *self.shape), generator=rng).to(self.conditions.device)
 
-    def clean(self, noisy: torch.Tensor, level: int) -> torch.Tensor:
+    def clean(
+        self, noisy: Float[torch.Tensor, "B C T"], level: int
+    ) -> Float[torch.Tensor, "B C T"]:
         """The network's estimate of x_0, clipped to the demonstrated range and its margin.
 
         Args:
-            noisy: Codes, shape (n * copies, C, T), a condition's copies one after another.
+            noisy: Codes, a condition's copies one after another.
             level: Of the noise in all of them.
         """
         conditions = self.conditions.repeat_interleave(len(noisy) // len(self.conditions), dim=0)

@@ -1,0 +1,202 @@
+"""Generators that are a network between the scale of conditions and the codec of plans.
+
+What diffusion and U-Net regression have in common: conditions are scaled, a network makes codes of
+them, and the codec turns these into plans. Torch, and what is built on it, is imported where a
+network is used: most commands use none, and importing torch takes longer than all that they do.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+from typing_extensions import Self
+
+from prior_reinforce.arrays import Plans, Points
+from prior_reinforce.errors import ConfigurationError
+from prior_reinforce.generators.base import ConditionScale, Generator, Report
+from prior_reinforce.generators.config import UNetConfig
+from prior_reinforce.generators.saving import Tensors
+from prior_reinforce.plans.codec import PlanCodec
+from prior_reinforce.plans.motions import Demonstrations
+from prior_reinforce.registry import build
+
+if TYPE_CHECKING:
+    import torch
+
+_CHUNK = 128
+"""Plans generated at once; bounds the memory of a dense grid of conditions."""
+_PREFIX = "network."
+
+
+@dataclass(frozen=True, eq=False)
+class Learned:
+    """What a fit makes, generating runs and saving keeps."""
+
+    codec: PlanCodec
+    scale: ConditionScale
+    network: torch.nn.Module
+    """In evaluation mode, on the device to compute on."""
+    seed: int
+    """Of the fit."""
+
+
+class NetworkGenerator(Generator):
+    """A generator whose codes come from a network; a member says which, and how it is trained."""
+
+    config_type: ClassVar[type[UNetConfig]]
+    config: UNetConfig
+
+    def __init__(
+        self, config: UNetConfig | None = None, *, device: str = "cpu", threads: int = 1
+    ) -> None:
+        """Choose settings.
+
+        Args:
+            config: All settings; the defaults when None.
+            device: Where torch computes, `cpu` or `cuda`.
+            threads: Threads to train on. The last digits depend on it, and two are slower than one
+                beside other work. Plans are always generated on one, so that a model means the
+                same ones everywhere.
+
+        Raises:
+            ConfigurationError: A device that is not there, or no thread.
+        """
+        if threads < 1:
+            raise ConfigurationError(f"threads must be at least 1, got {threads}")
+        self.config = config or self.config_type()
+        self._device = _available(device)
+        self._threads = threads
+        self._learned: Learned | None = None
+
+    @abstractmethod
+    def _build(self, channels: int, length: int, outcome_dim: int) -> torch.nn.Module:
+        """Make the network, of any weights, for codes (C, T) of conditions (k,)."""
+
+    @abstractmethod
+    def _train(
+        self,
+        network: torch.nn.Module,
+        codes: torch.Tensor,
+        conditions: torch.Tensor,
+        seed: int,
+        progress: Report,
+    ) -> torch.nn.Module:
+        """Fit the network to codes (N, C, T) of scaled conditions (N, k)."""
+
+    @abstractmethod
+    def _codes(self, learned: Learned, conditions: torch.Tensor) -> torch.Tensor:
+        """Make codes (n, C, T) for scaled conditions (n, k)."""
+
+    def _fit(self, demonstrations: Demonstrations, seed: int, progress: Report) -> None:
+        from prior_reinforce.generators.threads import torch_threads
+        from prior_reinforce.generators.training import build
+
+        plan_format, outcomes = demonstrations.format, demonstrations.outcomes_seen
+        codec = PlanCodec.fit(
+            demonstrations.plans,
+            per_plan=[name in plan_format.per_plan for name in plan_format.names],
+            representation=self.config.representation,
+            frames_per_point=self.config.frames_per_point,
+            length_multiple=self.config.network.length_multiple,
+            margin=self.config.margin,
+        )
+        scale = ConditionScale.fit(outcomes)
+        with torch_threads(self._threads):
+            shape = codec.channels, codec.length, outcomes.shape[1]
+            network = self._train(
+                build(lambda: self._build(*shape), seed).to(self._device),
+                self._tensor(codec.encode(demonstrations.plans)),
+                self._tensor(scale.scale(outcomes)),
+                seed,
+                progress,
+            )
+        self._learned = Learned(codec, scale, network, seed)
+
+    def _generate(self, conditions: Points) -> Plans:
+        from prior_reinforce.generators.threads import torch, torch_threads
+
+        assert self._learned is not None
+        learned, codec = self._learned, self._learned.codec
+        scaled = self._tensor(learned.scale.scale(conditions))
+        plans = [np.empty((0, codec.horizon, len(codec.kinds)))]
+        # One thread: a plan's last digits would depend on their number.
+        with torch_threads(1), torch.no_grad():
+            for chunk in torch.split(scaled, _CHUNK):
+                if len(chunk):
+                    codes = self._codes(learned, chunk)
+                    plans.append(codec.decode(codes.double().cpu().numpy()))
+        return np.concatenate(plans)
+
+    def state(self) -> tuple[dict[str, Any], Tensors]:
+        """Settings, codec and seed; weights and the ranges that are scaled to [-1, 1]."""
+        assert self._learned is not None
+        learned = self._learned
+        weights = learned.network.state_dict()
+        return (
+            {
+                "config": asdict(self.config),
+                "codec": learned.codec.settings(),
+                "seed": learned.seed,
+            },
+            {
+                **{f"{_PREFIX}{name}": value.cpu().numpy() for name, value in weights.items()},
+                "plan_range": learned.codec.plan_range,
+                "code_range": learned.codec.code_range,
+                "condition_range": learned.scale.range,
+            },
+        )
+
+    @classmethod
+    def from_state(cls, settings: Mapping[str, Any], tensors: Tensors) -> Self:
+        """Rebuild it on the CPU, wherever it was learned; see `Generator.from_state`."""
+        from prior_reinforce.generators.threads import torch
+        from prior_reinforce.generators.training import build as build_network
+
+        generator = cls(build(cls.config_type, settings["config"]))
+        codec = PlanCodec.restore(settings["codec"], tensors["plan_range"], tensors["code_range"])
+        scale = ConditionScale(tensors["condition_range"])
+        shape = codec.channels, codec.length, scale.range.shape[1]
+        network = build_network(lambda: generator._build(*shape), seed=0)
+        weights = {
+            name.removeprefix(_PREFIX): torch.from_numpy(value)
+            for name, value in tensors.items()
+            if name.startswith(_PREFIX)
+        }
+        network.load_state_dict(weights)  # refuses missing, unknown and misshapen tensors
+        network.eval().requires_grad_(False)
+        generator._learned = Learned(codec, scale, network, int(settings["seed"]))
+        return generator
+
+    def to(self, device: str) -> Self:
+        """Compute on another device from now on; see `Generator.to`."""
+        self._device = _available(device)
+        if self._learned is not None:
+            self._learned.network.to(device)
+        return self
+
+    def _tensor(self, values: np.ndarray) -> torch.Tensor:
+        """Return numbers as networks compute them: float32, on their device."""
+        from prior_reinforce.generators.threads import torch
+
+        return torch.as_tensor(values, dtype=torch.float32, device=self._device)
+
+
+def _available(device: str) -> str:
+    """The device, if torch can compute there."""
+    if device == "cpu":
+        return device
+    from prior_reinforce.generators.threads import torch
+
+    try:
+        parsed = torch.device(device)
+    except RuntimeError as error:
+        raise ConfigurationError(f"no device {device!r}; use 'cpu' or 'cuda'") from error
+    if parsed.type not in ("cpu", "cuda"):
+        raise ConfigurationError(f"no device {device!r}; use 'cpu' or 'cuda'")
+    if parsed.type == "cuda" and (parsed.index or 0) >= torch.cuda.device_count():
+        raise ConfigurationError(f"device {device!r} is not available here; use 'cpu'")
+    return device
