@@ -1,17 +1,15 @@
 """The diffusion generator learns a handful of synthetic throws, of any make."""
 
-import itertools
 from dataclasses import replace
 
 import numpy as np
 import pytest
-import torch
-from throws import plan_format, swing, throws
 
 from prior_reinforce.errors import ConfigurationError
-from prior_reinforce.generators import DiffusionConfig, DiffusionGenerator, load_generator
-from prior_reinforce.generators.diffusion_training import draw_batch, learning_rate_factor
-from prior_reinforce.generators.unet_size import UNetSize
+from prior_reinforce.generators import make_generator
+from prior_reinforce.generators.config import UNetSize
+from prior_reinforce.generators.diffusion import DiffusionConfig, DiffusionGenerator
+from prior_reinforce.generators.timed import Timed
 from prior_reinforce.plans.motions import Demonstrations
 
 SMALL = DiffusionConfig(
@@ -28,11 +26,11 @@ SMALL = DiffusionConfig(
 )  # fmt: skip
 
 
-def fitted(demos: Demonstrations, config: DiffusionConfig = SMALL) -> DiffusionGenerator:
-    return DiffusionGenerator(config, threads=1).fit(demos, seed=0)
+def fitted(demos: Demonstrations, config: DiffusionConfig = SMALL) -> Timed:
+    return Timed(DiffusionGenerator(config)).fit(demos, seed=0)
 
 
-def misses(generator: DiffusionGenerator, demos: Demonstrations) -> np.ndarray:
+def misses(generator: Timed, demos: Demonstrations) -> np.ndarray:
     """Rms over time at the demonstrations' own outcomes, in ranges of each dimension: (N, D)."""
     span = np.maximum(np.ptp(demos.plans, axis=(0, 1)), 1e-9)
     return np.sqrt(np.mean((generator.generate(demos.outcomes_seen) - demos.plans) ** 2, 1)) / span
@@ -40,13 +38,13 @@ def misses(generator: DiffusionGenerator, demos: Demonstrations) -> np.ndarray:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("n", "horizon"), [(2, 62), (4, 140)])
-def test_demonstrations_come_back_at_their_own_outcomes(n, horizon):
+def test_demonstrations_come_back_at_their_own_outcomes(n, horizon, throws):
     demos = throws(n, horizon)
     assert misses(fitted(demos), demos).max() < 0.01
 
 
 @pytest.mark.slow
-def test_a_horizon_of_five_comes_back():
+def test_a_horizon_of_five_comes_back(plan_format):
     rng = np.random.default_rng(0)
     demos = Demonstrations(
         rng.uniform(-1, 1, (3, 5, 2)), np.array([[0.1], [0.2], [0.3]]), plan_format(2)
@@ -55,7 +53,7 @@ def test_a_horizon_of_five_comes_back():
 
 
 @pytest.mark.slow
-def test_mixed_dimensions_come_back_at_outcomes_of_mixed_units():
+def test_mixed_dimensions_come_back_at_outcomes_of_mixed_units(swing, plan_format):
     t = np.arange(64) / 64
     starts = np.array([0.0, 0.12, 0.25])
     plans = np.stack(
@@ -84,7 +82,7 @@ def test_mixed_dimensions_come_back_at_outcomes_of_mixed_units():
 
 
 @pytest.mark.slow
-def test_between_demonstrations_the_direction_follows_the_condition():
+def test_between_demonstrations_the_direction_follows_the_condition(throws):
     demos = throws(4)
     generator = fitted(demos)
     middle = demos.outcomes_seen.mean(axis=0, keepdims=True)
@@ -92,10 +90,10 @@ def test_between_demonstrations_the_direction_follows_the_condition():
     assert plan[70, 2] == pytest.approx(middle[0, 1], abs=0.1 * np.ptp(demos.outcomes_seen[:, 1]))
 
 
-def test_two_seeds_differ_and_the_generator_can_be_fitted_again():
+def test_two_seeds_differ_and_the_generator_can_be_fitted_again(throws):
     demos = throws(3, 40)
     config = replace(SMALL, training_steps=5)
-    generator = DiffusionGenerator(config, threads=1)
+    generator = DiffusionGenerator(config)
     first = generator.fit(demos, seed=0).generate(demos.outcomes_seen)
     second = generator.fit(demos, seed=1).generate(demos.outcomes_seen)
     assert not np.array_equal(first, second)
@@ -110,85 +108,9 @@ def test_presets_and_representation_are_one_word_each():
     assert (paper.learning_rate, paper.warmup_steps, paper.training_steps) == (2e-4, 500, 5000)
     assert DiffusionGenerator(representation="frames").config.representation == "frames"
     assert DiffusionGenerator().config == DiffusionConfig()
-
-
-@pytest.mark.parametrize(
-    "wrong",
-    [{"training_steps": 0}, {"sampling_steps": 101}, {"learning_rate": 0.0}, {"ema_limit": 1.0},
-     {"margin": -0.1}, {"warmup_steps": -1}, {"noise_draws": 3}, {"prediction": "eps"},
-     {"sampler": "dpm"}, {"representation": "spline"}],
-)  # fmt: skip
-def test_settings_out_of_range_are_named(wrong):
-    with pytest.raises(ConfigurationError, match=next(iter(wrong))):
-        DiffusionConfig(**wrong)
+    assert make_generator("diffusion-paper").config == DiffusionConfig.preset("paper")
 
 
 def test_config_and_preset_contradict_each_other():
     with pytest.raises(ConfigurationError, match="not both"):
         DiffusionGenerator(DiffusionConfig(), preset="paper")
-
-
-@pytest.mark.parametrize(
-    "device",
-    [
-        "gpu",
-        "meta",
-        pytest.param(
-            "cuda", marks=pytest.mark.skipif(torch.cuda.is_available(), reason="it is there")
-        ),
-    ],
-)
-def test_a_device_that_is_not_there_is_named(device, tmp_path):
-    with pytest.raises(ConfigurationError, match=device):
-        DiffusionGenerator(device=device)
-    config = replace(SMALL, training_steps=1)
-    DiffusionGenerator(config, threads=1).fit(throws(2, 20), seed=0).save(tmp_path)
-    with pytest.raises(ConfigurationError, match=device):
-        load_generator(tmp_path, device=device)
-
-
-@pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a CUDA device")
-def test_what_was_learned_on_a_gpu_is_loaded_on_either(tmp_path):
-    demos = throws(3, 40)
-    config = replace(SMALL, training_steps=5)
-    learned = DiffusionGenerator(config, device="cuda").fit(demos, seed=0)
-    learned.save(tmp_path)
-    plans = learned.generate(demos.outcomes_seen)
-    on_gpu = load_generator(tmp_path, device="cuda")
-    np.testing.assert_array_equal(on_gpu.generate(demos.outcomes_seen), plans)
-    on_cpu = load_generator(tmp_path)
-    np.testing.assert_allclose(on_cpu.generate(demos.outcomes_seen), plans, atol=1e-2)
-
-
-def test_configuration_survives_json():
-    config = DiffusionConfig.preset("paper")
-    assert DiffusionConfig.from_json(config.to_json()) == config
-
-
-def test_learning_rate_rises_then_falls_as_a_cosine():
-    config = replace(SMALL, warmup_steps=10, training_steps=110)
-    factors = [learning_rate_factor(step, config) for step in range(110)]
-    assert factors[0] == 0
-    assert factors[5] == pytest.approx(0.5)
-    assert factors[10] == 1
-    assert factors[60] == pytest.approx(0.5)
-    assert all(a > b for a, b in itertools.pairwise(factors[10:]))
-
-
-@pytest.mark.parametrize(("n", "size"), [(6, 24), (6, 10), (40, 24)])
-def test_a_batch_holds_every_demonstration_alike_and_one_noise_level_of_each_stratum(n, size):
-    config = replace(SMALL, batch_size=size, noise_levels=1000, stratified=True)
-    rows, levels = draw_batch(n, config, torch.Generator().manual_seed(0))
-    counts = np.bincount(rows, minlength=n)
-    assert counts.sum() == size
-    assert np.ptp(counts) <= 1
-    strata = np.sort(levels.numpy()) * size // 1000
-    assert np.all(np.abs(strata - np.arange(size)) <= 1)
-
-
-def test_the_papers_batch_is_one_pass_over_the_demonstrations():
-    config = DiffusionConfig.preset("paper")
-    rows, levels = draw_batch(6, config, torch.Generator().manual_seed(0))
-    assert sorted(rows.tolist()) == [0, 1, 2, 3, 4, 5]
-    assert levels.min() >= 0
-    assert levels.max() < 100

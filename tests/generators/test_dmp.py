@@ -11,7 +11,6 @@ from prior_reinforce.generators.dmp import (
     DynamicMovementPrimitives,
     DynamicMovementPrimitivesConfig,
     _Response,
-    motion_span,
 )
 from prior_reinforce.generators.interpolation import SmoothInterpolation
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
@@ -104,17 +103,6 @@ def test_unsegmented_primitives_of_one_duration_mix_motions_and_nothing_else():
     primitives = DynamicMovementPrimitives(config).fit(demos, seed=0).generate(goals)
     mixture = SmoothInterpolation().fit(demos, seed=0).generate(goals)
     np.testing.assert_allclose(primitives, mixture, atol=2e-3)
-
-
-def test_a_motion_spans_its_threshold_crossings_and_a_tenth_more():
-    """A linear rise and fall between frames 20 and 60: 5 % of the peak is a frame inside."""
-    speed = np.clip(1 - np.abs(np.arange(100) - 40) / 20, 0, None)
-    np.testing.assert_allclose(motion_span(speed), [21 - 3.8, 59 + 3.8])
-
-
-def test_a_motion_at_the_ends_of_its_recording_keeps_them():
-    np.testing.assert_array_equal(motion_span(np.ones(30)), [0, 29])
-    np.testing.assert_array_equal(motion_span(np.zeros(30)), [0, 29])
 
 
 def test_without_the_library_the_extra_to_install_is_named(monkeypatch: pytest.MonkeyPatch):

@@ -3,9 +3,8 @@
 import pytest
 import torch
 
-from prior_reinforce.errors import ConfigurationError
-from prior_reinforce.generators.unet import ConditionalUNet
-from prior_reinforce.generators.unet_size import UNetSize
+from prior_reinforce.generators.config import UNetSize
+from prior_reinforce.generators.unet import ConditionalUNet, RegressionNetwork
 
 TINY = UNetSize(widths=(8, 16), groups=2, step_width=8, condition_width=8)
 
@@ -100,12 +99,14 @@ def test_step_embedding_tells_all_levels_apart():
     assert torch.pdist(embedded).min() > 1e-5
 
 
-@pytest.mark.parametrize(
-    "wrong",
-    [{"widths": ()}, {"widths": (64, 100)}, {"widths": (0,)}, {"kernel": 4}, {"kernel": 0},
-     {"groups": 0}, {"step_width": 2}, {"step_width": 9}, {"condition_width": 0},
-     {"activation": "relu"}],
-)  # fmt: skip
-def test_sizes_that_do_not_fit_are_named(wrong):
-    with pytest.raises(ConfigurationError, match=next(iter(wrong))):
-        UNetSize(**wrong)
+def test_regression_knows_time_from_its_learned_input():
+    """Two networks that differ in that input alone give different codes; the batch is alike."""
+    torch.manual_seed(0)
+    regression = RegressionNetwork(3, 8, 2, TINY).eval()
+    conditions = torch.tensor([[0.1, 0.2], [0.1, 0.2], [-0.5, 0.4]])
+    with torch.no_grad():
+        codes = regression(conditions)
+        regression.input += torch.randn(regression.input.shape)
+        assert not torch.allclose(regression(conditions), codes, atol=1e-3)
+    assert codes.shape == (3, 3, 8)
+    torch.testing.assert_close(codes[0], codes[1])

@@ -17,7 +17,7 @@ from prior_reinforce.experiments.goals import unseen_goals
 from prior_reinforce.experiments.methods import make_adapter, make_generator
 from prior_reinforce.experiments.protocol import is_hit, see_demonstrations
 from prior_reinforce.experiments.sight import open_sight
-from prior_reinforce.generators import DiffusionGenerator, Generator
+from prior_reinforce.generators import Generator
 from prior_reinforce.perception import Perception, VisionLanguageModelConfig
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.report import record_film
@@ -208,5 +208,4 @@ class Rollout(Simulated):
 
 
 def _unfitted(name: str) -> Generator:
-    """A generator to learn with on all cores, as nothing else runs meanwhile."""
-    return DiffusionGenerator() if name == DiffusionGenerator.name else make_generator(name)
+    return make_generator(name)

@@ -2,8 +2,8 @@
 
     A(c) = sum_i w_i(c) A_i
 
-- `NearestNeighbours`: the paper's simplest baseline, "I.N.N.", w_i proportional to |c - r_i|^-p over
-  the m nearest outcomes.
+- `NearestNeighbours`: the paper's simplest baseline, "I.N.N.", w_i proportional to |c - r_i|^-p
+  over the m nearest outcomes.
 - `SmoothInterpolation`: w the cardinal weights of a polyharmonic spline with an affine tail, the
   strongest way to mix demonstrations we know. Not in the paper; ours, because it asks how much of a
   generator's work is done by the assumption that plans depend smoothly on outcomes.

@@ -11,13 +11,8 @@ from scipy.interpolate import CubicSpline, PchipInterpolator
 
 from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
 from prior_reinforce.importing.recording import Recording
-from prior_reinforce.plans.timing import ends_in_motion
+from prior_reinforce.plans.timing import ends_in_motion, moving_rows, still_bands
 
-_STILL_SHARE = 0.005
-"""A channel counts as still within this share of the largest range of any channel of its unit.
-Ours: above encoder noise, and reached by a smooth start within its first tenth."""
-_STILL_FLOOR = {"rad": 1e-3, "m": 5e-4}
-"""Never less than this. Ours: several counts of a joint encoder or a gripper."""
 _ON_GRID = 0.02
 """A frame within this share of a time step of where it should be is taken as recorded. Ours: at
 2 rad/s and 100 Hz that is 0.4 mrad, below the servo's own error."""
@@ -140,25 +135,19 @@ def _moving_spans(
     """From where to where each recording is kept, in [s]."""
     if not settings.trim:
         return [(0.0, recording.duration) for recording in recordings]
-    ranges = np.max([np.ptp(recording.positions, axis=0) for recording in recordings], axis=0)
-    largest = {
-        unit: max(r for r, u in zip(ranges, units, strict=True) if u == unit) for unit in set(units)
-    }
-    still = np.array([max(_STILL_SHARE * largest[u], _STILL_FLOOR.get(u, 0.0)) for u in units])
+    still = still_bands([recording.positions for recording in recordings], units)
     spans = []
     for recording in recordings:
-        q, t = recording.positions, recording.times
-        left = np.flatnonzero(np.any(np.abs(q - q[0]) > still, axis=1))
-        ahead = np.flatnonzero(np.any(np.abs(q - q[-1]) > still, axis=1))
-        if not left.size:
+        t = recording.times
+        moving = moving_rows(recording.positions, still)
+        if moving is None:
             raise InvalidDemonstrationsError(
                 f"episode {recording.episode} never moves by more than {still.max():.2g} from its "
                 "first pose; leave it out, or import without trimming"
             )
-        # The last frame within the still band before the motion, and the first one after it. A
-        # motion that returns to where it began has frames of both kinds all the same.
-        last_moving = ahead[-1] if ahead.size else left[-1]
-        first = np.searchsorted(t, t[left[0] - 1] - settings.margin, side="right") - 1
+        # The last frame within the still band before the motion, and the first one after it.
+        first_moving, last_moving = moving
+        first = np.searchsorted(t, t[first_moving - 1] - settings.margin, side="right") - 1
         last = np.searchsorted(t, t[min(last_moving + 1, len(t) - 1)] + settings.margin)
         spans.append((float(t[max(first, 0)]), float(t[min(last, len(t) - 1)])))
     return spans
@@ -195,9 +184,3 @@ def _gaps(recording: Recording, start: float, end: float) -> list[str]:
         f"{recording.episode}: nothing recorded for {steps[worst]:.3f} s at "
         f"{recording.times[worst]:.2f} s"
     ]
-
-
-def _ends_in_motion(piece: np.ndarray) -> bool:
-    """Whether the last step of a channel is over 5 % of its largest step."""
-    steps = np.abs(np.diff(piece, axis=0))
-    return bool(np.any(steps[-1] > 0.05 * np.maximum(steps.max(axis=0), 1e-9)))

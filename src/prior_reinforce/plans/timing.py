@@ -33,8 +33,8 @@ from prior_reinforce.errors import InvalidDemonstrationsError
 from prior_reinforce.plans.motions import Demonstrations
 
 SMOOTHING = 0.03
-"""Standard deviation of the Gaussian that smooths velocities before they are compared, in [s]. Ours:
-well above a frame of jitter, well below the dynamic phase of a throw."""
+"""Standard deviation of the Gaussian that smooths velocities before they are compared, in [s].
+Ours: well above a frame of jitter, well below the dynamic phase of a throw."""
 AT_REST = 0.005
 """Slower than this part of the peak speed, frames may be cut away. Ours, low: they are lost."""
 MOVING = 0.05

@@ -65,14 +65,14 @@ class Method:
 OURS = Method("diffusion", "diffusion", aligned=False, kind="method")
 METHODS = (
     OURS,
-    Method("diffusion on whole plans", "diffusion-whole", aligned=False, kind="method"),
+    Method("diffusion on whole plans", "diffusion,timing=none", aligned=False, kind="method"),
     Method("nearest neighbours", "nearest", aligned=False),
-    Method("DMP", "dmp-whole", aligned=False),
-    Method("U-Net regression", "regression-whole", aligned=False),
+    Method("DMP", "dmp,segmented=false", aligned=False),
+    Method("U-Net regression", "regression,timing=none", aligned=False),
     Method("segmented DMP", "dmp", aligned=False, kind="other"),
     Method("nearest neighbours, aligned", "nearest", aligned=True),
-    Method("DMP, aligned", "dmp-whole", aligned=True),
-    Method("U-Net regression, aligned", "regression-whole", aligned=True),
+    Method("DMP, aligned", "dmp,segmented=false", aligned=True),
+    Method("U-Net regression, aligned", "regression,timing=none", aligned=True),
     Method("smooth interpolation, aligned", "interpolation", aligned=True, kind="other"),
 )
 """Our default, and the same network on whole plans; the paper's baselines; and, so that nothing is

@@ -1,12 +1,14 @@
-"""Sampling with denoisers that are known exactly: what comes out can be worked by hand."""
+"""Batches of noise levels; sampling with denoisers that are known exactly, worked by hand."""
 
 import math
+from dataclasses import replace
 
+import numpy as np
 import pytest
 import torch
 
 from prior_reinforce.generators import DiffusionConfig
-from prior_reinforce.generators.diffusion_sampling import sample
+from prior_reinforce.generators.denoiser import draw_batch, sample
 from prior_reinforce.generators.noise_schedule import NoiseSchedule, mean_shift_levels
 
 CONFIG = DiffusionConfig(prediction="sample", margin=1.0)
@@ -73,3 +75,22 @@ def test_a_code_depends_on_its_condition_alone(sampler):
 def test_levels_fall_and_reach_low_noise():
     assert mean_shift_levels(100, 6) == (95, 65, 42, 23, 10, 2)
     assert mean_shift_levels(100, 1) == (95,)
+
+
+@pytest.mark.parametrize(("n", "size"), [(6, 24), (6, 10), (40, 24)])
+def test_a_batch_holds_every_demonstration_alike_and_one_noise_level_of_each_stratum(n, size):
+    config = replace(CONFIG, batch_size=size, noise_levels=1000, stratified=True)
+    rows, levels = draw_batch(n, config, torch.Generator().manual_seed(0))
+    counts = np.bincount(rows, minlength=n)
+    assert counts.sum() == size
+    assert np.ptp(counts) <= 1
+    strata = np.sort(levels.numpy()) * size // 1000
+    assert np.all(np.abs(strata - np.arange(size)) <= 1)
+
+
+def test_the_papers_batch_is_one_pass_over_the_demonstrations():
+    config = DiffusionConfig.preset("paper")
+    rows, levels = draw_batch(6, config, torch.Generator().manual_seed(0))
+    assert sorted(rows.tolist()) == [0, 1, 2, 3, 4, 5]
+    assert levels.min() >= 0
+    assert levels.max() < 100

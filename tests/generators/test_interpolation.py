@@ -1,14 +1,15 @@
-"""I.N.N. and smooth interpolation of plans: values by hand, and what each must reproduce."""
+"""Mixtures of demonstrations: values worked by hand, and what each must reproduce."""
 
 import numpy as np
 import pytest
 
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.generators.interpolation import (
+    NearestNeighbours,
+    NearestNeighboursConfig,
     SmoothInterpolation,
     SmoothInterpolationConfig,
 )
-from prior_reinforce.generators.nearest import NearestNeighbours, NearestNeighboursConfig
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 
 FORMAT = PlanFormat(("joint1", "gripper"), ("rad", "1"), 0.02)
@@ -72,5 +73,5 @@ def test_nearest_refuses_senseless_settings(setting: str, value: float):
 
 
 def test_interpolation_refuses_an_unknown_kernel():
-    with pytest.raises(ConfigurationError, match="cubic"):
+    with pytest.raises(ConfigurationError, match="kernel.*cubic"):
         SmoothInterpolationConfig(kernel="cubic")  # type: ignore[arg-type]

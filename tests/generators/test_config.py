@@ -1,0 +1,51 @@
+"""Settings: what is out of range is named, by whoever makes them."""
+
+from dataclasses import asdict
+
+import numpy as np
+import pytest
+
+from prior_reinforce.errors import ConfigurationError
+from prior_reinforce.generators.config import UNetSize
+from prior_reinforce.generators.diffusion import DiffusionConfig
+from prior_reinforce.generators.regression import UNetRegressionConfig
+from prior_reinforce.registry import build
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [{"widths": ()}, {"widths": (64, 100)}, {"widths": (0,)}, {"kernel": 4}, {"kernel": 0},
+     {"groups": 0}, {"step_width": 2}, {"step_width": 9}, {"condition_width": 0},
+     {"activation": "relu"}],
+)  # fmt: skip
+def test_sizes_that_do_not_fit_are_named(wrong):
+    with pytest.raises(ConfigurationError, match=next(iter(wrong))):
+        UNetSize(**wrong)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [{"training_steps": 0}, {"sampling_steps": 101}, {"learning_rate": 0.0}, {"ema_limit": 1.0},
+     {"margin": -0.1}, {"warmup_steps": -1}, {"noise_draws": 3}, {"prediction": "eps"},
+     {"sampler": "dpm"}, {"representation": "spline"},
+     {"margin": float("nan")}, {"training_steps": 2.5}],
+)  # fmt: skip
+def test_settings_out_of_range_are_named(wrong):
+    with pytest.raises(ConfigurationError, match=next(iter(wrong))):
+        DiffusionConfig(**wrong)
+
+
+def test_numbers_of_numpy_are_numbers():
+    assert DiffusionConfig(training_steps=np.int64(3), margin=np.float64(0.1)).training_steps == 3
+
+
+@pytest.mark.parametrize("config", [DiffusionConfig.preset("paper"), UNetRegressionConfig()])
+def test_settings_survive_json(config):
+    assert build(type(config), asdict(config)) == config
+
+
+def test_regression_differs_from_diffusion_in_nothing_but_diffusion():
+    """Network and codec are the same, so that a comparison of the two is one of methods."""
+    ours, theirs = UNetRegressionConfig(), DiffusionConfig()
+    for setting in ("network", "representation", "frames_per_point", "margin"):
+        assert getattr(ours, setting) == getattr(theirs, setting)
