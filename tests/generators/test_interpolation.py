@@ -73,5 +73,5 @@ def test_nearest_refuses_senseless_settings(setting: str, value: float):
 
 
 def test_interpolation_refuses_an_unknown_kernel():
-    with pytest.raises(ConfigurationError, match="kernel.*cubic"):
+    with pytest.raises(ConfigurationError, match=r"kernel.*cubic"):
         SmoothInterpolationConfig(kernel="cubic")  # type: ignore[arg-type]

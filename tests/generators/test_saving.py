@@ -7,7 +7,13 @@ import pytest
 
 from prior_reinforce.errors import FileFormatError
 from prior_reinforce.generators import load_generator
-from prior_reinforce.generators.saving import CONFIG_FILE, TENSOR_FILE, read_model, write_model
+from prior_reinforce.generators.saving import (
+    CONFIG_FILE,
+    TENSOR_FILE,
+    SavedModel,
+    read_model,
+    write_model,
+)
 
 TENSORS = {"a": np.arange(6, dtype=np.float32).reshape(2, 3), "b": np.array([np.pi])}
 SETTINGS = {"gain": 0.1, "widths": [1, 2], "name": "x"}
@@ -15,7 +21,7 @@ SETTINGS = {"gain": 0.1, "widths": [1, 2], "name": "x"}
 
 @pytest.fixture
 def folder(tmp_path):
-    write_model(tmp_path / "model", "some kind", SETTINGS, TENSORS)
+    write_model(tmp_path / "model", SavedModel("some kind", SETTINGS, TENSORS))
     return tmp_path / "model"
 
 

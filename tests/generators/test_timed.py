@@ -1,4 +1,4 @@
-"""Start times as a channel of their own: nothing is lost, and only where motions rest."""
+"""Start times apart from the motion, for any generator: nothing is lost, and only at rest."""
 
 import re
 from dataclasses import replace
@@ -6,7 +6,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from prior_reinforce.generators.timed import StartTimeCodec
+from prior_reinforce.errors import ConfigurationError, FileFormatError, InvalidDemonstrationsError
+from prior_reinforce.generators import load_generator, make_generator
+from prior_reinforce.generators.config import UNetSize
+from prior_reinforce.generators.diffusion import DiffusionConfig, DiffusionGenerator
+from prior_reinforce.generators.interpolation import NearestNeighbours, SmoothInterpolation
+from prior_reinforce.generators.timed import Timed
+from prior_reinforce.plans.alignment import align
+from prior_reinforce.plans.codec import PlanCodec
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 from prior_reinforce.tasks import make_task
 
@@ -19,7 +26,7 @@ WHY = {
 }
 
 
-def demonstrations(*, plans=None, horizon=90):
+def demonstrations(*, plans=None, horizon=90, names=("a", "b", "c")):
     """Minimum-jerk swings of 40 frames that start at STARTS, two joints and a constant one."""
     phase = np.clip((np.arange(horizon)[None] - np.array(STARTS)[:, None]) / 40, 0, 1)
     swing = 10 * phase**3 - 15 * phase**4 + 6 * phase**5
@@ -27,53 +34,73 @@ def demonstrations(*, plans=None, horizon=90):
     if plans is None:
         plans = np.stack([0.2 + size * swing, 1.5 - 0.7 * size * swing, 0 * swing + 0.3], axis=-1)
     outcomes = np.array([[0.8, -0.2], [0.8, 0.2], [1.0, -0.1], [1.0, 0.2]])
-    return Demonstrations(plans, outcomes, PlanFormat(("a", "b", "c"), ("rad",) * 3, 0.0125))
+    return Demonstrations(plans, outcomes, PlanFormat(names, ("rad",) * 3, 0.0125))
 
 
-def fit(demos, **changes):
-    settings = {
-        "start_times": True,
-        "representation": "frames",
-        "frames_per_point": 4,
-        "length_multiple": 4,
-        "margin": 0.05,
-    }
-    return StartTimeCodec.fit(demos, **(settings | changes))
+class Recall(NearestNeighbours):
+    """Its demonstrations through the codec, exactly or at chosen codes; keeps what it was given."""
+
+    name = "recall"
+
+    def _fit(self, demonstrations, seed, progress):
+        super()._fit(demonstrations, seed, progress)
+        self.learned = demonstrations
+        plan_format = demonstrations.format
+        self.codec = PlanCodec.fit(
+            demonstrations.plans,
+            per_plan=[name in plan_format.per_plan for name in plan_format.names],
+            representation="splines",
+            frames_per_point=4,
+            length_multiple=4,
+            margin=0.05,
+        )
+        self.codes = self.codec.encode(demonstrations.plans)
+
+    def _generate(self, conditions):
+        return self.codec.decode(self.codes)
 
 
-def test_plans_come_back_to_the_last_bit_from_frames():
+def recalled(demos):
+    timed = Timed(Recall()).fit(demos, seed=0)
+    return timed, timed.generate(demos.outcomes_seen)
+
+
+def test_plans_come_back_to_rounding():
     demos = demonstrations()
-    codec, codes = fit(demos)
-    assert codec.starts is not None
-    np.testing.assert_allclose(codec.decode(codes), demos.plans, atol=1e-12)
+    timed = Timed(NearestNeighbours()).fit(demos, seed=0)
+    np.testing.assert_allclose(timed.generate(demos.outcomes_seen), demos.plans, atol=1e-15)
+    assert timed.remarks == ()
 
 
 def test_plans_come_back_from_control_points():
     demos = demonstrations()
-    codec, codes = fit(demos, representation="splines")
-    np.testing.assert_allclose(codec.decode(codes), demos.plans, atol=3e-3)
+    _, plans = recalled(demos)
+    np.testing.assert_allclose(plans, demos.plans, atol=3e-3)
 
 
-def test_the_cut_out_motions_start_together_and_the_channel_says_when():
-    demos = demonstrations()
-    codec, codes = fit(demos)
-    assert codec.channels == codes.shape[1] == codec.motion.channels + 1
-    earliest, latest = codec.starts
-    assert latest - earliest == max(STARTS) - min(STARTS)
-    expected = 2 * (np.array(STARTS) - min(STARTS)) / (max(STARTS) - min(STARTS)) - 1
-    np.testing.assert_allclose(codes[:, -1], np.repeat(expected[:, None], codes.shape[2], axis=1))
-    # The same swing but for its size: without its start time it is the same code but for a scale.
-    centred = codes[:, :3] - codes[:, :3].mean(axis=2, keepdims=True)
-    shapes = centred[:, 0].reshape(4, -1)
+@pytest.mark.parametrize("names", [("a", "b", "c"), ("a", "start", "c")])
+def test_the_motions_start_together_and_one_more_dimension_says_when(names):
+    timed, _ = recalled(demonstrations(names=names))
+    learned = timed.generator.learned
+    assert learned.action_dim == 4
+    assert learned.format.per_plan == learned.format.names[3:]
+    assert timed.starts[1] - timed.starts[0] == max(STARTS) - min(STARTS)
+    np.testing.assert_array_equal(
+        learned.plans[:, 0, 3], timed.starts[0] + np.array(STARTS) - min(STARTS)
+    )
+    # The same swing but for its size: without its start time it is the same but for a scale.
+    shapes = learned.plans[:, :, 0] - learned.plans[:, :1, 0]
     shapes /= np.linalg.norm(shapes, axis=1, keepdims=True)
     assert np.all(shapes @ shapes.T > 0.999)
 
 
-def test_codes_between_two_demonstrations_are_swings_of_full_speed_in_between():
+def test_between_two_demonstrations_is_a_swing_of_full_speed():
     """Averaging frames would halve the peak speed of two swings that do not overlap."""
     demos = demonstrations()
-    codec, codes = fit(demos)
-    middle = codec.decode(codes[[0, 3]].mean(axis=0, keepdims=True))[0]
+    timed, _ = recalled(demos)
+    recall = timed.generator
+    recall.codes = recall.codes[[0, 3]].mean(axis=0, keepdims=True)
+    middle = timed.generate(demos.outcomes_seen[:1])[0]
     speed = np.abs(np.diff(middle[:, 0]))
     demonstrated = np.abs(np.diff(demos.plans[[0, 3], :, 0], axis=1)).max(axis=1)
     assert speed.max() > 0.98 * demonstrated.min()
@@ -81,17 +108,15 @@ def test_codes_between_two_demonstrations_are_swings_of_full_speed_in_between():
 
 
 def test_a_start_beyond_the_demonstrated_ones_is_not_used():
-    codec, codes = fit(demonstrations())
-    codes[:, -1] = 5.0
-    moving = np.abs(np.diff(codec.decode(codes)[:, :, 0], axis=1)) > 0
-    assert np.all(moving.argmax(axis=1) == moving.argmax(axis=1)[0])
-    assert moving.argmax(axis=1)[0] == max(STARTS)
+    demos = demonstrations()
+    timed, _ = recalled(demos)
+    timed.generator.codes[:, -1] = 5.0
+    moving = np.abs(np.diff(timed.generate(demos.outcomes_seen)[:, :, 0], axis=1)) > 1e-3
+    np.testing.assert_allclose(moving.argmax(axis=1), max(STARTS), atol=2)
 
 
-@pytest.mark.parametrize(
-    "how", ["switched off", "ends in mid-swing", "same start", "slow and late would not fit"]
-)
-def test_whole_plans_are_coded_where_there_is_nothing_to_cut(how):
+@pytest.mark.parametrize("how", ["ends in mid-swing", "same start", "slow and late would not fit"])
+def test_whole_plans_are_learned_where_there_is_nothing_to_cut(how):
     demos = demonstrations()
     if how == "ends in mid-swing":
         demos = demonstrations(plans=demos.plans[:, :55])
@@ -103,34 +128,25 @@ def test_whole_plans_are_coded_where_there_is_nothing_to_cut(how):
         plans = demos.plans[:, :86].copy()
         plans[0] = demos.plans[0, np.clip((np.arange(86) - 5) // 2 + 5, 0, 85)]  # half as fast
         demos = demonstrations(plans=plans)
-    codec, codes = fit(demos, start_times=how != "switched off")
-    assert codec.starts is None
-    if how in ("switched off", "same start"):
-        assert codec.whole_because is None
+    timed = Timed(NearestNeighbours()).fit(demos, seed=0)
+    assert timed.starts is None
+    if how == "same start":
+        assert timed.remarks == ()
     else:
-        assert re.search(WHY[how], codec.whole_because)
-    np.testing.assert_allclose(codec.decode(codes), demos.plans, atol=1e-3)
+        (remark,) = timed.remarks
+        assert remark.startswith("start times are not learned")
+        assert re.search(WHY[how], remark)
+    np.testing.assert_array_equal(timed.generate(demos.outcomes_seen), demos.plans)
+    timed.fit(demonstrations(), seed=0)
+    assert timed.remarks == ()
+    assert timed.starts is not None
 
 
-def test_a_restored_codec_decodes_alike():
-    codec, codes = fit(demonstrations(), representation="splines")
-    again = StartTimeCodec.restore(
-        codec.settings(), codec.motion.plan_range, codec.motion.code_range
-    )
-    np.testing.assert_array_equal(again.decode(codes), codec.decode(codes))
-    assert (again.horizon, again.action_dim, again.channels) == (90, 3, 4)
-
-
-def test_why_whole_plans_are_coded_is_kept_on_disk():
-    demos = demonstrations()
-    codec, _ = fit(demonstrations(plans=demos.plans[:, :55]))
-    ranges = codec.motion.plan_range, codec.motion.code_range
-    again = StartTimeCodec.restore(codec.settings(), *ranges)
-    assert again.whole_because == codec.whole_because
-    assert again.whole_because
-    before_it_was_kept = codec.settings()
-    del before_it_was_kept["whole_because"]
-    assert StartTimeCodec.restore(before_it_was_kept, *ranges).whole_because is None
+def test_why_start_times_are_not_learned_is_kept_on_disk(tmp_path):
+    demos = demonstrations(plans=demonstrations().plans[:, :55])
+    timed = Timed(NearestNeighbours()).fit(demos, seed=0)
+    timed.save(tmp_path)
+    assert load_generator(tmp_path).remarks == timed.remarks != ()
 
 
 def test_a_trembling_hand_rests_where_it_hardly_moves():
@@ -141,12 +157,12 @@ def test_a_trembling_hand_rests_where_it_hardly_moves():
     phases = rng.uniform(0, 2 * np.pi, (4, 1, 3))
     tremor = 0.006 * np.sin(2 * np.pi * 1.1 * t[None, :, None] + phases)
     trembling = demonstrations(plans=demos.plans + tremor)
-    codec, codes = fit(trembling)
-    assert codec.starts is not None
-    assert codec.starts[1] - codec.starts[0] == pytest.approx(max(STARTS) - min(STARTS), abs=2)
+    timed = Timed(NearestNeighbours()).fit(trembling, seed=0)
+    assert timed.starts is not None
+    assert timed.starts[1] - timed.starts[0] == pytest.approx(max(STARTS) - min(STARTS), abs=2)
     moving = np.ptp(trembling.plans, axis=(0, 1))[:2]
-    lost = np.abs(codec.decode(codes) - trembling.plans)[:, :, :2].max(axis=(0, 1))
-    assert np.all(lost < 0.03 * moving)
+    lost = np.abs(timed.generate(demos.outcomes_seen) - trembling.plans)
+    assert np.all(lost[:, :, :2].max(axis=(0, 1)) < 0.03 * moving)
 
 
 def test_a_small_dimension_that_still_moves_at_the_end_is_not_held():
@@ -155,18 +171,57 @@ def test_a_small_dimension_that_still_moves_at_the_end_is_not_held():
     plans = demos.plans.copy()
     plans[:, :, 2] = 0.01 * np.clip((t - 20) / 60, 0, 1)  # cut off at full speed
     moving = demonstrations(plans=plans)
-    codec, codes = fit(replace(moving, format=replace(moving.format, units=("rad", "rad", "m"))))
-    assert codec.starts is None
-    assert re.search(r"demonstration 1 .* last frame, with 4\d% of its peak", codec.whole_because)
-    np.testing.assert_allclose(codec.decode(codes), plans, atol=1e-12)
+    moving = replace(moving, format=replace(moving.format, units=("rad", "rad", "m")))
+    timed = Timed(NearestNeighbours()).fit(moving, seed=0)
+    assert timed.starts is None
+    assert re.search(r"demonstration 1 .* last frame, with 4\d% of its peak", timed.remarks[0])
+    np.testing.assert_array_equal(timed.generate(demos.outcomes_seen), plans)
 
 
 @pytest.mark.parametrize("name", ["A", "B"])
 def test_a_trembling_hand_is_not_jerked_where_its_tremor_is_held(name):
     """Cut in mid-swing, the shipped curling sets' tremor would jerk the wrist."""
     demos = make_task("curling").demonstrations(name)
-    codec, codes = fit(demos, representation="splines")
-    jolts = np.abs(np.diff(codec.decode(codes), n=2, axis=1)).max(axis=(0, 1))
+    timed, plans = recalled(demos)
+    jolts = np.abs(np.diff(plans, n=2, axis=1)).max(axis=(0, 1))
     shown = np.abs(np.diff(demos.plans, n=2, axis=1)).max(axis=(0, 1))
-    assert codec.starts is not None
+    assert timed.starts is not None
     assert np.all(jolts <= 1.1 * shown)
+
+
+def test_aligned_it_generates_what_the_generator_learned_from_aligned_ones_does():
+    demos = demonstrations()
+    timed = Timed(SmoothInterpolation(), "align").fit(demos, seed=0)
+    plain = SmoothInterpolation().fit(align(demos).demonstrations, seed=0)
+    conditions = np.array([[0.9, 0.1], [0.95, -0.1]])
+    np.testing.assert_array_equal(timed.generate(conditions), plain.generate(conditions))
+
+
+def test_what_cannot_be_aligned_is_refused():
+    demos = demonstrations(plans=demonstrations().plans[:, :55])
+    with pytest.raises(InvalidDemonstrationsError, match="do not align"):
+        Timed(SmoothInterpolation(), "align").fit(demos, seed=0)
+
+
+@pytest.mark.parametrize("timing", ["start", "align"])
+def test_it_is_saved_with_the_generator_within(timing, tmp_path):
+    demos = demonstrations()
+    size = UNetSize(widths=(8, 16), groups=2, step_width=8, condition_width=8)
+    inner = DiffusionGenerator(DiffusionConfig(network=size, training_steps=2))
+    timed = Timed(inner, timing).fit(demos, seed=0)
+    timed.save(tmp_path)
+    conditions = np.array([[0.9, 0.1]])
+    for loaded in (load_generator(tmp_path), Timed.load(tmp_path)):
+        assert isinstance(loaded, Timed)
+        assert isinstance(loaded.generator, DiffusionGenerator)
+        assert (loaded.timing, loaded.starts) == (timing, timed.starts)
+        np.testing.assert_array_equal(loaded.generate(conditions), timed.generate(conditions))
+    with pytest.raises(FileFormatError, match="timed"):
+        DiffusionGenerator.load(tmp_path)
+
+
+def test_timing_is_start_or_align_and_once():
+    with pytest.raises(ConfigurationError, match="late"):
+        Timed(NearestNeighbours(), "late")
+    with pytest.raises(ConfigurationError, match="once"):
+        Timed(make_generator("regression"))

@@ -36,7 +36,7 @@ def test_averaged_weights_are_those_worked_by_hand():
         return ((network.weight - 3) ** 2).sum()
 
     averaged = optimise(network, loss, CONFIG, seen.append, decay=lambda n: 0.5)
-    weights = [w for w in seen if isinstance(w, float)][1:] + [network.weight.item()]
+    weights = [*[w for w in seen if isinstance(w, float)][1:], network.weight.item()]
     expected = weights[0]
     for weight in weights[1:]:
         expected = 0.5 * expected + 0.5 * weight

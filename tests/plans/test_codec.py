@@ -3,9 +3,24 @@
 import numpy as np
 import pytest
 from scipy.interpolate import BSpline
-from throws import swing, throws
 
 from prior_reinforce.plans.codec import PlanCodec
+
+
+def swing(times, start, duration):
+    """Minimum-jerk time course from 0 to 1."""
+    s = np.clip((times - start) / duration, 0, 1)
+    return s**3 * (10 - 15 * s + 6 * s**2)
+
+
+def throws(n, horizon=140):
+    """Plans of two joints that swing at different times, and a third that is constant."""
+    rng = np.random.default_rng(0)
+    t = np.arange(horizon) / horizon
+    paths = np.stack([swing(t, start, 0.6) for start in rng.uniform(0.02, 0.3, n)])
+    reach = rng.permutation(np.linspace(0.8, 1.1, n))[:, None]
+    side = np.broadcast_to(rng.uniform(-0.3, 0.3, (n, 1)), paths.shape)
+    return np.stack([reach * paths - 1, 2 - 0.8 * reach * paths, side], axis=-1)
 
 
 def codec_of(plans, representation="splines", margin=0.05, multiple=4):
@@ -23,9 +38,9 @@ def round_trip(codec, plans):
 
 
 def test_throws_come_back_from_splines_within_a_tenth_of_a_milliradian_rms():
-    plans = throws(6).plans
+    plans = throws(6)
     codec = codec_of(plans)
-    assert codec.smooth == (True, True, True)
+    assert codec.kinds == ("spline",) * 3
     assert codec.length == 36
     residual = round_trip(codec, plans) - plans
     assert np.sqrt(np.mean(residual**2)) < 1e-4
@@ -40,7 +55,7 @@ def test_a_cubic_comes_back_exactly():
 @pytest.mark.parametrize("horizon", [2, 5, 62, 139])
 @pytest.mark.parametrize("representation", ["splines", "frames"])
 def test_any_horizon_comes_back(horizon, representation):
-    plans = throws(3, horizon).plans
+    plans = throws(3, horizon)
     codec = codec_of(plans, representation)
     assert codec.length % 4 == 0
     np.testing.assert_allclose(round_trip(codec, plans), plans, atol=4e-3)
@@ -59,7 +74,7 @@ def test_mixed_dimensions_are_each_coded_as_they_need():
         plans[i, :, 4] = swing(t, 0.5, 1.0)  # ends in mid-swing
         plans[i, :, 5] = np.random.default_rng(i).normal(size=140)  # recorded noise
     codec = codec_of(plans)
-    assert codec.smooth == (True, False, True, True, True, False)
+    assert codec.kinds == ("spline", "frames", "spline", "spline", "spline", "frames")
     assert codec.levels == ((), (0.0, 1.0), (), (), (), ())
     assert codec.channels == 4 + 2 * 4
     back = round_trip(codec, plans)
@@ -71,14 +86,14 @@ def test_mixed_dimensions_are_each_coded_as_they_need():
 
 def test_codes_of_demonstrations_fill_minus_one_to_one():
     for representation in ("splines", "frames"):
-        plans = throws(4).plans
+        plans = throws(4)
         codes = codec_of(plans, representation).encode(plans)
         np.testing.assert_allclose(codes.min(axis=(0, 2)), -1, atol=1e-12)
         np.testing.assert_allclose(codes.max(axis=(0, 2)), 1, atol=1e-12)
 
 
 def test_any_code_decodes_into_range_and_to_rest_at_both_ends():
-    plans = throws(4).plans
+    plans = throws(4)
     codec = codec_of(plans)
     assert all(codec.rest_start)
     assert all(codec.rest_end)
@@ -107,7 +122,7 @@ def test_a_swing_that_is_cut_off_is_not_brought_to_rest():
 
 
 def test_settings_and_arrays_are_all_there_is():
-    plans = throws(3).plans
+    plans = throws(3)
     codec = codec_of(plans)
     again = PlanCodec.restore(codec.settings(), codec.plan_range, codec.code_range)
     codes = np.random.default_rng(0).normal(size=(5, codec.channels, codec.length))
@@ -133,3 +148,26 @@ def test_ripple_between_control_points_hardly_accelerates_the_plan():
     knots = np.concatenate([[0] * 3, np.linspace(0, horizon - 1, points - 2), [horizon - 1] * 3])
     bare = BSpline(knots, half * ripple, 3)(np.arange(horizon))
     assert np.abs(np.diff(moved[0, :, 0], 2)).max() < np.abs(np.diff(bare, 2)).max() / 3
+
+
+@pytest.mark.parametrize("representation", ["splines", "frames"])
+def test_one_number_a_plan_is_coded_by_its_value_and_decoded_by_the_mean(representation):
+    plans = throws(3)
+    plans[:, :, 1] = np.array([4.0, 31.0, 12.0])[:, None]
+    codec = PlanCodec.fit(
+        plans,
+        per_plan=(False, True, False),
+        representation=representation,
+        frames_per_point=4,
+        length_multiple=4,
+        margin=0.1,
+    )
+    assert codec.kinds[1] == "number"
+    codes = codec.encode(plans)
+    channel = 1 if representation == "splines" else int(np.ceil(140 / codec.length))
+    expected = 2 * (np.array([4.0, 31.0, 12.0]) - 4) / 27 - 1
+    np.testing.assert_allclose(codes[:, channel], np.tile(expected[:, None], codec.length))
+    codes[:, channel] += np.linspace(-0.5, 0.5, codec.length)  # its mean stays
+    np.testing.assert_allclose(codec.decode(codes)[:, :, 1], plans[:, :, 1])
+    codes[:, channel] = 9.0
+    np.testing.assert_allclose(codec.decode(codes)[:, :, 1], 31 + 0.1 * 27)  # the margin

@@ -1,0 +1,87 @@
+"""What the base class does for every generator."""
+
+import numpy as np
+import pytest
+
+from prior_reinforce.errors import ConfigurationError, FileFormatError, NotFittedError
+from prior_reinforce.generators.base import ConditionScale, Generator
+
+
+class Constant(Generator):
+    """The mean plan, whatever is asked for; remarks on demonstrations that start apart."""
+
+    name = "constant"
+
+    def _fit(self, demonstrations, seed, progress):
+        self.plan = demonstrations.plans.mean(axis=0)
+        if np.ptp(demonstrations.plans[:, 0, 0]):
+            self.remarks = ("demonstrations start apart",)
+
+    def _generate(self, conditions):
+        return np.repeat(self.plan[None], len(conditions), axis=0)
+
+
+class Kept(Constant):
+    name = "kept"
+
+    def state(self):
+        return {}, {"plan": self.plan}
+
+    @classmethod
+    def from_state(cls, settings, tensors):
+        kept = cls()
+        kept.plan = tensors["plan"]
+        return kept
+
+
+def test_fit_and_generate_are_enough_to_be_used(throws):
+    demos = throws(3, 20)
+    generator = Constant().fit(demos, seed=0)
+    assert generator.generate([[0.9, 0.1]]).shape == (1, 20, 3)
+
+
+def test_before_fit_nothing_is_generated_or_saved(tmp_path):
+    for use in (lambda: Kept().generate([[0.9, 0.1]]), lambda: Kept().save(tmp_path / "model")):
+        with pytest.raises(NotFittedError, match="Kept has learned nothing"):
+            use()
+    assert not (tmp_path / "model").exists()
+
+
+def test_remarks_are_of_the_last_fit_and_kept_on_disk(throws, tmp_path):
+    demos = throws(3, 20)
+    apart = demos.plans.copy()
+    apart[0] += 0.1
+    generator = Kept().fit(demos.with_plans(apart), seed=0)
+    assert generator.remarks == ("demonstrations start apart",)
+    generator.save(tmp_path)
+    assert Kept.load(tmp_path).remarks == generator.remarks
+    assert generator.fit(demos, seed=0).remarks == ()
+
+
+def test_without_a_state_saving_says_what_is_missing(throws, tmp_path):
+    with pytest.raises(NotImplementedError, match=r"Constant has no state"):
+        Constant().fit(throws(3, 20), seed=0).save(tmp_path)
+
+
+def test_a_tensor_that_is_missing_is_a_damaged_model(throws, tmp_path):
+    class Forgetful(Kept):
+        name = "kept"
+
+        def state(self):
+            return {}, {"another": self.plan}
+
+    Forgetful().fit(throws(3, 20), seed=0).save(tmp_path)
+    with pytest.raises(FileFormatError, match=r"no complete kept generator .*plan"):
+        Kept.load(tmp_path)
+
+
+def test_the_cpu_is_the_only_device_unless_a_member_says_otherwise():
+    assert Constant().to("cpu")
+    with pytest.raises(ConfigurationError, match="CPU only"):
+        Constant().to("cuda")
+
+
+def test_scaled_conditions_span_minus_one_to_one_in_every_unit():
+    outcomes = np.array([[0.8, 20.0], [1.2, 35.0], [1.0, 5.0]])
+    scaled = ConditionScale.fit(outcomes).scale(outcomes)
+    np.testing.assert_allclose(scaled, [[-1, 0], [1, 1], [0, -1]], atol=1e-12)

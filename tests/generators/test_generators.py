@@ -1,0 +1,110 @@
+"""Generators by name: what a choice makes, and what is loaded again."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from prior_reinforce.errors import ConfigurationError, FileFormatError
+from prior_reinforce.generators import GENERATORS, load_generator, make_generator
+from prior_reinforce.generators.diffusion import DiffusionConfig
+from prior_reinforce.generators.interpolation import NearestNeighbours
+from prior_reinforce.generators.timed import Timed
+
+
+class Own(NearestNeighbours):
+    """One's own."""
+
+    name = "own"
+
+
+OWN = f"{__name__}:Own"
+
+
+@pytest.mark.parametrize("name", GENERATORS.members)
+def test_a_name_is_that_of_its_class(name):
+    kind = GENERATORS.kind(name)
+    assert kind.name == {"diffusion-paper": "diffusion"}.get(name, name)
+
+
+@pytest.mark.parametrize(
+    ("choice", "timing"),
+    [
+        ("diffusion", "start"),
+        ("regression", "start"),
+        ("diffusion-paper", None),
+        ("dmp", None),
+        ("nearest", None),
+        ("interpolation", None),
+        ("diffusion,timing=none", None),
+        ("regression,timing=align", "align"),
+        ("nearest,timing=start,neighbours=2", "start"),
+        (f"{OWN},timing=align,neighbours=2", "align"),
+    ],
+)
+def test_timing_of_a_choice(choice, timing):
+    generator = make_generator(choice)
+    assert (generator.timing if isinstance(generator, Timed) else None) == timing
+    inner = generator.generator if isinstance(generator, Timed) else generator
+    assert GENERATORS.name_of(generator) == GENERATORS.name_of(inner)
+    if "neighbours" in choice:
+        assert inner.config.neighbours == 2
+
+
+def test_settings_of_a_choice():
+    config = make_generator("diffusion,training_steps=7,sampler=ddim,timing=none").config
+    assert config == DiffusionConfig(training_steps=7, sampler="ddim")
+    assert make_generator("dmp,segmented=false").config.segmented is False
+    assert make_generator("diffusion-paper").config == DiffusionConfig.preset("paper")
+    assert make_generator("regression", threads=2, device="cpu").generator._threads == 2
+
+
+@pytest.mark.parametrize(
+    ("choice", "named"),
+    [
+        ("difusion", "known are diffusion, diffusion-paper"),
+        ("nearest,timing=late", "late"),
+        ("nearest,speed=3", "speed"),
+        ("diffusion,training_steps=0", "training_steps"),
+        ("prior_reinforce.tasks:make_task", "not a Generator"),
+    ],
+)
+def test_a_choice_that_cannot_be_made_is_named(choice, named):
+    with pytest.raises(ConfigurationError, match=named):
+        make_generator(choice)
+
+
+def test_help_says_every_name_and_how_to_time_it():
+    for word in (*GENERATORS.members, "timing=align", "module:Class"):
+        assert word in GENERATORS.help
+
+
+@pytest.mark.parametrize("timing", ["none", "start"])
+def test_ones_own_is_loaded_by_its_name_alone(timing, throws, tmp_path):
+    demos = throws(3, 60)
+    generator = make_generator(f"{OWN},timing={timing}").fit(demos, seed=0)
+    generator.save(tmp_path)
+    with pytest.raises(FileFormatError, match="module:Class"):
+        load_generator(tmp_path)
+    with pytest.raises(FileFormatError, match="own generator, not of nearest"):
+        load_generator(tmp_path, own="nearest")
+    loaded = load_generator(tmp_path, own=OWN)
+    np.testing.assert_array_equal(
+        loaded.generate(demos.outcomes_seen), generator.generate(demos.outcomes_seen)
+    )
+
+
+def test_another_device_is_refused_by_what_is_no_network(throws, tmp_path):
+    NearestNeighbours().fit(throws(3, 20), seed=0).save(tmp_path)
+    with pytest.raises(ConfigurationError, match="CPU only"):
+        load_generator(tmp_path, device="cuda")
+
+
+def test_names_are_read_without_torch_or_scipy():
+    code = (
+        "import sys, prior_reinforce.generators; "
+        "print([m for m in ('torch', 'scipy', 'safetensors') if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"

@@ -1,0 +1,140 @@
+"""When a plan moves: known motions, at every threshold."""
+
+import numpy as np
+import pytest
+
+from prior_reinforce.plans.motions import Demonstrations, PlanFormat
+from prior_reinforce.plans.timing import (
+    CannotShiftError,
+    check_ends_rest,
+    cut_out,
+    ends_in_motion,
+    frames_at_rest,
+    middle,
+    motion_span,
+    moving_rows,
+    onset,
+    recorded_speeds,
+    resting_dimensions,
+    shift,
+    speeds,
+    still_bands,
+    velocity_profiles,
+)
+
+STARTS = np.array([5, 31, 12, 44])
+
+
+def demonstrations(tremor: float = 0.0) -> Demonstrations:
+    """Minimum-jerk swings of 40 frames in 90, of a joint and of a slide, and a constant joint."""
+    phase = np.clip((np.arange(90) - STARTS[:, None]) / 40, 0, 1)
+    swing = 10 * phase**3 - 15 * phase**4 + 6 * phase**5
+    plans = np.stack([swing, 0.01 * swing, 0 * swing + 0.3], axis=-1)
+    shake = np.sin(0.086 * np.arange(90)[None, :, None] + np.arange(4)[:, None, None])
+    outcomes = np.array([[0.8, -0.2], [0.8, 0.2], [1.0, -0.1], [1.0, 0.2]])
+    plan_format = PlanFormat(("a", "slide", "c"), ("rad", "m", "rad"), 0.0125)
+    return Demonstrations(plans + tremor * shake * [1, 0.01, 1], outcomes, plan_format)
+
+
+def test_profiles_of_a_unit_share_a_scale_and_units_count_alike():
+    demos = demonstrations()
+    profiles = velocity_profiles(demos.plans, demos.format.units, 0.0)
+    # Of the joints one rests: the other is sqrt(2) times the pooled rms; the slide is alone.
+    np.testing.assert_allclose(profiles[:, :, 0], np.sqrt(2) * profiles[:, :, 1], atol=1e-9)
+    np.testing.assert_array_equal(profiles[:, :, 2], 0)
+    assert np.mean(profiles[:, :, 1] ** 2) == pytest.approx(1)
+
+
+def test_constant_plans_have_no_speed():
+    profiles = velocity_profiles(np.full((2, 9, 1), 0.1) + 1e-17, ("rad",), 2.0)
+    np.testing.assert_array_equal(profiles, 0)
+
+
+def test_a_swing_moves_fastest_in_its_middle():
+    demos = demonstrations()
+    np.testing.assert_allclose(speeds(demos).argmax(axis=1), STARTS + 20, atol=1)
+    for start, speed in zip(STARTS, recorded_speeds(demos), strict=True):
+        assert middle(speed) == pytest.approx(start + 20, abs=1e-6)
+        # 5 % of the peak of 30 u^2 (1 - u)^2 is reached at u = 0.059.
+        assert onset(speed) == start + np.ceil(0.059 * 40)
+
+
+def test_rest_ends_at_a_two_hundredth_of_the_peak():
+    speed = np.array([0, 0.004, 0.006, 1, 0.3, 0.005, 0])
+    assert frames_at_rest(speed) == (2, 2)
+    assert frames_at_rest(np.zeros(7)) == (7, 7)
+
+
+def test_a_motion_spans_its_threshold_crossings_and_a_tenth_more():
+    """A linear rise and fall between frames 20 and 60: 5 % of the peak is a frame inside."""
+    speed = np.clip(1 - np.abs(np.arange(100) - 40) / 20, 0, None)
+    np.testing.assert_allclose(motion_span(speed), [21 - 3.8, 59 + 3.8])
+
+
+def test_a_motion_at_the_ends_of_its_recording_keeps_them():
+    np.testing.assert_array_equal(motion_span(np.ones(30)), [0, 29])
+    np.testing.assert_array_equal(motion_span(np.zeros(30)), [0, 29])
+
+
+def test_only_a_frame_that_is_to_be_held_has_to_rest():
+    moving_at_its_end = np.array([[0.0, 1.0, 0.5], [0.05, 1.0, 0.0]])
+    check_ends_rest(moving_at_its_end, np.array([[True, False], [True, True]]))
+    with pytest.raises(CannotShiftError, match=r"demonstration 0 .* last frame, with 50%"):
+        check_ends_rest(moving_at_its_end, np.array([[False, True], [False, False]]))
+
+
+def test_dimensions_rest_each_on_its_own():
+    plans = np.zeros((2, 5, 2))
+    plans[0, :, 0] = [0, 0, 1, 2, 3]
+    plans[:, :, 1] = [0, 1, 2, 3, 3.009]
+    starts, ends = resting_dimensions(plans)
+    assert starts == (True, False)
+    assert ends == (False, True)
+
+
+def test_a_recording_ends_in_motion_if_one_channel_does():
+    still = np.array([[0.0, 0], [1, 1], [1.04, 1]])
+    assert not ends_in_motion(still)
+    assert ends_in_motion(still + np.array([[0, 0], [0, 0], [0, 0.06]]))
+
+
+def test_still_bands_follow_the_largest_range_of_a_unit_and_have_a_floor():
+    recordings = [np.array([[0.0, 0, 0], [2, 0.1, 0.01]]), np.array([[0.0, 0, 0], [1, 0.2, 0]])]
+    bands = still_bands(recordings, ("rad", "rad", "m"))
+    np.testing.assert_allclose(bands, [0.01, 0.01, 5e-4])
+
+
+def test_moving_rows_of_a_motion_that_returns():
+    there_and_back = np.array([[0.0], [0.001], [0.5], [1.0], [0.5], [0.001], [0.0]])
+    assert moving_rows(there_and_back, np.array([0.01])) == (2, 4)
+    assert moving_rows(np.zeros((4, 1)), np.array([0.01])) is None
+
+
+def test_whole_frames_are_shifted_without_a_change_and_ends_held():
+    plans = np.random.default_rng(0).normal(size=(2, 5, 1))
+    later = shift(plans, np.array([2, -1]), 7, before=1)
+    np.testing.assert_array_equal(later[0, :, 0], plans[0, [0, 0, 0, 0, 1, 2, 3], 0])
+    np.testing.assert_array_equal(later[1, :, 0], plans[1, [0, 1, 2, 3, 4, 4, 4], 0])
+
+
+def test_parts_of_frames_are_interpolated():
+    line = np.arange(6.0)[None, :, None]
+    half = shift(line, np.array([0.5]), 6)[0, :, 0]
+    np.testing.assert_allclose(half, [0, 0.5, 1.5, 2.5, 3.5, 4.5])
+
+
+def test_a_cut_holds_every_motion_and_shifting_it_back_loses_nothing():
+    demos = demonstrations()
+    cut = cut_out(demos, STARTS - 23)
+    motions = cut.motions(demos.plans)
+    assert motions.shape == (4, cut.length, 3)
+    np.testing.assert_allclose(shift(motions, cut.begins, 90), demos.plans, atol=1e-15)
+    assert cut.before == 4
+    np.testing.assert_array_equal(cut.begins, STARTS - cut.before)
+
+
+def test_what_trembles_is_held_and_what_moves_is_not():
+    cut = cut_out(demonstrations(tremor=0.006), STARTS - 23)
+    np.testing.assert_allclose(cut.begins, STARTS - cut.before, atol=3)
+    with pytest.raises(CannotShiftError, match=r"would change it by .* of the largest range"):
+        cut_out(demonstrations(tremor=0.02), STARTS - 23)
