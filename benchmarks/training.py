@@ -19,7 +19,7 @@ import numpy as np
 from scipy.spatial import Delaunay
 
 from prior_reinforce.cores import available_cores
-from prior_reinforce.generators import DiffusionConfig, DiffusionGenerator
+from prior_reinforce.generators import DiffusionConfig, DiffusionGenerator, Timed
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.tasks.basketball import BasketballShot
 
@@ -32,21 +32,22 @@ def step_times(
 ) -> list[float]:
     """Return the duration of each step but the first, which warms up, in [s]."""
     ends: list[float] = []
-    generator = DiffusionGenerator(replace(config, training_steps=n_steps + 1), threads=threads)
+    config = replace(config, training_steps=n_steps + 1)
+    generator = Timed(DiffusionGenerator(config, threads=threads))
     generator.fit(demos, seed=seed, progress=lambda _: ends.append(time.perf_counter()))
     return np.diff(ends).tolist()
 
 
 def train_in_full(
     config: DiffusionConfig, demos: Demonstrations, seed: int, threads: int
-) -> tuple[DiffusionGenerator, float, float]:
+) -> tuple[Timed, float, float]:
     """Return the generator, the wall time and the processor time of its fit, in [s]."""
     wall, processor = time.perf_counter(), time.process_time()
-    generator = DiffusionGenerator(config, threads=threads).fit(demos, seed=seed)
+    generator = Timed(DiffusionGenerator(config, threads=threads)).fit(demos, seed=seed)
     return generator, time.perf_counter() - wall, time.process_time() - processor
 
 
-def zero_shot(generator: DiffusionGenerator, demos: Demonstrations, seed: int) -> str:
+def zero_shot(generator: Timed, demos: Demonstrations, seed: int) -> str:
     """Throw at random goals in the demonstrations' hull, without disturbances."""
     rng, hull = np.random.default_rng(seed), Delaunay(demos.outcomes_seen)
     low, high = demos.outcomes_seen.min(axis=0), demos.outcomes_seen.max(axis=0)

@@ -20,7 +20,8 @@ from prior_reinforce.adapters.normalisation import Normalisation
 from prior_reinforce.adapters.vectors import as_goal_seen, as_trial, not_started
 from prior_reinforce.experiments.methods import make_adapter, make_perception
 from prior_reinforce.experiments.protocol import run_goals, success_by_round
-from prior_reinforce.generators import NearestNeighbours, align
+from prior_reinforce.generators import NearestNeighbours
+from prior_reinforce.plans.alignment import align
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.tasks import make_task
 

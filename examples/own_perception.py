@@ -20,8 +20,9 @@ import numpy as np
 from prior_reinforce.adapters import GaussianProcessAdapter
 from prior_reinforce.errors import ConfigurationError, PerceptionFailedError
 from prior_reinforce.experiments.protocol import run_goals, success_by_round
-from prior_reinforce.generators import NearestNeighbours, align
+from prior_reinforce.generators import NearestNeighbours
 from prior_reinforce.perception import Exact, Perception
+from prior_reinforce.plans.alignment import align
 from prior_reinforce.rollouts import Rollout
 from prior_reinforce.tasks import make_task
 

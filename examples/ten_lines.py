@@ -24,7 +24,7 @@ def main() -> int:
     task = pr.make_task("basketball-v1")
     demos = task.demonstrations("A")
     config = pr.DiffusionConfig(training_steps=options.training_steps)
-    generator = pr.DiffusionGenerator(config).fit(demos, seed=0)
+    generator = pr.Timed(pr.DiffusionGenerator(config)).fit(demos, seed=0)
     session = pr.Session(
         generator, pr.GaussianProcessAdapter(), demos, goal=options.goal, tolerance=task.tolerance
     )

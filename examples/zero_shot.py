@@ -18,7 +18,7 @@ import argparse
 import numpy as np
 
 from prior_reinforce.experiments.methods import make_generator
-from prior_reinforce.generators import align
+from prior_reinforce.plans.alignment import align
 from prior_reinforce.tasks.basketball import BasketballShot
 
 

@@ -14,6 +14,17 @@ from .generators import load_generator as load_generator
 from .generators import make_generator as make_generator
 from .generators.base import FitProgress as FitProgress
 from .generators.base import Generator as Generator
+from .generators.config import UNetSize as UNetSize
+from .generators.diffusion import DiffusionConfig as DiffusionConfig
+from .generators.diffusion import DiffusionGenerator as DiffusionGenerator
+from .generators.dmp import DynamicMovementPrimitives as DynamicMovementPrimitives
+from .generators.dmp import DynamicMovementPrimitivesConfig as DynamicMovementPrimitivesConfig
+from .generators.interpolation import NearestNeighbours as NearestNeighbours
+from .generators.interpolation import NearestNeighboursConfig as NearestNeighboursConfig
+from .generators.interpolation import SmoothInterpolation as SmoothInterpolation
+from .generators.interpolation import SmoothInterpolationConfig as SmoothInterpolationConfig
+from .generators.regression import UNetRegression as UNetRegression
+from .generators.regression import UNetRegressionConfig as UNetRegressionConfig
 from .generators.timed import Timed as Timed
 from .perception import make_perception as make_perception
 from .perception.amplified import Amplified as Amplified
@@ -23,6 +34,7 @@ from .perception.camera import Camera as Camera
 from .perception.exact import Exact as Exact
 from .perception.eye import Eye as Eye
 from .plans.alignment import Alignment as Alignment
+from .plans.alignment import AlignmentConfig as AlignmentConfig
 from .plans.alignment import align as align
 from .plans.files import read_plan as read_plan
 from .plans.files import write_plan as write_plan

@@ -1,5 +1,6 @@
 """What diffusion and regression share: threads, devices, and weights that have to fit."""
 
+import copy
 from dataclasses import replace
 
 import numpy as np
@@ -65,10 +66,10 @@ def test_another_seed_draws_other_initial_weights(make, throws):
 @each
 def test_weights_of_another_network_are_a_damaged_model(make, throws):
     saved = make().fit(throws(2, 20), seed=0).pack()
-    config = {**saved.settings["config"], "network": {**saved.settings["config"]["network"]}}
-    config["network"]["widths"] = (8, 32)
+    state = copy.deepcopy(saved.settings["state"])
+    state["config"]["network"]["widths"] = (8, 32)
     with pytest.raises(FileFormatError, match="learn it again"):
-        make().unpack(replace(saved, settings={**saved.settings, "config": config}))
+        make().unpack(replace(saved, settings={**saved.settings, "state": state}))
     fewer = {k: v for k, v in saved.tensors.items() if not k.endswith("head.1.bias")}
     with pytest.raises(FileFormatError, match="learn it again"):
         make().unpack(replace(saved, tensors=fewer))

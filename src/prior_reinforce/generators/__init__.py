@@ -103,7 +103,7 @@ def load_generator(
     """
     saved = read_model(Path(folder))
     if saved.generator == Timed.name:
-        inner = class_named(str(saved.settings.get("generator")), own)
+        inner = class_named(Timed.wrapped(saved), own)
         return Timed.unpack(saved, kind=inner).to(device)
     return class_named(saved.generator, own).unpack(saved).to(device)
 

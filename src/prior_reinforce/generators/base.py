@@ -127,7 +127,7 @@ class Generator(ABC):
         """
         common = {"outcome_dim": self._fitted_to(), "remarks": list(self.remarks)}
         settings, tensors = self.state()
-        return SavedModel(self.name, {**common, **settings}, tensors)
+        return SavedModel(self.name, {**common, "state": settings}, tensors)
 
     @classmethod
     def unpack(cls, saved: SavedModel, **context: Any) -> Self:
@@ -141,7 +141,7 @@ class Generator(ABC):
             FileFormatError: Something is missing, or does not fit.
         """
         try:
-            generator = cls.from_state(saved.settings, saved.tensors, **context)
+            generator = cls.from_state(saved.settings["state"], saved.tensors, **context)
             generator.remarks = tuple(map(str, saved.settings["remarks"]))
             generator._outcome_dim = int(saved.settings["outcome_dim"])
         except FileFormatError:

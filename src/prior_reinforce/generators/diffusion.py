@@ -49,8 +49,8 @@ PAPER: dict[str, Any] = {
 
 Diffusion Policy's published low-dimensional training ([Chi2023] in docs/references.md) with the
 paper's learning rate: raw frames, widths 256, 512 and 1024, AdamW, cosine with 500 steps of
-warm-up, EMA, 100-step DDPM on the noise. A batch there is one pass over the demonstrations, as they are
-fewer than its 256; its 5,000 epochs so are 5,000 steps.
+warm-up, EMA, 100-step DDPM on the noise. A batch there is one pass over the demonstrations, as they
+are fewer than its 256; its 5,000 epochs so are 5,000 steps.
 """
 
 

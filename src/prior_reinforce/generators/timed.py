@@ -24,7 +24,7 @@ import numpy as np
 from typing_extensions import Self
 
 from prior_reinforce.arrays import Plans, Points
-from prior_reinforce.errors import ConfigurationError
+from prior_reinforce.errors import ConfigurationError, FileFormatError
 from prior_reinforce.generators.base import Generator, Report
 from prior_reinforce.generators.saving import SavedModel, Tensors
 from prior_reinforce.plans.alignment import align
@@ -118,6 +118,18 @@ class Timed(Generator):
             earliest, latest = settings["starts"]
             timed._starts = int(earliest), int(latest)
         return timed
+
+    @staticmethod
+    def wrapped(saved: SavedModel) -> str:
+        """Return the name of the generator within a saved one.
+
+        Raises:
+            FileFormatError: There is none.
+        """
+        try:
+            return str(saved.settings["state"]["generator"])
+        except (KeyError, TypeError) as error:
+            raise FileFormatError(f"the model names no generator to time ({error!r})") from error
 
     def _started_together(self, demonstrations: Demonstrations) -> Demonstrations:
         """The motions alone, with their start as one more dimension; whole plans if that fails."""

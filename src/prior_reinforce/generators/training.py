@@ -8,7 +8,10 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from typing import TypeVar
+from typing import Any, TypeVar, cast
+
+from torch.optim.lr_scheduler import LambdaLR
+from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
 
 from prior_reinforce.generators.base import FitProgress, Report
 from prior_reinforce.generators.config import UNetConfig
@@ -55,9 +58,6 @@ def optimise(
     Returns:
         The network, with averaged weights if so, in evaluation mode.
     """
-    from torch.optim.lr_scheduler import LambdaLR
-    from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
-
     optimiser = torch.optim.AdamW(
         network.parameters(),
         lr=config.learning_rate,
@@ -68,12 +68,7 @@ def optimise(
     schedule = LambdaLR(optimiser, lambda step: learning_rate_factor(step, config))
     average = None
     if decay is not None:
-        average = AveragedModel(
-            network,
-            multi_avg_fn=lambda averaged, current, n: get_ema_multi_avg_fn(decay(int(n)))(
-                averaged, current, n
-            ),
-        )
+        average = AveragedModel(network, multi_avg_fn=_averaging(decay))
     started, mean_loss, n_steps = time.monotonic(), 0.0, config.training_steps
     for done in range(1, n_steps + 1):
         loss = loss_of_step()
@@ -87,8 +82,18 @@ def optimise(
         if done == n_steps or done % max(1, n_steps // _REPORTS) == 0:
             left = (time.monotonic() - started) / done * (n_steps - done)
             progress(FitProgress(done, n_steps, mean_loss, left))
-    fitted: Network = network if average is None else average.module
+    fitted = network if average is None else cast(Network, average.module)
     return fitted.eval().requires_grad_(False)
+
+
+def _averaging(decay: Callable[[int], float]) -> Callable[..., None]:
+    """Torch's exponential averaging, with a decay that changes from step to step."""
+
+    def average(averaged: Any, current: Any, n: torch.Tensor) -> None:
+        step: Any = get_ema_multi_avg_fn(decay(int(n)))  # type: ignore[no-untyped-call]
+        step(averaged, current, n)
+
+    return average
 
 
 def learning_rate_factor(step: int, config: UNetConfig) -> float:
