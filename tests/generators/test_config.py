@@ -2,7 +2,6 @@
 
 from dataclasses import asdict
 
-import numpy as np
 import pytest
 
 from prior_reinforce.errors import ConfigurationError
@@ -33,10 +32,6 @@ def test_sizes_that_do_not_fit_are_named(wrong):
 def test_settings_out_of_range_are_named(wrong):
     with pytest.raises(ConfigurationError, match=next(iter(wrong))):
         DiffusionConfig(**wrong)
-
-
-def test_numbers_of_numpy_are_numbers():
-    assert DiffusionConfig(training_steps=np.int64(3), margin=np.float64(0.1)).training_steps == 3
 
 
 @pytest.mark.parametrize("config", [DiffusionConfig.preset("paper"), UNetRegressionConfig()])

@@ -8,20 +8,17 @@ from pathlib import Path
 from typing import Any, cast
 
 from prior_reinforce.errors import FileFormatError
-from prior_reinforce.generators.base import FitProgress, Generator
-from prior_reinforce.generators.config import UNetConfig, UNetSize
-from prior_reinforce.generators.diffusion import PAPER, DiffusionConfig, DiffusionGenerator
-from prior_reinforce.generators.dmp import (
-    DynamicMovementPrimitives,
-    DynamicMovementPrimitivesConfig,
-)
-from prior_reinforce.generators.interpolation import (
-    NearestNeighbours,
-    NearestNeighboursConfig,
-    SmoothInterpolation,
-    SmoothInterpolationConfig,
-)
-from prior_reinforce.generators.regression import UNetRegression, UNetRegressionConfig
+from prior_reinforce.generators.base import FitProgress as FitProgress
+from prior_reinforce.generators.base import Generator
+from prior_reinforce.generators.config import UNetSize as UNetSize
+from prior_reinforce.generators.diffusion import PAPER
+from prior_reinforce.generators.diffusion import DiffusionConfig as DiffusionConfig
+from prior_reinforce.generators.diffusion import DiffusionGenerator as DiffusionGenerator
+from prior_reinforce.generators.dmp import DynamicMovementPrimitives as DynamicMovementPrimitives
+from prior_reinforce.generators.interpolation import NearestNeighbours as NearestNeighbours
+from prior_reinforce.generators.interpolation import SmoothInterpolation as SmoothInterpolation
+from prior_reinforce.generators.regression import UNetRegression as UNetRegression
+from prior_reinforce.generators.regression import UNetRegressionConfig as UNetRegressionConfig
 from prior_reinforce.generators.saving import read_model
 from prior_reinforce.generators.timed import Timed, Timing
 from prior_reinforce.registry import Member, Registry, parse_choice
@@ -127,26 +124,3 @@ def class_named(name: str, own: str | None = None) -> type[Generator]:
     if kind.name != name:
         raise FileFormatError(f"the model is of a {name} generator, not of {own or name}")
     return kind
-
-
-__all__ = [
-    "GENERATORS",
-    "DiffusionConfig",
-    "DiffusionGenerator",
-    "DynamicMovementPrimitives",
-    "DynamicMovementPrimitivesConfig",
-    "FitProgress",
-    "Generator",
-    "NearestNeighbours",
-    "NearestNeighboursConfig",
-    "SmoothInterpolation",
-    "SmoothInterpolationConfig",
-    "Timed",
-    "Timing",
-    "UNetConfig",
-    "UNetRegression",
-    "UNetRegressionConfig",
-    "UNetSize",
-    "load_generator",
-    "make_generator",
-]

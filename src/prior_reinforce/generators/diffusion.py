@@ -13,13 +13,14 @@ from typing_extensions import Self
 
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.generators.base import Report
-from prior_reinforce.generators.config import Count, NonNegative, UNetConfig
+from prior_reinforce.generators.config import UNetConfig
 from prior_reinforce.generators.network import Learned, NetworkGenerator
 from prior_reinforce.plans.codec import Representation
 from prior_reinforce.registry import build
+from prior_reinforce.settings import Count, NonNegative
 
 if TYPE_CHECKING:
-    import torch
+    from torch import Tensor, nn
 
     from prior_reinforce.generators.unet import ConditionalUNet
 
@@ -151,18 +152,13 @@ class DiffusionGenerator(NetworkGenerator):
         return ConditionalUNet(channels, outcome_dim, self.config.network)
 
     def _train(
-        self,
-        network: torch.nn.Module,
-        codes: torch.Tensor,
-        conditions: torch.Tensor,
-        seed: int,
-        progress: Report,
-    ) -> torch.nn.Module:
+        self, network: nn.Module, codes: Tensor, conditions: Tensor, seed: int, progress: Report
+    ) -> nn.Module:
         from prior_reinforce.generators.denoiser import train
 
         return train(network, codes, conditions, self.config, seed, progress)
 
-    def _codes(self, learned: Learned, conditions: torch.Tensor) -> torch.Tensor:
+    def _codes(self, learned: Learned, conditions: Tensor) -> Tensor:
         from prior_reinforce.generators.denoiser import sample
 
         shape = learned.codec.channels, learned.codec.length

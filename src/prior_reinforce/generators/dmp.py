@@ -38,12 +38,12 @@ from typing_extensions import Self
 from prior_reinforce.arrays import Frames, Plans, Points
 from prior_reinforce.errors import MissingExtraError
 from prior_reinforce.generators.base import Generator, Report, at_once
-from prior_reinforce.generators.config import Checked, Positive
 from prior_reinforce.generators.outcome_weights import smooth_weights
 from prior_reinforce.generators.saving import Tensors
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.plans.timing import motion_span, speeds
 from prior_reinforce.registry import build
+from prior_reinforce.settings import Checked, Positive
 
 _INTEGRATION_STEPS = 1000
 """Runge-Kutta steps over a motion. The library evaluates the forcing one step late, which at its

@@ -30,7 +30,6 @@ from typing_extensions import Self
 
 from prior_reinforce.arrays import Plans, Points
 from prior_reinforce.generators.base import Generator, Report, at_once
-from prior_reinforce.generators.config import Checked, Count, Positive
 from prior_reinforce.generators.outcome_weights import (
     Kernel,
     inverse_distance_weights,
@@ -39,6 +38,7 @@ from prior_reinforce.generators.outcome_weights import (
 from prior_reinforce.generators.saving import Tensors
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.registry import build
+from prior_reinforce.settings import Checked, Count, Positive
 
 
 @dataclass(frozen=True)
@@ -71,9 +71,7 @@ class _Mixture(Generator):
         self.config = config or self.config_type()
 
     @abstractmethod
-    def weights(
-        self, conditions: Points, outcomes: Float[np.ndarray, "N k"]
-    ) -> Float[np.ndarray, "n N"]:
+    def _weights(self, conditions: Points) -> Float[np.ndarray, "n N"]:
         """How much of each plan goes into the plan for each condition."""
 
     def _fit(self, demonstrations: Demonstrations, seed: int, progress: Report) -> None:
@@ -83,8 +81,7 @@ class _Mixture(Generator):
         at_once(progress, loss=0.0)
 
     def _generate(self, conditions: Points) -> Plans:
-        weights = self.weights(conditions, self._outcomes)
-        return np.tensordot(weights, self._plans, axes=1)
+        return np.tensordot(self._weights(conditions), self._plans, axes=1)
 
     def state(self) -> tuple[dict[str, Any], Tensors]:
         """The demonstrations; see `Generator.state`."""
@@ -108,12 +105,13 @@ class NearestNeighbours(_Mixture):
     config_type: ClassVar[type[NearestNeighboursConfig]] = NearestNeighboursConfig
     config: NearestNeighboursConfig
 
-    def weights(
-        self, conditions: Points, outcomes: Float[np.ndarray, "N k"]
-    ) -> Float[np.ndarray, "n N"]:
+    def _weights(self, conditions: Points) -> Float[np.ndarray, "n N"]:
         """Weigh the nearest plans; at a demonstration's outcome, its own alone."""
         return inverse_distance_weights(
-            conditions, outcomes, neighbours=self.config.neighbours, power=self.config.power
+            conditions,
+            self._outcomes,
+            neighbours=self.config.neighbours,
+            power=self.config.power,
         )
 
 
@@ -124,8 +122,6 @@ class SmoothInterpolation(_Mixture):
     config_type: ClassVar[type[SmoothInterpolationConfig]] = SmoothInterpolationConfig
     config: SmoothInterpolationConfig
 
-    def weights(
-        self, conditions: Points, outcomes: Float[np.ndarray, "N k"]
-    ) -> Float[np.ndarray, "n N"]:
+    def _weights(self, conditions: Points) -> Float[np.ndarray, "n N"]:
         """Weigh all plans; at a demonstration's outcome its own alone, to rounding."""
-        return smooth_weights(conditions, outcomes, kernel=self.config.kernel)
+        return smooth_weights(conditions, self._outcomes, kernel=self.config.kernel)

@@ -25,7 +25,7 @@ from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.registry import build
 
 if TYPE_CHECKING:
-    import torch
+    from torch import Tensor, nn
 
 _CHUNK = 128
 """Plans generated at once; bounds the memory of a dense grid of conditions."""
@@ -38,7 +38,7 @@ class Learned:
 
     codec: PlanCodec
     scale: ConditionScale
-    network: torch.nn.Module
+    network: nn.Module
     """In evaluation mode, on the device to compute on."""
     seed: int
     """Of the fit."""
@@ -73,22 +73,17 @@ class NetworkGenerator(Generator):
         self._learned: Learned | None = None
 
     @abstractmethod
-    def _build(self, channels: int, length: int, outcome_dim: int) -> torch.nn.Module:
+    def _build(self, channels: int, length: int, outcome_dim: int) -> nn.Module:
         """Make the network, of any weights, for codes (C, T) of conditions (k,)."""
 
     @abstractmethod
     def _train(
-        self,
-        network: torch.nn.Module,
-        codes: torch.Tensor,
-        conditions: torch.Tensor,
-        seed: int,
-        progress: Report,
-    ) -> torch.nn.Module:
+        self, network: nn.Module, codes: Tensor, conditions: Tensor, seed: int, progress: Report
+    ) -> nn.Module:
         """Fit the network to codes (N, C, T) of scaled conditions (N, k)."""
 
     @abstractmethod
-    def _codes(self, learned: Learned, conditions: torch.Tensor) -> torch.Tensor:
+    def _codes(self, learned: Learned, conditions: Tensor) -> Tensor:
         """Make codes (n, C, T) for scaled conditions (n, k)."""
 
     def _fit(self, demonstrations: Demonstrations, seed: int, progress: Report) -> None:
@@ -178,7 +173,7 @@ class NetworkGenerator(Generator):
             self._learned.network.to(device)
         return self
 
-    def _tensor(self, values: np.ndarray) -> torch.Tensor:
+    def _tensor(self, values: np.ndarray) -> Tensor:
         """Return numbers as networks compute them: float32, on their device."""
         from prior_reinforce.generators.threads import torch
 

@@ -72,14 +72,7 @@ class NoiseSchedule:
     def clean_estimate(
         self, noisy: Codes, predicted: Codes, step: int, prediction: Prediction
     ) -> Codes:
-        """Return the estimate of x_0 that a prediction at x_t amounts to.
-
-        Args:
-            noisy: x_t.
-            predicted: The network's answer.
-            step: t, one for the whole batch.
-            prediction: What the answer means.
-        """
+        """Return the estimate of x_0 that a prediction at x_t amounts to, at one t for all."""
         if prediction == "sample":
             return predicted
         signal = self.signal_at(step)
@@ -93,11 +86,7 @@ class NoiseSchedule:
     def ddim_step(self, noisy: Codes, clean: Codes, step: int, next_step: int) -> Codes:
         """Go from x_t to x_s, s < t, without fresh noise (Song et al., equation 12, sigma = 0).
 
-        Args:
-            noisy: x_t.
-            clean: The (clipped) estimate of x_0; the noise direction is recomputed from it.
-            step: t.
-            next_step: s; -1 gives the clean sample itself.
+        The noise direction is recomputed from the (clipped) estimate of x_0; s = -1 gives that.
         """
         signal, next_signal = self.signal_at(step), self.signal_at(next_step)
         noise = (noisy - math.sqrt(signal) * clean) / math.sqrt(1 - signal)
@@ -106,15 +95,10 @@ class NoiseSchedule:
     def ddpm_step(
         self, noisy: Codes, clean: Codes, step: int, noise: Float[torch.Tensor, "#B C T"]
     ) -> Codes:
-        """Draw x_{t-1} given x_t (Ho et al., equations 6 and 7).
+        """Draw x_{t-1} given x_t and the (clipped) estimate of x_0 (Ho et al., equations 6 and 7).
 
-        The variance is the posterior's ("fixed small"); the last step, t = 0, adds none.
-
-        Args:
-            noisy: x_t.
-            clean: The (clipped) estimate of x_0.
-            step: t.
-            noise: Unit Gaussian noise, one for all or one each.
+        The variance is the posterior's ("fixed small"); the last step, t = 0, adds none. The unit
+        Gaussian noise may be one for all.
         """
         signal, previous = self.signal_at(step), self.signal_at(step - 1)
         alpha = signal / previous

@@ -18,11 +18,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 from prior_reinforce.generators.base import Report
-from prior_reinforce.generators.config import Count, NonNegative, Positive, UNetConfig
+from prior_reinforce.generators.config import UNetConfig
 from prior_reinforce.generators.network import Learned, NetworkGenerator
+from prior_reinforce.settings import Count, NonNegative, Positive
 
 if TYPE_CHECKING:
-    import torch
+    from torch import Tensor, nn
 
     from prior_reinforce.generators.unet import RegressionNetwork
 
@@ -57,13 +58,8 @@ class UNetRegression(NetworkGenerator):
         return RegressionNetwork(channels, length, outcome_dim, self.config.network)
 
     def _train(
-        self,
-        network: torch.nn.Module,
-        codes: torch.Tensor,
-        conditions: torch.Tensor,
-        seed: int,
-        progress: Report,
-    ) -> torch.nn.Module:
+        self, network: nn.Module, codes: Tensor, conditions: Tensor, seed: int, progress: Report
+    ) -> nn.Module:
         """Fit to all demonstrations at every step; the seed has drawn the initial weights."""
         from torch.nn.functional import mse_loss
 
@@ -73,6 +69,6 @@ class UNetRegression(NetworkGenerator):
             network, lambda: mse_loss(network(conditions), codes), self.config, progress
         )
 
-    def _codes(self, learned: Learned, conditions: torch.Tensor) -> torch.Tensor:
-        codes: torch.Tensor = learned.network(conditions)
+    def _codes(self, learned: Learned, conditions: Tensor) -> Tensor:
+        codes: Tensor = learned.network(conditions)
         return codes

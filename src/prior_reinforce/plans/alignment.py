@@ -15,11 +15,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
+import msgspec
 import numpy as np
 from jaxtyping import Complex, Float
 
-from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.plans.timing import (
     LARGEST_END_SPEED,
@@ -29,6 +30,7 @@ from prior_reinforce.plans.timing import (
     shift,
     velocity_profiles,
 )
+from prior_reinforce.settings import Checked, NonNegative
 
 # Ours: rounds of "re-estimate the template, move each demonstration to it". Synthetic shifts and
 # the shipped prior sets settle in 3 to 8.
@@ -40,28 +42,15 @@ _NEWTON_STEPS = 4
 
 
 @dataclass(frozen=True)
-class AlignmentConfig:
+class AlignmentConfig(Checked):
     """How demonstrations are aligned."""
 
-    smoothing: float = SMOOTHING
+    smoothing: NonNegative = SMOOTHING
     """Standard deviation of the Gaussian that smooths velocities before they are compared, in [s].
     The plans stay unsmoothed."""
-    largest_end_speed: float = LARGEST_END_SPEED
+    largest_end_speed: Annotated[float, msgspec.Meta(gt=0, le=1)] = LARGEST_END_SPEED
     """A demonstration whose first or last frame moves faster than this part of its peak speed does
     not rest there and is refused, in [-]."""
-
-    def __post_init__(self) -> None:
-        """Check the settings.
-
-        Raises:
-            ConfigurationError: One is outside its range.
-        """
-        if not (math.isfinite(self.smoothing) and self.smoothing >= 0):
-            raise ConfigurationError(f"smoothing must be at least 0 s, got {self.smoothing}")
-        if not 0 < self.largest_end_speed <= 1:
-            raise ConfigurationError(
-                f"largest_end_speed must lie in (0, 1], got {self.largest_end_speed}"
-            )
 
 
 @dataclass(frozen=True, eq=False)

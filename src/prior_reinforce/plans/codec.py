@@ -48,6 +48,9 @@ acceleration by a third or less of what it did."""
 _CONSTANT = 1e-9
 """A dimension whose range is below this, relative to its values, is constant."""
 
+_SETTINGS = ("horizon", "length", "kinds", "rest_start", "rest_end", "levels")
+"""What a codec is beside its two arrays."""
+
 
 @dataclass(frozen=True, eq=False)
 class PlanCodec:
@@ -171,12 +174,7 @@ class PlanCodec:
 
     def settings(self) -> dict[str, Any]:
         """Everything but the arrays, as JSON types."""
-        return {
-            "horizon": self.horizon,
-            "length": self.length,
-            **{name: list(getattr(self, name)) for name in ("kinds", "rest_start", "rest_end")},
-            "levels": [list(values) for values in self.levels],
-        }
+        return {name: getattr(self, name) for name in _SETTINGS}
 
     @classmethod
     def restore(
@@ -188,18 +186,10 @@ class PlanCodec:
         """Rebuild a codec from its `settings` and arrays.
 
         Raises:
-            KeyError, TypeError, ValueError: Something is missing, or does not fit.
+            KeyError, TypeError: Something is missing.
         """
-        return cls(
-            horizon=int(settings["horizon"]),
-            length=int(settings["length"]),
-            kinds=tuple(settings["kinds"]),
-            rest_start=tuple(settings["rest_start"]),
-            rest_end=tuple(settings["rest_end"]),
-            levels=tuple(tuple(values) for values in settings["levels"]),
-            plan_range=plan_range,
-            code_range=code_range,
-        )
+        known = {name: _as_tuples(settings[name]) for name in _SETTINGS}
+        return cls(**known, plan_range=plan_range, code_range=code_range)
 
     @property
     def _fold(self) -> int:
@@ -293,3 +283,8 @@ def _levels(values: _Values) -> tuple[float, ...]:
     """The values of a switch; empty where there are too many for one."""
     distinct = np.unique(values)
     return tuple(distinct.tolist()) if distinct.size <= _MOST_LEVELS else ()
+
+
+def _as_tuples(value: Any) -> Any:
+    """JSON's lists as the tuples they were."""
+    return tuple(map(_as_tuples, value)) if isinstance(value, (list, tuple)) else value
