@@ -43,7 +43,7 @@ def test_a_gentle_swing_passes_everything():
         "rest at start",
         "rest at end",
         "demonstrations",
-        "workspace",
+        "box",
     ]
     report.require()
 
@@ -157,15 +157,15 @@ def test_demonstrations_of_other_columns_are_named():
         check_plan(Plan(swing(4, 0.5, 1.0), renamed), PANDA, demonstrations())
 
 
-def test_workspace_box():
+def test_the_box_for_the_tool_tip():
     plan = Plan(swing(4, 0.5, 1.0), FORMAT)
-    free = GateSettings(workspace_low=(-1, -1, 0), workspace_high=(1, 1, 1.5))
-    line = lines(check_plan(plan, PANDA, settings=free))["workspace"]
+    free = GateSettings(box_low=(-1, -1, 0), box_high=(1, 1, 1.5))
+    line = lines(check_plan(plan, PANDA, settings=free))["box"]
     assert line.status == "pass"
     low = GateSettings(
-        workspace_low=(-1, -1, 0), workspace_high=(1, 1, 1.5), tool_tip=(0.0, 0.0, 0.9)
+        box_low=(-1, -1, 0), box_high=(1, 1, 1.5), tool_tip=(0.0, 0.0, 0.9)
     )
-    line = lines(check_plan(plan, PANDA, settings=low))["workspace"]
+    line = lines(check_plan(plan, PANDA, settings=low))["box"]
     assert (line.status, line.joint, line.limit) == ("refuse", "z", 0.0)
     assert line.margin < 0
 
@@ -187,7 +187,7 @@ def test_some_joints_only():
     report = check_plan(Plan(swing(4, 1.2, 1.0)[:, [3, 5]], form), PANDA)
     found = lines(report)
     assert found["velocity"].joint == "joint4"
-    assert found["workspace"].status == "unchecked"
+    assert found["box"].status == "unchecked"
     assert (found["joints"].status, found["joints"].value) == ("warn", 5)
     assert found["joints"].text.endswith("joint1, joint2, joint3, joint5, joint7")
 
@@ -239,8 +239,8 @@ def test_the_report_is_plain_data():
         {"warn_above": 0.0},
         {"beyond_warn": 2.0},
         {"rest_speed": -1.0},
-        {"workspace_low": (0, 0, 0)},
-        {"workspace_low": (0, 0, 0), "workspace_high": (1, 1, 0)},
+        {"box_low": (0, 0, 0)},
+        {"box_low": (0, 0, 0), "box_high": (1, 1, 0)},
         {"tool_tip": (0.0, np.nan, 0.0)},
     ],
 )

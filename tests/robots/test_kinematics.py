@@ -6,7 +6,8 @@ import mujoco
 import numpy as np
 
 import prior_reinforce.tasks
-from prior_reinforce.robots.kinematics import FRANKA, tool_tip
+from prior_reinforce.robots.kinematics import tool_tip
+from prior_reinforce.robots.presets import FRANKA
 
 
 def test_stretched_arm_by_hand():
@@ -39,7 +40,7 @@ def test_agrees_with_the_simulated_arm():
         mujoco.mj_kinematics(model, data)
         rotation = data.site_xmat[flange].reshape(3, 3)
         expected = data.site_xpos[flange] + rotation @ turn @ tip - data.xpos[base]
-        np.testing.assert_allclose(tool_tip(FRANKA, q, tip), expected, atol=1e-6)
+        np.testing.assert_allclose(tool_tip(FRANKA, q, tip), expected, atol=1e-12)
 
 
 def test_shapes_broadcast():

@@ -1,30 +1,37 @@
-"""Limits of robot arms, per firmware, each with its source."""
+"""What a plan may ask of a robot arm, and which of its columns moves which joint."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
 
 import numpy as np
+from jaxtyping import Float
 
-from prior_reinforce.errors import ConfigurationError
-from prior_reinforce.robots.kinematics import FRANKA, Chain
+from prior_reinforce.errors import ConfigurationError, InvalidPlanError
+from prior_reinforce.plans.motions import PlanFormat
+from prior_reinforce.robots.kinematics import Chain, JointPositions
+
+PerJoint = Float[np.ndarray, " D"]
+"""One number for each of an arm's D joints."""
 
 
 @dataclass(frozen=True, eq=False)
 class VelocityEnvelope:
-    """A velocity bound that shrinks towards the stops; arrays have shape (D,).
+    """A velocity bound that shrinks towards the stops.
 
     min(velocity, max(0, -offset + sqrt(max(0, 2 deceleration (upper - q))))), mirrored at the lower
     end (frankarobotics/docs, robot_specifications.rst, "Position-Based Velocity Limits").
     """
 
-    offset: np.ndarray
+    offset: PerJoint
     """[rad/s]."""
-    deceleration: np.ndarray
+    deceleration: PerJoint
     """[rad/s^2]."""
-    lower: np.ndarray
+    lower: PerJoint
     """Lower end in the formula, [rad]; libfranka's differs a little from the position limit."""
-    upper: np.ndarray
+    upper: PerJoint
     """Upper end in the formula, [rad]."""
 
 
@@ -40,20 +47,20 @@ class RobotLimits:
     """Where the numbers are published."""
     joint_names: tuple[str, ...]
     """Names of the D joints; a plan's columns are matched to them by name."""
-    lower: np.ndarray
-    """Lowest joint positions, shape (D,), [rad]."""
-    upper: np.ndarray
-    """Highest joint positions, shape (D,), [rad]."""
-    velocity: np.ndarray
-    """Largest joint speeds, shape (D,), [rad/s]."""
-    acceleration: np.ndarray
-    """Largest joint accelerations, shape (D,), [rad/s^2]."""
-    jerk: np.ndarray
-    """Largest joint jerks, shape (D,), [rad/s^3]."""
+    lower: PerJoint
+    """Lowest joint positions, [rad]."""
+    upper: PerJoint
+    """Highest joint positions, [rad]."""
+    velocity: PerJoint
+    """Largest joint speeds, [rad/s]."""
+    acceleration: PerJoint
+    """Largest joint accelerations, [rad/s^2]."""
+    jerk: PerJoint
+    """Largest joint jerks, [rad/s^3]."""
     envelopes: tuple[VelocityEnvelope, ...] = ()
     """Position-dependent velocity bounds, where the robot has them; the narrowest counts."""
     chain: Chain | None = None
-    """Kinematics, for the tool tip; None leaves the workspace box unchecked."""
+    """Kinematics, for the tool tip; None leaves the box unchecked."""
 
     def __post_init__(self) -> None:
         """Copy and check.
@@ -68,12 +75,11 @@ class RobotLimits:
                 f"limits of {self.robot} need joint names that differ, got {self.joint_names}"
             )
         for name in ("lower", "upper", "velocity", "acceleration", "jerk"):
-            object.__setattr__(self, name, _numbers(self.robot, name, getattr(self, name), d))
-        for name in ("velocity", "acceleration", "jerk"):
-            if np.any(getattr(self, name) <= 0):
+            values = _per_joint(self.robot, name, getattr(self, name), d)
+            object.__setattr__(self, name, values)
+            if name not in ("lower", "upper") and np.any(values <= 0):
                 raise ConfigurationError(
-                    f"{name} limits of {self.robot} must be positive, got "
-                    f"{getattr(self, name).tolist()}"
+                    f"{name} limits of {self.robot} must be positive, got {values.tolist()}"
                 )
         if np.any(self.lower >= self.upper):
             joint = self.joint_names[int(np.argmax(self.lower >= self.upper))]
@@ -82,15 +88,15 @@ class RobotLimits:
             )
         for envelope in self.envelopes:
             for item in fields(envelope):
-                _numbers(self.robot, item.name, getattr(envelope, item.name), d)
+                _per_joint(self.robot, item.name, getattr(envelope, item.name), d)
         if self.chain is not None and len(self.chain.rows) != d:
             raise ConfigurationError(
                 f"the kinematics of {self.robot} have {len(self.chain.rows)} joints, its limits {d}"
             )
 
-    def velocity_bounds(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Lowest (negative) and highest velocities allowed at positions q, shape (..., D)."""
-        high = np.broadcast_to(self.velocity, np.shape(q))
+    def velocity_bounds(self, q: JointPositions) -> tuple[JointPositions, JointPositions]:
+        """Return the lowest (negative) and highest velocities allowed at positions q, [rad/s]."""
+        high = np.broadcast_to(self.velocity, q.shape)
         low = -high
         for e in self.envelopes:
             upward = np.sqrt(np.maximum(0.0, 2 * e.deceleration * (e.upper - q))) - e.offset
@@ -100,7 +106,66 @@ class RobotLimits:
         return low, high
 
 
-def _numbers(robot: str, name: str, values: object, d: int) -> np.ndarray:
+def match_joints(format: PlanFormat, limits: RobotLimits) -> dict[int, int]:
+    """Match a plan's columns to a robot's joints: by name, never guessed.
+
+    Args:
+        format: Of the plan. `joint4`, `panda_joint4` (ROS) and `joint4.pos` (LeRobot) are joint4;
+            nothing else is, so that no column is held against another joint's limits.
+        limits: Of the robot.
+
+    Returns:
+        Column of the plan by index of the robot's joint, for the joints that have one.
+
+    Raises:
+        InvalidPlanError: Two columns look like one joint, or a joint is in another unit than [rad].
+    """
+    columns: dict[int, int] = {}
+    for joint, name in enumerate(limits.joint_names):
+        ending = re.compile(rf"(^|[_/.]){re.escape(name)}(\.pos)?$")
+        found = [i for i, column in enumerate(format.names) if ending.search(column)]
+        exact = [i for i in found if format.names[i] == name]
+        if len(found) > 1 and not exact:
+            raise InvalidPlanError(
+                f"columns {[format.names[i] for i in found]} all look like {name} of "
+                f"{limits.robot}; rename those that are not"
+            )
+        if found:
+            columns[joint] = (exact or found)[0]
+    for column in columns.values():
+        if format.units[column] != "rad":
+            raise InvalidPlanError(
+                f"{format.names[column]} is in {format.units[column]!r}, but limits of "
+                f"{limits.robot} are in rad; convert the plan first"
+            )
+    return columns
+
+
+def missing_joints(
+    columns: dict[int, int], limits: RobotLimits, absent: Sequence[str]
+) -> tuple[str, ...]:
+    """Name the joints that should have a column and have none.
+
+    Args:
+        columns: What `match_joints` found.
+        limits: Of the robot.
+        absent: Joints that plans leave out on purpose.
+
+    Raises:
+        ConfigurationError: A joint is said to be absent that the robot has not, or the plan moves.
+    """
+    moved = {limits.joint_names[joint] for joint in columns}
+    for name in absent:
+        if name not in limits.joint_names or name in moved:
+            why = "the plan moves it" if name in moved else f"{limits.robot} has no such joint"
+            raise ConfigurationError(
+                f"absent_joints names {name!r}, but {why}; drop it there (joints are "
+                f"{', '.join(limits.joint_names)})"
+            )
+    return tuple(name for name in limits.joint_names if name not in moved and name not in absent)
+
+
+def _per_joint(robot: str, name: str, values: object, d: int) -> PerJoint:
     try:
         array = np.array(values, dtype=np.float64)
     except (TypeError, ValueError) as error:
@@ -111,108 +176,3 @@ def _numbers(robot: str, name: str, values: object, d: int) -> np.ndarray:
         )
     array.setflags(write=False)
     return array
-
-
-_JOINTS = tuple(f"joint{i}" for i in range(1, 8))
-
-PANDA = RobotLimits(
-    robot="panda",
-    firmware="any",
-    source=(
-        "frankarobotics/docs, robot_specifications.rst and control-parameters-joint-panda.csv, "
-        "read 4 May 2026"
-    ),
-    joint_names=_JOINTS,
-    lower=np.array([-2.8973, -1.7628, -2.8973, -3.0718, -2.8973, -0.0175, -2.8973]),
-    upper=np.array([2.8973, 1.7628, 2.8973, -0.0698, 2.8973, 3.7525, 2.8973]),
-    velocity=np.array([2.175, 2.175, 2.175, 2.175, 2.61, 2.61, 2.61]),
-    acceleration=np.array([15.0, 7.5, 10.0, 12.5, 15.0, 20.0, 20.0]),
-    jerk=np.array([7500.0, 3750.0, 5000.0, 6250.0, 7500.0, 10000.0, 10000.0]),
-    chain=FRANKA,
-)
-"""The Franka Emika Robot (FER), sold as Panda."""
-
-_FR3_VELOCITY = np.array([2.62, 2.62, 2.62, 2.62, 5.26, 4.18, 5.26])
-_FR3_ACCELERATION = np.full(7, 10.0)
-_FR3_JERK = np.full(7, 5000.0)
-_FR3_DECELERATION = np.array([6.0, 2.585, 3.5, 4.0, 17.0, 5.5, 17.0])
-_FR3_NEW_SOURCE = "frankarobotics/docs, control-parameters-joint-fr3.csv, read 21 Nov 2026"
-_FR3_OLD_SOURCE = (
-    "positions: Franka's documentation before system 5.9 (also franka_description's URDF of that "
-    "time); velocity envelope: libfranka, include/franka/rate_limiting.h"
-)
-
-FR3 = RobotLimits(
-    robot="fr3",
-    firmware=">=5.9",
-    source=_FR3_NEW_SOURCE,
-    joint_names=_JOINTS,
-    lower=np.array([-2.9007, -1.8361, -2.9007, -3.0770, -2.8763, 0.4398, -3.0508]),
-    upper=np.array([2.9007, 1.8361, 2.9007, -0.1169, 2.8763, 4.6216, 3.0508]),
-    velocity=_FR3_VELOCITY,
-    acceleration=_FR3_ACCELERATION,
-    jerk=_FR3_JERK,
-    envelopes=(
-        VelocityEnvelope(
-            offset=np.array([0.6599, 0.2517, 0.2000, 0.3533, 0.5757, 0.4878, 0.4628]),
-            deceleration=_FR3_DECELERATION,
-            lower=np.array([-2.9007, -1.8361, -2.9007, -3.0770, -2.8763, 0.4398, -3.0508]),
-            upper=np.array([2.9007, 1.8361, 2.9007, -0.1169, 2.8763, 4.6216, 3.0508]),
-        ),
-    ),
-    chain=FRANKA,
-)
-"""Franka Research 3 with system image 5.9.0 or later."""
-
-FR3_BEFORE_5_9 = replace(
-    FR3,
-    firmware="<5.9",
-    source=_FR3_OLD_SOURCE,
-    lower=np.array([-2.7437, -1.7837, -2.9007, -3.0421, -2.8065, 0.5445, -3.0159]),
-    upper=np.array([2.7437, 1.7837, 2.9007, -0.1518, 2.8065, 4.5169, 3.0159]),
-    envelopes=(
-        VelocityEnvelope(
-            offset=np.array([0.30, 0.20, 0.20, 0.30, 0.35, 0.35, 0.35]),
-            deceleration=_FR3_DECELERATION,
-            lower=np.array([-2.7501, -1.7918, -2.9065, -3.0481, -2.8101, 0.54092, -3.0196]),
-            upper=np.array([2.7501, 1.7918, 2.9065, -0.1458, 2.8101, 4.5205, 3.0196]),
-        ),
-    ),
-)
-"""Franka Research 3 with a system image before 5.9.0."""
-
-FR3_ANY = replace(
-    FR3,
-    firmware="any",
-    source=f"the narrower of: {_FR3_NEW_SOURCE}; and {_FR3_OLD_SOURCE}",
-    lower=np.maximum(FR3.lower, FR3_BEFORE_5_9.lower),
-    upper=np.minimum(FR3.upper, FR3_BEFORE_5_9.upper),
-    envelopes=FR3.envelopes + FR3_BEFORE_5_9.envelopes,
-)
-"""Franka Research 3 of unknown firmware: a plan within these numbers holds on both."""
-
-_KNOWN = (PANDA, FR3, FR3_BEFORE_5_9, FR3_ANY)
-
-
-def robot_limits(robot: str, firmware: str = "any") -> RobotLimits:
-    """Limits of a robot that is known here.
-
-    Args:
-        robot: `panda` (or `fer`), or `fr3`.
-        firmware: System image of an FR3: `>=5.9`, `<5.9`, or `any` for the narrower of both.
-
-    Raises:
-        ConfigurationError: No such robot or firmware; the message lists the known ones.
-    """
-    name = "panda" if robot.lower() in ("panda", "fer") else robot.lower()
-    candidates = [limits for limits in _KNOWN if limits.robot == name]
-    if not candidates:
-        raise ConfigurationError(
-            f"no limits for robot {robot!r}; known are panda and fr3: for another arm give its "
-            "limits as numbers"
-        )
-    for limits in candidates:
-        if limits.firmware == firmware:
-            return limits
-    known = ", ".join(repr(limits.firmware) for limits in candidates)
-    raise ConfigurationError(f"no limits for {name} with firmware {firmware!r}; known are {known}")

@@ -16,26 +16,26 @@ _MARK: dict[Status, str] = {
 }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class LimitLine:
-    """One check with its worst place."""
+    """One check with its worst place; numbers are None where nothing could be checked."""
 
     check: str
     """`joints`, `position`, `velocity`, `acceleration`, `jerk`, `rest at start`, `rest at end`,
-    `demonstrations` or `workspace`."""
+    `demonstrations` or `box`."""
     status: Status
     """`unchecked` where the plan, the robot or the settings lack what the check needs."""
-    value: float | None
+    value: float | None = None
     """The plan's worst value, in `unit`."""
-    limit: float | None
+    limit: float | None = None
     """What it is held against, in `unit`."""
-    margin: float | None
+    margin: float | None = None
     """How far within the limit, in `unit`; negative beyond it."""
-    unit: str
+    unit: str = ""
     """Unit of the three numbers."""
-    joint: str | None
+    joint: str | None = None
     """Joint or axis of the worst place."""
-    time: float | None
+    time: float | None = None
     """Time of the worst place from the plan's first frame, in [s]."""
     text: str
     """The same for a person, without the check's name."""
@@ -70,7 +70,7 @@ class LimitReport:
         return tuple(line.check for line in self.lines if line.status == "unchecked")
 
     def text(self) -> str:
-        """Readable report, a verdict and a line a check."""
+        """Return a readable report: a verdict and a line a check."""
         if self.refused:
             verdict = "refused"
         elif "velocity" in self.unchecked:
@@ -83,16 +83,11 @@ class LimitReport:
         )
 
     def as_json(self) -> dict[str, Any]:
-        """The same as plain data, ready for `json.dumps`."""
-        return {
-            "robot": self.robot,
-            "firmware": self.firmware,
-            "source": self.source,
-            "refused": self.refused,
-            "warned": self.warned,
-            "unchecked": list(self.unchecked),
-            "lines": [asdict(line) for line in self.lines],
-        }
+        """Return the same as plain data, ready for `json.dumps`."""
+        verdicts = {"refused": self.refused, "warned": self.warned, "unchecked": [*self.unchecked]}
+        lines = [asdict(line) for line in self.lines]
+        about = {"robot": self.robot, "firmware": self.firmware, "source": self.source}
+        return about | verdicts | {"lines": lines}
 
     def require(self) -> None:
         """Do nothing if the plan may leave.
@@ -107,8 +102,3 @@ class LimitReport:
                 "or retimed: choose another goal, learn again with another seed or more steps, "
                 "or demonstrate gentler motions"
             )
-
-
-def unchecked(check: str, why: str) -> LimitLine:
-    """The line of a check that could not be made, with the reason."""
-    return LimitLine(check, "unchecked", None, None, None, "", None, None, f"not checked: {why}")

@@ -14,7 +14,7 @@ import mujoco
 import numpy as np
 
 from prior_reinforce.plans.interpolation import join_frames
-from prior_reinforce.robots.limits import PANDA as LIMITS
+from prior_reinforce.robots.presets import PANDA as LIMITS
 
 N_JOINTS = 7
 JOINT_NAMES = tuple(f"joint{i}" for i in range(1, N_JOINTS + 1))

@@ -1,0 +1,127 @@
+"""Limits and kinematics that makers publish, per firmware, each with its source."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import pi
+
+import numpy as np
+
+from prior_reinforce.errors import ConfigurationError
+from prior_reinforce.robots.kinematics import Chain
+from prior_reinforce.robots.limits import RobotLimits, VelocityEnvelope
+
+FRANKA = Chain(
+    rows=(
+        (0.0, 0.333, 0.0),
+        (0.0, 0.0, -pi / 2),
+        (0.0, 0.316, pi / 2),
+        (0.0825, 0.0, pi / 2),
+        (-0.0825, 0.384, -pi / 2),
+        (0.0, 0.0, pi / 2),
+        (0.088, 0.0, pi / 2),
+    ),
+    flange=0.107,
+)
+"""The Panda (FER) and the FR3 share one chain (frankarobotics/docs, robot_specifications.rst,
+"Denavit-Hartenberg Parameters", read 21 Nov 2026; frankaemika/docs, control_parameters.rst)."""
+
+PANDA = RobotLimits(
+    robot="panda",
+    firmware="any",
+    source=(
+        "frankarobotics/docs, robot_specifications.rst and control-parameters-joint-panda.csv, "
+        "read 4 May 2026"
+    ),
+    joint_names=tuple(f"joint{i}" for i in range(1, 8)),
+    lower=np.array([-2.8973, -1.7628, -2.8973, -3.0718, -2.8973, -0.0175, -2.8973]),
+    upper=np.array([2.8973, 1.7628, 2.8973, -0.0698, 2.8973, 3.7525, 2.8973]),
+    velocity=np.array([2.175, 2.175, 2.175, 2.175, 2.61, 2.61, 2.61]),
+    acceleration=np.array([15.0, 7.5, 10.0, 12.5, 15.0, 20.0, 20.0]),
+    jerk=np.array([7500.0, 3750.0, 5000.0, 6250.0, 7500.0, 10000.0, 10000.0]),
+    chain=FRANKA,
+)
+"""The Franka Emika Robot (FER), sold as Panda."""
+
+_FR3_LOWER = np.array([-2.9007, -1.8361, -2.9007, -3.0770, -2.8763, 0.4398, -3.0508])
+_FR3_UPPER = np.array([2.9007, 1.8361, 2.9007, -0.1169, 2.8763, 4.6216, 3.0508])
+_FR3_DECELERATION = np.array([6.0, 2.585, 3.5, 4.0, 17.0, 5.5, 17.0])
+
+FR3 = RobotLimits(
+    robot="fr3",
+    firmware=">=5.9",
+    source="frankarobotics/docs, control-parameters-joint-fr3.csv, read 21 Nov 2026",
+    joint_names=PANDA.joint_names,
+    lower=_FR3_LOWER,
+    upper=_FR3_UPPER,
+    velocity=np.array([2.62, 2.62, 2.62, 2.62, 5.26, 4.18, 5.26]),
+    acceleration=np.full(7, 10.0),
+    jerk=np.full(7, 5000.0),
+    envelopes=(
+        VelocityEnvelope(
+            offset=np.array([0.6599, 0.2517, 0.2000, 0.3533, 0.5757, 0.4878, 0.4628]),
+            deceleration=_FR3_DECELERATION,
+            lower=_FR3_LOWER,
+            upper=_FR3_UPPER,
+        ),
+    ),
+    chain=FRANKA,
+)
+"""Franka Research 3 with system image 5.9.0 or later."""
+
+FR3_BEFORE_5_9 = replace(
+    FR3,
+    firmware="<5.9",
+    source=(
+        "positions: Franka's documentation before system 5.9 (also franka_description's URDF of "
+        "that time); velocity envelope: libfranka, include/franka/rate_limiting.h"
+    ),
+    lower=np.array([-2.7437, -1.7837, -2.9007, -3.0421, -2.8065, 0.5445, -3.0159]),
+    upper=np.array([2.7437, 1.7837, 2.9007, -0.1518, 2.8065, 4.5169, 3.0159]),
+    envelopes=(
+        VelocityEnvelope(
+            offset=np.array([0.30, 0.20, 0.20, 0.30, 0.35, 0.35, 0.35]),
+            deceleration=_FR3_DECELERATION,
+            lower=np.array([-2.7501, -1.7918, -2.9065, -3.0481, -2.8101, 0.54092, -3.0196]),
+            upper=np.array([2.7501, 1.7918, 2.9065, -0.1458, 2.8101, 4.5205, 3.0196]),
+        ),
+    ),
+)
+"""Franka Research 3 with a system image before 5.9.0."""
+
+FR3_ANY = replace(
+    FR3,
+    firmware="any",
+    source=f"the narrower of: {FR3.source}; and {FR3_BEFORE_5_9.source}",
+    lower=np.maximum(FR3.lower, FR3_BEFORE_5_9.lower),
+    upper=np.minimum(FR3.upper, FR3_BEFORE_5_9.upper),
+    envelopes=FR3.envelopes + FR3_BEFORE_5_9.envelopes,
+)
+"""Franka Research 3 of unknown firmware: a plan within these numbers holds on both."""
+
+_KNOWN = (PANDA, FR3, FR3_BEFORE_5_9, FR3_ANY)
+
+
+def robot_limits(robot: str, firmware: str = "any") -> RobotLimits:
+    """Return the limits of a robot that is known here.
+
+    Args:
+        robot: `panda` (or `fer`), or `fr3`.
+        firmware: System image of an FR3: `>=5.9`, `<5.9`, or `any` for the narrower of both.
+
+    Raises:
+        ConfigurationError: No such robot or firmware; the message lists the known ones.
+    """
+    name = "panda" if robot.lower() in ("panda", "fer") else robot.lower()
+    by_firmware = {limits.firmware: limits for limits in _KNOWN if limits.robot == name}
+    if not by_firmware:
+        raise ConfigurationError(
+            f"no limits for robot {robot!r}; known are panda and fr3: for another arm give its "
+            "limits as numbers"
+        )
+    if firmware not in by_firmware:
+        known = ", ".join(map(repr, by_firmware))
+        raise ConfigurationError(
+            f"no limits for {name} with firmware {firmware!r}; known are {known}"
+        )
+    return by_firmware[firmware]
