@@ -5,14 +5,14 @@ Every message names the file, the line, the value and the remedy.
 
 from __future__ import annotations
 
-import math
 import re
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar, get_type_hints
 
+import msgspec
 import numpy as np
 
 from prior_reinforce.errors import ConfigurationError, FileFormatError, PriorReinforceError
@@ -24,36 +24,20 @@ from prior_reinforce.robots import (
     missing_joints,
     robot_limits,
 )
-from prior_reinforce.workspace.manifest_template import TEMPLATE  # noqa: F401
+from prior_reinforce.wording import WORDS
 
 if sys.version_info >= (3, 11):
     import tomllib
 else:
     import tomli as tomllib
 
+T = TypeVar("T")
 MANIFEST_FILE = "workspace.toml"
+TEMPLATE = Path(__file__).with_name("template.toml").read_text(encoding="utf-8")
+"""The manifest that `new` writes, for `format` to fill in."""
 # Ours: every throw within a metre would count as reached, and no swing is told a frame a second.
 _IMPLAUSIBLE_METRES = 1.0
 _IMPLAUSIBLE_SECONDS = 1.0
-
-_SECTIONS: Mapping[str, frozenset[str]] = {
-    "task": frozenset({"name"}),
-    "plan": frozenset({"names", "units", "dt"}),
-    "outcome": frozenset({"names", "units", "tolerance"}),
-    "robot": frozenset(
-        {
-            "model",
-            "firmware",
-            "joint_names",
-            "lower",
-            "upper",
-            "velocity",
-            "acceleration",
-            "jerk",
-        }
-    ),
-    "gate": frozenset(GateSettings.__dataclass_fields__),
-}
 
 
 @dataclass(frozen=True)
@@ -74,6 +58,31 @@ class Manifest:
     """Limits that every plan is held against; None where the manifest says `none`."""
     gate: GateSettings
     """The gate's own lines."""
+
+    @property
+    def in_words(self) -> bool:
+        """Whether an operator's words (long, left, high) describe this task's outcomes."""
+        return len(self.outcome_names) <= len(WORDS) and set(self.outcome_units) == {"m"}
+
+
+_TEXTS, _NUMBERS = tuple[str, ...], tuple[float, ...]
+_LISTS = ("lower", "upper", "velocity", "acceleration", "jerk")
+_BOX, _BOX_KEY = "box_", "workspace_"
+"""How the two corners of the tool tip's box begin in `GateSettings` and in the file."""
+_SECTIONS: Mapping[str, Mapping[str, Any]] = {
+    "task": {"name": str},
+    "plan": {"names": _TEXTS, "units": _TEXTS, "dt": float},
+    "outcome": {"names": _TEXTS, "units": _TEXTS, "tolerance": float},
+    "robot": {"model": str, "firmware": str, "joint_names": _TEXTS}
+    | dict.fromkeys(_LISTS, _NUMBERS),
+    "gate": {k.replace(_BOX, _BOX_KEY): v for k, v in get_type_hints(GateSettings).items()},
+}
+_WANTED = {
+    str: "a text in quotes",
+    float: "a number",
+    _TEXTS: 'a list of texts, such as ["x", "y"]',
+    _NUMBERS: "a list of finite numbers",
+}
 
 
 def load_manifest(path: Path) -> Manifest:
@@ -105,99 +114,62 @@ def parse_manifest(text: str, path: Path) -> Manifest:
         data = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
         raise FileFormatError(f"{path} is not a TOML file: {error}; mend that line") from error
-    return _Reader(path, text, data).manifest()
+    return _Reader(path, text.splitlines(), data).manifest()
 
 
+@dataclass(frozen=True)
 class _Reader:
-    """Reads values, and says where a wrong one stands."""
+    """Reads sections, and says where a wrong value stands."""
 
-    def __init__(self, path: Path, text: str, data: dict[str, Any]) -> None:
-        self._path = path
-        self._lines = text.splitlines()
-        self._data = data
+    path: Path
+    lines: list[str]
+    data: dict[str, Any]
 
     def manifest(self) -> Manifest:
         """Everything, checked."""
-        for section, content in self._data.items():
+        for section in self.data:
             if section not in _SECTIONS:
-                raise self._error(section, None, f"unknown; sections are {', '.join(_SECTIONS)}")
-            if not isinstance(content, dict):
-                raise self._error(section, None, f"must be a section, [{section}]")
-            for key in content:
-                if key not in _SECTIONS[section]:
-                    raise self._error(
-                        section, key, f"unknown; keys are {', '.join(sorted(_SECTIONS[section]))}"
-                    )
-        outcome_names = self._texts("outcome", "names")
-        outcome_units = self._texts("outcome", "units")
-        if len(outcome_names) != len(outcome_units):
-            raise self._error(
-                "outcome", "units", f"must name one unit for each of {list(outcome_names)}"
-            )
-        tolerance = self._number("outcome", "tolerance")
+                raise self.error(section, None, f"unknown; sections are {', '.join(_SECTIONS)}")
+        task, plan, outcome, robot, gate = map(self.section, _SECTIONS)
+        if not task["name"].strip():
+            raise self.error("task", "name", "must not be empty")
+        if plan["dt"] > _IMPLAUSIBLE_SECONDS:
+            raise self.error("plan", "dt", "looks like milliseconds or a rate; give seconds")
+        names, units, tolerance = outcome["names"], outcome["units"], outcome["tolerance"]
+        if len(names) != len(units):
+            raise self.error("outcome", "units", f"must name one unit for each of {list(names)}")
         if tolerance <= 0:
-            raise self._error("outcome", "tolerance", "must be more than 0")
-        if set(outcome_units) == {"m"} and tolerance >= _IMPLAUSIBLE_METRES:
-            raise self._error("outcome", "tolerance", "looks like centimetres; give metres")
-        name = self._text("task", "name")
-        if not name.strip():
-            raise self._error("task", "name", "must not be empty")
-        manifest = Manifest(
-            name=name,
-            format=self._checked("plan", self._format),
-            outcome_names=outcome_names,
-            outcome_units=outcome_units,
-            tolerance=tolerance,
-            robot=self._checked("robot", self._robot),
-            gate=self._checked("gate", self._gate),
-        )
-        if manifest.robot is not None:
-            self._check_joints(manifest, manifest.robot)
-        return manifest
+            raise self.error("outcome", "tolerance", "must be more than 0")
+        if set(units) == {"m"} and tolerance >= _IMPLAUSIBLE_METRES:
+            raise self.error("outcome", "tolerance", "looks like centimetres; give metres")
+        form = self.made("plan", lambda: PlanFormat(**plan))
+        limits = self.made("robot", lambda: self.limits(robot, task["name"]))
+        gate = {key.replace(_BOX_KEY, _BOX): value for key, value in gate.items()}
+        settings = self.made("gate", lambda: GateSettings(**gate))
+        if limits is not None:
+            self.check_joints(form, limits, settings)
+        return Manifest(task["name"], form, names, units, tolerance, limits, settings)
 
-    def _format(self) -> PlanFormat:
-        dt = self._number("plan", "dt")
-        if dt > _IMPLAUSIBLE_SECONDS:
-            raise self._error("plan", "dt", "looks like milliseconds or a rate; give seconds")
-        return PlanFormat(self._texts("plan", "names"), self._texts("plan", "units"), dt)
-
-    def _robot(self) -> RobotLimits | None:
-        model = self._text("robot", "model")
-        if model == "none":
+    def limits(self, robot: dict[str, Any], task: str) -> RobotLimits | None:
+        """Limits of the robot's model; None where there is none."""
+        if robot["model"] == "none":
             return None
-        if model != "given":
-            has_firmware = "firmware" in self._data["robot"]
-            return robot_limits(model, self._text("robot", "firmware") if has_firmware else "any")
-        return RobotLimits(
-            robot=self._text("task", "name"),
-            firmware="as given",
-            source=str(self._path),
-            joint_names=self._texts("robot", "joint_names"),
-            lower=np.array(self._numbers("robot", "lower")),
-            upper=np.array(self._numbers("robot", "upper")),
-            velocity=np.array(self._numbers("robot", "velocity")),
-            acceleration=np.array(self._numbers("robot", "acceleration")),
-            jerk=np.array(self._numbers("robot", "jerk")),
-        )
-
-    def _gate(self) -> GateSettings:
-        content = dict(self._data.get("gate", {}))
-        for key, value in content.items():
-            if key == "absent_joints":
-                content[key] = self._texts("gate", key)
-            elif isinstance(value, list):
-                content[key] = tuple(self._numbers("gate", key))
-            else:
-                content[key] = self._number("gate", key)
-        return GateSettings(**content)
-
-    def _check_joints(self, manifest: Manifest, robot: RobotLimits) -> None:
-        """Refuse a plan format that lacks joints of the robot: nothing of them would be checked."""
-        columns = self._checked("plan", lambda: match_joints(manifest.format, robot))
-        absent = manifest.gate.absent_joints
-        missing = self._checked("gate", lambda: missing_joints(columns, robot, absent))
+        if robot["model"] != "given":
+            return robot_limits(robot["model"], robot.get("firmware", "any"))
+        missing = [key for key in ("joint_names", *_LISTS) if key not in robot]
         if missing:
-            raise self._error(
+            also = f" (and {', '.join(missing[1:])})" if missing[1:] else ""
+            raise self.error("robot", missing[0], f"missing{also}; add it, one value a joint")
+        low, high, speed, acceleration, jerk = (np.array(robot[key]) for key in _LISTS)
+        names, source = robot["joint_names"], str(self.path)
+        return RobotLimits(task, "as given", source, names, low, high, speed, acceleration, jerk)
+
+    def check_joints(self, form: PlanFormat, robot: RobotLimits, gate: GateSettings) -> None:
+        """Refuse a plan format that lacks joints of the robot: nothing of them would be checked."""
+        columns = self.made("plan", lambda: match_joints(form, robot))
+        missing = self.made("gate", lambda: missing_joints(columns, robot, gate.absent_joints))
+        if missing:
+            raise self.error(
                 "plan",
                 "names",
                 f"lacks {', '.join(missing)} of {robot.robot}, whose limits could then not be "
@@ -206,67 +178,60 @@ class _Reader:
                 '[robot] model = "none"',
             )
 
-    def _checked(self, section: str, read: Any) -> Any:
-        """Call a reader; say where a value stands that it finds to be wrong."""
+    def section(self, name: str) -> dict[str, Any]:
+        """Values of one section, each of its type; numbers are finite."""
+        content, types = self.data.get(name, {}), _SECTIONS[name]
+        if not isinstance(content, dict):
+            raise self.error(name, None, f"must be a section, [{name}]")
+        for key in content:
+            if key not in types:
+                raise self.error(name, key, f"unknown; keys are {', '.join(sorted(types))}")
+        required = {"robot": ["model"], "gate": []}.get(name, types)
+        for key in required:
+            if key not in content:
+                raise self.error(name, key, "missing; add it, `prior-reinforce new` shows how")
+        return {key: self.value(name, key, content[key], types[key]) for key in content}
+
+    def value(self, section: str, key: str, given: Any, kind: Any) -> Any:
+        """A value of the kind that is wanted; an empty list is of no kind."""
+        wanted = _WANTED.get(kind, "a list of three finite numbers")
         try:
-            return read()
-        except PriorReinforceError as error:
-            if str(self._path) in str(error):
-                raise
-            raise self._error(section, None, str(error)) from error
-
-    def _value(self, section: str, key: str) -> Any:
-        content = self._data.get(section)
-        if content is None or key not in content:
-            raise self._error(section, key, "missing; add it, `prior-reinforce new` shows how")
-        return content[key]
-
-    def _text(self, section: str, key: str) -> str:
-        value = self._value(section, key)
-        if not isinstance(value, str):
-            raise self._error(section, key, "must be a text in quotes")
+            value = msgspec.convert(given, kind)
+        except msgspec.ValidationError:
+            value = ()
+        if value == ():
+            raise self.error(section, key, f"must be {wanted}")
+        if kind not in (str, _TEXTS) and not np.all(np.isfinite(value)):
+            finite = "finite" if kind is float else wanted
+            raise self.error(section, key, f"must be {finite}")
         return value
 
-    def _texts(self, section: str, key: str) -> tuple[str, ...]:
-        value = self._value(section, key)
-        if not isinstance(value, list) or not value or not all(isinstance(v, str) for v in value):
-            raise self._error(section, key, 'must be a list of texts, such as ["x", "y"]')
-        return tuple(value)
+    def made(self, section: str, make: Callable[[], T]) -> T:
+        """What a function makes of a section; where it finds a value wrong, say where it stands."""
+        try:
+            return make()
+        except PriorReinforceError as error:
+            if str(self.path) in str(error):
+                raise
+            raise self.error(section, None, str(error)) from error
 
-    def _number(self, section: str, key: str) -> float:
-        value = self._value(section, key)
-        if isinstance(value, bool) or not isinstance(value, (int, float)):
-            raise self._error(section, key, "must be a number")
-        if not math.isfinite(value):
-            raise self._error(section, key, "must be finite")
-        return float(value)
-
-    def _numbers(self, section: str, key: str) -> list[float]:
-        value = self._value(section, key)
-        numbers = isinstance(value, list) and all(
-            isinstance(v, (int, float)) and not isinstance(v, bool) and math.isfinite(v)
-            for v in value
-        )
-        if not numbers:
-            raise self._error(section, key, "must be a list of finite numbers")
-        return [float(v) for v in value]
-
-    def _error(self, section: str, key: str | None, problem: str) -> ConfigurationError:
-        content = self._data.get(section)
+    def error(self, section: str, key: str | None, problem: str) -> ConfigurationError:
+        """One line on a wrong value: file, line, value, problem and remedy."""
+        content = self.data.get(section)
         value = content.get(key) if isinstance(content, dict) and key is not None else None
         shown = "" if value is None else f" = {value!r}"
         where = f"[{section}]" if key is None else f"[{section}] {key}{shown}"
-        line = self._line(section, key)
-        place = f"{self._path}:{line}" if line else f"{self._path}"
+        line = self.line(section, key)
+        place = f"{self.path}:{line}" if line else f"{self.path}"
         return ConfigurationError(f"{place}: {where}: {problem}")
 
-    def _line(self, section: str, key: str | None) -> int | None:
+    def line(self, section: str, key: str | None) -> int | None:
         """Line of a key, of its section's head where the key is not there, from 1."""
         name = re.escape(section if key is None else key)
         wanted = re.compile(rf"\s*\"?{name}\"?\s*=")
         inside = False
         found = None
-        for number, line in enumerate(self._lines, start=1):
+        for number, line in enumerate(self.lines, start=1):
             header = re.match(r"\s*\[\s*([\w-]+)\s*\]", line)
             if header:
                 inside = header[1] == section
