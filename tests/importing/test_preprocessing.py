@@ -8,14 +8,13 @@ from recorded import BEFORE, SWING, N, duration, sampled, throw
 
 from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
 from prior_reinforce.importing.preprocessing import Preprocessing, preprocess
-from prior_reinforce.importing.recording import Recording, made_up_names
+from prior_reinforce.importing.recording import Recording
 
 UNITS = ("rad",) * 7
 
 
 def recording(t, q, name="0"):
-    q = np.asarray(q, dtype=float)
-    return Recording(name, t, q, made_up_names(q.shape[1]))
+    return Recording(name, t, np.asarray(q, dtype=float))
 
 
 def throws(rate=100):

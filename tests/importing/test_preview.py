@@ -7,7 +7,7 @@ from recorded import JOINTS, OUTCOMES, write_bags, write_csv, write_npz, write_o
 
 from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
 from prior_reinforce.importing import Preprocessing, import_demonstrations
-from prior_reinforce.importing.picture import hull_corners
+from prior_reinforce.importing.preview import hull_corners
 
 
 @pytest.fixture(scope="module")

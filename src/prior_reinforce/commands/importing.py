@@ -14,8 +14,8 @@ from prior_reinforce.commands.outcome_questions import ask_for_outcomes, keep_ty
 from prior_reinforce.commands.workspace import Folder, print_next
 from prior_reinforce.files import named_disk_errors
 from prior_reinforce.importing import (
+    FORMATS,
     Preprocessing,
-    RecordingFormat,
     import_demonstrations,
     read_recordings,
 )
@@ -33,8 +33,10 @@ class Import:
     source: Annotated[Path, tyro.conf.Positional]
     """Recordings, a file or a folder: NPZ, CSV, LeRobot, robomimic or DROID HDF5, ROS 1, ROS 2 or
     MCAP, or a replay buffer in zarr."""
-    format: RecordingFormat | None = None
-    """What it is; detected if not given."""
+    format: Annotated[
+        str | None,
+        tyro.conf.arg(help=f"What it is, one of {', '.join(FORMATS)}; detected if not given."),
+    ] = None
     outcomes: Path | None = None
     """CSV `episode,x,y` with where each object landed; if not given, `outcomes.csv` beside the
     source, and what it lacks is asked for on a terminal."""

@@ -1,20 +1,21 @@
 """Demonstrations from the format they were recorded in: read, trim, resample, look at, use."""
 
 from prior_reinforce.importing.importer import (
+    FORMATS,
     ImportResult,
     import_demonstrations,
     read_recordings,
 )
 from prior_reinforce.importing.preprocessing import Preprocessing
 from prior_reinforce.importing.preview import Preview
-from prior_reinforce.importing.recording import Recording, RecordingFormat
+from prior_reinforce.importing.recording import Recording
 
 __all__ = [
+    "FORMATS",
     "ImportResult",
     "Preprocessing",
     "Preview",
     "Recording",
-    "RecordingFormat",
     "import_demonstrations",
     "read_recordings",
 ]

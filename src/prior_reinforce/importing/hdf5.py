@@ -13,9 +13,19 @@ from typing import Any
 import numpy as np
 
 from prior_reinforce.errors import FileFormatError
-from prior_reinforce.importing.files import load_extra, named_damage, natural_order
-from prior_reinforce.importing.recording import Reading, Recording, evenly, made_up_names
+from prior_reinforce.importing.recording import (
+    Positions,
+    ReadOptions,
+    Recording,
+    evenly,
+    files_at,
+    has_files,
+    named_damage,
+    natural_order,
+)
 
+_SUFFIXES = (".h5", ".hdf5")
+_TRAJECTORY = "trajectory.h5"
 _ROBOMIMIC_KEY = "obs/robot0_joint_pos"
 """robosuite's name of the first arm's joint positions; `actions` are mostly pose increments."""
 _DROID_KEY = "observation/robot_state/joint_positions"
@@ -23,14 +33,31 @@ _DROID_TIMES_MS = (
     "observation/timestamp/robot_state/read_start",
     "observation/timestamp/control/step_start",
 )
-SUFFIXES = (".h5", ".hdf5")
 
 
-def read_robomimic(source: Path, reading: Reading) -> list[Recording]:
+def is_droid(source: Path) -> bool:
+    """Whether a path looks like DROID."""
+    if source.is_dir():
+        return next(source.rglob(_TRAJECTORY), None) is not None
+    return source.name == _TRAJECTORY
+
+
+def is_robomimic(source: Path) -> bool:
+    """Whether a path looks like robomimic."""
+    return has_files(source, _SUFFIXES) and not is_droid(source)
+
+
+def read_robomimic(source: Path, options: ReadOptions) -> list[Recording]:
     """Read every `data/demo_k` of a robomimic file."""
-    h5py = load_extra("h5py", "hdf5")
-    path = _only_file(source)
-    key = reading.key or _ROBOMIMIC_KEY
+    import h5py
+
+    paths = files_at(source, _SUFFIXES)
+    if len(paths) != 1:
+        raise FileFormatError(
+            f"{source} holds {len(paths)} HDF5 files, expected one; give the path of the file"
+        )
+    (path,), key = paths, options.key or _ROBOMIMIC_KEY
+    recordings = []
     with named_damage(path, "robomimic HDF5"), h5py.File(path, "r") as file:
         if "data" not in file:
             raise FileFormatError(
@@ -38,53 +65,44 @@ def read_robomimic(source: Path, reading: Reading) -> list[Recording]:
                 "its format"
             )
         data = file["data"]
-        rate = reading.rate or _control_rate(data)
-        recordings = []
-        for episode in sorted(data, key=natural_order):
-            if not reading.wants(episode):
-                continue
+        rate = options.rate or _control_rate(data)
+        for episode in filter(options.wants, sorted(data, key=natural_order)):
             positions = _array(path, data[episode], key, f"data/{episode}")
             declared = data[episode].attrs.get("num_samples")
-            if declared is not None and int(declared) != positions.shape[0]:
+            if declared is not None and int(declared) != len(positions):
                 raise FileFormatError(
                     f"{path}: {episode} declares {int(declared)} samples but {key} holds "
-                    f"{positions.shape[0]}; copy the file again, or leave that episode out"
+                    f"{len(positions)}; copy the file again, or leave that episode out"
                 )
-            times = evenly(positions.shape[0], rate, episode)
-            recordings.append(_unnamed(episode, times, positions))
+            times = evenly(len(positions), rate, episode)
+            recordings.append(Recording(episode, times, positions))
     return recordings
 
 
-def read_droid(source: Path, reading: Reading) -> list[Recording]:
+def read_droid(source: Path, options: ReadOptions) -> list[Recording]:
     """Read a `trajectory.h5`, or every one below a folder; an episode is named by its folder."""
-    h5py = load_extra("h5py", "hdf5")
+    import h5py
+
+    paths = [source]
     if source.is_dir():
-        paths = sorted(source.rglob("trajectory.h5"), key=lambda path: natural_order(str(path)))
-    else:
-        paths = [source]
-    key = reading.key or _DROID_KEY
+        paths = sorted(source.rglob(_TRAJECTORY), key=natural_order)
     recordings = []
     for path in paths:
-        episode = path.parent.name if path.name == "trajectory.h5" else path.stem
-        if not reading.wants(episode):
+        episode = path.parent.name if path.name == _TRAJECTORY else path.stem
+        if not options.wants(episode):
             continue
         with named_damage(path, "DROID HDF5"), h5py.File(path, "r") as file:
-            positions = _array(path, file, key, "the file")
+            positions = _array(path, file, options.key or _DROID_KEY, "the file")
             stamps = next((name for name in _DROID_TIMES_MS if name in file), None)
-            if reading.rate is None and stamps is not None:
+            if options.rate is None and stamps is not None:
                 times = np.asarray(file[stamps][()], dtype=np.float64) / 1000.0
             else:
-                times = evenly(positions.shape[0], reading.rate, episode)
-            recordings.append(_unnamed(episode, times, positions))
+                times = evenly(len(positions), options.rate, episode)
+            recordings.append(Recording(episode, times, positions))
     return recordings
 
 
-def _unnamed(episode: str, times: np.ndarray, positions: np.ndarray) -> Recording:
-    names = made_up_names(positions.shape[1])
-    return Recording(episode, times, positions, names, named=False)
-
-
-def _array(path: Path, group: Any, key: str, where: str) -> np.ndarray:
+def _array(path: Path, group: Any, key: str, where: str) -> Positions:
     """The motion under a key, or an error that lists what could be meant."""
     candidates: list[str] = []
 
@@ -107,18 +125,5 @@ def _array(path: Path, group: Any, key: str, where: str) -> np.ndarray:
 def _control_rate(data: Any) -> float | None:
     """Control frequency of robosuite, where the file has it."""
     text = data.attrs.get("env_args")
-    if text is None:
-        return None
-    rate = json.loads(text).get("env_kwargs", {}).get("control_freq")
+    rate = None if text is None else json.loads(text).get("env_kwargs", {}).get("control_freq")
     return float(rate) if rate else None
-
-
-def _only_file(source: Path) -> Path:
-    if not source.is_dir():
-        return source
-    found = [path for path in sorted(source.iterdir()) if path.suffix.lower() in SUFFIXES]
-    if len(found) != 1:
-        raise FileFormatError(
-            f"{source} holds {len(found)} HDF5 files, expected one; give the path of the file"
-        )
-    return found[0]

@@ -14,33 +14,38 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from jaxtyping import Shaped
 
 from prior_reinforce.errors import FileFormatError
-from prior_reinforce.importing.files import load_extra, named_damage
-from prior_reinforce.importing.recording import Reading, Recording, made_up_names
+from prior_reinforce.importing.recording import Positions, ReadOptions, Recording, named_damage
 
+FrameNumbers = Shaped[np.ndarray, " T"]
 _MEASURED, _COMMANDED = "observation.state", "action"
 
 
-def read_lerobot(source: Path, reading: Reading) -> list[Recording]:
+def recognises(source: Path) -> bool:
+    """Whether a path looks like this format."""
+    return (source / "meta" / "info.json").is_file()
+
+
+def read(source: Path, options: ReadOptions) -> list[Recording]:
     """Read every episode of a data set's folder."""
-    parquet = load_extra("pyarrow.parquet", "lerobot")
     info_path = source / "meta" / "info.json"
     with named_damage(info_path, "LeRobot's meta/info.json"):
         info = json.loads(info_path.read_text(encoding="utf-8"))
         features = dict(info["features"])
-        rate = reading.rate or float(info["fps"])
+        rate = options.rate or float(info["fps"])
         if not 0 < rate < 1e6:
             raise ValueError(f"fps is {rate}")
-    key = _column(source, features, reading.key)
-    lengths = _listed_lengths(parquet, source)
-    frames = _frames(parquet, source, key)
-    wanted = [e for e in sorted(lengths.keys() | frames.keys()) if reading.wants(str(e))]
+    key = _column(source, features, options.key)
     remarks: tuple[str, ...] = ()
-    if reading.key is None and key == _MEASURED and _COMMANDED in features:
+    if options.key is None and key == _MEASURED and _COMMANDED in features:
         remarks = (f"motion is {_MEASURED} (measured); key {_COMMANDED} has the commanded one",)
+    lengths, frames = _listed_lengths(source), _frames(source, key)
     recordings = []
-    for episode in wanted:
+    for episode in sorted(lengths.keys() | frames.keys()):
+        if not options.wants(str(episode)):
+            continue
         index, positions = frames.get(episode, (np.zeros(0), np.zeros((0, 0))))
         listed = lengths.get(episode, len(index))
         if len(index) != listed or len(index) == 0:
@@ -49,16 +54,7 @@ def read_lerobot(source: Path, reading: Reading) -> list[Recording]:
                 "data/; copy the data set again, or name only the other episodes"
             )
         names = _names(features[key], positions.shape[1])
-        recordings.append(
-            Recording(
-                str(episode),
-                index / rate,
-                positions,
-                names or made_up_names(positions.shape[1]),
-                named=names is not None,
-                remarks=remarks,
-            )
-        )
+        recordings.append(Recording(str(episode), index / rate, positions, names, remarks=remarks))
     return recordings
 
 
@@ -83,8 +79,10 @@ def _column(source: Path, features: dict[str, Any], key: str | None) -> str:
     return key
 
 
-def _listed_lengths(parquet: Any, source: Path) -> dict[int, int]:
+def _listed_lengths(source: Path) -> dict[int, int]:
     """Frames of each episode according to the metadata; empty where it lists none."""
+    import pyarrow.parquet as parquet
+
     lengths: dict[int, int] = {}
     for path in sorted((source / "meta" / "episodes").glob("**/*.parquet")):
         with named_damage(path, "LeRobot's list of episodes"):
@@ -94,16 +92,15 @@ def _listed_lengths(parquet: Any, source: Path) -> dict[int, int]:
     path = source / "meta" / "episodes.jsonl"
     if path.is_file():
         with named_damage(path, "LeRobot's list of episodes"):
-            for line in path.read_text(encoding="utf-8").splitlines():
-                row = json.loads(line)
-                lengths[int(row["episode_index"])] = int(row["length"])
+            rows = map(json.loads, path.read_text(encoding="utf-8").splitlines())
+            lengths.update({int(row["episode_index"]): int(row["length"]) for row in rows})
     return lengths
 
 
-def _frames(parquet: Any, source: Path, key: str) -> dict[int, tuple[np.ndarray, np.ndarray]]:
-    """Frame numbers (T,) and positions (T, D) of each episode, in time order."""
-    parts: dict[int, list[tuple[np.ndarray, np.ndarray]]] = {}
-    for episode, index, positions in _parts(parquet, source, key):
+def _frames(source: Path, key: str) -> dict[int, tuple[FrameNumbers, Positions]]:
+    """Frame numbers and positions of each episode, in time order."""
+    parts: dict[int, list[tuple[FrameNumbers, Positions]]] = {}
+    for episode, index, positions in _parts(source, key):
         parts.setdefault(episode, []).append((index, positions))
     frames = {}
     for episode, pieces in parts.items():
@@ -115,7 +112,9 @@ def _frames(parquet: Any, source: Path, key: str) -> dict[int, tuple[np.ndarray,
     return frames
 
 
-def _parts(parquet: Any, source: Path, key: str) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
+def _parts(source: Path, key: str) -> Iterator[tuple[int, FrameNumbers, Positions]]:
+    import pyarrow.parquet as parquet
+
     paths = sorted((source / "data").glob("**/*.parquet"))
     if not paths:
         raise FileFormatError(
@@ -135,11 +134,11 @@ def _parts(parquet: Any, source: Path, key: str) -> Iterator[tuple[int, np.ndarr
             yield episode, index[own], positions[own]
 
 
-def _names(feature: dict[str, Any], count: int) -> tuple[str, ...] | None:
-    """Channel names; some writers nest them as {"motors": [...]}, some give none."""
+def _names(feature: dict[str, Any], count: int) -> tuple[str, ...]:
+    """Channel names; some writers nest them as {"motors": [...]}, some give none that fit."""
     names = feature.get("names")
     if isinstance(names, dict) and len(names) == 1:
         names = next(iter(names.values()))
     if not isinstance(names, list) or len(names) != count:
-        return None
+        return ()
     return tuple(map(str, names))

@@ -6,8 +6,8 @@ of the outcome, except `source` and `note`. A column `x_cm` or `x_mm` is convert
 
 from __future__ import annotations
 
-import csv
 import math
+import os
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -15,12 +15,13 @@ from pathlib import Path
 
 import numpy as np
 
+from prior_reinforce.arrays import Points
 from prior_reinforce.errors import (
     ConfigurationError,
     FileFormatError,
     InvalidDemonstrationsError,
 )
-from prior_reinforce.importing.files import named_damage
+from prior_reinforce.importing.csv import read_table
 from prior_reinforce.importing.recording import Recording
 
 OUTCOMES_FILE = "outcomes.csv"
@@ -41,18 +42,37 @@ class Outcomes:
     """k numbers by episode."""
 
 
-def find_outcomes(source: Path, recordings: Sequence[Recording]) -> Outcomes:
-    """Outcomes from `outcomes.csv` inside or beside the source, or from the recordings.
+def find_outcomes(
+    source: Path,
+    recordings: Sequence[Recording],
+    given: str | os.PathLike[str] | Mapping[str, Sequence[float]] | None = None,
+) -> Outcomes:
+    """Find outcomes: those given, `outcomes.csv` inside or beside the source, the recordings' own.
+
+    Args:
+        source: Where the recordings are from.
+        recordings: Some hold their outcomes.
+        given: A table, or numbers by episode.
 
     Raises:
+        ConfigurationError: What was given are no numbers.
         InvalidDemonstrationsError: There are none; all episodes are named.
-        FileFormatError: The table is damaged.
+        FileFormatError: The table is missing or damaged.
     """
-    folders = [source, source.parent] if source.is_dir() else [source.parent]
-    for folder in folders:
+    if isinstance(given, Mapping):
+        try:
+            numbers = {str(name): tuple(map(float, value)) for name, value in given.items()}
+        except (TypeError, ValueError) as error:
+            raise ConfigurationError(
+                f"outcomes must be numbers by episode, such as {{'0': (0.9, 0.1)}}: {error}"
+            ) from error
+        return Outcomes("the given outcomes", (), numbers)
+    if given is not None:
+        return read_outcomes(Path(given))
+    for folder in [source, source.parent] if source.is_dir() else [source.parent]:
         if (folder / OUTCOMES_FILE).is_file():
             return read_outcomes(folder / OUTCOMES_FILE)
-    own = {r.episode: tuple(map(float, r.outcome)) for r in recordings if r.outcome is not None}
+    own = {r.episode: tuple(r.outcome.tolist()) for r in recordings if r.outcome is not None}
     if own:
         return Outcomes("the recording itself", (), own)
     raise InvalidDemonstrationsError(
@@ -69,33 +89,26 @@ def read_outcomes(path: Path) -> Outcomes:
     """
     if not path.is_file():
         raise FileFormatError(f"no outcomes at {path}; {_REMEDY}")
-    with named_damage(path, "CSV in UTF-8"), path.open(newline="", encoding="utf-8-sig") as file:
-        reader = csv.reader(file, strict=True)
-        lines = [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
-    header = [cell.strip() for cell in lines[0][1]] if lines else []
+    header, rows = read_table(path)
     columns = [i for i, name in enumerate(header) if name not in _NOT_COMPONENTS]
     if "episode" not in header or not columns or len(set(header)) != len(header):
         raise FileFormatError(
             f"{path} begins with {','.join(header)!r}, expected column names such as episode,x,y"
         )
-    values: dict[str, tuple[float, ...]] = {}
     units = [_unit(header[i]) for i in columns]
-    for line, row in lines[1:]:
-        if len(row) != len(header):
-            raise FileFormatError(
-                f"{path}, line {line}: {len(row)} cells for {len(header)} columns; mend that line"
-            )
-        episode, cells = row[header.index("episode")].strip(), [row[i].strip() for i in columns]
+    values: dict[str, tuple[float, ...]] = {}
+    for line, row in rows:
+        episode, cells = row[header.index("episode")], [row[i] for i in columns]
         if episode in values:
             raise FileFormatError(f"{path}, line {line}: episode {episode} again; drop one of them")
         if any(cells):
             pairs = zip(cells, units, strict=True)
             values[episode] = tuple(_number(path, line, cell) * u[1] for cell, u in pairs)
-    return Outcomes(path.name, tuple(unit[0] for unit in units), values)
+    return Outcomes(path.name, tuple(name for name, _ in units), values)
 
 
 def in_order(outcomes: Outcomes, names: Sequence[str] | None) -> Outcomes:
-    """The outcomes with their components in the order of the names.
+    """Return the outcomes with their components in the order of the names.
 
     Args:
         outcomes: Their components are matched by name where they have names, else by position.
@@ -117,10 +130,8 @@ def in_order(outcomes: Outcomes, names: Sequence[str] | None) -> Outcomes:
     return Outcomes(outcomes.where, tuple(names), values)
 
 
-def outcomes_of(
-    recordings: Sequence[Recording], outcomes: Outcomes, *, partial: bool
-) -> np.ndarray:
-    """The outcome of each recording, in order.
+def outcomes_of(recordings: Sequence[Recording], outcomes: Outcomes, *, partial: bool) -> Points:
+    """Return the outcome of each recording, in order.
 
     Episodes are matched by name, else by the number their names end in (`3` is `demo_003`).
 
@@ -129,24 +140,13 @@ def outcomes_of(
         outcomes: By episode.
         partial: Only some episodes were asked for, so outcomes of others are no mistake.
 
-    Returns:
-        Shape (N, k).
-
     Raises:
         InvalidDemonstrationsError: Outcomes that are missing, of a wrong length, not finite, or of
             episodes that do not exist; each is named.
     """
-    by_number: dict[int, list[str]] = {}
-    for name in outcomes.values:
-        by_number.setdefault(_number_of(name), []).append(name)
-    numbers = [_number_of(recording.episode) for recording in recordings]
-    picked: dict[str, str] = {}
-    for recording, number in zip(recordings, numbers, strict=True):
-        if recording.episode in outcomes.values:
-            picked[recording.episode] = recording.episode
-        elif number >= 0 and numbers.count(number) == 1 and len(by_number.get(number, ())) == 1:
-            picked[recording.episode] = by_number[number][0]
-    missing = [r.episode for r in recordings if r.episode not in picked]
+    episodes = [recording.episode for recording in recordings]
+    picked = _matched(episodes, list(outcomes.values))
+    missing = [episode for episode in episodes if episode not in picked]
     if missing:
         raise InvalidDemonstrationsError(
             f"no outcome for episodes {_listed(missing)} in {outcomes.where} (it has "
@@ -156,40 +156,38 @@ def outcomes_of(
     if unknown and not partial:
         raise InvalidDemonstrationsError(
             f"{outcomes.where} names episodes {_listed(unknown)} that were not found (there are "
-            f"{_listed([r.episode for r in recordings])}); correct the names, or record them again"
+            f"{_listed(episodes)}); correct the names, or record them again"
         )
-    lengths = {len(outcomes.values[name]) for name in picked.values()}
+    rows = [outcomes.values[picked[episode]] for episode in episodes]
+    lengths = set(map(len, rows))
     if len(lengths) != 1 or 0 in lengths:
         raise InvalidDemonstrationsError(
             f"outcomes in {outcomes.where} have {sorted(lengths)} components, expected one number "
             "for all, at least 1; complete them"
         )
-    array = np.array([outcomes.values[picked[r.episode]] for r in recordings], dtype=np.float64)
-    if not np.all(np.isfinite(array)):
-        row = int(np.argwhere(~np.isfinite(array))[0][0])
-        raise InvalidDemonstrationsError(
-            f"the outcome of episode {recordings[row].episode} is {array[row].tolist()}, expected "
-            "finite numbers; measure it, or leave that episode out"
-        )
-    return array
+    for episode, row in zip(episodes, rows, strict=True):
+        if not all(map(math.isfinite, row)):
+            raise InvalidDemonstrationsError(
+                f"the outcome of episode {episode} is {list(row)}, expected finite numbers; "
+                "measure it, or leave that episode out"
+            )
+    return np.array(rows, dtype=np.float64)
 
 
-def given_outcomes(values: Mapping[str, Sequence[float]]) -> Outcomes:
-    """Outcomes that were passed as numbers.
-
-    Raises:
-        ConfigurationError: Not numbers.
-    """
-    try:
-        numbers = {str(name): tuple(map(float, value)) for name, value in values.items()}
-    except (TypeError, ValueError) as error:
-        raise ConfigurationError(
-            f"outcomes must be numbers by episode, such as {{'0': (0.9, 0.1)}}: {error}"
-        ) from error
-    return Outcomes("the given outcomes", (), numbers)
+def _matched(episodes: list[str], names: list[str]) -> dict[str, str]:
+    """Name in the table by episode; a number that two names end in matches none."""
+    numbers, there = list(map(_number_at_end, episodes)), list(map(_number_at_end, names))
+    picked: dict[str, str] = {}
+    for episode, number in zip(episodes, numbers, strict=True):
+        if episode in names:
+            picked[episode] = episode
+        elif number >= 0 and numbers.count(number) == 1 and there.count(number) == 1:
+            picked[episode] = names[there.index(number)]
+    return picked
 
 
 def _unit(column: str) -> tuple[str, float]:
+    """A column's component, and what its numbers are multiplied with."""
     for ending, metres in _METRES.items():
         if column.endswith(ending):
             return column.removesuffix(ending), metres
@@ -209,10 +207,10 @@ def _number(path: Path, line: int, text: str) -> float:
     return value
 
 
-def _number_of(name: str) -> int:
+def _number_at_end(name: str) -> int:
     """The number a name ends in, -1 if in none."""
     match = re.search(r"(\d+)$", name)
-    return int(match.group(1)) if match else -1
+    return int(match[1]) if match else -1
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -1,18 +1,22 @@
-"""From recordings of any rate and length to plans of one time step and one horizon."""
+"""From recordings of any channels, rate and length to plans of one format and one horizon."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.interpolate import CubicSpline, PchipInterpolator
 
+from prior_reinforce.arrays import Frames, Plans
 from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
 from prior_reinforce.importing.recording import Recording
-from prior_reinforce.plans.timing import ends_in_motion, moving_rows, still_bands
 
+_STILL_SHARE = 0.005
+"""A channel counts as still within this share of the largest range of any channel of its unit.
+Ours: above encoder noise, and reached by a smooth start within its first tenth."""
+_STILL_FLOOR = {"rad": 1e-3, "m": 5e-4}
+"""Never less than this. Ours: several counts of a joint encoder or a gripper."""
 _ON_GRID = 0.02
 """A frame within this share of a time step of where it should be is taken as recorded. Ours: at
 2 rad/s and 100 Hz that is 0.4 mrad, below the servo's own error."""
@@ -20,6 +24,15 @@ _OVERSHOOT = 0.01
 """A spline that leaves a channel's recorded range by more than this share of it is refused."""
 _MOST_FRAMES = 100_000
 """Longest plan that is made; more is a wrong time step far more often than a motion."""
+
+
+@dataclass(frozen=True)
+class Selection:
+    """Recordings that hold the plan's columns and nothing else."""
+
+    recordings: tuple[Recording, ...]
+    names: tuple[str, ...]
+    units: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -55,8 +68,7 @@ class Preprocessing:
 class Preprocessed:
     """Plans, and what was done to get them."""
 
-    plans: np.ndarray
-    """Shape (N, H, D)."""
+    plans: Plans
     dt: float
     """Time between two frames, in [s]."""
     starts: tuple[float, ...]
@@ -67,6 +79,62 @@ class Preprocessed:
     """How many plans hold their last pose to reach the horizon."""
     remarks: tuple[str, ...]
     """What a person should look at."""
+
+
+def select(
+    recordings: Sequence[Recording],
+    joints: Sequence[str] | None = None,
+    names: Sequence[str] | None = None,
+    units: Sequence[str] | None = None,
+) -> Selection:
+    """Pick, order, convert and rename the channels of every recording.
+
+    Args:
+        recordings: At least one.
+        joints: Recorded names to keep, in order; None keeps those of the first recording. They
+            name the columns, in order, of recordings that name nothing.
+        names: What to call them; None keeps the recorded names.
+        units: Recorded units; `deg` is converted to `rad`; None is radians.
+
+    Raises:
+        InvalidDemonstrationsError: A joint that a recording lacks.
+        ConfigurationError: Another number of names or units than of joints.
+    """
+    joints = tuple(joints) if joints is not None else recordings[0].names
+    names = tuple(names) if names is not None else joints
+    units = tuple(units) if units is not None else ("rad",) * len(joints)
+    if not joints or len(set(joints)) != len(joints):
+        raise ConfigurationError(f"joints must be names that differ, got {list(joints)}")
+    if len(names) != len(joints) or len(units) != len(joints):
+        raise ConfigurationError(
+            f"{len(joints)} joints need as many names and units, got {len(names)} names and "
+            f"{len(units)} units: {list(joints)}"
+        )
+    scale = np.where([unit == "deg" for unit in units], np.pi / 180, 1.0)
+    picked = tuple(
+        replace(r, positions=r.positions[:, _columns(r, joints)] * scale, names=joints)
+        for r in recordings
+    )
+    return Selection(picked, names, tuple("rad" if unit == "deg" else unit for unit in units))
+
+
+def _columns(recording: Recording, joints: tuple[str, ...]) -> list[int]:
+    missing = [joint for joint in joints if joint not in recording.names]
+    if not missing:
+        return [recording.names.index(joint) for joint in joints]
+    there = ", ".join(recording.names)
+    if recording.named:
+        raise InvalidDemonstrationsError(
+            f"episode {recording.episode} has no joint {', '.join(missing)}; it has {there}: give "
+            "the recorded names"
+        )
+    if len(recording.names) != len(joints):
+        raise InvalidDemonstrationsError(
+            f"episode {recording.episode} has {len(recording.names)} columns without names, but "
+            f"{len(joints)} joints were given; name all its columns in order, or give some of "
+            f"{there}"
+        )
+    return list(range(len(joints)))
 
 
 def preprocess(
@@ -83,8 +151,11 @@ def preprocess(
         InvalidDemonstrationsError: An episode that never moves, or is longer than the horizon.
     """
     dt = settings.dt or _common_dt(recordings)
-    remarks: list[str] = [remark for r in recordings for remark in r.remarks]
-    spans = _moving_spans(recordings, units, settings)
+    remarks = [remark for recording in recordings for remark in recording.remarks]
+    spans = [(0.0, recording.duration) for recording in recordings]
+    if settings.trim:
+        still = _still_bands(recordings, units)
+        spans = [_moving_span(recording, still, settings.margin) for recording in recordings]
     pieces = []
     for recording, (start, end) in zip(recordings, spans, strict=True):
         if (end - start) / dt > _MOST_FRAMES:
@@ -92,12 +163,12 @@ def preprocess(
                 f"episode {recording.episode} makes {(end - start) / dt:.0f} frames at dt {dt:g} s;"
                 " give a larger dt, or cut the recording"
             )
-        piece, smoothed = _resample(recording, start, end, dt)
+        piece, stepwise = _resample(recording, start, end, dt)
         pieces.append(piece)
         remarks += _gaps(recording, start, end)
-        if smoothed:
-            remarks.append(f"{recording.episode}: {', '.join(smoothed)} stepwise, no spline")
-    longest = max(len(piece) for piece in pieces)
+        if stepwise:
+            remarks.append(f"{recording.episode}: {', '.join(stepwise)} stepwise, no spline")
+    longest = max(map(len, pieces))
     horizon = settings.horizon or longest
     for recording, piece in zip(recordings, pieces, strict=True):
         if len(piece) > horizon:
@@ -105,15 +176,12 @@ def preprocess(
                 f"episode {recording.episode} has {len(piece)} frames, more than the horizon "
                 f"{horizon}; give a horizon of {longest}, or a larger dt (motions are never cut)"
             )
-        if len(piece) < horizon and ends_in_motion(piece):
+        if len(piece) < horizon and _ends_in_motion(piece):
             remarks.append(f"{recording.episode}: ends in motion, then holds its last pose")
     if horizon > 400:
         remarks.append(f"{horizon} frames are many; dt {dt * horizon / 140:.2g} s would make 140")
-    plans = np.stack(
-        [np.concatenate([p, np.repeat(p[-1:], horizon - len(p), axis=0)]) for p in pieces]
-    )
     return Preprocessed(
-        plans,
+        np.stack([np.pad(p, ((0, horizon - len(p)), (0, 0)), mode="edge") for p in pieces]),
         dt,
         tuple(start for start, _ in spans),
         tuple(end for _, end in spans),
@@ -129,40 +197,43 @@ def _common_dt(recordings: Sequence[Recording]) -> float:
     return 1 / rate if rate > 0 and abs(rate * period - 1) < 0.005 else period
 
 
-def _moving_spans(
-    recordings: Sequence[Recording], units: Sequence[str], settings: Preprocessing
-) -> list[tuple[float, float]]:
-    """From where to where each recording is kept, in [s]."""
-    if not settings.trim:
-        return [(0.0, recording.duration) for recording in recordings]
-    still = still_bands([recording.positions for recording in recordings], units)
-    spans = []
-    for recording in recordings:
-        t = recording.times
-        moving = moving_rows(recording.positions, still)
-        if moving is None:
-            raise InvalidDemonstrationsError(
-                f"episode {recording.episode} never moves by more than {still.max():.2g} from its "
-                "first pose; leave it out, or import without trimming"
-            )
-        # The last frame within the still band before the motion, and the first one after it.
-        first_moving, last_moving = moving
-        first = np.searchsorted(t, t[first_moving - 1] - settings.margin, side="right") - 1
-        last = np.searchsorted(t, t[min(last_moving + 1, len(t) - 1)] + settings.margin)
-        spans.append((float(t[max(first, 0)]), float(t[min(last, len(t) - 1)])))
-    return spans
+def _still_bands(recordings: Sequence[Recording], units: Sequence[str]) -> list[float]:
+    """How far each channel may be from a pose and still be there, in its unit."""
+    ranges = np.max([np.ptp(recording.positions, axis=0) for recording in recordings], axis=0)
+    largest = {u: max(r for r, v in zip(ranges, units, strict=True) if v == u) for u in set(units)}
+    return [max(_STILL_SHARE * largest[unit], _STILL_FLOOR.get(unit, 0.0)) for unit in units]
+
+
+def _moving_span(recording: Recording, still: list[float], margin: float) -> tuple[float, float]:
+    """From when to when a recording is kept, in [s]: its motion and a margin."""
+    q, t = recording.positions, recording.times
+    left = np.flatnonzero(np.any(np.abs(q - q[0]) > still, axis=1))
+    ahead = np.flatnonzero(np.any(np.abs(q - q[-1]) > still, axis=1))
+    if not left.size:
+        raise InvalidDemonstrationsError(
+            f"episode {recording.episode} never moves by more than {max(still):.2g} from its "
+            "first pose; leave it out, or import without trimming"
+        )
+    # The last frame within the still band before the motion, and the first one after it. A
+    # motion that returns to where it began has frames of both kinds all the same.
+    last_moving = ahead[-1] if ahead.size else left[-1]
+    first = np.searchsorted(t, t[left[0] - 1] - margin, side="right") - 1
+    last = np.searchsorted(t, t[min(last_moving + 1, len(t) - 1)] + margin)
+    return float(t[max(first, 0)]), float(t[min(last, len(t) - 1)])
 
 
 def _resample(
     recording: Recording, start: float, end: float, dt: float
-) -> tuple[np.ndarray, list[str]]:
-    """Frames (n, D) at start, start + dt, ... until the end is covered, and stepwise channels."""
+) -> tuple[Frames, list[str]]:
+    """Frames at start, start + dt, ... until the end is covered, and names of stepwise channels."""
     t, q = recording.times, recording.positions
     count = max(2, math.ceil((end - start) / dt - _ON_GRID) + 1)
     grid = start + np.arange(count) * dt
     nearest = np.clip(np.searchsorted(t, grid - dt / 2), 0, len(t) - 1)
     if np.all(np.abs(t[nearest] - grid) <= _ON_GRID * dt):
         return q[nearest], []
+    from scipy.interpolate import CubicSpline, PchipInterpolator
+
     at = np.clip(grid, t[0], t[-1])
     frames = CubicSpline(t, q)(at) if len(t) > 3 else PchipInterpolator(t, q)(at)
     low, high = q.min(axis=0), q.max(axis=0)
@@ -184,3 +255,9 @@ def _gaps(recording: Recording, start: float, end: float) -> list[str]:
         f"{recording.episode}: nothing recorded for {steps[worst]:.3f} s at "
         f"{recording.times[worst]:.2f} s"
     ]
+
+
+def _ends_in_motion(piece: Frames) -> bool:
+    """Whether the last step of a channel is over 5 % of its largest step."""
+    steps = np.abs(np.diff(piece, axis=0))
+    return bool(np.any(steps[-1] > 0.05 * np.maximum(steps.max(axis=0), 1e-9)))

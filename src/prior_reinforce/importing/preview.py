@@ -2,140 +2,206 @@
 
 from __future__ import annotations
 
+import math
 import os
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from jaxtyping import Float, Int
 
-from prior_reinforce.importing.picture import Picture, hull_corners
 from prior_reinforce.importing.preprocessing import Preprocessed
 from prior_reinforce.importing.recording import Recording
 from prior_reinforce.plans.motions import Demonstrations
 
 _REMARKS_SHOWN = 4
+_COLUMNS = 4
+_LEAST_RANGE = 0.2
+"""Smallest vertical range of a channel's panel, as a share of the largest motion."""
+Corners = Int[np.ndarray, " corners"]
+PlanePoints = Float[np.ndarray, "n 2"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Preview:
     """The last look before demonstrations are used."""
 
-    text: str
-    """About ten lines: episodes, rate, trimming, resampling, outcomes, remarks."""
-    remarks: tuple[str, ...]
-    """What a person should look at: gaps, ends in mid-swing, messages skipped."""
-    picture: Picture = field(repr=False, compare=False)
-    """What `draw` draws."""
+    source: str
+    """What was read, with its format."""
+    recordings: tuple[Recording, ...]
+    """N recordings with the plan's channels."""
+    done: Preprocessed
+    """What became of them."""
+    demonstrations: Demonstrations
+    """The result."""
+    outcomes_from: str
+    """Where the outcomes are from."""
+
+    @property
+    def episodes(self) -> tuple[str, ...]:
+        """Names of the recordings."""
+        return tuple(recording.episode for recording in self.recordings)
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What a person should look at: gaps, ends in mid-swing, messages skipped."""
+        return self.done.remarks
+
+    @property
+    def text(self) -> str:
+        """About ten lines: episodes, rate, trimming, resampling, outcomes, remarks."""
+        demos, form = self.demonstrations, self.demonstrations.format
+        outcomes = zip(demos.outcome_names, demos.outcome_units, demos.outcomes_seen.T, strict=True)
+        ranges = ", ".join(f"{n} {v.min():.3g} to {v.max():.3g} {u}" for n, u, v in outcomes)
+        rows = {
+            "episodes": f"{demos.n} from {self.source}: {', '.join(self.episodes)}",
+            "rate": self._rate(),
+            "channels": ", ".join(
+                f"{n} [{u}]" for n, u in zip(form.names, form.units, strict=True)
+            ),
+            "still ends": self._trimming(),
+            "length": self._length(),
+            "motion": self._motion(),
+            "outcomes": f"{ranges}, from {self.outcomes_from}",
+            "coverage": self._coverage(),
+            "remarks": "none" if not self.remarks else f"{len(self.remarks)}",
+        }
+        lines = [f"{name:<11} {text}" for name, text in rows.items()]
+        lines += [f"  - {remark}" for remark in self.remarks[:_REMARKS_SHOWN]]
+        if len(self.remarks) > _REMARKS_SHOWN:
+            lines.append(f"  - and {len(self.remarks) - _REMARKS_SHOWN} more")
+        return "\n".join(lines)
 
     def draw(self, path: str | os.PathLike[str]) -> None:
         """Write the picture (PNG): every joint over time, and the outcomes with their hull."""
-        self.picture.draw(path)
+        from matplotlib import colormaps
+        from matplotlib.figure import Figure
+
+        demos = self.demonstrations
+        rows = math.ceil((demos.action_dim + 1) / _COLUMNS)
+        figure = Figure(figsize=(3.4 * _COLUMNS, 2.6 * rows + 0.5), layout="constrained", dpi=110)
+        axes = figure.subplots(rows, _COLUMNS, squeeze=False).ravel()
+        colours = [colormaps["tab10"](i % 10) for i in range(demos.n)]
+        for channel in range(demos.action_dim):
+            self._draw_channel(axes[channel], channel, colours)
+        self._draw_outcomes(axes[demos.action_dim], colours)
+        for spare in axes[demos.action_dim + 1 :]:
+            spare.set_axis_off()
+        figure.suptitle(
+            f"{demos.n} demonstrations as they will be learned (colour, dot where the motion ends) "
+            "and as recorded (grey)"
+        )
+        figure.savefig(path, format="png")
+
+    def _rate(self) -> str:
+        recorded = _span((1 / recording.period for recording in self.recordings), ".4g")
+        dt = self.done.dt
+        return f"recorded at {recorded} Hz, plans at {1 / dt:.4g} Hz (dt {dt:.4g} s)"
+
+    def _trimming(self) -> str:
+        before = self.done.starts
+        after = [r.duration - end for r, end in zip(self.recordings, self.done.ends, strict=True)]
+        if max(*before, *after) <= 0:
+            return "nothing dropped"
+        return (
+            f"dropped {_span(before, '.2f')} s before and {_span(after, '.2f')} s after the motion"
+        )
+
+    def _length(self) -> str:
+        done, horizon = self.done, self.demonstrations.horizon
+        lengths = [end - start for start, end in zip(done.starts, done.ends, strict=True)]
+        held = f"; {done.held} hold their last pose" if done.held else ""
+        return (
+            f"motions of {_span(lengths, '.2f')} s, plans of {horizon} frames "
+            f"({(horizon - 1) * done.dt:.2f} s){held}"
+        )
+
+    def _motion(self) -> str:
+        demos, form = self.demonstrations, self.demonstrations.format
+        ranges = np.ptp(demos.plans, axis=(0, 1))
+        most = int(np.argmax(ranges))
+        speeds = np.abs(np.diff(demos.plans, axis=1)).max(axis=1) / form.dt
+        episode, joint = np.unravel_index(int(np.argmax(speeds)), speeds.shape)
+        return (
+            f"{form.names[most]} moves most, over {ranges[most]:.3g} {form.units[most]}; fastest "
+            f"is {form.names[joint]} of {self.episodes[episode]}, {speeds[episode, joint]:.3g} "
+            f"{form.units[joint]}/s"
+        )
+
+    def _coverage(self) -> str:
+        demos, points = self.demonstrations, self.demonstrations.outcomes_seen
+        gaps = np.linalg.norm(points[:, None] - points[None], axis=-1)
+        gaps[np.diag_indices(demos.n)] = np.inf
+        i, j = np.unravel_index(int(np.argmin(gaps)), gaps.shape)
+        nearest = (
+            f"nearest two are {self.episodes[i]} and {self.episodes[j]}, {gaps[i, j]:.3g} apart"
+        )
+        if demos.outcome_dim == 1:
+            return nearest
+        corners = hull_corners(points[:, :2])
+        x, y = points[corners, 0], points[corners, 1]
+        area = 0.5 * abs(np.dot(x, np.roll(y, -1)) - np.dot(y, np.roll(x, -1)))
+        unit = demos.outcome_units[0]
+        square = f" {unit}^2" if demos.outcome_units[1] == unit else ""
+        name = " and ".join(demos.outcome_names[:2])
+        return f"hull in {name} of {area:.3g}{square} by {len(corners)} of {demos.n}; {nearest}"
+
+    def _draw_channel(self, axes: Any, channel: int, colours: list[Any]) -> None:
+        demos, form = self.demonstrations, self.demonstrations.format
+        times = np.arange(demos.horizon) * form.dt
+        for recording, start in zip(self.recordings, self.done.starts, strict=True):
+            recorded = recording.positions[:, channel]
+            axes.plot(recording.times - start, recorded, color="0.8", linewidth=2.5, zorder=1)
+        for plan, colour in zip(demos.plans, colours, strict=True):
+            axes.plot(times, plan[:, channel], color=colour, linewidth=1.1, zorder=2)
+            moving = np.flatnonzero(np.any(plan != plan[-1], axis=1))
+            end = min(int(moving[-1]) + 1, len(times) - 1) if moving.size else 0
+            axes.plot(times[end], plan[end, channel], "o", color=colour, markersize=3, zorder=3)
+        # A channel that hardly moves must not look as if it did.
+        low, high = axes.get_ylim()
+        least = _LEAST_RANGE * float(np.ptp(demos.plans, axis=(0, 1)).max())
+        if high - low < least:
+            axes.set_ylim((low + high - least) / 2, (low + high + least) / 2)
+        axes.set_title(f"{form.names[channel]} [{form.units[channel]}]", fontsize=10)
+        axes.set_xlabel("time from the plan's start [s]", fontsize=8)
+        axes.tick_params(labelsize=8)
+
+    def _draw_outcomes(self, axes: Any, colours: list[Any]) -> None:
+        """Outcomes with the hull of their first two components; a single one on a line."""
+        demos = self.demonstrations
+        names, units = demos.outcome_names, demos.outcome_units
+        points = demos.outcomes_seen[:, :2]
+        if demos.outcome_dim == 1:
+            points = np.column_stack([points[:, 0], np.zeros(demos.n)])
+            axes.set_yticks([])
+        else:
+            corners = hull_corners(points)
+            if corners.size:
+                axes.fill(*points[corners].T, color="0.9", zorder=1)
+                axes.set_ylabel(f"{names[1]} [{units[1]}]", fontsize=8)
+            if units[0] == units[1]:
+                axes.set_aspect("equal", adjustable="datalim")
+        axes.scatter(*points.T, c=colours, s=30, zorder=2)
+        for point, episode in zip(points, self.episodes, strict=True):
+            axes.annotate(episode, point, textcoords="offset points", xytext=(5, 4), fontsize=7)
+        axes.margins(0.25)
+        axes.set_xlabel(f"{names[0]} [{units[0]}]", fontsize=8)
+        axes.set_title("outcomes and their hull", fontsize=10)
+        axes.tick_params(labelsize=8)
 
 
-def make_preview(
-    source: str,
-    format: str,
-    recordings: Sequence[Recording],
-    done: Preprocessed,
-    demos: Demonstrations,
-    outcomes_from: str,
-) -> Preview:
-    """Describe an import.
+def hull_corners(points: PlanePoints) -> Corners:
+    """Return indices of the corners of the points' convex hull, in order; none where it is flat."""
+    from scipy.spatial import ConvexHull, QhullError
 
-    Args:
-        source: Name of what was read.
-        format: Its format.
-        recordings: N recordings with the plan's channels.
-        done: What became of them.
-        demos: The result.
-        outcomes_from: Where the outcomes are from.
-    """
-    episodes = tuple(recording.episode for recording in recordings)
-    rows = [
-        ("episodes", f"{demos.n} from {source} ({format}): {', '.join(episodes)}"),
-        ("rate", _rate(recordings, done)),
-        ("channels", _channels(demos)),
-        ("still ends", _trimming(recordings, done)),
-        ("length", _length(done, demos)),
-        ("motion", _motion(demos, episodes)),
-        ("outcomes", f"{_ranges(demos)}, from {outcomes_from}"),
-        ("coverage", _coverage(demos, episodes)),
-        ("remarks", "none" if not done.remarks else f"{len(done.remarks)}"),
-    ]
-    lines = [f"{name:<11} {text}" for name, text in rows]
-    lines += [f"  - {remark}" for remark in done.remarks[:_REMARKS_SHOWN]]
-    if len(done.remarks) > _REMARKS_SHOWN:
-        lines.append(f"  - and {len(done.remarks) - _REMARKS_SHOWN} more")
-    picture = Picture(demos, episodes, tuple(recordings), done.starts)
-    return Preview("\n".join(lines), done.remarks, picture)
+    try:
+        return np.asarray(ConvexHull(points).vertices)
+    except (QhullError, ValueError):
+        return np.zeros(0, dtype=int)
 
 
-def _span(low: float, high: float, form: str) -> str:
-    first, last = format(low, form), format(high, form)
+def _span(values: Iterable[float], form: str) -> str:
+    ordered = sorted(values)
+    first, last = format(ordered[0], form), format(ordered[-1], form)
     return first if first == last else f"{first} to {last}"
-
-
-def _rate(recordings: Sequence[Recording], done: Preprocessed) -> str:
-    rates = [1 / recording.period for recording in recordings]
-    recorded = _span(min(rates), max(rates), ".4g")
-    return f"recorded at {recorded} Hz, plans at {1 / done.dt:.4g} Hz (dt {done.dt:.4g} s)"
-
-
-def _channels(demos: Demonstrations) -> str:
-    form = demos.format
-    return ", ".join(f"{n} [{u}]" for n, u in zip(form.names, form.units, strict=True))
-
-
-def _trimming(recordings: Sequence[Recording], done: Preprocessed) -> str:
-    after = [r.duration - end for r, end in zip(recordings, done.ends, strict=True)]
-    if max(*done.starts, *after) <= 0:
-        return "nothing dropped"
-    return (
-        f"dropped {_span(min(done.starts), max(done.starts), '.2f')} s before and "
-        f"{_span(min(after), max(after), '.2f')} s after the motion"
-    )
-
-
-def _length(done: Preprocessed, demos: Demonstrations) -> str:
-    lengths = [end - start for start, end in zip(done.starts, done.ends, strict=True)]
-    whole = (demos.horizon - 1) * done.dt
-    held = f"; {done.held} hold their last pose" if done.held else ""
-    return (
-        f"motions of {_span(min(lengths), max(lengths), '.2f')} s, plans of {demos.horizon} frames "
-        f"({whole:.2f} s){held}"
-    )
-
-
-def _motion(demos: Demonstrations, episodes: tuple[str, ...]) -> str:
-    form = demos.format
-    ranges = np.ptp(demos.plans, axis=(0, 1))
-    most = int(np.argmax(ranges))
-    speeds = np.abs(np.diff(demos.plans, axis=1)).max(axis=1) / form.dt
-    episode, joint = np.unravel_index(int(np.argmax(speeds)), speeds.shape)
-    return (
-        f"{form.names[most]} moves most, over {ranges[most]:.3g} {form.units[most]}; fastest is "
-        f"{form.names[joint]} of {episodes[episode]}, {speeds[episode, joint]:.3g} "
-        f"{form.units[joint]}/s"
-    )
-
-
-def _ranges(demos: Demonstrations) -> str:
-    parts = zip(demos.outcome_names, demos.outcome_units, demos.outcomes_seen.T, strict=True)
-    return ", ".join(f"{n} {v.min():.3g} to {v.max():.3g} {u}" for n, u, v in parts)
-
-
-def _coverage(demos: Demonstrations, episodes: tuple[str, ...]) -> str:
-    points = demos.outcomes_seen
-    gaps = np.linalg.norm(points[:, None] - points[None], axis=-1)
-    gaps[np.diag_indices(demos.n)] = np.inf
-    i, j = np.unravel_index(int(np.argmin(gaps)), gaps.shape)
-    nearest = f"nearest two are {episodes[i]} and {episodes[j]}, {gaps[i, j]:.3g} apart"
-    if demos.outcome_dim == 1:
-        return nearest
-    corners = hull_corners(points[:, :2])
-    x, y = points[corners, 0], points[corners, 1]
-    area = 0.5 * abs(np.dot(x, np.roll(y, -1)) - np.dot(y, np.roll(x, -1)))
-    unit = demos.outcome_units[0]
-    square = f" {unit}^2" if demos.outcome_units[1] == unit else ""
-    name = " and ".join(demos.outcome_names[:2])
-    return f"hull in {name} of {area:.3g}{square} by {len(corners)} of {demos.n}; {nearest}"

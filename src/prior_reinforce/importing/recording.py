@@ -1,21 +1,31 @@
-"""One episode as it was recorded: uneven times, whatever channels the recorder had."""
+"""One episode as it was recorded, and what the readers of all formats share."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
+from jaxtyping import Float
 
-from prior_reinforce.errors import FileFormatError, InvalidDemonstrationsError
+from prior_reinforce.arrays import Point
+from prior_reinforce.errors import (
+    FileFormatError,
+    InvalidDemonstrationsError,
+    PriorReinforceError,
+)
 
-RecordingFormat = Literal["npz", "csv", "lerobot", "robomimic", "droid", "ros", "zarr"]
-"""What can be read. `ros` covers ROS 1 bags, ROS 2 sqlite bags and MCAP; `zarr` is the replay
-buffer of Diffusion Policy."""
+Times = Float[np.ndarray, " T"]
+"""Of T frames, [s]."""
+Positions = Float[np.ndarray, "T D"]
+"""D channels at T times, in their units."""
 
 
 @dataclass(frozen=True)
-class Reading:
+class ReadOptions:
     """What the reader of a format is asked for; each field as in `read_recordings`."""
 
     key: str | None = None
@@ -30,22 +40,22 @@ class Reading:
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """One demonstration before trimming and resampling."""
+    """One demonstration before trimming and resampling: uneven times, any channels."""
 
     episode: str
     """Name within its source, by which outcomes and messages refer to it."""
-    times: np.ndarray
-    """Time of each frame from the first, shape (T,), strictly increasing, in [s]."""
-    positions: np.ndarray
-    """What was recorded, shape (T, D), in the recorder's units, float64."""
-    names: tuple[str, ...]
-    """Names of the D channels, as recorded."""
-    named: bool = True
-    """False where the file names nothing and `names` were made up."""
-    outcome: np.ndarray | None = None
-    """Where the object landed, shape (k,), for the rare file that says so."""
+    times: Times
+    """Time of each frame from the first, strictly increasing."""
+    positions: Positions
+    """What was recorded, in the recorder's units."""
+    names: tuple[str, ...] = ()
+    """Names of the D channels, as recorded; `joint1`, `joint2`, ... where the file names none."""
+    outcome: Point | None = None
+    """Where the object landed, for the rare file that says so."""
     remarks: tuple[str, ...] = ()
     """What a person should know about how it was read."""
+    named: bool = field(init=False)
+    """Whether the file names the channels."""
 
     def __post_init__(self) -> None:
         """Copy and check.
@@ -54,44 +64,41 @@ class Recording:
             InvalidDemonstrationsError: Shapes that do not fit, fewer than two frames, repeated
                 names, times that do not increase, or values that are not finite.
         """
+        episode = f"episode {self.episode}"
         try:
             times = np.array(self.times, dtype=np.float64)
             positions = np.array(self.positions, dtype=np.float64)
         except (TypeError, ValueError, OverflowError) as error:
             raise InvalidDemonstrationsError(
-                f"episode {self.episode} must hold numbers: {error}; mend or drop it"
+                f"{episode} must hold numbers: {error}; mend or drop it"
             ) from error
-        names = tuple(str(name) for name in self.names)
+        width = positions.shape[1] if positions.ndim == 2 else 0
+        names = tuple(map(str, self.names)) or tuple(f"joint{i + 1}" for i in range(width))
         fits = positions.shape == (times.size, len(names)) and len(names) > 0
         if times.ndim != 1 or not fits or times.size < 2:
             raise InvalidDemonstrationsError(
-                f"episode {self.episode} has times {times.shape} and positions {positions.shape} "
-                f"for {len(names)} channels; expected (T,) and (T, {len(names)}) with T >= 2: "
-                "mend or drop it"
+                f"{episode} has times {times.shape} and positions {positions.shape} for "
+                f"{len(names)} channels; expected (T,) and (T, {len(names)}) with T >= 2: mend or "
+                "drop it"
             )
         if len(set(names)) != len(names):
             raise InvalidDemonstrationsError(
-                f"episode {self.episode} repeats a channel name: {names}; rename the channels"
+                f"{episode} repeats a channel name: {names}; rename the channels"
             )
-        bad = np.argwhere(~np.isfinite(positions))
+        numbers = np.column_stack([positions, times])
+        bad = np.argwhere(~np.isfinite(numbers))
         if bad.size:
-            frame, channel = bad[0].tolist()
+            frame, column = bad[0].tolist()
             raise InvalidDemonstrationsError(
-                f"episode {self.episode}: {names[channel]} is {positions[frame, channel]} at frame "
+                f"{episode}: {(*names, 'time')[column]} is {numbers[frame, column]} at frame "
                 f"{frame}, expected a finite number; mend or drop that episode"
-            )
-        if not np.all(np.isfinite(times)):
-            frame = int(np.argmax(~np.isfinite(times)))
-            raise InvalidDemonstrationsError(
-                f"episode {self.episode}: time is {times[frame]} at frame {frame}, expected a "
-                "finite number; mend or drop that episode"
             )
         backward = np.flatnonzero(np.diff(times) <= 0)
         if backward.size:
             frame = int(backward[0]) + 1
             raise InvalidDemonstrationsError(
-                f"episode {self.episode}: time does not increase at frame {frame} "
-                f"({times[frame - 1]:g} s, then {times[frame]:g} s); sort or drop those frames"
+                f"{episode}: time does not increase at frame {frame} ({times[frame - 1]:g} s, then "
+                f"{times[frame]:g} s); sort or drop those frames"
             )
         if self.outcome is not None:
             outcome = np.atleast_1d(np.array(self.outcome, dtype=np.float64))
@@ -99,6 +106,7 @@ class Recording:
         times -= times[0]
         times.setflags(write=False)
         positions.setflags(write=False)
+        object.__setattr__(self, "named", bool(self.names))
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "positions", positions)
         object.__setattr__(self, "names", names)
@@ -114,13 +122,8 @@ class Recording:
         return float(np.median(np.diff(self.times)))
 
 
-def made_up_names(count: int) -> tuple[str, ...]:
-    """`joint1`, `joint2`, ...: for channels that a file does not name."""
-    return tuple(f"joint{i}" for i in range(1, count + 1))
-
-
-def evenly(count: int, rate: float | None, episode: str) -> np.ndarray:
-    """Times of frames that a file does not time, from the given rate.
+def evenly(count: int, rate: float | None, episode: str) -> Times:
+    """Return times of frames that a file does not time, from the given rate.
 
     Raises:
         FileFormatError: No rate was given.
@@ -130,3 +133,49 @@ def evenly(count: int, rate: float | None, episode: str) -> np.ndarray:
             f"episode {episode} holds neither times nor a rate; give the rate in frames a second"
         )
     return np.arange(count) / rate
+
+
+@contextmanager
+def named_damage(path: Path, what: str) -> Iterator[None]:
+    """Turn whatever a format's library raises on a damaged file into one named error.
+
+    Wide on purpose: parsers of foreign formats raise anything on damaged bytes (struct.error,
+    UnicodeDecodeError, RuntimeError, KeyError, their own trees). Keep only parsing inside.
+
+    Raises:
+        FileFormatError: With the library's first words.
+    """
+    try:
+        yield
+    except PriorReinforceError:
+        raise
+    except Exception as error:
+        words = str(error).split("\n")[0][:200] or "no reason given"
+        raise FileFormatError(
+            f"cannot read {path} as {what} ({type(error).__name__}: {words}); it is damaged or "
+            "something else: copy it again from where it was recorded, or say its format"
+        ) from error
+
+
+def natural_order(name: object) -> tuple[tuple[int, str], ...]:
+    """Return a sort key by which `demo_10` follows `demo_9`."""
+    parts = re.split(r"(\d+)", str(name))
+    return tuple((int(part), "") if part.isdigit() else (-1, part) for part in parts)
+
+
+def files_at(source: Path, suffixes: tuple[str, ...]) -> list[Path]:
+    """Return a file itself, or a folder's files with one of the suffixes, in natural order."""
+    if not source.is_dir():
+        return [source]
+    found = [path for path in source.iterdir() if path.is_file() and has_suffix(path, suffixes)]
+    return sorted((path for path in found if path.name != "outcomes.csv"), key=natural_order)
+
+
+def has_suffix(path: Path, suffixes: tuple[str, ...]) -> bool:
+    """Whether a name ends in one of the suffixes, in capitals or not."""
+    return path.suffix.lower() in suffixes
+
+
+def has_files(source: Path, suffixes: tuple[str, ...]) -> bool:
+    """Whether a file has one of the suffixes, or a folder holds one that has."""
+    return bool(files_at(source, suffixes)) and (source.is_dir() or has_suffix(source, suffixes))

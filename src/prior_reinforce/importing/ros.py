@@ -13,33 +13,30 @@ from typing import Any
 import numpy as np
 
 from prior_reinforce.errors import FileFormatError
-from prior_reinforce.importing.files import load_extra, named_damage, natural_order
-from prior_reinforce.importing.recording import Reading, Recording
+from prior_reinforce.importing.recording import (
+    ReadOptions,
+    Recording,
+    Times,
+    has_suffix,
+    named_damage,
+    natural_order,
+)
 
-SUFFIXES = (".bag", ".mcap", ".db3")
+_SUFFIXES = (".bag", ".mcap", ".db3")
 _STATE, _TRAJECTORY = "sensor_msgs/msg/JointState", "trajectory_msgs/msg/JointTrajectory"
 
 
-def bags_at(source: Path) -> list[Path]:
-    """The bags a path stands for: itself, or those of its folder; empty if there are none."""
-    if not source.is_dir():
-        return [source] if source.suffix.lower() in SUFFIXES else []
-    if (source / "metadata.yaml").is_file():
-        return [source]
-    found = [
-        path
-        for path in source.iterdir()
-        if (path.is_dir() and (path / "metadata.yaml").is_file())
-        or (path.is_file() and path.suffix.lower() in SUFFIXES)
-    ]
-    return sorted(found, key=lambda path: natural_order(path.name))
+def recognises(source: Path) -> bool:
+    """Whether a path looks like a bag, or a folder that holds one."""
+    return bool(_bags_at(source))
 
 
-def read_ros(source: Path, reading: Reading) -> list[Recording]:
+def read(source: Path, options: ReadOptions) -> list[Recording]:
     """Read a bag, or every bag of a folder."""
-    highlevel = load_extra("rosbags.highlevel", "ros")
-    typesys = load_extra("rosbags.typesys", "ros")
-    bags = bags_at(source)
+    from rosbags.highlevel import AnyReader
+    from rosbags.typesys import Stores, get_typestore
+
+    bags = _bags_at(source)
     if not bags:
         raise FileFormatError(
             f"{source} is no bag and holds none; expected .bag, .mcap, .db3 or a ROS 2 bag's folder"
@@ -47,13 +44,13 @@ def read_ros(source: Path, reading: Reading) -> list[Recording]:
     recordings: list[Recording] = []
     for bag in bags:
         name = bag.name if bag.is_dir() else bag.stem
-        if not any(e == name or e.startswith(f"{name}-") for e in reading.episodes or (name,)):
+        if not any(e == name or e.startswith(f"{name}-") for e in options.episodes or (name,)):
             continue
         with named_damage(bag, "a ROS bag"):
             # Bags from before ROS 2 Iron carry no definitions; these two messages never changed.
-            definitions = typesys.get_typestore(typesys.Stores.LATEST)
-            with highlevel.AnyReader([bag], default_typestore=definitions) as reader:
-                connections, kind = _topic(bag, reader, reading.key)
+            definitions = get_typestore(Stores.LATEST)
+            with AnyReader([bag], default_typestore=definitions) as reader:
+                connections, kind = _topic(bag, reader, options.key)
                 messages = [
                     (stamp, reader.deserialize(raw, connection.msgtype))
                     for connection, stamp, raw in reader.messages(connections=connections)
@@ -61,10 +58,24 @@ def read_ros(source: Path, reading: Reading) -> list[Recording]:
             if not messages:
                 raise FileFormatError(f"{bag}: topic {connections[0].topic} has no messages")
             if kind == _STATE:
-                recordings.append(_states(bag, name, messages, reading.joints))
+                recordings.append(_states(bag, name, messages, options.joints))
             else:
                 recordings.extend(_trajectories(name, [message for _, message in messages]))
-    return [recording for recording in recordings if reading.wants(recording.episode)]
+    return [recording for recording in recordings if options.wants(recording.episode)]
+
+
+def _bags_at(source: Path) -> list[Path]:
+    """The bags a path stands for: itself, or those of its folder; empty if there are none."""
+    if _is_bag(source):
+        return [source]
+    inside = source.iterdir() if source.is_dir() else ()
+    return sorted(filter(_is_bag, inside), key=natural_order)
+
+
+def _is_bag(path: Path) -> bool:
+    if path.is_dir():
+        return (path / "metadata.yaml").is_file()
+    return path.is_file() and has_suffix(path, _SUFFIXES)
 
 
 def _topic(bag: Path, reader: Any, key: str | None) -> tuple[list[Any], str]:
@@ -115,7 +126,7 @@ def _states(
     return Recording(name, times[~repeated], positions[~repeated], names, remarks=tuple(remarks))
 
 
-def _seconds(stamps: list[int]) -> np.ndarray:
+def _seconds(stamps: list[int]) -> Times:
     """Nanoseconds since 1970 to seconds since the first; as floats they would be 0.2 us coarse."""
     return np.array([stamp - stamps[0] for stamp in stamps]) * 1e-9
 
@@ -125,13 +136,8 @@ def _trajectories(name: str, messages: list[Any]) -> list[Recording]:
     for index, message in enumerate(messages):
         times = [p.time_from_start.sec + p.time_from_start.nanosec * 1e-9 for p in message.points]
         positions = np.array([p.positions for p in message.points], dtype=np.float64)
+        positions = positions.reshape(len(times), -1)
         episode = name if len(messages) == 1 else f"{name}-{index}"
-        recordings.append(
-            Recording(
-                episode,
-                np.array(times),
-                positions.reshape(len(times), -1),
-                tuple(message.joint_names),
-            )
-        )
+        names = tuple(message.joint_names)
+        recordings.append(Recording(episode, np.array(times), positions, names))
     return recordings

@@ -159,7 +159,7 @@ class _Reader:
         missing = [key for key in ("joint_names", *_LISTS) if key not in robot]
         if missing:
             also = f" (and {', '.join(missing[1:])})" if missing[1:] else ""
-            raise self.error("robot", missing[0], f"missing{also}; add it, one value a joint")
+            raise self.error("robot", missing[0], f"missing{also}; add it, `prior-reinforce new` shows how")
         low, high, speed, acceleration, jerk = (np.array(robot[key]) for key in _LISTS)
         names, source = robot["joint_names"], str(self.path)
         return RobotLimits(task, "as given", source, names, low, high, speed, acceleration, jerk)

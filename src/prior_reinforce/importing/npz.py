@@ -1,0 +1,112 @@
+"""Recordings in NPZ: a file an episode, or one file whose motion array has shape (N, T, D).
+
+Arrays: the motion (`key`, or `q`, `plans`, `positions`, `actions`), `t` or `dt` or `rate`, and
+where wanted `joint_names` or `names`, `outcome` or `outcomes` or `outcomes_seen`.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from prior_reinforce.errors import FileFormatError
+from prior_reinforce.importing.recording import (
+    ReadOptions,
+    Recording,
+    Times,
+    evenly,
+    files_at,
+    has_files,
+    named_damage,
+)
+
+Arrays = Mapping[str, np.ndarray]
+_MOTION_KEYS = ("q", "plans", "positions", "actions")
+
+
+def recognises(source: Path) -> bool:
+    """Whether a path looks like this format."""
+    return has_files(source, (".npz",))
+
+
+def read(source: Path, options: ReadOptions) -> list[Recording]:
+    """Read an NPZ file, or every NPZ file of a folder as an episode."""
+    paths = files_at(source, (".npz",))
+    wanted = [path for path in paths if len(paths) == 1 or options.wants(path.stem)]
+    return [recording for path in wanted for recording in _episodes(path, options)]
+
+
+def _episodes(path: Path, options: ReadOptions) -> list[Recording]:
+    arrays = _arrays(path)
+    key = options.key or next((name for name in _MOTION_KEYS if name in arrays), None)
+    if key is None or key not in arrays:
+        raise FileFormatError(
+            f"{path} has no array {key or ' or '.join(_MOTION_KEYS)}; it holds "
+            f"{sorted(arrays)}: say which with the key"
+        )
+    motion = arrays[key]
+    if motion.ndim not in (2, 3) or motion.dtype.kind not in "fiu":
+        raise FileFormatError(
+            f"{path}: {key} has shape {motion.shape} and type {motion.dtype}, expected numbers of "
+            "shape (T, D) or (N, T, D)"
+        )
+    names = _first(arrays, ("joint_names", "names"))
+    outcomes = _first(arrays, ("outcome", "outcomes", "outcomes_seen"))
+    single = motion.ndim == 2
+    motions = motion[None] if single else motion
+    if outcomes is not None:
+        outcomes = np.reshape(outcomes, (1, -1)) if single else outcomes
+        if outcomes.ndim != 2 or len(outcomes) != len(motions) or outcomes.dtype.kind not in "fiu":
+            raise FileFormatError(
+                f"{path}: outcomes have shape {outcomes.shape}, expected numbers of shape "
+                f"({len(motions)}, k)"
+            )
+    episodes = [path.stem] if single else [str(index) for index in range(len(motions))]
+    return [
+        Recording(
+            episode,
+            _times(path, arrays, motions.shape[1], index, options.rate, episode),
+            motions[index],
+            () if names is None else tuple(map(str, np.ravel(names))),
+            None if outcomes is None else outcomes[index],
+        )
+        for index, episode in enumerate(episodes)
+        if single or options.wants(episode)
+    ]
+
+
+def _arrays(path: Path) -> Arrays:
+    """Everything in a file; of our own demonstrations and plans also what their metadata says."""
+    with (
+        named_damage(path, "NPZ with plain number arrays"),
+        path.open("rb") as file,
+        np.load(file, allow_pickle=False) as archive,
+    ):
+        content = {name: np.array(archive[name]) for name in archive.files}
+        if "metadata" in content:
+            metadata = json.loads(str(content.pop("metadata")))
+            form = metadata.get("format", metadata)
+            content.setdefault("dt", np.array(float(form["dt"])))
+            content.setdefault("names", np.array(form.get("names") or form.get("joint_names")))
+        return content
+
+
+def _first(arrays: Arrays, keys: Sequence[str]) -> np.ndarray | None:
+    return next((arrays[key] for key in keys if key in arrays), None)
+
+
+def _times(
+    path: Path, arrays: Arrays, count: int, index: int, rate: float | None, episode: str
+) -> Times:
+    with named_damage(path, "NPZ with times t, or dt, or rate"):
+        if "t" in arrays:
+            times = arrays["t"]
+            return np.asarray(times[index] if times.ndim == 2 else times, dtype=np.float64)
+        if "dt" in arrays:
+            return np.arange(count) * float(arrays["dt"])
+        if "rate" in arrays:
+            rate = float(arrays["rate"])
+    return evenly(count, rate, episode)
