@@ -11,12 +11,16 @@ import h5py
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
+import pytest
 import zarr
 from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_typestore
 
+from prior_reinforce.importing import ImportResult, Preprocessing
+
+AS_IS = Preprocessing(trim=False)
 N = 6
 JOINTS = tuple(f"joint{i}" for i in range(1, 8))
 BEFORE = 0.3
@@ -43,6 +47,18 @@ def sampled(i: int, rate: float) -> tuple[np.ndarray, np.ndarray]:
     """Times and positions of a whole recording."""
     t = np.arange(round((BEFORE + duration(i) + AFTER) * rate) + 1) / rate
     return t, throw(i, t)
+
+
+def check_motions(result: ImportResult, rate: float, *, tolerance: float) -> None:
+    """Plans are the throws that were written, untrimmed, each holding its last pose."""
+    demos = result.demonstrations
+    t = np.arange(demos.horizon) / rate
+    assert demos.format.dt == pytest.approx(1 / rate, rel=1e-9)
+    assert demos.horizon == round((BEFORE + 1.2 + AFTER) * rate) + 1
+    for i in range(N):
+        np.testing.assert_allclose(demos.plans[i], throw(i, t), atol=tolerance)
+    np.testing.assert_allclose(demos.outcomes_seen, list(OUTCOMES.values()))
+    assert demos.outcome_names == ("x", "y")
 
 
 def write_outcomes(folder: Path, outcomes: dict[str, Sequence[float]] | None = None) -> Path:

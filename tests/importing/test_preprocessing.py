@@ -4,9 +4,21 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from recorded import BEFORE, SWING, N, duration, sampled, throw
+from recorded import (
+    BEFORE,
+    OUTCOMES,
+    SWING,
+    N,
+    duration,
+    sampled,
+    throw,
+    write_csv,
+    write_npz,
+    write_outcomes,
+)
 
 from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
+from prior_reinforce.importing import import_demonstrations
 from prior_reinforce.importing.preprocessing import Preprocessing, preprocess
 from prior_reinforce.importing.recording import Recording
 
@@ -179,3 +191,47 @@ def test_plans_start_and_end_where_the_kept_recording_does(seed, period, dt, tri
         np.testing.assert_allclose(plan[0], source.positions[first], atol=1e-9)
         np.testing.assert_allclose(plan[-1], source.positions[last], atol=0.02 * 4 * np.ptp(SWING))
         assert (len(plan) - 1) * dt >= end - start - 0.03 * dt
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = write_npz(tmp_path_factory.mktemp("selected"))
+    write_outcomes(folder)
+    return folder
+
+
+def test_joints_are_picked_renamed_and_converted(tmp_path):
+    write_outcomes(write_csv(tmp_path))
+    plain = import_demonstrations(tmp_path, preprocessing=Preprocessing(trim=False))
+    result = import_demonstrations(
+        tmp_path,
+        joints=["joint6", "joint4"],
+        names=["wrist", "elbow"],
+        units=["deg", "rad"],
+        preprocessing=Preprocessing(trim=False),
+    ).demonstrations
+    assert result.format.names == ("wrist", "elbow")
+    assert result.format.units == ("rad", "rad")
+    np.testing.assert_allclose(result.plans[..., 0], np.deg2rad(plain.demonstrations.plans[..., 5]))
+    np.testing.assert_array_equal(result.plans[..., 1], plain.demonstrations.plans[..., 3])
+
+
+def test_joints_that_do_not_fit(folder):
+    with pytest.raises(InvalidDemonstrationsError, match=r"no joint elbow; it has joint1, joint2"):
+        import_demonstrations(folder, joints=["elbow"])
+    with pytest.raises(ConfigurationError, match="need as many names"):
+        import_demonstrations(folder, names=["a"])
+    with pytest.raises(ConfigurationError, match="must be names that differ"):
+        import_demonstrations(folder, joints=["joint1", "joint1"])
+
+
+def test_columns_without_names(tmp_path):
+    plans = np.random.default_rng(0).normal(size=(6, 20, 3))
+    np.savez(tmp_path / "all.npz", q=plans, rate=20)
+    options = {"outcomes": OUTCOMES, "preprocessing": Preprocessing(trim=False)}
+    made_up = import_demonstrations(tmp_path / "all.npz", **options).demonstrations
+    assert made_up.format.names == ("joint1", "joint2", "joint3")
+    named = import_demonstrations(tmp_path / "all.npz", joints="xyz", **options).demonstrations
+    assert named.format.names == ("x", "y", "z")
+    with pytest.raises(InvalidDemonstrationsError, match="3 columns without names, but 2"):
+        import_demonstrations(tmp_path / "all.npz", joints="xy", **options)

@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 from matplotlib.image import imread
-from recorded import JOINTS, OUTCOMES, write_bags, write_csv, write_npz, write_outcomes
+from recorded import JOINTS, OUTCOMES, write_bags, write_npz, write_outcomes
 
-from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
-from prior_reinforce.importing import Preprocessing, import_demonstrations
+from prior_reinforce.importing import import_demonstrations
 from prior_reinforce.importing.preview import hull_corners
 
 
@@ -71,40 +70,3 @@ def test_many_remarks_are_counted(tmp_path):
     preview = import_demonstrations(tmp_path, joints=JOINTS).preview
     assert len(preview.remarks) == 6
     assert preview.text.splitlines()[-1] == "  - and 2 more"
-
-
-def test_joints_are_picked_renamed_and_converted(tmp_path):
-    write_outcomes(write_csv(tmp_path))
-    plain = import_demonstrations(tmp_path, preprocessing=Preprocessing(trim=False))
-    result = import_demonstrations(
-        tmp_path,
-        joints=["joint6", "joint4"],
-        names=["wrist", "elbow"],
-        units=["deg", "rad"],
-        preprocessing=Preprocessing(trim=False),
-    ).demonstrations
-    assert result.format.names == ("wrist", "elbow")
-    assert result.format.units == ("rad", "rad")
-    np.testing.assert_allclose(result.plans[..., 0], np.deg2rad(plain.demonstrations.plans[..., 5]))
-    np.testing.assert_array_equal(result.plans[..., 1], plain.demonstrations.plans[..., 3])
-
-
-def test_joints_that_do_not_fit(folder):
-    with pytest.raises(InvalidDemonstrationsError, match=r"no joint elbow; it has joint1, joint2"):
-        import_demonstrations(folder, joints=["elbow"])
-    with pytest.raises(ConfigurationError, match="need as many names"):
-        import_demonstrations(folder, names=["a"])
-    with pytest.raises(ConfigurationError, match="must be names that differ"):
-        import_demonstrations(folder, joints=["joint1", "joint1"])
-
-
-def test_columns_without_names(tmp_path):
-    plans = np.random.default_rng(0).normal(size=(6, 20, 3))
-    np.savez(tmp_path / "all.npz", q=plans, rate=20)
-    options = {"outcomes": OUTCOMES, "preprocessing": Preprocessing(trim=False)}
-    made_up = import_demonstrations(tmp_path / "all.npz", **options).demonstrations
-    assert made_up.format.names == ("joint1", "joint2", "joint3")
-    named = import_demonstrations(tmp_path / "all.npz", joints="xyz", **options).demonstrations
-    assert named.format.names == ("x", "y", "z")
-    with pytest.raises(InvalidDemonstrationsError, match="3 columns without names, but 2"):
-        import_demonstrations(tmp_path / "all.npz", joints="xy", **options)

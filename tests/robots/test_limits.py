@@ -1,14 +1,13 @@
-"""Published numbers, the position-dependent bound by hand, and given limits."""
+"""The position-dependent bound by hand, given limits, and joints matched by name."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from prior_reinforce.errors import ConfigurationError
-from prior_reinforce.robots import RobotLimits, robot_limits
-
-FIRMWARES = [("panda", "any"), ("fr3", ">=5.9"), ("fr3", "<5.9"), ("fr3", "any")]
+from prior_reinforce.errors import ConfigurationError, InvalidPlanError
+from prior_reinforce.plans.motions import PlanFormat
+from prior_reinforce.robots import RobotLimits, match_joints, missing_joints, robot_limits
 
 
 def test_velocity_of_an_fr3_shrinks_towards_its_stop():
@@ -34,48 +33,6 @@ def test_velocity_of_an_fr3_is_zero_at_and_beyond_its_stop():
     assert np.all(high >= 0)
 
 
-def test_old_firmware_reaches_zero_speed_at_its_position_limit():
-    # libfranka ends, to 8 mrad, where the documented range does: upper - offset^2 / (2 dec).
-    limits = robot_limits("fr3", "<5.9")
-    (e,) = limits.envelopes
-    np.testing.assert_allclose(
-        e.upper - e.offset**2 / (2 * e.deceleration), limits.upper, atol=1e-2
-    )
-    np.testing.assert_allclose(
-        e.lower + e.offset**2 / (2 * e.deceleration), limits.lower, atol=1e-2
-    )
-
-
-def test_unknown_firmware_is_never_wider_than_a_known_one():
-    narrow = robot_limits("fr3")
-    q = np.random.default_rng(0).uniform(-3, 3, size=(500, 7))
-    low, high = narrow.velocity_bounds(q)
-    for firmware in (">=5.9", "<5.9"):
-        wide = robot_limits("fr3", firmware)
-        assert np.all(narrow.lower >= wide.lower)
-        assert np.all(narrow.upper <= wide.upper)
-        wide_low, wide_high = wide.velocity_bounds(q)
-        assert np.all(low >= wide_low)
-        assert np.all(high <= wide_high)
-
-
-@pytest.mark.parametrize(("robot", "firmware"), FIRMWARES)
-def test_every_table_says_where_it_is_from(robot, firmware):
-    limits = robot_limits(robot, firmware)
-    assert "frank" in limits.source
-    assert len(limits.joint_names) == 7
-
-
-def test_fer_is_the_panda():
-    assert robot_limits("FER") is robot_limits("panda")
-
-
-@pytest.mark.parametrize(("robot", "firmware"), [("ur5", "any"), ("fr3", "6.0"), ("panda", "4.2")])
-def test_unknown_robots_and_firmwares_list_the_known(robot, firmware):
-    with pytest.raises(ConfigurationError, match="known are"):
-        robot_limits(robot, firmware)
-
-
 @pytest.mark.parametrize(
     "change",
     [
@@ -99,3 +56,28 @@ def test_given_limits_of_another_arm():
     low, high = limits.velocity_bounds(np.zeros((3, 2)))
     np.testing.assert_array_equal(high, np.full((3, 2), 2.0))
     np.testing.assert_array_equal(low, -high)
+
+
+PANDA = robot_limits("panda")
+
+
+def matched(*names, units=None):
+    return match_joints(PlanFormat(names, units or ("rad",) * len(names), 0.01), PANDA)
+
+
+def test_joints_are_matched_by_name_and_never_guessed():
+    assert matched("gripper", "panda_joint4", "joint2.pos", "Joint1", "j3") == {1: 2, 3: 1}
+    assert matched("fr3_joint1", "joint1") == {0: 1}
+    with pytest.raises(InvalidPlanError, match="all look like joint1 of panda"):
+        matched("left_joint1", "right_joint1")
+    with pytest.raises(InvalidPlanError, match="joint1 is in 'deg'"):
+        matched("joint1", units=("deg",))
+
+
+def test_joints_without_a_column_are_missing_unless_left_out_on_purpose():
+    columns = matched(*(f"joint{i}" for i in range(1, 6)))
+    assert missing_joints(columns, PANDA, ()) == ("joint6", "joint7")
+    assert missing_joints(columns, PANDA, ("joint7",)) == ("joint6",)
+    for name, why in (("joint1", "the plan moves it"), ("elbow", "panda has no such joint")):
+        with pytest.raises(ConfigurationError, match=f"absent_joints names '{name}', but {why}"):
+            missing_joints(columns, PANDA, (name,))

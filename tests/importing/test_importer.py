@@ -1,7 +1,11 @@
-"""Damaged recordings: truncated, bit-flipped, NaN. Never a traceback, always a named error."""
+"""Formats are told apart, episodes chosen, and damage of any kind is a named error."""
 
+import builtins
+import importlib
+import re
 import shutil
 import warnings
+from pathlib import Path
 
 import h5py
 import numpy as np
@@ -12,6 +16,8 @@ from recorded import (
     JOINTS,
     OUTCOMES,
     N,
+    sampled,
+    write_bag,
     write_bags,
     write_csv,
     write_droid,
@@ -23,11 +29,90 @@ from recorded import (
 )
 
 from prior_reinforce.errors import (
+    ConfigurationError,
     FileFormatError,
     InvalidDemonstrationsError,
+    MissingExtraError,
     PriorReinforceError,
 )
-from prior_reinforce.importing import import_demonstrations, read_recordings
+from prior_reinforce.importing import (
+    Recording,
+    import_demonstrations,
+    importer,
+    read_recordings,
+)
+from prior_reinforce.importing.importer import Format, detect_format
+
+
+@pytest.mark.parametrize(
+    ("module", "extra", "write"),
+    [
+        ("pyarrow", "lerobot", lambda folder: write_lerobot(folder / "set")),
+        ("h5py", "hdf5", write_robomimic),
+        ("zarr", "zarr", write_zarr),
+        ("rosbags", "ros", lambda folder: write_bag(folder / "throw0", 0, kind="mcap")),
+    ],
+)
+def test_a_missing_library_names_its_extra(tmp_path, monkeypatch, module, extra, write):
+    source = write(tmp_path)
+    real = importlib.import_module
+
+    def without(name, package=None):
+        if name.split(".")[0] == module:
+            raise ModuleNotFoundError(f"No module named {name!r}")
+        return real(name, package)
+
+    monkeypatch.setattr(importlib, "import_module", without)
+    with pytest.raises(MissingExtraError, match=rf'pip install "prior-reinforce\[{extra}\]"'):
+        read_recordings(source)
+
+
+def test_the_core_formats_need_no_optional_library(tmp_path, monkeypatch):
+    real = builtins.__import__
+
+    def without(name, *arguments, **options):
+        if name.split(".")[0] in ("pyarrow", "h5py", "rosbags", "zarr"):
+            raise ModuleNotFoundError(f"No module named {name!r}")
+        return real(name, *arguments, **options)
+
+    write_outcomes(write_csv(tmp_path))
+    monkeypatch.setattr(builtins, "__import__", without)
+    assert import_demonstrations(tmp_path).demonstrations.n == N
+
+
+def test_episodes_are_chosen_by_name_and_order(tmp_path):
+    write_outcomes(write_csv(tmp_path))
+    result = import_demonstrations(tmp_path, episodes=["4", "0", "1"])
+    assert result.episodes == ("4", "0", "1")
+    np.testing.assert_allclose(
+        result.demonstrations.outcomes_seen, [OUTCOMES["4"], OUTCOMES["0"], OUTCOMES["1"]]
+    )
+    with pytest.raises(InvalidDemonstrationsError, match=r"no episode 9 in .*0, 1, 2, 3, 4, 5"):
+        import_demonstrations(tmp_path, episodes=["9"])
+
+
+@pytest.mark.parametrize("name", ["nothing.npz", "nothing", "text.txt"])
+def test_no_recording(tmp_path, name):
+    (tmp_path / "text.txt").write_text("hello")
+    with pytest.raises(FileFormatError, match=r"no recording at|no format that can be read"):
+        read_recordings(tmp_path / name)
+
+
+def test_a_folder_of_two_formats_asks_which(tmp_path):
+    write_npz(write_csv(tmp_path))
+    with pytest.raises(FileFormatError, match="npz and csv; say its format"):
+        read_recordings(tmp_path)
+    assert len(read_recordings(tmp_path, format="csv")) == N
+    with pytest.raises(ConfigurationError, match="unknown format 'pickle'"):
+        read_recordings(tmp_path, format="pickle")
+
+
+def test_two_episodes_of_one_name(tmp_path):
+    (tmp_path / "log.csv").write_text("episode,t,a\nthrow,0,1\nthrow,1,2\n")
+    (tmp_path / "throw.csv").write_text("t,a\n0,1\n1,2\n")
+    with pytest.raises(InvalidDemonstrationsError, match="more than one episode named throw"):
+        read_recordings(tmp_path)
+
 
 WRITERS = {
     "npz": lambda folder: write_npz(folder, rate=50),
@@ -43,6 +128,8 @@ WRITERS = {
 
 
 FEWER = dict.fromkeys(("ros1", "sqlite", "mcap"), 2)
+
+
 OPTIONS = {"zarr": {"key": "joint_pos", "rate": 50}}
 
 
@@ -74,6 +161,12 @@ def test_the_originals_are_good(originals, name):
         source_of(originals[name], name), joints=JOINTS, **OPTIONS.get(name, {})
     )
     assert result.demonstrations.n == FEWER.get(name, N)
+
+
+@pytest.mark.parametrize("rate", [0.0, -5.0, float("nan")])
+def test_the_rate_is_checked(originals, rate):
+    with pytest.raises(PriorReinforceError, match="positive number of frames a second"):
+        read_recordings(originals["npz"], rate=rate)
 
 
 damage = given(
@@ -162,55 +255,32 @@ def test_a_value_that_is_not_finite_is_named_with_its_episode_and_frame(
         import_demonstrations(source_of(folder, name))
 
 
-def test_pickled_objects_are_never_loaded(tmp_path):
-    np.savez(tmp_path / "bad.npz", q=np.array([{"a": 1}, None], dtype=object), dt=0.01)
-    with pytest.raises(FileFormatError, match="plain number arrays"):
-        read_recordings(tmp_path / "bad.npz")
+@pytest.mark.slow
+def test_the_examples_of_the_guide_run(tmp_path, monkeypatch):
+    guide = Path(__file__).parents[2] / "docs" / "demonstrations.md"
+    blocks = re.findall(r"```python\n(.*?)```", guide.read_text(), flags=re.DOTALL)
+    assert blocks
+    monkeypatch.chdir(tmp_path)
+    exec(compile("\n".join(blocks), guide.name, "exec"), {})
 
 
-@pytest.mark.parametrize(
-    ("arrays", "says"),
-    [
-        ({"q": np.zeros((5, 2))}, "give the rate"),
-        ({"angles": np.zeros((5, 2)), "dt": 0.01}, r"no array q .* it holds \['angles', 'dt'\]"),
-        ({"q": np.zeros(5), "dt": 0.01}, r"expected numbers of shape \(T, D\)"),
-        ({"q": np.zeros((5, 2)), "t": np.zeros(4)}, "has times"),
-        ({"q": np.zeros((5, 2)), "t": np.zeros(5)}, "time does not increase at frame 1"),
-        ({"q": np.zeros((5, 2)), "t": np.full(5, np.nan)}, "time is nan at frame 0"),
-        ({"q": np.zeros((5, 2)), "dt": np.zeros(3)}, "times t, or dt, or rate"),
-        ({"q": np.zeros((5, 2)), "dt": 0.01, "names": np.array(["a", "a"])}, "repeats a channel"),
-        ({"q": np.zeros((5, 2)), "dt": 0.01, "names": np.array(["a"])}, "for 1 channels"),
-        ({"q": np.array([["a", "b"]] * 5), "dt": 0.01}, "expected numbers"),
-        ({"q": np.zeros((2, 5, 2)), "dt": 0.01, "outcomes": np.zeros(3)}, "outcomes have shape"),
-    ],
-)
-def test_npz_of_other_content(tmp_path, arrays, says):
-    np.savez(tmp_path / "bad.npz", **arrays)
-    with pytest.raises(PriorReinforceError, match=says):
-        read_recordings(tmp_path / "bad.npz")
+def test_a_data_set_is_recognised_whatever_else_lies_in_its_folder(tmp_path):
+    folder = write_lerobot(tmp_path / "set")
+    write_npz(folder)
+    assert detect_format(folder) == "lerobot"
+    assert detect_format(write_csv(tmp_path)) == "csv"
 
 
-@pytest.mark.parametrize(
-    ("text", "says"),
-    [
-        ("", "has 0 lines"),
-        ("t,a\n0,1\n", "has 2 lines"),
-        ("t,a\n0,1\n0.1\n", "line 3: 1 cells for 2 columns"),
-        ("t,a\n0,1\n0.1,x\n", "line 3: a is 'x'"),
-        ("a,b\n0,1\n1,2\n", "give the rate"),
-        ("t,a\n0.1,1\n0.0,2\n", "time does not increase"),
-        ("t,a,a\n0,1,1\n0.1,2,2\n", "repeats a channel name"),
-        ('t,a\n0,"1\n0.1,2\n', "as CSV in UTF-8"),
-        ("t\n0\n1\n", "for 0 channels"),
-    ],
-)
-def test_csv_of_other_content(tmp_path, text, says):
-    (tmp_path / "bad.csv").write_text(text)
-    with pytest.raises(PriorReinforceError, match=says):
-        read_recordings(tmp_path / "bad.csv")
+def test_a_format_is_one_entry_of_the_table(tmp_path, monkeypatch):
+    def read(source, options):
+        t, q = sampled(int(options.key), 100)
+        return [Recording(source.stem, t, q, JOINTS)]
 
-
-@pytest.mark.parametrize("rate", [0.0, -5.0, float("nan")])
-def test_the_rate_is_checked(originals, rate):
-    with pytest.raises(PriorReinforceError, match="positive number of frames a second"):
-        read_recordings(originals["npz"], rate=rate)
+    mine = Format(read, lambda source: source.suffix == ".mine")
+    monkeypatch.setattr(importer, "FORMATS", {**importer.FORMATS, "mine": mine})
+    (tmp_path / "throw.mine").touch()
+    (recording,) = read_recordings(tmp_path / "throw.mine", key="2")
+    np.testing.assert_array_equal(recording.positions, sampled(2, 100)[1])
+    (tmp_path / "throw.yours").touch()
+    with pytest.raises(FileFormatError, match=r"one of npz, .*, mine"):
+        read_recordings(tmp_path / "throw.yours")

@@ -1,0 +1,72 @@
+"""NPZ files come back as the motions that were written, and say what is wrong with them."""
+
+import numpy as np
+import pytest
+from recorded import AS_IS, JOINTS, OUTCOMES, N, check_motions, throw, write_npz, write_outcomes
+
+from prior_reinforce.errors import FileFormatError, PriorReinforceError
+from prior_reinforce.importing import import_demonstrations, read_recordings
+from prior_reinforce.plans.files import write_plan
+from prior_reinforce.plans.motions import Plan
+
+
+def test_npz(tmp_path):
+    write_outcomes(write_npz(tmp_path))
+    result = import_demonstrations(tmp_path, preprocessing=AS_IS)
+    check_motions(result, 100, tolerance=0)
+    assert result.demonstrations.format.names == JOINTS
+    assert result.episodes == tuple(f"throw_{i}" for i in range(N))
+
+
+def test_npz_of_one_array_with_its_own_outcomes(tmp_path):
+    t = np.arange(171) / 100
+    plans = np.stack([throw(i, t) for i in range(N)])
+    np.savez(tmp_path / "all.npz", q=plans, dt=0.01, outcomes=np.array(list(OUTCOMES.values())))
+    result = import_demonstrations(tmp_path / "all.npz", preprocessing=AS_IS)
+    np.testing.assert_array_equal(result.demonstrations.plans, plans)
+    assert result.episodes == tuple(OUTCOMES)
+
+
+def test_our_own_demonstrations_and_plans_come_back(tmp_path):
+    write_outcomes(write_npz(tmp_path))
+    demos = import_demonstrations(tmp_path, preprocessing=AS_IS).demonstrations
+    demos.save(tmp_path / "saved.npz")
+    again = import_demonstrations(
+        tmp_path / "saved.npz",
+        outcomes={str(i): OUTCOMES[str(i)] for i in range(N)},
+        preprocessing=AS_IS,
+    ).demonstrations
+    np.testing.assert_array_equal(again.plans, demos.plans)
+    assert again.format == demos.format
+    write_plan(Plan(demos.plans[2], demos.format), tmp_path / "plan.npz")
+    (recording,) = read_recordings(tmp_path / "plan.npz")
+    np.testing.assert_array_equal(recording.positions, demos.plans[2])
+    assert recording.names == JOINTS
+
+
+def test_pickled_objects_are_never_loaded(tmp_path):
+    np.savez(tmp_path / "bad.npz", q=np.array([{"a": 1}, None], dtype=object), dt=0.01)
+    with pytest.raises(FileFormatError, match="plain number arrays"):
+        read_recordings(tmp_path / "bad.npz")
+
+
+@pytest.mark.parametrize(
+    ("arrays", "says"),
+    [
+        ({"q": np.zeros((5, 2))}, "give the rate"),
+        ({"angles": np.zeros((5, 2)), "dt": 0.01}, r"no array q .* it holds \['angles', 'dt'\]"),
+        ({"q": np.zeros(5), "dt": 0.01}, r"expected numbers of shape \(T, D\)"),
+        ({"q": np.zeros((5, 2)), "t": np.zeros(4)}, "has times"),
+        ({"q": np.zeros((5, 2)), "t": np.zeros(5)}, "time does not increase at frame 1"),
+        ({"q": np.zeros((5, 2)), "t": np.full(5, np.nan)}, "time is nan at frame 0"),
+        ({"q": np.zeros((5, 2)), "dt": np.zeros(3)}, "times t, or dt, or rate"),
+        ({"q": np.zeros((5, 2)), "dt": 0.01, "names": np.array(["a", "a"])}, "repeats a channel"),
+        ({"q": np.zeros((5, 2)), "dt": 0.01, "names": np.array(["a"])}, "for 1 channels"),
+        ({"q": np.array([["a", "b"]] * 5), "dt": 0.01}, "expected numbers"),
+        ({"q": np.zeros((2, 5, 2)), "dt": 0.01, "outcomes": np.zeros(3)}, "outcomes have shape"),
+    ],
+)
+def test_npz_of_other_content(tmp_path, arrays, says):
+    np.savez(tmp_path / "bad.npz", **arrays)
+    with pytest.raises(PriorReinforceError, match=says):
+        read_recordings(tmp_path / "bad.npz")

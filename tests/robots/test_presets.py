@@ -1,0 +1,51 @@
+"""Published numbers say where they are from, and agree with one another."""
+
+import numpy as np
+import pytest
+
+from prior_reinforce.errors import ConfigurationError
+from prior_reinforce.robots import robot_limits
+
+FIRMWARES = [("panda", "any"), ("fr3", ">=5.9"), ("fr3", "<5.9"), ("fr3", "any")]
+
+
+def test_old_firmware_reaches_zero_speed_at_its_position_limit():
+    # libfranka ends, to 8 mrad, where the documented range does: upper - offset^2 / (2 dec).
+    limits = robot_limits("fr3", "<5.9")
+    (e,) = limits.envelopes
+    np.testing.assert_allclose(
+        e.upper - e.offset**2 / (2 * e.deceleration), limits.upper, atol=1e-2
+    )
+    np.testing.assert_allclose(
+        e.lower + e.offset**2 / (2 * e.deceleration), limits.lower, atol=1e-2
+    )
+
+
+def test_unknown_firmware_is_never_wider_than_a_known_one():
+    narrow = robot_limits("fr3")
+    q = np.random.default_rng(0).uniform(-3, 3, size=(500, 7))
+    low, high = narrow.velocity_bounds(q)
+    for firmware in (">=5.9", "<5.9"):
+        wide = robot_limits("fr3", firmware)
+        assert np.all(narrow.lower >= wide.lower)
+        assert np.all(narrow.upper <= wide.upper)
+        wide_low, wide_high = wide.velocity_bounds(q)
+        assert np.all(low >= wide_low)
+        assert np.all(high <= wide_high)
+
+
+@pytest.mark.parametrize(("robot", "firmware"), FIRMWARES)
+def test_every_table_says_where_it_is_from(robot, firmware):
+    limits = robot_limits(robot, firmware)
+    assert "frank" in limits.source
+    assert len(limits.joint_names) == 7
+
+
+def test_fer_is_the_panda():
+    assert robot_limits("FER") is robot_limits("panda")
+
+
+@pytest.mark.parametrize(("robot", "firmware"), [("ur5", "any"), ("fr3", "6.0"), ("panda", "4.2")])
+def test_unknown_robots_and_firmwares_list_the_known(robot, firmware):
+    with pytest.raises(ConfigurationError, match="known are"):
+        robot_limits(robot, firmware)
