@@ -24,7 +24,6 @@ from prior_reinforce.robots import (
     missing_joints,
     robot_limits,
 )
-from prior_reinforce.wording import WORDS
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -58,11 +57,6 @@ class Manifest:
     """Limits that every plan is held against; None where the manifest says `none`."""
     gate: GateSettings
     """The gate's own lines."""
-
-    @property
-    def in_words(self) -> bool:
-        """Whether an operator's words (long, left, high) describe this task's outcomes."""
-        return len(self.outcome_names) <= len(WORDS) and set(self.outcome_units) == {"m"}
 
 
 _TEXTS, _NUMBERS = tuple[str, ...], tuple[float, ...]
@@ -159,7 +153,9 @@ class _Reader:
         missing = [key for key in ("joint_names", *_LISTS) if key not in robot]
         if missing:
             also = f" (and {', '.join(missing[1:])})" if missing[1:] else ""
-            raise self.error("robot", missing[0], f"missing{also}; add it, `prior-reinforce new` shows how")
+            raise self.error(
+                "robot", missing[0], f"missing{also}; add it, `prior-reinforce new` shows how"
+            )
         low, high, speed, acceleration, jerk = (np.array(robot[key]) for key in _LISTS)
         names, source = robot["joint_names"], str(self.path)
         return RobotLimits(task, "as given", source, names, low, high, speed, acceleration, jerk)
