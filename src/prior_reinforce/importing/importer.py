@@ -210,7 +210,7 @@ def detect_format(source: Path) -> str:
 
 
 def _need(format: Format) -> None:
-    """Where a format's library is missing, raise MissingExtraError, which says how to install it."""
+    """Raise MissingExtraError, with how to install it, where a library of the format is missing."""
     try:
         if format.library:
             importlib.import_module(format.library)

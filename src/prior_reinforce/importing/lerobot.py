@@ -9,7 +9,6 @@ collected by their own `episode_index`: the listed file pointers can be stale in
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -99,20 +98,6 @@ def _listed_lengths(source: Path) -> dict[int, int]:
 
 def _frames(source: Path, key: str) -> dict[int, tuple[FrameNumbers, Positions]]:
     """Frame numbers and positions of each episode, in time order."""
-    parts: dict[int, list[tuple[FrameNumbers, Positions]]] = {}
-    for episode, index, positions in _parts(source, key):
-        parts.setdefault(episode, []).append((index, positions))
-    frames = {}
-    for episode, pieces in parts.items():
-        index = np.concatenate([piece[0] for piece in pieces])
-        with named_damage(source, f"LeRobot data with one width of {key}"):
-            positions = np.concatenate([piece[1] for piece in pieces])
-        order = np.argsort(index, kind="stable")
-        frames[episode] = index[order], positions[order]
-    return frames
-
-
-def _parts(source: Path, key: str) -> Iterator[tuple[int, FrameNumbers, Positions]]:
     import pyarrow.parquet as parquet
 
     paths = sorted((source / "data").glob("**/*.parquet"))
@@ -120,18 +105,22 @@ def _parts(source: Path, key: str) -> Iterator[tuple[int, FrameNumbers, Position
         raise FileFormatError(
             f"{source} has no data/**.parquet; copy the whole data set, not only meta/"
         )
+    parts = []
     for path in paths:
         with named_damage(path, "LeRobot frames"):
             table = parquet.read_table(path, columns=["episode_index", "frame_index", key])
-            episodes = np.asarray(table["episode_index"].to_pylist(), dtype=np.int64)
+            episode = np.asarray(table["episode_index"].to_pylist(), dtype=np.int64)
             index = np.asarray(table["frame_index"].to_pylist(), dtype=np.int64)
             positions = np.array(table[key].to_pylist(), dtype=np.float64)
-            if len(episodes) == 0:
-                continue
-            positions = positions.reshape(len(episodes), -1)
-        for episode in np.unique(episodes).tolist():
-            own = episodes == episode
-            yield episode, index[own], positions[own]
+            if len(episode) > 0:
+                parts.append((episode, index, positions.reshape(len(episode), -1)))
+    if not parts:
+        return {}
+    with named_damage(source, f"LeRobot data with one width of {key}"):
+        episode, index, positions = map(np.concatenate, zip(*parts, strict=True))
+    order = np.argsort(index, kind="stable")
+    own = {number: order[episode[order] == number] for number in np.unique(episode).tolist()}
+    return {number: (index[rows], positions[rows]) for number, rows in own.items()}
 
 
 def _names(feature: dict[str, Any], count: int) -> tuple[str, ...]:
