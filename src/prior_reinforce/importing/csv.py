@@ -17,7 +17,6 @@ from prior_reinforce.importing.recording import (
     Recording,
     evenly,
     files_at,
-    has_files,
     named_damage,
     natural_order,
 )
@@ -25,11 +24,6 @@ from prior_reinforce.importing.recording import (
 _TIME_COLUMNS = ("t", "time", "timestamp")
 Rows = list[tuple[int, list[str]]]
 """Cells of each row, with the number of its line."""
-
-
-def recognises(source: Path) -> bool:
-    """Whether a path looks like this format."""
-    return has_files(source, (".csv",))
 
 
 def read(source: Path, options: ReadOptions) -> list[Recording]:

@@ -23,7 +23,7 @@ from prior_reinforce.importing import csv, hdf5, lerobot, npz, ros, zarr
 from prior_reinforce.importing.outcomes import find_outcomes, in_order, outcomes_of
 from prior_reinforce.importing.preprocessing import Preprocessing, preprocess, select
 from prior_reinforce.importing.preview import Preview
-from prior_reinforce.importing.recording import ReadOptions, Recording
+from prior_reinforce.importing.recording import ReadOptions, Recording, has_files
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 
 
@@ -43,8 +43,8 @@ class Format:
 
 
 FORMATS: Mapping[str, Format] = {
-    "npz": Format(npz.read, npz.recognises),
-    "csv": Format(csv.read, csv.recognises),
+    "npz": Format(npz.read, lambda source: has_files(source, (".npz",))),
+    "csv": Format(csv.read, lambda source: has_files(source, (".csv",))),
     "lerobot": Format(lerobot.read, lerobot.recognises, "pyarrow.parquet", "lerobot", whole=True),
     "robomimic": Format(hdf5.read_robomimic, hdf5.is_robomimic, "h5py", "hdf5"),
     "droid": Format(hdf5.read_droid, hdf5.is_droid, "h5py", "hdf5"),
@@ -86,10 +86,10 @@ def import_demonstrations(
 
     Args:
         source: As in `read_recordings`, and so are the next four.
-        format: What it is; None detects it.
-        key: Where the motion is within the source.
-        rate: Frames a second, for files that hold neither times nor a rate.
-        episodes: Names of the episodes to keep, in order; None keeps all.
+        format: See there.
+        key: See there.
+        rate: See there.
+        episodes: See there.
         outcomes: Where each demonstration's object landed: a CSV `episode,x,y[,z]`, or numbers by
             episode name. None takes `outcomes.csv` beside or inside the source.
         outcome_names: Names of the k components, in order, matched to the CSV's columns; None

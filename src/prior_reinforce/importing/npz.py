@@ -19,17 +19,11 @@ from prior_reinforce.importing.recording import (
     Times,
     evenly,
     files_at,
-    has_files,
     named_damage,
 )
 
 Arrays = Mapping[str, np.ndarray]
 _MOTION_KEYS = ("q", "plans", "positions", "actions")
-
-
-def recognises(source: Path) -> bool:
-    """Whether a path looks like this format."""
-    return has_files(source, (".npz",))
 
 
 def read(source: Path, options: ReadOptions) -> list[Recording]:
