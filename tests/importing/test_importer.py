@@ -2,10 +2,8 @@
 
 import builtins
 import importlib
-import re
 import shutil
 import warnings
-from pathlib import Path
 
 import h5py
 import numpy as np
@@ -253,15 +251,6 @@ def test_a_value_that_is_not_finite_is_named_with_its_episode_and_frame(
             file["data/demo_2/obs/robot0_joint_pos"][7, 3] = value
     with pytest.raises(InvalidDemonstrationsError, match=r"2: joint4 is (nan|inf) at frame 7"):
         import_demonstrations(source_of(folder, name))
-
-
-@pytest.mark.slow
-def test_the_examples_of_the_guide_run(tmp_path, monkeypatch):
-    guide = Path(__file__).parents[2] / "docs" / "demonstrations.md"
-    blocks = re.findall(r"```python\n(.*?)```", guide.read_text(), flags=re.DOTALL)
-    assert blocks
-    monkeypatch.chdir(tmp_path)
-    exec(compile("\n".join(blocks), guide.name, "exec"), {})
 
 
 def test_a_data_set_is_recognised_whatever_else_lies_in_its_folder(tmp_path):
