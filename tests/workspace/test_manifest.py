@@ -2,6 +2,8 @@
 
 import contextlib
 import re
+import subprocess
+import sys
 
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -44,6 +46,16 @@ def test_limits_can_be_given(tmp_path):
     limits = load_manifest(write(tmp_path, text)).robot
     assert limits.upper.tolist() == [2, 2]
     assert limits.jerk.tolist() == [5000, 5000]
+
+
+def test_the_box_for_the_tool_tip(tmp_path):
+    """The template's own example, its comment signs taken away."""
+    text = manifest()
+    start, end = text.index("# tool_tip"), text.index("# absent_joints")
+    text = text[:start] + re.sub("^# ", "", text[start:end], flags=re.M) + text[end:]
+    gate = load_manifest(write(tmp_path, text)).gate
+    assert (gate.box_low, gate.box_high) == ((0.2, -0.6, 0.0), (0.9, 0.6, 1.2))
+    assert gate.tool_tip == (0.0, 0.0, 0.1)
 
 
 @pytest.mark.parametrize("stem", ["Joint", "j", "q", "motor_"])
@@ -96,7 +108,11 @@ def test_joints_may_stay_still_on_purpose(tmp_path, absent, message):
         ('name = "planar"', 'nmae = "planar"', r"nmae = 'planar'.*unknown; keys are name"),
         ('name = "planar"', 'name = " "', "must not be empty"),
         ('model = "none"', 'model = "ur5"', r"\[robot\].*known are panda and fr3"),
-        ('model = "none"', 'model = "given"', r"joint_names.*missing"),
+        ('model = "none"', 'model = "given"', r"joint_names: missing \(and lower, .*, jerk\)"),
+        ("dt = 0.02", f"dt = 1{'0' * 400}", "must be a number"),
+        ("[gate]", "[gate]\nworkspace_low = [0, 0]", "must be a list of three finite numbers"),
+        ("[gate]", "[gate]\nbox_low = [0, 0, 0]", r"box_low.*unknown; keys are .*workspace_low"),
+        ("[gate]", "[gate]\nworkspace_low = [0, 0, 0]", r"\[gate\].*needs both corners"),
         ("[gate]", "[gait]", "unknown; sections are"),
         ("[gate]", "[gate]\nbeyond_refuse = -1", r"\[gate\].*beyond_warn"),
     ],
@@ -137,3 +153,11 @@ def test_no_damage_causes_anything_but_a_named_error(tmp_path, position, junk):
     path.write_bytes(whole[:position] + junk + whole[position + len(junk) :])
     with contextlib.suppress(ConfigurationError, FileFormatError):
         assert load_manifest(path).tolerance > 0
+
+
+def test_reading_one_loads_nothing_heavy():
+    """Every command on a workspace does so, also those that only look something up."""
+    heavy = ("scipy.interpolate", "scipy.spatial", "mujoco", "torch", "matplotlib")
+    code = "import sys, prior_reinforce.workspace.manifest; print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert not set(heavy) & set(done.stdout.split())
