@@ -8,15 +8,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from prior_reinforce.arrays import Frames, Plans
+from prior_reinforce.arrays import Frames, Plans, Point
 from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
 from prior_reinforce.importing.recording import Recording
+from prior_reinforce.plans.timing import ends_in_motion, moving_rows, still_bands
 
-_STILL_SHARE = 0.005
-"""A channel counts as still within this share of the largest range of any channel of its unit.
-Ours: above encoder noise, and reached by a smooth start within its first tenth."""
-_STILL_FLOOR = {"rad": 1e-3, "m": 5e-4}
-"""Never less than this. Ours: several counts of a joint encoder or a gripper."""
 _ON_GRID = 0.02
 """A frame within this share of a time step of where it should be is taken as recorded. Ours: at
 2 rad/s and 100 Hz that is 0.4 mrad, below the servo's own error."""
@@ -154,7 +150,7 @@ def preprocess(
     remarks = [remark for recording in recordings for remark in recording.remarks]
     spans = [(0.0, recording.duration) for recording in recordings]
     if settings.trim:
-        still = _still_bands(recordings, units)
+        still = still_bands([recording.positions for recording in recordings], units)
         spans = [_moving_span(recording, still, settings.margin) for recording in recordings]
     pieces = []
     for recording, (start, end) in zip(recordings, spans, strict=True):
@@ -176,7 +172,7 @@ def preprocess(
                 f"episode {recording.episode} has {len(piece)} frames, more than the horizon "
                 f"{horizon}; give a horizon of {longest}, or a larger dt (motions are never cut)"
             )
-        if len(piece) < horizon and _ends_in_motion(piece):
+        if len(piece) < horizon and ends_in_motion(piece):
             remarks.append(f"{recording.episode}: ends in motion, then holds its last pose")
     if horizon > 400:
         remarks.append(f"{horizon} frames are many; dt {dt * horizon / 140:.2g} s would make 140")
@@ -197,28 +193,18 @@ def _common_dt(recordings: Sequence[Recording]) -> float:
     return 1 / rate if rate > 0 and abs(rate * period - 1) < 0.005 else period
 
 
-def _still_bands(recordings: Sequence[Recording], units: Sequence[str]) -> list[float]:
-    """How far each channel may be from a pose and still be there, in its unit."""
-    ranges = np.max([np.ptp(recording.positions, axis=0) for recording in recordings], axis=0)
-    largest = {u: max(r for r, v in zip(ranges, units, strict=True) if v == u) for u in set(units)}
-    return [max(_STILL_SHARE * largest[unit], _STILL_FLOOR.get(unit, 0.0)) for unit in units]
-
-
-def _moving_span(recording: Recording, still: list[float], margin: float) -> tuple[float, float]:
+def _moving_span(recording: Recording, still: Point, margin: float) -> tuple[float, float]:
     """From when to when a recording is kept, in [s]: its motion and a margin."""
-    q, t = recording.positions, recording.times
-    left = np.flatnonzero(np.any(np.abs(q - q[0]) > still, axis=1))
-    ahead = np.flatnonzero(np.any(np.abs(q - q[-1]) > still, axis=1))
-    if not left.size:
+    t, rows = recording.times, moving_rows(recording.positions, still)
+    if rows is None:
         raise InvalidDemonstrationsError(
-            f"episode {recording.episode} never moves by more than {max(still):.2g} from its "
+            f"episode {recording.episode} never moves by more than {still.max():.2g} from its "
             "first pose; leave it out, or import without trimming"
         )
-    # The last frame within the still band before the motion, and the first one after it. A
-    # motion that returns to where it began has frames of both kinds all the same.
-    last_moving = ahead[-1] if ahead.size else left[-1]
-    first = np.searchsorted(t, t[left[0] - 1] - margin, side="right") - 1
-    last = np.searchsorted(t, t[min(last_moving + 1, len(t) - 1)] + margin)
+    # The last frame within the still band before the motion, and the first one after it.
+    before, after = rows[0] - 1, min(rows[1] + 1, len(t) - 1)
+    first = np.searchsorted(t, t[before] - margin, side="right") - 1
+    last = np.searchsorted(t, t[after] + margin)
     return float(t[max(first, 0)]), float(t[min(last, len(t) - 1)])
 
 
@@ -255,9 +241,3 @@ def _gaps(recording: Recording, start: float, end: float) -> list[str]:
         f"{recording.episode}: nothing recorded for {steps[worst]:.3f} s at "
         f"{recording.times[worst]:.2f} s"
     ]
-
-
-def _ends_in_motion(piece: Frames) -> bool:
-    """Whether the last step of a channel is over 5 % of its largest step."""
-    steps = np.abs(np.diff(piece, axis=0))
-    return bool(np.any(steps[-1] > 0.05 * np.maximum(steps.max(axis=0), 1e-9)))
