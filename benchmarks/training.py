@@ -18,7 +18,6 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import Delaunay
 
-from prior_reinforce.cores import available_cores
 from prior_reinforce.generators import DiffusionConfig, DiffusionGenerator, Timed
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.tasks.basketball import BasketballShot
@@ -69,7 +68,7 @@ def main() -> None:
     parser.add_argument("--steps", type=int, default=20)
     parser.add_argument("--paper-steps", type=int, default=5)
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--threads", type=int, default=available_cores())
+    parser.add_argument("--threads", type=int, default=joblib.cpu_count())
     parser.add_argument("--paper-full", action="store_true")
     arguments = parser.parse_args()
     demos = BasketballShot().demonstrations(arguments.set)
