@@ -16,7 +16,7 @@ import importlib.util
 import inspect
 import pkgutil
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
@@ -74,11 +74,13 @@ class Registry(Generic[T]):
         takes = inspect.signature(kind).parameters
         context = {key: value for key, value in context.items() if key in takes}
         config = getattr(kind, "config_type", None)
+        given_config = context.pop("config", None)
         try:
             if config is None:
                 return kind(**context, **_checked_names(settings, takes, choice))
-            if settings:
-                context["config"] = build(config, settings, choice)
+            if isinstance(given_config, config):  # settings in the choice come on top
+                settings = {**asdict(given_config), **settings}
+            context["config"] = build(config, settings, choice)
             return kind(**context)
         except (TypeError, ValueError) as error:
             if isinstance(error, ConfigurationError):
