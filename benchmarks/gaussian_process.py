@@ -19,7 +19,7 @@ from sklearn.exceptions import ConvergenceWarning
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel
 
-from prior_reinforce.adapters import GaussianProcessAdapter
+from prior_reinforce.adapters.gaussian_process import GaussianProcessAdapter
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 
 N_DEMONSTRATIONS, N_TRIALS, OUTCOME_DIM = 6, 2, 2

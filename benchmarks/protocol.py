@@ -20,10 +20,10 @@ from unittest.mock import patch
 import mujoco.rollout
 import numpy as np
 
-from prior_reinforce.adapters import GaussianProcessAdapter
+from prior_reinforce.adapters.gaussian_process import GaussianProcessAdapter
 from prior_reinforce.experiments.protocol import run_goals
 from prior_reinforce.generators import DiffusionConfig, DiffusionGenerator
-from prior_reinforce.perception import Amplified
+from prior_reinforce.perception.amplified import Amplified
 from prior_reinforce.tasks import make_task
 
 

@@ -17,7 +17,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from prior_reinforce.rollouts import Rollout
-from prior_reinforce.tasks import FAMILY, make_task
+from prior_reinforce.tasks import TASKS, make_task
 from prior_reinforce.tasks.base import Task
 
 ANGLE = 0.002  # [rad]
@@ -65,7 +65,7 @@ def main() -> None:
     arguments = parser.parse_args()
     if arguments.copies < 2:
         parser.error("--copies must be at least 2, or there is no spread")
-    for name in arguments.tasks or [kind.name for kind in FAMILY]:
+    for name in arguments.tasks or list(TASKS.members):
         task, rng = make_task(name), np.random.default_rng(arguments.seed)
         plans = np.concatenate([task.demonstrations(key).plans for key in task.demonstration_sets])
         outcomes = np.array([rollout.outcome for rollout in task.rollout(plans, None)])

@@ -7,14 +7,13 @@
 Without names, all tasks. The trials are like real ones: a goal anywhere in the region, a plan that
 smooth interpolation of the aligned demonstrations makes for a condition off that goal by what a
 first trial misses (below), executed in physics with disturbances. Without --base-url the answers
-come from the stand-in, which finds the objects by colour in the very picture it is sent: that
-measures everything but the model's eyesight. With it, the same pictures measure a real model.
+come from `ColourCamera`, which finds the objects by colour in the very picture: that measures
+everything but a model's eyesight. With it, the same pictures measure a real model.
 """
 
 from __future__ import annotations
 
 import argparse
-import contextlib
 import os
 import time
 from collections.abc import Iterator
@@ -28,16 +27,13 @@ import numpy as np
 from prior_reinforce.errors import PerceptionFailedError
 from prior_reinforce.generators import Generator
 from prior_reinforce.generators.interpolation import SmoothInterpolation
-from prior_reinforce.perception import (
-    Camera,
-    VisionLanguageModel,
-    VisionLanguageModelConfig,
-    scene_of,
-)
-from prior_reinforce.perception.stand_in_server import StandInServer
+from prior_reinforce.perception.camera import Camera
+from prior_reinforce.perception.colour_camera import ColourCamera
+from prior_reinforce.perception.vlm import VisionLanguageModel
+from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
 from prior_reinforce.plans.alignment import align
 from prior_reinforce.rollouts import Rollout
-from prior_reinforce.tasks import FAMILY, make_task
+from prior_reinforce.tasks import TASKS, make_task
 from prior_reinforce.tasks.base import Task
 
 MISS = 0.04
@@ -108,7 +104,8 @@ def measure(perception: VisionLanguageModel, task: Task, arguments: argparse.Nam
 
 def calibrated(task: Task, camera: Camera) -> str:
     """The calibration's own account of its error."""
-    scene = scene_of(task.name)
+    scene = task.scene
+    assert scene is not None
     (rollout,) = task.rollout(task.demonstrations("A").plans[:1], None)
     assert rollout.key_frame is not None
     marks = np.array(scene.marks)
@@ -116,14 +113,14 @@ def calibrated(task: Task, camera: Camera) -> str:
 
 
 def main() -> None:
-    """Measure every task named, with the stand-in or with a real endpoint."""
+    """Measure every task named, found by colour or by a real endpoint."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("tasks", nargs="*", metavar="TASK", help="all when none is named")
     parser.add_argument("--pictures", type=int, default=40, help="for each task")
     parser.add_argument("--outliers", type=float, default=0.0, help="share of wrong answers")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--family", default="glm-4.5v")
-    parser.add_argument("--base-url", help="a real endpoint, in place of the stand-in")
+    parser.add_argument("--base-url", help="a real endpoint, in place of colours")
     parser.add_argument("--model", default="zai-org/GLM-4.5V")
     parser.add_argument("--server", default="vllm", choices=["vllm", "zai", "plain"])
     parser.add_argument("--api-key-variable")
@@ -132,25 +129,28 @@ def main() -> None:
     arguments = parser.parse_args()
 
     total = Score([], [])
-    for name in arguments.tasks or [kind.name for kind in FAMILY]:
+    for name in arguments.tasks or list(TASKS.members):
         task = make_task(name)
-        with contextlib.ExitStack() as stack:
-            url = arguments.base_url
-            if url is None:
-                stand_in = StandInServer(
-                    arguments.family, outlier_rate=arguments.outliers, seed=arguments.seed
-                )
-                url = stack.enter_context(stand_in).base_url
+        camera = Camera()
+        if arguments.base_url is None:
+            config = VisionLanguageModelConfig(family=arguments.family)
+            perception: VisionLanguageModel = ColourCamera(
+                task.scene,
+                config,
+                seed=arguments.seed,
+                outlier_rate=arguments.outliers,
+                camera=camera,
+            )
+        else:
             config = VisionLanguageModelConfig(
-                base_url=url,
+                base_url=arguments.base_url,
                 model=arguments.model,
                 family=arguments.family,
                 server=arguments.server,
                 api_key_variable=arguments.api_key_variable,
             )
-            camera = Camera()
-            perception = VisionLanguageModel(scene_of(task.name), config, camera=camera)
-            stack.callback(perception.close)
+            perception = VisionLanguageModel(task.scene, config, camera=camera)
+        with perception:
             score = measure(perception, task, arguments)
             print(score.line(task.name), flush=True)
             print(f"    {calibrated(task, camera)}", flush=True)

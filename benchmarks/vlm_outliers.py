@@ -5,9 +5,9 @@
 
 The same learned generator reaches the same goals twice, under the same disturbances, with the
 Gaussian process adapter: once with every answer right, once with wrong ones (of the right size,
-anywhere in the picture) among them. The answers come over HTTP from the stand-in, which finds the
-objects by colour in the very picture it is sent. A goal that is not reached counts as one round
-more than there were; a picture that cannot be read is judged by eye instead, and counted.
+anywhere in the picture) among them. The answers come from `ColourCamera`, which finds the objects
+by colour in the very picture. A goal that is not reached counts as one round more than there were;
+a picture that cannot be read is judged by eye instead, and counted.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ os.environ.setdefault("MUJOCO_GL", "egl")
 
 import numpy as np
 
-from prior_reinforce.adapters import GaussianProcessAdapter
+from prior_reinforce.adapters.gaussian_process import GaussianProcessAdapter
 from prior_reinforce.experiments.evaluation import Training
 from prior_reinforce.experiments.protocol import GoalTrials, run_goals
-from prior_reinforce.experiments.sight import STAND_IN, open_sight
 from prior_reinforce.experiments.statistics import (
     bootstrap_difference,
     bootstrap_mean,
     trials_counted,
 )
-from prior_reinforce.perception import VisionLanguageModelConfig
+from prior_reinforce.perception.colour_camera import ColourCamera
+from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
 from prior_reinforce.tasks import make_task
 
 GOAL_SEED = 500  # of the goals; no other measurement uses them
@@ -41,8 +41,8 @@ def reach(training: Training, outliers: float, arguments: argparse.Namespace) ->
     task = make_task(training.task)
     learned = training.learned(arguments.folder)
     config = VisionLanguageModelConfig(votes=arguments.votes)
-    sight = open_sight(STAND_IN, task.name, config, outlier_rate=outliers, seed=arguments.seed)
-    with sight as perception:
+    seed = arguments.seed
+    with ColourCamera(task.scene, config, seed=seed, outlier_rate=outliers) as perception:
         return run_goals(
             task,
             learned.generator,

@@ -22,10 +22,9 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from prior_reinforce.rollouts import Rollout
-from prior_reinforce.tasks import BasketballShot, BasketballShotV2, BasketballShotV3
+from prior_reinforce.tasks.basketball import HARDWARE, BasketballShot
 from prior_reinforce.tasks.demonstrations import basketball as making
 
-HARDWARE = (BasketballShot, BasketballShotV2, BasketballShotV3)
 DRAWN = 5
 """The demonstration of set A that the picture shows: one to the middle of the region."""
 
@@ -60,8 +59,8 @@ def draw(path: Path) -> None:
     plan = BasketballShot().demonstrations("A").plans[DRAWN]
     promised = BasketballShot().rollout(plan[None], None)[0].outcome
     columns = []
-    for kind in HARDWARE:
-        task = kind()
+    for hardware in HARDWARE:
+        task = BasketballShot(hardware)
         (rollout,) = task.rollout(plan[None], None)
         ready, frame = task._start(plan[0], np.zeros(2)), rollout.key_frame
         assert frame is not None
@@ -117,8 +116,8 @@ def main() -> None:
         "| | shift along x | along y | distance, largest | repeated: sd x, y | lost | map, lost |"
     )
     print("|---|---|---|---|---|---|---|")
-    for kind in HARDWARE:
-        task = kind()
+    for hardware in HARDWARE:
+        task = BasketballShot(hardware)
         landed, _ = read(task.rollout(plans, None))
         shift = 100 * (landed - on_v1)
         distance = np.linalg.norm(shift, axis=1)
@@ -128,7 +127,7 @@ def main() -> None:
         reached, lost_map = read(task.rollout(throws_map(task), None))
         far = np.linalg.norm(reached, axis=1)
         print(
-            f"| {kind.name} | {shift[:, 0].mean():.1f} cm, sd {shift[:, 0].std():.1f} "
+            f"| {task.name} | {shift[:, 0].mean():.1f} cm, sd {shift[:, 0].std():.1f} "
             f"| {shift[:, 1].mean():.1f} cm, sd {shift[:, 1].std():.1f} "
             f"| {distance.mean():.1f} cm, {distance.max():.1f} "
             f"| {spread[:, 0].mean():.2f}, {spread[:, 1].mean():.2f} cm "

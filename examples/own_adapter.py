@@ -11,13 +11,11 @@ the demonstrations say. Prints the share of goals reached, next to our adapters.
 from __future__ import annotations
 
 import argparse
-from typing import ClassVar
 
 import numpy as np
 
-from prior_reinforce.adapters import Adapter
+from prior_reinforce.adapters.base import Adapter
 from prior_reinforce.adapters.normalisation import Normalisation
-from prior_reinforce.adapters.vectors import as_goal_seen, as_trial, not_started
 from prior_reinforce.experiments.methods import make_adapter, make_perception
 from prior_reinforce.experiments.protocol import run_goals, success_by_round
 from prior_reinforce.generators import NearestNeighbours
@@ -29,40 +27,30 @@ from prior_reinforce.tasks import make_task
 class RidgeAdapter(Adapter):
     """c = g + b + B z(g), with (b, B) the ridge solution over all trials so far."""
 
-    name: ClassVar[str] = "ridge"
-
     def __init__(self, penalty: float = 0.1) -> None:
         """Choose how strongly the map is drawn to the identity, in normalised units squared."""
         self.penalty = penalty
-        self._units: Normalisation | None = None
-        self._trials: list[tuple[np.ndarray, np.ndarray]] = []
 
-    def start(self, demonstrations: Demonstrations) -> None:
+    def _start(self, demonstrations: Demonstrations) -> None:
         """Take the units of the demonstrations and forget all trials."""
         self._units = Normalisation.of(demonstrations)
-        self._trials = []
+        self._trials: list[tuple[np.ndarray, np.ndarray]] = []
 
-    def propose(self, goal_seen: np.ndarray) -> np.ndarray:
+    def _propose(self, goal_seen: np.ndarray) -> np.ndarray:
         """Return the goal plus the correction fitted there, shape (k,)."""
-        units = self._started()
-        goal = as_goal_seen(goal_seen, units.outcome_dim)
+        units = self._units
         if not self._trials:
-            return goal
+            return goal_seen
         conditions, outcomes = (units.apply(np.array(a)) for a in zip(*self._trials, strict=True))
         ones = np.ones((len(outcomes), 1))
         features = np.hstack([ones, outcomes])  # (n, 1 + k)
         kernel = features @ features.T + self.penalty * np.eye(len(features))
         weights = features.T @ np.linalg.solve(kernel, conditions - outcomes)  # (1 + k, k)
-        return goal + units.scale * (np.append(1.0, units.apply(goal)) @ weights)
+        return goal_seen + units.scale * (np.append(1.0, units.apply(goal_seen)) @ weights)
 
-    def observe(self, condition: np.ndarray, outcome_seen: np.ndarray) -> None:
+    def _observe(self, condition: np.ndarray, outcome_seen: np.ndarray) -> None:
         """Remember the trial."""
-        self._trials.append(as_trial(condition, outcome_seen, self._started().outcome_dim))
-
-    def _started(self) -> Normalisation:
-        if self._units is None:
-            raise not_started(self)
-        return self._units
+        self._trials.append((condition, outcome_seen))
 
 
 def main() -> None:
@@ -79,7 +67,7 @@ def main() -> None:
     makers = {
         name: lambda name=name: make_adapter(name) for name in ("frozen", "proportional", "gp")
     }
-    for name, make in {RidgeAdapter.name: RidgeAdapter, **makers}.items():
+    for name, make in {"ridge": RidgeAdapter, **makers}.items():
         results = run_goals(
             task,
             generator,

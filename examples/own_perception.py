@@ -13,16 +13,15 @@ from __future__ import annotations
 import argparse
 import math
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 
-from prior_reinforce.adapters import GaussianProcessAdapter
+from prior_reinforce.adapters.gaussian_process import GaussianProcessAdapter
 from prior_reinforce.errors import ConfigurationError, PerceptionFailedError
 from prior_reinforce.experiments.protocol import run_goals, success_by_round
-from prior_reinforce.generators import NearestNeighbours
-from prior_reinforce.perception import Exact, Perception
-from prior_reinforce.plans.alignment import align
+from prior_reinforce.generators import NearestNeighbours, align
+from prior_reinforce.perception.base import Perception
+from prior_reinforce.perception.exact import Exact
 from prior_reinforce.rollouts import Rollout
 from prior_reinforce.tasks import make_task
 
@@ -30,8 +29,6 @@ from prior_reinforce.tasks import make_task
 @dataclass(frozen=True)
 class OverheadCamera(Perception):
     """The first two components of the error with parallax and pixel noise, the others exact."""
-
-    name: ClassVar[str] = "overhead"
 
     below: tuple[float, float] = (0.75, 0.0)
     """The point of the table below the lens, x and y in [m]."""

@@ -23,15 +23,15 @@ from typing import ClassVar
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from prior_reinforce.adapters import GaussianProcessAdapter
+from prior_reinforce.adapters.gaussian_process import GaussianProcessAdapter
 from prior_reinforce.arrays import as_plans
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.experiments.protocol import run_goals, success_by_round
 from prior_reinforce.generators import SmoothInterpolation
-from prior_reinforce.perception import Eye
+from prior_reinforce.perception.eye import Eye
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 from prior_reinforce.rollouts import Rollout
-from prior_reinforce.tasks import Task
+from prior_reinforce.tasks.base import Task
 
 GRAVITY = 9.81  # [m/s^2]
 ARM = 0.6  # Length, in [m].

@@ -50,18 +50,16 @@ class RepeatingGenerator(Generator):
 class FullStepAdapter(Adapter):
     """Subtracts the whole last error: solves a constant offset in two trials."""
 
-    name = "full-step"
-
-    def start(self, demonstrations):
+    def _start(self, demonstrations):
         self.seen = []
 
-    def propose(self, goal_seen):
+    def _propose(self, goal_seen):
         if not self.seen:
             return goal_seen.copy()
         condition, outcome_seen = self.seen[-1]
         return condition - (outcome_seen - goal_seen)
 
-    def observe(self, condition, outcome_seen):
+    def _observe(self, condition, outcome_seen):
         self.seen.append((condition.copy(), outcome_seen.copy()))
 
 

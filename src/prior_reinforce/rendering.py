@@ -5,10 +5,18 @@ from __future__ import annotations
 import copy
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import TYPE_CHECKING
 
-import mujoco
+import numpy as np
+from jaxtyping import UInt8
 
 from prior_reinforce.errors import RenderingUnavailableError
+
+if TYPE_CHECKING:
+    import mujoco
+
+Picture = UInt8[np.ndarray, "height width 3"]
+"""RGB, row by row from the top."""
 
 
 def make_renderer(model: mujoco.MjModel, width: int, height: int) -> mujoco.Renderer:
@@ -22,6 +30,8 @@ def make_renderer(model: mujoco.MjModel, width: int, height: int) -> mujoco.Rend
     Raises:
         RenderingUnavailableError: There is no OpenGL on this machine.
     """
+    import mujoco
+
     # The frame buffer's size is part of the model, and the model is shared: draw a copy.
     drawn = copy.copy(model)
     screen = drawn.vis.global_

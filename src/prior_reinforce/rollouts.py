@@ -1,8 +1,4 @@
-"""What came of executing one plan: the true outcome, and the picture a camera would need.
-
-Notation (docs/notation.md):
-    r  `outcome`  (k,)  mostly [m], table frame: x forward and y left of the robot's base axis
-"""
+"""What came of executing one plan: the true outcome, and the picture a camera would need."""
 
 from __future__ import annotations
 
@@ -10,6 +6,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from jaxtyping import Float
+
+from prior_reinforce.arrays import Point
 
 if TYPE_CHECKING:
     import mujoco
@@ -25,8 +24,8 @@ class KeyFrame:
 
     model: mujoco.MjModel
     """The scene; shared between rollouts, never changed by a reader."""
-    state: np.ndarray
-    """Positions `qpos` of the model at this instant, shape (nq,)."""
+    state: Float[np.ndarray, " nq"]
+    """Positions `qpos` of the model at this instant."""
     time: float
     """Time since the plan's first frame, in [s]."""
 
@@ -35,8 +34,9 @@ class KeyFrame:
 class Rollout:
     """Result of one open-loop execution (paper eq. r = rollout_Env(A))."""
 
-    outcome: np.ndarray
-    """True outcome r, shape (k,), mostly [m] in the table frame. Always finite."""
+    outcome: Point
+    """True outcome r, mostly [m] in the table frame: x forward and y left of the robot's base axis.
+    Always finite."""
     valid: bool
     """False where the object never reached the place that defines the outcome (a lost ball);
     `outcome` is then a sensible place, stated by the task, that no goal can be near."""

@@ -7,8 +7,7 @@ from sklearn.exceptions import ConvergenceWarning
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel
 
-from prior_reinforce.adapters import GaussianProcessAdapter, GaussianProcessConfig
-from prior_reinforce.adapters.gp_posterior import GPPosterior
+from prior_reinforce.adapters.gaussian_process import GaussianProcessAdapter, GaussianProcessConfig
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 
@@ -101,20 +100,9 @@ def test_predictions_are_scikit_learns_given_the_same_kernel(seed):
     )
     points = np.random.default_rng(seed).normal(size=(5, adapter.memory_outcomes_.shape[1]))
     expected = fitted.predict(points).reshape(points.shape)
-    np.testing.assert_allclose(adapter._posterior.mean(points), expected, atol=1e-6)
-
-
-def test_posterior_of_one_point_by_hand():
-    # a = 2, alpha = 0.5, y = 3 at x = 0: mean(x) = 2 exp(-x^2 / 2 l^2) / 2.5 * 3.
-    posterior = GPPosterior.condition_on(
-        np.array([[0.0]]),
-        np.array([[3.0]]),
-        amplitude=2.0,
-        length_scale=2.0,
-        jitter=np.array([0.5]),
-    )
-    expected = [[2.4], [2.4 * np.exp(-0.5)], [0.0]]
-    np.testing.assert_allclose(posterior.mean(np.array([[0.0], [2.0], [200.0]])), expected)
+    units = adapter._normalisation
+    proposed = [units.apply(adapter.propose(units.undo(point))) for point in points]
+    np.testing.assert_allclose(proposed, expected, atol=1e-6)
 
 
 @pytest.mark.parametrize("seed", range(10))
@@ -138,19 +126,27 @@ def test_far_outside_a_condition_returns_to_the_demonstrations_mean():
     np.testing.assert_allclose(adapter.propose(far), outcomes.mean(axis=0), atol=1e-6)
 
 
+def test_the_memory_starts_with_conditions_equal_to_outcomes():
+    outcomes = spread_over_region(1)
+    adapter = GaussianProcessAdapter()
+    adapter.start(demonstrations(outcomes))
+    np.testing.assert_array_equal(adapter.memory_conditions_, adapter.memory_outcomes_)
+    np.testing.assert_allclose(adapter._normalisation.undo(adapter.memory_outcomes_), outcomes)
+
+
 def test_trials_are_learned_from_and_the_oldest_is_forgotten():
     outcomes = spread_over_region(1)
     adapter = GaussianProcessAdapter(GaussianProcessConfig(memory_size=2))
     adapter.start(demonstrations(outcomes))
     trials = np.random.default_rng(0).uniform(*REGION, size=(4, 2, 2))
-    scale, offset = adapter._normalisation.scale, adapter._normalisation.offset
+    undo = adapter._normalisation.undo
     for count, (condition, outcome) in enumerate(trials, start=1):
         adapter.observe(condition, outcome)
         kept = trials[max(0, count - 2) : count]
         expected_outcomes = np.vstack([outcomes, kept[:, 1]])
         expected_conditions = np.vstack([outcomes, kept[:, 0]])
-        np.testing.assert_allclose(adapter.memory_outcomes_ * scale + offset, expected_outcomes)
-        np.testing.assert_allclose(adapter.memory_conditions_ * scale + offset, expected_conditions)
+        np.testing.assert_allclose(undo(adapter.memory_outcomes_), expected_outcomes)
+        np.testing.assert_allclose(undo(adapter.memory_conditions_), expected_conditions)
 
 
 def test_the_demonstrations_are_trusted_as_far_as_trials_obey_them_by_hand():

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from prior_reinforce.adapters import ProportionalAdapter
+from prior_reinforce.adapters.proportional import ProportionalAdapter
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tests.perception.vision_server import VisionServer
 
 from prior_reinforce.cli import main
-from prior_reinforce.perception.stand_in_server import StandInServer
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.tasks import make_task
 
@@ -30,7 +30,7 @@ def test_what_the_demo_learned_serves_adapt_together_with_what_it_saw(tmp_path, 
 
 @pytest.mark.slow
 def test_what_a_model_saw_of_the_demonstrations_is_kept(tmp_path):
-    with StandInServer() as server:
+    with VisionServer() as server:
         endpoint = ["--perception", "vlm", "--vlm.base-url", server.base_url]
         quick = ["--generator", "nearest", "--goals", "1", "--no-film", "--out", str(tmp_path)]
         assert main(["demo", *endpoint, *quick]) in (0, 1)

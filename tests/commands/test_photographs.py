@@ -7,14 +7,15 @@ import re
 import imageio.v3 as imageio
 import numpy as np
 import pytest
+from tests.perception.vision_server import VisionServer
 
 from prior_reinforce.cli import main
-from prior_reinforce.perception import Camera, scene_of
-from prior_reinforce.perception.stand_in_server import StandInServer
+from prior_reinforce.perception.camera import Camera
 from prior_reinforce.tasks import make_task
+from prior_reinforce.tasks.basketball import HARDWARE
 
 GOAL = np.array([1.0, 0.05])
-SCENE = scene_of("basketball-v1")
+SCENE = HARDWARE["v1"].scene
 
 
 @pytest.fixture(scope="module")
@@ -58,7 +59,7 @@ def test_a_photograph_tells_the_error(table, capsys):
     status = main(["calibrate", *files, *lens])
     assert status == 0
     assert "plane 10.0 cm above the table" in capsys.readouterr().out
-    with StandInServer() as server:
+    with VisionServer() as server:
         assert look(folder, server.base_url) == 0
         said = capsys.readouterr().out
         told = re.search(r"--error (\S+) (\S+)", said)

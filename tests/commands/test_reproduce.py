@@ -11,7 +11,7 @@ from prior_reinforce.cli import main
 from prior_reinforce.commands.reproduce import Reproduce
 from prior_reinforce.experiments.evaluation import Training
 from prior_reinforce.experiments.recipes import RECIPES, Recipe, Run, Scale
-from prior_reinforce.perception import VisionLanguageModelConfig
+from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
 
 GENERATOR = "prior_reinforce.generators:SmoothInterpolation"
 ADAPTER = "prior_reinforce.adapters:FrozenAdapter"

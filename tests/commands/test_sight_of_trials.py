@@ -9,11 +9,11 @@ import sys
 from dataclasses import asdict
 
 import pytest
+from tests.perception.vision_server import VisionServer
 
 from prior_reinforce.cli import main
 from prior_reinforce.commands.learning import TrainingRecord
 from prior_reinforce.generators.interpolation import SmoothInterpolation
-from prior_reinforce.perception.stand_in_server import StandInServer
 from prior_reinforce.plans.alignment import align
 from prior_reinforce.tasks import make_task
 
@@ -60,7 +60,7 @@ def typed(monkeypatch):
 
 @pytest.mark.slow
 def test_a_model_at_an_endpoint_sees_the_trials_and_its_readings_are_kept(adapt, tmp_path, capsys):
-    with StandInServer("qwen3-vl") as server:
+    with VisionServer("qwen3-vl") as server:
         flags = ("--vlm.base-url", server.base_url, "--vlm.family", "qwen3-vl")
         assert adapt("--perception", "vlm", *flags, "--vlm.model", "qwen") == 0
     reading = json.loads((tmp_path / "seen" / "goal1-trial1.json").read_text())
@@ -72,14 +72,14 @@ def test_a_model_at_an_endpoint_sees_the_trials_and_its_readings_are_kept(adapt,
 
 
 @pytest.mark.slow
-def test_the_stand_in_needs_no_endpoint(adapt, tmp_path):
-    assert adapt("--perception", "stand-in") == 0
+def test_the_camera_needs_no_endpoint(adapt, tmp_path):
+    assert adapt("--perception", "camera") == 0
     assert (tmp_path / "seen" / "goal1-trial1.png").is_file()
 
 
 @pytest.mark.slow
 def test_without_a_terminal_a_failed_reading_ends_in_one_line(adapt, tmp_path, capsys):
-    with StandInServer() as server:
+    with VisionServer() as server:
         gone = server.base_url
     assert adapt("--perception", "vlm", "--vlm.base-url", gone, "--vlm.max-retries", "0") == 2
     said = capsys.readouterr().err.strip()
@@ -92,7 +92,7 @@ def test_without_a_terminal_a_failed_reading_ends_in_one_line(adapt, tmp_path, c
 @pytest.mark.slow
 def test_at_a_terminal_the_operator_is_asked_until_it_is_understood(adapt, typed, capsys):
     typed("a little long\n5cm long, 2cm left\n" + "hit\n" * 9)
-    with StandInServer() as server:
+    with VisionServer() as server:
         gone = server.base_url
     status = adapt("--perception", "vlm", "--vlm.base-url", gone, "--vlm.max-retries", "0")
     said = capsys.readouterr().out
@@ -105,7 +105,7 @@ def test_at_a_terminal_the_operator_is_asked_until_it_is_understood(adapt, typed
 @pytest.mark.slow
 def test_an_operator_who_hangs_up_is_no_number(adapt, typed, capsys):
     typed("\x04")
-    with StandInServer() as server:
+    with VisionServer() as server:
         gone = server.base_url
     assert adapt("--perception", "vlm", "--vlm.base-url", gone, "--vlm.max-retries", "0") == 2
     assert "no answer came" in capsys.readouterr().err
@@ -114,7 +114,10 @@ def test_an_operator_who_hangs_up_is_no_number(adapt, typed, capsys):
 @pytest.mark.parametrize(
     ("flags", "message"),
     [
-        (("--perception", "eyes"), "no perception 'eyes'; known are exact, eye, amplified, vlm"),
+        (
+            ("--perception", "eyes"),
+            "no perception 'eyes'; known are exact, eye, amplified, camera, vlm",
+        ),
         (("--perception", "vlm", "--vlm.api-key-variable", "NO_SUCH_KEY"), "NO_SUCH_KEY is not"),
     ],
 )

@@ -1,27 +1,12 @@
-"""What every condition adapter keeps to. A new one: add a line to FACTORIES."""
-
-from collections.abc import Callable
+"""What every condition adapter keeps to; the members are taken from their registry."""
 
 import numpy as np
 import pytest
 
-from prior_reinforce.adapters import (
-    Adapter,
-    FrozenAdapter,
-    GaussianProcessAdapter,
-    GaussianProcessConfig,
-    ProportionalAdapter,
-)
+from prior_reinforce.adapters import ADAPTERS
 from prior_reinforce.errors import InvalidFeedbackError, InvalidGoalError, NotFittedError
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 
-FACTORIES: list[Callable[[], Adapter]] = [
-    GaussianProcessAdapter,
-    lambda: GaussianProcessAdapter(GaussianProcessConfig(memory_size=None)),
-    ProportionalAdapter,
-    FrozenAdapter,
-]
-IDS = ["gp", "gp-keeps-all", "proportional", "frozen"]
 UNITS = {1: ("m",), 2: ("m", "m"), 3: ("m", "m", "s")}
 SCALES = {1: [0.3], 2: [0.25, 0.5], 3: [0.25, 0.5, 40.0]}
 
@@ -40,7 +25,11 @@ def trials(k: int, n: int = 4) -> list[tuple[np.ndarray, np.ndarray]]:
     return list(zip(conditions, conditions + errors, strict=True))
 
 
-pytestmark = [pytest.mark.parametrize("make", FACTORIES, ids=IDS)]
+@pytest.fixture(params=ADAPTERS.members)
+def make(request):
+    return lambda: ADAPTERS.make(request.param)
+
+
 each_k = pytest.mark.parametrize("k", [1, 2, 3])
 
 

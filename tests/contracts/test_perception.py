@@ -5,7 +5,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from prior_reinforce.perception import Amplified, Exact, Eye, Perception
+from prior_reinforce.perception.amplified import Amplified
+from prior_reinforce.perception.base import Perception
+from prior_reinforce.perception.exact import Exact
+from prior_reinforce.perception.eye import Eye
 from prior_reinforce.rollouts import Rollout
 
 FACTORIES: list[Callable[[], Perception]] = [Exact, Eye, Amplified]
@@ -48,7 +51,3 @@ def test_a_lost_ball_is_seen_where_the_task_says_it_went(make):
         rollout([0.0, 0.0], valid=False), np.array([0.9, 0.0]), np.random.default_rng(1)
     )
     assert seen[0] < -0.5
-
-
-def test_it_has_a_name_for_the_command_line(make):
-    assert make().name.islower()

@@ -4,12 +4,17 @@ import numpy as np
 import pytest
 
 from prior_reinforce.errors import ConfigurationError, InvalidPlanError
-from prior_reinforce.tasks import FAMILY, Task
+from prior_reinforce.tasks import TASKS, make_task
+from prior_reinforce.tasks.base import Task
 
 
-@pytest.fixture(scope="module", params=FAMILY, ids=lambda kind: kind.name)
+@pytest.fixture(scope="module", params=TASKS.members)
 def task(request: pytest.FixtureRequest) -> Task:
-    return request.param()
+    return make_task(request.param)
+
+
+def test_a_task_knows_its_name(task, request):
+    assert task.name == request.node.callspec.params["task"]
 
 
 @pytest.fixture(scope="module")

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from prior_reinforce.adapters import GaussianProcessAdapter
+from prior_reinforce.adapters.gaussian_process import GaussianProcessAdapter
 from prior_reinforce.experiments.carry_over import compare, trials_needed
 from prior_reinforce.generators import Generator
-from prior_reinforce.perception import Exact
+from prior_reinforce.perception.exact import Exact
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 from prior_reinforce.rollouts import Rollout
-from prior_reinforce.tasks import Task
+from prior_reinforce.tasks.base import Task
 
 FORMAT = PlanFormat(("x", "y"), ("m", "m"), 0.1)
 OFF = np.array([0.05, -0.03])

@@ -15,7 +15,7 @@ def test_both_kinds_of_dmp_have_a_name(name, segmented):
     ("name", "family"),
     [
         ("prior_reinforce.generators:SmoothInterpolation", "generator"),
-        ("prior_reinforce.adapters:FrozenAdapter", "adapter"),
+        ("prior_reinforce.adapters.frozen:FrozenAdapter", "adapter"),
     ],
 )
 def test_a_class_tells_its_family(name, family):
@@ -24,7 +24,12 @@ def test_a_class_tells_its_family(name, family):
 
 @pytest.mark.parametrize(
     "name",
-    ["prior_reinforce.perception:Exact", "interpolation", "nowhere:Thing", "json:JSONDecoder"],
+    [
+        "prior_reinforce.perception.exact:Exact",
+        "interpolation",
+        "nowhere:Thing",
+        "json:JSONDecoder",
+    ],
 )
 def test_what_is_neither_generator_nor_adapter_is_refused(name):
     with pytest.raises(ConfigurationError):

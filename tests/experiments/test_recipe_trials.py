@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
+from tests.perception.vision_server import VisionServer
 
 from prior_reinforce.errors import EndpointError
 from prior_reinforce.experiments.evaluation import Training, Trials
@@ -18,8 +19,7 @@ from prior_reinforce.experiments.recipes.process import Process, ProcessPictures
 from prior_reinforce.experiments.recipes.trials import TrialsTable, first_throws_that_hit
 from prior_reinforce.experiments.recipes.trials_rows import ROWS
 from prior_reinforce.experiments.sight import STAND_IN
-from prior_reinforce.perception import VisionLanguageModelConfig
-from prior_reinforce.perception.stand_in_server import StandInServer
+from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
 from prior_reinforce.tasks import make_task
 
 SMALL = Scale(goals=3, seeds=(0,), sets=("A",), rounds=2)
@@ -171,10 +171,10 @@ def test_pictures_give_the_same_trials_again_and_share_the_eyes_goals(tmp_path):
 def test_a_real_endpoint_is_asked_in_place_of_the_stand_in(tmp_path):
     asked = []
 
-    class Endpoint(StandInServer):
-        def reply(self, path, headers, body):
+    class Endpoint(VisionServer):
+        def reply(self, headers, body):
             asked.append(body["model"])
-            return super().reply(path, headers, body)
+            return super().reply(headers, body)
 
     with Endpoint() as server:
         model = VisionLanguageModelConfig(base_url=server.base_url, model="mine", votes=1)

@@ -11,7 +11,10 @@ from prior_reinforce.errors import InvalidDemonstrationsError, PerceptionFailedE
 from prior_reinforce.experiments.evaluation import GOAL_SEED, SeenDemonstrations, Training, Trials
 from prior_reinforce.experiments.protocol import look_by_eye, see_demonstrations
 from prior_reinforce.experiments.units import result_of
-from prior_reinforce.perception import Amplified, Exact, Eye, Perception
+from prior_reinforce.perception.amplified import Amplified
+from prior_reinforce.perception.base import Perception
+from prior_reinforce.perception.exact import Exact
+from prior_reinforce.perception.eye import Eye
 from prior_reinforce.rollouts import Rollout
 from prior_reinforce.tasks import make_task
 

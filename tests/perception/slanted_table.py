@@ -7,7 +7,13 @@ import itertools
 import mujoco
 import numpy as np
 
+from prior_reinforce.scene import SeenObject, TableScene
+
 RIM_HEIGHT = 0.10
+SCENE = TableScene(
+    SeenObject("the orange ball", 0.06), SeenObject("the red ring", 0.102), RIM_HEIGHT
+)
+BALL, GOAL = np.array([0.95, 0.20]), np.array([0.80, 0.08])
 
 # A tilted camera, off the table's middle: the homography must do more than scale.
 _SCENE = """

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from prior_reinforce.errors import ConfigurationError
-from prior_reinforce.perception import Amplified
+from prior_reinforce.perception.amplified import Amplified
 from prior_reinforce.rollouts import Rollout
 
 

@@ -1,6 +1,6 @@
 import numpy as np
 
-from prior_reinforce.perception import Exact
+from prior_reinforce.perception.exact import Exact
 from prior_reinforce.rollouts import Rollout
 
 

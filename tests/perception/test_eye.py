@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from prior_reinforce.perception import Eye
+from prior_reinforce.perception.eye import Eye
 from prior_reinforce.rollouts import Rollout
 
 

@@ -9,9 +9,9 @@ from prior_reinforce.tasks.curling import (
     FRICTION,
     STONE_RADIUS,
     STONE_START,
-    TARGET_OFFSET,
+    TARGET_BEHIND,
     Curling,
-    Disturbances,
+    CurlingDisturbances,
 )
 from prior_reinforce.tasks.demonstrations import curling as making
 from prior_reinforce.tasks.inverse_kinematics import joint_paths
@@ -44,7 +44,8 @@ def test_the_scene_has_the_documented_constants(task):
     model = task.model
     np.testing.assert_array_equal(model.body("stone").pos[:2], STONE_START)
     assert model.geom("stone").size[0] == model.geom("target").size[0] == STONE_RADIUS
-    np.testing.assert_array_equal(model.body("target").pos[:2], TARGET_OFFSET)
+    np.testing.assert_array_equal(model.body("target").pos[:2], [TARGET_BEHIND, 0.0])
+    assert task.scene.goal_offset == (-TARGET_BEHIND, 0.0)
     assert set(model.geom_friction[task._feet, 0]) == {FRICTION}
     assert model.geom("tool/bar").size[0] == making.BAR_RADIUS
     np.testing.assert_allclose(model.site("tool/bar").pos, [0, 0, making.HANDLE])
@@ -120,7 +121,7 @@ def test_a_repeated_plan_stops_within_about_half_a_centimetre(task):
     plans = np.repeat(pushes([0.1]), 64, axis=0)
     spread = outcomes(task.rollout(plans, np.random.default_rng(0))).std(axis=0)
     assert np.all((spread > 0.0005) & (spread < 0.006))
-    quiet = Curling(Disturbances(ArmDisturbances(0.0, 0.0), stone=0.0, friction=0.0))
+    quiet = Curling(CurlingDisturbances(ArmDisturbances(0.0, 0.0), stone=0.0, friction=0.0))
     stopped = outcomes(quiet.rollout(plans[:4], np.random.default_rng(0)))
     np.testing.assert_array_equal(stopped, np.repeat(stopped[:1], 4, axis=0))
 

@@ -3,8 +3,8 @@
 import mujoco
 import numpy as np
 
+from prior_reinforce.robots.limits import PANDA
 from prior_reinforce.tasks import inverse_kinematics as ik
-from prior_reinforce.tasks.panda import LIMITS
 
 DT = 0.02
 
@@ -44,11 +44,11 @@ def test_limits_are_kept_where_poses_ask_for_too_much():
     far, fast = circle(), circle(speed=12.0)
     far[:, 0] += np.linspace(0.0, 0.8, 60)
     joints = ik.joint_paths(np.stack([far, fast]), DT)
-    assert np.all(joints > LIMITS.lower - 1e-6)
-    assert np.all(joints < LIMITS.upper + 1e-6)
+    assert np.all(joints > PANDA.lower - 1e-6)
+    assert np.all(joints < PANDA.upper + 1e-6)
     speed = np.abs(np.diff(joints, axis=1)) / DT
-    assert np.all(speed < LIMITS.velocity * (1 + 1e-6))
-    assert np.any(speed > 0.99 * LIMITS.velocity)
+    assert np.all(speed < PANDA.velocity * (1 + 1e-6))
+    assert np.any(speed > 0.99 * PANDA.velocity)
 
 
 def test_a_plan_has_one_path_whatever_its_batch():

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
+from prior_reinforce.robots.limits import PANDA
 from prior_reinforce.tasks import panda
 
 SCENE = Path(panda.__file__).with_name("basketball.xml")
@@ -46,7 +47,7 @@ def flange(joints: np.ndarray) -> np.ndarray:
 def test_forward_kinematics_is_the_product_of_the_published_transforms(model):
     rng = np.random.default_rng(0)
     data = mujoco.MjData(model)
-    for joints in rng.uniform(panda.LIMITS.lower, panda.LIMITS.upper, (50, 7)):
+    for joints in rng.uniform(PANDA.lower, PANDA.upper, (50, 7)):
         data.qpos[:7] = joints
         mujoco.mj_kinematics(model, data)
         expected = flange(joints)
@@ -57,8 +58,8 @@ def test_forward_kinematics_is_the_product_of_the_published_transforms(model):
 
 def test_joint_ranges_of_the_model_are_the_published_ones(model):
     joints = [model.joint(f"panda/{name}") for name in panda.JOINT_NAMES]
-    np.testing.assert_allclose([j.range[0] for j in joints], panda.LIMITS.lower)
-    np.testing.assert_allclose([j.range[1] for j in joints], panda.LIMITS.upper)
+    np.testing.assert_allclose([j.range[0] for j in joints], PANDA.lower)
+    np.testing.assert_allclose([j.range[1] for j in joints], PANDA.upper)
 
 
 def test_setpoints_interpolate_the_frames_at_rest_at_both_ends_and_hold():

@@ -1,28 +1,35 @@
 """M: condition adapters. One file each; all share the interface of `base`."""
 
-from prior_reinforce.adapters.base import Adapter
-from prior_reinforce.adapters.frozen import FrozenAdapter
-from prior_reinforce.adapters.gaussian_process import GaussianProcessAdapter, GaussianProcessConfig
-from prior_reinforce.adapters.proportional import ProportionalAdapter
+from __future__ import annotations
 
-__all__ = [
-    "Adapter",
-    "FrozenAdapter",
-    "GaussianProcessAdapter",
-    "GaussianProcessConfig",
-    "ProportionalAdapter",
-]
+from typing import TYPE_CHECKING
 
 from prior_reinforce.registry import Member, Registry
 
+if TYPE_CHECKING:
+    from prior_reinforce.adapters.base import Adapter
+
 _GP = "prior_reinforce.adapters.gaussian_process:GaussianProcessAdapter"
-ADAPTERS = Registry(
+_ONE_TERM = {"trial_jitter": 1e-3, "demonstration_jitter_bounds": (1e-3, 1e-3)}
+
+ADAPTERS: Registry[Adapter] = Registry(
     "adapter",
     "prior_reinforce.adapters.base:Adapter",
     {
-        "gp": Member(_GP, "m = 2"),
-        "proportional": Member("prior_reinforce.adapters.proportional:ProportionalAdapter", "p"),
-        "frozen": Member("prior_reinforce.adapters.frozen:FrozenAdapter", "f"),
+        "gp": Member(_GP, "Gaussian process, m = 2 trials remembered"),
+        "gp-all": Member(_GP, "every trial remembered", {"memory_size": None}),
+        "gp-one-term": Member(_GP, "one fixed diagonal term, as in the paper", _ONE_TERM),
+        "gp-one-term-all": Member(
+            _GP, "the same, every trial remembered", {**_ONE_TERM, "memory_size": None}
+        ),
+        "proportional": Member(
+            "prior_reinforce.adapters.proportional:ProportionalAdapter",
+            "a fixed share of the last error",
+        ),
+        "frozen": Member(
+            "prior_reinforce.adapters.frozen:FrozenAdapter", "no adaptation: the goal itself"
+        ),
     },
 )
+
 make_adapter = ADAPTERS.make

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
+from jaxtyping import Float
 
 from prior_reinforce.adapters.base import Adapter
-from prior_reinforce.adapters.gp_posterior import GPPosterior
 from prior_reinforce.adapters.marginal_likelihood import maximise
-from prior_reinforce.adapters.memory import Memory
 from prior_reinforce.adapters.normalisation import Normalisation
-from prior_reinforce.adapters.vectors import as_goal_seen, as_trial, not_started
+from prior_reinforce.arrays import Point, Points
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.plans.motions import Demonstrations
 
@@ -92,7 +92,7 @@ class GaussianProcessAdapter(Adapter):
     memory_conditions_)` poses the same problem.
     """
 
-    name: ClassVar[str] = "gp"
+    config_type: ClassVar[type[GaussianProcessConfig]] = GaussianProcessConfig
 
     log_marginal_likelihood_: float
     """log p(conditions | outcomes), summed over components; scikit-learn's
@@ -101,70 +101,58 @@ class GaussianProcessAdapter(Adapter):
     """The kernel's constant; scikit-learn's `ConstantKernel.constant_value`."""
     length_scale_: float
     """Length scale in normalised units; scikit-learn's `RBF.length_scale`."""
-    jitter_: np.ndarray
-    """What is added to the diagonal, shape (n,); scikit-learn's `alpha`."""
-    memory_outcomes_: np.ndarray
-    """Perceived outcomes in normalised units, shape (n, k): demonstrations, then trials by age."""
-    memory_conditions_: np.ndarray
-    """Their conditions in normalised units, shape (n, k)."""
+    jitter_: Float[np.ndarray, " n"]
+    """What is added to the diagonal; scikit-learn's `alpha`."""
+    memory_outcomes_: Points
+    """Perceived outcomes in normalised units: demonstrations, then trials by age."""
+    memory_conditions_: Points
+    """Their conditions in normalised units."""
 
     def __init__(self, config: GaussianProcessConfig | None = None) -> None:
         """Take the settings, or the defaults."""
         self.config = config or GaussianProcessConfig()
-        self._memory: Memory | None = None
 
-    def start(self, demonstrations: Demonstrations) -> None:
-        """Begin anew with D_M = {(c_i, r_i) | c_i = r_i}, forgetting all trials."""
+    def _start(self, demonstrations: Demonstrations) -> None:
         self._normalisation = Normalisation.of(demonstrations)
-        self._memory = Memory(demonstrations.outcomes_seen, self.config.memory_size)
-        self._refit(self._memory)
+        self._demonstrated = demonstrations.outcomes_seen
+        # Data forgetting (paper, Stage 2): the latest m trials only, so that one corrupted
+        # observation does not bias the adapter for good.
+        self._trials: deque[tuple[Point, Point]] = deque(maxlen=self.config.memory_size)
+        self._refit()
 
-    def propose(self, goal_seen: np.ndarray) -> np.ndarray:
-        """Return the posterior mean at the goal, shape (k,), in the outcomes' units."""
-        if self._memory is None:
-            raise not_started(self)
-        goal = as_goal_seen(goal_seen, self._normalisation.outcome_dim)
-        mean = self._posterior.mean(self._normalisation.apply(goal)[None, :])[0]
-        return self._normalisation.undo(mean)
+    def _observe(self, condition: Point, outcome_seen: Point) -> None:
+        self._trials.append((condition, outcome_seen))
+        self._refit()
 
-    def observe(self, condition: np.ndarray, outcome_seen: np.ndarray) -> None:
-        """Remember the trial, forget the oldest beyond m, and refit."""
-        if self._memory is None:
-            raise not_started(self)
-        self._memory.add(*as_trial(condition, outcome_seen, self._normalisation.outcome_dim))
-        self._refit(self._memory)
+    def _propose(self, goal_seen: Point) -> Point:
+        """The posterior mean at the goal, a r(g)' (a R + diag(alpha))^-1 C."""
+        goal = self._normalisation.apply(goal_seen)[None, :]
+        mean = self._kernel(goal, self.memory_outcomes_) @ self._weights
+        return self._normalisation.undo(mean[0])
 
-    def _jitter(self, outcomes: np.ndarray, conditions: np.ndarray, n_trials: int) -> np.ndarray:
-        """Return alpha of every remembered pair, shape (n,), all in normalised units."""
-        n_demonstrations = len(outcomes) - n_trials
-        low, high = self.config.demonstration_jitter_bounds
-        strayed = np.square(conditions - outcomes)[n_demonstrations:]
-        of_demonstrations = np.clip(np.mean(strayed), low, high) if n_trials else low
-        return np.repeat(
-            [of_demonstrations, self.config.trial_jitter], [n_demonstrations, n_trials]
+    def _refit(self) -> None:
+        conditions, outcomes = (
+            self._normalisation.apply(np.vstack([self._demonstrated, *trials]))
+            for trials in ([c for c, _ in self._trials], [r for _, r in self._trials])
         )
-
-    def _refit(self, memory: Memory) -> None:
-        outcomes = self._normalisation.apply(memory.outcomes_seen)
-        conditions = self._normalisation.apply(memory.conditions)
-        jitter = self._jitter(outcomes, conditions, memory.n_trials)
-        kernel = maximise(
+        jitter = self._jitter(outcomes, conditions)
+        self._kernel, self.log_marginal_likelihood_ = maximise(
             outcomes,
             conditions,
             jitter=jitter,
             amplitude_bounds=self.config.amplitude_bounds,
             length_scale_bounds=self.config.length_scale_bounds,
         )
-        self._posterior = GPPosterior.condition_on(
-            outcomes,
-            conditions,
-            amplitude=kernel.amplitude,
-            length_scale=kernel.length_scale,
-            jitter=jitter,
+        self._weights = self._kernel.weights(outcomes, conditions, jitter)
+        self.amplitude_, self.length_scale_ = self._kernel.amplitude, self._kernel.length_scale
+        self.jitter_, self.memory_outcomes_, self.memory_conditions_ = jitter, outcomes, conditions
+
+    def _jitter(self, outcomes: Points, conditions: Points) -> Float[np.ndarray, " n"]:
+        """Return alpha of every remembered pair, all in normalised units."""
+        n_trials, n_demonstrations = len(self._trials), len(self._demonstrated)
+        low, high = self.config.demonstration_jitter_bounds
+        strayed = np.square(conditions - outcomes)[n_demonstrations:]
+        of_demonstrations = np.clip(np.mean(strayed), low, high) if n_trials else low
+        return np.repeat(
+            [of_demonstrations, self.config.trial_jitter], [n_demonstrations, n_trials]
         )
-        self.log_marginal_likelihood_ = kernel.log_likelihood
-        self.amplitude_ = kernel.amplitude
-        self.length_scale_ = kernel.length_scale
-        self.jitter_ = jitter
-        self.memory_outcomes_ = outcomes
-        self.memory_conditions_ = conditions

@@ -20,7 +20,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Float, Int
+from scipy.linalg import cho_factor, cho_solve
 from scipy.spatial.distance import cdist
+
+from prior_reinforce.arrays import Points
 
 _SCAN_POINTS = 64
 """Length scales of the scan, evenly spaced in log l: a step is about 0.25 for data that occur."""
@@ -39,66 +43,71 @@ _ZOOM_ROUNDS = 4
 
 
 @dataclass(frozen=True)
-class KernelFit:
-    """A kernel, and how well it explains the points it was fitted to."""
+class Kernel:
+    """a exp(-d^2 / (2 l^2)); a Gaussian process with it and prior mean 0."""
 
     amplitude: float
     """a, the variance of the prior; scikit-learn's `ConstantKernel` value."""
     length_scale: float
     """l, in the unit of the inputs."""
-    log_likelihood: float
-    """log p(Y | X, a, l), summed over outputs."""
 
+    def __call__(self, a: Float[np.ndarray, "p k"], b: Points) -> Float[np.ndarray, "p n"]:
+        """Return the prior covariance of two sets of points.
 
-def rbf_correlation(squared_distances: np.ndarray, length_scale: np.ndarray | float) -> np.ndarray:
-    """Return exp(-d^2 / (2 l^2)), broadcasting distances against length scales."""
-    return np.asarray(np.exp(-0.5 * squared_distances / np.square(length_scale)))
+        Far apart, compared with the length scale, it is 0: there a prediction returns to the mean.
+        """
+        return self.amplitude * _correlation(cdist(a, b, "sqeuclidean"), self.length_scale)
+
+    def weights(
+        self,
+        inputs: Points,
+        targets: Float[np.ndarray, "n outputs"],
+        jitter: Float[np.ndarray, " n"],
+    ) -> Float[np.ndarray, "n outputs"]:
+        """Return (K + diag(alpha))^-1 Y; `kernel(x, inputs) @ weights` is the posterior mean."""
+        covariance = self(inputs, inputs)
+        covariance[np.diag_indices_from(covariance)] += jitter
+        return np.asarray(cho_solve(cho_factor(covariance, lower=True), targets))
 
 
 def log_marginal_likelihood(
-    inputs: np.ndarray,
-    targets: np.ndarray,
-    *,
-    amplitude: float,
-    length_scale: float,
-    jitter: np.ndarray,
+    kernel: Kernel,
+    inputs: Points,
+    targets: Float[np.ndarray, "n outputs"],
+    jitter: Float[np.ndarray, " n"],
 ) -> float:
-    """Return log p(Y | X) under one kernel, summed over outputs.
-
-    Args:
-        inputs: X, shape (n, k).
-        targets: Y, shape (n, outputs), of zero prior mean.
-        amplitude: a, the constant before the RBF.
-        length_scale: l, in the inputs' unit.
-        jitter: alpha, added to the diagonal, shape (n,), positive.
-    """
+    """Return log p(Y | X) under one kernel, summed over outputs; arguments as in `maximise`."""
     squared = cdist(inputs, inputs, "sqeuclidean")
-    spectra = _Spectra(squared, targets, jitter, np.array([length_scale]))
-    return float(spectra.log_likelihood(np.log([[amplitude]]))[0, 0])
+    spectra = _Spectra(squared, targets, jitter, np.array([kernel.length_scale]))
+    return float(spectra.log_likelihood(np.log([[kernel.amplitude]]))[0, 0])
 
 
 def maximise(
-    inputs: np.ndarray,
-    targets: np.ndarray,
+    inputs: Points,
+    targets: Float[np.ndarray, "n outputs"],
     *,
-    jitter: np.ndarray,
+    jitter: Float[np.ndarray, " n"],
     amplitude_bounds: tuple[float, float],
     length_scale_bounds: tuple[float, float],
-) -> KernelFit:
-    """Return the kernel of greatest marginal likelihood within the bounds. Deterministic.
+) -> tuple[Kernel, float]:
+    """Return the kernel of greatest marginal likelihood within the bounds, and its log likelihood.
+
+    Deterministic.
 
     Args:
-        inputs: X, shape (n, k).
-        targets: Y, shape (n, outputs), of zero prior mean.
-        jitter: alpha, added to the diagonal, shape (n,), positive.
+        inputs: X.
+        targets: Y, of zero prior mean; its columns share the kernel.
+        jitter: alpha, added to the diagonal, positive.
         amplitude_bounds: Least and greatest a.
         length_scale_bounds: Least and greatest l, in the inputs' unit.
     """
     squared = cdist(inputs, inputs, "sqeuclidean")
     log_amplitude_bounds = float(np.log(amplitude_bounds[0])), float(np.log(amplitude_bounds[1]))
 
-    def profile(log_lengths: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Best log likelihood and its log amplitude, each of the shape of `log_lengths`."""
+    def profile(
+        log_lengths: Float[np.ndarray, "*s"],
+    ) -> tuple[Float[np.ndarray, "*s"], Float[np.ndarray, "*s"]]:
+        """Best log likelihood and its log amplitude."""
         spectra = _Spectra(squared, targets, jitter, np.exp(log_lengths.ravel()))
         values, log_amplitudes = spectra.best_amplitude(log_amplitude_bounds)
         return values.reshape(log_lengths.shape), log_amplitudes.reshape(log_lengths.shape)
@@ -118,11 +127,11 @@ def maximise(
         value, log_length, log_amplitude = values[best], candidates[best], log_amplitudes[best]
         half_width *= 2.0 / (_ZOOM_POINTS - 1)
     winner = int(np.argmax(value))
-    return KernelFit(
+    kernel = Kernel(
         amplitude=float(np.clip(np.exp(log_amplitude[winner]), *amplitude_bounds)),
         length_scale=float(np.clip(np.exp(log_length[winner]), *length_scale_bounds)),
-        log_likelihood=float(value[winner]),
     )
+    return kernel, float(value[winner])
 
 
 class _Spectra:
@@ -130,21 +139,13 @@ class _Spectra:
 
     def __init__(
         self,
-        squared_distances: np.ndarray,
-        targets: np.ndarray,
-        jitter: np.ndarray,
-        length_scales: np.ndarray,
+        squared_distances: Float[np.ndarray, "n n"],
+        targets: Float[np.ndarray, "n outputs"],
+        jitter: Float[np.ndarray, " n"],
+        length_scales: Float[np.ndarray, " m"],
     ) -> None:
-        """Decompose.
-
-        Args:
-            squared_distances: Shape (n, n).
-            targets: Y, shape (n, outputs).
-            jitter: alpha, shape (n,), positive.
-            length_scales: Shape (m,).
-        """
         whitening = 1.0 / np.sqrt(jitter)
-        correlations = rbf_correlation(squared_distances, length_scales[:, None, None])
+        correlations = _correlation(squared_distances, length_scales[:, None, None])
         s, U = np.linalg.eigh(whitening[:, None] * correlations * whitening)
         self._s = np.maximum(s, 0.0)[:, None, :]  # (m, 1, n); rounding may go below 0
         projected = np.swapaxes(U, 1, 2) @ (whitening[:, None] * targets)
@@ -152,14 +153,16 @@ class _Spectra:
         self._outputs = targets.shape[1]
         self._constant = self._outputs * float(np.sum(np.log(2.0 * np.pi * jitter)))
 
-    def log_likelihood(self, log_amplitudes: np.ndarray) -> np.ndarray:
-        """Return log p, shape (m, p), for log amplitudes of shape (m or 1, p)."""
+    def log_likelihood(self, log_amplitudes: Float[np.ndarray, "_ p"]) -> Float[np.ndarray, "m p"]:
+        """Return log p for log amplitudes of each length scale, or one row for all."""
         variances = np.exp(log_amplitudes)[:, :, None] * self._s + 1.0
         terms = self._q / variances + self._outputs * np.log(variances)
         return -0.5 * (np.sum(terms, axis=2) + self._constant)
 
-    def best_amplitude(self, bounds: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
-        """Return the greatest log p over the log amplitude within bounds, and where: (m,) each."""
+    def best_amplitude(
+        self, bounds: tuple[float, float]
+    ) -> tuple[Float[np.ndarray, " m"], Float[np.ndarray, " m"]]:
+        """Return the greatest log p over the log amplitude within bounds, and where."""
         grid = np.linspace(*bounds, _AMPLITUDE_POINTS)[None, :]
         start = grid[0, np.argmax(self.log_likelihood(grid), axis=1)][:, None]
         step = (bounds[1] - bounds[0]) / (_AMPLITUDE_POINTS - 1)
@@ -179,8 +182,15 @@ class _Spectra:
         return values[best], candidates[best]
 
 
+def _correlation(
+    squared_distances: Float[np.ndarray, "*s"], length_scale: Float[np.ndarray, "*l"] | float
+) -> Float[np.ndarray, "..."]:
+    """Return exp(-d^2 / (2 l^2)), broadcasting distances against length scales."""
+    return np.asarray(np.exp(-0.5 * squared_distances / np.square(length_scale)))
+
+
 def _distinct_log_lengths(
-    squared_distances: np.ndarray, bounds: tuple[float, float]
+    squared_distances: Float[np.ndarray, "n n"], bounds: tuple[float, float]
 ) -> tuple[float, float]:
     """Return the bounds in log l, leaving out short ones that all give the same matrix.
 
@@ -191,7 +201,7 @@ def _distinct_log_lengths(
     return float(np.log(shortest)), float(np.log(bounds[1]))
 
 
-def _basins(values: np.ndarray) -> np.ndarray:
+def _basins(values: Float[np.ndarray, " m"]) -> Int[np.ndarray, " b"]:
     """Return the indices of a scan's highest local maxima, its ends included."""
     padded = np.concatenate([[-np.inf], values, [-np.inf]])
     peaks = np.flatnonzero((values >= padded[:-2]) & (values >= padded[2:]))

@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Float
 
+from prior_reinforce.arrays import Point
 from prior_reinforce.plans.motions import Demonstrations
 
 
@@ -13,10 +15,10 @@ from prior_reinforce.plans.motions import Demonstrations
 class Normalisation:
     """An affine map fixed by the demonstrations, so that trials cannot move it."""
 
-    offset: np.ndarray
-    """Mean of the demonstrated outcomes, shape (k,), in the outcomes' units."""
-    scale: np.ndarray
-    """Length that counts as 1, shape (k,), in the outcomes' units."""
+    offset: Point
+    """Mean of the demonstrated outcomes, in the outcomes' units."""
+    scale: Point
+    """What counts as 1, in the outcomes' units."""
 
     @classmethod
     def of(cls, demonstrations: Demonstrations) -> Normalisation:
@@ -32,15 +34,10 @@ class Normalisation:
         scale = np.sqrt([variance[units == unit].mean() for unit in units])
         return cls(offset=outcomes.mean(axis=0), scale=scale)
 
-    @property
-    def outcome_dim(self) -> int:
-        """k, the number of components."""
-        return len(self.offset)
-
-    def apply(self, values: np.ndarray) -> np.ndarray:
-        """Return outcomes or conditions, shape (..., k), in normalised units."""
+    def apply(self, values: Float[np.ndarray, "*n k"]) -> Float[np.ndarray, "*n k"]:
+        """Return outcomes or conditions in normalised units."""
         return (values - self.offset) / self.scale
 
-    def undo(self, values: np.ndarray) -> np.ndarray:
-        """Return normalised values, shape (..., k), in the outcomes' units."""
+    def undo(self, values: Float[np.ndarray, "*n k"]) -> Float[np.ndarray, "*n k"]:
+        """Return normalised values in the outcomes' units."""
         return values * self.scale + self.offset

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import ClassVar
-
-import numpy as np
 
 from prior_reinforce.adapters.base import Adapter
-from prior_reinforce.adapters.vectors import as_goal_seen, as_trial, not_started
+from prior_reinforce.arrays import Point
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.plans.motions import Demonstrations
 
@@ -20,8 +17,6 @@ class ProportionalAdapter(Adapter):
     that trial's outcome minus the new goal: one trial then makes `gain` of the way, so that a
     session for a new goal is better started afresh.
     """
-
-    name: ClassVar[str] = "proportional"
 
     def __init__(self, gain: float = 0.8) -> None:
         """Choose the share of the error to correct.
@@ -35,26 +30,15 @@ class ProportionalAdapter(Adapter):
         if not (math.isfinite(gain) and gain > 0):
             raise ConfigurationError(f"gain must be a positive number, got {gain}; try 0.8")
         self.gain = gain
-        self._outcome_dim: int | None = None
-        self._last: tuple[np.ndarray, np.ndarray] | None = None
 
-    def start(self, demonstrations: Demonstrations) -> None:
-        """Forget all trials; of the demonstrations only k matters."""
-        self._outcome_dim = demonstrations.outcome_dim
-        self._last = None
+    def _start(self, demonstrations: Demonstrations) -> None:
+        self._last: tuple[Point, Point] | None = None
 
-    def propose(self, goal_seen: np.ndarray) -> np.ndarray:
-        """Return the goal, or the last condition corrected, shape (k,)."""
-        if self._outcome_dim is None:
-            raise not_started(self)
-        goal = as_goal_seen(goal_seen, self._outcome_dim)
+    def _propose(self, goal_seen: Point) -> Point:
         if self._last is None:
-            return goal
+            return goal_seen
         condition, outcome_seen = self._last
-        return condition - self.gain * (outcome_seen - goal)
+        return condition - self.gain * (outcome_seen - goal_seen)
 
-    def observe(self, condition: np.ndarray, outcome_seen: np.ndarray) -> None:
-        """Remember this trial in place of the one before it."""
-        if self._outcome_dim is None:
-            raise not_started(self)
-        self._last = as_trial(condition, outcome_seen, self._outcome_dim)
+    def _observe(self, condition: Point, outcome_seen: Point) -> None:
+        self._last = condition, outcome_seen

@@ -17,10 +17,12 @@ from prior_reinforce.experiments.methods import make_adapter
 from prior_reinforce.experiments.protocol import GoalTrials, run_goals
 from prior_reinforce.experiments.sight import MODEL
 from prior_reinforce.generators import Generator
-from prior_reinforce.perception import Perception, VisionLanguageModel, VisionLanguageModelConfig
+from prior_reinforce.perception.base import Perception
+from prior_reinforce.perception.vlm import VisionLanguageModel
+from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.report import AdaptationRecord, Film, record_film, write_report
-from prior_reinforce.tasks import Task
+from prior_reinforce.tasks.base import Task
 
 SEEN = "seen"
 """Folder beside the report for what a model saw and said."""
@@ -32,7 +34,7 @@ class Adaptation(Simulated):
 
     perception: str = "eye"
     """How a trial's error is seen: exact, eye, amplified, vlm (a vision-language model, --vlm.*),
-    stand-in (the same way without a model: objects found by colour), or one's own as
+    camera (the same way without a model: objects found by colour), or one's own as
     module:Class."""
     vlm: VisionLanguageModelConfig = field(default_factory=VisionLanguageModelConfig)
     """Endpoint and model for --perception vlm (docs/perception.md)."""

@@ -10,7 +10,8 @@ import numpy as np
 from rich.console import Console
 
 from prior_reinforce.errors import InvalidFeedbackError, PerceptionFailedError
-from prior_reinforce.perception import Perception, VisionLanguageModel
+from prior_reinforce.perception.base import Perception
+from prior_reinforce.perception.vlm import VisionLanguageModel
 from prior_reinforce.rollouts import Rollout
 from prior_reinforce.wording import from_words, say_place
 

@@ -12,13 +12,10 @@ import numpy as np
 import tyro
 
 from prior_reinforce.errors import ConfigurationError, FileFormatError, PerceptionFailedError
-from prior_reinforce.perception import (
-    SeenObject,
-    TableCalibration,
-    TableScene,
-    VisionLanguageModel,
-    VisionLanguageModelConfig,
-)
+from prior_reinforce.perception.calibration import TableCalibration
+from prior_reinforce.perception.vlm import VisionLanguageModel
+from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
+from prior_reinforce.scene import SeenObject, TableScene
 from prior_reinforce.wording import to_words
 
 _COLUMNS = ("x", "y", "u", "v")

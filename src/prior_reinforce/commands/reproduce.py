@@ -27,7 +27,7 @@ from prior_reinforce.experiments.recipes.base import Progress as OnProgress
 from prior_reinforce.experiments.recipes.trials import TrialsTable
 from prior_reinforce.experiments.units import Workers
 from prior_reinforce.files import write
-from prior_reinforce.perception import VisionLanguageModelConfig
+from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
 
 _SLOWEST = "diffusion"
 """Takes twice as long to learn as the next."""

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.plans.motions import Demonstrations
-from prior_reinforce.tasks import Task, make_task
+from prior_reinforce.tasks import make_task
+from prior_reinforce.tasks.base import Task
 
 
 @dataclass(frozen=True)

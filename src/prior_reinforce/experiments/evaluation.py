@@ -23,8 +23,8 @@ from prior_reinforce.experiments.protocol import (
 from prior_reinforce.experiments.sight import open_sight
 from prior_reinforce.experiments.units import Unit, digest_of, result_of
 from prior_reinforce.files import in_place
-from prior_reinforce.generators import GENERATORS, Generator, load_generator
-from prior_reinforce.perception import VisionLanguageModelConfig
+from prior_reinforce.generators import Generator, load_generator
+from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
 from prior_reinforce.plans.alignment import align
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.registry import source_digest
@@ -155,9 +155,9 @@ class Training(Unit):
                 unfinished.mkdir()
                 generator.save(unfinished / "generator")
                 prior.save(unfinished / "demonstrations.npz")
-        own = None if GENERATORS.owns(self.generator) else self.generator
-        generator = load_generator(home / "generator", own=own)
-        return Learned(generator, Demonstrations.load(home / "demonstrations.npz"))
+        own = ":" in self.generator
+        load = type(make_generator(self.generator)).load if own else load_generator
+        return Learned(load(home / "generator"), Demonstrations.load(home / "demonstrations.npz"))
 
     def _home(self, folder: Path) -> Path:
         return folder / "models" / digest_of(self)

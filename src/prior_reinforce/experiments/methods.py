@@ -2,58 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
 from typing import Literal
 
-from prior_reinforce.adapters import (
-    Adapter,
-    FrozenAdapter,
-    GaussianProcessAdapter,
-    GaussianProcessConfig,
-    ProportionalAdapter,
-)
+from prior_reinforce.adapters import make_adapter
+from prior_reinforce.adapters.base import Adapter
 from prior_reinforce.errors import ConfigurationError
-from prior_reinforce.generators import Generator, make_generator
-from prior_reinforce.perception import Amplified, Exact, Eye, Perception
-from prior_reinforce.registry import import_and_make, make_own
+from prior_reinforce.generators import Generator
+from prior_reinforce.generators.by_name import make_generator
+from prior_reinforce.perception import make_perception
+from prior_reinforce.registry import import_and_make
 
 __all__ = ["family_of", "make_adapter", "make_generator", "make_perception"]
-
-
-def make_adapter(name: str) -> Adapter:
-    """Make an adapter by its name, or one's own by `module:Class`.
-
-    `gp` is ours with m = 2; `gp-all` keeps every trial (m = infinity). `gp-one-term` and
-    `gp-one-term-all` put one fixed size on the whole diagonal, as the paper writes it.
-
-    Raises:
-        ConfigurationError: There is no such adapter.
-    """
-    one_term = GaussianProcessConfig(trial_jitter=1e-3, demonstration_jitter_bounds=(1e-3, 1e-3))
-    known: dict[str, Callable[[], Adapter]] = {
-        "gp": GaussianProcessAdapter,
-        "gp-all": lambda: GaussianProcessAdapter(GaussianProcessConfig(memory_size=None)),
-        "gp-one-term": lambda: GaussianProcessAdapter(one_term),
-        "gp-one-term-all": lambda: GaussianProcessAdapter(replace(one_term, memory_size=None)),
-        "proportional": ProportionalAdapter,
-        "frozen": FrozenAdapter,
-    }
-    if name in known:
-        return known[name]()
-    return make_own(name, Adapter, list(known))
-
-
-def make_perception(name: str) -> Perception:
-    """Make a perception by its name, or one's own by `module:Class`.
-
-    Raises:
-        ConfigurationError: There is no such perception.
-    """
-    known = {"exact": Exact, "eye": Eye, "amplified": Amplified}
-    if name in known:
-        return known[name]()
-    return make_own(name, Perception, list(known))
 
 
 def family_of(name: str) -> Literal["generator", "adapter"]:

@@ -123,8 +123,8 @@ def see_demonstrations(
         return replace(demonstrations, outcomes_seen=np.array(seen))
     except InvalidDemonstrationsError as error:
         raise InvalidDemonstrationsError(
-            f"as {perception.name} saw {task.name} (seed {seed}), {error}; choose another seed or "
-            "a finer perception"
+            f"as {type(perception).__name__} saw {task.name} (seed {seed}), {error}; choose "
+            "another seed or a finer perception"
         ) from error
 
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 
+from prior_reinforce.arrays import Point
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.perception.base import Perception
 from prior_reinforce.rollouts import Rollout
@@ -16,8 +16,6 @@ from prior_reinforce.rollouts import Rollout
 @dataclass(frozen=True)
 class Amplified(Perception):
     """The true error times one random factor, plus Gaussian noise on each component."""
-
-    name: ClassVar[str] = "amplified"
 
     scale_low: float = 0.7
     """Least factor, uniformly drawn once a vector (paper: 0.7)."""
@@ -43,8 +41,8 @@ class Amplified(Perception):
                 f"noise_sd must be 0 m or more, got {self.noise_sd}; 0.01 is the default"
             )
 
-    def perceive(self, rollout: Rollout, goal: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-        """Return s (r - g) + n, shape (k,), in [m], with one s and k components of n drawn."""
+    def perceive(self, rollout: Rollout, goal: Point, rng: np.random.Generator) -> Point:
+        """Return s (r - g) + n, with one s and k components of n drawn."""
         error = rollout.outcome - goal
         scale = rng.uniform(self.scale_low, self.scale_high)
         return scale * error + rng.normal(0.0, self.noise_sd, size=error.shape)

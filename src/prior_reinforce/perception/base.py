@@ -3,31 +3,40 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import ClassVar
 
 import numpy as np
+from typing_extensions import Self
 
+from prior_reinforce.arrays import Point
 from prior_reinforce.rollouts import Rollout
 
 
 class Perception(ABC):
     """A way of seeing by how much a trial missed: e_seen = P(r - g)."""
 
-    name: ClassVar[str]
-    """Name on the command line and in results."""
-
     @abstractmethod
-    def perceive(self, rollout: Rollout, goal: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    def perceive(self, rollout: Rollout, goal: Point, rng: np.random.Generator) -> Point:
         """Return the perceived error of one trial.
 
         Args:
             rollout: What came of the trial; its true outcome, or the picture of its key frame.
-            goal: True goal g, shape (k,), in [m].
+            goal: True goal g, in [m].
             rng: Source of perception noise.
 
         Returns:
-            Error seen, outcome minus goal, shape (k,), in [m].
+            Error seen, outcome minus goal, in [m].
 
         Raises:
             PerceptionFailedError: Nothing could be made out; ask an operator.
         """
+
+    def close(self) -> None:  # noqa: B027  # most hold nothing
+        """Free what it holds: connections, graphics memory."""
+
+    def __enter__(self) -> Self:
+        """Use it for the length of a block."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close it."""
+        self.close()

@@ -14,8 +14,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from jaxtyping import Float
+from numpy.typing import ArrayLike
 
+from prior_reinforce import files
 from prior_reinforce.errors import ConfigurationError, FileFormatError
+
+_Pairs = Float[np.ndarray, "n 2"]
 
 _FILE_KIND = "prior-reinforce table calibration 1"
 
@@ -33,8 +38,8 @@ class TableCalibration:
     outcome is defined, with `fit`, or move a calibration there, with `at_height`.
     """
 
-    homography: np.ndarray
-    """H, shape (3, 3), with Frobenius norm 1 and positive depth over the table."""
+    homography: Float[np.ndarray, "3 3"]
+    """H, with Frobenius norm 1 and positive depth over the table."""
     height: float
     """Height of the plane above the table, in [m]."""
     fit_error: float
@@ -46,7 +51,7 @@ class TableCalibration:
 
     @classmethod
     def fit(
-        cls, table_points: np.ndarray, pixels: np.ndarray, *, height: float = 0.0
+        cls, table_points: ArrayLike, pixels: ArrayLike, *, height: float = 0.0
     ) -> TableCalibration:
         """Fit H to known points by the normalised direct linear transform.
 
@@ -60,20 +65,20 @@ class TableCalibration:
         Raises:
             ConfigurationError: Too few points, points on one line, or pixels in another order.
         """
-        points, pixels = _checked_pairs(table_points, pixels)
-        homography = _direct_linear_transform(points, pixels)
-        fit_error = _rms(_map(np.linalg.inv(homography), pixels) - points)
-        return cls(homography, float(height), fit_error, _left_out_error(points, pixels))
+        points, seen = _checked_pairs(table_points, pixels)
+        homography = _direct_linear_transform(points, seen)
+        fit_error = _rms(_map(np.linalg.inv(homography), seen) - points)
+        return cls(homography, float(height), fit_error, _left_out_error(points, seen))
 
-    def to_table(self, pixels: np.ndarray) -> np.ndarray:
-        """Map pixels, shape (..., 2), to points in the plane, shape (..., 2), in [m]."""
+    def to_table(self, pixels: ArrayLike) -> Float[np.ndarray, "*n 2"]:
+        """Map pixels, shape (..., 2), to points in the plane, in [m]."""
         return _map(np.linalg.inv(self.homography), np.asarray(pixels, dtype=float))
 
-    def to_pixels(self, table_points: np.ndarray) -> np.ndarray:
-        """Map points in the plane, shape (..., 2), in [m], to pixels, shape (..., 2)."""
+    def to_pixels(self, table_points: ArrayLike) -> Float[np.ndarray, "*n 2"]:
+        """Map points in the plane, shape (..., 2), in [m], to pixels."""
         return _map(self.homography, np.asarray(table_points, dtype=float))
 
-    def at_height(self, height: float, camera_position: np.ndarray) -> TableCalibration:
+    def at_height(self, height: float, camera_position: ArrayLike) -> TableCalibration:
         """Return the calibration of a parallel plane, from where the camera hangs.
 
         The ray through a pixel meets the two planes in p and p'. With the camera at c, higher than
@@ -91,7 +96,7 @@ class TableCalibration:
         camera = np.asarray(camera_position, dtype=float)
         if camera.shape != (3,) or not camera[2] > max(height, self.height):
             raise ConfigurationError(
-                f"camera position {camera_position} must be three numbers in metres, higher than "
+                f"camera position {camera.tolist()} must be three numbers in metres, higher than "
                 f"the planes at {self.height} m and {height} m; measure it from the table's frame"
             )
         scale = (camera[2] - self.height) / (camera[2] - height)
@@ -121,7 +126,7 @@ class TableCalibration:
             "fit_error_m": self.fit_error,
             "left_out_error_m": self.left_out_error,
         }
-        path.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
+        files.write(path, json.dumps(content, indent=2) + "\n")
 
     @classmethod
     def load(cls, path: Path) -> TableCalibration:
@@ -150,20 +155,20 @@ class TableCalibration:
             ) from error
 
 
-def _checked_pairs(table_points: np.ndarray, pixels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    points, pixels = np.asarray(table_points, dtype=float), np.asarray(pixels, dtype=float)
-    if points.ndim != 2 or points.shape[1] != 2 or points.shape != pixels.shape or len(points) < 4:
+def _checked_pairs(table_points: ArrayLike, pixels: ArrayLike) -> tuple[_Pairs, _Pairs]:
+    points, seen = np.asarray(table_points, dtype=float), np.asarray(pixels, dtype=float)
+    if points.ndim != 2 or points.shape[1] != 2 or points.shape != seen.shape or len(points) < 4:
         raise ConfigurationError(
-            f"calibration points of shape {points.shape} and pixels of shape {pixels.shape}: "
+            f"calibration points of shape {points.shape} and pixels of shape {seen.shape}: "
             "expected (n, 2) for both, with n >= 4; click at least four known points"
         )
-    if not (np.isfinite(points).all() and np.isfinite(pixels).all()):
+    if not (np.isfinite(points).all() and np.isfinite(seen).all()):
         raise ConfigurationError("calibration points and pixels must be finite; click them again")
-    return points, pixels
+    return points, seen
 
 
-def _direct_linear_transform(points: np.ndarray, pixels: np.ndarray) -> np.ndarray:
-    """Least algebraic error H with unit norm; `points` and `pixels` are (n, 2)."""
+def _direct_linear_transform(points: _Pairs, pixels: _Pairs) -> Float[np.ndarray, "3 3"]:
+    """Least algebraic error H with unit norm."""
     to_unit_points, to_unit_pixels = _similarity_to_unit(points), _similarity_to_unit(pixels)
     x, y = _map(to_unit_points, points).T
     u, v = _map(to_unit_pixels, pixels).T
@@ -191,7 +196,7 @@ def _direct_linear_transform(points: np.ndarray, pixels: np.ndarray) -> np.ndarr
     return homography
 
 
-def _left_out_error(points: np.ndarray, pixels: np.ndarray) -> float | None:
+def _left_out_error(points: _Pairs, pixels: _Pairs) -> float | None:
     """Root mean square distance of each point from where the other points' H sees it, in [m]."""
     if len(points) == 4:
         return None
@@ -207,7 +212,7 @@ def _left_out_error(points: np.ndarray, pixels: np.ndarray) -> float | None:
     return _rms(np.array(misses)) if misses else None
 
 
-def _similarity_to_unit(points: np.ndarray) -> np.ndarray:
+def _similarity_to_unit(points: _Pairs) -> Float[np.ndarray, "3 3"]:
     """Similarity that moves points to centroid 0 and root mean square distance sqrt(2)."""
     centre = points.mean(axis=0)
     spread = np.sqrt(((points - centre) ** 2).sum(axis=1).mean() / 2)
@@ -220,11 +225,13 @@ def _similarity_to_unit(points: np.ndarray) -> np.ndarray:
     )
 
 
-def _map(homography: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Apply a (3, 3) projective map to points of shape (..., 2)."""
-    mapped: np.ndarray = points @ homography[:, :2].T + homography[:, 2]
+def _map(
+    homography: Float[np.ndarray, "3 3"], points: Float[np.ndarray, "*n 2"]
+) -> Float[np.ndarray, "*n 2"]:
+    """Apply a projective map."""
+    mapped = points @ homography[:, :2].T + homography[:, 2]
     return mapped[..., :2] / mapped[..., 2:]
 
 
-def _rms(differences: np.ndarray) -> float:
+def _rms(differences: _Pairs) -> float:
     return float(np.sqrt((differences**2).sum(axis=-1).mean()))

@@ -10,10 +10,13 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
+from jaxtyping import Float
+from numpy.typing import ArrayLike
 
+from prior_reinforce.arrays import Point
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.perception.calibration import TableCalibration
-from prior_reinforce.rendering import make_renderer
+from prior_reinforce.rendering import Picture, make_renderer
 from prior_reinforce.rollouts import KeyFrame
 
 GOAL_BODY = "goal"
@@ -51,16 +54,13 @@ class Camera:
         self._source: mujoco.MjModel | None = None
         self._renderer: mujoco.Renderer | None = None
 
-    def picture(self, key_frame: KeyFrame, goal: np.ndarray) -> np.ndarray:
+    def picture(self, key_frame: KeyFrame, goal: Point) -> Picture:
         """Draw a key frame with the goal's object at the goal.
 
         Args:
             key_frame: What to draw; not changed.
-            goal: True goal, shape (k,) with k <= 3, in [m]; the components it leaves out are
-                zero, so that a goal (x, y) puts the body's origin on the table.
-
-        Returns:
-            Picture, shape (height, width, 3), dtype uint8.
+            goal: True goal, k <= 3, in [m]; the components it leaves out are zero, so that a goal
+                (x, y) puts the body's origin on the table.
 
         Raises:
             RenderingUnavailableError: There is no OpenGL on this machine.
@@ -73,10 +73,12 @@ class Camera:
         data.mocap_pos[_goal_mocap_id(model)] = np.pad(goal, (0, 3 - len(goal)))
         mujoco.mj_forward(model, data)
         renderer.update_scene(data, camera=self.config.name)
-        picture: np.ndarray = renderer.render()
+        picture: Picture = renderer.render()
         return picture
 
-    def find_marks(self, model: mujoco.MjModel, points: np.ndarray) -> np.ndarray:
+    def find_marks(
+        self, model: mujoco.MjModel, points: Float[np.ndarray, "n 3"]
+    ) -> Float[np.ndarray, "n 2"]:
         """Lay a bright mark on each point in turn and find its centre in the picture.
 
         Everything else is out of the scene meanwhile, as an arm is out of the way when a lab
@@ -84,10 +86,10 @@ class Camera:
 
         Args:
             model: The scene; not changed.
-            points: Where the marks lie, table frame, shape (n, 3), in [m].
+            points: Where the marks lie, table frame, in [m].
 
         Returns:
-            Centres of the marks, shape (n, 2), in [px].
+            Centres of the marks, in [px].
 
         Raises:
             ConfigurationError: A mark is outside the picture or cut by its edge.
@@ -100,7 +102,7 @@ class Camera:
         renderer.scene.ngeom = 0
         empty = renderer.render().astype(float)
         centres = []
-        for point in np.asarray(points, dtype=float):
+        for point in points:
             _add_mark(renderer.scene, point)
             brightness = np.abs(renderer.render() - empty).sum(axis=2)
             renderer.scene.ngeom = 0
@@ -116,7 +118,7 @@ class Camera:
         return np.array(centres)
 
     def calibrate(
-        self, model: mujoco.MjModel, table_points: np.ndarray, *, height: float
+        self, model: mujoco.MjModel, table_points: ArrayLike, *, height: float
     ) -> TableCalibration:
         """Calibrate the camera on marks laid at known points of a plane parallel to the table.
 
@@ -161,7 +163,7 @@ def _goal_mocap_id(model: mujoco.MjModel) -> int:
     return mocap
 
 
-def _add_mark(scene: mujoco.MjvScene, point: np.ndarray) -> None:
+def _add_mark(scene: mujoco.MjvScene, point: Float[np.ndarray, "3"]) -> None:
     mark = scene.geoms[scene.ngeom]
     mujoco.mjv_initGeom(
         mark,

@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import ClassVar
-
 import numpy as np
 
+from prior_reinforce.arrays import Point
 from prior_reinforce.perception.base import Perception
 from prior_reinforce.rollouts import Rollout
 
 
-@dataclass(frozen=True)
 class Exact(Perception):
     """The true error, outcome minus goal."""
 
-    name: ClassVar[str] = "exact"
-
-    def perceive(self, rollout: Rollout, goal: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-        """Return r - g, shape (k,), in [m]; draws nothing from `rng`."""
+    def perceive(self, rollout: Rollout, goal: Point, rng: np.random.Generator) -> Point:
+        """Return r - g; draws nothing from `rng`."""
         return rollout.outcome - goal

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import ClassVar
-
 import numpy as np
 
+from prior_reinforce.arrays import Point
 from prior_reinforce.perception.base import Perception
 from prior_reinforce.rollouts import Rollout
 
@@ -23,7 +21,6 @@ _RESOLUTION_DECIMALS = 9
 """Errors are compared to the nanometre, so that 0.92 - 0.91 is a tie as 1 cm is on paper."""
 
 
-@dataclass(frozen=True)
 class Eye(Perception):
     """Each component of the error, rounded to the nearest of 0, 2, 5, 10, 20, 30, ... cm.
 
@@ -33,10 +30,8 @@ class Eye(Perception):
     miss for ever). Nothing is random: the paper describes the rounding and no other error.
     """
 
-    name: ClassVar[str] = "eye"
-
-    def perceive(self, rollout: Rollout, goal: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-        """Return the rounded error, shape (k,), in [m]; draws nothing from `rng`."""
+    def perceive(self, rollout: Rollout, goal: Point, rng: np.random.Generator) -> Point:
+        """Return the rounded error; draws nothing from `rng`."""
         error = rollout.outcome - goal
         size = np.round(np.abs(error), _RESOLUTION_DECIMALS)
         near = _NEAR[np.searchsorted(_BETWEEN_NEAR, size, side="right")]

@@ -12,18 +12,29 @@ from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
+from jaxtyping import Float
 
+from prior_reinforce.arrays import Point
 from prior_reinforce.errors import ConfigurationError, EndpointError, PerceptionFailedError
 from prior_reinforce.perception.base import Perception
 from prior_reinforce.perception.calibration import TableCalibration
 from prior_reinforce.perception.camera import Camera
 from prior_reinforce.perception.vlm_client import (
     ModelClient,
-    SentPicture,
+    OpenAIClient,
     VisionLanguageModelConfig,
 )
-from prior_reinforce.perception.vlm_formats import Box
+from prior_reinforce.perception.vlm_formats import (
+    FORMATS,
+    Box,
+    Family,
+    NotInPictureError,
+    UnreadableAnswerError,
+    read_box,
+    size_to_send,
+)
 from prior_reinforce.perception.vlm_reading import Answer, Reading, Sighting
+from prior_reinforce.rendering import Picture
 from prior_reinforce.rollouts import KeyFrame, Rollout
 from prior_reinforce.scene import SeenObject, TableScene
 
@@ -35,38 +46,46 @@ class VisionLanguageModel(Perception):
         last_reading: Record of the latest picture, also of one that gave no error; None before.
     """
 
-    name: ClassVar[str] = "vlm"
+    config_type: ClassVar[type[VisionLanguageModelConfig]] = VisionLanguageModelConfig
 
     def __init__(
         self,
-        scene: TableScene,
+        scene: TableScene | None,
         config: VisionLanguageModelConfig | None = None,
         *,
+        client: ModelClient | None = None,
         camera: Camera | None = None,
         calibration: TableCalibration | None = None,
     ) -> None:
         """Connect to the endpoint; nothing is sent yet.
 
         Args:
-            scene: What to look for.
+            scene: What to look for: a task's `scene`.
             config: Where and how to ask.
+            client: Who is asked; the endpoint of `config` when not given.
             camera: Takes the pictures of simulated trials.
             calibration: Of the camera. None calibrates it on the scene's marks, in simulation.
 
         Raises:
             MissingExtraError: The extra [vlm] is not installed.
-            ConfigurationError: The variable that should hold the key is not set.
+            ConfigurationError: There is no scene, or the variable that should hold the key is not
+                set.
         """
+        if scene is None:
+            raise ConfigurationError(
+                "nothing says what to look for in the picture; give the task a `scene`: a "
+                "TableScene with your objects' names"
+            )
         self.scene = scene
         self.config = config or VisionLanguageModelConfig()
         self.last_reading: Reading | None = None
         self._camera = camera or Camera()
-        self._client = ModelClient(self.config)
+        self._client = client or OpenAIClient(self.config)
         self._calibration = calibration
         self._scene_model: object = None
         """The model on which we calibrated ourselves; None where the calibration was given."""
 
-    def perceive(self, rollout: Rollout, goal: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    def perceive(self, rollout: Rollout, goal: Point, rng: np.random.Generator) -> Point:
         """Photograph the key frame, with the goal's object at the goal, and read the picture.
 
         The randomness is the model's own; `rng` is not used.
@@ -94,11 +113,11 @@ class VisionLanguageModel(Perception):
             raise kind(f"{reading.problem}; ask the operator for the error")
         return reading.error_seen
 
-    def read(self, picture: np.ndarray) -> Reading:
+    def read(self, picture: Picture) -> Reading:
         """Read the error from any picture of the calibrated camera, a photograph for instance.
 
         Args:
-            picture: Shape (height, width, 3), dtype uint8, RGB.
+            picture: RGB.
 
         Returns:
             The record; its `error_seen` is None, and `problem` says why, where reading failed.
@@ -110,17 +129,17 @@ class VisionLanguageModel(Perception):
             raise ConfigurationError(
                 "the camera is not calibrated; pass calibration=TableCalibration.fit(...)"
             )
-        calibration, sent = self._calibration, self._client.prepare(picture)
+        calibration, sent = self._calibration, _shrunk(picture, self.config)
         goal = goal_place = goal_pixel = None
-        reached = self._find(self.scene.reached, sent, calibration)
+        reached = self._find(self.scene.reached, picture, sent, calibration)
         if reached.problem is None:
-            goal = self._find(self.scene.goal, sent, calibration)
+            goal = self._find(self.scene.goal, picture, sent, calibration)
             if goal.place is not None:
                 goal_place = goal.place + np.array(self.scene.goal_offset)
                 x, y = calibration.to_pixels(goal_place).tolist()
                 goal_pixel = (x, y)
         self.last_reading = Reading(
-            picture, self.config.model, reached, goal, goal_place, goal_pixel
+            picture, self._client.model, reached, goal, goal_place, goal_pixel
         )
         return self.last_reading
 
@@ -139,17 +158,22 @@ class VisionLanguageModel(Perception):
         self._scene_model = key_frame.model
 
     def _find(
-        self, wanted: SeenObject, picture: SentPicture, calibration: TableCalibration
+        self,
+        wanted: SeenObject,
+        picture: Picture,
+        sent: Picture,
+        calibration: TableCalibration,
     ) -> Sighting:
         """Ask for one object until enough answers agree, or none will."""
         words, votes = wanted.words, self.config.votes
         answers: list[Answer] = []
         for _ in range(self.config.most_requests):
             try:
-                answer = self._client.ask(words, picture)
+                answer = self._client.ask(words, sent)
             except EndpointError as error:
                 problem = f"looking for {words}: {error}"
                 return Sighting(words, tuple(answers), problem=problem, unanswered=True)
+            answer = _with_box(answer, self.config.family, picture, sent)
             answers.append(_of_right_size(answer, wanted.size, calibration))
             boxes = [answer.box for answer in answers if answer.box is not None]
             absent = sum(answer.absent for answer in answers)
@@ -161,6 +185,31 @@ class VisionLanguageModel(Perception):
                 place = calibration.to_table(_centres(np.array([box])))[0]
                 return Sighting(words, tuple(answers), box, place)
         return Sighting(words, tuple(answers), problem=_no_agreement(words, answers, self.config))
+
+
+def _shrunk(picture: Picture, config: VisionLanguageModelConfig) -> Picture:
+    """The picture in a size that a server will leave as it is."""
+    from PIL import Image
+
+    image = Image.fromarray(picture)
+    sent = size_to_send(*image.size, config.max_image_side, FORMATS[config.family])
+    if sent == image.size:
+        return picture
+    return np.asarray(image.resize(sent, Image.Resampling.LANCZOS))
+
+
+def _with_box(answer: Answer, family: Family, picture: Picture, sent: Picture) -> Answer:
+    """The answer with its box, in pixels of the picture as taken, or with why there is none."""
+    sent_size = (sent.shape[1], sent.shape[0])
+    try:
+        if answer.finish_reason == "length":
+            raise UnreadableAnswerError("cut off at max_tokens")
+        left, top, right, bottom = read_box(answer.text, FORMATS[family], sent_size)
+    except UnreadableAnswerError as error:
+        absent = isinstance(error, NotInPictureError)
+        return replace(answer, problem=str(error), absent=absent)
+    per_x, per_y = picture.shape[1] / sent_size[0], picture.shape[0] / sent_size[1]
+    return replace(answer, box=(left * per_x, top * per_y, right * per_x, bottom * per_y))
 
 
 def _of_right_size(answer: Answer, size: float, calibration: TableCalibration) -> Answer:
@@ -176,8 +225,7 @@ def _of_right_size(answer: Answer, size: float, calibration: TableCalibration) -
     return replace(answer, box=None, problem=problem)
 
 
-def _centres(boxes: np.ndarray) -> np.ndarray:
-    """Centres of boxes (n, 4), shape (n, 2)."""
+def _centres(boxes: Float[np.ndarray, "n 4"]) -> Float[np.ndarray, "n 2"]:
     return (boxes[:, :2] + boxes[:, 2:]) / 2
 
 

@@ -1,4 +1,4 @@
-"""One request to an OpenAI-compatible endpoint: where is this object in this picture?"""
+"""Who is asked where an object is in a picture: any OpenAI-compatible endpoint."""
 
 from __future__ import annotations
 
@@ -6,21 +6,13 @@ import base64
 import io
 import os
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, Protocol
 from urllib.parse import urlsplit
 
-import numpy as np
-
 from prior_reinforce.errors import ConfigurationError, EndpointError, MissingExtraError
-from prior_reinforce.perception.vlm_formats import (
-    FORMATS,
-    Family,
-    NotInPictureError,
-    UnreadableAnswerError,
-    read_box,
-    size_to_send,
-)
+from prior_reinforce.perception.vlm_formats import FORMATS, Family
 from prior_reinforce.perception.vlm_reading import Answer
+from prior_reinforce.rendering import Picture
 
 _THIS_MACHINE = {"127.0.0.1", "localhost", "::1"}
 
@@ -83,20 +75,33 @@ class VisionLanguageModelConfig:
             )
 
 
-@dataclass(frozen=True)
-class SentPicture:
-    """A picture in the form in which it is sent."""
+class ModelClient(Protocol):
+    """Answers where an object is in a picture."""
 
-    url: str
-    """PNG data address."""
-    sent_size: tuple[int, int]
-    """Width and height in which it is sent, in [px]."""
-    size: tuple[int, int]
-    """Width and height in which it was taken, in [px]."""
+    @property
+    def model(self) -> str:
+        """Who answers, for the record."""
+
+    def ask(self, words: str, picture: Picture) -> Answer:
+        """Ask for one object.
+
+        Args:
+            words: The object, for instance `the orange ball`.
+            picture: RGB, of the size in which it shall be seen.
+
+        Returns:
+            The words of the answer; nobody has looked for a box in them yet.
+
+        Raises:
+            EndpointError: Nothing came back, and trying again at once will not help.
+        """
+
+    def close(self) -> None:
+        """Close the connections."""
 
 
-class ModelClient:
-    """Asks a model for one object at a time."""
+class OpenAIClient:
+    """Asks an OpenAI-compatible endpoint, see `ModelClient`."""
 
     def __init__(self, config: VisionLanguageModelConfig) -> None:
         """Prepare the connection; nothing is sent yet.
@@ -107,13 +112,13 @@ class ModelClient:
         """
         try:
             import openai
-            import PIL  # noqa: F401
         except ImportError as error:
             raise MissingExtraError(
-                "perception by a vision-language model needs the openai client and Pillow; "
-                "install them with: pip install 'prior-reinforce[vlm]'"
+                "perception by a vision-language model needs the openai client; install it with: "
+                "pip install 'prior-reinforce[vlm]'"
             ) from error
         self.config = config
+        self.model = config.model
         # A proxy, set for the internet at large, does not know a server on this machine.
         is_here = urlsplit(config.base_url).hostname in _THIS_MACHINE
         self._client = openai.OpenAI(
@@ -123,73 +128,23 @@ class ModelClient:
             max_retries=config.max_retries,
             http_client=openai.DefaultHttpxClient(trust_env=not is_here),
         )
+        self._sent: tuple[object, str] = (None, "")
 
-    def prepare(self, picture: np.ndarray) -> SentPicture:
-        """Shrink a picture if need be, and encode it once for all requests.
-
-        Args:
-            picture: Shape (height, width, 3), dtype uint8, RGB.
-        """
-        from PIL import Image
-
-        image = Image.fromarray(picture)
-        size = image.size
-        sent = size_to_send(*size, self.config.max_image_side, FORMATS[self.config.family])
-        if sent != size:
-            image = image.resize(sent, Image.Resampling.LANCZOS)
-        data = io.BytesIO()
-        image.save(data, format="PNG")
-        encoded = base64.b64encode(data.getvalue()).decode()
-        return SentPicture(f"data:image/png;base64,{encoded}", sent, size)
-
-    def ask(self, words: str, picture: SentPicture) -> Answer:
-        """Ask for one object in a picture.
-
-        Args:
-            words: The object, for instance `the orange ball`.
-            picture: What `prepare` made of it.
-
-        Returns:
-            What came back, readable or not; a box is in pixels of the picture as taken.
-
-        Raises:
-            EndpointError: Nothing came back, and trying again at once will not help.
-        """
-        text, thinking, reason = self._request(words, picture.url)
-        try:
-            if reason == "length":
-                raise UnreadableAnswerError("cut off at max_tokens")
-            sent_box = read_box(text, FORMATS[self.config.family], picture.sent_size)
-        except UnreadableAnswerError as error:
-            absent = isinstance(error, NotInPictureError)
-            return Answer(text, thinking, reason, problem=str(error), absent=absent)
-        per_x = picture.size[0] / picture.sent_size[0]
-        per_y = picture.size[1] / picture.sent_size[1]
-        left, top, right, bottom = sent_box
-        box = (left * per_x, top * per_y, right * per_x, bottom * per_y)
-        return Answer(text, thinking, reason, box)
-
-    def close(self) -> None:
-        """Close the connections."""
-        self._client.close()
-
-    def _request(self, words: str, url: str) -> tuple[str, str | None, str | None]:
-        """Return the answer's text, its separate thoughts, and why it stopped."""
+    def ask(self, words: str, picture: Picture) -> Answer:
+        """See `ModelClient.ask`."""
         import openai
 
+        if self._sent[0] is not picture:  # the same picture is asked about several times
+            self._sent = (picture, _png_address(picture))
         prompt = FORMATS[self.config.family].prompt.format(words=words)
+        content: list[Any] = [
+            {"type": "image_url", "image_url": {"url": self._sent[1]}},
+            {"type": "text", "text": prompt},
+        ]
         try:
             completion = self._client.chat.completions.create(
                 model=self.config.model,
-                messages=[
-                    {
-                        "role": "user",
-                        "content": [
-                            {"type": "image_url", "image_url": {"url": url}},
-                            {"type": "text", "text": prompt},
-                        ],
-                    }
-                ],
+                messages=[{"role": "user", "content": content}],
                 temperature=self.config.temperature,
                 max_tokens=self.config.max_tokens,
                 extra_body=_extra_body(self.config),
@@ -205,7 +160,19 @@ class ModelClient:
             )
         message = choices[0].message
         thinking = getattr(message, "reasoning_content", None)
-        return message.content or "", thinking, choices[0].finish_reason
+        return Answer(message.content or "", thinking, choices[0].finish_reason)
+
+    def close(self) -> None:
+        """Close the connections."""
+        self._client.close()
+
+
+def _png_address(picture: Picture) -> str:
+    from PIL import Image
+
+    data = io.BytesIO()
+    Image.fromarray(picture).save(data, format="PNG")
+    return f"data:image/png;base64,{base64.b64encode(data.getvalue()).decode()}"
 
 
 def _key(config: VisionLanguageModelConfig) -> str:

@@ -12,9 +12,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from jaxtyping import Float
 
-from prior_reinforce.errors import MissingExtraError
 from prior_reinforce.perception.vlm_formats import Box
+from prior_reinforce.rendering import Picture
 
 if TYPE_CHECKING:
     from PIL import ImageDraw
@@ -50,8 +51,8 @@ class Sighting:
     answers: tuple[Answer, ...]
     box: Box | None = None
     """Median box of the answers that agree, in pixels of the picture."""
-    place: np.ndarray | None = None
-    """Centre of `box` on the calibrated plane, table frame, shape (2,), in [m]."""
+    place: Float[np.ndarray, "2"] | None = None
+    """Centre of `box` on the calibrated plane, table frame, in [m]."""
     problem: str | None = None
     """Why there is no place."""
     unanswered: bool = False
@@ -62,15 +63,15 @@ class Sighting:
 class Reading:
     """One picture, read."""
 
-    picture: np.ndarray
-    """What was shown, shape (height, width, 3), dtype uint8."""
+    picture: Picture
+    """What was shown."""
     model: str
     """Who was asked."""
     reached: Sighting
     goal: Sighting | None
     """None where `reached` failed already, and nobody was asked."""
-    goal_place: np.ndarray | None = None
-    """The goal, as far from its object's centre as the scene says, shape (2,), in [m]."""
+    goal_place: Float[np.ndarray, "2"] | None = None
+    """The goal, as far from its object's centre as the scene says, in [m]."""
     goal_pixel: tuple[float, float] | None = None
     """The goal in the picture."""
 
@@ -85,24 +86,16 @@ class Reading:
         return self.reached.unanswered or (self.goal is not None and self.goal.unanswered)
 
     @property
-    def error_seen(self) -> np.ndarray | None:
-        """Reached place minus goal, shape (2,), in [m]; None where there is a problem."""
+    def error_seen(self) -> Float[np.ndarray, "2"] | None:
+        """Reached place minus goal, in [m]; None where there is a problem."""
         if self.reached.place is None or self.goal_place is None:
             return None
         return self.reached.place - self.goal_place
 
-    def drawn(self) -> np.ndarray:
-        """Return the picture with boxes, agreed ones thick, single answers thin, and the error.
+    def drawn(self) -> Picture:
+        """Return the picture with boxes, agreed ones thick, single answers thin, and the error."""
+        from PIL import Image, ImageDraw
 
-        Raises:
-            MissingExtraError: Pillow is not installed.
-        """
-        try:
-            from PIL import Image, ImageDraw
-        except ImportError as error:
-            raise MissingExtraError(
-                "drawing boxes needs Pillow; install it with: pip install 'prior-reinforce[vlm]'"
-            ) from error
         image = Image.fromarray(self.picture)
         pen = ImageDraw.Draw(image)
         found = [(self.reached, REACHED_COLOUR)]

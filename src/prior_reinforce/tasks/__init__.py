@@ -1,42 +1,27 @@
 """Env: dynamic manipulation tasks in contact physics. Each a `.py` with its `.xml`."""
 
-from prior_reinforce.registry import make_own
-from prior_reinforce.tasks.base import Task
-from prior_reinforce.tasks.basketball import BasketballShot
-from prior_reinforce.tasks.basketball_v2 import BasketballShotV2
-from prior_reinforce.tasks.basketball_v3 import BasketballShotV3
-from prior_reinforce.tasks.curling import Curling
-from prior_reinforce.tasks.fishing import Fishing
+from __future__ import annotations
 
-FAMILY: tuple[type[Task], ...] = (
-    BasketballShot,
-    BasketballShotV2,
-    BasketballShotV3,
-    Curling,
-    Fishing,
+from typing import TYPE_CHECKING
+
+from prior_reinforce.registry import Member, Registry
+
+if TYPE_CHECKING:
+    from prior_reinforce.tasks.base import Task
+
+_HERE = "prior_reinforce.tasks"
+_SHOT = f"{_HERE}.basketball:BasketballShot"
+
+TASKS: Registry[Task] = Registry(
+    "task",
+    f"{_HERE}.base:Task",
+    {
+        "basketball-v1": Member(_SHOT, "throw a ball into a hoop"),
+        "basketball-v2": Member(_SHOT, "the same with a shorter spoon", {"hardware": "v2"}),
+        "basketball-v3": Member(_SHOT, "a smaller ball and a cup", {"hardware": "v3"}),
+        "curling": Member(f"{_HERE}.curling:Curling", "slide a stone to a target"),
+        "fishing": Member(f"{_HERE}.fishing:Fishing", "swing a hook onto a magnet"),
+    },
 )
-"""Every task that can be named on the command line."""
 
-
-def make_task(name: str) -> Task:
-    """Make a task by its name, or one's own by `module:Class`.
-
-    Raises:
-        ConfigurationError: There is no such task; the message lists them.
-    """
-    known = {kind.name: kind for kind in FAMILY}
-    if name in known:
-        return known[name]()
-    return make_own(name, Task, list(known))
-
-
-__all__ = [
-    "FAMILY",
-    "BasketballShot",
-    "BasketballShotV2",
-    "BasketballShotV3",
-    "Curling",
-    "Fishing",
-    "Task",
-    "make_task",
-]
+make_task = TASKS.make

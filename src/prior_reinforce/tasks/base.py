@@ -8,12 +8,16 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
-from typing import ClassVar
 
 import numpy as np
+from jaxtyping import Float
+from numpy.typing import ArrayLike
 
+from prior_reinforce.arrays import Points
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
+from prior_reinforce.rendering import Picture
 from prior_reinforce.rollouts import Rollout
+from prior_reinforce.scene import TableScene
 
 
 class Task(ABC):
@@ -23,21 +27,23 @@ class Task(ABC):
     x forward, y left, z up, in [m].
     """
 
-    name: ClassVar[str]
-    """Name on the command line and in results, for instance `basketball-v1`."""
-    format: ClassVar[PlanFormat]
+    name: str
+    """Name in results and messages, for instance `basketball-v1`."""
+    format: PlanFormat
     """What a frame of a plan means, and how fast frames follow each other."""
-    outcome_names: ClassVar[tuple[str, ...]] = ("x", "y")
+    outcome_names: tuple[str, ...] = ("x", "y")
     """Names of the k components of an outcome."""
-    tolerance: ClassVar[float]
+    tolerance: float
     """epsilon of the paper: largest true error that counts as reached, in [m]."""
-    region: ClassVar[np.ndarray]
-    """Reachable region of goals, a box: lower and upper corner, shape (2, k), in [m]."""
-    demonstration_sets: ClassVar[tuple[str, ...]] = ("A", "B")
+    region: Float[np.ndarray, "2 k"]
+    """Reachable region of goals, a box: lower and upper corner, in [m]."""
+    demonstration_sets: tuple[str, ...] = ("A", "B")
     """Names of the shipped prior sets."""
+    scene: TableScene | None = None
+    """What tells the error in a picture from above; None where no picture does."""
 
     @abstractmethod
-    def rollout(self, plans: np.ndarray, rng: np.random.Generator | None) -> list[Rollout]:
+    def rollout(self, plans: ArrayLike, rng: np.random.Generator | None) -> list[Rollout]:
         """Execute plans open loop, each from rest in its own first frame.
 
         Args:
@@ -62,15 +68,15 @@ class Task(ABC):
     @abstractmethod
     def film(
         self,
-        plan: np.ndarray,
-        goal: np.ndarray,
+        plan: ArrayLike,
+        goal: ArrayLike,
         rng: np.random.Generator | None = None,
         *,
         width: int = 640,
         height: int = 480,
         frames_per_second: int = 30,
         camera: str = "film",
-    ) -> Iterator[np.ndarray]:
+    ) -> Iterator[Picture]:
         """Execute one plan with the goal's object in place and draw it, frame by frame.
 
         Args:
@@ -82,18 +88,13 @@ class Task(ABC):
             frames_per_second: Of simulated time.
             camera: A camera of the scene: `film` or `birdseye`.
 
-        Yields:
-            Pictures, shape (height, width, 3), dtype uint8.
-
         Raises:
             RenderingUnavailableError: There is no OpenGL on this machine.
+            InvalidPlanError: Wrong shape, or values that are not finite.
+            InvalidGoalError: Wrong shape, or values that are not finite.
         """
 
-    def sample_goals(self, n: int, rng: np.random.Generator) -> np.ndarray:
-        """Draw n goals uniformly from the reachable region (paper, Evaluation Protocol).
-
-        Returns:
-            Goals, shape (n, k), in [m].
-        """
+    def sample_goals(self, n: int, rng: np.random.Generator) -> Points:
+        """Draw n goals uniformly from the reachable region (paper, Evaluation Protocol)."""
         low, high = self.region
         return rng.uniform(low, high, size=(n, low.shape[0]))

@@ -1,33 +1,68 @@
-"""Basketball Shot V1: the Panda throws a ball from a spoon into a hoop on the table.
+"""Basketball Shot: the Panda throws a ball from a spoon into a hoop on the table.
 
 The ball lies in the spoon and leaves it because the spoon brakes and tips; nothing else holds or
 frees it. The outcome is where the ball's centre comes down through the plane of the hoop's rim.
-The scene is in `basketball.xml`, the arm in `panda.xml`; lengths in [m], table frame. V2 and V3
-are the same throw with other hardware: `basketball_v2.py`, `basketball_v3.py`.
+The same throw has three hardwares (paper, Section V-A and hardware figure). V2 and V3 are thrown
+with V1's demonstrations and the outcomes they had on V1, unchanged: these promise more than the
+hardware gives, and adaptation has to find out by how much.
+The scenes are in `basketball.xml`, `basketball_v2.xml` and `basketball_v3.xml`, the arm in
+`panda.xml`; lengths in [m], table frame.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
 
 import mujoco
 import numpy as np
+from jaxtyping import Float
 
+from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.plans.motions import PlanFormat
-from prior_reinforce.rollouts import KeyFrame, Rollout
-from prior_reinforce.tasks.panda import JOINT_NAMES, N_JOINTS, STEP
-from prior_reinforce.tasks.panda_task import Draws, PandaTask
+from prior_reinforce.rollouts import Rollout
+from prior_reinforce.scene import SeenObject, TableScene
+from prior_reinforce.tasks.panda import JOINT_NAMES, N_JOINTS
+from prior_reinforce.tasks.panda_task import Draws, PandaTask, first_descent
 
 RIM_HEIGHT = 0.10
 """Height of the rim's plane (V3: the cup's) above the table, in [m]; ours, the paper does not
 give it."""
-_LOST = np.zeros(2)
-"""Outcome of a ball that never comes down through the rim's plane: the robot's own base."""
 
 
 @dataclass(frozen=True)
-class Disturbances:
+class Hardware:
+    """Spoon, ball and goal."""
+
+    xml: str
+    """File name of the scene."""
+    tolerance: float
+    """Clean pass, (free diameter - ball) / 2: (9.0 - 6.0) cm / 2, V3 (7.5 - 5.0) cm / 2; in [m]."""
+    scene: TableScene
+    """What a camera sees of them."""
+
+
+_BALL_AND_HOOP = TableScene(
+    SeenObject("the orange ball", 0.06), SeenObject("the red hoop", 0.10), plane_height=RIM_HEIGHT
+)
+HARDWARE = {
+    "v1": Hardware("basketball.xml", 0.015, _BALL_AND_HOOP),
+    # V1 with a shorter spoon.
+    "v2": Hardware("basketball_v2.xml", 0.015, _BALL_AND_HOOP),
+    # V2 with a smaller, lighter ball and a smaller white cup, its rim 8.3 cm wide outside.
+    "v3": Hardware(
+        "basketball_v3.xml",
+        0.0125,
+        TableScene(
+            SeenObject("the orange ball", 0.05),
+            SeenObject("the red rim of the cup", 0.083),
+            plane_height=RIM_HEIGHT,
+        ),
+    ),
+}
+
+
+@dataclass(frozen=True)
+class BasketballDisturbances:
     """What differs between two executions of one plan; standard deviations, ours.
 
     Together they spread the landing point of a repeated plan by about half a centimetre along
@@ -45,33 +80,38 @@ class Disturbances:
 
 
 class BasketballShot(PandaTask):
-    """Basketball Shot V1 (paper, Section III and Figure 3), in MuJoCo."""
+    """Basketball Shot (paper, Section III and Figure 3), in MuJoCo."""
 
-    name: ClassVar[str] = "basketball-v1"
-    format: ClassVar[PlanFormat] = PlanFormat(JOINT_NAMES, ("rad",) * N_JOINTS, 0.0125)
-    outcome_names: ClassVar[tuple[str, ...]] = ("x", "y")
-    tolerance: ClassVar[float] = 0.015  # clean pass: (9.0 cm - 6.0 cm) / 2
-    region: ClassVar[np.ndarray] = np.array([[0.92, -0.26], [1.18, 0.26]])
-    scene: ClassVar[str] = "basketball"
-    recordings: ClassVar[str] = "basketball"  # V2 and V3 are thrown with V1's demonstrations
-    lead_in: ClassVar[float] = 0.2  # the ball settles in the spoon
-    lead_out: ClassVar[float] = 0.9  # the longest fall takes 0.5 s
-    batch: ClassVar[int] = 64  # 40 MB of recorded states
+    format = PlanFormat(JOINT_NAMES, ("rad",) * N_JOINTS, 0.0125)
+    region = np.array([[0.92, -0.26], [1.18, 0.26]])
+    recordings = "basketball"
+    lead_in = 0.2  # the ball settles in the spoon
+    lead_out = 0.9  # the longest fall takes 0.5 s
+    batch = 64  # 40 MB of recorded states
 
-    def __init__(self, disturbances: Disturbances | None = None) -> None:
+    def __init__(
+        self, hardware: str = "v1", disturbances: BasketballDisturbances | None = None
+    ) -> None:
         """Compile the scene.
 
         Args:
+            hardware: One of `HARDWARE`.
             disturbances: How repeated executions differ; the documented ones when not given.
+
+        Raises:
+            ConfigurationError: There is no such hardware.
         """
-        self.disturbances = disturbances or Disturbances()
+        if hardware not in HARDWARE:
+            raise ConfigurationError(
+                f"no hardware {hardware!r} of Basketball Shot; use one of {', '.join(HARDWARE)}"
+            )
+        self.name = f"basketball-{hardware}"
+        self.xml, self.tolerance = HARDWARE[hardware].xml, HARDWARE[hardware].tolerance
+        self.scene = HARDWARE[hardware].scene
+        self.disturbances = disturbances or BasketballDisturbances()
         super().__init__()
         self._bowl = np.flatnonzero(self.model.geom_bodyid == self.model.body("tool/bowl").id)
         self._ball = self.model.jnt_qposadr[self.model.joint("ball").id]
-
-    def joint_plans(self, plans: np.ndarray) -> np.ndarray:
-        """A plan is the joint path."""
-        return plans
 
     def _draw(self, n: int, rng: np.random.Generator) -> Draws:
         size = self.disturbances
@@ -80,29 +120,22 @@ class BasketballShot(PandaTask):
         servo = 1.0 + rng.normal(0.0, size.servo, (n, N_JOINTS))
         return Draws(pose, servo, 1.0 + rng.normal(0.0, size.friction, (n, 1)), ball)
 
-    def _disturb(self, model: mujoco.MjModel, scene: np.ndarray) -> None:
+    def _disturb(self, model: mujoco.MjModel, scene: Float[np.ndarray, "1"]) -> None:
         model.geom_friction[self._bowl, 0] *= scene[0]
 
-    def _place(self, data: mujoco.MjData, start: np.ndarray | None) -> None:
+    def _place(self, data: mujoco.MjData, start: Float[np.ndarray, "2"] | None) -> None:
         """The ball lies in the spoon."""
         seat = data.site("tool/seat")
         offset = 0.0 if start is None else seat.xmat.reshape(3, 3)[:, :2] @ start
         data.qpos[self._ball : self._ball + 3] = seat.xpos + offset
 
-    def _result(self, states: np.ndarray, sensors: np.ndarray) -> Rollout:
-        """Where the ball's centre first passes the rim's plane downwards, the hoop out of the way.
-
-        A ball that never does is lost, with outcome (0, 0), where no goal can be.
-        """
-        qpos = states[:, 1 : 1 + self.model.nq]
-        ball = qpos[:, self._ball : self._ball + 3]
-        down = np.flatnonzero((ball[:-1, 2] >= RIM_HEIGHT) & (ball[1:, 2] < RIM_HEIGHT))
-        if not down.size:
-            frame = KeyFrame(self.model, qpos[-1].copy(), len(qpos) * STEP - self.lead_in)
-            return Rollout(_LOST.copy(), valid=False, key_frame=frame)
-        before, after = ball[down[0]], ball[down[0] + 1]
-        part = (before[2] - RIM_HEIGHT) / (before[2] - after[2])
-        outcome = before[:2] + part * (after[:2] - before[:2])
+    def _result(
+        self, states: Float[np.ndarray, "steps s"], sensors: Float[np.ndarray, "steps m"]
+    ) -> Rollout:
+        """Where the ball's centre first falls through the rim's plane, the hoop out of the way."""
+        descent = first_descent(states[:, 1 + self._ball : 4 + self._ball], RIM_HEIGHT)
+        if descent is None:
+            return self._lost(states)
+        row, part, place = descent
         # State k of a rollout is the one after k + 1 steps.
-        time = (down[0] + 1 + part) * STEP - self.lead_in
-        return Rollout(outcome, True, KeyFrame(self.model, qpos[down[0] + 1].copy(), float(time)))
+        return Rollout(place, True, self._key_frame(states[row + 1], row + 1 + part))

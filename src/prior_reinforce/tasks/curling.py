@@ -10,14 +10,15 @@ lengths in [m], table frame.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import ClassVar
 
 import mujoco
 import numpy as np
+from jaxtyping import Float
 
 from prior_reinforce.plans.motions import PlanFormat
-from prior_reinforce.rollouts import KeyFrame, Rollout
-from prior_reinforce.tasks.panda import JOINT_NAMES, N_JOINTS, STEP
+from prior_reinforce.rollouts import Rollout
+from prior_reinforce.scene import SeenObject, TableScene
+from prior_reinforce.tasks.panda import JOINT_NAMES, N_JOINTS
 from prior_reinforce.tasks.panda_task import ArmDisturbances, Draws, PandaTask
 
 STONE_START = np.array([0.43, 0.0])
@@ -28,15 +29,13 @@ STONE_RADIUS = 0.03
 FRICTION = 0.12
 """Of the stone on the table [-]; in `curling.xml` too. Ours: a waxed board. Less would need
 gentler pushes whose length is more sensitive to speed, more would need a faster arm."""
-TARGET_OFFSET = np.array([0.08, 0.0])
-"""From a goal to the centre of the target stone behind it, (x, y) in [m]; in `curling.xml` too.
+TARGET_BEHIND = 0.08
+"""From a goal to the centre of the target stone behind it, along x, in [m]; in `curling.xml` too.
 Ours: a gap of 2 cm between two stones, so that a success never touches the target."""
-_LOST = np.zeros(2)
-"""Outcome of a stone that leaves the table: the robot's own base."""
 
 
 @dataclass(frozen=True)
-class Disturbances:
+class CurlingDisturbances:
     """What differs between two executions of one plan; standard deviations, ours.
 
     Together they spread the resting place of a repeated plan by 0.34 cm along x and 0.12 cm along y
@@ -53,22 +52,28 @@ class Disturbances:
 class Curling(PandaTask):
     """Curling (paper, Section III and Figure 3), in MuJoCo."""
 
-    name: ClassVar[str] = "curling"
-    format: ClassVar[PlanFormat] = PlanFormat(JOINT_NAMES, ("rad",) * N_JOINTS, 0.0125)
-    tolerance: ClassVar[float] = 0.01  # ours (docs/tasks/curling.md)
-    region: ClassVar[np.ndarray] = np.array([[0.78, -0.20], [1.03, 0.20]])
-    scene: ClassVar[str] = "curling"
-    recordings: ClassVar[str] = "curling"
-    lead_in: ClassVar[float] = 0.1
-    lead_out: ClassVar[float] = 1.5  # the fastest stone slides for 1 s
+    name = "curling"
+    format = PlanFormat(JOINT_NAMES, ("rad",) * N_JOINTS, 0.0125)
+    tolerance = 0.01  # ours (docs/tasks/curling.md)
+    region = np.array([[0.78, -0.20], [1.03, 0.20]])
+    scene = TableScene(
+        SeenObject("the curling stone with the blue handle", 2 * STONE_RADIUS),
+        SeenObject("the curling stone with the red handle", 2 * STONE_RADIUS),
+        plane_height=0.02,  # both stones lie on the table and are 3 cm high
+        goal_offset=(-TARGET_BEHIND, 0.0),
+    )
+    xml = "curling.xml"
+    recordings = "curling"
+    lead_in = 0.1
+    lead_out = 1.5  # the fastest stone slides for 1 s
 
-    def __init__(self, disturbances: Disturbances | None = None) -> None:
+    def __init__(self, disturbances: CurlingDisturbances | None = None) -> None:
         """Compile the scene.
 
         Args:
             disturbances: How repeated executions differ; the documented ones when not given.
         """
-        self.disturbances = disturbances or Disturbances()
+        self.disturbances = disturbances or CurlingDisturbances()
         super().__init__()
         stone = self.model.body("stone")
         self._stone = self.model.jnt_qposadr[stone.jntadr[0]]
@@ -77,28 +82,24 @@ class Curling(PandaTask):
             & (self.model.geom_type == mujoco.mjtGeom.mjGEOM_SPHERE)
         )
 
-    def joint_plans(self, plans: np.ndarray) -> np.ndarray:
-        """A plan is the joint path."""
-        return plans
-
     def _draw(self, n: int, rng: np.random.Generator) -> Draws:
         pose, servo = self.disturbances.arm.draw(n, rng)
         friction = 1.0 + rng.normal(0.0, self.disturbances.friction, (n, 1))
         return Draws(pose, servo, friction, rng.normal(0.0, self.disturbances.stone, (n, 2)))
 
-    def _disturb(self, model: mujoco.MjModel, scene: np.ndarray) -> None:
+    def _disturb(self, model: mujoco.MjModel, scene: Float[np.ndarray, "1"]) -> None:
         model.geom_friction[self._feet, 0] *= scene[0]
 
-    def _place(self, data: mujoco.MjData, start: np.ndarray | None) -> None:
+    def _place(self, data: mujoco.MjData, start: Float[np.ndarray, "2"] | None) -> None:
         """The stone starts at `STONE_START`, where the scene has it."""
         if start is not None:
             data.qpos[self._stone : self._stone + 2] += start
 
-    def _result(self, states: np.ndarray, sensors: np.ndarray) -> Rollout:
+    def _result(
+        self, states: Float[np.ndarray, "steps s"], sensors: Float[np.ndarray, "steps m"]
+    ) -> Rollout:
         """Where the stone is at the end of an execution, at rest on the table."""
-        qpos = states[-1, 1 : 1 + self.model.nq].copy()
-        stone = qpos[self._stone : self._stone + 3]
-        frame = KeyFrame(self.model, qpos, len(states) * STEP - self.lead_in)
+        stone = states[-1, 1 + self._stone : 4 + self._stone]
         if stone[2] < 0.0:
-            return Rollout(_LOST.copy(), valid=False, key_frame=frame)
-        return Rollout(stone[:2].copy(), True, frame)
+            return self._lost(states)
+        return Rollout(stone[:2].copy(), True, self._key_frame(states[-1], len(states)))

@@ -11,16 +11,17 @@ The scene is in `fishing.xml`, the arm in `panda.xml`; lengths in [m], table fra
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import ClassVar
 
 import mujoco
 import numpy as np
+from jaxtyping import Float
 
+from prior_reinforce.arrays import Plans
 from prior_reinforce.plans.motions import PlanFormat
-from prior_reinforce.rollouts import KeyFrame, Rollout
+from prior_reinforce.rollouts import Rollout
+from prior_reinforce.scene import SeenObject, TableScene
 from prior_reinforce.tasks.inverse_kinematics import POSE_NAMES, POSE_UNITS, joint_paths
-from prior_reinforce.tasks.panda import STEP
-from prior_reinforce.tasks.panda_task import ArmDisturbances, Draws, PandaTask
+from prior_reinforce.tasks.panda_task import ArmDisturbances, Draws, PandaTask, first_descent
 
 HOOK_RADIUS = 0.006
 """In [m]; in `fishing.xml` too. The hook touches the table where its centre is so high."""
@@ -29,12 +30,10 @@ TABLE = np.array([[0.35, -0.5], [1.35, 0.5]])
 _PULL, _GRIP = 200.0, 1.5
 """The magnet's force on a hook within its reach, in [N/m] and [N s/m]; for films only, and ours: it
 stops the hook within a centimetre and then holds against the rope."""
-_LOST = np.zeros(2)
-"""Outcome of a hook that never touches the table: the robot's own base."""
 
 
 @dataclass(frozen=True)
-class Disturbances:
+class FishingDisturbances:
     """What differs between two executions of one plan; standard deviations, ours.
 
     Together they spread the hook's first touch by about 0.3 cm (docs/tasks/fishing.md).
@@ -51,29 +50,35 @@ class Disturbances:
 class Fishing(PandaTask):
     """Fishing Rod Swinging (paper, Section III and Figure 3), in MuJoCo."""
 
-    name: ClassVar[str] = "fishing"
-    format: ClassVar[PlanFormat] = PlanFormat(POSE_NAMES, POSE_UNITS, 0.02)
-    tolerance: ClassVar[float] = 0.01  # the paper's magnet catches the hook within about 1 cm
-    region: ClassVar[np.ndarray] = np.array([[0.78, -0.20], [0.98, 0.20]])
-    scene: ClassVar[str] = "fishing"
-    recordings: ClassVar[str] = "fishing"
-    lead_in: ClassVar[float] = 0.1
-    lead_out: ClassVar[float] = 0.4
+    name = "fishing"
+    format = PlanFormat(POSE_NAMES, POSE_UNITS, 0.02)
+    tolerance = 0.01  # the paper's magnet catches the hook within about 1 cm
+    region = np.array([[0.78, -0.20], [0.98, 0.20]])
+    # The hook is a bead of 12 mm that touches the table; the magnet lies on a disc of 2 cm.
+    scene = TableScene(
+        SeenObject("the red hook", 2 * HOOK_RADIUS),
+        SeenObject("the yellow disc", 0.02),
+        plane_height=0.003,
+    )
+    xml = "fishing.xml"
+    recordings = "fishing"
+    lead_in = 0.1
+    lead_out = 0.4
 
-    def __init__(self, disturbances: Disturbances | None = None) -> None:
+    def __init__(self, disturbances: FishingDisturbances | None = None) -> None:
         """Compile the scene.
 
         Args:
             disturbances: How repeated executions differ; the documented ones when not given.
         """
-        self.disturbances = disturbances or Disturbances()
+        self.disturbances = disturbances or FishingDisturbances()
         super().__init__()
         self._swivel = self.model.jnt_qposadr[self.model.joint("tool/swivel").id]
         self._hook = self.model.sensor("tool/hook").adr[0]
         balls = np.flatnonzero(self.model.jnt_type == mujoco.mjtJoint.mjJNT_BALL)
         self._bends = balls[self.model.jnt_stiffness[balls] > 0]
 
-    def joint_plans(self, plans: np.ndarray) -> np.ndarray:
+    def joint_plans(self, plans: Plans) -> Float[np.ndarray, "n H 7"]:
         """Follow the poses with the arm, within its limits."""
         return joint_paths(plans, self.format.dt)
 
@@ -82,13 +87,13 @@ class Fishing(PandaTask):
         rope = 1.0 + rng.normal(0.0, self.disturbances.rope, (n, 2))
         return Draws(pose, servo, rope, rng.normal(0.0, self.disturbances.sway, (n, 2)))
 
-    def _disturb(self, model: mujoco.MjModel, scene: np.ndarray) -> None:
+    def _disturb(self, model: mujoco.MjModel, scene: Float[np.ndarray, "2"]) -> None:
         stiffness, damping = scene
         model.jnt_stiffness[self._bends] *= stiffness
         dofs = (model.jnt_dofadr[self._bends][:, None] + np.arange(3)).ravel()
         model.dof_damping[dofs] *= damping
 
-    def _place(self, data: mujoco.MjData, start: np.ndarray | None) -> None:
+    def _place(self, data: mujoco.MjData, start: Float[np.ndarray, "2"] | None) -> None:
         """Let the rope hang: the swivel undoes the rod's attitude, every segment is straight.
 
         This is the settled state itself, because the swivel has no spring and the others are
@@ -104,7 +109,7 @@ class Fishing(PandaTask):
         mujoco.mju_mulQuat(hanging, upright, quat)
         data.qpos[self._swivel : self._swivel + 4] = hanging
 
-    def _act_at_goal(self, data: mujoco.MjData, goal: np.ndarray) -> None:
+    def _act_at_goal(self, data: mujoco.MjData, goal: Float[np.ndarray, "2"]) -> None:
         """The magnet holds a hook that is within its reach."""
         hook = data.geom("tool/hook")
         off = np.append(goal, HOOK_RADIUS) - hook.xpos
@@ -114,19 +119,14 @@ class Fishing(PandaTask):
         near = np.linalg.norm(off) <= self.tolerance
         data.xfrc_applied[body, :3] = near * (_PULL * off - _GRIP * velocity[3:])
 
-    def _result(self, states: np.ndarray, sensors: np.ndarray) -> Rollout:
+    def _result(
+        self, states: Float[np.ndarray, "steps s"], sensors: Float[np.ndarray, "steps m"]
+    ) -> Rollout:
         """Where the hook first touches the table, between two steps by linear interpolation."""
-        hook = sensors[:, self._hook : self._hook + 3]
-        touches = np.flatnonzero((hook[:-1, 2] > HOOK_RADIUS) & (hook[1:, 2] <= HOOK_RADIUS))
-        if touches.size:
-            first = int(touches[0])
-            before, after = hook[first], hook[first + 1]
-            part = (before[2] - HOOK_RADIUS) / (before[2] - after[2])
-            place = before[:2] + part * (after[:2] - before[:2])
+        descent = first_descent(sensors[:, self._hook : self._hook + 3], HOOK_RADIUS)
+        if descent is not None:
+            row, part, place = descent
             if np.all((TABLE[0] <= place) & (place <= TABLE[1])):
-                qpos = states[first, 1 : 1 + self.model.nq].copy()  # after first + 1 steps
-                time = float((first + part) * STEP - self.lead_in)
-                return Rollout(place, True, KeyFrame(self.model, qpos, time))
-        qpos = states[-1, 1 : 1 + self.model.nq].copy()
-        frame = KeyFrame(self.model, qpos, len(states) * STEP - self.lead_in)
-        return Rollout(_LOST.copy(), valid=False, key_frame=frame)
+                # The sensors of a row are those of the state before it.
+                return Rollout(place, True, self._key_frame(states[row], row + part))
+        return self._lost(states)

@@ -15,9 +15,11 @@ from pathlib import Path
 import mink
 import mujoco
 import numpy as np
+from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
-from prior_reinforce.tasks.panda import LIMITS, N_JOINTS
+from prior_reinforce.robots.limits import PANDA
+from prior_reinforce.tasks.panda import N_JOINTS
 
 POSE_NAMES = ("x", "y", "z", "rx", "ry", "rz")
 POSE_UNITS = ("m", "m", "m", "rad", "rad", "rad")
@@ -40,30 +42,27 @@ _ARRIVED = 1e-9
 """Largest joint motion of a step that counts as none, in [rad]."""
 
 
-def to_matrix(rotation_vectors: np.ndarray) -> np.ndarray:
-    """Flange attitudes as rotation matrices (..., 3, 3) from rotation vectors (..., 3) in [rad]."""
+def to_matrix(rotation_vectors: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3 3"]:
+    """Flange attitudes as rotation matrices, from rotation vectors in [rad]."""
     vectors = np.array(rotation_vectors, dtype=float)  # SciPy wants a writable array
     return Rotation.from_rotvec(vectors).as_matrix() @ NOMINAL
 
 
-def to_rotation_vector(attitudes: np.ndarray) -> np.ndarray:
-    """Rotation vectors (..., 3) in [rad] from flange attitudes (..., 3, 3): undoes `to_matrix`."""
+def to_rotation_vector(attitudes: Float[np.ndarray, "*n 3 3"]) -> Float[np.ndarray, "*n 3"]:
+    """Rotation vectors in [rad] from flange attitudes: undoes `to_matrix`."""
     return Rotation.from_matrix(attitudes @ NOMINAL.T).as_rotvec()
 
 
-def joint_paths(poses: np.ndarray, dt: float) -> np.ndarray:
-    """Joint paths that carry the flange along pose paths as well as the arm's limits allow.
+def joint_paths(poses: Float[np.ndarray, "n H 6"], dt: float) -> Float[np.ndarray, "n H 7"]:
+    """Joint paths that carry the flange along pose paths, as well as the arm allows; in [rad].
 
     Every frame is solved from the one before it as a quadratic program (mink, DAQP) with the
     Panda's position and velocity limits as bounds. Where a path asks for more than they allow the
     arm lags behind or stops short, as a real one would, and catches up when it can.
 
     Args:
-        poses: Pose paths, shape (n, H, 6).
+        poses: Pose paths.
         dt: Time between frames, in [s].
-
-    Returns:
-        Joint paths, shape (n, H, 7), in [rad].
     """
     paths = np.empty((*poses.shape[:2], N_JOINTS))
     for path, out in zip(poses, paths, strict=True):
@@ -76,8 +75,8 @@ def _arm() -> mujoco.MjModel:
     return mujoco.MjModel.from_xml_path(str(Path(__file__).with_name("panda.xml")))
 
 
-def _follow(poses: np.ndarray, dt: float, out: np.ndarray) -> None:
-    """Solve one path (H, 6) into `out` (H, 7)."""
+def _follow(poses: Float[np.ndarray, "H 6"], dt: float, out: Float[np.ndarray, "H 7"]) -> None:
+    """Solve one path into `out`."""
     arm = _arm()
     configuration = mink.Configuration(arm, q=READY)
     reach = mink.FrameTask("flange", "site", _POSITION_COST, _ATTITUDE_COST)
@@ -85,7 +84,7 @@ def _follow(poses: np.ndarray, dt: float, out: np.ndarray) -> None:
     elbow.set_target(READY)
     bounds = mink.ConfigurationLimit(arm)
     names = [arm.joint(j).name for j in range(N_JOINTS)]
-    speed = mink.VelocityLimit(arm, dict(zip(names, LIMITS.velocity, strict=True)))
+    speed = mink.VelocityLimit(arm, dict(zip(names, PANDA.velocity, strict=True)))
     attitudes = to_matrix(poses[:, 3:])
 
     def step(limits: list[mink.Limit], seconds: float) -> float:

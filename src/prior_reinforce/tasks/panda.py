@@ -12,24 +12,14 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
+from jaxtyping import Float
 
 from prior_reinforce.plans.interpolation import join_frames
-from prior_reinforce.robots.presets import PANDA as LIMITS
 
 N_JOINTS = 7
 JOINT_NAMES = tuple(f"joint{i}" for i in range(1, N_JOINTS + 1))
 STEP = 0.001
 """Physics and servo period, in [s]: the real arm's control loop runs at 1 kHz."""
-
-__all__ = [
-    "JOINT_NAMES",
-    "LIMITS",
-    "N_JOINTS",
-    "STEP",
-    "build_scene",
-    "servo_controls",
-    "setpoints",
-]
 
 
 def build_scene(path: Path) -> mujoco.MjModel:
@@ -49,8 +39,8 @@ def build_scene(path: Path) -> mujoco.MjModel:
 @lru_cache(maxsize=8)
 def _interpolation(
     horizon: int, dt: float, lead_in: float, n_steps: int
-) -> tuple[np.ndarray, np.ndarray]:
-    """Matrices (n_steps, H) from frames to positions and to velocities at 1 kHz.
+) -> tuple[Float[np.ndarray, "steps H"], Float[np.ndarray, "steps H"]]:
+    """Matrices from frames to positions and to velocities at 1 kHz.
 
     A cubic spline is linear in its frames, so interpolating the identity gives the matrix.
     """
@@ -60,36 +50,38 @@ def _interpolation(
 
 
 def setpoints(
-    plans: np.ndarray, dt: float, n_steps: int, *, lead_in: float = 0.0
-) -> tuple[np.ndarray, np.ndarray]:
+    plans: Float[np.ndarray, "n H 7"], dt: float, n_steps: int, *, lead_in: float = 0.0
+) -> tuple[Float[np.ndarray, "n steps 7"], Float[np.ndarray, "n steps 7"]]:
     """Joint positions and velocities asked for at every servo period.
 
     Frames are joined by a cubic spline with continuous acceleration, at rest at both ends; the
     first frame is held before it and the last one after it.
 
     Args:
-        plans: Shape (n, H, 7), in [rad].
+        plans: Joint paths, in [rad].
         dt: Time between frames, in [s].
         n_steps: Servo periods, counted from the start of the lead-in.
         lead_in: How long the first frame is held, in [s].
 
     Returns:
-        Positions in [rad] and velocities in [rad/s], each of shape (n, n_steps, 7).
+        Positions in [rad] and velocities in [rad/s].
     """
     position, velocity = _interpolation(plans.shape[1], dt, lead_in, n_steps)
     return position @ plans, velocity @ plans
 
 
 def servo_controls(
-    model: mujoco.MjModel, plans: np.ndarray, dt: float, n_steps: int, *, lead_in: float = 0.0
-) -> np.ndarray:
-    """Controls that make the position servos follow the plans with velocity feed-forward.
+    model: mujoco.MjModel,
+    plans: Float[np.ndarray, "n H 7"],
+    dt: float,
+    n_steps: int,
+    *,
+    lead_in: float = 0.0,
+) -> Float[np.ndarray, "n steps 7"]:
+    """Controls in [rad] that make the position servos follow the plans with velocity feed-forward.
 
     A MuJoCo position servo gives kp (ctrl - q) - kv dq; with ctrl = q_d + kv / kp dq_d that is
     kp (q_d - q) + kv (dq_d - dq), the law of the real arm's joint position controllers.
-
-    Returns:
-        Controls, shape (n, n_steps, 7), in [rad].
     """
     position, velocity = setpoints(plans, dt, n_steps, lead_in=lead_in)
     position += velocity * (

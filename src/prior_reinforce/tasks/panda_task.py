@@ -12,24 +12,26 @@ from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar
 
+import joblib
 import mujoco
 import mujoco.rollout
 import numpy as np
+from jaxtyping import Float
+from numpy.typing import ArrayLike
 
-from prior_reinforce.arrays import as_plans
-from prior_reinforce.cores import available_cores
-from prior_reinforce.errors import ConfigurationError, InvalidGoalError
+from prior_reinforce.arrays import Plans, as_goal, as_plans
+from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.plans.motions import Demonstrations
-from prior_reinforce.rendering import open_renderer
-from prior_reinforce.rollouts import Rollout
+from prior_reinforce.rendering import Picture, open_renderer
+from prior_reinforce.rollouts import KeyFrame, Rollout
 from prior_reinforce.tasks.base import Task
 from prior_reinforce.tasks.panda import N_JOINTS, STEP, build_scene, servo_controls
 
 _FOLDER = Path(__file__).parent
 _FULL = mujoco.mjtState.mjSTATE_FULLPHYSICS
-_Batch = tuple[list[mujoco.MjModel], np.ndarray, np.ndarray]
+_Batch = tuple[list[mujoco.MjModel], Float[np.ndarray, "n s"], Float[np.ndarray, "n steps 7"]]
+"""Models (one, or one an execution), initial full physics states, and controls in [rad]."""
 
 
 @dataclass(frozen=True)
@@ -41,8 +43,10 @@ class ArmDisturbances:
     servo: float = 0.03
     """Relative error of every joint's servo stiffness and damping."""
 
-    def draw(self, n: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-        """Pose offsets and servo factors of n executions, shape (n, 7) each."""
+    def draw(
+        self, n: int, rng: np.random.Generator
+    ) -> tuple[Float[np.ndarray, "n 7"], Float[np.ndarray, "n 7"]]:
+        """Pose offsets and servo factors of n executions."""
         pose = rng.normal(0.0, self.pose, (n, N_JOINTS))
         return pose, 1.0 + rng.normal(0.0, self.servo, (n, N_JOINTS))
 
@@ -51,71 +55,73 @@ class ArmDisturbances:
 class Draws:
     """What differs between the executions of one batch; row i belongs to execution i."""
 
-    pose: np.ndarray
-    """Offset of every joint, shape (n, 7), in [rad]."""
-    servo: np.ndarray
-    """Factor on every joint's servo stiffness and damping, shape (n, 7)."""
-    scene: np.ndarray
-    """The task's own numbers for `_disturb`, shape (n, p)."""
-    start: np.ndarray
-    """The task's own numbers for `_place`, shape (n, q)."""
+    pose: Float[np.ndarray, "n 7"]
+    """Offset of every joint, in [rad]."""
+    servo: Float[np.ndarray, "n 7"]
+    """Factor on every joint's servo stiffness and damping."""
+    scene: Float[np.ndarray, "n p"]
+    """The task's own numbers for `_disturb`."""
+    start: Float[np.ndarray, "n q"]
+    """The task's own numbers for `_place`."""
 
 
 class PandaTask(Task):
     """A task in which the Panda executes a plan from rest, and physics decides the rest."""
 
-    scene: ClassVar[str]
-    """File name of the scene without `.xml`."""
-    recordings: ClassVar[str]
+    xml: str
+    """File name of the scene."""
+    recordings: str
     """Shipped prior sets are `demonstrations/<recordings>_<set>.npz`."""
-    lead_in: ClassVar[float]
+    lead_in: float
     """The arm stands in its first frame for so long before the plan begins, in [s]."""
-    lead_out: ClassVar[float]
+    lead_out: float
     """Physics goes on for so long after the last frame, in [s]."""
-    batch: ClassVar[int] = 32
+    batch: int = 32
     """Executions simulated at once: bounds memory at about 100 MB of recorded states. Draws are
     made batch by batch, so the number is part of what a seed means."""
 
     def __init__(self) -> None:
         """Compile the scene."""
-        self.model = build_scene(_FOLDER / f"{self.scene}.xml")
+        self.model = build_scene(_FOLDER / self.xml)
         self.model.opt.timestep = STEP
-        self._workers = [mujoco.MjData(self.model) for _ in range(available_cores())]
+        self._workers = [mujoco.MjData(self.model) for _ in range(joblib.cpu_count())]
         self._scratch = mujoco.MjData(self.model)  # the workers' are busy while it is used
 
-    @abstractmethod
-    def joint_plans(self, plans: np.ndarray) -> np.ndarray:
-        """Joint paths (n, H, 7) in [rad] that plans (n, H, D) stand for."""
+    def joint_plans(self, plans: Plans) -> Float[np.ndarray, "n H 7"]:
+        """Joint paths in [rad] that plans stand for; here a plan is the joint path."""
+        return plans
 
     @abstractmethod
     def _draw(self, n: int, rng: np.random.Generator) -> Draws:
         """Draw what differs between n executions; the order is part of what a seed means."""
 
     @abstractmethod
-    def _disturb(self, model: mujoco.MjModel, scene: np.ndarray) -> None:
-        """Change the task's own constants in a copy of the model by an execution's draws (p,)."""
+    def _disturb(self, model: mujoco.MjModel, scene: Float[np.ndarray, " p"]) -> None:
+        """Change the task's own constants in a copy of the model by an execution's draws."""
 
     @abstractmethod
-    def _place(self, data: mujoco.MjData, start: np.ndarray | None) -> None:
+    def _place(self, data: mujoco.MjData, start: Float[np.ndarray, " q"] | None) -> None:
         """Put the task's objects where they start; the arm already stands in its first frame.
 
         Args:
             data: The state to be changed.
-            start: The execution's draws, shape (q,); None where nothing is disturbed.
+            start: The execution's draws; None where nothing is disturbed.
         """
 
     @abstractmethod
-    def _result(self, states: np.ndarray, sensors: np.ndarray) -> Rollout:
+    def _result(
+        self, states: Float[np.ndarray, "steps s"], sensors: Float[np.ndarray, "steps m"]
+    ) -> Rollout:
         """Read the outcome of one execution.
 
         Args:
-            states: Full physics states, shape (steps, 1 + nq + nv); row k is after k + 1 steps.
-            sensors: The scene's sensors, shape (steps, n), at the beginning of each step, so that
-                row k belongs to the state after k steps.
+            states: Full physics states: time, nq positions, velocities; row k is after k + 1 steps.
+            sensors: The scene's sensors at the beginning of each step, so that row k belongs to the
+                state after k steps.
         """
 
-    def rollout(self, plans: np.ndarray, rng: np.random.Generator | None) -> list[Rollout]:
-        """Execute plans open loop; see `Task.rollout`, and the task for its outcome."""
+    def rollout(self, plans: ArrayLike, rng: np.random.Generator | None) -> list[Rollout]:
+        """See `Task.rollout`, and the task for its outcome."""
         plans = as_plans(plans, self.format.action_dim)
         results: list[Rollout] = []
         for models, states, controls in self._batches(plans, rng):
@@ -124,7 +130,7 @@ class PandaTask(Task):
         return results
 
     def demonstrations(self, name: str) -> Demonstrations:
-        """Load the shipped prior set `name`."""
+        """See `Task.demonstrations`."""
         if name not in self.demonstration_sets:
             raise ConfigurationError(
                 f"{self.name} has no demonstration set {name!r}; use one of "
@@ -134,20 +140,18 @@ class PandaTask(Task):
 
     def film(
         self,
-        plan: np.ndarray,
-        goal: np.ndarray,
+        plan: ArrayLike,
+        goal: ArrayLike,
         rng: np.random.Generator | None = None,
         *,
         width: int = 640,
         height: int = 480,
         frames_per_second: int = 30,
         camera: str = "film",
-    ) -> Iterator[np.ndarray]:
-        """Execute one plan with the goal's object in place and draw it; see `Task.film`."""
+    ) -> Iterator[Picture]:
+        """See `Task.film`."""
         plan = as_plans(plan, self.format.action_dim, name="plan", single=True)
-        goal = np.array(goal, dtype=float)
-        if goal.shape != (2,) or not np.all(np.isfinite(goal)):
-            raise InvalidGoalError(f"goal must be two finite numbers (x, y) in [m], got {goal}")
+        goal = as_goal(goal, self.outcome_names)
         models, states, controls = self._prepare(plan[None], rng)
         model, data = models[0], mujoco.MjData(models[0])
         mujoco.mj_setState(model, data, states[0], _FULL)
@@ -164,10 +168,20 @@ class PandaTask(Task):
                 self._act_at_goal(data, goal)
                 mujoco.mj_step(model, data)
 
-    def _act_at_goal(self, data: mujoco.MjData, goal: np.ndarray) -> None:
+    def _act_at_goal(self, data: mujoco.MjData, goal: Float[np.ndarray, "2"]) -> None:
         """What the goal's object does beyond standing in the way, at each step of a film."""
 
-    def _batches(self, plans: np.ndarray, rng: np.random.Generator | None) -> Iterator[_Batch]:
+    def _key_frame(self, state: Float[np.ndarray, " s"], n_steps: float) -> KeyFrame:
+        """The key frame of a full physics state, and of when it was, in steps from the start."""
+        return KeyFrame(
+            self.model, state[1 : 1 + self.model.nq].copy(), float(n_steps * STEP - self.lead_in)
+        )
+
+    def _lost(self, states: Float[np.ndarray, "steps s"]) -> Rollout:
+        """The object never came where an outcome is: the robot's own base, where no goal can be."""
+        return Rollout(np.zeros(2), False, self._key_frame(states[-1], len(states)))
+
+    def _batches(self, plans: Plans, rng: np.random.Generator | None) -> Iterator[_Batch]:
         """Prepare batch after batch, each while the engine simulates the one before.
 
         The engine leaves Python free meanwhile. It pays where plans are end-effector poses, whose
@@ -183,8 +197,7 @@ class PandaTask(Task):
             if coming is not None:
                 yield coming.result()
 
-    def _prepare(self, plans: np.ndarray, rng: np.random.Generator | None) -> _Batch:
-        """Models, initial full physics states (n, s) and controls (n, steps, 7) of a batch."""
+    def _prepare(self, plans: Plans, rng: np.random.Generator | None) -> _Batch:
         n, horizon, _ = plans.shape
         n_steps = round((self.lead_in + (horizon - 1) * self.format.dt + self.lead_out) / STEP)
         joints = self.joint_plans(plans)
@@ -199,15 +212,19 @@ class PandaTask(Task):
         states = np.stack([self._start(*own) for own in zip(frames, draws.start, strict=True)])
         return models, states, controls
 
-    def _disturbed(self, servo: np.ndarray, scene: np.ndarray) -> mujoco.MjModel:
+    def _disturbed(
+        self, servo: Float[np.ndarray, "7"], scene: Float[np.ndarray, " p"]
+    ) -> mujoco.MjModel:
         model = copy.copy(self.model)
         model.actuator_gainprm[:, 0] *= servo
         model.actuator_biasprm[:, 1:3] *= servo[:, None]
         self._disturb(model, scene)
         return model
 
-    def _start(self, joints: np.ndarray, start: np.ndarray | None) -> np.ndarray:
-        """Full physics state with the arm at `joints` (7,) and the objects in place."""
+    def _start(
+        self, joints: Float[np.ndarray, "7"], start: Float[np.ndarray, " q"] | None
+    ) -> Float[np.ndarray, " s"]:
+        """Full physics state with the arm at `joints` and the objects in place."""
         data = self._scratch
         mujoco.mj_resetData(self.model, data)
         data.qpos[:N_JOINTS] = joints
@@ -216,3 +233,24 @@ class PandaTask(Task):
         state = np.empty(mujoco.mj_stateSize(self.model, _FULL))
         mujoco.mj_getState(self.model, data, state, _FULL)
         return state
+
+
+def first_descent(
+    path: Float[np.ndarray, "steps 3"], height: float
+) -> tuple[int, float, Float[np.ndarray, "2"]] | None:
+    """Return where a path first passes a height downwards, by linear interpolation, if it does.
+
+    Args:
+        path: Positions, in [m], one a row.
+        height: In [m].
+
+    Returns:
+        The last row above, the part of a row after it, and (x, y) there.
+    """
+    down = np.flatnonzero((path[:-1, 2] >= height) & (path[1:, 2] < height))
+    if not down.size:
+        return None
+    row = int(down[0])
+    before, after = path[row], path[row + 1]
+    part = float((before[2] - height) / (before[2] - after[2]))
+    return row, part, before[:2] + part * (after[:2] - before[:2])

@@ -11,10 +11,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import FancyArrowPatch, Rectangle
 
-from prior_reinforce.perception import Camera, CameraConfig, TableCalibration, TableScene, scene_of
+from prior_reinforce.perception.calibration import TableCalibration
+from prior_reinforce.perception.camera import Camera, CameraConfig
 from prior_reinforce.report.style import GOAL, HIT, INK, drawing, new_figure, save_png
 from prior_reinforce.rollouts import KeyFrame
-from prior_reinforce.tasks import Task
+from prior_reinforce.scene import TableScene
+from prior_reinforce.tasks.base import Task
 from prior_reinforce.wording import to_words
 
 _PIXELS = 1344
@@ -87,7 +89,8 @@ def draw_process(rows: Sequence[ProcessRow], path: Path) -> Path:
 
 def _draw_row(line: Sequence[Axes], row: ProcessRow, fine: Camera, coarse: Camera) -> None:
     model = _scene_model(row.task)
-    scene = scene_of(row.task.name)
+    scene = row.task.scene
+    assert scene is not None
     calibration = coarse.calibrate(model, np.array(scene.marks), height=scene.plane_height)
     close_up = _close_up(row, scene, calibration)
     for axes, i in zip(line[1:], _shown(len(row.trials)), strict=False):

@@ -39,7 +39,7 @@ from prior_reinforce.experiments.statistics import (
     reached_by,
     trials_counted,
 )
-from prior_reinforce.perception import VisionLanguageModelConfig
+from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
 
 _UNSEEN_GOALS = 5
 """Goals a prior set (paper, Section V-A)."""

@@ -11,16 +11,17 @@ executed once, with the disturbances of any execution, and where that ball lande
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
+from jaxtyping import Float
 from scipy.special import betainc
 
+from prior_reinforce.arrays import Plans, Points
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.tasks.basketball import BasketballShot
+from prior_reinforce.tasks.demonstrations import write_sets
 
 HORIZON = 140
 """Frames, as in the paper."""
@@ -39,11 +40,13 @@ DESIGNED = {
     "B": ((0.91, 0.03), (0.97, -0.28), (0.95, 0.27), (1.20, -0.20), (1.17, 0.27), (1.07, -0.03)),
 }
 """Where the six throws of each set are to land, (x, y) in [m]."""
+Knobs = Float[np.ndarray, "n 2"]
+"""Reach and direction of each throw, in [rad]."""
 SEEDS = {"A": 1, "B": 2}
 
 
 @dataclass(frozen=True)
-class Differences:
+class Variation:
     """How repetitions of the throw differ; standard deviations unless said otherwise; ours."""
 
     start: tuple[float, float] = (0.04, 0.60)
@@ -57,27 +60,31 @@ class Differences:
 
 
 def throw(
-    start: float, tempo: float, travel: np.ndarray, posture: np.ndarray, dt: float
-) -> np.ndarray:
+    start: float,
+    tempo: float,
+    travel: Float[np.ndarray, "7"],
+    posture: Float[np.ndarray, "7"],
+    dt: float,
+) -> Float[np.ndarray, "H 7"]:
     """One throw as a plan: from rest to rest along a quintic (minimum-jerk) time course.
 
     Args:
         start: When the throw begins, in [s].
         tempo: Its speed relative to `DURATION`.
-        travel: Travel of each joint, shape (7,), in [rad].
-        posture: Joint positions before the throw, shape (7,), in [rad].
+        travel: Travel of each joint, in [rad].
+        posture: Joint positions before the throw, in [rad].
         dt: Time between frames, in [s].
 
     Returns:
-        Plan, shape (HORIZON, 7), in [rad].
+        Plan of `HORIZON` frames, in [rad].
     """
     part = np.clip((np.arange(HORIZON) * dt - start) * tempo / DURATION, 0.0, 1.0)
     return posture + travel * betainc(3, 3, part)[:, None]
 
 
-def make(name: str, differences: Differences | None = None) -> Demonstrations:
+def make(name: str, variation: Variation | None = None) -> Demonstrations:
     """Make the prior set `name` ("A" or "B"), the same every time on the same machine."""
-    size = differences or Differences()
+    size = variation or Variation()
     task = BasketballShot()
     rng = np.random.default_rng(SEEDS[name])
     designed = np.array(DESIGNED[name])
@@ -87,8 +94,7 @@ def make(name: str, differences: Differences | None = None) -> Demonstrations:
     amplitudes = 1.0 + rng.normal(0.0, size.amplitude, (n, 7))
     postures = READY + rng.normal(0.0, size.posture, (n, 7)) * (np.arange(7) > 0)
 
-    def plans(knobs: np.ndarray) -> np.ndarray:
-        """Plans (n, H, 7) for reach and direction of the throw, shape (n, 2), in [rad]."""
+    def plans(knobs: Knobs) -> Plans:
         reach, direction = knobs[:, :1], knobs[:, 1:]
         base = reach * LEAN + direction * np.eye(7)[0]
         travel = (1.0 + SWING_PER_REACH * reach) * amplitudes * SWING
@@ -96,7 +102,7 @@ def make(name: str, differences: Differences | None = None) -> Demonstrations:
             [throw(*one, dt) for one in zip(starts, tempi, travel, postures + base, strict=True)]
         )
 
-    def land(knobs: np.ndarray) -> np.ndarray:
+    def land(knobs: Knobs) -> Points:
         return np.array([rollout.outcome for rollout in task.rollout(plans(knobs), None)])
 
     knobs = _solve(land, designed)
@@ -105,9 +111,7 @@ def make(name: str, differences: Differences | None = None) -> Demonstrations:
     return Demonstrations(solved, outcomes, task.format)
 
 
-def _solve(
-    land: Callable[[np.ndarray], np.ndarray], targets: np.ndarray, tolerance: float = 4e-3
-) -> np.ndarray:
+def _solve(land: Callable[[Knobs], Points], targets: Points, tolerance: float = 4e-3) -> Knobs:
     """Newton's method on reach and direction, all throws at once, differences of 0.03 rad."""
     knobs = np.column_stack([np.zeros(len(targets)), np.arctan2(targets[:, 1], targets[:, 0])])
     for _ in range(12):
@@ -121,14 +125,5 @@ def _solve(
     raise RuntimeError(f"no throw lands within {tolerance} m of {targets.tolist()}")
 
 
-def main() -> None:
-    """Write both sets."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--folder", type=Path, default=Path(__file__).parent)
-    folder = parser.parse_args().folder
-    for name in DESIGNED:
-        make(name).save(folder / f"basketball_{name}.npz")
-
-
 if __name__ == "__main__":
-    main()
+    write_sets(make, DESIGNED, "basketball", __doc__)

@@ -8,14 +8,14 @@ execution, and where that stone stopped is its outcome, near the place that was 
 
 from __future__ import annotations
 
-import argparse
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import numpy as np
+from jaxtyping import Float
 
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.tasks.curling import FRICTION, STONE_RADIUS, STONE_START, Curling
+from prior_reinforce.tasks.demonstrations import write_sets
 from prior_reinforce.tasks.demonstrations.teleoperation import Teleoperation, record, smoothstep
 from prior_reinforce.tasks.inverse_kinematics import joint_paths, to_rotation_vector
 
@@ -44,7 +44,7 @@ SEEDS = {"A": 1, "B": 2}
 
 
 @dataclass(frozen=True)
-class Differences:
+class Variation:
     """How an operator's pushes differ; standard deviations unless said otherwise; ours."""
 
     start: tuple[float, float] = (0.10, 0.68)
@@ -70,8 +70,8 @@ def push(
     aside: float,
     tilt: float,
     dt: float,
-) -> np.ndarray:
-    """Flange poses that carry the bar through one push, as meant, shape (HORIZON, 6).
+) -> Float[np.ndarray, "H 6"]:
+    """Flange poses that carry the bar through one push, as meant, `HORIZON` frames.
 
     Args:
         heading: Direction of the push from the x axis, in [rad].
@@ -105,9 +105,9 @@ def _speed_for(distance: float) -> float:
     return float((np.sqrt(b * b + 4 * a * (distance - CARRIED_ON)) - b) / (2 * a))
 
 
-def make(name: str, differences: Differences | None = None) -> Demonstrations:
+def make(name: str, variation: Variation | None = None) -> Demonstrations:
     """Make the prior set `name` ("A" or "B"), the same every time on the same machine."""
-    size = differences or Differences()
+    size = variation or Variation()
     task = Curling()
     rng = np.random.default_rng(SEEDS[name])
     dt, aimed = task.format.dt, AIMED[name]
@@ -132,14 +132,5 @@ def make(name: str, differences: Differences | None = None) -> Demonstrations:
     return Demonstrations(plans, outcomes, task.format)
 
 
-def main() -> None:
-    """Write both sets."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--folder", type=Path, default=Path(__file__).parent)
-    folder = parser.parse_args().folder
-    for name in AIMED:
-        make(name).save(folder / f"curling_{name}.npz")
-
-
 if __name__ == "__main__":
-    main()
+    write_sets(make, AIMED, "curling", __doc__)

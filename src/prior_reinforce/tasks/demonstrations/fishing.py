@@ -8,14 +8,14 @@ execution, and where the hook first touched the table is its outcome.
 
 from __future__ import annotations
 
-import argparse
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import numpy as np
+from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
 from prior_reinforce.plans.motions import Demonstrations
+from prior_reinforce.tasks.demonstrations import write_sets
 from prior_reinforce.tasks.demonstrations.teleoperation import Teleoperation, record, smoothstep
 from prior_reinforce.tasks.fishing import Fishing
 
@@ -47,7 +47,7 @@ SEEDS = {"A": 1, "B": 2}
 
 
 @dataclass(frozen=True)
-class Differences:
+class Variation:
     """How an operator's casts differ; standard deviations unless said otherwise; ours."""
 
     start: tuple[float, float] = (0.10, 1.03)
@@ -63,15 +63,19 @@ class Differences:
 
 
 def cast(
-    azimuth: float, hand: np.ndarray, start: float, durations: np.ndarray, dt: float
-) -> np.ndarray:
-    """Flange poses of one cast, as meant, shape (HORIZON, 6).
+    azimuth: float,
+    hand: Float[np.ndarray, "3 3"],
+    start: float,
+    durations: Float[np.ndarray, "2"],
+    dt: float,
+) -> Float[np.ndarray, "H 6"]:
+    """Flange poses of one cast, as meant, `HORIZON` frames.
 
     Args:
         azimuth: Direction of the cast about the base axis, in [rad].
-        hand: Distance, height, tilt before, at the top and after the cast, shape (3, 3).
+        hand: Distance, height, tilt before, at the top and after the cast.
         start: When the hand begins to rise, in [s].
-        durations: Of raising and of casting, shape (2,), in [s].
+        durations: Of raising and of casting, in [s].
         dt: Time between frames, in [s].
     """
     times = np.arange(HORIZON) * dt - start
@@ -90,9 +94,9 @@ def cast(
     )
 
 
-def make(name: str, differences: Differences | None = None) -> Demonstrations:
+def make(name: str, variation: Variation | None = None) -> Demonstrations:
     """Make the prior set `name` ("A" or "B"), the same every time on the same machine."""
-    size = differences or Differences()
+    size = variation or Variation()
     task = Fishing()
     rng = np.random.default_rng(SEEDS[name])
     dt, aimed = task.format.dt, np.array(AIMED[name])
@@ -110,14 +114,5 @@ def make(name: str, differences: Differences | None = None) -> Demonstrations:
     return Demonstrations(np.array(plans), np.array(outcomes), task.format)
 
 
-def main() -> None:
-    """Write both sets."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--folder", type=Path, default=Path(__file__).parent)
-    folder = parser.parse_args().folder
-    for name in AIMED:
-        make(name).save(folder / f"fishing_{name}.npz")
-
-
 if __name__ == "__main__":
-    main()
+    write_sets(make, AIMED, "fishing", __doc__)

@@ -11,7 +11,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Float
 from scipy.signal import cont2discrete, lfilter, lfiltic
+
+_Poses = Float[np.ndarray, "H 6"]
 
 
 @dataclass(frozen=True)
@@ -32,19 +35,14 @@ class Teleoperation:
     """Of the follower, a critically damped filter of second order, in [Hz]."""
 
 
-def record(
-    meant: np.ndarray, dt: float, hand: Teleoperation, rng: np.random.Generator
-) -> np.ndarray:
+def record(meant: _Poses, dt: float, hand: Teleoperation, rng: np.random.Generator) -> _Poses:
     """Pose path that is recorded when an operator means another one.
 
     Args:
-        meant: Pose path, shape (H, 6): position in [m], rotation vector in [rad].
+        meant: Pose path: position in [m], rotation vector in [rad].
         dt: Time between frames, which is the tracker's period too, in [s].
         hand: The chain.
         rng: Of the tremor.
-
-    Returns:
-        Recorded pose path, shape (H, 6).
     """
     amplitude = np.repeat([hand.tremor, hand.tremor_angle], 3)
     step = np.repeat([hand.resolution, hand.resolution_angle], 3)
@@ -53,8 +51,8 @@ def record(
     return _follow(np.round(shaken / step) * step, dt, hand.bandwidth)
 
 
-def _engaged(times: np.ndarray) -> np.ndarray:
-    """How far the hand leads the arm, shape (H, 1): nothing, then all within 0.2 s, and back.
+def _engaged(times: Float[np.ndarray, " H"]) -> Float[np.ndarray, "H 1"]:
+    """How far the hand leads the arm: nothing, then all within 0.2 s, and back.
 
     The arm stands still before the operator takes hold of it and after letting go.
     """
@@ -64,14 +62,16 @@ def _engaged(times: np.ndarray) -> np.ndarray:
     return (smoothstep(rising) * smoothstep(falling))[:, None]
 
 
-def smoothstep(part: np.ndarray) -> np.ndarray:
+def smoothstep(part: Float[np.ndarray, "*s"]) -> Float[np.ndarray, "*s"]:
     """From 0 to 1 along a minimum-jerk time course: 10 p^3 - 15 p^4 + 6 p^5."""
     part = np.clip(part, 0.0, 1.0)
     return part**3 * (10.0 - 15.0 * part + 6.0 * part**2)
 
 
-def _tremor(times: np.ndarray, band: tuple[float, float], rng: np.random.Generator) -> np.ndarray:
-    """Six slow random drifts of unit variance, shape (H, 6): sums of four sines each."""
+def _tremor(
+    times: Float[np.ndarray, " H"], band: tuple[float, float], rng: np.random.Generator
+) -> _Poses:
+    """Slow random drifts of unit variance: sums of four sines each."""
     n_sines = 4
     frequencies = rng.uniform(*band, (n_sines, 6))
     phases = rng.uniform(0.0, 2 * np.pi, (n_sines, 6))
@@ -79,8 +79,8 @@ def _tremor(times: np.ndarray, band: tuple[float, float], rng: np.random.Generat
     return waves.sum(axis=1) * np.sqrt(2.0 / n_sines)
 
 
-def _follow(path: np.ndarray, dt: float, bandwidth: float) -> np.ndarray:
-    """Low-pass a path (H, 6) with a critically damped second-order filter, from rest."""
+def _follow(path: _Poses, dt: float, bandwidth: float) -> _Poses:
+    """Low-pass a path with a critically damped second-order filter, from rest."""
     w = 2 * np.pi * bandwidth
     numerator, denominator, _ = cont2discrete(([w * w], [1.0, 2 * w, w * w]), dt, method="bilinear")
     numerator = numerator.ravel()

@@ -1,6 +1,10 @@
-"""The shipped scenes: both objects can be seen at the key frame, whatever else is there."""
+"""The tasks' scenes: both objects can be seen at the key frame, whatever else is there."""
 
 from __future__ import annotations
+
+import os
+
+os.environ.setdefault("MUJOCO_GL", "egl")
 
 import numpy as np
 import pytest
@@ -8,11 +12,14 @@ import pytest
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.generators.interpolation import SmoothInterpolation
 from prior_reinforce.perception.camera import Camera
-from prior_reinforce.perception.colour_finder import find_by_colour
+from prior_reinforce.perception.colour_camera import find_by_colour
 from prior_reinforce.plans.alignment import align
 from prior_reinforce.rollouts import KeyFrame
-from prior_reinforce.scene import scene_of
-from prior_reinforce.tasks import FAMILY, Curling, Fishing
+from prior_reinforce.scene import SeenObject
+from prior_reinforce.tasks import TASKS, make_task
+from prior_reinforce.tasks.base import Task
+from prior_reinforce.tasks.curling import Curling
+from prior_reinforce.tasks.fishing import Fishing
 
 
 @pytest.fixture(scope="module")
@@ -22,11 +29,9 @@ def camera():
     camera.close()
 
 
-def errors_seen(
-    camera: Camera, task_name: str, pairs: list[tuple[KeyFrame, np.ndarray]]
-) -> np.ndarray:
+def errors_seen(camera: Camera, task: Task, pairs: list[tuple[KeyFrame, np.ndarray]]) -> np.ndarray:
     """Errors by the colours in the pictures of key frames and goals; NaN where one is not seen."""
-    scene, model = scene_of(task_name), pairs[0][0].model
+    scene, model = task.scene, pairs[0][0].model
     calibration = camera.calibrate(model, np.array(scene.marks), height=scene.plane_height)
     errors = np.full((len(pairs), 2), np.nan)
     for i, (frame, goal) in enumerate(pairs):
@@ -38,12 +43,13 @@ def errors_seen(
     return errors
 
 
-@pytest.mark.parametrize("kind", FAMILY, ids=lambda kind: kind.name)
-def test_the_camera_sees_the_whole_region_and_is_calibrated_to_a_millimetre(kind, camera):
-    model, scene = kind().model, scene_of(kind.name)
+@pytest.mark.parametrize("name", TASKS.members)
+def test_the_camera_sees_the_whole_region_and_is_calibrated_to_a_millimetre(name, camera):
+    task = make_task(name)
+    model, scene = task.model, task.scene
     calibration = camera.calibrate(model, np.array(scene.marks), height=scene.plane_height)
     assert calibration.left_out_error < 0.001
-    low, high = kind.region
+    low, high = task.region
     corners = np.array([low, high, [low[0], high[1]], [high[0], low[1]]])
     corners += 0.05 * np.sign(corners - (low + high) / 2)  # a margin for what goes too far
     pixels = calibration.to_pixels(corners)
@@ -57,13 +63,13 @@ def test_a_stone_as_far_as_the_target_hides_neither(camera):
     stone = task.model.jnt_qposadr[task.model.joint("stone").id]
     angles, distances = np.meshgrid([0.0, 0.8, 2.0, 4.0], [0.0, 0.01, 0.02, 0.035, 0.06])
     circles = distances.ravel() * np.array([np.cos(angles.ravel()), np.sin(angles.ravel())])
-    places = goal + np.array([0.08, 0.0]) + circles.T
+    places = goal - task.scene.goal_offset + circles.T
     pairs = []
     for place in places:
         state = task.model.qpos0.copy()
         state[stone : stone + 2] = place
         pairs.append((KeyFrame(task.model, state, 0.0), goal))
-    seen = errors_seen(camera, "curling", pairs)
+    seen = errors_seen(camera, task, pairs)
     np.testing.assert_allclose(seen, places - goal, atol=0.005)
 
 
@@ -80,10 +86,11 @@ def test_the_rod_hides_neither_hook_nor_magnet_in_twelve_casts(camera):
     outcomes = np.array([rollout.outcome for rollout in rollouts])
     goals = np.clip(outcomes + rng.normal(0.0, 0.04, outcomes.shape), *task.region)
     frames = [rollout.key_frame for rollout in rollouts]
-    seen = errors_seen(camera, "fishing", list(zip(frames, goals, strict=True)))
+    seen = errors_seen(camera, task, list(zip(frames, goals, strict=True)))
     np.testing.assert_allclose(seen, outcomes - goals, atol=0.005)
 
 
-def test_an_unknown_task_is_named():
-    with pytest.raises(ConfigurationError, match="no scene is described for task 'darts'"):
-        scene_of("darts")
+@pytest.mark.parametrize(("words", "size"), [("the ball", 0.0), (" ", 0.1)])
+def test_an_object_has_words_and_a_size(words, size):
+    with pytest.raises(ConfigurationError, match="cannot be looked for"):
+        SeenObject(words, size)

@@ -1,0 +1,171 @@
+"""P = the overhead camera, and objects found in its picture by their colour.
+
+A camera of centimetre accuracy for simulated trials. It goes the whole way of a vision-language
+model: the picture shrunk as a server wants it, a box in whole thousandths, an answer in a family's
+words, the parser, the votes. Only the eyesight is not a model's, so that its readings are no
+evidence about models.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+
+import numpy as np
+
+from prior_reinforce.errors import ConfigurationError
+from prior_reinforce.perception.calibration import TableCalibration
+from prior_reinforce.perception.camera import Camera
+from prior_reinforce.perception.vlm import VisionLanguageModel
+from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
+from prior_reinforce.perception.vlm_formats import FORMATS, Box, Family
+from prior_reinforce.perception.vlm_reading import Answer
+from prior_reinforce.rendering import Picture
+from prior_reinforce.scene import TableScene
+
+COLOURS = {
+    "red": (-12.0, 10.0, 0.62),
+    "orange": (14.0, 36.0, 0.72),
+    "blue": (195.0, 245.0, 0.55),
+    "yellow": (44.0, 60.0, 0.72),
+}
+"""Least and greatest hue in degrees, and least saturation, of each colour that is told apart
+(ours). Table, floor, arm and shadows of our scenes are all paler."""
+
+_DARKEST = 60
+"""Least value of a pixel whose hue means anything, of 255 (ours)."""
+_SPECK = 12
+"""Fewer connected pixels are noise, in [px] (ours)."""
+_PIECE = 0.2
+"""A piece of this share of the largest belongs to the object (ours): something, a bead on a ring,
+may lie across it."""
+
+
+class ColourCamera(VisionLanguageModel):
+    """Reads the error in a simulated trial's picture; the objects' words name their colours."""
+
+    def __init__(
+        self,
+        scene: TableScene | None,
+        config: VisionLanguageModelConfig | None = None,
+        *,
+        seed: int = 0,
+        outlier_rate: float = 0.0,
+        camera: Camera | None = None,
+        calibration: TableCalibration | None = None,
+    ) -> None:
+        """Make the camera; nothing is drawn yet.
+
+        Args:
+            scene: What to look for.
+            config: Family whose format is gone through, and votes; an endpoint is not needed.
+            seed: Of the outliers.
+            outlier_rate: Share of answers whose box, of the right size, lies anywhere.
+            camera: As in `VisionLanguageModel`.
+            calibration: As in `VisionLanguageModel`.
+
+        Raises:
+            ConfigurationError: There is no scene, or the rate is no share.
+        """
+        config = config or VisionLanguageModelConfig()
+        client = ColourClient(config.family, outlier_rate=outlier_rate, seed=seed)
+        super().__init__(scene, config, client=client, camera=camera, calibration=calibration)
+
+
+class ColourClient:
+    """Answers as a model of some family would; the same questions in order, the same answers."""
+
+    model = "found by colour"
+
+    def __init__(
+        self, family: Family = "glm-4.5v", *, outlier_rate: float = 0.0, seed: int = 0
+    ) -> None:
+        """Take the settings; arguments and errors as in `ColourCamera`."""
+        if not 0 <= outlier_rate <= 1:
+            raise ConfigurationError(f"outlier_rate = {outlier_rate}; expected a share from 0 to 1")
+        self._family = family
+        self._outlier_rate = outlier_rate
+        self._rng = np.random.default_rng(seed)
+        self._found: tuple[object, str, Box | None] = (None, "", None)
+
+    def ask(self, words: str, picture: Picture) -> Answer:
+        """Find what has the colour that the words name, and say where."""
+        size = (picture.shape[1], picture.shape[0])
+        astray = self._rng.random() < self._outlier_rate
+        if self._found[0] is not picture or self._found[1] != words:  # it is asked several times
+            self._found = (picture, words, find_by_colour(picture, words))
+        box = self._found[2]
+        if box is not None and astray:
+            box = _elsewhere(box, size, self._rng)
+        return Answer(say_box(box, size, words, self._family), None, "stop")
+
+    def close(self) -> None:
+        """Nothing is held."""
+
+
+def say_box(box: Box | None, size: tuple[int, int], words: str, family: Family) -> str:
+    """Return the answer of a model of some family: the box in its scale, an empty list for none.
+
+    Args:
+        box: In pixels of the picture that was sent.
+        size: Width and height of that picture, in [px].
+        words: What was asked for.
+        family: Of the model.
+    """
+    if box is None:
+        numbers = []
+    else:
+        step = FORMATS[family].side_multiple
+        pixels = FORMATS[family].scale == "pixels"
+        seen = [step * round(side / step) if pixels else 1000 for side in size]
+        numbers = [[round(v * seen[i % 2] / size[i % 2]) for i, v in enumerate(box)]]
+    if family == "glm-4.5v":
+        return f"The bounding box is <|begin_of_box|>{json.dumps(numbers)}<|end_of_box|>."
+    labelled = [{"bbox_2d": found, "label": words} for found in numbers]
+    return f"```json\n{json.dumps(labelled)}\n```"
+
+
+def _elsewhere(box: Box, size: tuple[int, int], rng: np.random.Generator) -> Box:
+    """A box of the same size anywhere in the picture."""
+    width, height = box[2] - box[0], box[3] - box[1]
+    left, top = rng.uniform(0, size[0] - width), rng.uniform(0, size[1] - height)
+    return left, top, left + width, top + height
+
+
+def find_by_colour(picture: Picture, words: str) -> Box | None:
+    """Find the bounding box of what has the colour that the words name.
+
+    Args:
+        picture: RGB.
+        words: For instance `the orange ball`; they name exactly one of `COLOURS`.
+
+    Returns:
+        The box in pixels; None if nothing in the picture has that colour.
+
+    Raises:
+        ConfigurationError: The words name no colour, or several.
+    """
+    from PIL import Image
+    from scipy import ndimage
+
+    low, high, least_saturation = COLOURS[_named_colour(words)]
+    hue, saturation, value = np.moveaxis(np.asarray(Image.fromarray(picture).convert("HSV")), 2, 0)
+    degrees = (hue * (360 / 256) - low) % 360 + low
+    of_colour = (degrees <= high) & (saturation > 255 * least_saturation) & (value > _DARKEST)
+    pieces, n_pieces = ndimage.label(of_colour, np.ones((3, 3)))
+    areas = np.bincount(pieces.ravel(), minlength=n_pieces + 1)
+    areas[0] = 0  # the background
+    if areas.max() < _SPECK:
+        return None
+    rows, columns = np.nonzero((areas > areas.max() * _PIECE)[pieces])
+    return float(columns.min()), float(rows.min()), columns.max() + 1.0, rows.max() + 1.0
+
+
+def _named_colour(words: str) -> str:
+    named = [colour for colour in COLOURS if re.search(rf"\b{colour}\b", words)]
+    if len(named) != 1:
+        raise ConfigurationError(
+            f"{words!r} names {len(named)} colours; to be found by colour it must name one of "
+            f"{', '.join(COLOURS)}"
+        )
+    return named[0]
