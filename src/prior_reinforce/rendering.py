@@ -15,7 +15,7 @@ from prior_reinforce.errors import RenderingUnavailableError
 if TYPE_CHECKING:
     import mujoco
 
-Picture = UInt8[np.ndarray, "height width 3"]
+Picture = UInt8[np.ndarray, "_height _width 3"]
 """RGB, row by row from the top."""
 
 

@@ -143,7 +143,7 @@ class VisionServer:
             "truncated": draft + " But looking closer, I see that",
             "swapped corners": say((x2, y2, x1, y1)),
             "out of range": say((x1, y1, x2 + 2 * size[0], y2)),
-            "whole picture": say((0.0, 0.0, *size)),
+            "whole picture": say((0.0, 0.0, *map(float, size))),
             "no area": say((x1, y1, x1, y2)),
             "thinking in the text": f"<think>Perhaps {draft} No, wait.</think>\n{said}",
             "thinking without end": f"<think>Perhaps {draft} No, wait. {said}",

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from typing import TypeVar
 
 import numpy as np
-from typing_extensions import Self
 
 from prior_reinforce.arrays import Point
 from prior_reinforce.rollouts import Rollout
+
+_P = TypeVar("_P", bound="Perception")  # not Self: run-time checks of annotations cannot read it
 
 
 class Perception(ABC):
@@ -33,7 +35,7 @@ class Perception(ABC):
     def close(self) -> None:  # noqa: B027  # most hold nothing
         """Free what it holds: connections, graphics memory."""
 
-    def __enter__(self) -> Self:
+    def __enter__(self: _P) -> _P:
         """Use it for the length of a block."""
         return self
 

@@ -6,7 +6,7 @@ import base64
 import io
 import os
 from dataclasses import dataclass
-from typing import Any, Literal, Protocol
+from typing import Any, Literal, Protocol, runtime_checkable
 from urllib.parse import urlsplit
 
 from prior_reinforce.errors import ConfigurationError, EndpointError, MissingExtraError
@@ -75,6 +75,7 @@ class VisionLanguageModelConfig:
             )
 
 
+@runtime_checkable
 class ModelClient(Protocol):
     """Answers where an object is in a picture."""
 

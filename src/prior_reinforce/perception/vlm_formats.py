@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
@@ -117,10 +116,9 @@ def read_box(answer: str, box_format: BoxFormat, size: tuple[int, int]) -> Box:
     return _in_pixels(boxes[0], box_format, size)
 
 
-_NUMBER = r"-?\d+(?:\.\d+)?"
+_NUMBER = r"(-?\d+(?:\.\d+)?)"
 _BETWEEN = r"\s*[\])>]?\s*,\s*[\[(<]?\s*"  # "(x1, y1), (x2, y2)" counts as one box
-_QUADRUPLE = re.compile(_BETWEEN.join([f"({_NUMBER})"] * 4))
-_EMPTY = re.compile(r"\[[\s\[\]]*\]")
+_BOX_OR_EMPTY = re.compile(_BETWEEN.join([_NUMBER] * 4) + r"|\[[\s\[\]]*\]")
 _MARKED = re.compile(
     r"<\|(?:begin_of_box|box_start)\|>(.*?)(?:<\|(?:end_of_box|box_end)\|>|\Z)", re.DOTALL
 )
@@ -145,26 +143,17 @@ def _last_boxes(said: str) -> list[tuple[float, ...]] | None:
     text = _MARKER.sub(" ", said)
     last: list[tuple[float, ...]] | None = None
     end = None
-    for start, stop, numbers in _finds(text):
-        if numbers is None:
+    for found in _BOX_OR_EMPTY.finditer(text):
+        if found[1] is None:
             last, end = [], None
             continue
-        if last is None or end is None or not _same_list(text, end, start):
+        if last is None or end is None or not _same_list(text, end, found.start()):
             last = []
+        numbers = tuple(map(float, found.groups()))
         if numbers not in last:
             last.append(numbers)
-        end = stop
+        end = found.end()
     return last
-
-
-def _finds(text: str) -> Iterator[tuple[int, int, tuple[float, ...] | None]]:
-    """Yield start, stop and numbers of each quadruple, and of each empty list with None."""
-    quadruples = [
-        (match.start(), match.end(), tuple(map(float, match.groups())))
-        for match in _QUADRUPLE.finditer(text)
-    ]
-    empties = [(match.start(), match.end(), None) for match in _EMPTY.finditer(text)]
-    yield from sorted([*quadruples, *empties], key=lambda found: found[0])
 
 
 def _same_list(text: str, end: int, start: int) -> bool:
@@ -180,10 +169,8 @@ def _same_list(text: str, end: int, start: int) -> bool:
 
 
 def _in_pixels(numbers: tuple[float, ...], box_format: BoxFormat, size: tuple[int, int]) -> Box:
-    thousandths = box_format.scale == "thousandths"
-    most_x, most_y = (1000, 1000) if thousandths else size
-    x1, y1, x2, y2 = numbers
-    left, right, top, bottom = min(x1, x2), max(x1, x2), min(y1, y2), max(y1, y2)
+    most_x, most_y = (1000, 1000) if box_format.scale == "thousandths" else size
+    (left, right), (top, bottom) = sorted(numbers[::2]), sorted(numbers[1::2])
     if left < 0 or top < 0 or right > most_x or bottom > most_y:
         raise UnreadableAnswerError(
             f"box {list(numbers)} leaves the picture, which ends at ({most_x}, {most_y}) in this "

@@ -104,20 +104,24 @@ class Reading:
             for answer in sighting.answers:
                 if answer.box is not None:
                     pen.rectangle(answer.box, outline=colour, width=1)
-        agreed = [(sighting.words, sighting.box, colour) for sighting, colour in found]
-        boxes = [box for _, box, _ in agreed if box is not None]
         if self.reached.box is not None and self.goal_pixel is not None:
             pen.line([self.goal_pixel, _middle(self.reached.box)], fill="black", width=2)
             pen.circle(self.goal_pixel, 4, outline="black", width=2)
+        agreed = [(sighting.words, sighting.box, colour) for sighting, colour in found]
+        boxes = np.array([box for _, box, _ in agreed if box is not None]).reshape(-1, 4)
+        # The upper object's words go above it, the lower's below it; of two that are close
+        # together, above and below both, so that words never cover a box.
+        close = len(boxes) == 2 and np.ptp(boxes[:, :2] + boxes[:, 2:], axis=0).max() < (
+            2 * image.width / 5
+        )
         for words, box, colour in agreed:
             if box is not None:
                 left, top, right, bottom = box
                 pen.rectangle((left - 3, top - 3, right + 3, bottom + 3), outline=colour, width=3)
-                # The upper object's words go above it, the lower's below it; of two that are
-                # close together, above and below both, so that words never cover a box.
-                above = box == min(boxes, key=_middle_height)
-                clear_of = _around(boxes) if _are_close(boxes, image.width / 5) else box
-                at = ((left + right) / 2, clear_of[1] - 8 if above else clear_of[3] + 8)
+                above = top + bottom == (boxes[:, 1] + boxes[:, 3]).min()
+                if close:
+                    top, bottom = boxes[:, 1].min(), boxes[:, 3].max()
+                at = ((left + right) / 2, top - 8 if above else bottom + 8)
                 _write(pen, words, at, colour, image.size, above=above)
         return np.asarray(image)
 
@@ -179,17 +183,3 @@ def _write(
 
 def _middle(box: Box) -> tuple[float, float]:
     return (box[0] + box[2]) / 2, (box[1] + box[3]) / 2
-
-
-def _middle_height(box: Box) -> float:
-    return box[1] + box[3]
-
-
-def _are_close(boxes: list[Box], distance: float) -> bool:
-    middles = np.array([_middle(box) for box in boxes])
-    return bool((np.ptp(middles, axis=0) < distance).all())
-
-
-def _around(boxes: list[Box]) -> Box:
-    left, top, right, bottom = zip(*boxes, strict=True)
-    return min(left), min(top), max(right), max(bottom)
