@@ -33,6 +33,12 @@ from .perception.calibration import TableCalibration as TableCalibration
 from .perception.camera import Camera as Camera
 from .perception.exact import Exact as Exact
 from .perception.eye import Eye as Eye
+from .perception.colour_camera import ColourCamera as ColourCamera
+from .perception.vlm import VisionLanguageModel as VisionLanguageModel
+from .perception.vlm_client import VisionLanguageModelConfig as VisionLanguageModelConfig
+from .scene import SeenObject as SeenObject
+from .scene import TableScene as TableScene
+from .rollouts import KeyFrame as KeyFrame
 from .plans.alignment import Alignment as Alignment
 from .plans.alignment import AlignmentConfig as AlignmentConfig
 from .plans.alignment import align as align

@@ -13,10 +13,10 @@ _TABLE_MARKS = tuple((x, y) for x in (0.5, 0.85, 1.2) for y in (-0.4, 0.0, 0.4))
 
 @dataclass(frozen=True)
 class SeenObject:
-    """An object in words that a model understands."""
+    """An object, in words that a model understands."""
 
     words: str
-    """For instance `the orange ball`; only one thing in the picture answers to it."""
+    """For instance `the orange ball`; they must fit one thing in the picture only."""
     size: float
     """Longer side of a box around it, in [m]. A box of less than half of it, or more than twice,
     is not around this object, however often the model repeats it."""

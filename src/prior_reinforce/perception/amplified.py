@@ -1,4 +1,4 @@
-"""Exact seeing made worse on purpose (paper, Section V-B, "Amplified Perception Noise")."""
+"""The exact error, distorted on purpose (paper, Section V-B, "Amplified Perception Noise")."""
 
 from __future__ import annotations
 

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import TypeVar
 
 import numpy as np
+from typing_extensions import Self
 
 from prior_reinforce.arrays import Point
 from prior_reinforce.rollouts import Rollout
 
-_P = TypeVar("_P", bound="Perception")  # not Self: run-time checks of annotations cannot read it
-
 
 class Perception(ABC):
-    """A way of seeing by how much a trial missed: e_seen = P(r - g)."""
+    """Perceives by how much a trial missed: e_seen = P(r - g)."""
 
     @abstractmethod
     def perceive(self, rollout: Rollout, goal: Point, rng: np.random.Generator) -> Point:
@@ -29,13 +27,13 @@ class Perception(ABC):
             Error seen, outcome minus goal, in [m].
 
         Raises:
-            PerceptionFailedError: Nothing could be made out; ask an operator.
+            PerceptionFailedError: Nothing could be recognised; ask an operator.
         """
 
     def close(self) -> None:  # noqa: B027  # most hold nothing
         """Free what it holds: connections, graphics memory."""
 
-    def __enter__(self: _P) -> _P:
+    def __enter__(self) -> Self:
         """Use it for the length of a block."""
         return self
 

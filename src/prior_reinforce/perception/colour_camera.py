@@ -1,9 +1,9 @@
 """P = the overhead camera, and objects found in its picture by their colour.
 
-A camera of centimetre accuracy for simulated trials. It goes the whole way of a vision-language
-model: the picture shrunk as a server wants it, a box in whole thousandths, an answer in a family's
-words, the parser, the votes. Only the eyesight is not a model's, so that its readings are no
-evidence about models.
+A camera of centimetre accuracy for simulated trials. Its readings take the same path as those of a
+vision-language model: the picture resized as for a server, a box in whole thousandths, an answer in
+a model family's words, the parser, the votes. Only the objects are not found by a model, so that
+these readings are no evidence about models.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ class ColourCamera(VisionLanguageModel):
 
         Args:
             scene: What to look for.
-            config: Family whose format is gone through, and votes; an endpoint is not needed.
+            config: Model family whose format is used, and votes; the endpoint is ignored.
             seed: Of the outliers.
             outlier_rate: Share of answers whose box, of the right size, lies anywhere.
             camera: As in `VisionLanguageModel`.

@@ -1,4 +1,4 @@
-"""Seeing without error: what a simulator, or a very good measurement, reports."""
+"""Perception without error: what a simulator, or a very good measurement, reports."""
 
 from __future__ import annotations
 

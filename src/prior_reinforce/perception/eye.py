@@ -9,12 +9,12 @@ from prior_reinforce.perception.base import Perception
 from prior_reinforce.rollouts import Rollout
 
 _NEAR = np.array([0.0, 0.02, 0.05, 0.10])
-"""Distances told apart near the goal, in [m] (paper: 0 cm, 2 cm, 5 cm, multiples of 10 cm)."""
+"""Distances distinguished near the goal, in [m] (paper: 0 cm, 2 cm, 5 cm, multiples of 10 cm)."""
 _BETWEEN_NEAR = (0.01, 0.035, 0.075)
 """Half-way between them; written out, since the float (5 cm + 10 cm) / 2 is not 7.5 cm."""
-_LEAST_TOLD = _NEAR[1]
-"""What the larger component is called where the miss is `_BETWEEN_NEAR[0]` or more, but every
-component rounds to 0."""
+_LEAST = _NEAR[1]
+"""Reported for the larger component where the miss is `_BETWEEN_NEAR[0]` or more, but every
+component rounds to 0, in [m]."""
 _STEP = 0.10
 """Distances beyond are multiples of this, in [m]."""
 _RESOLUTION_DECIMALS = 9
@@ -24,10 +24,10 @@ _RESOLUTION_DECIMALS = 9
 class Eye(Perception):
     """Each component of the error, rounded to the nearest of 0, 2, 5, 10, 20, 30, ... cm.
 
-    The sign is kept. A tie (1, 3.5, 7.5, 15, ... cm) counts as the larger: who is in doubt reports
-    the miss. Nobody calls a miss of 1.2 cm none because it is 0.9 cm along one axis and 0.8 cm
-    along the other: the larger component is then called 2 cm (ours; "no error" would repeat the
-    miss for ever). Nothing is random: the paper describes the rounding and no other error.
+    The sign is kept. A tie (1, 3.5, 7.5, 15, ... cm) is rounded up. A miss of 1 cm or more is never
+    reported as zero because each component alone rounds to zero, as 0.9 cm and 0.8 cm do: the
+    larger one is then reported as 2 cm (ours; "no error" would repeat the miss for ever). Nothing
+    is random: the paper describes the rounding and no other error.
     """
 
     def perceive(self, rollout: Rollout, goal: Point, rng: np.random.Generator) -> Point:
@@ -39,6 +39,6 @@ class Eye(Perception):
         seen = np.where(size < _NEAR[-1], near, far)
         distance = np.round(np.linalg.norm(size), _RESOLUTION_DECIMALS)
         if not seen.any() and distance >= _BETWEEN_NEAR[0]:
-            seen[np.argmax(size)] = _LEAST_TOLD
+            seen[np.argmax(size)] = _LEAST
         # Adding 0 turns the -0.0 of a small negative error into 0.0.
         return np.sign(error) * seen + 0.0

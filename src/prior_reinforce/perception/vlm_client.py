@@ -6,7 +6,7 @@ import base64
 import io
 import os
 from dataclasses import dataclass
-from typing import Any, Literal, Protocol, runtime_checkable
+from typing import Any, Literal, Protocol
 from urllib.parse import urlsplit
 
 from prior_reinforce.errors import ConfigurationError, EndpointError, MissingExtraError
@@ -19,7 +19,7 @@ _THIS_MACHINE = {"127.0.0.1", "localhost", "::1"}
 
 @dataclass(frozen=True)
 class VisionLanguageModelConfig:
-    """Where the model is, how it speaks, and when its answers are believed."""
+    """Where the model is, its format, and when its answers are accepted."""
 
     base_url: str = "http://127.0.0.1:8000/v1"
     """OpenAI-compatible endpoint; the default is where vLLM and SGLang serve."""
@@ -75,7 +75,6 @@ class VisionLanguageModelConfig:
             )
 
 
-@runtime_checkable
 class ModelClient(Protocol):
     """Answers where an object is in a picture."""
 

@@ -2,9 +2,9 @@
 
 The ball lies in the spoon and leaves it because the spoon brakes and tips; nothing else holds or
 frees it. The outcome is where the ball's centre comes down through the plane of the hoop's rim.
-The same throw has three hardwares (paper, Section V-A and hardware figure). V2 and V3 are thrown
-with V1's demonstrations and the outcomes they had on V1, unchanged: these promise more than the
-hardware gives, and adaptation has to find out by how much.
+There are three sets of hardware (paper, Section V-A and hardware figure). V2 and V3 use
+V1's demonstrations with the outcomes they had on V1, unchanged: there the same plans land shorter,
+and adaptation has to find out by how much.
 The scenes are in `basketball.xml`, `basketball_v2.xml` and `basketball_v3.xml`, the arm in
 `panda.xml`; lengths in [m], table frame.
 """
@@ -36,7 +36,7 @@ class Hardware:
     xml: str
     """File name of the scene."""
     tolerance: float
-    """Clean pass, (free diameter - ball) / 2: (9.0 - 6.0) cm / 2, V3 (7.5 - 5.0) cm / 2; in [m]."""
+    """For a clean pass, in [m]: (9 - 6) cm / 2 of free diameter and ball; V3: (7.5 - 5) cm / 2."""
     scene: TableScene
     """What a camera sees of them."""
 
