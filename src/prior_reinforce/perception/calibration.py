@@ -9,6 +9,7 @@ down, and the first pixel's centre is (0.5, 0.5).
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -24,7 +25,6 @@ from prior_reinforce.errors import ConfigurationError, FileFormatError
 _Pairs = Float[np.ndarray, "n 2"]
 
 _Row = tuple[float, float, float]
-_FILE_KIND: Literal["prior-reinforce table calibration 1"] = "prior-reinforce table calibration 1"
 
 
 class _Saved(msgspec.Struct):
@@ -132,9 +132,14 @@ class TableCalibration:
 
     def save(self, path: Path) -> None:
         """Write the calibration as JSON."""
-        a, b, c = map(tuple, self.homography.tolist())
-        saved = _Saved(_FILE_KIND, (a, b, c), self.height, self.fit_error, self.left_out_error)
-        files.write(path, msgspec.json.format(msgspec.json.encode(saved)) + b"\n")
+        saved = {
+            "kind": "prior-reinforce table calibration 1",
+            "homography": self.homography.tolist(),
+            "height_m": self.height,
+            "fit_error_m": self.fit_error,
+            "left_out_error_m": self.left_out_error,
+        }
+        files.write(path, json.dumps(saved, indent=2) + "\n")
 
     @classmethod
     def load(cls, path: Path) -> TableCalibration:
