@@ -76,8 +76,6 @@ def test_a_lost_demonstration_is_named():
 
 def test_outcomes_that_look_the_same_are_told_with_what_to_do():
     class Asleep(Perception):
-        name = "asleep"
-
         def perceive(self, rollout, goal, rng):
             return np.zeros(2)
 
