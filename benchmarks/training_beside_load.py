@@ -18,7 +18,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from prior_reinforce.cores import available_cores
+import joblib
 
 _TRAIN = """
 import sys, time
@@ -60,7 +60,7 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=3)
     options = parser.parse_args()
 
-    cores = available_cores()
+    cores = joblib.cpu_count()
     print(f"{cores} cores, load before {os.getloadavg()[0]:.1f}; {options.steps} steps, in [s]")
     print("threads  waiting  quiet  loaded  ratio")
     for threads, wait in itertools.product(options.threads, ("PASSIVE", "ACTIVE")):

@@ -3,7 +3,7 @@
 import mujoco
 import numpy as np
 
-from prior_reinforce.robots.limits import PANDA
+from prior_reinforce.robots.presets import PANDA
 from prior_reinforce.tasks import inverse_kinematics as ik
 
 DT = 0.02

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from prior_reinforce.robots.limits import PANDA
+from prior_reinforce.robots.presets import PANDA
 from prior_reinforce.tasks import panda
 
 SCENE = Path(panda.__file__).with_name("basketball.xml")

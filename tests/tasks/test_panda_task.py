@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from prior_reinforce.robots.limits import PANDA
+from prior_reinforce.robots.presets import PANDA
 from prior_reinforce.tasks import TASKS, make_task, panda
 from prior_reinforce.tasks.curling import Curling
 from prior_reinforce.tasks.panda_task import first_descent

@@ -18,7 +18,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
-from prior_reinforce.robots.limits import PANDA
+from prior_reinforce.robots.presets import PANDA
 from prior_reinforce.tasks.panda import N_JOINTS
 
 POSE_NAMES = ("x", "y", "z", "rx", "ry", "rz")
