@@ -7,6 +7,7 @@ A program of its own, because a process that has used threads cannot be forked.
 
 import os
 import signal
+import subprocess
 import sys
 import time
 from pathlib import Path
@@ -19,6 +20,21 @@ from prior_reinforce.experiments.units import Workers, run_units
 WRITING = 0.02
 """Seconds that every write takes at least, so that a kill within one does not depend on luck."""
 WORKERS = (1, 1, 1, 2)  # A new worker takes seconds to start, so most runs do without.
+
+
+def printed_by(program, *args):
+    """What a program of its own prints; these fork, or leave Ray around."""
+    here = Path(__file__).parent
+    path = os.pathsep.join([str(here), os.environ.get("PYTHONPATH", "")])
+    done = subprocess.run(
+        [sys.executable, here / program, *map(str, args)],
+        capture_output=True,
+        text=True,
+        env=os.environ
+        | {"OMP_NUM_THREADS": "1", "RAY_USAGE_STATS_ENABLED": "0", "PYTHONPATH": path},
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
 
 
 def start(folder: Path, workers: int) -> int:

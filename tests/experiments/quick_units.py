@@ -11,7 +11,7 @@ import numpy as np
 from prior_reinforce.experiments.evaluation import Training, Trials, ZeroShot
 from prior_reinforce.experiments.units import Unit
 from prior_reinforce.generators import DiffusionConfig, DiffusionGenerator
-from prior_reinforce.generators.unet_size import UNetSize
+from prior_reinforce.generators.config import UNetSize
 
 
 class BriefDiffusion(DiffusionGenerator):
@@ -37,7 +37,7 @@ def real_units():
     """A generator of each kind is learned, thrown, and adapted."""
     nearest, smooth, diffusion = trainings()
     return [
-        smooth.seen,
+        smooth.perceived,
         *trainings(),
         Trials(nearest, "basketball-v1", "gp", "amplified", goals=3, rounds=2),
         Trials(smooth, "basketball-v1", "proportional", "eye", goals=2, unseen=True, rounds=1),

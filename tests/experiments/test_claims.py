@@ -2,8 +2,7 @@
 
 import pytest
 
-from prior_reinforce.experiments.recipes.claims import Verdict, above, all_of, at_most
-from prior_reinforce.experiments.recipes.success import verdict_by_round
+from prior_reinforce.experiments.claims import Verdict, above, above_by_round, all_of, at_most
 from prior_reinforce.experiments.statistics import Interval
 
 CONFIRMED, NOT_CONFIRMED, OPEN = Verdict.CONFIRMED, Verdict.NOT_CONFIRMED, Verdict.OPEN
@@ -47,11 +46,11 @@ def test_by_round_leaves_out_rounds_before_the_claim_and_rounds_that_both_have_w
     none = {"value": 0.0, "low": 0.0, "high": 0.0}
     ours, other = [point(0.2), point(0.9), won], [point(0.3), point(0.5), won]
     difference = [point(-0.1), point(0.4), none]
-    assert verdict_by_round(ours, other, difference, 2, trainings=6) is CONFIRMED
-    assert verdict_by_round(ours, other, difference, 1, trainings=6) is NOT_CONFIRMED
+    assert above_by_round(ours, other, difference, 2, trainings=6) is CONFIRMED
+    assert above_by_round(ours, other, difference, 1, trainings=6) is NOT_CONFIRMED
 
 
 def test_by_round_asks_every_round():
     ours, other = [point(0.2), point(0.9), point(0.9)], [point(0.2), point(0.5), point(0.9)]
     difference = [point(0.0), point(0.4), point(0.0, half=0.05)]
-    assert verdict_by_round(ours, other, difference, 2, trainings=6) is OPEN
+    assert above_by_round(ours, other, difference, 2, trainings=6) is OPEN

@@ -2,6 +2,8 @@
 
 import json
 import re
+from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
@@ -10,11 +12,10 @@ from prior_reinforce.errors import (
     FileFormatError,
     RenderingUnavailableError,
 )
+from prior_reinforce.experiments import recipes
+from prior_reinforce.experiments.claims import Verdict
 from prior_reinforce.experiments.evidence import write_evidence
-from prior_reinforce.experiments.provenance import provenance
-from prior_reinforce.experiments.recipes import Run, Scale, Verdict
-from prior_reinforce.experiments.recipes.adapters import Adapters
-from prior_reinforce.experiments.recipes.alignment import TimelineAlignment
+from prior_reinforce.experiments.recipes import Run, Scale, alignment
 
 ROUNDS = 10
 
@@ -48,17 +49,7 @@ ADAPTERS = {
     "proportional_minus_frozen": curve(0.0, 0.15, 0.3),
     "proportional_mean_minus_frozen": curve(0.2)[0],
 }
-SCALE = Scale()
-MADE_BY = provenance("prior-reinforce reproduce this", SCALE, {"abc123"})
-
-
-def test_where_both_reach_every_goal_neither_is_refuted():
-    none = [{"value": 0.0, "low": 0.0, "high": 0.0}] * ROUNDS
-    all_reached = {name: curve(0.5, 1.0) for name in ADAPTERS["success"]}
-    forms = {"gp": {**ADAPTERS["forms"]["gp"], "minus_proportional": none}}
-    claims = Adapters().claims({**ADAPTERS, "success": all_reached, "forms": forms})
-    (lower,) = (claim for claim in claims if claim.paper.endswith("ends lower."))
-    assert lower.verdict is Verdict.OPEN
+MADE_BY = Run(Path(), Scale(), commits={"abc123"}).made_by("prior-reinforce reproduce this")
 
 
 def put(folder, name, figures):
@@ -68,7 +59,7 @@ def put(folder, name, figures):
 
 def test_the_page_holds_claims_tables_and_pictures_in_one_file(tmp_path):
     put(tmp_path, "adapters", ADAPTERS)
-    put(tmp_path, "alignment", TimelineAlignment().run(Run(tmp_path, Scale(sets=("A",)))))
+    put(tmp_path, "alignment", alignment.Alignment().run(Run(tmp_path, Scale(sets=("A",)))))
     page, markdown = write_evidence(tmp_path)
     text, plain = page.read_text(), markdown.read_text()
     assert len(re.findall(r'src="data:image/png;base64,', text)) == 2
@@ -89,10 +80,12 @@ def test_the_page_holds_claims_tables_and_pictures_in_one_file(tmp_path):
 
 
 def test_a_picture_that_cannot_be_drawn_costs_no_figures(tmp_path, monkeypatch):
-    def draw(self, figures, folder):
+    def draw(figures, folder):
         raise RenderingUnavailableError("no OpenGL here")
 
-    monkeypatch.setattr(Adapters, "draw", draw)
+    monkeypatch.setitem(
+        recipes.RECIPES, "adapters", replace(recipes.RECIPES["adapters"], draw=draw)
+    )
     put(tmp_path, "adapters", ADAPTERS)
     for path in write_evidence(tmp_path):
         text = path.read_text()

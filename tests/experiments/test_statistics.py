@@ -3,12 +3,16 @@
 import numpy as np
 import pytest
 
-from prior_reinforce.experiments.recipes.claims import Verdict, above
+from prior_reinforce.experiments.claims import Verdict, above
 from prior_reinforce.experiments.statistics import (
     SHARE,
     bootstrap_difference,
     bootstrap_mean,
+    difference_curve,
+    mean_success_difference,
     reached_by,
+    success_curve,
+    trials_counted,
 )
 
 
@@ -69,3 +73,18 @@ def test_a_paired_difference_does_not_know_what_both_share():
 
 def test_goals_that_were_never_reached_count_as_missed():
     np.testing.assert_array_equal(reached_by(np.array([0, 1, 3]), 2), [0.0, 1.0, 0.0])
+    np.testing.assert_array_equal(trials_counted(np.array([0, 1, 3]), 10), [11.0, 1.0, 3.0])
+
+
+def test_curves_of_a_worked_example():
+    solved = np.array([[1, 2, 0, 3]])
+    assert [point["value"] for point in success_curve(solved, 3)] == [0.25, 0.5, 0.75]
+    other = np.array([[1, 0, 0, 1]])
+    assert [point["value"] for point in difference_curve(solved, other, 3)] == [-0.25, 0.0, 0.25]
+    assert mean_success_difference(solved, other, 3).value == pytest.approx(0.0)
+
+
+def test_a_difference_of_curves_is_paired():
+    solved = np.tile([1, 0], (3, 20))
+    (point,) = difference_curve(solved, solved, 1)
+    assert point == {"value": 0.0, "low": 0.0, "high": 0.0}

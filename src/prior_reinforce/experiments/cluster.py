@@ -1,8 +1,7 @@
 """Work on a Ray cluster that survives the loss of a node.
 
-joblib's Ray backend does not: it deals work out to a fixed set of actors, and a lost actor takes
-its work with it and fails whatever is dealt to it next. Plain Ray tasks are put on another node by
-Ray itself.
+joblib's Ray backend does not: a lost actor takes its work with it and fails whatever it is given
+next. Plain Ray tasks are put on another node by Ray itself.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The units that everything is made of: see demonstrations; learn; throw once; try goals."""
+"""The units that everything is made of: perceive demonstrations; learn; throw once; try goals."""
 
 from __future__ import annotations
 
@@ -9,26 +9,25 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.spatial import Delaunay
 
-from prior_reinforce.errors import PerceptionFailedError
-from prior_reinforce.experiments.goals import unseen_goals
-from prior_reinforce.experiments.methods import make_adapter, make_generator
+from prior_reinforce.adapters import make_adapter
+from prior_reinforce.arrays import Points
+from prior_reinforce.experiments.learned import own_class
 from prior_reinforce.experiments.protocol import (
     GoalTrials,
-    look_by_eye,
+    estimate_by_eye,
+    perceive_demonstrations,
     run_goals,
-    see_demonstrations,
+    unseen_goals,
 )
-from prior_reinforce.experiments.sight import open_sight
 from prior_reinforce.experiments.units import Unit, digest_of, result_of
 from prior_reinforce.files import in_place
-from prior_reinforce.generators import Generator, load_generator
+from prior_reinforce.generators import Generator, load_generator, make_generator
+from prior_reinforce.perception import make_perception
 from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
 from prior_reinforce.plans.alignment import align
 from prior_reinforce.plans.motions import Demonstrations
-from prior_reinforce.registry import source_digest
-from prior_reinforce.rollouts import Rollout
+from prior_reinforce.registry import parse_choice, source_digest
 from prior_reinforce.tasks import make_task
 
 GOAL_SEED = 100
@@ -36,7 +35,7 @@ GOAL_SEED = 100
 
 
 @dataclass(frozen=True)
-class SeenDemonstrations(Unit):
+class PerceivedDemonstrations(Unit):
     """Execute a prior set once and see where it went (paper, Stage 1); whoever learns shares it."""
 
     task: str
@@ -44,7 +43,7 @@ class SeenDemonstrations(Unit):
     demonstrations: str
     """Prior set, A or B."""
     perception: str
-    """Perception's name (`sight.SIGHTS`), or module:Class."""
+    """Perception, by its choice."""
     seed: int
     """Seed of the training that it is for."""
     model: VisionLanguageModelConfig | None = None
@@ -53,37 +52,44 @@ class SeenDemonstrations(Unit):
     @property
     def label(self) -> str:
         """What it is, for a progress line."""
-        return f"see {self.task} {self.demonstrations} by {self.perception}, {self.seed}"
+        return f"perceive {self.task} {self.demonstrations} by {self.perception}, {self.seed}"
 
     @property
     def own_sources(self) -> tuple[str, ...]:
-        """Digests of a task's and a perception's own files; see `Unit`."""
+        """Hashes of a task's and a perception's own files; see `Unit`."""
         return source_digest(self.task), source_digest(self.perception)
 
     def run(self, folder: Path) -> Mapping[str, Any]:
         """Execute and look."""
         task = make_task(self.task)
-        failures: list[PerceptionFailedError] = []
+        failures: list[str] = []
 
-        def look(
-            failure: PerceptionFailedError,
-            rollout: Rollout,
-            goal: np.ndarray,
-            rng: np.random.Generator,
-        ) -> np.ndarray:
-            failures.append(failure)
-            return look_by_eye(failure, rollout, goal, rng)
+        def count_and_estimate(failure: Any, *seen: Any) -> Any:
+            failures.append(str(failure))
+            return estimate_by_eye(failure, *seen)
 
         seed = GOAL_SEED + self.seed
-        with open_sight(self.perception, self.task, self.model, seed=seed) as sight:
-            seen = see_demonstrations(
+        with make_perception(
+            self.perception, scene=task.scene, config=self.model, seed=seed
+        ) as perception:
+            perceived = perceive_demonstrations(
                 task,
                 task.demonstrations(self.demonstrations),
-                sight,
+                perception,
                 seed=seed,
-                on_failed_reading=look,
+                on_failed_reading=count_and_estimate,
             )
-        return {"outcomes_seen": seen.outcomes_seen.tolist(), "failed_readings": len(failures)}
+        return {"outcomes_seen": perceived.outcomes_seen.tolist(), "failed_readings": len(failures)}
+
+
+@dataclass(frozen=True, eq=False)
+class Learned:
+    """What a training gives."""
+
+    generator: Generator
+    """pi."""
+    prior: Demonstrations
+    """What it was learned from, with the outcomes that were seen."""
 
 
 @dataclass(frozen=True)
@@ -95,38 +101,34 @@ class Training(Unit):
     demonstrations: str
     """Prior set, A or B."""
     generator: str
-    """Generator's name, or module:Class."""
+    """Generator, by its choice: `nearest,timing=align`."""
     seed: int
     """Seed of the training."""
-    aligned: bool = False
-    """Whether the demonstrations are aligned in time first."""
     subset: tuple[int, ...] | None = None
     """Which of the demonstrations to learn from; None for all."""
     perception: str | None = None
-    """How the outcomes of the demonstrations are seen (`sight.SIGHTS`), or module:Class; None for
-    the true ones, as recorded."""
+    """How the outcomes of the demonstrations are seen, by its choice; None for the exact ones."""
     model: VisionLanguageModelConfig | None = None
     """Endpoint to ask where `perception` is vlm."""
 
     @property
     def label(self) -> str:
         """What it is, for a progress line."""
-        how = ", aligned" if self.aligned else ""
-        how += "" if self.perception is None else f" by {self.perception}"
+        how = "" if self.perception is None else f" by {self.perception}"
         return f"learn {self.generator} on {self.task} {self.demonstrations}{how}, {self.seed}"
 
     @property
     def own_sources(self) -> tuple[str, ...]:
-        """Digests of the own files behind what is learned; see `Unit`."""
+        """Hashes of your own files behind what is learned; see `Unit`."""
         own = source_digest(self.task), source_digest(self.generator)
-        return own if self.seen is None else (*own, *self.seen.own_sources)
+        return own if self.perceived is None else (*own, *self.perceived.own_sources)
 
     @property
-    def seen(self) -> SeenDemonstrations | None:
-        """The demonstrations as they are seen, the same for every generator; None: as recorded."""
+    def perceived(self) -> PerceivedDemonstrations | None:
+        """The demonstrations as perceived, the same for every generator; None: exact outcomes."""
         if self.perception is None:
             return None
-        return SeenDemonstrations(
+        return PerceivedDemonstrations(
             self.task, self.demonstrations, self.perception, self.seed, self.model
         )
 
@@ -141,7 +143,7 @@ class Training(Unit):
         return {}
 
     def recorded(self) -> Demonstrations:
-        """The prior set with its true outcomes, whole."""
+        """The whole prior set with its exact outcomes."""
         return make_task(self.task).demonstrations(self.demonstrations)
 
     def learned(self, folder: Path) -> Learned:
@@ -150,14 +152,12 @@ class Training(Unit):
         if not home.is_dir():
             prior = self._prior(folder)
             generator = make_generator(self.generator).fit(prior, seed=self.seed)
-            home.parent.mkdir(parents=True, exist_ok=True)
             with in_place(home) as unfinished:
                 unfinished.mkdir()
                 generator.save(unfinished / "generator")
                 prior.save(unfinished / "demonstrations.npz")
-        own = ":" in self.generator
-        load = type(make_generator(self.generator)).load if own else load_generator
-        return Learned(load(home / "generator"), Demonstrations.load(home / "demonstrations.npz"))
+        generator = load_generator(home / "generator", own=own_class(self.generator))
+        return Learned(generator, Demonstrations.load(home / "demonstrations.npz"))
 
     def _home(self, folder: Path) -> Path:
         return folder / "models" / digest_of(self)
@@ -165,11 +165,9 @@ class Training(Unit):
     def _prior(self, folder: Path) -> Demonstrations:
         """The demonstrations that are learned from."""
         demonstrations = self.recorded()
-        if self.seen is not None:
-            outcomes = np.array(result_of(folder, self.seen)["outcomes_seen"])
+        if self.perceived is not None:
+            outcomes = np.array(result_of(folder, self.perceived)["outcomes_seen"])
             demonstrations = replace(demonstrations, outcomes_seen=outcomes)
-        if self.aligned:
-            demonstrations = align(demonstrations).demonstrations
         if self.subset is not None:
             chosen = list(self.subset)
             demonstrations = replace(
@@ -178,16 +176,6 @@ class Training(Unit):
                 outcomes_seen=demonstrations.outcomes_seen[chosen],
             )
         return demonstrations
-
-
-@dataclass(frozen=True, eq=False)
-class Learned:
-    """What a training gives."""
-
-    generator: Generator
-    """pi."""
-    prior: Demonstrations
-    """What it was learned from, with the outcomes that were seen."""
 
 
 @dataclass(frozen=True)
@@ -199,9 +187,9 @@ class Trials(Unit):
     task: str
     """Where it is tried; another hardware variant than the training's, perhaps."""
     adapter: str
-    """Adapter's name, or module:Class."""
+    """Adapter, by its choice."""
     perception: str
-    """Perception's name (`sight.SIGHTS`), or module:Class."""
+    """Perception, by its choice."""
     goals: int
     """Number of goals."""
     unseen: bool = False
@@ -221,11 +209,22 @@ class Trials(Unit):
 
     @property
     def own_sources(self) -> tuple[str, ...]:
-        """Digests of the own files behind what is tried; see `Unit`."""
+        """Hashes of your own files behind what is tried; see `Unit`."""
         own = (self.task, self.adapter, self.perception)
-        return super().own_sources + tuple(source_digest(name) for name in own)
+        return super().own_sources + tuple(source_digest(choice) for choice in own)
 
     def run(self, folder: Path) -> Mapping[str, Any]:
+        """Run the protocol, and keep plain numbers, a row a goal."""
+        results = self.trials(folder)
+        return {
+            "goals": [result.goal.tolist() for result in results],
+            "solved_at": [result.solved_at or 0 for result in results],
+            "first_error": [float(np.linalg.norm(result.errors[0])) for result in results],
+            "lost": [sum(not rollout.valid for rollout in result.rollouts) for result in results],
+            "failed_readings": [result.failed_readings for result in results],
+        }
+
+    def trials(self, folder: Path) -> list[GoalTrials]:
         """Run the protocol."""
         task = make_task(self.task)
         learned = self.training.learned(folder)
@@ -237,8 +236,10 @@ class Trials(Unit):
             else task.sample_goals(self.goals, rng)
         )
         seed = GOAL_SEED + self.training.seed
-        with open_sight(self.perception, self.task, self.model, seed=seed) as perception:
-            results = run_goals(
+        with make_perception(
+            self.perception, scene=task.scene, config=self.model, seed=seed
+        ) as perception:
+            return run_goals(
                 task,
                 learned.generator,
                 lambda: make_adapter(self.adapter),
@@ -248,7 +249,6 @@ class Trials(Unit):
                 rounds=self.rounds,
                 seed=seed,
             )
-        return summary(results)
 
 
 @dataclass(frozen=True)
@@ -271,6 +271,8 @@ class ZeroShot(Unit):
         learned = self.training.learned(folder)
         generator, prior = learned.generator, learned.prior
         own = generator.generate(prior.outcomes_seen)
+        if is_aligned(self.training.generator):
+            prior = align(prior).demonstrations
         own_rms = np.sqrt(np.mean((own - prior.plans) ** 2, axis=(1, 2)))
         shown = np.array([rollout.outcome for rollout in task.rollout(prior.plans, None)])
         landed = np.array([rollout.outcome for rollout in task.rollout(own, None)])
@@ -288,22 +290,18 @@ class ZeroShot(Unit):
         }
 
 
-def _grid(outcomes: np.ndarray, spacing: float) -> np.ndarray:
-    """Points of a square grid inside the outcomes' hull, shape (n, k)."""
+def is_aligned(choice: str) -> bool:
+    """Whether a choice of a generator is fitted to aligned demonstrations."""
+    return parse_choice(choice)[1].get("timing") == "align"
+
+
+def _grid(outcomes: Points, spacing: float) -> Points:
+    """Points of a square grid inside the outcomes' hull."""
+    from scipy.spatial import Delaunay
+
     axes = [
         np.arange(low, high + spacing, spacing)
         for low, high in zip(outcomes.min(axis=0), outcomes.max(axis=0), strict=True)
     ]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(axes))
     return points[Delaunay(outcomes).find_simplex(points) >= 0]
-
-
-def summary(results: list[GoalTrials]) -> dict[str, Any]:
-    """What is kept of many goals: plain numbers, a row a goal."""
-    return {
-        "goals": [result.goal.tolist() for result in results],
-        "solved_at": [result.solved_at or 0 for result in results],
-        "first_error": [float(np.linalg.norm(result.errors[0])) for result in results],
-        "lost": [sum(not rollout.valid for rollout in result.rollouts) for result in results],
-        "failed_readings": [result.failed_readings for result in results],
-    }

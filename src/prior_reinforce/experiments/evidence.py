@@ -12,14 +12,11 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-from prior_reinforce.errors import (
-    ConfigurationError,
-    FileFormatError,
-    RenderingUnavailableError,
-)
-from prior_reinforce.experiments.recipes import RECIPES, Claim, Picture, Recipe, Table, Verdict
+from prior_reinforce.errors import ConfigurationError, FileFormatError, RenderingUnavailableError
+from prior_reinforce.experiments.claims import Claim, Verdict
+from prior_reinforce.experiments.recipes import RECIPES, Picture, Recipe, Table
+from prior_reinforce.experiments.recipes.base import Figures
 from prior_reinforce.files import write
 from prior_reinforce.report.html import data_uri, render
 
@@ -77,10 +74,7 @@ def write_evidence(folder: Path) -> tuple[Path, Path]:
         source=data_uri,
     )
     markdown = _markdown(sections, _summary(counts), folder)
-    return (
-        write(folder / "evidence.html", page),
-        write(folder / "evidence.md", markdown),
-    )
+    return write(folder / "evidence.html", page), write(folder / "evidence.md", markdown)
 
 
 def claims_table(claims: Sequence[Claim]) -> Table:
@@ -93,7 +87,7 @@ def claims_table(claims: Sequence[Claim]) -> Table:
 
 def _section(recipe: Recipe, path: Path, pictures: Path) -> Section:
     try:
-        figures: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        figures = json.loads(path.read_text(encoding="utf-8"))
         remarks = recipe.remarks(figures)
         try:
             drawn = recipe.draw(figures, pictures)
@@ -116,7 +110,7 @@ def _section(recipe: Recipe, path: Path, pictures: Path) -> Section:
         ) from error
 
 
-def _made_by(figures: dict[str, Any]) -> str:
+def _made_by(figures: Figures) -> str:
     return (
         f"{figures['command']}; goals of seed {figures['goal_seed']}; version "
         f"{figures['version']}, commit {figures['commit']}"

@@ -11,35 +11,37 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from jaxtyping import Float
 
 from prior_reinforce.adapters.base import Adapter
-from prior_reinforce.errors import (
-    EndpointError,
-    InvalidDemonstrationsError,
-    PerceptionFailedError,
-)
+from prior_reinforce.arrays import Point, Points
+from prior_reinforce.errors import EndpointError, InvalidDemonstrationsError, PerceptionFailedError
 from prior_reinforce.experiments.statistics import reached_by
 from prior_reinforce.generators.base import Generator
+from prior_reinforce.perception import PERCEPTIONS
 from prior_reinforce.perception.base import Perception
 from prior_reinforce.perception.eye import Eye
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.rollouts import Rollout
 from prior_reinforce.session import Session, ask_all
-from prior_reinforce.trials import Trial
 from prior_reinforce.tasks.base import Task
+from prior_reinforce.trials import Trial
 
-FailedReading = Callable[
-    [PerceptionFailedError, Rollout, np.ndarray, np.random.Generator], np.ndarray
-]
-"""Who looks where perception gives up: why, rollout, goal, source of noise -> error seen (k,)."""
+FailedReading = Callable[[PerceptionFailedError, Rollout, Point, np.random.Generator], Point]
+"""Who looks where perception gives up: why, rollout, goal, source of noise -> error seen."""
+OnRound = Callable[[int, "list[GoalTrials]"], None]
+"""Called after every round with its number and the results so far."""
+
+_CANDIDATES_PER_GOAL = 20
+"""Ours: how many candidates are weighed for each unseen goal that is taken."""
 
 
 @dataclass(frozen=True, eq=False)
 class GoalTrials:
     """All trials of one goal, as executed in simulation."""
 
-    goal: np.ndarray
-    """g, shape (k,), [m]."""
+    goal: Point
+    """g, [m]."""
     trials: tuple[Trial, ...]
     """As the session kept them; the last one hit, unless the rounds were spent."""
     rollouts: tuple[Rollout, ...]
@@ -49,23 +51,23 @@ class GoalTrials:
 
     @property
     def solved_at(self) -> int | None:
-        """Number of the trial that reached the goal, from 1; None where none did."""
-        return next((trial.number for trial in self.trials if trial.hit), None)
+        """How many trials it took to reach the goal; None where none did."""
+        return next((i for i, trial in enumerate(self.trials, start=1) if trial.hit), None)
 
     @property
-    def errors(self) -> np.ndarray:
-        """True errors r - g, shape (trials, k), [m]."""
+    def errors(self) -> Points:
+        """True errors r - g of the trials, [m]."""
         return np.array([rollout.outcome - self.goal for rollout in self.rollouts])
 
 
-def is_hit(rollout: Rollout, goal: np.ndarray, tolerance: float) -> bool:
+def is_hit(rollout: Rollout, goal: Point, tolerance: float) -> bool:
     """Whether the true outcome is within the tolerance of the goal; a lost object never is."""
     return bool(rollout.valid and np.linalg.norm(rollout.outcome - goal) <= tolerance)
 
 
-def look_by_eye(
-    failure: PerceptionFailedError, rollout: Rollout, goal: np.ndarray, rng: np.random.Generator
-) -> np.ndarray:
+def estimate_by_eye(
+    failure: PerceptionFailedError, rollout: Rollout, goal: Point, rng: np.random.Generator
+) -> Point:
     """The simulated operator, who estimates by eye (`Eye`) what could not be read.
 
     Raises:
@@ -77,15 +79,31 @@ def look_by_eye(
     return Eye().perceive(rollout, goal, rng)
 
 
-def see_demonstrations(
+def unseen_goals(
+    task: Task, demonstrations: Demonstrations, n: int, rng: np.random.Generator
+) -> Points:
+    """Draw n goals far from all demonstrated outcomes and from each other, in the task's region.
+
+    The paper places its goals "deliberately far from prior rollout outcomes" by hand; ours takes
+    the best of random candidates, one goal after another (farthest-point sampling).
+    """
+    taken = demonstrations.outcomes_seen
+    for _ in range(n):
+        candidates = task.sample_goals(_CANDIDATES_PER_GOAL, rng)
+        distances = np.linalg.norm(candidates[:, None] - taken[None], axis=-1).min(axis=1)
+        taken = np.vstack([taken, candidates[np.argmax(distances)]])
+    return taken[demonstrations.n :].copy()
+
+
+def perceive_demonstrations(
     task: Task,
     demonstrations: Demonstrations,
     perception: Perception,
     *,
     seed: int,
-    on_failed_reading: FailedReading = look_by_eye,
+    on_failed_reading: FailedReading = estimate_by_eye,
 ) -> Demonstrations:
-    """Execute every demonstration once and see where it went: D_e of the paper's Stage 1.
+    """Execute every demonstration once and perceive its outcome: D_e of the paper's Stage 1.
 
     r_seen_i = g_0 + P(rollout(A_i) - g_0), with the reference goal g_0 in the middle of the
     task's region (ours: the paper names one, but not where). From so far off an estimate by eye
@@ -123,7 +141,7 @@ def see_demonstrations(
         return replace(demonstrations, outcomes_seen=np.array(seen))
     except InvalidDemonstrationsError as error:
         raise InvalidDemonstrationsError(
-            f"as {type(perception).__name__} saw {task.name} (seed {seed}), {error}; choose "
+            f"as {PERCEPTIONS.name_of(perception)} saw {task.name} (seed {seed}), {error}; choose "
             "another seed or a finer perception"
         ) from error
 
@@ -134,13 +152,12 @@ def run_goals(
     make_adapter: Callable[[], Adapter],
     perception: Perception,
     demonstrations: Demonstrations,
-    goals: np.ndarray,
+    goals: Points,
     *,
     rounds: int,
     seed: int,
-    earlier: Sequence[Sequence[tuple[np.ndarray, np.ndarray]]] | None = None,
-    on_round: Callable[[int, list[GoalTrials]], None] | None = None,
-    on_failed_reading: FailedReading = look_by_eye,
+    on_round: OnRound | None = None,
+    on_failed_reading: FailedReading = estimate_by_eye,
 ) -> list[GoalTrials]:
     """Try every goal until it is reached, or for a number of rounds.
 
@@ -150,11 +167,10 @@ def run_goals(
         make_adapter: Makes one adapter for each goal.
         perception: What the adapters see through.
         demonstrations: D_prior.
-        goals: Shape (n, k), [m].
+        goals: Each with a session of its own, [m].
         rounds: Largest number of trials a goal.
         seed: Of the disturbances (a stream a round) and of perception (a stream a goal).
-        earlier: For each goal what its session remembers of earlier goals; see `Session`.
-        on_round: Called after every round with its number and the results so far.
+        on_round: Called after every round.
         on_failed_reading: Called for the error of a trial in which perception gave up.
 
     Returns:
@@ -163,9 +179,65 @@ def run_goals(
     sessions = [
         Session(generator, make_adapter(), demonstrations, goal, task.tolerance) for goal in goals
     ]
-    seers = [np.random.default_rng([seed, 1, i]) for i in range(len(goals))]
-    rollouts: list[list[Rollout]] = [[] for _ in goals]
-    failed = [0] * len(goals)
+    return _reach(task, sessions, perception, rounds, seed, on_round, on_failed_reading)
+
+
+def run_sequences(
+    task: Task,
+    generator: Generator,
+    make_adapter: Callable[[], Adapter],
+    perception: Perception,
+    demonstrations: Demonstrations,
+    sequences: Float[np.ndarray, "sequences goals k"],
+    *,
+    carry_over: bool,
+    rounds: int,
+    seed: int,
+) -> list[list[GoalTrials]]:
+    """Work through sequences of goals, a session a sequence, all sequences in lock step.
+
+    Ours; the paper starts every goal from the demonstrations alone. Somebody who works through
+    several goals in one afternoon has the earlier goals' trials at no cost.
+
+    Args:
+        task: As for `run_goals`, like the arguments that are not named here.
+        generator: pi.
+        make_adapter: Makes one adapter for each sequence.
+        perception: P.
+        demonstrations: D_prior.
+        sequences: Goals, [m].
+        carry_over: Whether the trials of a sequence's earlier goals serve the later ones.
+        rounds: Largest number of trials a goal.
+        seed: Other streams for each goal of a sequence.
+
+    Returns:
+        For each sequence, a result a goal.
+    """
+    sessions = [
+        Session(generator, make_adapter(), demonstrations, carry_over=carry_over) for _ in sequences
+    ]
+    by_place = []
+    for j in range(sequences.shape[1]):
+        for session, goals in zip(sessions, sequences, strict=True):
+            session.set_goal(goals[j], task.tolerance)
+        own_seed = int(np.random.SeedSequence([seed, j]).generate_state(1)[0])
+        by_place.append(_reach(task, sessions, perception, rounds, own_seed))
+    return [list(results) for results in zip(*by_place, strict=True)]
+
+
+def _reach(
+    task: Task,
+    sessions: Sequence[Session],
+    perception: Perception,
+    rounds: int,
+    seed: int,
+    on_round: OnRound | None = None,
+    on_failed_reading: FailedReading = estimate_by_eye,
+) -> list[GoalTrials]:
+    """Try the goal that each session works on, in lock step; see `run_goals`."""
+    seers = [np.random.default_rng([seed, 1, i]) for i in range(len(sessions))]
+    rollouts: list[list[Rollout]] = [[] for _ in sessions]
+    failed = [0] * len(sessions)
 
     def results() -> list[GoalTrials]:
         return [
@@ -178,25 +250,23 @@ def run_goals(
         if not active:
             break
         trials = ask_all([sessions[i] for i in active])
-        plans = np.stack([trial.plan for trial in trials])
+        plans = np.stack([trial.plan for trial in trials if trial.plan is not None])
         executed = task.rollout(plans, np.random.default_rng([seed, 0, number]))
         for i, trial, rollout in zip(active, trials, executed, strict=True):
-            session = sessions[i]
+            goal = sessions[i].goal
             try:
-                error_seen = perception.perceive(rollout, session.goal, seers[i])
+                error_seen = perception.perceive(rollout, goal, seers[i])
             except PerceptionFailedError as failure:
                 failed[i] += 1
-                error_seen = on_failed_reading(failure, rollout, session.goal, seers[i])
+                error_seen = on_failed_reading(failure, rollout, goal, seers[i])
             rollouts[i].append(rollout)
-            session.tell(
-                trial.number, error_seen, hit=is_hit(rollout, session.goal, task.tolerance)
-            )
+            sessions[i].tell(trial.number, error_seen, hit=is_hit(rollout, goal, task.tolerance))
         if on_round is not None:
             on_round(number, results())
     return results()
 
 
-def success_by_round(results: list[GoalTrials], rounds: int) -> np.ndarray:
-    """Fraction of goals reached in at most 1, 2, ..., `rounds` trials, shape (rounds,)."""
+def success_by_round(results: Sequence[GoalTrials], rounds: int) -> Float[np.ndarray, " rounds"]:
+    """Fraction of goals reached in at most 1, 2, ..., `rounds` trials."""
     solved_at = np.array([result.solved_at or 0 for result in results])
     return np.array([reached_by(solved_at, number).mean() for number in range(1, rounds + 1)])

@@ -1,23 +1,33 @@
 """Intervals and paired differences: what "better" means here.
 
 Goals and trainings are both drawn at random, so both are resampled: a bootstrap draws trainings,
-and goals, the same for all of them as all are tried on the same. A bootstrap over half a dozen of
+and goals, the same for all of them as all are tried on the same. A bootstrap over half a dozen
 trainings is too narrow, so its interval is widened to what Student's distribution asks for so few.
 Methods of one comparison share goals, prior sets and seeds: their difference is taken pair by pair.
+
+Everywhere `solved_at` is the number of the trial that reached each goal, 0 where none did; its rows
+are trainings (prior set and seed), its columns goals.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
-from scipy import stats
+from jaxtyping import Float, Shaped
 
 _RESAMPLES = 2000
 _CONFIDENCE = 0.95
 _ANYWHERE = (-np.inf, np.inf)
 SHARE = (0.0, 1.0)
 """What a share can be."""
+
+Values = Shaped[np.ndarray, "trainings goals"]
+"""One number for each training and goal."""
+Curve = list[dict[str, float]]
+"""An interval for each round, from round 1, as it goes into JSON."""
 
 
 @dataclass(frozen=True)
@@ -38,66 +48,86 @@ class Interval:
         return f"{self.value:{spec}} [{self.low:{spec}}, {self.high:{spec}}]"
 
 
+def interval_of(values: Mapping[str, Any]) -> Interval:
+    """An interval as it was before it became JSON."""
+    return Interval(**values)
+
+
 def bootstrap_mean(
-    values: np.ndarray, *, within: tuple[float, float] = _ANYWHERE, seed: int = 0
+    values: Values, *, within: tuple[float, float] = _ANYWHERE, seed: int = 0
 ) -> Interval:
-    """Mean over groups and members, resampling both.
+    """Mean over trainings and goals, resampling both.
 
     Args:
-        values: Shape (groups, members): a row a training (prior set and seed), a column a goal.
+        values: What is averaged.
         within: What such a mean can be at all, `SHARE` for instance; the interval ends there. What
             was seen is no such bound: one goal that differs would decide on which side zero lies.
         seed: Of the resampling.
     """
     values = np.asarray(values, dtype=float)
     rng = np.random.default_rng(seed)
-    groups, members = values.shape
-    rows = rng.integers(groups, size=(_RESAMPLES, groups, 1))
-    columns = rng.integers(members, size=(_RESAMPLES, 1, members))
+    trainings, goals = values.shape
+    rows = rng.integers(trainings, size=(_RESAMPLES, trainings, 1))
+    columns = rng.integers(goals, size=(_RESAMPLES, 1, goals))
     means = values[rows, columns].mean(axis=(1, 2))
     value = values.mean()
     tail = (1 - _CONFIDENCE) / 2
-    ends = value + _widening(groups) * (np.quantile(means, [tail, 1 - tail]) - value)
+    ends = value + _widening(trainings) * (np.quantile(means, [tail, 1 - tail]) - value)
     low, high = np.clip(ends, *within)
     return Interval(float(value), float(low), float(high))
 
 
-def _widening(groups: int) -> float:
-    """How much too narrow a bootstrap over so few groups is: its variance, and its tails."""
-    if groups < 2:
+def _widening(trainings: int) -> float:
+    """How much too narrow a bootstrap over so few trainings is: its variance, and its tails."""
+    from scipy import stats
+
+    if trainings < 2:
         return 1.0
     tail = (1 + _CONFIDENCE) / 2
-    student = stats.t.ppf(tail, groups - 1) / stats.norm.ppf(tail)
-    return float(student * np.sqrt(groups / (groups - 1)))
+    student = stats.t.ppf(tail, trainings - 1) / stats.norm.ppf(tail)
+    return float(student * np.sqrt(trainings / (trainings - 1)))
 
 
 def bootstrap_difference(
-    a: np.ndarray, b: np.ndarray, *, within: tuple[float, float] = _ANYWHERE, seed: int = 0
+    a: Values, b: Values, *, within: tuple[float, float] = _ANYWHERE, seed: int = 0
 ) -> Interval:
-    """Mean of a - b, paired by group and member; shapes (groups, members) as above.
-
-    `within` is what either mean can be.
-    """
+    """Mean of a - b, paired by training and goal; `within` is what either mean can be."""
     low, high = within
     difference = np.asarray(a, dtype=float) - np.asarray(b, dtype=float)
     return bootstrap_mean(difference, within=(low - high, high - low), seed=seed)
 
 
-def trials_counted(solved_at: np.ndarray, rounds: int) -> np.ndarray:
-    """Trials that each goal took, one more than there were rounds where it was not reached.
-
-    Args:
-        solved_at: Number of the trial that reached each goal; 0 where none did.
-        rounds: Trials a goal at most.
-    """
+def trials_counted(solved_at: Shaped[np.ndarray, "*any"], rounds: int) -> Float[np.ndarray, "*any"]:
+    """Trials that each goal took, one more than there were rounds where it was not reached."""
     return np.where(solved_at > 0, solved_at, rounds + 1).astype(float)
 
 
-def reached_by(solved_at: np.ndarray, round_number: int) -> np.ndarray:
-    """1 where a goal was reached within that many trials, else 0; same shape.
-
-    Args:
-        solved_at: Number of the trial that reached each goal; 0 where none did.
-        round_number: From 1.
-    """
+def reached_by(
+    solved_at: Shaped[np.ndarray, "*any"], round_number: int
+) -> Float[np.ndarray, "*any"]:
+    """1 where a goal was reached within that many trials, else 0."""
     return ((solved_at > 0) & (solved_at <= round_number)).astype(float)
+
+
+def success_curve(solved_at: Values, rounds: int) -> Curve:
+    """Share of goals reached within 1, 2, ... rounds, with its interval."""
+    return [
+        asdict(bootstrap_mean(reached_by(solved_at, r), within=SHARE)) for r in range(1, rounds + 1)
+    ]
+
+
+def difference_curve(solved_at: Values, other: Values, rounds: int) -> Curve:
+    """Share reached minus the other's, paired by training and goal, with its interval."""
+    return [
+        asdict(bootstrap_difference(reached_by(solved_at, r), reached_by(other, r), within=SHARE))
+        for r in range(1, rounds + 1)
+    ]
+
+
+def mean_success_difference(solved_at: Values, other: Values, rounds: int) -> Interval:
+    """Area between two curves: the difference of the share reached, mean of all rounds."""
+    a, b = (
+        np.mean([reached_by(at, r) for r in range(1, rounds + 1)], axis=0)
+        for at in (solved_at, other)
+    )
+    return bootstrap_difference(a, b, within=SHARE)

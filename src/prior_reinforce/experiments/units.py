@@ -9,23 +9,21 @@ from __future__ import annotations
 
 import hashlib
 import json
+import subprocess
 import traceback
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import asdict, dataclass, fields
-from functools import partial
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
-import joblib
 from threadpoolctl import threadpool_limits
 
 from prior_reinforce.errors import UnitFailedError
 from prior_reinforce.experiments.cluster import run_on_ray
-from prior_reinforce.experiments.code_version import commit
 from prior_reinforce.files import sweep, write
-from prior_reinforce.generators.threads import torch_threads
 
 
 @dataclass(frozen=True)
@@ -39,7 +37,7 @@ class Unit(ABC):
 
     @property
     def own_sources(self) -> tuple[str, ...]:
-        """Digests of the classes of one's own that it runs: when one is edited, it runs anew.
+        """Hashes of the files of your own classes that it runs: when one is edited, it runs anew.
 
         Those of the units that are its fields, unless a unit says more.
         """
@@ -66,10 +64,7 @@ class Workers:
 
 
 def run_units(
-    units: Sequence[Unit],
-    folder: Path,
-    workers: Workers,
-    progress: Callable[[int, int, str], None],
+    units: Sequence[Unit], folder: Path, workers: Workers, progress: Callable[[int, int, str], None]
 ) -> list[Mapping[str, Any]]:
     """Run what is not done yet, and return what is kept of every unit, in order.
 
@@ -127,9 +122,40 @@ def result_path(folder: Path, unit: Unit) -> Path:
 
 
 def digest_of(unit: Unit) -> str:
-    """What tells a unit from others of its kind: its fields, and one's own code behind it."""
+    """What tells a unit from others of its kind: its fields, and your own code behind it."""
     told = json.dumps(asdict(unit), sort_keys=True) + "".join(unit.own_sources)
     return hashlib.sha256(told.encode()).hexdigest()[:16]
+
+
+@lru_cache(maxsize=1)
+def commit() -> str:
+    """The checkout's commit when first asked, and a hash of what was changed since.
+
+    Returns:
+        As `git describe --dirty` gives it, with the hash of the difference where there is one;
+        `not a checkout` where the package is in none, or there is no git.
+    """
+    described = _git("describe", "--always", "--dirty")
+    if described is None or _git("ls-files", "--error-unmatch", Path(__file__).name) is None:
+        return "not a checkout"
+    if not described.endswith("-dirty"):
+        return described
+    return f"{described}-{hashlib.sha256((_git('diff', 'HEAD') or '').encode()).hexdigest()[:8]}"
+
+
+def _git(*arguments: str) -> str | None:
+    """What git says, or None where it cannot."""
+    try:
+        done = subprocess.run(
+            ["git", *arguments],
+            capture_output=True,
+            text=True,
+            cwd=Path(__file__).parent,
+            check=False,
+        )
+    except OSError:
+        return None
+    return done.stdout.strip() if done.returncode == 0 else None
 
 
 def _outcomes(units: Sequence[Unit], folder: Path, workers: Workers) -> Iterator[_Outcome]:
@@ -140,6 +166,8 @@ def _outcomes(units: Sequence[Unit], folder: Path, workers: Workers) -> Iterator
         lost = partial(_keep_failure, folder)
         yield from run_on_ray(partial(_run, folder), units, workers.ray, lost=lost)
         return
+    import joblib
+
     parallel = joblib.Parallel(n_jobs=workers.count, return_as="generator_unordered")
     try:
         yield from parallel(joblib.delayed(_run)(folder, unit) for unit in units)
@@ -152,6 +180,8 @@ def _outcomes(units: Sequence[Unit], folder: Path, workers: Workers) -> Iterator
 
 def _run(folder: Path, unit: Unit) -> _Outcome:
     """Run a unit and keep its result; or keep how it failed."""
+    from prior_reinforce.generators.threads import torch_threads
+
     sweep(folder / "units")
     sweep(folder / "models")
     made_by = commit()  # before the work: a commit made meanwhile is not what ran

@@ -4,38 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from prior_reinforce.experiments.recipes.adapters import Adapters
-from prior_reinforce.experiments.recipes.alignment import TimelineAlignment
-from prior_reinforce.experiments.recipes.base import QUICK, Picture, Recipe, Run, Scale, Table
-from prior_reinforce.experiments.recipes.claims import Claim, Verdict
-from prior_reinforce.experiments.recipes.displacement import DisplacementFields
-from prior_reinforce.experiments.recipes.generators import Generators
-from prior_reinforce.experiments.recipes.process import ProcessPictures
-from prior_reinforce.experiments.recipes.trials import TrialsTable
-from prior_reinforce.experiments.recipes.zero_shot import ZeroShotErrors
+from prior_reinforce.experiments.recipes import (
+    adapters,
+    alignment,
+    displacement,
+    generators,
+    process,
+    trials,
+    zero_shot,
+)
+from prior_reinforce.experiments.recipes.base import (
+    QUICK,
+    Measurement,
+    Picture,
+    Recipe,
+    Run,
+    Scale,
+    Table,
+)
 
 RECIPES: Mapping[str, Recipe] = {
-    recipe.name: recipe
-    for recipe in (
-        ZeroShotErrors(),
-        Generators(),
-        Adapters(),
-        TimelineAlignment(),
-        DisplacementFields(),
-        TrialsTable(),
-        ProcessPictures(),
-    )
+    module.RECIPE.name: module.RECIPE
+    for module in (zero_shot, generators, adapters, alignment, displacement, trials, process)
 }
 """Every recipe by its name, in the order of the evidence page."""
 
-__all__ = [
-    "QUICK",
-    "RECIPES",
-    "Claim",
-    "Picture",
-    "Recipe",
-    "Run",
-    "Scale",
-    "Table",
-    "Verdict",
-]
+__all__ = ["QUICK", "RECIPES", "Measurement", "Picture", "Recipe", "Run", "Scale", "Table"]

@@ -1,25 +1,40 @@
-"""What a recipe is: the units it needs, and what their results mean.
+"""What a recipe is: a measurement that gives figures, and what is made of the figures.
 
-A recipe's figures are one JSON-able dict. Table, pictures and claims are made from the figures
-alone, so a page can be drawn again from the files of a run that took an hour.
+Figures are one JSON-able dict. Table, pictures and claims are functions of the figures alone, so a
+page can be drawn again from the files of a run that took an hour.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
+from importlib.metadata import version
 from pathlib import Path
-from typing import Any, ClassVar, Literal
+from typing import Any, Literal
 
-from prior_reinforce.experiments.code_version import commit
-from prior_reinforce.experiments.evaluation import Training
-from prior_reinforce.experiments.methods import family_of
-from prior_reinforce.experiments.recipes.claims import Claim
-from prior_reinforce.experiments.units import Unit, Workers, run_units
+import numpy as np
+from jaxtyping import Int
 
-Progress = Callable[[int, int, str], None]
+from prior_reinforce.adapters import ADAPTERS, make_adapter
+from prior_reinforce.errors import ConfigurationError
+from prior_reinforce.experiments.claims import Claim
+from prior_reinforce.experiments.evaluation import GOAL_SEED, Training, Trials
+from prior_reinforce.experiments.units import Unit, Workers, commit, run_units
+from prior_reinforce.generators import GENERATORS, make_generator
+
+TASK = "basketball-v1"
+"""The task of all comparisons of methods, as in the paper."""
+_ROUNDS_SHOWN = (1, 2, 4, 8, 10)
+
 Family = Literal["generator", "adapter"]
+_COMPARED: tuple[tuple[Family, Callable[[str], Any], Callable[[str], Any]], ...] = (
+    ("generator", GENERATORS.kind, make_generator),
+    ("adapter", ADAPTERS.kind, make_adapter),
+)
+
+Figures = Mapping[str, Any]
+Progress = Callable[[int, int, str], None]
 
 
 @dataclass(frozen=True)
@@ -49,10 +64,6 @@ QUICK = Scale(goals=10, seeds=(0,), sets=("A",), variants=False, read_pictures=F
 """One training a method of the paper, nothing read from pictures: decides no claim."""
 
 
-def _silent(done: int, total: int, label: str) -> None:
-    """Show no progress."""
-
-
 @dataclass(frozen=True)
 class Run:
     """One execution of a recipe."""
@@ -63,20 +74,21 @@ class Run:
     """How much is run."""
     workers: Workers = field(default_factory=Workers)
     """Where units run."""
-    progress: Progress = _silent
+    progress: Progress = lambda done, total, label: None
     """Called with units done, units in all, and the label of the last one."""
     include: tuple[str, ...] = ()
-    """One's own members of the recipe's family, each as module:Class."""
+    """Choices of the recipe's family that are put beside ours."""
     commits: set[str] = field(default_factory=lambda: {commit()})
     """What made the figures: this code, and whatever ran units that were found on disk."""
 
     def learn(self, trainings: Sequence[Training]) -> int:
-        """Learn what is not learned yet, from demonstrations that are seen first and once.
+        """Learn what is not learned yet, from demonstrations that are perceived first and once.
 
         Returns:
             How many demonstrations perception gave up on, so that they were judged by eye.
         """
-        seen = self.results(list(dict.fromkeys(t.seen for t in trainings if t.seen is not None)))
+        perceived = dict.fromkeys(t.perceived for t in trainings if t.perceived is not None)
+        seen = self.results(list(perceived))
         self.results(trainings)
         return sum(result["failed_readings"] for result in seen)
 
@@ -85,6 +97,20 @@ class Run:
         rows = run_units(units, self.folder, self.workers, self.progress)
         self.commits.update(row.get("commit", "unknown") for row in rows)
         return [row["result"] for row in rows]
+
+    def solved_at(self, units: Sequence[Trials]) -> Int[np.ndarray, "units goals"]:
+        """Trial that reached each goal, 0 where none did."""
+        return np.array([result["solved_at"] for result in self.results(units)])
+
+    def made_by(self, command: str) -> dict[str, Any]:
+        """What makes the figures again: version, commits of the units, scale and seeds."""
+        return {
+            "command": command,
+            "version": version("prior-reinforce"),
+            "commit": ", ".join(sorted(self.commits)),
+            "scale": asdict(self.scale),
+            "goal_seed": GOAL_SEED,
+        }
 
 
 @dataclass(frozen=True)
@@ -105,46 +131,79 @@ class Picture:
     """What is seen, in a sentence or two; read aloud where the picture cannot be seen."""
 
 
-class Recipe(ABC):
-    """One figure or table of the paper."""
+class Measurement(ABC):
+    """What a recipe measures: a frozen dataclass of settings."""
 
-    name: ClassVar[str]
-    """On the command line, and of its file of figures."""
-    title: ClassVar[str]
-    """Heading of its section."""
-    paper: ClassVar[str]
-    """The figure or table of the paper that it answers."""
-    family: ClassVar[Family | None] = None
-    """Which family's own members `--include` puts beside ours; None where none can join."""
-
-    def trainings(self, scale: Scale, include: Sequence[str]) -> Sequence[Training]:
+    def trainings(self, scale: Scale, include: Sequence[str] = ()) -> Sequence[Training]:
         """What is to be learned first, so that recipes can share it and learn side by side."""
         return ()
-
-    def joining(self, include: Sequence[str]) -> tuple[str, ...]:
-        """Which of one's own methods belong to the family that is compared here.
-
-        Raises:
-            ConfigurationError: One cannot be made, or is neither a generator nor an adapter.
-        """
-        return tuple(name for name in include if family_of(name) == self.family)
 
     @abstractmethod
     def run(self, run: Run) -> dict[str, Any]:
         """Run what is not done yet, and return the figures, JSON-able."""
 
-    @abstractmethod
-    def table(self, figures: Mapping[str, Any]) -> Table:
-        """Put the figures into rows."""
 
-    def draw(self, figures: Mapping[str, Any], folder: Path) -> list[Picture]:
-        """Draw the figures as PNGs in a folder."""
-        return []
+@dataclass(frozen=True)
+class Recipe:
+    """One figure or table of the paper."""
 
-    def claims(self, figures: Mapping[str, Any]) -> list[Claim]:
-        """Hold what the paper says against what was measured."""
-        return []
+    name: str
+    """On the command line, and of its file of figures."""
+    title: str
+    """Heading of its section."""
+    paper: str
+    """The figure or table of the paper that it answers."""
+    measurement: Measurement
+    """What is run."""
+    table: Callable[[Figures], Table]
+    """Puts the figures into rows."""
+    draw: Callable[[Figures, Path], list[Picture]] = lambda figures, folder: []
+    """Draws the figures as PNGs in a folder."""
+    claims: Callable[[Figures], list[Claim]] = lambda figures: []
+    """Holds what the paper says against what was measured."""
+    remarks: Callable[[Figures], list[str]] = lambda figures: []
+    """Says in sentences what was measured besides the claims and must not be missed."""
+    family: Family | None = None
+    """Which family's members `--include` puts beside ours; None where none can join."""
 
-    def remarks(self, figures: Mapping[str, Any]) -> list[str]:
-        """Say in sentences what was measured besides the paper's claims and must not be missed."""
-        return []
+    def joining(self, include: Sequence[str]) -> tuple[str, ...]:
+        """Which of some choices belong to the family that is compared here.
+
+        Raises:
+            ConfigurationError: One cannot be made, or is neither a generator nor an adapter.
+        """
+        return tuple(choice for choice in include if family_of(choice) == self.family)
+
+
+def family_of(choice: str) -> Family:
+    """Which family a choice belongs to: `module:Class`, or one of ours with other settings.
+
+    Raises:
+        ConfigurationError: It cannot be made, or is neither a generator nor an adapter.
+    """
+    for family, kind_of, make in _COMPARED:
+        try:
+            kind_of(choice)
+        except ConfigurationError as error:
+            problem = error
+        else:
+            make(choice)
+            return family
+    raise ConfigurationError(
+        f"{choice} is neither a Generator nor an Adapter, and only these are compared side by "
+        f"side: {problem}"
+    )
+
+
+def trainings_of(scale: Scale, generator: str, *, perception: str | None = None) -> list[Training]:
+    """One training for each prior set and seed; `perception` sees the demonstrations."""
+    return [
+        Training(TASK, name, generator, seed, perception=perception)
+        for name in scale.sets
+        for seed in scale.seeds
+    ]
+
+
+def rounds_shown(rounds: int) -> list[int]:
+    """Rounds that a table shows."""
+    return [r for r in _ROUNDS_SHOWN if r <= rounds]

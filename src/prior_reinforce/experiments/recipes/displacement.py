@@ -11,18 +11,33 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from itertools import combinations
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
-from scipy.spatial import Delaunay
+from jaxtyping import Bool, Float
 
-from prior_reinforce.experiments.displacement import Displacement
+from prior_reinforce.arrays import Points
+from prior_reinforce.experiments.claims import Claim, above
 from prior_reinforce.experiments.evaluation import Training
-from prior_reinforce.experiments.recipes.base import Picture, Recipe, Run, Scale, Table
-from prior_reinforce.experiments.recipes.claims import Claim, above
-from prior_reinforce.experiments.recipes.displacement_picture import Field, draw_fields
-from prior_reinforce.experiments.recipes.success import TASK, interval_of, trainings_of
-from prior_reinforce.experiments.statistics import SHARE, bootstrap_difference, bootstrap_mean
+from prior_reinforce.experiments.recipes.base import (
+    TASK,
+    Figures,
+    Measurement,
+    Picture,
+    Recipe,
+    Run,
+    Scale,
+    Table,
+    trainings_of,
+)
+from prior_reinforce.experiments.statistics import (
+    SHARE,
+    Interval,
+    bootstrap_difference,
+    bootstrap_mean,
+    interval_of,
+)
+from prior_reinforce.experiments.units import Unit
 from prior_reinforce.tasks import make_task
 
 HIGH_ERROR = 0.05
@@ -31,26 +46,55 @@ in a trial or two, in [m]."""
 
 
 @dataclass(frozen=True)
-class DisplacementFields(Recipe):
-    """Arrows from condition to landing, learned from six and from three demonstrations."""
+class Displacement(Unit):
+    """Where a dense grid of conditions lands, over the reachable region and beyond its edge."""
 
-    name: ClassVar[str] = "displacement"
-    title: ClassVar[str] = "Displacement fields with six and with three demonstrations"
-    paper: ClassVar[str] = "Figure 8"
+    training: Training
+    """What was learned; its task has two-dimensional outcomes."""
+    spacing: float = 0.025
+    """Of the grid, in [m]."""
+    margin: float = 0.05
+    """How far the grid goes beyond the reachable region, in [m]."""
+
+    @property
+    def label(self) -> str:
+        """What it is, for a progress line."""
+        return f"displacement of {self.training.label.removeprefix('learn ')}"
+
+    def run(self, folder: Path) -> Mapping[str, Any]:
+        """Throw once for each condition, with execution's disturbances switched off."""
+        task = make_task(self.training.task)
+        low, high = task.region[0] - self.margin, task.region[1] + self.margin
+        counts = np.round((high - low) / self.spacing).astype(int) + 1
+        axes = [np.linspace(*ends) for ends in zip(low, high, counts, strict=True)]
+        conditions = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+        plans = self.training.learned(folder).generator.generate(conditions.reshape(-1, len(axes)))
+        rollouts = task.rollout(plans, None)
+        landed = np.array([rollout.outcome for rollout in rollouts]).reshape(conditions.shape)
+        return {
+            "axes_m": [axis.tolist() for axis in axes],
+            "displacements_m": np.round(landed - conditions, 5).tolist(),
+            "lost": sum(not rollout.valid for rollout in rollouts),
+        }
+
+
+@dataclass(frozen=True)
+class DisplacementFields(Measurement):
+    """Arrows from condition to landing, learned from six and from three demonstrations."""
 
     generator: str = "diffusion"
     """Generator whose conditions are laid out."""
     spacing: float = 0.025
     """Of the grid of conditions, in [m]."""
 
-    def trainings(self, scale: Scale, include: Sequence[str]) -> Sequence[Training]:
+    def trainings(self, scale: Scale, include: Sequence[str] = ()) -> Sequence[Training]:
         """The generator from all demonstrations of each set, then from three."""
         full = trainings_of(scale, self.generator)
         return [*full, *(replace(t, subset=widest_three(t.recorded().outcomes_seen)) for t in full)]
 
     def run(self, run: Run) -> dict[str, Any]:
         """Throw once for every condition of a grid."""
-        trainings = self.trainings(run.scale, run.include)
+        trainings = self.trainings(run.scale)
         run.learn(trainings)
         results = run.results([Displacement(training, self.spacing) for training in trainings])
         region = make_task(TASK).region
@@ -62,21 +106,13 @@ class DisplacementFields(Recipe):
         ]
         # The grid is the same for all, so only trainings are resampled.
         by_name = {name: np.array([m[name] for m in summed]).reshape(2, n, 1) for name in summed[0]}
-        fields = [
-            {
-                **result,
-                "outcomes_m": outcomes[i].tolist(),
-                "training": asdict(trainings[i]),
-            }
-            for i, result in ((0, results[0]), (n, results[n]))
-        ]
         return {
             "trainings": n,
             "high_error_m": HIGH_ERROR,
             "region_m": region.tolist(),
             "rows": [
                 {
-                    "demonstrations": len(fields[i]["outcomes_m"]),
+                    "demonstrations": len(outcomes[i * n]),
                     **{
                         name: asdict(bootstrap_mean(v[i], within=_within(name)))
                         for name, v in by_name.items()
@@ -91,89 +127,15 @@ class DisplacementFields(Recipe):
             "outside_minus_inside_m": asdict(
                 bootstrap_difference(by_name["outside_m"][0], by_name["inside_m"][0])
             ),
-            "fields": fields,
+            "fields": [
+                {**results[i], "outcomes_m": outcomes[i].tolist(), "training": asdict(trainings[i])}
+                for i in (0, n)
+            ],
         }
 
-    def table(self, figures: Mapping[str, Any]) -> Table:
-        """One row a number of demonstrations, and their difference."""
-        rows = [(f"{row['demonstrations']} demonstrations", row, ".2f") for row in figures["rows"]]
-        rows.append(("difference", figures["three_minus_six"], "+.2f"))
-        return Table(
-            (
-                "learned from",
-                f"share of the region off by over {figures['high_error_m'] * 100:.0f} cm",
-                "mean error [cm]",
-                "inside the demonstrations' hull [cm]",
-                "outside it [cm]",
-                "steepness of the field [cm/cm]",
-            ),
-            tuple(
-                (
-                    label,
-                    format(interval_of(row["high_error_area"]), spec),
-                    *(format(_cm(row[name]), spec) for name in ("mean_m", "inside_m", "outside_m")),
-                    format(interval_of(row["steepness"]), spec),
-                )
-                for label, row, spec in rows
-            ),
-        )
 
-    def draw(self, figures: Mapping[str, Any], folder: Path) -> list[Picture]:
-        """Two fields, one above the other, of the first prior set and seed."""
-        fields = [
-            Field(
-                f"{len(field['outcomes_m'])} demonstrations",
-                tuple(np.array(axis) for axis in field["axes_m"]),
-                np.array(field["displacements_m"]),
-                np.array(field["outcomes_m"]),
-            )
-            for field in figures["fields"]
-        ]
-        path = draw_fields(fields, np.array(figures["region_m"]), folder / f"{self.name}.png")
-        training = figures["fields"][0]["training"]
-        return [
-            Picture(
-                path,
-                "Each arrow leads from the goal that was asked for to where the throw landed, "
-                "without any trial; the colour is how far that is. Yellow: where the "
-                "demonstrations landed. Dashed: the reachable region, seen from behind the "
-                f"robot. Prior set {training['demonstrations']}, seed {training['seed']}.",
-            )
-        ]
-
-    def claims(self, figures: Mapping[str, Any]) -> list[Claim]:
-        """Small inside, larger outside; three demonstrations widen and disorder it."""
-        trainings, difference = figures["trainings"], figures["three_minus_six"]
-        outside = _cm(figures["outside_minus_inside_m"])
-        area = interval_of(difference["high_error_area"])
-        steepness = interval_of(difference["steepness"])
-        six, three = figures["rows"]
-        return [
-            Claim(
-                "With six demonstrations errors are small within the demonstrated region and "
-                "grow towards the boundary (here: larger outside the hull than inside).",
-                f"mean error inside {_cm(six['inside_m'])} cm, outside "
-                f"{_cm(six['outside_m'])} cm; difference {outside:+.2f} cm",
-                above(outside, 0.0, trainings),
-            ),
-            Claim(
-                "With three demonstrations high-error regions expand.",
-                f"share of the region off by over {figures['high_error_m'] * 100:.0f} cm: "
-                f"{interval_of(three['high_error_area'])} against "
-                f"{interval_of(six['high_error_area'])}; difference {area:+.2f}",
-                above(area, 0.0, trainings),
-            ),
-            Claim(
-                "With three demonstrations the field becomes less structured.",
-                f"neighbouring displacements differ by {interval_of(three['steepness'])} cm a cm "
-                f"against {interval_of(six['steepness'])}; difference {steepness:+.2f}",
-                above(steepness, 0.0, trainings),
-            ),
-        ]
-
-
-def widest_three(outcomes: np.ndarray) -> tuple[int, ...]:
-    """Indices of the three outcomes, of shape (N, 2), that span the largest triangle."""
+def widest_three(outcomes: Float[np.ndarray, "N 2"]) -> tuple[int, ...]:
+    """Indices of the three outcomes that span the largest triangle."""
 
     def doubled_area(corners: tuple[int, ...]) -> float:
         (ax, ay), (bx, by) = outcomes[list(corners[1:])] - outcomes[corners[0]]
@@ -183,14 +145,14 @@ def widest_three(outcomes: np.ndarray) -> tuple[int, ...]:
 
 
 def measures(
-    result: Mapping[str, Any], outcomes: np.ndarray, region: np.ndarray
+    result: Mapping[str, Any], outcomes: Points, region: Float[np.ndarray, "2 2"]
 ) -> dict[str, float]:
     """Sum a field up.
 
     Args:
         result: Of a `Displacement` unit.
-        outcomes: Where the demonstrations landed, shape (N, 2), [m].
-        region: Lower and upper corner, shape (2, 2), [m].
+        outcomes: Where the demonstrations landed, [m].
+        region: Lower and upper corner of the reachable region, [m].
 
     Returns:
         `high_error_area`, a share of the reachable region; `mean_m`, the mean error in it, [m];
@@ -198,6 +160,8 @@ def measures(
         the outcomes, [m]; `steepness`, the mean change of the displacement from a point of the
         reachable region to the next, for each unit of their distance.
     """
+    from scipy.spatial import Delaunay
+
     x, y = (np.array(axis) for axis in result["axes_m"])
     displacements = np.array(result["displacements_m"])
     conditions = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1)
@@ -222,11 +186,95 @@ def _within(name: str) -> tuple[float, float]:
     return SHARE if name == "high_error_area" else (0.0, np.inf)
 
 
-def _both(mask: np.ndarray, axis: int) -> np.ndarray:
+def _both(mask: Bool[np.ndarray, "nx ny"], axis: int) -> Bool[np.ndarray, "mx my"]:
     """Where a point and its next along an axis are both in the mask."""
     return np.asarray(np.delete(mask, 0, axis) & np.delete(mask, -1, axis))
 
 
-def _cm(values: Mapping[str, Any]) -> Any:
+def table(figures: Figures) -> Table:
+    """One row a number of demonstrations, and their difference."""
+    rows = [(f"{row['demonstrations']} demonstrations", row, ".2f") for row in figures["rows"]]
+    rows.append(("difference", figures["three_minus_six"], "+.2f"))
+    return Table(
+        (
+            "learned from",
+            f"share of the region off by over {figures['high_error_m'] * 100:.0f} cm",
+            "mean error [cm]",
+            "inside the demonstrations' hull [cm]",
+            "outside it [cm]",
+            "steepness of the field [cm/cm]",
+        ),
+        tuple(
+            (
+                label,
+                format(interval_of(row["high_error_area"]), spec),
+                *(format(_cm(row[name]), spec) for name in ("mean_m", "inside_m", "outside_m")),
+                format(interval_of(row["steepness"]), spec),
+            )
+            for label, row, spec in rows
+        ),
+    )
+
+
+def draw(figures: Figures, folder: Path) -> list[Picture]:
+    """Two fields, one above the other, of the first prior set and seed."""
+    from prior_reinforce.experiments.recipes.charts import draw_fields
+
+    path = draw_fields(
+        figures["fields"], np.array(figures["region_m"]), folder / "displacement.png"
+    )
+    training = figures["fields"][0]["training"]
+    caption = (
+        "Each arrow leads from the goal that was asked for to where the throw landed, without any "
+        "trial; the colour is how far that is. Yellow: where the demonstrations landed. Dashed: "
+        "the reachable region, seen from behind the robot. Prior set "
+        f"{training['demonstrations']}, seed {training['seed']}."
+    )
+    return [Picture(path, caption)]
+
+
+def claims(figures: Figures) -> list[Claim]:
+    """Small inside, larger outside; three demonstrations widen and disorder it."""
+    trainings, difference = figures["trainings"], figures["three_minus_six"]
+    outside = _cm(figures["outside_minus_inside_m"])
+    area = interval_of(difference["high_error_area"])
+    steepness = interval_of(difference["steepness"])
+    six, three = figures["rows"]
+    return [
+        Claim(
+            "With six demonstrations errors are small within the demonstrated region and "
+            "grow towards the boundary (here: larger outside the hull than inside).",
+            f"mean error inside {_cm(six['inside_m'])} cm, outside {_cm(six['outside_m'])} cm; "
+            f"difference {outside:+.2f} cm",
+            above(outside, 0.0, trainings),
+        ),
+        Claim(
+            "With three demonstrations high-error regions expand.",
+            f"share of the region off by over {figures['high_error_m'] * 100:.0f} cm: "
+            f"{interval_of(three['high_error_area'])} against "
+            f"{interval_of(six['high_error_area'])}; difference {area:+.2f}",
+            above(area, 0.0, trainings),
+        ),
+        Claim(
+            "With three demonstrations the field becomes less structured.",
+            f"neighbouring displacements differ by {interval_of(three['steepness'])} cm a cm "
+            f"against {interval_of(six['steepness'])}; difference {steepness:+.2f}",
+            above(steepness, 0.0, trainings),
+        ),
+    ]
+
+
+def _cm(values: Mapping[str, Any]) -> Interval:
     """An interval in [m], in [cm]."""
     return interval_of({key: 100 * value for key, value in values.items()})
+
+
+RECIPE = Recipe(
+    name="displacement",
+    title="Displacement fields with six and with three demonstrations",
+    paper="Figure 8",
+    measurement=DisplacementFields(),
+    table=table,
+    draw=draw,
+    claims=claims,
+)

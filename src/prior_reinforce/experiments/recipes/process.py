@@ -5,23 +5,22 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
-from prior_reinforce.experiments.evaluation import GOAL_SEED, Training
-from prior_reinforce.experiments.goals import unseen_goals
-from prior_reinforce.experiments.methods import make_adapter
-from prior_reinforce.experiments.protocol import GoalTrials, run_goals
-from prior_reinforce.experiments.recipes.base import Picture, Recipe, Run, Scale, Table
-from prior_reinforce.experiments.recipes.process_picture import (
-    ProcessRow,
-    ProcessTrial,
-    draw_process,
+from prior_reinforce.experiments.evaluation import Training, Trials
+from prior_reinforce.experiments.protocol import GoalTrials
+from prior_reinforce.experiments.recipes.base import (
+    Figures,
+    Measurement,
+    Picture,
+    Recipe,
+    Run,
+    Scale,
+    Table,
 )
-from prior_reinforce.experiments.sight import open_sight
 from prior_reinforce.experiments.units import Unit
-from prior_reinforce.tasks import make_task
 from prior_reinforce.wording import to_words
 
 TASKS = {
@@ -55,45 +54,35 @@ class Process(Unit):
 
     def run(self, folder: Path) -> Mapping[str, Any]:
         """Run the protocol as `Trials` does, and keep everything."""
-        task = make_task(self.training.task)
-        learned = self.training.learned(folder)
-        seed = GOAL_SEED + self.training.seed
-        rng = np.random.default_rng(GOAL_SEED)
-        with open_sight(self.perception, task.name, seed=seed) as perception:
-            results = run_goals(
-                task,
-                learned.generator,
-                lambda: make_adapter("gp"),
-                perception,
-                learned.prior,
-                unseen_goals(task, self.training.recorded(), _GOALS, rng),
-                rounds=self.rounds,
-                seed=seed,
-            )
-        return {"goals": [_kept(result) for result in results]}
+        trials = Trials(
+            self.training,
+            self.training.task,
+            "gp",
+            self.perception,
+            _GOALS,
+            unseen=True,
+            rounds=self.rounds,
+        )
+        return {"goals": [_kept(result) for result in trials.trials(folder)]}
 
 
 @dataclass(frozen=True)
-class ProcessPictures(Recipe):
-    """Pictures from above of one goal of each task."""
-
-    name: ClassVar[str] = "process"
-    title: ClassVar[str] = "The process of adaptation"
-    paper: ClassVar[str] = "Figure 3"
+class ProcessPictures(Measurement):
+    """The trials of one goal of each task."""
 
     tasks: tuple[str, ...] = tuple(TASKS)
     """Which of `TASKS`."""
     generator: str = "diffusion"
     """What is learned."""
 
-    def trainings(self, scale: Scale, include: Sequence[str]) -> Sequence[Training]:
+    def trainings(self, scale: Scale, include: Sequence[str] = ()) -> Sequence[Training]:
         """One a task: the first set and seed."""
         first = scale.sets[0], self.generator, scale.seeds[0]
         return [Training(task, *first, perception="eye") for task in self.tasks]
 
     def run(self, run: Run) -> dict[str, Any]:
         """Try the unseen goals of each task, and choose one of them."""
-        trainings = self.trainings(run.scale, run.include)
+        trainings = self.trainings(run.scale)
         run.learn(trainings)
         results = run.results([Process(t, rounds=run.scale.rounds) for t in trainings])
         return {
@@ -106,53 +95,6 @@ class ProcessPictures(Recipe):
                 for training, result in zip(trainings, results, strict=True)
             ]
         }
-
-    def table(self, figures: Mapping[str, Any]) -> Table:
-        """What was seen of each trial."""
-        return Table(
-            ("task", "trial", "seen by eye", "truly off by"),
-            tuple(
-                (
-                    TASKS[row["task"]] if number == 1 else "",
-                    str(number),
-                    "hit" if trial["hit"] else to_words(trial["error_seen"]),
-                    f"{100 * np.linalg.norm(np.subtract(trial['outcome'], row['goal'])):.1f} cm",
-                )
-                for row in figures["rows"]
-                for number, trial in enumerate(row["trials"], start=1)
-            ),
-        )
-
-    def draw(self, figures: Mapping[str, Any], folder: Path) -> list[Picture]:
-        """Draw the key frames from above, with arrows."""
-        rows = [
-            ProcessRow(
-                TASKS[row["task"]],
-                make_task(row["task"]),
-                np.array(row["goal"]),
-                np.array(row["demonstrated"]),
-                tuple(
-                    ProcessTrial(
-                        np.array(trial["error_seen"]),
-                        np.array(trial["outcome"]),
-                        trial["hit"],
-                        np.array(trial["key_state"]),
-                    )
-                    for trial in row["trials"]
-                ),
-            )
-            for row in figures["rows"]
-        ]
-        path = draw_process(rows, folder / f"{self.name}.png")
-        return [
-            Picture(
-                path,
-                "From above, one goal of each task: the whole table with the demonstrations as "
-                "they were seen, then every trial's key frame close up. The arrow is the error as "
-                "it was seen by eye, from the goal; it guides the next trial. Of five unseen goals "
-                "the first that took three trials is shown, or the nearest to that.",
-            )
-        ]
 
 
 def _kept(result: GoalTrials) -> dict[str, Any]:
@@ -176,3 +118,44 @@ def _chosen(goals: Sequence[Mapping[str, Any]]) -> Mapping[str, Any]:
     """The first goal that was reached in a number of trials nearest to `_SHOWN`."""
     reached = [goal for goal in goals if goal["trials"][-1]["hit"]] or list(goals)
     return min(reached, key=lambda goal: abs(len(goal["trials"]) - _SHOWN))
+
+
+def table(figures: Figures) -> Table:
+    """What was seen of each trial."""
+    return Table(
+        ("task", "trial", "seen by eye", "truly off by"),
+        tuple(
+            (
+                TASKS[row["task"]] if number == 1 else "",
+                str(number),
+                "hit" if trial["hit"] else to_words(trial["error_seen"]),
+                f"{100 * np.linalg.norm(np.subtract(trial['outcome'], row['goal'])):.1f} cm",
+            )
+            for row in figures["rows"]
+            for number, trial in enumerate(row["trials"], start=1)
+        ),
+    )
+
+
+def draw(figures: Figures, folder: Path) -> list[Picture]:
+    """Draw the key frames from above, with arrows."""
+    from prior_reinforce.experiments.recipes.key_frames import draw_process
+
+    rows = {TASKS[row["task"]]: row for row in figures["rows"]}
+    caption = (
+        "From above, one goal of each task: the whole table with the demonstrations as they were "
+        "seen, then every trial's key frame close up. The arrow is the error as it was seen by "
+        "eye, from the goal; it guides the next trial. Of five unseen goals the first that took "
+        "three trials is shown, or the nearest to that."
+    )
+    return [Picture(draw_process(rows, folder / "process.png"), caption)]
+
+
+RECIPE = Recipe(
+    name="process",
+    title="The process of adaptation",
+    paper="Figure 3",
+    measurement=ProcessPictures(),
+    table=table,
+    draw=draw,
+)

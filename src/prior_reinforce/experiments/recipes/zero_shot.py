@@ -2,30 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict
-from typing import Any, ClassVar
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 
 from prior_reinforce.experiments.evaluation import Training, ZeroShot
-from prior_reinforce.experiments.recipes.base import Family, Recipe, Run, Scale, Table
-from prior_reinforce.experiments.recipes.success import trainings_of
+from prior_reinforce.experiments.recipes.base import (
+    Figures,
+    Measurement,
+    Recipe,
+    Run,
+    Scale,
+    Table,
+    trainings_of,
+)
 
 
-class ZeroShotErrors(Recipe):
+@dataclass(frozen=True)
+class ZeroShotErrors(Measurement):
     """Errors of first throws, and at the demonstrations' own outcomes.
 
     The latter, "own": how far each generated plan is from the demonstration, and how far from the
     demonstration's landing it lands, both without disturbances.
     """
 
-    name: ClassVar[str] = "zero-shot"
-    title: ClassVar[str] = "First throws, before any trial"
-    paper: ClassVar[str] = "no table of its own"
-    family: ClassVar[Family | None] = "generator"
-
-    def trainings(self, scale: Scale, include: Sequence[str]) -> Sequence[Training]:
+    def trainings(self, scale: Scale, include: Sequence[str] = ()) -> Sequence[Training]:
         """Diffusion and what is included, on misaligned demonstrations."""
         return [t for name in ("diffusion", *include) for t in trainings_of(scale, name)]
 
@@ -34,34 +37,47 @@ class ZeroShotErrors(Recipe):
         trainings = self.trainings(run.scale, run.include)
         run.learn(trainings)
         results = run.results([ZeroShot(training) for training in trainings])
-        return {
-            "rows": [
-                {**asdict(training), **result}
-                for training, result in zip(trainings, results, strict=True)
-            ]
-        }
+        return {"rows": [{**asdict(t), **r} for t, r in zip(trainings, results, strict=True)]}
 
-    def table(self, figures: Mapping[str, Any]) -> Table:
-        """One row a training."""
-        return Table(
+
+def table(figures: Figures) -> Table:
+    """One row a training."""
+    return Table(
+        (
+            "generator",
+            "set",
+            "seed",
+            "own plans, worst rms [mrad]",
+            "own landing, median [cm]",
+            "worst [cm]",
+            "grid median [cm]",
+            "p90 [cm]",
+            "within tolerance",
+            "lost",
+        ),
+        tuple(
             (
-                "generator", "set", "seed", "own plans, worst rms [mrad]",
-                "own landing, median [cm]", "worst [cm]", "grid median [cm]", "p90 [cm]",
-                "within tolerance", "lost",
-            ),
-            tuple(
-                (
-                    row["generator"],
-                    row["demonstrations"],
-                    str(row["seed"]),
-                    f"{max(row['own_rms_rad']) * 1e3:.1f}",
-                    f"{np.median(row['own_landing_from_demonstrated_m']) * 100:.1f}",
-                    f"{max(row['own_landing_from_demonstrated_m']) * 100:.1f}",
-                    f"{row['grid_median_m'] * 100:.2f}",
-                    f"{row['grid_p90_m'] * 100:.2f}",
-                    f"{row['grid_within_tolerance']:.2f}",
-                    f"{row['grid_lost']:.3f}",
-                )
-                for row in figures["rows"]
-            ),
-        )  # fmt: skip
+                row["generator"],
+                row["demonstrations"],
+                str(row["seed"]),
+                f"{max(row['own_rms_rad']) * 1e3:.1f}",
+                f"{np.median(row['own_landing_from_demonstrated_m']) * 100:.1f}",
+                f"{max(row['own_landing_from_demonstrated_m']) * 100:.1f}",
+                f"{row['grid_median_m'] * 100:.2f}",
+                f"{row['grid_p90_m'] * 100:.2f}",
+                f"{row['grid_within_tolerance']:.2f}",
+                f"{row['grid_lost']:.3f}",
+            )
+            for row in figures["rows"]
+        ),
+    )
+
+
+RECIPE = Recipe(
+    name="zero-shot",
+    title="First throws, before any trial",
+    paper="no table of its own",
+    measurement=ZeroShotErrors(),
+    table=table,
+    family="generator",
+)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
+from jaxtyping import Float, UInt8
 from matplotlib.axes import Axes
 from matplotlib.patches import FancyArrowPatch, Rectangle
 
@@ -16,8 +17,14 @@ from prior_reinforce.perception.camera import Camera, CameraConfig
 from prior_reinforce.report.style import GOAL, HIT, INK, drawing, new_figure, save_png
 from prior_reinforce.rollouts import KeyFrame
 from prior_reinforce.scene import TableScene
+from prior_reinforce.tasks import make_task
 from prior_reinforce.tasks.base import Task
 from prior_reinforce.wording import to_words
+
+Row = Mapping[str, Any]
+"""A goal: `task`, `goal`, `demonstrated` and its `trials`, each with `error_seen`, `outcome`, `hit`
+and the positions of the scene at the key frame, `key_state`."""
+_Corners = Float[np.ndarray, "2 2"]
 
 _PIXELS = 1344
 """Side of a picture as it is taken, in [px]: finer than a model's, to be looked at close up."""
@@ -33,68 +40,41 @@ _INCHES = 2.6  # of one panel
 _HALO = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 2.0}
 
 
-@dataclass(frozen=True, eq=False)
-class ProcessTrial:
-    """One trial."""
-
-    error_seen: np.ndarray
-    """Shape (2,), in [m]."""
-    outcome: np.ndarray
-    """True outcome, shape (2,), in [m]."""
-    hit: bool
-    key_state: np.ndarray
-    """Positions of the scene at the key frame, shape (nq,)."""
-
-
-@dataclass(frozen=True, eq=False)
-class ProcessRow:
-    """One goal of one task."""
-
-    title: str
-    task: Task
-    goal: np.ndarray
-    """Shape (2,), in [m]."""
-    demonstrated: np.ndarray
-    """Outcomes of the demonstrations, shape (n, 2), in [m]."""
-    trials: tuple[ProcessTrial, ...]
-
-
 @drawing()
-def draw_process(rows: Sequence[ProcessRow], path: Path) -> Path:
+def draw_process(rows: Mapping[str, Row], path: Path) -> Path:
     """Draw one row a task: the table, then its trials close up.
 
     Args:
-        rows: In the order drawn.
+        rows: By title, in the order drawn.
         path: PNG to write.
-
-    Returns:
-        The path.
 
     Raises:
         RenderingUnavailableError: There is no OpenGL on this machine.
     """
-    n_columns = 1 + max(min(len(row.trials), _MOST_TRIALS) for row in rows)
+    n_columns = 1 + max(min(len(row["trials"]), _MOST_TRIALS) for row in rows.values())
     figure = new_figure(_INCHES * n_columns, (_INCHES + 0.42) * len(rows))
     grid = figure.subplots(len(rows), n_columns, squeeze=False)
     fine = Camera(CameraConfig(width=_PIXELS, height=_PIXELS))
     coarse = Camera(CameraConfig(width=int(_SIDE), height=int(_SIDE)))
-    for line, row in zip(grid, rows, strict=True):
+    for line, (title, row) in zip(grid, rows.items(), strict=True):
         for axes in line:
             axes.set_axis_off()
+        line[0].set_title(title, loc="left", fontsize=12, color=INK)
         _draw_row(line, row, fine, coarse)
     fine.close()
     coarse.close()
     return save_png(figure, path)
 
 
-def _draw_row(line: Sequence[Axes], row: ProcessRow, fine: Camera, coarse: Camera) -> None:
-    model = _scene_model(row.task)
-    scene = row.task.scene
+def _draw_row(line: Sequence[Axes], row: Row, fine: Camera, coarse: Camera) -> None:
+    task, goal = make_task(row["task"]), np.array(row["goal"])
+    model, scene = _scene_model(task), task.scene
     assert scene is not None
     calibration = coarse.calibrate(model, np.array(scene.marks), height=scene.plane_height)
     close_up = _close_up(row, scene, calibration)
-    for axes, i in zip(line[1:], _shown(len(row.trials)), strict=False):
-        picture = fine.picture(KeyFrame(model, row.trials[i].key_state, 0.0), row.goal)
+    for axes, i in zip(line[1:], _shown(row["trials"]), strict=False):
+        state = np.array(row["trials"][i]["key_state"])
+        picture = fine.picture(KeyFrame(model, state, 0.0), goal)
         if i == 0:
             _draw_table(line[0], row, picture, calibration, close_up)
         _draw_trial(axes, row, i, picture, calibration, close_up)
@@ -107,16 +87,17 @@ def _scene_model(task: Task) -> mujoco.MjModel:
     return rollout.key_frame.model
 
 
-def _shown(n: int) -> list[int]:
+def _shown(trials: Sequence[Any]) -> list[int]:
+    n = len(trials)
     return list(range(n)) if n <= _MOST_TRIALS else [*range(_MOST_TRIALS - 1), n - 1]
 
 
-def _close_up(row: ProcessRow, scene: TableScene, calibration: TableCalibration) -> np.ndarray:
-    """Lower and upper corner of the square looked at, in units of the picture, shape (2, 2)."""
-    trials = [row.trials[i] for i in _shown(len(row.trials))]
-    seen = [row.goal + trial.error_seen for trial in trials]
-    goal_object = row.goal - np.array(scene.goal_offset)
-    places = np.array([row.goal, goal_object, *seen, *(trial.outcome for trial in trials)])
+def _close_up(row: Row, scene: TableScene, calibration: TableCalibration) -> _Corners:
+    """Lower and upper corner of the square looked at, in units of the picture."""
+    trials, goal = [row["trials"][i] for i in _shown(row["trials"])], np.array(row["goal"])
+    seen = [goal + trial["error_seen"] for trial in trials]
+    goal_object = goal - np.array(scene.goal_offset)
+    places = np.array([goal, goal_object, *seen, *(trial["outcome"] for trial in trials)])
     middle = (places.min(axis=0) + places.max(axis=0)) / 2
     half = max(_LEAST_HALF, float(np.ptp(places, axis=0).max()) / 2 + _MARGIN)
     corners = calibration.to_pixels(middle + half * np.array([[-1, -1], [-1, 1], [1, -1], [1, 1]]))
@@ -129,88 +110,66 @@ def _close_up(row: ProcessRow, scene: TableScene, calibration: TableCalibration)
 
 def _draw_table(
     axes: Axes,
-    row: ProcessRow,
-    picture: np.ndarray,
+    row: Row,
+    picture: UInt8[np.ndarray, "h w 3"],
     calibration: TableCalibration,
-    close_up: np.ndarray,
+    close_up: _Corners,
 ) -> None:
     axes.imshow(picture[::2, ::2], extent=(0, _SIDE, _SIDE, 0))
-    axes.set_title(row.title, loc="left", fontsize=12, color=INK)
-    across, down = calibration.to_pixels(row.demonstrated).T
-    axes.scatter(
-        across,
-        down,
-        s=26,
-        marker="s",
-        color="white",
-        edgecolors=INK,
-        linewidths=0.8,
-    )
-    _draw_goal(axes, calibration.to_pixels(row.goal))
+    across, down = calibration.to_pixels(np.array(row["demonstrated"])).T
+    axes.scatter(across, down, s=26, marker="s", color="white", edgecolors=INK, linewidths=0.8)
+    _draw_goal(axes, calibration.to_pixels(np.array(row["goal"])))
     low, high = close_up
     axes.add_patch(Rectangle(tuple(low), *(high - low), fill=False, edgecolor=INK, linewidth=1.2))
-    axes.text(
-        0.03,
-        0.03,
-        "□ demonstrations   ★ goal",
-        transform=axes.transAxes,
-        fontsize=8.5,
-        color=INK,
-        bbox=_HALO,
-    )
+    legend = "□ demonstrations   ★ goal"
+    axes.text(0.03, 0.03, legend, transform=axes.transAxes, fontsize=8.5, color=INK, bbox=_HALO)
 
 
 def _draw_trial(
     axes: Axes,
-    row: ProcessRow,
+    row: Row,
     i: int,
-    picture: np.ndarray,
+    picture: UInt8[np.ndarray, "h w 3"],
     calibration: TableCalibration,
-    close_up: np.ndarray,
+    close_up: _Corners,
 ) -> None:
-    trial = row.trials[i]
+    trial, goal = row["trials"][i], np.array(row["goal"])
     (left, top), (right, bottom) = close_up
     axes.imshow(picture, extent=(0, _SIDE, _SIDE, 0))
     axes.set_xlim(left, right)
     axes.set_ylim(bottom, top)
-    goal = calibration.to_pixels(row.goal)
-    _draw_goal(axes, goal)
-    if not trial.hit and np.any(trial.error_seen):
-        end = calibration.to_pixels(row.goal + trial.error_seen)
-        axes.add_patch(
-            FancyArrowPatch(
-                tuple(goal),
-                tuple(end),
-                arrowstyle="-|>",
-                mutation_scale=14,
-                shrinkA=0,
-                shrinkB=0,
-                linewidth=2.0,
-                color="black",
-            )
+    start = calibration.to_pixels(goal)
+    _draw_goal(axes, start)
+    if not trial["hit"] and np.any(trial["error_seen"]):
+        end = calibration.to_pixels(goal + trial["error_seen"])
+        arrow = FancyArrowPatch(
+            tuple(start),
+            tuple(end),
+            arrowstyle="-|>",
+            mutation_scale=14,
+            shrinkA=0,
+            shrinkB=0,
+            linewidth=2.0,
+            color="black",
         )
-    colour = HIT if trial.hit else INK
-    axes.set_title(f"trial {i + 1}: {_said(row, i)}", loc="left", fontsize=10, color=colour)
-    frame = Rectangle(
-        (0, 0),
-        1,
-        1,
-        transform=axes.transAxes,
-        fill=False,
-        edgecolor=colour,
-        linewidth=5.0 if trial.hit else 1.2,
+        axes.add_patch(arrow)
+    colour, width = (HIT, 5.0) if trial["hit"] else (INK, 1.2)
+    said = _said(trial, last=i == len(row["trials"]) - 1)
+    axes.set_title(f"trial {i + 1}: {said}", loc="left", fontsize=10, color=colour)
+    axes.add_patch(
+        Rectangle(
+            (0, 0), 1, 1, transform=axes.transAxes, fill=False, edgecolor=colour, linewidth=width
+        )
     )
-    axes.add_patch(frame)
 
 
-def _said(row: ProcessRow, i: int) -> str:
-    trial = row.trials[i]
-    if trial.hit:
+def _said(trial: Mapping[str, Any], *, last: bool) -> str:
+    if trial["hit"]:
         return "HIT"
-    if i == len(row.trials) - 1:
+    if last:
         return "not reached"
-    return to_words(trial.error_seen) if np.any(trial.error_seen) else "just missed"
+    return to_words(trial["error_seen"]) if np.any(trial["error_seen"]) else "just missed"
 
 
-def _draw_goal(axes: Axes, pixel: np.ndarray) -> None:
+def _draw_goal(axes: Axes, pixel: Float[np.ndarray, " 2"]) -> None:
     axes.plot(*pixel, marker="*", markersize=9, color="#f0e442", markeredgecolor=GOAL, zorder=5)

@@ -5,8 +5,10 @@ import json
 import numpy as np
 import pytest
 
-from prior_reinforce.experiments.recipes import Run, Scale, Verdict
+from prior_reinforce.experiments.claims import Verdict
+from prior_reinforce.experiments.recipes import Run, Scale
 from prior_reinforce.experiments.recipes.displacement import (
+    RECIPE,
     DisplacementFields,
     measures,
     widest_three,
@@ -58,17 +60,17 @@ def test_the_three_kept_span_the_largest_triangle():
 
 @pytest.mark.slow
 def test_the_recipe_runs_from_throws_to_claims_and_picture(tmp_path):
-    recipe = DisplacementFields(generator="dmp", spacing=0.06)
-    figures = recipe.run(Run(tmp_path, Scale(seeds=(0,), sets=("A",))))
+    figures = DisplacementFields(generator="dmp", spacing=0.06).run(
+        Run(tmp_path, Scale(seeds=(0,), sets=("A",)))
+    )
     figures = json.loads(json.dumps(figures))
     assert [row["demonstrations"] for row in figures["rows"]] == [6, 3]
     assert figures["fields"][1]["training"]["subset"] is not None
     # Six throws of one pattern pin a segmented DMP down to less than half a centimetre or so.
     assert figures["rows"][0]["inside_m"]["value"] < 0.01
     assert figures["three_minus_six"]["mean_m"]["value"] > 0
-    assert all(claim.verdict is Verdict.OPEN for claim in recipe.claims(figures))
-    assert (
-        len({len(row) for row in (recipe.table(figures).header, *recipe.table(figures).rows)}) == 1
-    )
-    (picture,) = recipe.draw(figures, tmp_path)
+    assert all(claim.verdict is Verdict.OPEN for claim in RECIPE.claims(figures))
+    table = RECIPE.table(figures)
+    assert {len(row) for row in table.rows} == {len(table.header)}
+    (picture,) = RECIPE.draw(figures, tmp_path)
     assert picture.path.read_bytes().startswith(b"\x89PNG")

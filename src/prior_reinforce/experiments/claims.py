@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 
-from prior_reinforce.experiments.statistics import Interval
+from prior_reinforce.experiments.statistics import Curve, Interval, interval_of
 
 LEAST_TRAININGS = 3
 """Ours: an interval over fewer trainings knows nothing of how trainings differ, and decides no
@@ -56,11 +56,12 @@ def above(interval: Interval, bound: float, trainings: int) -> Verdict:
 
 def at_most(interval: Interval, bound: float, trainings: int) -> Verdict:
     """Judge the claim that a quantity is at most a bound: not that it is above; see `above`."""
-    if trainings < LEAST_TRAININGS:
-        return Verdict.OPEN
-    if interval.high <= bound:
-        return Verdict.CONFIRMED
-    return Verdict.NOT_CONFIRMED if interval.low > bound else Verdict.OPEN
+    opposite = {
+        Verdict.CONFIRMED: Verdict.NOT_CONFIRMED,
+        Verdict.NOT_CONFIRMED: Verdict.CONFIRMED,
+        Verdict.OPEN: Verdict.OPEN,
+    }
+    return opposite[above(interval, bound, trainings)]
 
 
 def all_of(verdicts: Sequence[Verdict]) -> Verdict:
@@ -70,3 +71,26 @@ def all_of(verdicts: Sequence[Verdict]) -> Verdict:
     if not verdicts or Verdict.OPEN in verdicts:
         return Verdict.OPEN
     return Verdict.CONFIRMED
+
+
+def above_by_round(
+    curve: Curve, other: Curve, difference: Curve, first: int, trainings: int
+) -> Verdict:
+    """Judge the claim that one method is above another at every round.
+
+    Rounds at which both reach every goal leave nothing to be above in, and are left out.
+
+    Args:
+        curve: Share reached by the method that is claimed to be better.
+        other: By the other one.
+        difference: The first minus the second, paired.
+        first: Round from which on the claim is made.
+        trainings: How many trainings the intervals resampled.
+    """
+    return all_of(
+        [
+            above(interval_of(difference[i]), 0.0, trainings)
+            for i in range(first - 1, len(difference))
+            if not curve[i]["value"] == other[i]["value"] == 1.0
+        ]
+    )

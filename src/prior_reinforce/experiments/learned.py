@@ -1,0 +1,70 @@
+"""Models of simulated tasks, saved together with what they were learned from."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from prior_reinforce.errors import ConfigurationError, FileFormatError
+from prior_reinforce.files import write
+from prior_reinforce.generators import GENERATORS, Generator, load_generator
+from prior_reinforce.plans.motions import Demonstrations
+from prior_reinforce.registry import parse_choice
+
+_RECORD = "training.json"
+
+
+@dataclass(frozen=True)
+class TrainingRecord:
+    """What a saved model was learned from; stands beside its weights."""
+
+    demonstrations_sha256: str
+    """Hash of the demonstrations' plans and outcomes."""
+    seed: int
+    """Seed of the fit."""
+
+
+def save_learned(
+    folder: Path, generator: Generator, demonstrations: Demonstrations, seed: int
+) -> None:
+    """Save a fitted generator and the record of what it was fitted to, for `load_learned`."""
+    generator.save(folder)
+    record = TrainingRecord(demonstrations.sha256, seed)
+    write(folder / _RECORD, json.dumps(asdict(record), indent=2) + "\n")
+
+
+def load_learned(
+    folder: Path, demonstrations: Demonstrations, *, generator: str = "diffusion"
+) -> Generator:
+    """Load a model that was learned from these demonstrations.
+
+    Args:
+        folder: Made by `save_learned`.
+        demonstrations: What it must have been learned from.
+        generator: The choice that it was learned with, which matters where that names a class of
+            your own: a model is data, and names no code to run.
+
+    Raises:
+        FileFormatError: The folder holds no model.
+        ConfigurationError: The model was learned from other demonstrations.
+    """
+    path = folder / _RECORD
+    try:
+        record = TrainingRecord(**json.loads(path.read_text(encoding="utf-8")))
+    except (OSError, ValueError, TypeError) as error:
+        raise FileFormatError(
+            f"no learned model in {folder} ({error}); make one with: prior-reinforce learn "
+            f"--out {folder}"
+        ) from error
+    if record.demonstrations_sha256 != demonstrations.sha256:
+        raise ConfigurationError(
+            f"the model in {folder} was learned from other demonstrations; learn anew with "
+            "prior-reinforce learn, or name what it was learned from with --demonstrations"
+        )
+    return load_generator(folder, own=own_class(generator))
+
+
+def own_class(choice: str) -> str | None:
+    """`module:Class` where a choice of a generator names a class of your own, else None."""
+    return None if GENERATORS.owns(choice) else parse_choice(choice)[0]
