@@ -1,58 +1,74 @@
-"""Learning tells when its main feature is lost, and says nothing otherwise."""
+"""`learn`: the model and its record; remarks are told, and nothing where nothing is lost."""
 
-import io
 from dataclasses import replace
 
 import pytest
-from rich.console import Console
 
-from prior_reinforce.commands.learning import learn
-from prior_reinforce.generators import (
-    DiffusionConfig,
-    DiffusionGenerator,
-    NearestNeighbours,
-    UNetRegression,
-    UNetRegressionConfig,
-)
-from prior_reinforce.generators.unet_size import UNetSize
+from prior_reinforce.cli import main
+from prior_reinforce.experiments.learned import load_learned
+from prior_reinforce.plans.alignment import align
 from prior_reinforce.tasks import make_task
 
-TINY = UNetSize(widths=(8, 16), groups=2, step_width=8, condition_width=8)
-DIFFUSION = DiffusionConfig(network=TINY, training_steps=1)
-REGRESSION = UNetRegressionConfig(network=TINY, training_steps=1)
+TINY = "training_steps=1"
+RECORDED = make_task("basketball-v1").demonstrations("A")
 
 
-def told(generator, folder, *, frames: int) -> str:
-    """What `learn` prints for basketball's set A, of which only so many frames were recorded."""
-    demonstrations = make_task("basketball-v1").demonstrations("A")
-    demonstrations = replace(demonstrations, plans=demonstrations.plans[:, :frames])
-    text = io.StringIO()
-    console = Console(file=text, width=400)
-    learn(demonstrations, folder, generator=generator, seed=0, console=console)
-    return text.getvalue()
+@pytest.fixture
+def learn(tmp_path, capsys):
+    """Learn from set A of which only so many frames were recorded, and return what was told."""
+
+    def run(*flags, frames=140):
+        path = tmp_path / "recorded.npz"
+        cut = replace(RECORDED, plans=RECORDED.plans[:, :frames])
+        cut.save(path)
+        out = ["--demonstrations", str(path), "--out", str(tmp_path / "model")]
+        assert main(["learn", *flags, *out]) == 0
+        return capsys.readouterr().out, load_learned(tmp_path / "model", cut)
+
+    return run
 
 
-@pytest.mark.parametrize(
-    "generator",
-    [DiffusionGenerator(DIFFUSION, threads=1), UNetRegression(REGRESSION, threads=1)],
-    ids=["diffusion", "regression"],
-)
-def test_a_recording_cut_off_in_mid_swing_is_told_in_one_line(generator, tmp_path):
-    lines = [line for line in told(generator, tmp_path, frames=80).splitlines() if "rest" in line]
-    assert len(lines) == 1
-    assert "start times are not learned" in lines[0]
-    assert "demonstration" in lines[0]
-    assert "last frame" in lines[0]
+@pytest.mark.parametrize("generator", ["diffusion", "regression"])
+def test_a_recording_cut_off_in_mid_swing_is_told_in_a_line(learn, generator):
+    told, model = learn("--generator", f"{generator},{TINY}", frames=80)
+    assert "start times are not learned" in " ".join(told.split())
+    assert len(model.remarks) == 1
 
 
 @pytest.mark.parametrize(
     ("generator", "frames"),
-    [
-        (DiffusionGenerator(DIFFUSION, threads=1), 140),
-        (DiffusionGenerator(replace(DIFFUSION, start_times=False), threads=1), 80),
-        (NearestNeighbours(), 80),
-    ],
+    [(f"diffusion,{TINY}", 140), (f"diffusion,{TINY},timing=none", 80), ("nearest", 80)],
     ids=["all is well", "switched off", "knows no start times"],
 )
-def test_nothing_is_told_where_nothing_is_lost(generator, frames, tmp_path):
-    assert "start times" not in told(generator, tmp_path, frames=frames)
+def test_nothing_is_told_where_nothing_is_lost(learn, generator, frames):
+    told, model = learn("--generator", generator, frames=frames)
+    assert "start times" not in told
+    assert model.remarks == ()
+
+
+def test_align_is_short_for_a_setting(learn):
+    _, model = learn("--generator", "nearest", "--align")
+    _, same = learn("--generator", "nearest,timing=align")
+    conditions = RECORDED.outcomes_seen
+    aligned = align(RECORDED).demonstrations.plans
+    assert model.generate(conditions).shape == aligned.shape
+    assert (model.generate(conditions) == same.generate(conditions)).all()
+
+
+@pytest.mark.parametrize(
+    ("flags", "said"),
+    [
+        (["--generator", "diffusion,steps=3"], "has no setting 'steps'"),
+        (["--generator", "nearest,timing=never"], "timing"),
+        (["--generator", "none"], "no generator 'none'; known are diffusion"),
+        (["--generator", "nearest", "--seed", "-1"], "--seed must be 0 or more"),
+        (["folder", "--task", "curling"], "drop one of the two"),
+    ],
+)
+def test_wrong_input_is_one_line_and_leaves_nothing(flags, said, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["learn", *flags]) == 2
+    told = capsys.readouterr().err
+    assert said in told
+    assert told.count("\n") == 1
+    assert not list(tmp_path.iterdir())

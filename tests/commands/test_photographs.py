@@ -12,10 +12,10 @@ from tests.perception.vision_server import VisionServer
 from prior_reinforce.cli import main
 from prior_reinforce.perception.camera import Camera
 from prior_reinforce.tasks import make_task
-from prior_reinforce.tasks.basketball import HARDWARE
+from tests.perception.vision_server import VisionServer
 
 GOAL = np.array([1.0, 0.05])
-SCENE = HARDWARE["v1"].scene
+SCENE = make_task("basketball-v1").scene
 
 
 @pytest.fixture(scope="module")

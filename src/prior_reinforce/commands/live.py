@@ -1,67 +1,154 @@
-"""What an operator reads while trials run: one line a trial, in words and centimetres."""
+"""What an operator reads and is asked while a simulated task is learned and tried."""
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
 import numpy as np
 from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn
 
-from prior_reinforce.experiments.protocol import GoalTrials
-from prior_reinforce.wording import say_place, to_words
+from prior_reinforce.arrays import Point
+from prior_reinforce.errors import InvalidFeedbackError, PerceptionFailedError
+from prior_reinforce.wording import from_words, say_place, to_words
+
+if TYPE_CHECKING:
+    from prior_reinforce.experiments.protocol import GoalTrials
+    from prior_reinforce.generators.base import FitProgress
+    from prior_reinforce.perception.base import Perception
+    from prior_reinforce.rollouts import Rollout
+    from prior_reinforce.tasks.base import Task
 
 
 class LiveView:
     """Prints goals and trials as they happen."""
 
-    def __init__(self, console: Console, n_demonstrations: int) -> None:
+    def __init__(self, console: Console, task: Task, n_demonstrations: int) -> None:
         """Remember where to print, and how many demonstrations count into N."""
         self._console = console
-        self._n_demonstrations = n_demonstrations
+        self._task = task
+        self._n = n_demonstrations
 
-    def goal(self, number: int, n_goals: int, goal: np.ndarray) -> None:
+    def goal(self, number: int, n_goals: int, goal: Point) -> None:
         """Announce a goal."""
         of_all = f" {number} of {n_goals}" if n_goals > 1 else ""
-        place = say_place(goal, "xyz", ["m"] * len(goal))
-        self._console.print(f"\n[bold]goal{of_all}[/bold] at {place}")
+        self._console.print(
+            f"\n[bold]goal{of_all}[/bold]: {place(self._task, goal)}", highlight=False
+        )
 
     def trial(self, result: GoalTrials) -> None:
         """Print the latest trial: how the condition moved, what was seen, solved or not."""
-        trial = result.trials[-1]
+        trial, first = result.trials[-1], len(result.trials) == 1
         assert trial.error_seen is not None
-        before = result.trials[-2].condition if len(result.trials) > 1 else result.goal
-        moved = to_words(trial.condition - before)
+        moved = to_words(trial.condition - (result.goal if first else result.trials[-2].condition))
         aim = "aim at the goal" if moved == "on the goal" else f"aim {moved}"
+        if not first and moved != "on the goal":
+            aim = f"aim moved {moved}"
         seen = to_words(trial.error_seen)
         if trial.hit:
             seen = "[bold green]HIT[/bold green]"
         elif seen == "on the goal":
             seen = "a near miss"
-        if len(result.trials) > 1 and moved != "on the goal":
-            aim = f"aim moved {moved}"
         self._console.print(f"  trial {trial.number}  {aim:<36} seen: {seen}", highlight=False)
 
     def end(self, result: GoalTrials) -> None:
         """Print the paper's count for this goal."""
-        n = self._n_demonstrations
-        if result.solved_at is None:
-            self._console.print(
-                f"  [bold red]not reached[/bold red] in {len(result.trials)} trials",
-                highlight=False,
-            )
+        solved_at = result.solved_at
+        if solved_at is None:
+            told = f"[bold red]not reached[/bold red] in {len(result.trials)} trials"
         else:
-            self._console.print(
-                f"  reached: N = {n} demonstrations + {result.solved_at} "
-                f"trial{'s' if result.solved_at > 1 else ''} = {n + result.solved_at}",
-                highlight=False,
+            told = (
+                f"reached: N = {self._n} demonstrations + {solved_at} "
+                f"trial{'s' if solved_at > 1 else ''} = {self._n + solved_at}"
             )
+        self._console.print(f"  {told}", highlight=False)
 
-    def summary(self, results: list[GoalTrials]) -> None:
+    def summary(self, results: Sequence[GoalTrials]) -> None:
         """Print the count over all goals."""
         solved = [result.solved_at for result in results if result.solved_at is not None]
         if len(results) < 2 or not solved:
             return
-        n = self._n_demonstrations
+        mean = np.mean(solved)
         self._console.print(
             f"\n[bold]{len(solved)} of {len(results)} goals reached[/bold], on average "
-            f"N = {n} + {np.mean(solved):.1f} = {n + np.mean(solved):.1f} trials",
+            f"N = {self._n} + {mean:.1f} = {self._n + mean:.1f} trials",
             highlight=False,
         )
+
+
+def place(task: Task, point: Point) -> str:
+    """Say a place of a simulated task, whose outcomes are lengths."""
+    return say_place(point, task.outcome_names, ("m",) * len(point))
+
+
+class Operator:
+    """The person at the terminal; nobody and nothing else may make up a number."""
+
+    def __init__(self, console: Console, task: Task, perception: Perception) -> None:
+        """Remember where to talk, and whose pictures to show."""
+        self._console = console
+        self._task = task
+        self._perception = perception
+
+    def look(
+        self, failure: PerceptionFailedError, rollout: Rollout, goal: Point, rng: object
+    ) -> Point:
+        """Ask for the error of an execution that perception could not see.
+
+        Args:
+            failure: Why not.
+            rollout: What came of it; not looked at.
+            goal: g, in [m].
+            rng: Not used.
+
+        Returns:
+            Error seen, in [m].
+
+        Raises:
+            PerceptionFailedError: There is no terminal to ask at, or no answer.
+        """
+        if not sys.stdin.isatty():
+            raise PerceptionFailedError(
+                f"{failure}; there is no terminal to ask at: run in one, or choose another "
+                "--perception"
+            ) from failure
+        self._print(f"not seen: {failure}")
+        latest = getattr(self._perception, "latest", None)
+        if latest is not None:
+            self._print(f"picture: {latest}")
+        while True:
+            try:
+                text = input(
+                    f"  what was the error, seen from {place(self._task, goal)}? for instance "
+                    '"5cm long, 2cm left", or hit: '
+                )
+                return from_words(text, len(goal))
+            except EOFError as error:
+                raise PerceptionFailedError(f"{failure}; no answer came") from error
+            except InvalidFeedbackError as error:
+                self._print(str(error))
+
+    def _print(self, line: str) -> None:
+        self._console.print(f"  {line}", highlight=False, markup=False)
+
+
+@contextmanager
+def fit_progress(console: Console) -> Iterator[Callable[[FitProgress], None]]:
+    """Show a bar with loss and time left while a generator is fitted."""
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(bar_width=30),
+        TextColumn("{task.fields[detail]}"),
+    )
+    with Progress(*columns, console=console) as progress:
+        line = progress.add_task("learning the motion", total=None, detail="")
+
+        def show(state: FitProgress) -> None:
+            detail = f"loss {state.loss:.4f}, {state.seconds_left:.0f} s left"
+            progress.update(line, total=state.n_steps, completed=state.step, detail=detail)
+
+        yield show
+        progress.update(line, detail="done")

@@ -7,13 +7,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
 
-import imageio.v3 as imageio
 import numpy as np
 import tyro
+from jaxtyping import Float, UInt8
 
 from prior_reinforce.errors import ConfigurationError, FileFormatError, PerceptionFailedError
-from prior_reinforce.perception.calibration import TableCalibration
-from prior_reinforce.perception.vlm import VisionLanguageModel
 from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
 from prior_reinforce.scene import SeenObject, TableScene
 from prior_reinforce.wording import to_words
@@ -39,6 +37,8 @@ class Calibrate:
 
     def run(self) -> None:
         """Fit, save, and say how far each point lies from where the others put it."""
+        from prior_reinforce.perception.calibration import TableCalibration
+
         table_points, pixels = np.hsplit(_read_points(self.points), 2)
         calibration = TableCalibration.fit(table_points, pixels, height=self.height)
         if self.outcome_height is not None:
@@ -72,6 +72,9 @@ class Look:
 
     def run(self) -> None:
         """Look, keep what was seen beside the photograph, and say what to tell."""
+        from prior_reinforce.perception.calibration import TableCalibration
+        from prior_reinforce.perception.vlm import VisionLanguageModel
+
         calibration = TableCalibration.load(self.calibration)
         scene = TableScene(
             SeenObject(self.reached, self.reached_size),
@@ -80,11 +83,8 @@ class Look:
             goal_offset=self.goal_offset,
         )
         picture = _read_picture(self.picture)
-        model = VisionLanguageModel(scene, self.vlm, calibration=calibration)
-        try:
+        with VisionLanguageModel(scene, self.vlm, calibration=calibration) as model:
             reading = model.read(picture)
-        finally:
-            model.close()
         stem = f"{self.picture.stem}-seen"
         reading.save(self.picture.parent, stem)
         drawn = self.picture.with_name(f"{stem}.png")
@@ -97,8 +97,8 @@ class Look:
         print(f"if the boxes are right: prior-reinforce tell FOLDER TRIAL --error {x:.4f} {y:.4f}")
 
 
-def _read_points(path: Path) -> np.ndarray:
-    """Rows of x, y [m], u, v [px], shape (n, 4)."""
+def _read_points(path: Path) -> Float[np.ndarray, "n 4"]:
+    """Rows of x, y [m], u, v [px]."""
     try:
         with path.open(newline="", encoding="utf-8") as file:
             rows = list(csv.DictReader(file, skipinitialspace=True))
@@ -110,8 +110,10 @@ def _read_points(path: Path) -> np.ndarray:
         ) from error
 
 
-def _read_picture(path: Path) -> np.ndarray:
-    """Shape (height, width, 3), dtype uint8, RGB; upright as the camera says."""
+def _read_picture(path: Path) -> UInt8[np.ndarray, "height width 3"]:
+    """RGB, upright as the camera says."""
+    import imageio.v3 as imageio
+
     try:
         return np.asarray(imageio.imread(path, plugin="pillow", mode="RGB", rotate=True))
     except (OSError, ValueError) as error:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import json
 import shlex
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import tyro
 from rich import box
@@ -20,13 +20,12 @@ from rich.text import Text
 
 from prior_reinforce.errors import ConfigurationError, UnitFailedError
 from prior_reinforce.experiments.evidence import claims_table, write_evidence
-from prior_reinforce.experiments.methods import make_generator
-from prior_reinforce.experiments.provenance import provenance
 from prior_reinforce.experiments.recipes import QUICK, RECIPES, Recipe, Run, Scale, Table
 from prior_reinforce.experiments.recipes.base import Progress as OnProgress
 from prior_reinforce.experiments.recipes.trials import TrialsTable
 from prior_reinforce.experiments.units import Workers
 from prior_reinforce.files import write
+from prior_reinforce.generators import make_generator
 from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
 
 _SLOWEST = "diffusion"
@@ -47,8 +46,8 @@ class Reproduce:
     """Training seeds."""
     quick: bool = False
     """Ten goals, one training a method, no variants, no rows of the VLM: decides no claim."""
-    reader: Literal["stand-in", "vlm"] = "stand-in"
-    """Who reads the pictures of the VLM rows: a stand-in that finds objects by colour, or a model
+    reader: Literal["camera", "vlm"] = "camera"
+    """Who reads the pictures of the VLM rows: the camera that finds objects by colour, or a model
     (--vlm.*; docs/perception.md)."""
     vlm: VisionLanguageModelConfig = field(default_factory=VisionLanguageModelConfig)
     """Endpoint and model for --reader vlm."""
@@ -57,7 +56,8 @@ class Reproduce:
     ray: str | None = None
     """Address of a Ray cluster to run on."""
     include: tuple[str, ...] = ()
-    """One's own generators or adapters beside ours, each as module:Class."""
+    """Generators or adapters beside ours: your own as module:Class, or ours with other settings,
+    each as NAME,setting=value."""
 
     def run(self) -> None:
         """Run, save, print, and write the page of evidence."""
@@ -67,48 +67,63 @@ class Reproduce:
         scale = QUICK if self.quick else Scale(goals=self.goals, seeds=self.seeds)
         workers = Workers(self.workers, self.ray)
         console = Console()
-        # All that has to be learned comes first, the slowest of it before the rest, so that no core
-        # waits for the last training.
-        wanted = dict.fromkeys(
-            training
-            for recipe in recipes
-            for training in recipe.trainings(scale, included[recipe.name])
-        )
-        trainings = sorted(wanted, key=lambda t: _SLOWEST not in t.generator)
-        for name in dict.fromkeys(training.generator for training in trainings):
-            make_generator(name)  # a library that is not installed is told now, not after an hour
-        self.out.mkdir(parents=True, exist_ok=True)
-        if trainings:
-            # What fails here fails again in the recipes that need it, and is told there.
-            with suppress(UnitFailedError), _progress(console, "learn") as show:
-                Run(self.out, scale, workers, show).learn(trainings)
+        self._learn(recipes, included, scale, workers, console)
         failures: list[UnitFailedError] = []
         for recipe in recipes:
             try:
                 with _progress(console, recipe.name) as show:
                     run = Run(self.out, scale, workers, show, included[recipe.name])
-                    figures = recipe.run(run)
+                    figures = recipe.measurement.run(run)
             except UnitFailedError as error:
                 failures.append(error)  # the other recipes do not need it
                 console.print(f"{recipe.name}: {error}", markup=False, soft_wrap=True)
-                continue
-            made_by = provenance(self._command(recipe, run), scale, run.commits)
-            text = json.dumps({**made_by, **figures}, indent=1)
-            write(self.out / f"{recipe.name}.json", text + "\n")
-            console.print(_terminal(recipe.table(figures), recipe.title))
-            if claims := recipe.claims(figures):
-                console.print(_terminal(claims_table(claims), f"{recipe.title}: claims"))
-            if len(run.commits) > 1:
-                console.print(
-                    f"made by different code: {', '.join(sorted(run.commits))}; in a fresh --out "
-                    "all of it runs anew",
-                    markup=False,
-                )
+            else:
+                self._keep(recipe, run, figures, console)
         if len(failures) < len(recipes):
             page, _ = write_evidence(self.out)
             console.print(f"evidence: {page}", soft_wrap=True)
         if failures:
             raise failures[0]
+
+    def _learn(
+        self,
+        recipes: Sequence[Recipe],
+        included: Mapping[str, tuple[str, ...]],
+        scale: Scale,
+        workers: Workers,
+        console: Console,
+    ) -> None:
+        """Learn all that the recipes need, the slowest before the rest.
+
+        So no core waits for the last training.
+        """
+        wanted = dict.fromkeys(
+            training
+            for recipe in recipes
+            for training in recipe.measurement.trainings(scale, included[recipe.name])
+        )
+        trainings = sorted(wanted, key=lambda t: _SLOWEST not in t.generator)
+        for choice in dict.fromkeys(training.generator for training in trainings):
+            make_generator(choice)  # a library that is not installed is told now, not in an hour
+        self.out.mkdir(parents=True, exist_ok=True)
+        if trainings:
+            # What fails here fails again in the recipes that need it, and is told there.
+            with suppress(UnitFailedError), _progress(console, "learn") as show:
+                Run(self.out, scale, workers, show).learn(trainings)
+
+    def _keep(self, recipe: Recipe, run: Run, figures: Mapping[str, Any], console: Console) -> None:
+        """Write a recipe's figures down and print them."""
+        text = json.dumps({**run.made_by(self._command(recipe, run)), **figures}, indent=1)
+        write(self.out / f"{recipe.name}.json", text + "\n")
+        console.print(_terminal(recipe.table(figures), recipe.title))
+        if claims := recipe.claims(figures):
+            console.print(_terminal(claims_table(claims), f"{recipe.title}: claims"))
+        if len(run.commits) > 1:
+            console.print(
+                f"made by different code: {', '.join(sorted(run.commits))}; in a fresh --out "
+                "all of it runs anew",
+                markup=False,
+            )
 
     def _check(self) -> None:
         """Refuse settings out of range, and those that would be passed over in silence."""
@@ -119,7 +134,7 @@ class Reproduce:
         if self.quick and Scale(goals=self.goals, seeds=self.seeds) != Scale():
             raise ConfigurationError("--quick has its own goals and seeds; leave out either")
         asked = self.reader == "vlm"
-        if asked and (self.quick or self.recipe not in (TrialsTable.name, "all")):
+        if asked and (self.quick or self.recipe not in ("trials", "all")):
             raise ConfigurationError("--reader vlm reads the pictures of `trials`, without --quick")
         if self.vlm != VisionLanguageModelConfig() and not asked:
             raise ConfigurationError("--vlm.* say whom to ask with --reader vlm; give that as well")
@@ -133,10 +148,12 @@ class Reproduce:
             words += ["--goals", str(self.goals), "--seeds", *map(str, self.seeds)]
         for own in run.include:
             words += ["--include", own]
-        if isinstance(recipe, TrialsTable) and recipe.model is not None:
+        measurement = recipe.measurement
+        if isinstance(measurement, TrialsTable) and measurement.model is not None:
             words += ["--reader", "vlm"]
-            for setting in fields(recipe.model):
-                value, flag = getattr(recipe.model, setting.name), setting.name.replace("_", "-")
+            for setting in fields(measurement.model):
+                value = getattr(measurement.model, setting.name)
+                flag = setting.name.replace("_", "-")
                 if isinstance(value, bool):
                     words += [f"--vlm.{flag}"] if value else []
                 elif value != setting.default:
@@ -149,10 +166,12 @@ class Reproduce:
                 f"no recipe {self.recipe!r}; recipes are {', '.join(RECIPES)}, or all"
             )
         chosen = [recipe for name, recipe in RECIPES.items() if self.recipe in (name, "all")]
-        if self.reader == "stand-in":
+        if self.reader == "camera":
             return chosen
         return [
-            replace(recipe, model=self.vlm) if isinstance(recipe, TrialsTable) else recipe
+            replace(recipe, measurement=replace(recipe.measurement, model=self.vlm))
+            if isinstance(recipe.measurement, TrialsTable)
+            else recipe
             for recipe in chosen
         ]
 

@@ -1,0 +1,72 @@
+"""What is printed of a trial, word for word."""
+
+import io
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from rich.console import Console
+from rich.progress import Progress
+
+from prior_reinforce.commands.live import LiveView, fit_progress
+from prior_reinforce.experiments.protocol import GoalTrials
+from prior_reinforce.generators.base import FitProgress
+
+TASK = SimpleNamespace(outcome_names=("x", "y"))
+GOAL = np.array([1.0, 0.1])
+
+
+def trial(number, condition, error_seen, hit=False):
+    return SimpleNamespace(
+        number=number, condition=np.array(condition), error_seen=np.array(error_seen), hit=hit
+    )
+
+
+TRIALS = (
+    trial(1, [1.0, 0.1], [0.05, 0.0]),
+    trial(2, [0.95, 0.1], [0.0, 0.0]),
+    trial(3, [0.95, 0.08], [0.0, 0.01], hit=True),
+)
+
+
+@pytest.fixture
+def view():
+    console = Console(file=io.StringIO(), width=200)
+    return LiveView(console, TASK, n_demonstrations=6), console.file
+
+
+@pytest.mark.parametrize(
+    ("n", "line"),
+    [
+        (1, "trial 1  aim at the goal                      seen: 5 cm long"),
+        (2, "trial 2  aim moved 5 cm short                 seen: a near miss"),
+        (3, "trial 3  aim moved 2 cm right                 seen: HIT"),
+    ],
+)
+def test_a_trial_tells_how_the_aim_moved_and_what_was_seen(view, n, line):
+    shown, told = view
+    shown.trial(GoalTrials(GOAL, TRIALS[:n], ()))
+    assert told.getvalue().strip() == line
+
+
+def test_the_papers_count_is_demonstrations_plus_trials(view):
+    shown, told = view
+    shown.goal(2, 3, GOAL)
+    solved, missed = GoalTrials(GOAL, TRIALS, ()), GoalTrials(GOAL, TRIALS[:2], ())
+    shown.end(solved)
+    shown.end(missed)
+    shown.summary([solved, missed])
+    said = told.getvalue()
+    assert "goal 2 of 3: 100 cm ahead, 10 cm left" in said
+    assert "N = 6 demonstrations + 3 trials = 9" in said
+    assert "not reached in 2 trials" in said
+    assert "1 of 2 goals reached, on average N = 6 + 3.0 = 9.0 trials" in said
+
+
+def test_a_fit_shows_its_loss_and_the_time_left(monkeypatch):
+    shown = []
+    monkeypatch.setattr(Progress, "update", lambda self, line, **to: shown.append(to))
+    with fit_progress(Console(file=io.StringIO())) as progress:
+        progress(FitProgress(step=5, n_steps=10, loss=0.25, seconds_left=12.0))
+    assert shown[0] == {"total": 10, "completed": 5, "detail": "loss 0.2500, 12 s left"}
+    assert shown[-1]["detail"] == "done"
