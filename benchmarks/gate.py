@@ -16,8 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from prior_reinforce import make_task
-from prior_reinforce.experiments.methods import make_generator
-from prior_reinforce.generators import load_generator
+from prior_reinforce.generators import load_generator, make_generator
 from prior_reinforce.plans.motions import Plan
 from prior_reinforce.robots import check_plan, robot_limits
 

@@ -14,8 +14,7 @@ import argparse
 import numpy as np
 from scipy.spatial import Delaunay
 
-from prior_reinforce.generators.interpolation import SmoothInterpolation
-from prior_reinforce.plans.alignment import align
+from prior_reinforce.generators import make_generator
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.tasks import make_task
 from prior_reinforce.tasks.base import Task
@@ -23,9 +22,9 @@ from prior_reinforce.tasks.base import Task
 HULL_GOALS = 2000
 
 
-def misses(task: Task, prior: Demonstrations, goals: np.ndarray) -> str:
+def misses(task: Task, prior: Demonstrations, goals: np.ndarray, timing: str) -> str:
     """How far plans mixed for goals, shape (n, 2), land from them, in [cm]."""
-    plans = SmoothInterpolation().fit(prior, seed=0).generate(goals)
+    plans = make_generator(f"interpolation,timing={timing}").fit(prior, seed=0).generate(goals)
     rollouts = task.rollout(plans, None)
     landed = np.array([rollout.outcome for rollout in rollouts])
     distances = 100 * np.linalg.norm(landed - goals, axis=1)
@@ -49,8 +48,8 @@ def main() -> None:
             prior = task.demonstrations(key)
             is_inside = Delaunay(prior.outcomes_seen).find_simplex(goals) >= 0
             chosen = goals[is_inside][: arguments.goals]
-            aligned = misses(task, align(prior).demonstrations, chosen)
-            recorded = misses(task, prior, chosen)
+            aligned = misses(task, prior, chosen, "align")
+            recorded = misses(task, prior, chosen, "none")
             print(
                 f"| {name}, {key} | {is_inside.mean():.0%} | {aligned} | {recorded} |", flush=True
             )

@@ -22,7 +22,7 @@ import numpy as np
 
 from prior_reinforce.adapters.gaussian_process import GaussianProcessAdapter
 from prior_reinforce.experiments.protocol import run_goals
-from prior_reinforce.generators import DiffusionConfig, DiffusionGenerator
+from prior_reinforce.generators import make_generator
 from prior_reinforce.perception.amplified import Amplified
 from prior_reinforce.tasks import make_task
 
@@ -69,7 +69,7 @@ def main() -> None:
     for name in arguments.tasks:
         task = make_task(name)
         demos = task.demonstrations("A")
-        generator = DiffusionGenerator(DiffusionConfig(training_steps=2))
+        generator = make_generator("diffusion,training_steps=2")
         generator.fit(demos, seed=arguments.seed)
         goals = task.sample_goals(arguments.goals, np.random.default_rng(arguments.seed))
 

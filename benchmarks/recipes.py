@@ -30,8 +30,8 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
         for name in arguments.recipes:
-            recipe = RECIPES[name]
-            trainings = list(recipe.trainings(scale, ()))
+            recipe = RECIPES[name].measurement
+            trainings = recipe.trainings(scale)
             start = time.perf_counter()
             Run(folder, scale, workers).learn(trainings)
             learned = time.perf_counter()

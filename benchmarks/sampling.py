@@ -12,11 +12,10 @@ from __future__ import annotations
 
 import argparse
 import time
-from dataclasses import replace
 
 import numpy as np
 
-from prior_reinforce.generators import DiffusionConfig, DiffusionGenerator
+from prior_reinforce.generators import DiffusionConfig, make_generator
 from prior_reinforce.tasks.basketball import BasketballShot
 
 
@@ -32,14 +31,14 @@ def main() -> None:
     demos = task.demonstrations(arguments.set)
 
     default, paper = DiffusionConfig(), DiffusionConfig.preset("paper")
-    configs = {
-        f"default, {default.sampler} {default.sampling_steps}": default,
-        f"default's network, ddpm {default.noise_levels}": replace(default, sampler="ddpm"),
-        f"paper, ddpm {paper.noise_levels}": paper,
+    choices = {
+        f"default, {default.sampler} {default.sampling_steps}": "diffusion",
+        f"default's network, ddpm {default.noise_levels}": "diffusion,sampler=ddpm",
+        f"paper, ddpm {paper.noise_levels}": "diffusion-paper",
     }
     generators = {
-        name: DiffusionGenerator(replace(config, training_steps=1)).fit(demos, seed=arguments.seed)
-        for name, config in configs.items()
+        name: make_generator(f"{choice},training_steps=1").fit(demos, seed=arguments.seed)
+        for name, choice in choices.items()
     }
     names = list(generators)
     for n in arguments.plans:

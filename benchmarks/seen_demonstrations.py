@@ -3,7 +3,7 @@
     python benchmarks/seen_demonstrations.py [TASK ...] [--goals 50] [--workers 2]
 
 Both prior sets, training seeds 0, 1 and 2, the goals of `reproduce`, Gaussian process adapter: the
-demonstrations' outcomes as recorded or as seen by eye, the trials seen by eye or exactly. A goal
+demonstrations' outcomes exact or as seen by eye, the trials seen by eye or exactly. A goal
 that is not reached in ten trials counts as eleven. In brackets 95 % intervals over trainings and
 goals. What was learned is kept in --folder, and not learned again.
 """
@@ -13,11 +13,14 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-import numpy as np
-
 from prior_reinforce.experiments.evaluation import Training, Trials
 from prior_reinforce.experiments.recipes.base import Run, Scale
-from prior_reinforce.experiments.statistics import SHARE, bootstrap_mean, reached_by, trials_counted
+from prior_reinforce.experiments.statistics import (
+    SHARE,
+    bootstrap_mean,
+    reached_by,
+    trials_counted,
+)
 from prior_reinforce.experiments.units import Workers
 
 
@@ -33,7 +36,7 @@ def main() -> None:
     scale = Scale(goals=arguments.goals)
     run = Run(arguments.folder, scale, Workers(arguments.workers))
     for task in arguments.tasks:
-        for way, seen_by in (("as recorded", None), ("by eye", "eye")):
+        for way, seen_by in (("exact", None), ("by eye", "eye")):
             trainings = [
                 Training(task, name, "diffusion", seed, perception=seen_by)
                 for name in scale.sets
@@ -42,7 +45,7 @@ def main() -> None:
             run.learn(trainings)
             for perception in ("eye", "exact"):
                 units = [Trials(t, task, "gp", perception, scale.goals) for t in trainings]
-                solved = np.array([result["solved_at"] for result in run.results(units)])
+                solved = run.solved_at(units)
                 print(
                     f"{task:14} demonstrations {way:11} trials {perception:5}: "
                     f"{bootstrap_mean(trials_counted(solved, scale.rounds))} trials, first hits "

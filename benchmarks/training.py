@@ -13,12 +13,12 @@ from __future__ import annotations
 
 import argparse
 import time
-from dataclasses import replace
 
+import joblib
 import numpy as np
 from scipy.spatial import Delaunay
 
-from prior_reinforce.generators import DiffusionConfig, DiffusionGenerator, Timed
+from prior_reinforce.generators import DiffusionConfig, Generator, make_generator
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.tasks.basketball import BasketballShot
 
@@ -27,26 +27,25 @@ N_GOALS = 60
 
 
 def step_times(
-    config: DiffusionConfig, demos: Demonstrations, n_steps: int, seed: int, threads: int
+    choice: str, demos: Demonstrations, n_steps: int, seed: int, threads: int
 ) -> list[float]:
     """Return the duration of each step but the first, which warms up, in [s]."""
     ends: list[float] = []
-    config = replace(config, training_steps=n_steps + 1)
-    generator = Timed(DiffusionGenerator(config, threads=threads))
+    generator = make_generator(f"{choice},training_steps={n_steps + 1}", threads=threads)
     generator.fit(demos, seed=seed, progress=lambda _: ends.append(time.perf_counter()))
     return np.diff(ends).tolist()
 
 
 def train_in_full(
-    config: DiffusionConfig, demos: Demonstrations, seed: int, threads: int
-) -> tuple[Timed, float, float]:
+    choice: str, demos: Demonstrations, seed: int, threads: int
+) -> tuple[Generator, float, float]:
     """Return the generator, the wall time and the processor time of its fit, in [s]."""
     wall, processor = time.perf_counter(), time.process_time()
-    generator = Timed(DiffusionGenerator(config, threads=threads)).fit(demos, seed=seed)
+    generator = make_generator(choice, threads=threads).fit(demos, seed=seed)
     return generator, time.perf_counter() - wall, time.process_time() - processor
 
 
-def zero_shot(generator: Timed, demos: Demonstrations, seed: int) -> str:
+def zero_shot(generator: Generator, demos: Demonstrations, seed: int) -> str:
     """Throw at random goals in the demonstrations' hull, without disturbances."""
     rng, hull = np.random.default_rng(seed), Delaunay(demos.outcomes_seen)
     low, high = demos.outcomes_seen.min(axis=0), demos.outcomes_seen.max(axis=0)
@@ -78,22 +77,22 @@ def main() -> None:
     ours: list[float] = []
     theirs: list[float] = []
     for _ in range(N_TURNS):
-        ours += step_times(default, demos, arguments.steps, **run)
-        theirs += step_times(paper, demos, arguments.paper_steps, **run)
+        ours += step_times("diffusion", demos, arguments.steps, **run)
+        theirs += step_times("diffusion-paper", demos, arguments.paper_steps, **run)
     print(f"prior set {arguments.set}, {arguments.threads} threads, seed {arguments.seed}")
     for name, times in (("default", ours), ("paper", theirs)):
         low, median, high = 1e3 * np.percentile(times, [25, 50, 75])
         print(f"{name:8} {median:8.1f} ms a step  (middle half {low:.1f} to {high:.1f})")
     print(f"ratio    {np.median(theirs) / np.median(ours):8.1f} in time per step")
 
-    generator, wall, processor = train_in_full(default, demos, **run)
+    generator, wall, processor = train_in_full("diffusion", demos, **run)
     print(
         f"default  {wall:8.1f} s in full, {default.training_steps} steps "
         f"({processor:.1f} s of processor time)"
     )
     print(f"         {zero_shot(generator, demos, arguments.seed + 1000)}")
     if arguments.paper_full:
-        generator, paper_wall, _ = train_in_full(paper, demos, **run)
+        generator, paper_wall, _ = train_in_full("diffusion-paper", demos, **run)
         print(f"paper    {paper_wall:8.1f} s in full, {paper.training_steps} steps")
         print(f"         {zero_shot(generator, demos, arguments.seed + 1000)}")
     else:

@@ -25,13 +25,11 @@ os.environ.setdefault("MUJOCO_GL", "egl")
 import numpy as np
 
 from prior_reinforce.errors import PerceptionFailedError
-from prior_reinforce.generators import Generator
-from prior_reinforce.generators.interpolation import SmoothInterpolation
+from prior_reinforce.generators import Generator, make_generator
 from prior_reinforce.perception.camera import Camera
 from prior_reinforce.perception.colour_camera import ColourCamera
 from prior_reinforce.perception.vlm import VisionLanguageModel
 from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
-from prior_reinforce.plans.alignment import align
 from prior_reinforce.rollouts import Rollout
 from prior_reinforce.tasks import TASKS, make_task
 from prior_reinforce.tasks.base import Task
@@ -67,7 +65,7 @@ class Score:
 def trials(task: Task, n: int, rng: np.random.Generator) -> Iterator[tuple[Rollout, np.ndarray]]:
     """Yield n trials that reached the plane of the outcome, each with its goal, shape (2,)."""
     generators: list[Generator] = [
-        SmoothInterpolation().fit(align(task.demonstrations(name)).demonstrations, seed=0)
+        make_generator("interpolation,timing=align").fit(task.demonstrations(name), seed=0)
         for name in task.demonstration_sets
     ]
     made = 0

@@ -1,7 +1,7 @@
 """How many more trials it takes when a vision-language model is wrong in a share of its answers.
 
     python benchmarks/vlm_outliers.py [TASK ...] [--goals 24] [--outliers 0.1] [--votes 3]
-        [--generator diffusion] [--aligned] [--seed 0]
+        [--generator diffusion] [--seed 0]
 
 The same learned generator reaches the same goals twice, under the same disturbances, with the
 Gaussian process adapter: once with every answer right, once with wrong ones (of the right size,
@@ -64,13 +64,12 @@ def main() -> None:
     parser.add_argument("--outliers", type=float, default=0.1, help="share of wrong answers")
     parser.add_argument("--votes", type=int, default=3, help="1 believes every answer")
     parser.add_argument("--generator", default="diffusion")
-    parser.add_argument("--aligned", action="store_true", help="align the demonstrations first")
     parser.add_argument("--set", default="A", help="prior set")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--folder", type=Path, default=Path("runs/vlm-outliers"))
     arguments = parser.parse_args()
 
-    template = Training("", arguments.set, arguments.generator, arguments.seed, arguments.aligned)
+    template = Training("", arguments.set, arguments.generator, arguments.seed)
     for name in arguments.tasks:
         training = replace(template, task=name)
         trials = []

@@ -14,10 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from prior_reinforce.commands.learning import load_learned
-from prior_reinforce.commands.task_options import Simulated
-from prior_reinforce.experiments.carry_over import compare, trials_needed
-from prior_reinforce.experiments.methods import make_adapter, make_perception
+import prior_reinforce as pr
 
 GOALS = 5
 
@@ -34,31 +31,50 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
 
-    task, demonstrations = Simulated(options.task, options.demonstrations, options.seed).open()
+    task = pr.make_task(options.task)
+    if options.demonstrations in task.demonstration_sets:
+        demonstrations = task.demonstrations(options.demonstrations)
+    else:
+        demonstrations = pr.Demonstrations.load(options.demonstrations)
     goals = task.sample_goals(options.sequences * GOALS, np.random.default_rng([options.seed, 6]))
-    sequences = goals.reshape(options.sequences, GOALS, -1)
+    generators = [pr.load_learned(folder, demonstrations) for folder in options.models]
     print("| adapter | without | with earlier goals' trials | saved |")
     print("|---|---|---|---|")
     for adapter in options.adapters:
-        needed = {"goal": [], "workspace": []}
-        for folder in options.models:
-            generator = load_learned(folder, demonstrations)
-            for memory, results in needed.items():
-                results.append(
-                    trials_needed(
-                        task,
-                        generator,
-                        lambda name=adapter: make_adapter(name),
-                        make_perception(options.perception),
-                        demonstrations,
-                        sequences,
-                        memory=memory,
-                        rounds=options.rounds,
-                        seed=options.seed,
+        without, with_earlier = (
+            np.array(
+                [
+                    later_trials(
+                        pr.run_sequences(
+                            task,
+                            generator,
+                            lambda name=adapter: pr.make_adapter(name),
+                            pr.make_perception(options.perception, scene=task.scene),
+                            demonstrations,
+                            goals.reshape(options.sequences, GOALS, -1),
+                            carry_over=carry_over,
+                            rounds=options.rounds,
+                            seed=options.seed,
+                        ),
+                        options.rounds,
                     )
-                )
-        result = compare(np.array(needed["goal"]), np.array(needed["workspace"]))
-        print(f"| {adapter} | {result.without} | {result.with_earlier} | {result.saved} |")
+                    for generator in generators
+                ]
+            )
+            for carry_over in (False, True)
+        )
+        saved = pr.bootstrap_difference(without, with_earlier)
+        means = pr.bootstrap_mean(without), pr.bootstrap_mean(with_earlier)
+        print(f"| {adapter} | {means[0]} | {means[1]} | {saved} |")
+
+
+def later_trials(sequences, rounds):
+    """Mean trials on goals 2, 3, ... of each sequence.
+
+    A sequence is one draw, as its goals share what was remembered.
+    """
+    needed = [[result.solved_at or rounds + 1 for result in results] for results in sequences]
+    return np.array(needed, dtype=float)[:, 1:].mean(axis=1)
 
 
 if __name__ == "__main__":

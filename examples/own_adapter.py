@@ -1,4 +1,4 @@
-"""An adapter of one's own: an affine correction, fitted to the trials by ridge regression.
+"""An adapter of your own: an affine correction, fitted to the trials by ridge regression.
 
     python examples/own_adapter.py
     PYTHONPATH=examples prior-reinforce adapt --adapter own_adapter:RidgeAdapter
@@ -14,43 +14,39 @@ import argparse
 
 import numpy as np
 
-from prior_reinforce.adapters.base import Adapter
-from prior_reinforce.adapters.normalisation import Normalisation
-from prior_reinforce.experiments.methods import make_adapter, make_perception
-from prior_reinforce.experiments.protocol import run_goals, success_by_round
-from prior_reinforce.generators import NearestNeighbours
-from prior_reinforce.plans.alignment import align
-from prior_reinforce.plans.motions import Demonstrations
-from prior_reinforce.tasks import make_task
+import prior_reinforce as pr
 
 
-class RidgeAdapter(Adapter):
+class RidgeAdapter(pr.Adapter):
     """c = g + b + B z(g), with (b, B) the ridge solution over all trials so far."""
 
     def __init__(self, penalty: float = 0.1) -> None:
         """Choose how strongly the map is drawn to the identity, in normalised units squared."""
         self.penalty = penalty
 
-    def _start(self, demonstrations: Demonstrations) -> None:
+    def _start(self, demonstrations: pr.Demonstrations) -> None:
         """Take the units of the demonstrations and forget all trials."""
-        self._units = Normalisation.of(demonstrations)
+        outcomes = demonstrations.outcomes_seen
+        self._offset = outcomes.mean(axis=0)
+        self._scale = np.sqrt(outcomes.var(axis=0).mean())  # all components are lengths
         self._trials: list[tuple[np.ndarray, np.ndarray]] = []
 
     def _propose(self, goal_seen: np.ndarray) -> np.ndarray:
         """Return the goal plus the correction fitted there, shape (k,)."""
-        units = self._units
         if not self._trials:
             return goal_seen
-        conditions, outcomes = (units.apply(np.array(a)) for a in zip(*self._trials, strict=True))
-        ones = np.ones((len(outcomes), 1))
-        features = np.hstack([ones, outcomes])  # (n, 1 + k)
+        conditions, outcomes = (self._units(a) for a in zip(*self._trials, strict=True))
+        features = np.hstack([np.ones((len(outcomes), 1)), outcomes])  # (n, 1 + k)
         kernel = features @ features.T + self.penalty * np.eye(len(features))
         weights = features.T @ np.linalg.solve(kernel, conditions - outcomes)  # (1 + k, k)
-        return goal_seen + units.scale * (np.append(1.0, units.apply(goal_seen)) @ weights)
+        return goal_seen + self._scale * (np.append(1.0, self._units(goal_seen)) @ weights)
 
     def _observe(self, condition: np.ndarray, outcome_seen: np.ndarray) -> None:
         """Remember the trial."""
         self._trials.append((condition, outcome_seen))
+
+    def _units(self, points: object) -> np.ndarray:
+        return (np.array(points) - self._offset) / self._scale
 
 
 def main() -> None:
@@ -60,25 +56,25 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
 
-    task = make_task("basketball-v1")
-    demonstrations = align(task.demonstrations("A")).demonstrations
-    generator = NearestNeighbours().fit(demonstrations, seed=options.seed)
+    task = pr.make_task("basketball-v1")
+    demonstrations = task.demonstrations("A")
+    generator = pr.make_generator("nearest,timing=align").fit(demonstrations, seed=options.seed)
     goals = task.sample_goals(options.goals, np.random.default_rng(options.seed))
     makers = {
-        name: lambda name=name: make_adapter(name) for name in ("frozen", "proportional", "gp")
+        name: lambda name=name: pr.make_adapter(name) for name in ("frozen", "proportional", "gp")
     }
     for name, make in {"ridge": RidgeAdapter, **makers}.items():
-        results = run_goals(
+        results = pr.run_goals(
             task,
             generator,
             make,
-            make_perception("amplified"),
+            pr.make_perception("amplified"),
             demonstrations,
             goals,
             rounds=options.rounds,
             seed=options.seed,
         )
-        shares = " ".join(f"{share:4.0%}" for share in success_by_round(results, options.rounds))
+        shares = " ".join(f"{share:4.0%}" for share in pr.success_by_round(results, options.rounds))
         print(f"{name:<12}  reached by trial 1, 2, ...: {shares}")
 
 

@@ -1,4 +1,4 @@
-"""A perception of one's own: a camera above the table, calibrated for the table and nothing higher.
+"""A perception of your own: a camera above the table, calibrated for the table and nothing higher.
 
     python examples/own_perception.py
     PYTHONPATH=examples prior-reinforce adapt --perception own_perception:OverheadCamera
@@ -16,18 +16,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from prior_reinforce.adapters.gaussian_process import GaussianProcessAdapter
-from prior_reinforce.errors import ConfigurationError, PerceptionFailedError
-from prior_reinforce.experiments.protocol import run_goals, success_by_round
-from prior_reinforce.generators import NearestNeighbours, align
-from prior_reinforce.perception.base import Perception
-from prior_reinforce.perception.exact import Exact
-from prior_reinforce.rollouts import Rollout
-from prior_reinforce.tasks import make_task
+import prior_reinforce as pr
 
 
 @dataclass(frozen=True)
-class OverheadCamera(Perception):
+class OverheadCamera(pr.Perception):
     """The first two components of the error with parallax and pixel noise, the others exact."""
 
     below: tuple[float, float] = (0.75, 0.0)
@@ -48,19 +41,21 @@ class OverheadCamera(Perception):
             ConfigurationError: The ball is not between the table and the lens.
         """
         if not 0 <= self.ball_height < self.height < math.inf:
-            raise ConfigurationError(
+            raise pr.ConfigurationError(
                 f"ball_height must be at least 0 m and below the lens, got {self.ball_height} m "
                 f"under a lens at {self.height} m; measure both from the table"
             )
 
-    def perceive(self, rollout: Rollout, goal: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    def perceive(
+        self, rollout: pr.Rollout, goal: np.ndarray, rng: np.random.Generator
+    ) -> np.ndarray:
         """Return where the ball seems to be, minus the goal, shape (k,), in [m]."""
         seen = np.array(rollout.outcome, dtype=float)
         below = np.array(self.below[: len(seen)])
         flat = slice(len(below))
         seen[flat] = below + (seen[flat] - below) * self.height / (self.height - self.ball_height)
         if np.linalg.norm(seen[flat] - below) > self.field:
-            raise PerceptionFailedError(
+            raise pr.PerceptionFailedError(
                 f"the ball is out of the picture, more than {self.field} m from {self.below}; "
                 "look yourself"
             )
@@ -75,30 +70,30 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
 
-    task = make_task("basketball-v1")
+    task = pr.make_task("basketball-v1")
     for x, y in task.region:
-        hit = Rollout(outcome=np.array([x, y]), valid=True)
+        hit = pr.Rollout(outcome=np.array([x, y]), valid=True)
         bias = OverheadCamera(noise_sd=0.0).perceive(hit, hit.outcome, np.random.default_rng(0))
         print(f"a hit at ({x:.2f}, {y:.2f}) m seems to be {100 * np.linalg.norm(bias):.1f} cm off")
 
-    demonstrations = align(task.demonstrations("A")).demonstrations
-    generator = NearestNeighbours().fit(demonstrations, seed=options.seed)
+    demonstrations = task.demonstrations("A")
+    generator = pr.make_generator("nearest,timing=align").fit(demonstrations, seed=options.seed)
     goals = task.sample_goals(options.goals, np.random.default_rng(options.seed))
     table = OverheadCamera(ball_height=0.0)  # the same camera, calibrated at the ball's height
     for label, perception in (
-        ("exact", Exact()), ("calibrated", table), ("biased", OverheadCamera()),
+        ("exact", pr.Exact()), ("calibrated", table), ("biased", OverheadCamera()),
     ):  # fmt: skip
-        results = run_goals(
+        results = pr.run_goals(
             task,
             generator,
-            GaussianProcessAdapter,
+            pr.GaussianProcessAdapter,
             perception,
             demonstrations,
             goals,
             rounds=options.rounds,
             seed=options.seed,
         )
-        shares = " ".join(f"{share:4.0%}" for share in success_by_round(results, options.rounds))
+        shares = " ".join(f"{share:4.0%}" for share in pr.success_by_round(results, options.rounds))
         print(f"{label:<10}  reached by trial 1, 2, ...: {shares}")
 
 

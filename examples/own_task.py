@@ -1,4 +1,4 @@
-"""A task of one's own, without a simulator: a catapult on a turntable, flight in closed form.
+"""A task of your own, without a simulator: a catapult on a turntable, flight in closed form.
 
     python examples/own_task.py
     PYTHONPATH=examples prior-reinforce adapt --task own_task:Toss --generator interpolation
@@ -23,15 +23,7 @@ from typing import ClassVar
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from prior_reinforce.adapters.gaussian_process import GaussianProcessAdapter
-from prior_reinforce.arrays import as_plans
-from prior_reinforce.errors import ConfigurationError
-from prior_reinforce.experiments.protocol import run_goals, success_by_round
-from prior_reinforce.generators import SmoothInterpolation
-from prior_reinforce.perception.eye import Eye
-from prior_reinforce.plans.motions import Demonstrations, PlanFormat
-from prior_reinforce.rollouts import Rollout
-from prior_reinforce.tasks.base import Task
+import prior_reinforce as pr
 
 GRAVITY = 9.81  # [m/s^2]
 ARM = 0.6  # Length, in [m].
@@ -65,34 +57,34 @@ class Flight:
         return self.start + self.velocity * time - [0.0, 0.0, GRAVITY * time**2 / 2]
 
 
-class Toss(Task):
+class Toss(pr.Task):
     """Throw a ball onto a spot of the table."""
 
     name: ClassVar[str] = "toss"
-    format: ClassVar[PlanFormat] = PlanFormat(("turn", "swing"), ("rad", "rad"), 0.02)
+    format: ClassVar[pr.PlanFormat] = pr.PlanFormat(("turn", "swing"), ("rad", "rad"), 0.02)
     tolerance: ClassVar[float] = 0.015  # As in Basketball Shot.
     region: ClassVar[np.ndarray] = np.array([[0.95, -0.25], [1.30, 0.25]])
     demonstration_sets: ClassVar[tuple[str, ...]] = ("A",)
 
-    def rollout(self, plans: np.ndarray, rng: np.random.Generator | None) -> list[Rollout]:
+    def rollout(self, plans: np.ndarray, rng: np.random.Generator | None) -> list[pr.Rollout]:
         """Throw; a ball that stays on the arm counts as lost at the axis, (0, 0)."""
         rollouts = []
-        for plan in as_plans(plans, self.format.action_dim):
+        for plan in plans:
             flight = self._release(plan, rng)
-            lost = Rollout(outcome=np.zeros(2), valid=False)
-            rollouts.append(Rollout(flight.at(flight.duration)[:2], True) if flight else lost)
+            lost = pr.Rollout(outcome=np.zeros(2), valid=False)
+            rollouts.append(pr.Rollout(flight.at(flight.duration)[:2], True) if flight else lost)
         return rollouts
 
-    def demonstrations(self, name: str) -> Demonstrations:
+    def demonstrations(self, name: str) -> pr.Demonstrations:
         """Swing as in `SHOWN`, the outcomes seen without error."""
         if name not in self.demonstration_sets:
-            raise ConfigurationError(f"{self.name} has no demonstration set {name!r}; use A")
+            raise pr.ConfigurationError(f"{self.name} has no demonstration set {name!r}; use A")
         swing_times, turns = np.array(SHOWN).T[:, :, None]
         times = np.arange(HORIZON) * self.format.dt
         share = np.clip(times / swing_times, 0.0, 1.0)
         swings = BACK + (FORTH - BACK) * share**3 * (10 - 15 * share + 6 * share**2)  # least jerk
         plans = np.stack([np.broadcast_to(turns, swings.shape), swings], axis=-1)
-        return Demonstrations(plans, [r.outcome for r in self.rollout(plans, None)], self.format)
+        return pr.Demonstrations(plans, [r.outcome for r in self.rollout(plans, None)], self.format)
 
     def film(
         self,
@@ -106,7 +98,7 @@ class Toss(Task):
         camera: str = "film",
     ) -> Iterator[np.ndarray]:
         """Draw the ball (orange) and the goal (blue) from the side, or from above as `birdseye`."""
-        flight = self._release(as_plans(plan, 2, name="plan", single=True), rng)
+        flight = self._release(plan, rng)
         across = 1 if camera == "birdseye" else 2
         metres = 2.0 / width  # a pixel
         columns, rows = np.meshgrid(np.arange(width), np.arange(height))
@@ -123,6 +115,7 @@ class Toss(Task):
             yield picture
 
     def _release(self, plan: np.ndarray, rng: np.random.Generator | None) -> Flight | None:
+        plan = pr.Plan(plan, self.format).actions  # checks its shape, and that it is finite
         path = CubicSpline(np.arange(len(plan)) * self.format.dt, plan)
         passes = CubicSpline(path.x, plan[:, 1]).solve(STOP, extrapolate=False)
         passes = [time for time in passes if path(time, 1)[1] > 0]
@@ -149,17 +142,17 @@ def main() -> None:
 
     task = Toss()
     demonstrations = task.demonstrations("A")
-    results = run_goals(
+    results = pr.run_goals(
         task,
-        SmoothInterpolation().fit(demonstrations, seed=options.seed),
-        GaussianProcessAdapter,
-        Eye(),
+        pr.make_generator("interpolation").fit(demonstrations, seed=options.seed),
+        pr.GaussianProcessAdapter,
+        pr.Eye(),
         demonstrations,
         task.sample_goals(options.goals, np.random.default_rng(options.seed)),
         rounds=options.rounds,
         seed=options.seed,
     )
-    for number, share in enumerate(success_by_round(results, options.rounds), start=1):
+    for number, share in enumerate(pr.success_by_round(results, options.rounds), start=1):
         print(f"reached in at most {number} throws: {share:4.0%}")
 
 

@@ -17,8 +17,7 @@ from pathlib import Path
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
-from prior_reinforce.tasks import make_task
-from prior_reinforce.wording import to_words
+import prior_reinforce as pr
 
 CALLED_TO = 0.005
 """What an eye can tell apart, in [m]."""
@@ -33,14 +32,14 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=0, help="of the disturbances")
     options = parser.parse_args()
 
-    task = make_task(options.task)
+    task = pr.make_task(options.task)
     rollout = throw(task, options.plan, options.seed)
     if not rollout.valid:
         print("the ball never came down at the hoop's height: void this trial")
         return 1
     error = rollout.outcome - options.goal
     hit = np.linalg.norm(error) <= task.tolerance
-    called = "hit" if hit else to_words(np.round(error / CALLED_TO) * CALLED_TO)
+    called = "hit" if hit else pr.to_words(np.round(error / CALLED_TO) * CALLED_TO)
     if options.call is not None:
         options.call.write_text(called + "\n")
     print(f"the ball came down {called}" if not hit else "the ball went through the hoop: hit")

@@ -1,9 +1,9 @@
 """Tune a generator: how far from goals of their own does the first throw land, without an adapter?
 
-    python examples/zero_shot.py --methods nearest interpolation dmp dmp-whole
+    python examples/zero_shot.py --methods nearest nearest,timing=align dmp dmp,segmented=false
 
-prints a line for each method, prior set and timeline (as recorded, or aligned): the median error
-with its quartiles, the share of goals within the task's tolerance, and the share of lost balls.
+prints a line for each method and prior set: the median error with its quartiles, the share of goals
+within the task's tolerance, and the share of lost balls.
 
 `prior-reinforce reproduce zero-shot` reports, and this is for what comes before: there, goals are
 the fixed grid that figures are published on; here, they are drawn with any seed, so that a setting
@@ -17,44 +17,41 @@ import argparse
 
 import numpy as np
 
-from prior_reinforce.experiments.methods import make_generator
-from prior_reinforce.plans.alignment import align
-from prior_reinforce.tasks.basketball import BasketballShot
+import prior_reinforce as pr
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument(
-        "--methods", nargs="+", default=["nearest", "dmp"], help="names, or module:Class"
+        "--methods",
+        nargs="+",
+        default=["nearest", "nearest,timing=align", "dmp", "dmp,timing=align"],
+        help="names or module:Class, with settings",
     )
     parser.add_argument("--sets", nargs="+", default=["A", "B"])
-    parser.add_argument("--timelines", nargs="+", default=["recorded", "aligned"])
     parser.add_argument("--goals", type=int, default=100)
     parser.add_argument("--goal-seed", type=int, default=3000)
     parser.add_argument("--seed", type=int, default=0, help="of the training")
     options = parser.parse_args()
 
-    task = BasketballShot()
+    task = pr.make_task("basketball-v1")
     goals = task.sample_goals(options.goals, np.random.default_rng(options.goal_seed))
-    print("| method | set | timeline | median error [cm] (quartiles) | reached | lost |")
-    print("|---|---|---|---|---|---|")
+    print("| method | set | median error [cm] (quartiles) | reached | lost |")
+    print("|---|---|---|---|---|")
     for method in options.methods:
         for prior_set in options.sets:
-            for timeline in options.timelines:
-                demonstrations = task.demonstrations(prior_set)
-                if timeline == "aligned":
-                    demonstrations = align(demonstrations).demonstrations
-                generator = make_generator(method).fit(demonstrations, seed=options.seed)
-                rollouts = task.rollout(generator.generate(goals), None)
-                outcomes = np.array([rollout.outcome for rollout in rollouts])
-                lost = np.mean([not rollout.valid for rollout in rollouts])
-                errors = np.linalg.norm(outcomes - goals, axis=1)
-                low, median, high = 100 * np.percentile(errors, [25, 50, 75])
-                print(
-                    f"| {method} | {prior_set} | {timeline} | {median:.2f} ({low:.2f}-{high:.2f}) "
-                    f"| {np.mean(errors <= task.tolerance):.2f} | {lost:.2f} |",
-                    flush=True,
-                )
+            demonstrations = task.demonstrations(prior_set)
+            generator = pr.make_generator(method).fit(demonstrations, seed=options.seed)
+            rollouts = task.rollout(generator.generate(goals), None)
+            outcomes = np.array([rollout.outcome for rollout in rollouts])
+            lost = np.mean([not rollout.valid for rollout in rollouts])
+            errors = np.linalg.norm(outcomes - goals, axis=1)
+            low, median, high = 100 * np.percentile(errors, [25, 50, 75])
+            print(
+                f"| {method} | {prior_set} | {median:.2f} ({low:.2f}-{high:.2f}) "
+                f"| {np.mean(errors <= task.tolerance):.2f} | {lost:.2f} |",
+                flush=True,
+            )
 
 
 if __name__ == "__main__":

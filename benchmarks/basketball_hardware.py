@@ -1,6 +1,6 @@
 """What V1's demonstrations do on the other hardware of Basketball Shot.
 
-    python examples/basketball_hardware.py [--repetitions 32] [--seed 0] [--picture three.png]
+    python benchmarks/basketball_hardware.py [--repetitions 32] [--seed 0] [--picture three.png]
 
 prints, for V1, V2 and V3: how far the twelve plans of both prior sets land from where they land on
 V1 (undisturbed), how far the same plan, repeated with disturbances, spreads, and how many balls are
