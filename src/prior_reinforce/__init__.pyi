@@ -1,10 +1,10 @@
 # The public face: what `import prior_reinforce as pr` offers.
+from .adapters import make_adapter as make_adapter
 from .adapters.base import Adapter as Adapter
 from .adapters.frozen import FrozenAdapter as FrozenAdapter
 from .adapters.gaussian_process import GaussianProcessAdapter as GaussianProcessAdapter
 from .adapters.gaussian_process import GaussianProcessConfig as GaussianProcessConfig
 from .adapters.proportional import ProportionalAdapter as ProportionalAdapter
-from .adapters import make_adapter as make_adapter
 from .errors import PriorReinforceError as PriorReinforceError
 from .experiments.protocol import GoalTrials as GoalTrials
 from .experiments.protocol import perceive_demonstrations as perceive_demonstrations
@@ -31,14 +31,11 @@ from .perception.amplified import Amplified as Amplified
 from .perception.base import Perception as Perception
 from .perception.calibration import TableCalibration as TableCalibration
 from .perception.camera import Camera as Camera
+from .perception.colour_camera import ColourCamera as ColourCamera
 from .perception.exact import Exact as Exact
 from .perception.eye import Eye as Eye
-from .perception.colour_camera import ColourCamera as ColourCamera
 from .perception.vlm import VisionLanguageModel as VisionLanguageModel
 from .perception.vlm_client import VisionLanguageModelConfig as VisionLanguageModelConfig
-from .scene import SeenObject as SeenObject
-from .scene import TableScene as TableScene
-from .rollouts import KeyFrame as KeyFrame
 from .plans.alignment import Alignment as Alignment
 from .plans.alignment import AlignmentConfig as AlignmentConfig
 from .plans.alignment import align as align
@@ -47,7 +44,10 @@ from .plans.files import write_plan as write_plan
 from .plans.motions import Demonstrations as Demonstrations
 from .plans.motions import Plan as Plan
 from .plans.motions import PlanFormat as PlanFormat
+from .rollouts import KeyFrame as KeyFrame
 from .rollouts import Rollout as Rollout
+from .scene import SeenObject as SeenObject
+from .scene import TableScene as TableScene
 from .session import Session as Session
 from .session import ask_all as ask_all
 from .tasks import make_task as make_task

@@ -8,6 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 import torch
+from prior_reinforce.generators.unet_size import UNetSize
 
 from prior_reinforce.errors import FileFormatError, InvalidGoalError, NotFittedError
 from prior_reinforce.generators import (
@@ -24,7 +25,6 @@ from prior_reinforce.generators import (
     load_generator,
 )
 from prior_reinforce.generators.saving import CONFIG_FILE, TENSOR_FILE
-from prior_reinforce.generators.unet_size import UNetSize
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 
 # Trained for a moment only: these tests are about the contract, not about quality.
