@@ -1,0 +1,128 @@
+"""What every condition adapter keeps to."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from prior_reinforce.adapters.base import Adapter
+from prior_reinforce.arrays import Point
+from prior_reinforce.errors import InvalidFeedbackError, InvalidGoalError, NotFittedError
+from prior_reinforce.plans.motions import Demonstrations
+from prior_reinforce.testing.synthetic import synthetic_demonstrations
+
+each_k = pytest.mark.parametrize("k", [1, 2, 3])
+
+
+class AdapterContract:
+    """Inherit it, and name the adapter: `make = staticmethod(RidgeAdapter)`."""
+
+    make: Callable[[], Adapter]
+    """Makes a fresh adapter with the settings to test."""
+
+    @each_k
+    def test_proposals_are_finite_vectors_and_the_same_every_time(self, k: int) -> None:
+        goal = _goal(k)
+        proposals: list[list[Point]] = []
+        for _ in range(2):
+            adapter = self._started(k)
+            proposals.append([adapter.propose(goal)])
+            for condition, outcome in _trials(k):
+                adapter.observe(condition, outcome)
+                proposals[-1].append(adapter.propose(goal))
+        assert np.shape(proposals[0]) == (5, k)
+        assert np.all(np.isfinite(proposals[0]))
+        np.testing.assert_array_equal(proposals[0], proposals[1])
+
+    @each_k
+    def test_proposing_changes_nothing_and_aliases_nothing(self, k: int) -> None:
+        adapter = self._started(k)
+        for condition, outcome in _trials(k):
+            given = condition.copy(), outcome.copy()
+            adapter.observe(*given)
+            given[0][:], given[1][:] = 1e3, -1e3
+        goal = _goal(k)
+        kept = goal.copy()
+        first = adapter.propose(goal)
+        value = first.copy()
+        first[:] = 1e3
+        adapter.propose(2.0 * goal)  # another goal in between must leave no trace
+        np.testing.assert_array_equal(adapter.propose(goal), value)
+        np.testing.assert_array_equal(goal, kept)
+
+        clean = self._started(k)
+        for condition, outcome in _trials(k):
+            clean.observe(condition, outcome)
+        np.testing.assert_array_equal(clean.propose(goal), value)
+
+    @each_k
+    def test_starting_again_forgets_every_trial(self, k: int) -> None:
+        fresh, used = self._started(k), self.make()
+        used.start(synthetic_demonstrations(8, k=k))
+        for condition, outcome in _trials(k):
+            used.observe(condition, outcome)
+        used.start(_demonstrations(k))
+        np.testing.assert_array_equal(used.propose(_goal(k)), fresh.propose(_goal(k)))
+
+    @each_k
+    def test_the_first_condition_is_the_goal_to_within_a_hundredth_of_the_region(
+        self, k: int
+    ) -> None:
+        outcomes = _demonstrations(k).outcomes_seen
+        goal = outcomes.mean(axis=0)
+        off = np.abs(self._started(k).propose(goal) - goal)
+        assert np.all(off < 0.01 * np.ptp(outcomes, axis=0))
+
+    def test_before_start_it_says_what_to_call(self) -> None:
+        with pytest.raises(NotFittedError, match=r"start\(demonstrations\)"):
+            self.make().propose(np.zeros(2))
+        with pytest.raises(NotFittedError, match=r"start\(demonstrations\)"):
+            self.make().observe(np.zeros(2), np.zeros(2))
+
+    @pytest.mark.parametrize("bad", [np.zeros(3), np.zeros((1, 2)), np.array([0.1, np.nan]), "far"])
+    def test_bad_vectors_are_named_errors_and_leave_no_trace(self, bad: Any) -> None:
+        adapter = self._started(2)
+        good, goal = _trials(2)[0], _goal(2)
+        adapter.observe(*good)
+        before = adapter.propose(goal)
+        with pytest.raises(InvalidGoalError, match="goal"):
+            adapter.propose(bad)
+        with pytest.raises(InvalidFeedbackError, match="condition"):
+            adapter.observe(bad, good[1])
+        with pytest.raises(InvalidFeedbackError, match="outcome"):
+            adapter.observe(good[0], bad)
+        np.testing.assert_array_equal(adapter.propose(goal), before)
+
+    def test_a_trial_repeated_to_the_last_bit_is_no_trouble(self) -> None:
+        adapter = self._started(2)
+        for _ in range(5):
+            adapter.observe(*_trials(2)[0])
+        assert np.all(np.isfinite(adapter.propose(_goal(2))))
+
+    def _started(self, k: int) -> Adapter:
+        adapter = self.make()
+        adapter.start(_demonstrations(k))
+        return adapter
+
+
+def _demonstrations(k: int) -> Demonstrations:
+    return synthetic_demonstrations(k=k)
+
+
+def _goal(k: int) -> Point:
+    """Four tenths of the way through the demonstrated outcomes."""
+    outcomes = _demonstrations(k).outcomes_seen
+    return np.asarray(outcomes.min(axis=0) + 0.4 * np.ptp(outcomes, axis=0))
+
+
+def _trials(k: int, n: int = 4) -> list[tuple[Point, Point]]:
+    """Conditions, and outcomes that missed them by about a twentieth of the region."""
+    rng = np.random.default_rng(50 + k)
+    outcomes = _demonstrations(k).outcomes_seen
+    low, high = outcomes.min(axis=0), outcomes.max(axis=0)
+    conditions = rng.uniform(low, high, size=(n, k))
+    errors = rng.normal(scale=0.05, size=(n, k)) * (high - low)
+    return list(zip(conditions, conditions + errors, strict=True))

@@ -1,0 +1,73 @@
+"""What every perception keeps to."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import ClassVar
+
+import numpy as np
+import pytest
+
+from prior_reinforce.arrays import Point
+from prior_reinforce.errors import PerceptionFailedError
+from prior_reinforce.perception.base import Perception
+from prior_reinforce.rollouts import Rollout
+
+
+class PerceptionContract:
+    """Inherit it, and name the perception: `make = staticmethod(OverheadCamera)`.
+
+    One that reads pictures overrides `rollout`, to give it a key frame.
+    """
+
+    make: Callable[[], Perception]
+    """Makes a perception with the settings to test."""
+    dims: ClassVar[tuple[int, ...]] = (1, 2, 3)
+    """Every k that it can see."""
+
+    def rollout(self, outcome: Point, *, valid: bool = True) -> Rollout:
+        """Return what came of a trial; override it for a perception that needs a key frame."""
+        return Rollout(outcome=outcome, valid=valid)
+
+    @pytest.mark.parametrize("k", [1, 2, 3])
+    def test_the_same_seed_sees_the_same_finite_error(self, k: int) -> None:
+        if k not in self.dims:
+            pytest.skip(f"it does not see outcomes of {k} components")
+        trial, goal = self.rollout(np.linspace(0.9, 0.3, k)), np.full(k, 0.5)
+        seen = []
+        for _ in range(2):
+            with self.make() as perception:
+                seen.append(perception.perceive(trial, goal, np.random.default_rng(3)))
+        assert seen[0].shape == (k,)
+        assert seen[0].dtype == float
+        assert np.all(np.isfinite(seen[0]))
+        np.testing.assert_array_equal(seen[0], seen[1])
+
+    def test_it_returns_a_fresh_array_and_leaves_its_inputs(self) -> None:
+        trial, goal = self.rollout(np.array([0.9, 0.1])), np.array([0.8, 0.3])
+        with self.make() as perception:
+            seen = perception.perceive(trial, goal, np.random.default_rng(0))
+        seen[:] = 99.0
+        np.testing.assert_array_equal(trial.outcome, [0.9, 0.1])
+        np.testing.assert_array_equal(goal, [0.8, 0.3])
+
+    def test_a_large_error_is_seen_on_its_own_side(self) -> None:
+        trial, goal = self.rollout(np.array([1.1, 0.0])), np.array([0.9, 0.3])
+        with self.make() as perception:
+            for seed in range(20):
+                seen = perception.perceive(trial, goal, np.random.default_rng(seed))
+                assert seen[0] > 0.1
+                assert seen[1] < -0.15
+
+    def test_a_lost_object_is_seen_where_the_task_says_it_went_or_not_at_all(self) -> None:
+        trial, goal = self.rollout(np.array([0.0, 0.0]), valid=False), np.array([0.9, 0.0])
+        with self.make() as perception:
+            try:
+                seen = perception.perceive(trial, goal, np.random.default_rng(1))
+            except PerceptionFailedError:
+                return  # it is out of the picture, and an operator is asked
+        assert seen[0] < -0.5
+
+    def test_it_has_a_name_for_the_command_line(self) -> None:
+        with self.make() as perception:
+            assert perception.name.islower()
