@@ -13,8 +13,9 @@ demo: $(VENV)/.core
 # What a user needs; `. .venv/bin/activate` then has `prior-reinforce`.
 install: $(VENV)/.core
 
+# Two processes share the tests; who is done early takes over from the other.
 test: $(VENV)/.all
-	$(BIN)/python -m pytest $(ARGS)
+	$(BIN)/python -m pytest -n 2 --dist worksteal $(ARGS)
 
 check: $(VENV)/.all
 	$(BIN)/ruff format --check .

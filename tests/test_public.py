@@ -1,0 +1,140 @@
+"""What others build on: the exported names, and how little the small commands load."""
+
+import ast
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import prior_reinforce as pr
+import prior_reinforce.testing
+from prior_reinforce.cli import main
+
+REPOSITORY = Path(__file__).parents[1]
+PUBLIC = {"prior_reinforce": pr, "prior_reinforce.testing": prior_reinforce.testing}
+HEAVY = {
+    "torch",
+    "mujoco",
+    "mink",
+    "matplotlib",
+    "joblib",
+    "imageio",
+    "openai",
+    "scipy.interpolate",
+    "scipy.optimize",
+    "scipy.spatial",
+    "scipy.linalg",
+    "sklearn",
+    "pyarrow",
+}
+
+
+def shown_code():
+    """Python that a reader is shown or can run: name, and source."""
+    for path in sorted(REPOSITORY.glob("*.md")) + sorted(REPOSITORY.glob("docs/**/*.md")):
+        blocks = re.findall(r"^```python.*?\n(.*?)^```$", path.read_text(), re.M | re.S)
+        for number, block in enumerate(blocks):
+            yield f"{path.relative_to(REPOSITORY)}, block {number}", block
+    for path in sorted(REPOSITORY.glob("examples/*.py")):
+        yield str(path.relative_to(REPOSITORY)), path.read_text()
+    for folder in ("docs", "examples"):
+        for path in sorted((REPOSITORY / folder).glob("**/*.ipynb")):
+            cells = [c for c in json.loads(path.read_text())["cells"] if c["cell_type"] == "code"]
+            code = "\n".join("".join(cell["source"]) for cell in cells)
+            yield str(path.relative_to(REPOSITORY)), re.sub(r"^[%!].*$", "", code, flags=re.M)
+
+
+CODE = dict(shown_code())
+
+
+@pytest.mark.parametrize("module", PUBLIC.values(), ids=PUBLIC)
+def test_every_exported_name_is_there(module):
+    assert module.__all__
+    assert len(set(module.__all__)) == len(module.__all__)
+    for name in module.__all__:
+        getattr(module, name)
+    assert set(module.__all__) <= set(dir(module))
+
+
+def test_a_name_that_is_not_exported_is_told():
+    with pytest.raises(AttributeError, match="no attribute 'Sesion'"):
+        _ = pr.Sesion
+
+
+@pytest.mark.parametrize("where", CODE)
+def test_what_a_reader_is_shown_imports_public_names_only(where):
+    """`import prior_reinforce as pr`, then any `pr.name`; or `from prior_reinforce import name`."""
+    tree = ast.parse(CODE[where])
+    aliases = {}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            for name in node.names:
+                if name.name.partition(".")[0] == "prior_reinforce":
+                    assert name.name in PUBLIC, f"{where} imports {name.name}"
+                    aliases[name.asname or name.name] = PUBLIC[name.name]
+        if isinstance(node, ast.ImportFrom) and not node.level:
+            module = node.module or ""
+            if module.partition(".")[0] == "prior_reinforce":
+                assert module in PUBLIC, f"{where} imports from {module}"
+                for name in node.names:
+                    assert name.name in PUBLIC[module].__all__, f"{where} imports {name.name}"
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
+            module = aliases.get(node.value.id)
+            assert module is None or node.attr in module.__all__, f"{where}: {node.attr}"
+
+
+@pytest.fixture(scope="module")
+def workspace(tmp_path_factory):
+    """A workspace with a goal and an open trial."""
+    folder = tmp_path_factory.mktemp("public")
+    recordings = folder / "recordings"
+    recordings.mkdir()
+    outcomes = np.array([[0.8, -0.2], [0.8, 0.2], [1.0, -0.2], [1.0, 0.2]])
+    phase = np.linspace(0.0, 1.0, 24)
+    swing = phase**3 * (10 - 15 * phase + 6 * phase**2)
+    for i, outcome in enumerate(outcomes):
+        q = swing[:, None] * outcome
+        np.savez(recordings / f"throw_{i}.npz", t=np.arange(24) * 0.02, q=q)
+    rows = [f"{i},{x},{y}" for i, (x, y) in enumerate(outcomes)]
+    (recordings / "outcomes.csv").write_text("\n".join(["episode,x,y", *rows]))
+    made = folder / "planar"
+    names = ["--action-names", "joint1", "joint2", "--dt", "0.02", "--robot", "none"]
+    for command in (
+        ["new", str(made), *names],
+        ["import", str(made), str(recordings), "--no-trim", "--joints", "joint1", "joint2"],
+        ["learn", str(made), "--generator", "nearest"],
+        ["goal", str(made), "0.9", "0.1"],
+        ["ask", str(made), "--out", str(folder / "plan.json")],
+    ):
+        assert main(command) == 0
+    return made
+
+
+@pytest.mark.parametrize(
+    "command",
+    [["status"], ["tell", "1", "--error", "3cm long, 1cm left"], ["log"], ["goal", "0.95", "0.0"]],
+    ids=lambda command: command[0],
+)
+def test_small_commands_load_nothing_heavy(workspace, command):
+    """They answer at once; importing torch alone takes longer than all that they do."""
+    name, *rest = command
+    code = (
+        "import json, sys; from prior_reinforce.cli import main; status = main(sys.argv[1:]); "
+        "print(json.dumps([status, sorted(sys.modules)]))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, name, str(workspace), *rest],
+        capture_output=True,
+        text=True,
+        check=True,
+        env=os.environ,
+    )
+    status, loaded = json.loads(done.stdout.splitlines()[-1])
+    assert status == 0, done.stdout + done.stderr
+    assert HEAVY.isdisjoint(loaded), sorted(HEAVY & set(loaded))
