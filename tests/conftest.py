@@ -24,3 +24,8 @@ def one_blas_thread() -> Iterator[None]:
     """The tests' matrices are small; torch sets its own number of threads."""
     with threadpool_limits(limits=1, user_api="blas"):
         yield
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Start the longest tests first, or one process waits for them in the end."""
+    items.sort(key=lambda item: not item.path.name.startswith("test_tutorial"))
