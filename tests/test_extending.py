@@ -20,7 +20,7 @@ REPOSITORY = Path(__file__).parents[1]
 EXAMPLES = REPOSITORY / "examples"
 ADDED = {
     "ridge": (ADAPTERS, Member("own_adapter:RidgeAdapter", "affine, by ridge regression")),
-    "blend": (GENERATORS, Member("own_generator:SoftmaxBlend", "neighbours blended")),
+    "softmax-blend": (GENERATORS, Member("own_generator:SoftmaxBlend", "neighbours blended")),
     "overhead": (PERCEPTIONS, Member("own_perception:OverheadCamera", "with parallax")),
     "toss": (TASKS, Member("own_task:Toss", "a catapult")),
 }
@@ -68,7 +68,7 @@ def test_all_appear_in_the_help_of_the_command_that_takes_them():
 
 def test_all_are_made_by_name_with_settings():
     assert make_adapter("ridge,penalty=0.5").penalty == 0.5
-    assert make_generator("blend,neighbours=3,width=0.5").config.neighbours == 3
+    assert make_generator("softmax-blend,neighbours=3,width=0.5").config.neighbours == 3
     assert make_perception("overhead,noise_sd=0.0,height=2.0").height == 2.0
     assert type(make_task("toss")).__name__ == "Toss"
 
@@ -84,7 +84,7 @@ def test_all_are_held_to_their_contracts_and_no_test_file_is_touched():
 
 def test_a_saved_generator_is_found_by_its_name(tmp_path):
     demonstrations = synthetic_demonstrations()
-    generator = make_generator("blend,width=0.5").fit(demonstrations, seed=0)
+    generator = make_generator("softmax-blend,width=0.5").fit(demonstrations, seed=0)
     generator.save(tmp_path)
     loaded = load_generator(tmp_path)
     assert loaded.config == generator.config
@@ -103,15 +103,14 @@ def test_an_adapter_joins_the_comparison_of_adapters(tmp_path, capsys):
 
 def test_a_generator_joins_the_comparison_of_first_throws(tmp_path, capsys):
     with tiny_networks():
-        command = ["reproduce", "zero-shot", "--quick", "--include", "blend"]
+        command = ["reproduce", "zero-shot", "--quick", "--include", "softmax-blend"]
         assert main([*command, "--out", str(tmp_path)]) == 0
-    assert "blend" in capsys.readouterr().out
+    assert "softmax-blend" in capsys.readouterr().out
 
 
 def test_task_generator_adapter_and_perception_go_through_trials_together(tmp_path, capsys):
-    chosen = {"task": "toss", "generator": "blend", "adapter": "ridge", "perception": "overhead"}
-    command = [word for flag, name in chosen.items() for word in (f"--{flag}", name)]
-    command[-1] += ",ball_height=0.0,noise_sd=0.0"  # else its bias, of centimetres, stays
+    chosen = ["--task", "toss", "--generator", "softmax-blend", "--adapter", "ridge"]
+    level = "overhead,ball_height=0.0,noise_sd=0.0"  # else its bias, of centimetres, stays
     aim = ["--goal", "1.10", "0.05", "--no-film", "--out", str(tmp_path)]
-    assert main(["adapt", *command, *aim]) == 0
+    assert main(["adapt", *chosen, "--perception", level, *aim]) == 0
     assert "HIT" in capsys.readouterr().out

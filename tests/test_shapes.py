@@ -2,9 +2,12 @@
 
 import numpy as np
 import pytest
-from jaxtyping import Float, Int, TypeCheckError, jaxtyped
+from jaxtyping import Float, TypeCheckError, jaxtyped
 
+from prior_reinforce.adapters.normalisation import Normalisation
 from prior_reinforce.arrays import Plans, Points
+from prior_reinforce.perception.exact import Exact
+from prior_reinforce.rollouts import Rollout
 
 from .shapes import arrays_only
 
@@ -39,16 +42,13 @@ def test_a_shape_or_kind_that_does_not_fit_is_caught(plans, weights, note):
 
 
 def test_the_package_is_checked():
-    from prior_reinforce.adapters.normalisation import Normalisation
-
-    units = Normalisation(np.zeros(2), np.ones(2))
+    goal, seen = np.zeros(2), np.zeros(3)
     with pytest.raises(TypeCheckError):
-        units.apply(np.zeros((4, 3, 2)))
+        Exact().perceive(Rollout(outcome=goal, valid=True), goal[None], np.random.default_rng(0))
+    with pytest.raises(TypeCheckError):
+        Normalisation(goal, seen)
 
 
 def test_fields_are_held_to_their_shapes_once_they_are_set():
-    from prior_reinforce.rollouts import Rollout
-
     with pytest.raises(TypeCheckError):
         Rollout(outcome=np.zeros((1, 2)), valid=True)
-    _ = Int

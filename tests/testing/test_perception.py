@@ -1,17 +1,39 @@
 """Every perception of the registry keeps the contract."""
 
-from functools import partial
+from functools import cache, partial
 
+import numpy as np
 import pytest
 
 from prior_reinforce.perception import PERCEPTIONS, make_perception
+from prior_reinforce.rollouts import KeyFrame, Rollout
+from prior_reinforce.scene import SeenObject, TableScene
 from prior_reinforce.testing import PerceptionContract
 
+from ..perception.slanted_table import RIM_HEIGHT, slanted_table
+
 PICTURES = ("camera", "vlm")
-"""What reads pictures needs a table to look at, and a model to ask."""
+"""They need a table to look at; `perception/test_vlm.py` asks a model."""
+
+
+_table = cache(slanted_table)
 
 
 class TestPerceptions(PerceptionContract):
     @pytest.fixture(autouse=True, params=[n for n in PERCEPTIONS.members if n not in PICTURES])
     def choose(self, request):
         self.make = partial(make_perception, request.param)
+
+
+class TestCamera(PerceptionContract):
+    dims = (2,)
+    scene = TableScene(
+        SeenObject("the orange ball", 0.06), SeenObject("the red hoop", 0.10), RIM_HEIGHT
+    )
+
+    def make(self):
+        return make_perception("camera", scene=self.scene)
+
+    def rollout(self, outcome, *, valid=True):
+        state = np.array([*outcome, RIM_HEIGHT, 1.0, 0.0, 0.0, 0.0])
+        return Rollout(outcome, valid, KeyFrame(_table(), state, time=1.0))

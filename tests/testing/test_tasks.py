@@ -8,5 +8,6 @@ from prior_reinforce.testing import TaskContract
 
 class TestTasks(TaskContract):
     @pytest.fixture(scope="class", params=TASKS.members)
-    def task(self, request):
+    @classmethod
+    def task(cls, request):
         return make_task(request.param)

@@ -25,7 +25,7 @@ def synthetic_demonstrations(
     rng = np.random.default_rng(seed)
     outcomes = rng.uniform(size=(n, k)) * _SPREAD[:k]
     times = np.linspace(0, 1, horizon)
-    share = np.clip((times - rng.uniform(0, 0.3, (n, 1))) / 0.6, 0, 1)[:, :, None]
+    share = np.clip((times - rng.uniform(0.05, 0.3, (n, 1))) / 0.6, 0, 1)[:, :, None]
     plans = rng.normal(size=(n, 1, action_dim)) + share**2 * (3 - 2 * share)
     names = tuple(f"joint{d + 1}" for d in range(action_dim))
     plan_format = PlanFormat(names, ("rad",) * action_dim, 0.02)

@@ -20,13 +20,14 @@ class TaskContract:
     """Makes the task; called once."""
 
     @pytest.fixture(scope="class")
-    def task(self, request: pytest.FixtureRequest) -> Task:
+    @classmethod
+    def task(cls) -> Task:
         """The task, made once for all tests, as a scene may take a while to load."""
-        made: Task = request.cls.make()
-        return made
+        return cls.make()
 
     @pytest.fixture(scope="class")
-    def plans(self, task: Task) -> Plans:
+    @classmethod
+    def plans(cls, task: Task) -> Plans:
         """A few of its demonstrations."""
         return task.demonstrations(task.demonstration_sets[0]).plans[:3]
 
