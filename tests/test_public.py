@@ -36,7 +36,7 @@ HEAVY = {
 
 def shown_code():
     """Python that a reader is shown or can run: name, and source."""
-    for path in sorted(REPOSITORY.glob("*.md")) + sorted(REPOSITORY.glob("docs/**/*.md")):
+    for path in [REPOSITORY / "README.md", *sorted(REPOSITORY.glob("docs/**/*.md"))]:
         blocks = re.findall(r"^```python.*?\n(.*?)^```$", path.read_text(), re.M | re.S)
         for number, block in enumerate(blocks):
             yield f"{path.relative_to(REPOSITORY)}, block {number}", block
