@@ -61,7 +61,7 @@ def run(folder, *command, cwd=None):
         capture_output=True,
         text=True,
         cwd=cwd or folder,
-        env=os.environ | {"PYTHONPATH": path, "COLUMNS": "400"},
+        env=os.environ | {"PYTHONPATH": path, "COLUMNS": "200"},
     )
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout

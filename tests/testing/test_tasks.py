@@ -11,3 +11,6 @@ class TestTasks(TaskContract):
     @classmethod
     def task(cls, request):
         return make_task(request.param)
+
+    def test_a_task_knows_its_name(self, task, request):
+        assert task.name == request.node.callspec.params["task"]
