@@ -28,4 +28,4 @@ def one_blas_thread() -> Iterator[None]:
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Start the longest tests first, or one process waits for them in the end."""
-    items.sort(key=lambda item: not item.path.name.startswith("test_tutorial"))
+    items.sort(key=lambda item: item.path.suffix != ".ipynb" and item.path.stem != "test_tutorial")
