@@ -1,11 +1,12 @@
-# Every target sets up .venv by itself. `make demo` is the main job; `make test` runs all tests.
+# Every target sets up .venv by itself. `make demo` is the main job; `make test` runs all tests;
+# `make docs` builds the site.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 # Pictures are drawn without a display (EGL); without OpenGL the report says so in one line.
 export MUJOCO_GL ?= egl
 
-.PHONY: demo install test check reproduce clean
+.PHONY: demo install test check reproduce docs clean
 
 demo: $(VENV)/.core
 	$(BIN)/prior-reinforce demo --out runs/demo $(ARGS)
@@ -26,6 +27,10 @@ check: $(VENV)/.all
 reproduce: $(VENV)/.all
 	$(BIN)/prior-reinforce reproduce all --workers 2 $(ARGS)
 
+# Open site/index.html; it needs no server. A broken link or docstring is an error.
+docs: $(VENV)/.docs
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet $(ARGS)
+
 # The exact versions of constraints.txt. `.core` is what a user needs; `.all` adds every extra.
 $(VENV)/.core: pyproject.toml constraints.txt
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
@@ -37,5 +42,9 @@ $(VENV)/.all: $(VENV)/.core
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev,baselines,vlm,lerobot,hdf5,ros,zarr,ray]'
 	touch $@
 
+$(VENV)/.docs: $(VENV)/.core
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[docs]'
+	touch $@
+
 clean:
-	rm -rf $(VENV) runs
+	rm -rf $(VENV) runs site
