@@ -1,4 +1,4 @@
-"""Pages of the site that stand outside docs/, and links that work in the repository and on the site.
+"""Pages that stand outside docs/, and links that work in the repository and on the site.
 
 Every link in a Markdown file is written relative to that file, so that it works where the file is
 read in the repository. On the site README.md is the first page, and the others have pages of their
@@ -25,7 +25,9 @@ PAGES = {
 }
 """Files outside docs/ by their page on the site."""
 PICTURES = "results/pictures"
-LINK = re.compile(r'(?P<before>\]\(|src=")(?P<target>[^)\s"#]+)(?P<anchor>#[^)\s"]*)?(?P<after>[)"])')
+LINK = re.compile(
+    r'(?P<before>\]\(|src=")(?P<target>[^)\s"#]+)(?P<anchor>#[^)\s"]*)?(?P<after>[)"])'
+)
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
@@ -49,7 +51,9 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
             return link[0]
         place = posixpath.normpath(posixpath.join(folder, target))
         if not (REPOSITORY / place).exists():
-            raise PluginError(f"{source or page.file.src_uri} links to {target}, which is not there")
+            raise PluginError(
+                f"{source or page.file.src_uri} links to {target}, which is not there"
+            )
         return f"{link['before']}{_address(place, page, config)}{anchor}{link['after']}"
 
     return LINK.sub(on_site, markdown)
