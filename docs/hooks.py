@@ -43,6 +43,8 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
     """Point links at the site's pages, or at the source of what has none."""
     source = next((s for s, p in PAGES.items() if p == page.file.src_uri), None)
+    if page.file.src_uri == "index.md":
+        page.meta["hide"] = ["navigation"]
     folder = posixpath.dirname(source or f"docs/{page.file.src_uri}")
 
     def on_site(link: re.Match[str]) -> str:
