@@ -68,6 +68,19 @@ def test_members_written_as_the_guide_says_keep_their_contracts_and_reach_goals(
     assert shares.strip(" []\n").endswith("1.")  # every goal is reached in the end
 
 
+def test_files_that_docs_and_docstrings_name_are_there():
+    named = re.compile(r"\b(?:benchmarks|docs|examples|results|tests)/[\w./-]+\.(?:py|md|ipynb)\b")
+    pages = [*REPOSITORY.glob("*.md"), *DOCS.rglob("*.md"), *REPOSITORY.glob("benchmarks/*.md")]
+    modules = [*REPOSITORY.glob("src/**/*.py"), *REPOSITORY.glob("examples/*.py")]
+    missing = {
+        f"{path.relative_to(REPOSITORY)}: {name}"
+        for path in pages + modules
+        for name in named.findall(path.read_text())
+        if not (REPOSITORY / name).exists()
+    }
+    assert missing - {"CONTRIBUTING.md: tests/adapters/test_drift.py"} == set()  # the reader writes it
+
+
 def test_every_exported_name_is_in_the_reference_once():
     shown = [
         name
