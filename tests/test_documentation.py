@@ -78,7 +78,9 @@ def test_files_that_docs_and_docstrings_name_are_there():
         for name in named.findall(path.read_text())
         if not (REPOSITORY / name).exists()
     }
-    assert missing - {"CONTRIBUTING.md: tests/adapters/test_drift.py"} == set()  # the reader writes it
+    assert (
+        missing - {"CONTRIBUTING.md: tests/adapters/test_drift.py"} == set()
+    )  # the reader writes it
 
 
 def test_every_exported_name_is_in_the_reference_once():

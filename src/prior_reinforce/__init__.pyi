@@ -26,6 +26,8 @@ from .generators.interpolation import SmoothInterpolationConfig as SmoothInterpo
 from .generators.regression import UNetRegression as UNetRegression
 from .generators.regression import UNetRegressionConfig as UNetRegressionConfig
 from .generators.timed import Timed as Timed
+from .importing.importer import import_demonstrations as import_demonstrations
+from .importing.preprocessing import Preprocessing as Preprocessing
 from .perception import make_perception as make_perception
 from .perception.amplified import Amplified as Amplified
 from .perception.base import Perception as Perception
@@ -44,6 +46,11 @@ from .plans.files import write_plan as write_plan
 from .plans.motions import Demonstrations as Demonstrations
 from .plans.motions import Plan as Plan
 from .plans.motions import PlanFormat as PlanFormat
+from .robots.gate import GateSettings as GateSettings
+from .robots.gate import check_plan as check_plan
+from .robots.limits import RobotLimits as RobotLimits
+from .robots.presets import robot_limits as robot_limits
+from .robots.report import LimitReport as LimitReport
 from .rollouts import KeyFrame as KeyFrame
 from .rollouts import Rollout as Rollout
 from .scene import SeenObject as SeenObject

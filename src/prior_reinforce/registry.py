@@ -15,7 +15,7 @@ import hashlib
 import importlib.util
 import inspect
 import pkgutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Generic, TypeVar
@@ -218,27 +218,3 @@ def _checked_names(
         default = takes[name].default
         arguments[name] = type(default)(value) if isinstance(default, (int, float, str)) else value
     return arguments
-
-
-# --- to be removed: the callers move to registries ---
-def make_own(name: str, family: Any, known: Sequence[str]) -> Any:
-    if ":" not in name:
-        raise ConfigurationError(
-            f"no {family.__name__.lower()} {name!r}; known are {', '.join(known)}, or give your "
-            "own as module:Class"
-        )
-    made = import_and_make(name)
-    if not isinstance(made, family):
-        raise ConfigurationError(f"{name} is no {family.__name__}; derive it from that class")
-    return made
-
-
-def import_and_make(name: str) -> Any:
-    module, _, attribute = name.partition(":")
-    try:
-        return getattr(importlib.import_module(module), attribute)()
-    except (ImportError, AttributeError, TypeError, ValueError) as error:
-        raise ConfigurationError(
-            f"cannot make {name}: {error}; it must be importable from here (PYTHONPATH) and need "
-            "no arguments"
-        ) from error

@@ -7,11 +7,11 @@ import re
 import imageio.v3 as imageio
 import numpy as np
 import pytest
-from tests.perception.vision_server import VisionServer
 
 from prior_reinforce.cli import main
 from prior_reinforce.perception.camera import Camera
 from prior_reinforce.tasks import make_task
+from tests.perception.vision_server import VisionServer
 
 GOAL = np.array([1.0, 0.05])
 SCENE = make_task("basketball-v1").scene

@@ -10,13 +10,13 @@ import sys
 import imageio_ffmpeg
 import numpy as np
 import pytest
-from tests.perception.vision_server import VisionServer
 
 from prior_reinforce.cli import main
 from prior_reinforce.experiments.learned import save_learned
 from prior_reinforce.generators import make_generator
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.tasks import make_task
+from tests.perception.vision_server import VisionServer
 
 GOAL = ("1.0", "0.05")
 NOBODY = ("--perception=vlm", "--vlm.base-url=http://127.0.0.1:9/v1", "--vlm.max-retries=0")

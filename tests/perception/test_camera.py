@@ -9,12 +9,12 @@ import sys
 import mujoco
 import numpy as np
 import pytest
-from tests.perception.slanted_table import RIM_HEIGHT
 
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.perception.camera import Camera, CameraConfig
 from prior_reinforce.perception.colour_camera import find_by_colour
 from prior_reinforce.rollouts import KeyFrame
+from tests.perception.slanted_table import RIM_HEIGHT
 
 MARKS = np.array([(x, y) for x in (0.45, 0.85, 1.25) for y in (-0.4, 0.0, 0.4)])
 PLACES = np.array([(x, y) for x in (0.5, 0.85, 1.2) for y in (-0.35, 0.05, 0.35)])

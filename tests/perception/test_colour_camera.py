@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tests.perception.slanted_table import SCENE
-from tests.perception.vision_server import VisionServer
 
 from prior_reinforce.adapters.gaussian_process import GaussianProcessAdapter
 from prior_reinforce.errors import ConfigurationError
@@ -21,6 +19,8 @@ from prior_reinforce.perception.vlm import VisionLanguageModel
 from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
 from prior_reinforce.plans.alignment import align
 from prior_reinforce.tasks import TASKS, make_task
+from tests.perception.slanted_table import SCENE
+from tests.perception.vision_server import VisionServer
 
 RED, ORANGE, WOOD = (220, 30, 25), (245, 128, 25), (204, 178, 143)
 

@@ -2,13 +2,13 @@ import subprocess
 import sys
 
 import pytest
-from tests.perception.slanted_table import SCENE
 
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.perception import make_perception
 from prior_reinforce.perception.base import Perception
 from prior_reinforce.perception.colour_camera import ColourCamera
 from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
+from tests.perception.slanted_table import SCENE
 
 
 class Closing(Perception):

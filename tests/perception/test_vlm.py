@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tests.perception.slanted_table import BALL, GOAL, RIM_HEIGHT, SCENE
-from tests.perception.vision_server import VisionServer
 
 from prior_reinforce.errors import ConfigurationError, EndpointError, PerceptionFailedError
 from prior_reinforce.perception.camera import Camera, CameraConfig
@@ -14,6 +12,8 @@ from prior_reinforce.perception.vlm import VisionLanguageModel
 from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
 from prior_reinforce.rollouts import Rollout
 from prior_reinforce.scene import TableScene
+from tests.perception.slanted_table import BALL, GOAL, RIM_HEIGHT, SCENE
+from tests.perception.vision_server import VisionServer
 
 FAMILIES = ["glm-4.5v", "qwen2-vl", "qwen2.5-vl", "qwen3-vl"]
 RNG = np.random.default_rng(0)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tests.perception.slanted_table import BALL, GOAL
-from tests.perception.vision_server import VisionServer
 
 from prior_reinforce.errors import ConfigurationError, EndpointError
 from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
 from prior_reinforce.rollouts import Rollout
+from tests.perception.slanted_table import BALL, GOAL
+from tests.perception.vision_server import VisionServer
 
 RNG = np.random.default_rng(0)
 

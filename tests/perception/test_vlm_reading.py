@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 
 import numpy as np
+
 from tests.perception.slanted_table import BALL, GOAL
 from tests.perception.vision_server import VisionServer
 

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.report.swing_world import told
 
 from prior_reinforce.report.curves import draw_errors, draw_plans
+from tests.report.swing_world import told
 
 GOAL = np.array([0.92, -0.10])
 

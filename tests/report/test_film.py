@@ -6,11 +6,11 @@ import imageio_ffmpeg
 import numpy as np
 import pytest
 from PIL import Image
-from tests.report.swing_world import pictures
 
 from prior_reinforce.errors import ConfigurationError, RenderingUnavailableError
 from prior_reinforce.report import record_film
 from prior_reinforce.report.film import key_moments
+from tests.report.swing_world import pictures
 
 
 @pytest.mark.parametrize(("height", "width"), [(48, 64), (47, 63)])

@@ -9,11 +9,11 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 from PIL import Image
-from tests.report.swing_world import FullStep, adaptation, demonstrations, pictures
 
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.report import page, record_film, write_report
 from prior_reinforce.report.style import PICTURE_DPI
+from tests.report.swing_world import FullStep, adaptation, demonstrations, pictures
 
 FACTS = {
     "Seeds": "training 0, goals 1",

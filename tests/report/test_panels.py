@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from tests.report.swing_world import adaptation, told
 
 from prior_reinforce.report.panels import View, views_of
 from prior_reinforce.report.pictures import draw_close_up, draw_table
+from tests.report.swing_world import adaptation, told
 
 
 @pytest.mark.parametrize(

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.report.swing_world import adaptation, demonstrations, told
 
 from prior_reinforce.report.pictures import draw_close_up, draw_table
+from tests.report.swing_world import adaptation, demonstrations, told
 
 REGION = np.array([[0.80, -0.32], [1.08, 0.32]])
 KINDS = [(1, ("m",)), (2, ("m", "m")), (2, ("m", "s")), (3, ("m",) * 3), (4, ("rad",) * 4)]

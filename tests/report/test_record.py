@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.report.swing_world import adaptation, told
 
 from prior_reinforce.errors import ConfigurationError, InvalidGoalError
+from tests.report.swing_world import adaptation, told
 
 GOAL = np.array([0.92, -0.10])
 

@@ -4,8 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.report.swing_world import adaptation
-from tests.report.swing_world import told as record
 
 from prior_reinforce.report.summary import (
     headline,
@@ -16,6 +14,8 @@ from prior_reinforce.report.summary import (
     trial_rows,
 )
 from prior_reinforce.trials import Stage
+from tests.report.swing_world import adaptation
+from tests.report.swing_world import told as record
 
 GOAL = np.array([0.92, -0.10])
 REACHED_IN_2 = record([0.05, 0.0], None, [0.0, 0.01])
