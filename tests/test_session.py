@@ -33,18 +33,11 @@ class RepeatingGenerator(Generator):
     def __init__(self):
         self.calls = 0
 
-    def fit(self, demonstrations, *, seed, progress=None):
-        return self
+    def _fit(self, demonstrations, seed, progress): ...
 
-    def generate(self, conditions):
+    def _generate(self, conditions):
         self.calls += 1
         return np.repeat(conditions[:, None, :], 3, axis=1)
-
-    def save(self, folder): ...
-
-    @classmethod
-    def load(cls, folder):
-        return cls()
 
 
 class FullStepAdapter(Adapter):
@@ -65,7 +58,7 @@ class FullStepAdapter(Adapter):
 
 @pytest.fixture
 def session():
-    return Session(RepeatingGenerator(), FullStepAdapter(), DEMOS, GOAL, 0.015)
+    return Session(RepeatingGenerator().fit(DEMOS, seed=0), FullStepAdapter(), DEMOS, GOAL, 0.015)
 
 
 def test_a_constant_offset_is_corrected_in_the_second_trial(session):
@@ -146,7 +139,9 @@ def test_voiding_a_told_trial_forgets_it(session):
 def test_a_session_goes_on_from_its_log(session):
     session.tell(session.ask().number, [0.05, 0.0])
     session.ask()
-    again = Session(RepeatingGenerator(), FullStepAdapter(), DEMOS, log=session.log)
+    again = Session(
+        RepeatingGenerator().fit(DEMOS, seed=0), FullStepAdapter(), DEMOS, log=session.log
+    )
     np.testing.assert_array_equal(again.goal, GOAL)
     assert again.open_trial.number == session.open_trial.number == 2
     again.tell(2, [0.01, 0.02])
@@ -155,7 +150,9 @@ def test_a_session_goes_on_from_its_log(session):
 
 
 def test_two_sessions_on_one_log_tell_a_trial_once(session):
-    other = Session(RepeatingGenerator(), FullStepAdapter(), DEMOS, log=session.log)
+    other = Session(
+        RepeatingGenerator().fit(DEMOS, seed=0), FullStepAdapter(), DEMOS, log=session.log
+    )
     assert other.ask().number == session.ask().number == 1
     other.tell(1, [0.05, 0.0])
     with pytest.raises(TrialStateError, match="already told"):
@@ -165,7 +162,12 @@ def test_two_sessions_on_one_log_tell_a_trial_once(session):
 @pytest.mark.parametrize("carry_over", [False, True])
 def test_trials_of_earlier_goals_reach_the_adapter_where_they_are_carried_over(carry_over):
     session = Session(
-        RepeatingGenerator(), FullStepAdapter(), DEMOS, [0.8, 0.0], 0.015, carry_over=carry_over
+        RepeatingGenerator().fit(DEMOS, seed=0),
+        FullStepAdapter(),
+        DEMOS,
+        [0.8, 0.0],
+        0.015,
+        carry_over=carry_over,
     )
     session.tell(session.ask().number, [0.05, 0.0])
     session.set_goal(GOAL)
@@ -178,7 +180,11 @@ def test_trials_of_earlier_goals_reach_the_adapter_where_they_are_carried_over(c
 def test_trials_of_another_model_teach_nothing(session):
     session.tell(session.ask().number, [0.05, 0.0])
     other = Session(
-        RepeatingGenerator(), FullStepAdapter(), DEMOS, log=session.log, model="another"
+        RepeatingGenerator().fit(DEMOS, seed=0),
+        FullStepAdapter(),
+        DEMOS,
+        log=session.log,
+        model="another",
     )
     np.testing.assert_array_equal(other.ask().condition, GOAL)
 
@@ -210,7 +216,9 @@ class Gate:
 
 def test_a_refused_plan_never_leaves_whenever_it_is_asked_for():
     gate = Gate()
-    session = Session(RepeatingGenerator(), FullStepAdapter(), DEMOS, GOAL, 0.015, gate=gate)
+    session = Session(
+        RepeatingGenerator().fit(DEMOS, seed=0), FullStepAdapter(), DEMOS, GOAL, 0.015, gate=gate
+    )
     gate.limit = 0.5
     with pytest.raises(RobotLimitError, match="no plan for the condition"):
         session.ask()
@@ -291,12 +299,12 @@ def test_a_number_that_is_no_whole_number_is_named(session, number):
 @pytest.mark.parametrize("tolerance", [0.0, -1.0, np.nan, np.inf, "x", "0.01", None, True, [0.1]])
 def test_bad_tolerances_are_named(tolerance):
     with pytest.raises(ConfigurationError, match="tolerance"):
-        Session(RepeatingGenerator(), FullStepAdapter(), DEMOS, GOAL, tolerance)
+        Session(RepeatingGenerator().fit(DEMOS, seed=0), FullStepAdapter(), DEMOS, GOAL, tolerance)
 
 
 def test_a_goal_of_the_wrong_dimension_is_named():
     with pytest.raises(InvalidGoalError, match="2 components"):
-        Session(RepeatingGenerator(), FullStepAdapter(), DEMOS, [0.9], 0.01)
+        Session(RepeatingGenerator().fit(DEMOS, seed=0), FullStepAdapter(), DEMOS, [0.9], 0.01)
 
 
 def test_a_log_that_does_not_fit_together_is_refused(session):
@@ -305,11 +313,11 @@ def test_a_log_that_does_not_fit_together_is_refused(session):
     for event in reversed(session.log.events()):
         log.append(event.kind, event.data)
     with pytest.raises(WorkspaceError, match="does not fit the ones before"):
-        Session(RepeatingGenerator(), FullStepAdapter(), DEMOS, log=log)
+        Session(RepeatingGenerator().fit(DEMOS, seed=0), FullStepAdapter(), DEMOS, log=log)
 
 
 def test_asking_many_sessions_calls_the_generator_once_and_agrees_with_asking_each():
-    generator = RepeatingGenerator()
+    generator = RepeatingGenerator().fit(DEMOS, seed=0)
     goals = [[0.85, 0.0], [0.9, 0.1], [0.95, -0.1]]
     sessions = [Session(generator, FullStepAdapter(), DEMOS, goal, 0.015) for goal in goals]
     pending = sessions[1].ask()
@@ -320,7 +328,10 @@ def test_asking_many_sessions_calls_the_generator_once_and_agrees_with_asking_ea
 
 
 def test_sessions_with_different_generators_cannot_be_asked_together():
-    sessions = [Session(RepeatingGenerator(), FullStepAdapter(), DEMOS, GOAL, 0.1) for _ in "ab"]
+    sessions = [
+        Session(RepeatingGenerator().fit(DEMOS, seed=0), FullStepAdapter(), DEMOS, GOAL, 0.1)
+        for _ in "ab"
+    ]
     with pytest.raises(ConfigurationError, match="share one generator"):
         ask_all(sessions)
 

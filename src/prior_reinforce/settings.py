@@ -6,8 +6,7 @@ So the command line, a saved model and a constructor all keep to them, and none 
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from functools import cache
-from typing import Annotated, Any, get_type_hints
+from typing import Annotated, get_type_hints
 
 import msgspec
 import numpy as np
@@ -29,7 +28,7 @@ class Checked:
         Raises:
             ConfigurationError: One is of another type, or outside its range.
         """
-        hints = _hints(type(self))
+        hints = get_type_hints(type(self), include_extras=True)
         for each in fields(self):
             value = getattr(self, each.name)
             value = value.item() if isinstance(value, np.generic) else value
@@ -40,8 +39,3 @@ class Checked:
                     msgspec.convert(value, hints[each.name])
             except msgspec.ValidationError as error:
                 raise ConfigurationError(f"{each.name}: {error}, got {value!r}") from error
-
-
-@cache
-def _hints(kind: Any) -> dict[str, Any]:
-    return get_type_hints(kind, include_extras=True)

@@ -255,7 +255,7 @@ def test_another_generator_can_be_learned(run, folder):
     for args, remedy in (
         (("--generator", "spline"), "known are diffusion"),
         (("--generator", "nearest,training_steps=5"), "has no setting 'training_steps'"),
-        (("--generator", "nearest,neighbours=0"), "at least 1"),
+        (("--generator", "nearest,neighbours=0"), ">= 1 - at `$.neighbours`"),
     ):
         status, _, err = run("learn", folder, *args)
         assert status == 2

@@ -9,7 +9,7 @@ from typing import Any, cast
 
 from prior_reinforce.errors import FileFormatError
 from prior_reinforce.generators.base import FitProgress as FitProgress
-from prior_reinforce.generators.base import Generator
+from prior_reinforce.generators.base import Generator as Generator
 from prior_reinforce.generators.config import UNetSize as UNetSize
 from prior_reinforce.generators.diffusion import PAPER
 from prior_reinforce.generators.diffusion import DiffusionConfig as DiffusionConfig
@@ -20,7 +20,8 @@ from prior_reinforce.generators.interpolation import SmoothInterpolation as Smoo
 from prior_reinforce.generators.regression import UNetRegression as UNetRegression
 from prior_reinforce.generators.regression import UNetRegressionConfig as UNetRegressionConfig
 from prior_reinforce.generators.saving import read_model
-from prior_reinforce.generators.timed import Timed, Timing
+from prior_reinforce.generators.timed import Timed as Timed
+from prior_reinforce.generators.timed import Timing
 from prior_reinforce.registry import Member, Registry, parse_choice
 
 _HERE = "prior_reinforce.generators"
