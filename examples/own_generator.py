@@ -1,4 +1,4 @@
-"""A generator of your own: the nearest demonstrations, blended in motion and in timing.
+"""Your own generator: the nearest demonstrations, blended in motion and in timing.
 
     python examples/own_generator.py
     PYTHONPATH=examples prior-reinforce reproduce zero-shot --include own_generator:SoftmaxBlend
@@ -14,9 +14,7 @@ next to plain interpolation between nearest neighbours.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
-from typing import Any, ClassVar
 
 import numpy as np
 from scipy.special import softmax
@@ -37,58 +35,48 @@ class SoftmaxBlendConfig:
 class SoftmaxBlend(pr.Generator):
     """Softmax-weighted blend of demonstrations and of their onsets."""
 
-    name: ClassVar[str] = "softmax-blend"
-    config_type: ClassVar[type[SoftmaxBlendConfig]] = SoftmaxBlendConfig
+    name = "softmax-blend"
+    config_type = SoftmaxBlendConfig
 
     def __init__(self, config: SoftmaxBlendConfig | None = None) -> None:
         """Choose settings; the defaults when None."""
         self.config = config or SoftmaxBlendConfig()
 
-    def _fit(
-        self,
-        demonstrations: pr.Demonstrations,
-        seed: int,
-        progress: Callable[[pr.FitProgress], None],
-    ) -> None:
+    def _fit(self, demonstrations, seed, progress):
         """Keep the demonstrations and how far each is shifted; nothing is random."""
         # Ends are held, whether they rest or not: a plan that ends in mid-swing is welcome.
         shifts = pr.align(demonstrations, pr.AlignmentConfig(largest_end_speed=1.0)).shifts
-        self._plans = demonstrations.plans.copy()
-        self._outcomes = demonstrations.outcomes_seen.copy()
-        self._shifts = shifts / demonstrations.format.dt  # [frames]
+        self.plans = demonstrations.plans.copy()
+        self.outcomes = demonstrations.outcomes_seen.copy()
+        self.shifts = shifts / demonstrations.format.dt  # [frames]
+        progress(pr.FitProgress(step=1, n_steps=1, loss=0.0, seconds_left=0.0))
 
-    def _generate(self, conditions: np.ndarray) -> np.ndarray:
+    def _generate(self, conditions):
         """Blend, frames between recorded ones linearly."""
-        blended = np.zeros((len(conditions), *self._plans.shape[1:]))
+        blended = np.zeros((len(conditions), *self.plans.shape[1:]))
         for blend, weights in zip(blended, self._weights(conditions), strict=True):
             for i in np.flatnonzero(weights):
-                blend += weights[i] * _later(
-                    self._plans[i], self._shifts[i] - weights @ self._shifts
-                )
+                by = self.shifts[i] - weights @ self.shifts
+                blend += weights[i] * _later(self.plans[i], by)
         return blended
 
-    def state(self) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
-        """Settings and arrays, for `save`."""
-        tensors = {"plans": self._plans, "outcomes": self._outcomes, "shifts": self._shifts}
-        return asdict(self.config), tensors
+    def state(self):
+        """What is saved: settings, and arrays."""
+        arrays = {"plans": self.plans, "outcomes": self.outcomes, "shifts": self.shifts}
+        return asdict(self.config), arrays
 
     @classmethod
-    def from_state(
-        cls, settings: Mapping[str, Any], tensors: Mapping[str, np.ndarray]
-    ) -> SoftmaxBlend:
-        """Rebuild it from what `state` gave, for `load`."""
-        config = SoftmaxBlendConfig(settings["neighbours"], settings["width"])
-        generator = cls(config)
-        generator._plans = tensors["plans"]
-        generator._outcomes = tensors["outcomes"]
-        generator._shifts = tensors["shifts"]
+    def from_state(cls, settings, tensors):
+        """The generator that was saved."""
+        generator = cls(SoftmaxBlendConfig(**settings))
+        generator.plans, generator.outcomes = tensors["plans"], tensors["outcomes"]
+        generator.shifts = tensors["shifts"]
         return generator
 
     def _weights(self, conditions: np.ndarray) -> np.ndarray:
         """w, shape (n, N): rows sum to one, all but the nearest are 0."""
-        outcomes = self._outcomes
-        away = (conditions[:, None] - outcomes) / np.ptp(outcomes, axis=0) / self.config.width
-        logits = -np.sum(away**2, axis=-1)
+        away = (conditions[:, None] - self.outcomes) / np.ptp(self.outcomes, axis=0)
+        logits = -np.sum((away / self.config.width) ** 2, axis=-1)
         order = np.argsort(-logits, axis=1, kind="stable")
         np.put_along_axis(logits, order[:, self.config.neighbours :], -np.inf, axis=1)
         return softmax(logits, axis=1)
@@ -109,7 +97,7 @@ def main() -> None:
     task = pr.make_task("basketball-v1")
     demonstrations = task.demonstrations("A")
     goals = task.sample_goals(options.goals, np.random.default_rng(options.seed))
-    for generator in (SoftmaxBlend(), pr.make_generator("nearest")):
+    for generator in (SoftmaxBlend(), pr.NearestNeighbours()):
         generator.fit(demonstrations, seed=options.seed)
         rollouts = task.rollout(generator.generate(goals), None)
         errors = np.linalg.norm([r.outcome for r in rollouts] - goals, axis=1)

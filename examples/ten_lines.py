@@ -16,14 +16,15 @@ import prior_reinforce as pr
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--generator", default="diffusion", help="what generates plans")
+    parser.add_argument("--training-steps", type=int, default=pr.DiffusionConfig().training_steps)
     parser.add_argument("--goal", type=float, nargs=2, default=[1.05, 0.10], help="x y, in [m]")
     parser.add_argument("--rounds", type=int, default=10, help="throws at most")
     options = parser.parse_args()
 
     task = pr.make_task("basketball-v1")
     demos = task.demonstrations("A")
-    generator = pr.make_generator(options.generator).fit(demos, seed=0)
+    config = pr.DiffusionConfig(training_steps=options.training_steps)
+    generator = pr.Timed(pr.DiffusionGenerator(config)).fit(demos, seed=0)
     session = pr.Session(
         generator, pr.GaussianProcessAdapter(), demos, goal=options.goal, tolerance=task.tolerance
     )

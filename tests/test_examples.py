@@ -72,8 +72,7 @@ def test_own_task_is_learned(printed):
 
 
 def test_ten_lines_tell_every_throw(printed):
-    brief = ("--generator", "diffusion,training_steps=2", "--rounds", "2")
-    status, text = printed("ten_lines", *brief)
+    status, text = printed("ten_lines", "--training-steps", "2", "--rounds", "2")
     assert status == 1  # two steps teach nothing
     assert re.findall(r"^throw (\d+): seen", text, re.MULTILINE) == ["1", "2"]
     assert text.endswith("not reached, N = 6 demonstrations + 2 throws\n")

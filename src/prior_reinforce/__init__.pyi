@@ -5,11 +5,17 @@ from .adapters.frozen import FrozenAdapter as FrozenAdapter
 from .adapters.gaussian_process import GaussianProcessAdapter as GaussianProcessAdapter
 from .adapters.gaussian_process import GaussianProcessConfig as GaussianProcessConfig
 from .adapters.proportional import ProportionalAdapter as ProportionalAdapter
+from .errors import ConfigurationError as ConfigurationError
+from .errors import PerceptionFailedError as PerceptionFailedError
 from .errors import PriorReinforceError as PriorReinforceError
+from .experiments.learned import load_learned as load_learned
 from .experiments.protocol import GoalTrials as GoalTrials
 from .experiments.protocol import perceive_demonstrations as perceive_demonstrations
 from .experiments.protocol import run_goals as run_goals
+from .experiments.protocol import run_sequences as run_sequences
 from .experiments.protocol import success_by_round as success_by_round
+from .experiments.statistics import bootstrap_difference as bootstrap_difference
+from .experiments.statistics import bootstrap_mean as bootstrap_mean
 from .generators import load_generator as load_generator
 from .generators import make_generator as make_generator
 from .generators.base import FitProgress as FitProgress

@@ -28,8 +28,6 @@ TRAINING = Training("basketball-v1", "A", "nearest", 0)
 
 
 class Blind(Perception):
-    name = "blind"
-
     def perceive(self, rollout, goal, rng):
         raise PerceptionFailedError("too dark")
 

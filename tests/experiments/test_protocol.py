@@ -34,8 +34,6 @@ MIDDLE = np.array([1.05, 0.0])
 
 
 class Blind(Perception):
-    name = "blind"
-
     def perceive(self, rollout, goal, rng):
         raise PerceptionFailedError("too dark")
 
@@ -86,14 +84,12 @@ def test_a_lost_demonstration_is_named():
 
 def test_outcomes_that_look_the_same_are_told_with_what_to_do():
     class Asleep(Perception):
-        name = "asleep"
-
         def perceive(self, rollout, goal, rng):
             return np.zeros(2)
 
     with pytest.raises(InvalidDemonstrationsError) as raised:
         seen(Asleep(), seed=7)
-    for told in ("asleep", "basketball-v1", "seed 7", "the same outcome", "choose another seed"):
+    for told in ("Asleep", "basketball-v1", "seed 7", "the same outcome", "choose another seed"):
         assert told in str(raised.value)
 
 

@@ -43,19 +43,33 @@ class Learn:
 
     def run(self) -> None:
         """Fit and save."""
-        console = Console()
-        generator = self._unfitted()
-        if self.folder is not None:
-            self._refuse_what_is_a_simulated_tasks()
-            with Workspace(self.folder) as workspace:
-                with fit_progress(console) as progress:
-                    learned = workspace.learn(self.generator, seed=self.seed, progress=progress)
-                for remark in learned.remarks:
-                    print(remark)
-                print(f"model {learned.model} is in use")
-                print_next(workspace)
-            return
-        _, demonstrations = self.open()
+        choice = f"{self.generator},timing=align" if self.align else self.generator
+        if self.folder is None:
+            self._learn_from_task(choice)
+        elif self.simulated == FromTask():
+            self._learn_in_workspace(self.folder, choice)
+        else:
+            raise ConfigurationError(
+                "--task, --demonstrations and --out are a simulated task's; a workspace has its "
+                "own, drop one of the two"
+            )
+
+    def _learn_in_workspace(self, folder: Path, choice: str) -> None:
+        from prior_reinforce.commands.workspace import print_next
+        from prior_reinforce.workspace.workspace import Workspace
+
+        make_generator(choice)
+        with Workspace(folder) as workspace:
+            with fit_progress(Console()) as progress:
+                learned = workspace.learn(choice, seed=self.seed, progress=progress)
+            for remark in learned.remarks:
+                print(remark)
+            print(f"model {learned.model} is in use")
+            print_next(workspace)
+
+    def _learn_from_task(self, choice: str) -> None:
+        source, console = self.simulated, Console()
+        _, demonstrations = open_task(source.task, source.demonstrations, self.seed)
         learn(
             demonstrations,
             source.out,

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
 from prior_reinforce.adapters import make_adapter
 from prior_reinforce.arrays import Points
@@ -295,7 +296,7 @@ def is_aligned(choice: str) -> bool:
     return parse_choice(choice)[1].get("timing") == "align"
 
 
-def _grid(outcomes: Points, spacing: float) -> Points:
+def _grid(outcomes: Points, spacing: float) -> Float[np.ndarray, "m k"]:
     """Points of a square grid inside the outcomes' hull."""
     from scipy.spatial import Delaunay
 

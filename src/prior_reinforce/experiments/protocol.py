@@ -18,7 +18,6 @@ from prior_reinforce.arrays import Point, Points
 from prior_reinforce.errors import EndpointError, InvalidDemonstrationsError, PerceptionFailedError
 from prior_reinforce.experiments.statistics import reached_by
 from prior_reinforce.generators.base import Generator
-from prior_reinforce.perception import PERCEPTIONS
 from prior_reinforce.perception.base import Perception
 from prior_reinforce.perception.eye import Eye
 from prior_reinforce.plans.motions import Demonstrations
@@ -141,7 +140,7 @@ def perceive_demonstrations(
         return replace(demonstrations, outcomes_seen=np.array(seen))
     except InvalidDemonstrationsError as error:
         raise InvalidDemonstrationsError(
-            f"as {PERCEPTIONS.name_of(perception)} saw {task.name} (seed {seed}), {error}; choose "
+            f"as {type(perception).__name__} saw {task.name} (seed {seed}), {error}; choose "
             "another seed or a finer perception"
         ) from error
 

@@ -172,53 +172,39 @@ def claims(figures: Figures) -> list[Claim]:
 def _claims_of_form(form: str, figures: Figures) -> list[Claim]:
     """Hold one form of the Gaussian process against the proportional rule and no forgetting."""
     label, trainings, differences = LABELS[form], figures["trainings"], figures["forms"][form]
-    last = len(figures["success"][form])
+    success, last = figures["success"], len(figures["success"][form])
     sooner = interval_of(differences["mean_minus_proportional"])
-    in_the_end = [
+
+    def in_the_end(says: str, it_minus: str, other: str, difference: Curve) -> Claim:
         # By round, because where both reach every goal nothing is left to be above in.
-        Claim(
+        return Claim(
             f"{label}: {says}",
-            f"it minus {name}, round {last}: {interval_of(differences[key][-1]):+.3f}",
-            above_by_round(
-                figures["success"][form],
-                figures["success"][other],
-                differences[key],
-                last,
-                trainings,
-            ),
+            f"it minus {it_minus}, round {last}: {interval_of(difference[-1]):+.3f}",
+            above_by_round(success[form], success[other], difference, last, trainings),
         )
-        for says, name, other, key in (
-            (
-                "the proportional compensator ends lower.",
-                "proportional",
-                "proportional",
-                "minus_proportional",
-            ),
-            (
-                "forgetting all but the latest two trials improves the upper end.",
-                "the same without forgetting",
-                _FORMS[form],
-                "minus_no_forgetting",
-            ),
-        )
-    ]
+
     return [
         Claim(
             f"{label}: the proportional compensator converges more slowly.",
             f"share reached, mean of all rounds, it minus proportional: {sooner:+.3f}",
             above(sooner, 0.0, trainings),
         ),
-        *in_the_end,
+        in_the_end(
+            "the proportional compensator ends lower.",
+            "proportional",
+            "proportional",
+            differences["minus_proportional"],
+        ),
+        in_the_end(
+            "forgetting all but the latest two trials improves the upper end.",
+            "the same without forgetting",
+            _FORMS[form],
+            differences["minus_no_forgetting"],
+        ),
     ]
 
 
 RECIPE = Recipe(
-    name="adapters",
-    title="Adapters under amplified noise",
-    paper="Figure 7b",
-    measurement=Adapters(),
-    table=table,
-    draw=draw,
-    claims=claims,
-    family="adapter",
-)
+    "adapters", "Adapters under amplified noise", "Figure 7b",
+    Adapters(), table, draw, claims, family="adapter",
+)  # fmt: skip

@@ -74,27 +74,16 @@ def _spread(moment: Callable[[Any], float], demonstrations: Demonstrations) -> f
 
 def table(figures: Figures) -> Table:
     """One row a prior set."""
-    return Table(
-        (
-            "task",
-            "set",
-            "moved by up to [s]",
-            "starts, sd [ms]",
-            "aligned",
-            "middles, sd [ms]",
-            "aligned ",
-        ),
-        tuple(
-            (
-                row["task"],
-                row["set"],
-                f"{max(abs(shift) for shift in row['shifts_s']):.2f}",
-                *(f"{1000 * sd:.0f}" for sd in row["start_sd_s"]),
-                *(f"{1000 * sd:.0f}" for sd in row["middle_sd_s"]),
-            )
-            for row in figures["rows"]
-        ),
-    )
+    columns = {
+        "task": lambda row: row["task"],
+        "set": lambda row: row["set"],
+        "moved by up to [s]": lambda row: f"{max(map(abs, row['shifts_s'])):.2f}",
+        "starts, sd [ms]": lambda row: f"{1000 * row['start_sd_s'][0]:.0f}",
+        "aligned": lambda row: f"{1000 * row['start_sd_s'][1]:.0f}",
+        "middles, sd [ms]": lambda row: f"{1000 * row['middle_sd_s'][0]:.0f}",
+        "aligned ": lambda row: f"{1000 * row['middle_sd_s'][1]:.0f}",
+    }
+    return Table.of(figures["rows"], columns)
 
 
 def draw(figures: Figures, folder: Path) -> list[Picture]:
@@ -116,11 +105,4 @@ def draw(figures: Figures, folder: Path) -> list[Picture]:
     return [Picture(path, caption)]
 
 
-RECIPE = Recipe(
-    name="alignment",
-    title="Timeline alignment",
-    paper="Figure 6",
-    measurement=Alignment(),
-    table=table,
-    draw=draw,
-)
+RECIPE = Recipe("alignment", "Timeline alignment", "Figure 6", Alignment(), table, draw)

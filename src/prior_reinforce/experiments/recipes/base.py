@@ -120,6 +120,12 @@ class Table:
     header: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
 
+    @classmethod
+    def of(cls, rows: Sequence[Any], columns: Mapping[str, Callable[[Any], object]]) -> Table:
+        """Make it from rows, and what each column shows of one."""
+        cells = tuple(tuple(str(show(row)) for show in columns.values()) for row in rows)
+        return cls(tuple(columns), cells)
+
 
 @dataclass(frozen=True)
 class Picture:

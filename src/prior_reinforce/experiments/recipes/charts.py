@@ -75,13 +75,9 @@ def draw_success(panels: Sequence[Panel], path: Path) -> Path:
         _draw_panel(axes, panel)
         axes.set_title(panel.title, loc="left", fontsize=12, color=INK)
         axes.legend(
-            loc="upper center",
-            bbox_to_anchor=(0.5, -0.14),
-            ncols=2,
-            frameon=False,
-            fontsize=9.5,
-            labelcolor=INK,
-        )
+            loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=2,
+            frameon=False, fontsize=9.5, labelcolor=INK,
+        )  # fmt: skip
     return save_png(figure, path)
 
 

@@ -193,27 +193,20 @@ def _both(mask: Bool[np.ndarray, "nx ny"], axis: int) -> Bool[np.ndarray, "mx my
 
 def table(figures: Figures) -> Table:
     """One row a number of demonstrations, and their difference."""
+    off = f"share of the region off by over {figures['high_error_m'] * 100:.0f} cm"
     rows = [(f"{row['demonstrations']} demonstrations", row, ".2f") for row in figures["rows"]]
     rows.append(("difference", figures["three_minus_six"], "+.2f"))
-    return Table(
-        (
-            "learned from",
-            f"share of the region off by over {figures['high_error_m'] * 100:.0f} cm",
-            "mean error [cm]",
-            "inside the demonstrations' hull [cm]",
-            "outside it [cm]",
-            "steepness of the field [cm/cm]",
+    columns = {
+        "learned from": lambda row: row[0],
+        off: lambda row: format(interval_of(row[1]["high_error_area"]), row[2]),
+        "mean error [cm]": lambda row: format(_cm(row[1]["mean_m"]), row[2]),
+        "inside the demonstrations' hull [cm]": lambda row: format(_cm(row[1]["inside_m"]), row[2]),
+        "outside it [cm]": lambda row: format(_cm(row[1]["outside_m"]), row[2]),
+        "steepness of the field [cm/cm]": lambda row: format(
+            interval_of(row[1]["steepness"]), row[2]
         ),
-        tuple(
-            (
-                label,
-                format(interval_of(row["high_error_area"]), spec),
-                *(format(_cm(row[name]), spec) for name in ("mean_m", "inside_m", "outside_m")),
-                format(interval_of(row["steepness"]), spec),
-            )
-            for label, row, spec in rows
-        ),
-    )
+    }
+    return Table.of(rows, columns)
 
 
 def draw(figures: Figures, folder: Path) -> list[Picture]:
@@ -270,11 +263,6 @@ def _cm(values: Mapping[str, Any]) -> Interval:
 
 
 RECIPE = Recipe(
-    name="displacement",
-    title="Displacement fields with six and with three demonstrations",
-    paper="Figure 8",
-    measurement=DisplacementFields(),
-    table=table,
-    draw=draw,
-    claims=claims,
-)
+    "displacement", "Displacement fields with six and with three demonstrations", "Figure 8",
+    DisplacementFields(), table, draw, claims,
+)  # fmt: skip

@@ -253,13 +253,6 @@ def _forms_above(baselines: Sequence[Figures], says: str, trainings: int) -> lis
 
 
 RECIPE = Recipe(
-    name="generators",
-    title="Generators, on demonstrations as recorded and aligned",
-    paper="Figure 7a",
-    measurement=Generators(),
-    table=table,
-    draw=draw,
-    claims=claims,
-    remarks=remarks,
-    family="generator",
-)
+    "generators", "Generators, on demonstrations as recorded and aligned", "Figure 7a",
+    Generators(), table, draw, claims, remarks, family="generator",
+)  # fmt: skip

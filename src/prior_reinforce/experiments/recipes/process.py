@@ -151,11 +151,4 @@ def draw(figures: Figures, folder: Path) -> list[Picture]:
     return [Picture(draw_process(rows, folder / "process.png"), caption)]
 
 
-RECIPE = Recipe(
-    name="process",
-    title="The process of adaptation",
-    paper="Figure 3",
-    measurement=ProcessPictures(),
-    table=table,
-    draw=draw,
-)
+RECIPE = Recipe("process", "The process of adaptation", "Figure 3", ProcessPictures(), table, draw)

@@ -55,12 +55,10 @@ _HALF = 0.5
 
 @dataclass(frozen=True)
 class PaperRow:
-    """One row of the paper's table."""
+    """One row of the paper's table: Stage-2 trials on a real arm, their mean and deviation."""
 
     title: str
-    """The task as the paper calls it."""
     task: str
-    """Where it is tried."""
     learned_on: str
     """The task whose demonstrations are learned from."""
     by_model: bool
@@ -68,9 +66,7 @@ class PaperRow:
     prior: int
     """|D_prior|."""
     trials: float
-    """The paper's mean of Stage-2 trials, on a real arm."""
     sd: float
-    """The paper's standard deviation."""
 
 
 ROWS = (
@@ -230,34 +226,27 @@ def _sense(row: Figures, figures: Figures) -> str:
 
 def table(figures: Figures) -> Table:
     """The paper's columns, its own numbers beside them."""
-    return Table(
-        (
-            "task",
-            "sense",
-            "prior",
-            "trials, unseen goals",
-            "trials, many goals",
-            "total",
-            "not reached",
-            "first throws that hit, many goals",
-            "paper: trials (total)",
+
+    def missed(row: Figures) -> str:
+        n, goals = (row["unseen"][key] + row["many"][key] for key in ("not_reached", "goals"))
+        return f"{n} of {row['unseen']['goals']} + {goals - row['unseen']['goals']}"
+
+    columns = {
+        "task": lambda row: row["title"],
+        "sense": lambda row: (
+            _sense(row, figures) + ("" if row["adapter"] == "gp" else f", {row['adapter']}")
         ),
-        tuple(
-            (
-                row["title"],
-                _sense(row, figures) + ("" if row["adapter"] == "gp" else f", {row['adapter']}"),
-                str(row["prior"]),
-                _trials(row["unseen"]),
-                _trials(row["many"]),
-                f"{row['prior'] + row['many']['trials']['value']:.1f}",
-                f"{row['unseen']['not_reached'] + row['many']['not_reached']} of "
-                f"{row['unseen']['goals']} + {row['many']['goals']}",
-                str(interval_of(row["first_throws"])),
-                f"{row['trials']:.1f} ± {row['sd']:.1f} ({row['prior'] + row['trials']:.1f})",
-            )
-            for row in figures["rows"]
+        "prior": lambda row: row["prior"],
+        "trials, unseen goals": lambda row: _trials(row["unseen"]),
+        "trials, many goals": lambda row: _trials(row["many"]),
+        "total": lambda row: f"{row['prior'] + row['many']['trials']['value']:.1f}",
+        "not reached": missed,
+        "first throws that hit, many goals": lambda row: interval_of(row["first_throws"]),
+        "paper: trials (total)": lambda row: (
+            f"{row['trials']:.1f} ± {row['sd']:.1f} ({row['prior'] + row['trials']:.1f})"
         ),
-    )
+    }
+    return Table.of(figures["rows"], columns)
 
 
 def _trials(summary: Figures) -> str:
@@ -366,13 +355,6 @@ def remarks(figures: Figures) -> list[str]:
 
 
 RECIPE = Recipe(
-    name="trials",
-    title="Trials to reach a new goal",
-    paper="Table II",
-    measurement=TrialsTable(),
-    table=table,
-    draw=draw,
-    claims=claims,
-    remarks=remarks,
-    family="adapter",
-)
+    "trials", "Trials to reach a new goal", "Table II",
+    TrialsTable(), table, draw, claims, remarks, family="adapter",
+)  # fmt: skip

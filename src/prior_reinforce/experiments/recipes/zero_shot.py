@@ -42,42 +42,23 @@ class ZeroShotErrors(Measurement):
 
 def table(figures: Figures) -> Table:
     """One row a training."""
-    return Table(
-        (
-            "generator",
-            "set",
-            "seed",
-            "own plans, worst rms [mrad]",
-            "own landing, median [cm]",
-            "worst [cm]",
-            "grid median [cm]",
-            "p90 [cm]",
-            "within tolerance",
-            "lost",
-        ),
-        tuple(
-            (
-                row["generator"],
-                row["demonstrations"],
-                str(row["seed"]),
-                f"{max(row['own_rms_rad']) * 1e3:.1f}",
-                f"{np.median(row['own_landing_from_demonstrated_m']) * 100:.1f}",
-                f"{max(row['own_landing_from_demonstrated_m']) * 100:.1f}",
-                f"{row['grid_median_m'] * 100:.2f}",
-                f"{row['grid_p90_m'] * 100:.2f}",
-                f"{row['grid_within_tolerance']:.2f}",
-                f"{row['grid_lost']:.3f}",
-            )
-            for row in figures["rows"]
-        ),
-    )
+    own = "own_landing_from_demonstrated_m"
+    columns = {
+        "generator": lambda row: row["generator"],
+        "set": lambda row: row["demonstrations"],
+        "seed": lambda row: row["seed"],
+        "own plans, worst rms [mrad]": lambda row: f"{max(row['own_rms_rad']) * 1e3:.1f}",
+        "own landing, median [cm]": lambda row: f"{np.median(row[own]) * 100:.1f}",
+        "worst [cm]": lambda row: f"{max(row[own]) * 100:.1f}",
+        "grid median [cm]": lambda row: f"{row['grid_median_m'] * 100:.2f}",
+        "p90 [cm]": lambda row: f"{row['grid_p90_m'] * 100:.2f}",
+        "within tolerance": lambda row: f"{row['grid_within_tolerance']:.2f}",
+        "lost": lambda row: f"{row['grid_lost']:.3f}",
+    }
+    return Table.of(figures["rows"], columns)
 
 
 RECIPE = Recipe(
-    name="zero-shot",
-    title="First throws, before any trial",
-    paper="no table of its own",
-    measurement=ZeroShotErrors(),
-    table=table,
+    "zero-shot", "First throws, before any trial", "no table of its own", ZeroShotErrors(), table,
     family="generator",
-)
+)  # fmt: skip
