@@ -3,7 +3,7 @@
 import os
 import signal
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -21,8 +21,8 @@ class BriefDiffusion(DiffusionGenerator):
 
     def __init__(self, config=None, **options):
         size = UNetSize(widths=(16, 32), step_width=16, condition_width=16)
-        brief = DiffusionConfig(network=size, training_steps=10, sampling_steps=2)
-        super().__init__(config or brief, **{"threads": 1, **options})
+        brief = {"network": size, "training_steps": 10, "sampling_steps": 2}
+        super().__init__(replace(config or DiffusionConfig(), **brief), **options)
 
 
 def trainings():

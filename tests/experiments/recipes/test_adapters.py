@@ -13,18 +13,18 @@ SMALL = Scale(goals=5, seeds=(0,), sets=("A",), rounds=3)
 
 @pytest.mark.slow
 def test_adapters_that_move_nothing_share_the_first_throw_and_differ_after(tmp_path):
-    run = Run(tmp_path, SMALL, include=("proportional,gain=0.0", "gp"))
+    run = Run(tmp_path, SMALL, include=("proportional,gain=0.8", "gp"))
     # Of outcomes seen by eye: something is left to adapt.
     figures = json.loads(json.dumps(Adapters(generator="dmp").run(run)))
     success = figures["success"]
-    assert success["proportional,gain=0.0"] == success["frozen"]  # ours with another setting
+    assert success["proportional,gain=0.8"] == success["proportional"]  # ours, set by hand
     frozen = [point["value"] for point in figures["success"]["frozen"]]
     adapted = [point["value"] for point in figures["success"]["gp"]]
     assert figures["proportional_minus_frozen"][0] == {"value": 0.0, "low": 0.0, "high": 0.0}
     assert adapted[-1] > frozen[-1]
     assert figures["gp_minus"]["frozen"][-1]["value"] == pytest.approx(adapted[-1] - frozen[-1])
     table = RECIPE.table(figures)
-    assert [row[0] for row in table.rows][-2:] == ["no adapter", "proportional,gain=0.0"]
+    assert [row[0] for row in table.rows][-2:] == ["no adapter", "proportional,gain=0.8"]
     assert {claim.verdict for claim in RECIPE.claims(figures)} == {Verdict.OPEN}
     (picture,) = RECIPE.draw(figures, tmp_path)
     assert picture.path.is_file()
