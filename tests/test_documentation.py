@@ -1,4 +1,4 @@
-"""The documentation's own code, as it stands: guides, extension, API pages, notebook."""
+"""The documentation's own code, as it stands: guides, members, names and paths."""
 
 import os
 import re
@@ -49,23 +49,13 @@ def test_the_examples_of_the_guides_run(name, tmp_path, monkeypatch, capsys):
 
 
 @pytest.mark.slow
-def test_members_written_as_the_guide_says_keep_their_contracts_and_reach_goals(tmp_path):
-    files = re.findall(
-        r'^```python title="(.*?)"\n(.*?)^```$',
-        (DOCS / "extending.md").read_text(),
-        flags=re.DOTALL | re.MULTILINE,
-    )
-    assert [name for name, _ in files] == [
-        "drift.py", "affine.py", "tape.py", "puck.py", "compare.py", "test_mine.py",
-    ]  # fmt: skip
+def test_members_of_the_guide_go_through_trials_on_the_command_line(tmp_path):
+    text = (DOCS / "extending.md").read_text()
+    files = re.findall(r'^```python title="(.*?)"\n(.*?)^```$', text, re.DOTALL | re.MULTILINE)
     for name, code in files:
         (tmp_path / name).write_text(code)
-    commands = blocks("extending.md", "sh")
-    assert len(commands) == 2
-    for command in commands:
-        run("bash", "-e", "-o", "pipefail", "-c", command, cwd=tmp_path)
-    shares = run(sys.executable, "compare.py", cwd=tmp_path)
-    assert shares.strip(" []\n").endswith("1.")  # every goal is reached in the end
+    told = run("bash", "-e", "-o", "pipefail", "-c", blocks("extending.md", "sh")[0], cwd=tmp_path)
+    assert len(re.findall(r"reached: N = 6 demonstrations \+ \d+ trial", told)) == 2
 
 
 def test_files_that_docs_and_docstrings_name_are_there():
@@ -78,9 +68,8 @@ def test_files_that_docs_and_docstrings_name_are_there():
         for name in named.findall(path.read_text())
         if not (REPOSITORY / name).exists()
     }
-    assert (
-        missing - {"CONTRIBUTING.md: tests/adapters/test_drift.py"} == set()
-    )  # the reader writes it
+    readers_own = {"CONTRIBUTING.md: tests/adapters/test_drift.py"}
+    assert missing <= readers_own
 
 
 def test_every_exported_name_is_in_the_reference_once():
@@ -92,8 +81,3 @@ def test_every_exported_name_is_in_the_reference_once():
     exported = {*pr.__all__} - {"__version__"}
     exported |= {f"testing.{name}" for name in prior_reinforce.testing.__all__}
     assert sorted(shown) == sorted(exported)
-
-
-@pytest.mark.slow
-def test_the_notebook_runs_from_top_to_bottom():
-    run(sys.executable, "-m", "pytest", "-q", "--nbmake", "docs/first-goal.ipynb", cwd=REPOSITORY)

@@ -5,9 +5,11 @@ from .adapters.frozen import FrozenAdapter as FrozenAdapter
 from .adapters.gaussian_process import GaussianProcessAdapter as GaussianProcessAdapter
 from .adapters.gaussian_process import GaussianProcessConfig as GaussianProcessConfig
 from .adapters.proportional import ProportionalAdapter as ProportionalAdapter
+from .arrays import as_plans as as_plans
 from .errors import ConfigurationError as ConfigurationError
 from .errors import PerceptionFailedError as PerceptionFailedError
 from .errors import PriorReinforceError as PriorReinforceError
+from .errors import RenderingUnavailableError as RenderingUnavailableError
 from .experiments.learned import load_learned as load_learned
 from .experiments.protocol import GoalTrials as GoalTrials
 from .experiments.protocol import perceive_demonstrations as perceive_demonstrations
@@ -32,7 +34,9 @@ from .generators.interpolation import SmoothInterpolationConfig as SmoothInterpo
 from .generators.regression import UNetRegression as UNetRegression
 from .generators.regression import UNetRegressionConfig as UNetRegressionConfig
 from .generators.timed import Timed as Timed
+from .importing.importer import ImportResult as ImportResult
 from .importing.importer import import_demonstrations as import_demonstrations
+from .importing.importer import read_recordings as read_recordings
 from .importing.preprocessing import Preprocessing as Preprocessing
 from .perception import make_perception as make_perception
 from .perception.amplified import Amplified as Amplified
@@ -52,6 +56,8 @@ from .plans.files import write_plan as write_plan
 from .plans.motions import Demonstrations as Demonstrations
 from .plans.motions import Plan as Plan
 from .plans.motions import PlanFormat as PlanFormat
+from .robots.executors.command import CommandResult as CommandResult
+from .robots.executors.command import run_command as run_command
 from .robots.gate import GateSettings as GateSettings
 from .robots.gate import check_plan as check_plan
 from .robots.limits import RobotLimits as RobotLimits
