@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 from collections.abc import Iterator
 
 import pytest
@@ -29,3 +30,49 @@ def one_blas_thread() -> Iterator[None]:
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Start the longest tests first, or one process waits for them in the end."""
     items.sort(key=lambda item: item.path.suffix != ".ipynb" and item.path.stem != "test_tutorial")
+
+
+@pytest.fixture(scope="session")
+def learned_folder(tmp_path_factory):
+    """A small workspace with a model and no goal; copy it, never change it."""
+    from prior_reinforce.workspace.workspace import Workspace
+
+    from .workspace.planar import demonstrations, manifest
+
+    folder = tmp_path_factory.mktemp("learned") / "planar"
+    with Workspace.create(folder, manifest()) as workspace:
+        workspace.import_demonstrations(demonstrations(), "made up")
+        workspace.learn("interpolation")
+    return folder
+
+
+@pytest.fixture
+def workspace(learned_folder, tmp_path):
+    """A copy of it, with a goal."""
+    from prior_reinforce.workspace.workspace import Workspace
+
+    shutil.copytree(learned_folder, tmp_path / "planar")
+    with Workspace(tmp_path / "planar") as workspace:
+        workspace.set_goal([0.9, 0.05])
+        yield workspace
+
+
+@pytest.fixture
+def folder(learned_folder, tmp_path, monkeypatch):
+    """A copy of it, in the folder that commands are called in; its name."""
+    shutil.copytree(learned_folder, tmp_path / "planar")
+    monkeypatch.chdir(tmp_path)
+    return "planar"
+
+
+@pytest.fixture
+def run(capsys):
+    """Call a command; its exit status, and what it printed and complained of."""
+    from prior_reinforce.cli import main
+
+    def call(*args):
+        status = main([str(arg) for arg in args])
+        said = capsys.readouterr()
+        return status, said.out, said.err
+
+    return call

@@ -209,6 +209,8 @@ def _checked_names(
     settings: Mapping[str, Any], takes: Mapping[str, inspect.Parameter], choice: str
 ) -> dict[str, Any]:
     """Plain arguments of a constructor, read from text by the type of their default."""
+    import msgspec
+
     arguments: dict[str, Any] = {}
     for name, value in settings.items():
         if name not in takes:
@@ -216,5 +218,6 @@ def _checked_names(
                 f"{choice} has no setting {name!r}; it has {', '.join(takes) or 'none'}"
             )
         default = takes[name].default
-        arguments[name] = type(default)(value) if isinstance(default, (int, float, str)) else value
+        kind = type(default) if isinstance(default, (int, float, str)) else type(value)
+        arguments[name] = msgspec.convert(value, kind, strict=False)
     return arguments

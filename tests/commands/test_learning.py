@@ -9,6 +9,8 @@ from prior_reinforce.experiments.learned import load_learned
 from prior_reinforce.plans.alignment import align
 from prior_reinforce.tasks import make_task
 
+from ..workspace.planar import events_in
+
 TINY = "training_steps=1"
 RECORDED = make_task("basketball-v1").demonstrations("A")
 
@@ -72,3 +74,19 @@ def test_wrong_input_is_one_line_and_leaves_nothing(flags, said, tmp_path, capsy
     assert said in told
     assert told.count("\n") == 1
     assert not list(tmp_path.iterdir())
+
+
+def test_another_generator_can_be_learned(run, folder):
+    _, out, _ = run("learn", folder, "--generator", "interpolation,timing=align")
+    assert "next: prior-reinforce goal" in out
+    assert "interpolation" in run("status", folder)[1]
+    before = events_in(folder)
+    for args, remedy in (
+        (("--generator", "spline"), "known are diffusion"),
+        (("--generator", "nearest,training_steps=5"), "has no setting 'training_steps'"),
+        (("--generator", "nearest,neighbours=0"), ">= 1 - at `$.neighbours`"),
+    ):
+        status, _, err = run("learn", folder, *args)
+        assert status == 2
+        assert remedy in err
+    assert events_in(folder) == before

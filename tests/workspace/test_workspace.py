@@ -1,16 +1,18 @@
 """A workspace: what happened is kept, whatever happens in between."""
 
+import os
 import shutil
-import sqlite3
+import signal
+import subprocess
+import sys
+import time
 
 import numpy as np
 import pytest
-from planar import demonstrations, manifest
 
 from prior_reinforce.adapters.gaussian_process import GaussianProcessAdapter
 from prior_reinforce.errors import (
     ConfigurationError,
-    FileFormatError,
     InvalidDemonstrationsError,
     InvalidFeedbackError,
     InvalidGoalError,
@@ -26,6 +28,8 @@ from prior_reinforce.trials import Stage
 from prior_reinforce.workspace.status import describe
 from prior_reinforce.workspace.workspace import Workspace
 
+from .planar import amend, ask, demonstrations, manifest, reopened, tell, trials, void
+
 GOAL = [0.9, 0.05]
 SLOW = (
     'model = "given"\njoint_names = ["joint1", "joint2"]\nlower = [-3, -3]\nupper = [3, 3]\n'
@@ -40,38 +44,6 @@ class OwnInterpolation(SmoothInterpolation):
 
 
 OWN = f"{__name__}:OwnInterpolation"
-
-
-@pytest.fixture
-def folder(workspace):
-    workspace.close()
-    return workspace.folder
-
-
-def reopened(workspace):
-    workspace.close()
-    return Workspace(workspace.folder)
-
-
-def ask(workspace, own=None, **how):
-    return workspace.session(own).ask(**how)
-
-
-def tell(workspace, number, error, **how):
-    return workspace.session().tell(number, error, **how)
-
-
-def amend(workspace, number, error, **how):
-    return workspace.session().amend(number, error, **how)
-
-
-def void(workspace, number, reason):
-    return workspace.session().void(number, reason)
-
-
-def trials(workspace):
-    session = workspace.session()
-    return [trial for goal in session.goals for trial in session.trials_of(goal.number)]
 
 
 def test_a_told_trial_is_there_when_the_program_starts_again(workspace):
@@ -235,14 +207,6 @@ def test_the_order_of_things_is_told(tmp_path):
     workspace.close()
 
 
-def test_demonstrations_that_changed_ask_for_learning_anew(workspace):
-    other = demonstrations()
-    changed = Demonstrations(other.plans * 1.01, other.outcomes_seen, other.format)
-    workspace.import_demonstrations(changed, "again")
-    with pytest.raises(WorkspaceError, match="other demonstrations"):
-        ask(workspace)
-
-
 def test_demonstrations_must_fit_the_manifest(workspace):
     other = demonstrations()
     slow = Demonstrations(
@@ -252,33 +216,16 @@ def test_demonstrations_must_fit_the_manifest(workspace):
         workspace.import_demonstrations(slow, "slow.npz")
 
 
-def test_a_damaged_plan_or_model_is_never_handed_out(workspace):
-    trial = ask(workspace)
-    path = workspace.plan_path(trial)
-    content = bytearray(path.read_bytes())
-    content[len(content) // 2] ^= 1
-    path.chmod(0o644)
-    path.write_bytes(content)
-    with pytest.raises(FileFormatError):
-        ask(workspace)
-    void(workspace, 1, "damaged")
-    weights = next((workspace.folder / "models").glob("*/model.safetensors"))
-    weights.write_bytes(weights.read_bytes()[:-1] + b"x")
-    with pytest.raises(FileFormatError, match="not the one that was learned"):
-        ask(workspace)
-
-
-def test_a_plan_that_breaks_a_limit_is_refused_and_nothing_is_written(folder):
-    text = (folder / "workspace.toml").read_text()
-    (folder / "workspace.toml").write_text(text.replace('model = "none"', SLOW, 1))
-    workspace = Workspace(folder)
-    workspace.set_goal(GOAL)
-    before = workspace.events
+def test_a_plan_that_breaks_a_limit_is_refused_and_nothing_is_written(workspace):
+    path = workspace.folder / "workspace.toml"
+    path.write_text(path.read_text().replace('model = "none"', SLOW, 1))
+    slow = reopened(workspace)
+    before = slow.events
     with pytest.raises(RobotLimitError, match="velocity"):
-        ask(workspace)
-    assert workspace.events == before
-    assert not list((folder / "plans").glob("*"))
-    workspace.close()
+        ask(slow)
+    assert slow.events == before
+    assert not list((slow.folder / "plans").glob("*"))
+    slow.close()
 
 
 def test_a_command_runs_once_and_its_end_is_kept(workspace):
@@ -329,25 +276,6 @@ def test_an_execution_that_was_cut_off_is_never_repeated_by_itself(workspace):
     again.close()
 
 
-def test_the_journal_is_append_only(workspace):
-    ask(workspace)
-    connection = sqlite3.connect(workspace.folder / "journal.sqlite")
-    for statement in ("DELETE FROM events", "UPDATE events SET kind = 'x'"):
-        with pytest.raises(sqlite3.IntegrityError, match="append-only"):
-            connection.execute(statement)
-    connection.close()
-
-
-def test_two_programs_exclude_each_other(workspace, monkeypatch):
-    monkeypatch.setattr("prior_reinforce.workspace.journal._LOCK_TIMEOUT_S", 0.1)
-    other = Workspace(workspace.folder)
-    with workspace.log.journal.exclusive(), pytest.raises(WorkspaceError, match="another command"):
-        ask(other)
-    ask(other)
-    other.close()
-    assert len(trials(workspace)) == 1
-
-
 def test_a_workspace_that_was_copied_goes_on(workspace, tmp_path):
     tell(workspace, ask(workspace).number, [0.05, -0.02])
     shutil.copytree(workspace.folder, tmp_path / "elsewhere")
@@ -356,41 +284,12 @@ def test_a_workspace_that_was_copied_goes_on(workspace, tmp_path):
     copy.close()
 
 
-def test_a_refused_disk_is_named_and_the_journal_stays_good(workspace):
-    """A page limit stands for the full disk: SQLite then says `database or disk is full`."""
-    number = ask(workspace).number
-    connection = workspace.log.journal._connection
-    pages = connection.execute("PRAGMA page_count").fetchone()[0]
-    connection.execute(f"PRAGMA max_page_count = {pages}")
-    with pytest.raises(WorkspaceError, match="free some disk space"):
-        void(workspace, number, "x" * 100_000)
-    connection.execute("PRAGMA max_page_count = 1000000")
-    assert trials(workspace)[0].stage is Stage.ASKED
-    tell(workspace, number, [0.0, 0.0])
-
-
 def test_folders_that_are_no_workspace_are_named(tmp_path):
     with pytest.raises(WorkspaceError, match="prior-reinforce new"):
         Workspace(tmp_path)
     (tmp_path / "file").write_text("x")
     with pytest.raises(WorkspaceError, match="not empty"):
         Workspace.create(tmp_path, manifest())
-
-
-def test_a_damaged_journal_is_named(folder):
-    (folder / "journal.sqlite").write_bytes(b"not a database at all" * 300)
-    with pytest.raises(WorkspaceError, match="restore it from a copy"):
-        Workspace(folder)
-
-
-def test_status_is_short_and_says_what_is_next(workspace):
-    assert "prior-reinforce ask" in describe(workspace)
-    tell(workspace, ask(workspace).number, [0.05, 0.0])
-    tell(workspace, ask(workspace).number, [0.0, 0.0])
-    text = describe(workspace)
-    assert "5 cm long" in text
-    assert "N = 4 demonstrations + 2 trials = 6" in text
-    assert len(text.splitlines()) <= 12
 
 
 def test_a_trial_is_told_once_and_voided_once(workspace):
@@ -410,22 +309,50 @@ def test_a_trial_is_told_once_and_voided_once(workspace):
     assert workspace.events == before
 
 
-def test_a_reading_that_was_damaged_on_the_disk_is_never_believed(workspace):
-    tell(workspace, ask(workspace).number, [0.0512, 0.0])
-    workspace.close()
-    path = workspace.folder / "journal.sqlite"
-    content = path.read_bytes()
-    assert content.count(b"0.0512") == 1
-    path.write_bytes(content.replace(b"0.0512", b"0.0112"))
-    again = Workspace(workspace.folder)
-    with pytest.raises(WorkspaceError, match="not what was written; restore"):
-        _ = again.events
-    again.close()
+def wait_for(what):
+    deadline = time.monotonic() + 60
+    while not what():
+        assert time.monotonic() < deadline, "waited a minute in vain"
+        time.sleep(0.02)
 
 
-def test_a_reading_can_be_told_where_the_model_is_gone(workspace):
-    number = ask(workspace).number
-    shutil.rmtree(workspace.folder / "models")
-    assert tell(workspace, number, [0.0, 0.0]).hit
-    with pytest.raises(FileFormatError, match="prior-reinforce learn"):
-        ask(workspace)
+CONTROLLER = """
+import pathlib, sys, time
+here = pathlib.Path(sys.argv[1])
+with open(here / "runs", "a") as file:
+    file.write("moved\\n")
+until = time.monotonic() + 60
+while not (here / "stop").exists() and time.monotonic() < until:
+    time.sleep(0.02)
+"""
+PROGRAM = """
+import sys
+from prior_reinforce.workspace.workspace import Workspace
+Workspace(sys.argv[1]).execute(1, sys.argv[2], time_limit=120)
+"""
+
+
+@pytest.mark.slow
+def test_a_controller_that_outlives_our_program_keeps_the_arm_to_itself(workspace, tmp_path):
+    workspace.session().ask()
+    (tmp_path / "arm.py").write_text(CONTROLLER)
+    command = f"{sys.executable} {tmp_path}/arm.py {tmp_path} {{plan}}"
+    program = subprocess.Popen([sys.executable, "-c", PROGRAM, workspace.folder, command])
+    wait_for((tmp_path / "runs").exists)
+    os.kill(program.pid, signal.SIGKILL)
+    program.wait()
+
+    for moved_or_not in ({}, {"arm_did_not_move": True}):
+        with pytest.raises(TrialStateError, match="executing now"):
+            workspace.session().ask(**moved_or_not)
+    # Even told trials make no room for the next while the arm moves.
+    workspace.session().tell(1, [0.05, 0.0])
+    assert workspace.session().ask().number == 2
+    with pytest.raises(TrialStateError, match="executed right now"):
+        workspace.execute(2, command, time_limit=1)
+
+    (tmp_path / "stop").touch()
+    wait_for(lambda: not workspace.log.is_executing())
+    assert (tmp_path / "runs").read_text() == "moved\n"
+    assert workspace.execute(2, command, time_limit=60).succeeded
+    assert workspace.session().trial(2).stage is Stage.EXECUTED

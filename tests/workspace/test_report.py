@@ -1,0 +1,28 @@
+"""The report of a workspace."""
+
+
+def test_the_report_shows_every_goal_and_the_voided_trials(run, folder, tmp_path):
+    run("goal", folder, "0.9", "0.05")
+    run("ask", folder)
+    run("tell", folder, 1, "--error", "3cm long")
+    run("ask", folder)
+    run("void", folder, 2, "--reason", "ball slipped")
+    run("goal", folder, "0.95", "-0.05", "--memory", "workspace")
+    run("ask", folder)
+    status, out, _ = run("report", folder)
+    assert status == 0
+    page = (tmp_path / "planar" / "report" / "report.html").read_text()
+    assert out == "report: planar/report/report.html\n"
+    for text in ("Goal 1", "Goal 2", "ball slipped", "3 cm long"):
+        assert text in page
+    path = next((tmp_path / "planar" / "plans").glob("trial-001*"))
+    path.chmod(0o644)
+    path.write_bytes(path.read_bytes()[:-20])
+    assert run("ask", folder)[0] == 0  # goes on, for that trial was told
+    assert run("report", folder)[0] == 0
+    page = (tmp_path / "planar" / "report" / "report.html").read_text()
+    assert "the plan of trial 1 is not drawn" in page
+    assert path.name in page
+    path.unlink()
+    run("void", folder, 1)
+    assert run("report", folder)[0] == 0

@@ -1,0 +1,15 @@
+"""Where a workspace stands, in words."""
+
+from prior_reinforce.workspace.status import describe
+
+from .planar import ask, tell
+
+
+def test_status_is_short_and_says_what_is_next(workspace):
+    assert "prior-reinforce ask" in describe(workspace)
+    tell(workspace, ask(workspace).number, [0.05, 0.0])
+    tell(workspace, ask(workspace).number, [0.0, 0.0])
+    text = describe(workspace)
+    assert "5 cm long" in text
+    assert "N = 4 demonstrations + 2 trials = 6" in text
+    assert len(text.splitlines()) <= 12
