@@ -139,3 +139,15 @@ def test_the_digest_follows_the_file_of_a_class_of_ones_own(tmp_path, monkeypatc
     assert source_digest("plain") == ""
     with pytest.raises(ConfigurationError, match="cannot find nowhere_sail:Own"):
         source_digest("nowhere_sail:Own")
+
+
+class Racing(Rigged):
+    """Shares a config, with defaults of its own."""
+
+    def __init__(self, config: RiggedConfig | None = None) -> None:
+        super().__init__(config or RiggedConfig(battens=12))
+
+
+def test_a_class_keeps_its_own_defaults_where_nothing_is_set():
+    assert SAILS.make(f"{__name__}:Racing").config.battens == 12
+    assert SAILS.make(f"{__name__}:Racing,battens=2").config.battens == 2

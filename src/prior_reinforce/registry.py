@@ -80,7 +80,8 @@ class Registry(Generic[T]):
                 return kind(**context, **_checked_names(settings, takes, choice))
             if isinstance(given_config, config):  # settings in the choice come on top
                 settings = {**asdict(given_config), **settings}
-            context["config"] = build(config, settings, choice)
+            if settings:  # else the class's own defaults, which may differ from its config's
+                context["config"] = build(config, settings, choice)
             return kind(**context)
         except (TypeError, ValueError) as error:
             if isinstance(error, ConfigurationError):
