@@ -72,6 +72,14 @@ def test_files_that_docs_and_docstrings_name_are_there():
     assert missing <= readers_own
 
 
+def test_every_part_of_the_package_is_on_the_page_of_the_architecture():
+    page = (DOCS / "architecture.md").read_text()
+    package = Path(pr.__file__).parent
+    parts = {p.name + "/" if p.is_dir() else p.name for p in package.iterdir()}
+    parts -= {"__init__.py", "__init__.pyi", "py.typed", "__pycache__/"}
+    assert {part for part in parts if f"`{part}`" not in page} == set()
+
+
 def test_every_exported_name_is_in_the_reference_once():
     shown = [
         name
