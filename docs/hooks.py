@@ -61,6 +61,20 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
     return LINK.sub(on_site, markdown)
 
 
+def on_page_content(html: str, page: Page, config: MkDocsConfig, files: Files) -> str:
+    """Point a notebook's links at pages, which is done for Markdown only."""
+    if not page.file.src_uri.endswith(".ipynb"):
+        return html
+
+    def on_site(link: re.Match[str]) -> str:
+        file = files.get_file_from_path(link[1])
+        if file is None:
+            raise PluginError(f"{page.file.src_uri} links to {link[1]}, which is not there")
+        return f'href="{file.url_relative_to(page.file)}"'
+
+    return re.sub(r'href="([\w/.-]+\.md)"', on_site, html)
+
+
 def _address(place: str, page: Page, config: MkDocsConfig) -> str:
     """What a link to a file of the repository is on the site."""
     if place in PAGES:
