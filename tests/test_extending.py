@@ -1,7 +1,6 @@
 """The guide's member of each family: as it stands, and as one of ours by a line in its registry."""
 
 import ast
-import json
 import os
 import re
 import subprocess
@@ -13,11 +12,14 @@ import pytest
 
 from prior_reinforce.adapters import ADAPTERS, make_adapter
 from prior_reinforce.cli import main
+from prior_reinforce.experiments.recipes import RECIPES, Run, Scale
+from prior_reinforce.experiments.recipes.adapters import Adapters
+from prior_reinforce.experiments.recipes.generators import Generators, Method
 from prior_reinforce.generators import GENERATORS, Timed, load_generator, make_generator
 from prior_reinforce.perception import PERCEPTIONS, make_perception
 from prior_reinforce.registry import Member
 from prior_reinforce.tasks import TASKS, make_task
-from prior_reinforce.testing import synthetic_demonstrations, tiny_networks
+from prior_reinforce.testing import synthetic_demonstrations
 
 REPOSITORY = Path(__file__).parents[1]
 GUIDE = (REPOSITORY / "docs" / "extending.md").read_text()
@@ -35,6 +37,9 @@ LINES = "\n".join(
     )
 )
 """One a family, for a process of its own: as if they stood in the registries."""
+
+
+FEW = Scale(goals=2, seeds=(0,), sets=("A",), rounds=1)
 
 
 @pytest.fixture(scope="module")
@@ -125,22 +130,20 @@ def test_a_saved_generator_is_found_by_its_name(added, choice, tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("choice", ["drift", "drift:Drift,gain=0.5"])
-def test_an_adapter_joins_the_comparison_of_adapters(added, choice, tmp_path, capsys):
-    command = ["reproduce", "adapters", "--goals", "1", "--seeds", "0", "--include", choice]
-    with tiny_networks():
-        assert main([*command, "--out", str(tmp_path)]) == 0
-    figures = json.loads((tmp_path / "adapters.json").read_text())
-    assert choice in figures["success"]
+def test_an_adapter_joins_the_comparison_of_adapters(added, tmp_path):
+    choices = ("drift", "drift:Drift,gain=0.5")
+    assert RECIPES["adapters"].joining(("affine", *choices)) == choices
+    figures = Adapters(generator="nearest").run(Run(tmp_path, FEW, include=choices))
+    assert {"gp", *choices} <= set(figures["success"])
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("choice", ["affine", "affine:Affine,timing=align"])
-def test_a_generator_joins_the_comparison_of_first_throws(added, choice, tmp_path, capsys):
-    command = ["reproduce", "zero-shot", "--quick", "--include", choice, "--out", str(tmp_path)]
-    with tiny_networks():
-        assert main(command) == 0
-    assert choice in capsys.readouterr().out
+def test_a_generator_joins_the_comparison_of_generators(added, tmp_path):
+    choices = ("affine", "affine:Affine,timing=align")
+    assert RECIPES["generators"].joining(("drift", *choices)) == choices
+    nearest = Method("nearest", "nearest", kind="method")
+    figures = Generators((nearest,)).run(Run(tmp_path, FEW, include=choices))
+    assert [row["generator"] for row in figures["rows"]] == ["nearest", *choices]
 
 
 def test_all_four_go_through_trials_together(added, tmp_path, capsys):
