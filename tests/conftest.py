@@ -36,8 +36,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 def learned_folder(tmp_path_factory):
     """A small workspace with a model and no goal; copy it, never change it."""
     from prior_reinforce.workspace.workspace import Workspace
-
-    from .workspace.planar import demonstrations, manifest
+    from tests.workspace.planar import demonstrations, manifest
 
     folder = tmp_path_factory.mktemp("learned") / "planar"
     with Workspace.create(folder, manifest()) as workspace:

@@ -5,8 +5,7 @@ import os
 import pytest
 
 from prior_reinforce.cli import main
-
-from .workspace.planar import events_in
+from tests.workspace.planar import events_in
 
 
 @pytest.mark.parametrize(

@@ -8,8 +8,7 @@ from prior_reinforce.adapters.normalisation import Normalisation
 from prior_reinforce.arrays import Plans, Points
 from prior_reinforce.perception.exact import Exact
 from prior_reinforce.rollouts import Rollout
-
-from .shapes import arrays_only
+from tests.shapes import arrays_only
 
 
 @jaxtyped(typechecker=arrays_only)

@@ -1,6 +1,6 @@
 """`import`, from the first command on."""
 
-from ..workspace.planar import recordings
+from tests.workspace.planar import recordings
 
 NEW = (
     "--action-names", "joint1", "joint2", "--dt", "0.02", "--robot", "none",

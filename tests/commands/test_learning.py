@@ -8,8 +8,7 @@ from prior_reinforce.cli import main
 from prior_reinforce.experiments.learned import load_learned
 from prior_reinforce.plans.alignment import align
 from prior_reinforce.tasks import make_task
-
-from ..workspace.planar import events_in
+from tests.workspace.planar import events_in
 
 TINY = "training_steps=1"
 RECORDED = make_task("basketball-v1").demonstrations("A")

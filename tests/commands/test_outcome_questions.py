@@ -3,8 +3,7 @@
 import numpy as np
 
 from prior_reinforce.workspace.workspace import Workspace
-
-from ..workspace.planar import demonstrations, recordings
+from tests.workspace.planar import demonstrations, recordings
 
 
 def test_missing_outcomes_are_named_or_asked_for(run, folder, tmp_path, monkeypatch):

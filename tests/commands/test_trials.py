@@ -4,8 +4,7 @@ import pytest
 
 from prior_reinforce.trials import Stage
 from prior_reinforce.workspace.workspace import Workspace
-
-from ..workspace.planar import events_in, trials_in
+from tests.workspace.planar import events_in, trials_in
 
 
 @pytest.mark.parametrize(

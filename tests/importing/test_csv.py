@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from recorded import AS_IS, check_motions, write_csv, write_outcomes
 
 from prior_reinforce.errors import FileFormatError, PriorReinforceError
 from prior_reinforce.importing import import_demonstrations, read_recordings
+from tests.importing.recorded import AS_IS, check_motions, write_csv, write_outcomes
 
 
 def test_csv(tmp_path):

@@ -3,7 +3,10 @@
 import h5py
 import numpy as np
 import pytest
-from recorded import (
+
+from prior_reinforce.errors import FileFormatError
+from prior_reinforce.importing import Preprocessing, import_demonstrations, read_recordings
+from tests.importing.recorded import (
     AS_IS,
     JOINTS,
     N,
@@ -14,9 +17,6 @@ from recorded import (
     write_outcomes,
     write_robomimic,
 )
-
-from prior_reinforce.errors import FileFormatError
-from prior_reinforce.importing import Preprocessing, import_demonstrations, read_recordings
 
 
 def test_robomimic(tmp_path):

@@ -10,21 +10,6 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from recorded import (
-    JOINTS,
-    OUTCOMES,
-    N,
-    sampled,
-    write_bag,
-    write_bags,
-    write_csv,
-    write_droid,
-    write_lerobot,
-    write_npz,
-    write_outcomes,
-    write_robomimic,
-    write_zarr,
-)
 
 from prior_reinforce.errors import (
     ConfigurationError,
@@ -40,6 +25,21 @@ from prior_reinforce.importing import (
     read_recordings,
 )
 from prior_reinforce.importing.importer import Format, detect_format
+from tests.importing.recorded import (
+    JOINTS,
+    OUTCOMES,
+    N,
+    sampled,
+    write_bag,
+    write_bags,
+    write_csv,
+    write_droid,
+    write_lerobot,
+    write_npz,
+    write_outcomes,
+    write_robomimic,
+    write_zarr,
+)
 
 
 @pytest.mark.parametrize(

@@ -2,10 +2,18 @@
 
 import numpy as np
 import pytest
-from recorded import AS_IS, JOINTS, OUTCOMES, N, check_motions, write_lerobot, write_outcomes
 
 from prior_reinforce.errors import FileFormatError
 from prior_reinforce.importing import import_demonstrations
+from tests.importing.recorded import (
+    AS_IS,
+    JOINTS,
+    OUTCOMES,
+    N,
+    check_motions,
+    write_lerobot,
+    write_outcomes,
+)
 
 
 @pytest.mark.parametrize("version", ["v3.0", "v2.1"])

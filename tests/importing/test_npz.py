@@ -2,12 +2,21 @@
 
 import numpy as np
 import pytest
-from recorded import AS_IS, JOINTS, OUTCOMES, N, check_motions, throw, write_npz, write_outcomes
 
 from prior_reinforce.errors import FileFormatError, PriorReinforceError
 from prior_reinforce.importing import import_demonstrations, read_recordings
 from prior_reinforce.plans.files import write_plan
 from prior_reinforce.plans.motions import Plan
+from tests.importing.recorded import (
+    AS_IS,
+    JOINTS,
+    OUTCOMES,
+    N,
+    check_motions,
+    throw,
+    write_npz,
+    write_outcomes,
+)
 
 
 def test_npz(tmp_path):

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from recorded import OUTCOMES, write_csv, write_outcomes
 
 from prior_reinforce.errors import (
     ConfigurationError,
@@ -11,6 +10,7 @@ from prior_reinforce.errors import (
 )
 from prior_reinforce.importing import import_demonstrations
 from prior_reinforce.importing.outcomes import read_outcomes
+from tests.importing.recorded import OUTCOMES, write_csv, write_outcomes
 
 
 @pytest.fixture(scope="module")

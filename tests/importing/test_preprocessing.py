@@ -4,7 +4,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from recorded import (
+
+from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
+from prior_reinforce.importing import import_demonstrations
+from prior_reinforce.importing.preprocessing import Preprocessing, preprocess
+from prior_reinforce.importing.recording import Recording
+from tests.importing.recorded import (
     BEFORE,
     OUTCOMES,
     SWING,
@@ -16,11 +21,6 @@ from recorded import (
     write_npz,
     write_outcomes,
 )
-
-from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
-from prior_reinforce.importing import import_demonstrations
-from prior_reinforce.importing.preprocessing import Preprocessing, preprocess
-from prior_reinforce.importing.recording import Recording
 
 UNITS = ("rad",) * 7
 

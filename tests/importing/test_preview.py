@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 from matplotlib.image import imread
-from recorded import JOINTS, OUTCOMES, write_bags, write_npz, write_outcomes
 
 from prior_reinforce.importing import import_demonstrations
 from prior_reinforce.importing.preview import hull_corners
+from tests.importing.recorded import JOINTS, OUTCOMES, write_bags, write_npz, write_outcomes
 
 
 @pytest.fixture(scope="module")

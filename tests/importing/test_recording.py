@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from recorded import AFTER, BEFORE, duration, write_npz
 
 from prior_reinforce.errors import FileFormatError, InvalidDemonstrationsError
 from prior_reinforce.importing import Recording, read_recordings
@@ -13,6 +12,7 @@ from prior_reinforce.importing.recording import (
     named_damage,
     natural_order,
 )
+from tests.importing.recorded import AFTER, BEFORE, duration, write_npz
 
 
 def test_durations_are_those_written(tmp_path):

@@ -2,10 +2,18 @@
 
 import numpy as np
 import pytest
-from recorded import AS_IS, JOINTS, check_motions, sampled, write_bag, write_bags, write_outcomes
 
 from prior_reinforce.errors import FileFormatError
 from prior_reinforce.importing import import_demonstrations, read_recordings
+from tests.importing.recorded import (
+    AS_IS,
+    JOINTS,
+    check_motions,
+    sampled,
+    write_bag,
+    write_bags,
+    write_outcomes,
+)
 
 KINDS = ["ros1", "sqlite", "mcap"]
 

@@ -4,10 +4,10 @@ import shutil
 
 import pytest
 import zarr
-from recorded import AS_IS, JOINTS, check_motions, write_outcomes, write_zarr
 
 from prior_reinforce.errors import FileFormatError
 from prior_reinforce.importing import import_demonstrations, read_recordings
+from tests.importing.recorded import AS_IS, JOINTS, check_motions, write_outcomes, write_zarr
 
 
 @pytest.mark.parametrize("zipped", [False, True])

@@ -9,8 +9,7 @@ from prior_reinforce.perception import PERCEPTIONS, make_perception
 from prior_reinforce.rollouts import KeyFrame, Rollout
 from prior_reinforce.scene import SeenObject, TableScene
 from prior_reinforce.testing import PerceptionContract
-
-from ..perception.slanted_table import RIM_HEIGHT, slanted_table
+from tests.perception.slanted_table import RIM_HEIGHT, slanted_table
 
 PICTURES = ("camera", "vlm")
 """They need a table to look at; `perception/test_vlm.py` asks a model."""

@@ -15,8 +15,7 @@ from prior_reinforce.cli import main
 from prior_reinforce.errors import PriorReinforceError
 from prior_reinforce.workspace.manifest import parse_manifest
 from prior_reinforce.workspace.workspace import Workspace
-
-from .planar import demonstrations, manifest
+from tests.workspace.planar import demonstrations, manifest
 
 many = settings(
     max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]

@@ -7,8 +7,7 @@ import pytest
 from prior_reinforce.errors import WorkspaceError
 from prior_reinforce.trials import Stage
 from prior_reinforce.workspace.workspace import Workspace
-
-from .planar import ask, tell, trials, void
+from tests.workspace.planar import ask, tell, trials, void
 
 
 def test_the_journal_is_append_only(workspace):

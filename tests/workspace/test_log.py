@@ -4,8 +4,7 @@ import pytest
 
 from prior_reinforce.errors import WorkspaceError
 from prior_reinforce.plans.motions import Demonstrations
-
-from .planar import ask, demonstrations
+from tests.workspace.planar import ask, demonstrations
 
 
 def test_demonstrations_that_changed_ask_for_learning_anew(workspace):

@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 
 from prior_reinforce.errors import ConfigurationError, FileFormatError
 from prior_reinforce.workspace.manifest import load_manifest
-
-from .planar import manifest
+from tests.workspace.planar import manifest
 
 SEVEN = {"names": str([f"joint{i}" for i in range(1, 8)]), "units": str(["rad"] * 7)}
 

@@ -1,8 +1,7 @@
 """Where a workspace stands, in words."""
 
 from prior_reinforce.workspace.status import describe
-
-from .planar import ask, tell
+from tests.workspace.planar import ask, tell
 
 
 def test_status_is_short_and_says_what_is_next(workspace):

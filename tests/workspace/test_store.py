@@ -5,8 +5,7 @@ import shutil
 import pytest
 
 from prior_reinforce.errors import FileFormatError
-
-from .planar import ask, tell, void
+from tests.workspace.planar import ask, tell, void
 
 
 def test_a_damaged_plan_or_model_is_never_handed_out(workspace):

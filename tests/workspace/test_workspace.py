@@ -27,8 +27,16 @@ from prior_reinforce.session import Session
 from prior_reinforce.trials import Stage
 from prior_reinforce.workspace.status import describe
 from prior_reinforce.workspace.workspace import Workspace
-
-from .planar import amend, ask, demonstrations, manifest, reopened, tell, trials, void
+from tests.workspace.planar import (
+    amend,
+    ask,
+    demonstrations,
+    manifest,
+    reopened,
+    tell,
+    trials,
+    void,
+)
 
 GOAL = [0.9, 0.05]
 SLOW = (
