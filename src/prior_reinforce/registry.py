@@ -200,7 +200,9 @@ def source_digest(choice: str) -> str:
 def _resolve(target: str) -> Any:
     try:
         return pkgutil.resolve_name(target)
-    except (ImportError, AttributeError, ValueError) as error:
+    except AttributeError as error:
+        raise ConfigurationError(f"cannot find {target}: {error}; check its spelling") from error
+    except (ImportError, ValueError) as error:
         raise ConfigurationError(
             f"cannot import {target}: {error}; it must be importable from here (PYTHONPATH)"
         ) from error

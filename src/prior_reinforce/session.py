@@ -103,17 +103,17 @@ class Session:
 
     @cached_property
     def generator(self) -> Generator:
-        """Pi."""
+        """The generator pi; loaded now, if a function was given."""
         return _loaded(self._given[0])
 
     @cached_property
     def adapter(self) -> Adapter:
-        """M."""
+        """The adapter M; loaded now, if a function was given."""
         return _loaded(self._given[1])
 
     @cached_property
     def demonstrations(self) -> Demonstrations:
-        """D_prior."""
+        """The demonstrations D_prior; loaded now, if a function was given."""
         return _loaded(self._given[2])
 
     @property
@@ -123,12 +123,12 @@ class Session:
 
     @property
     def goal(self) -> Point:
-        """G tilde of the goal that is worked on: the latest."""
+        """The goal g tilde that is worked on: the latest."""
         return self._current_goal().goal
 
     @property
     def tolerance(self) -> float:
-        """Epsilon of the goal that is worked on."""
+        """The tolerance epsilon of the goal that is worked on."""
         return self._current_goal().tolerance
 
     @property

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from prior_reinforce.adapters.gaussian_process import GaussianProcessAdapter
+from prior_reinforce.adapters.proportional import ProportionalAdapter
 from prior_reinforce.errors import (
     ConfigurationError,
     InvalidDemonstrationsError,
@@ -175,6 +176,24 @@ def test_ones_own_generator_is_named_by_a_person_not_by_the_journal(workspace):
     workspace.learn("interpolation")
     with pytest.raises(ConfigurationError, match="drop --generator"):
         ask(workspace, own=OWN)
+
+
+class OwnAdapter(ProportionalAdapter):
+    """Not one of ours, as far as the package knows."""
+
+
+def test_ones_own_adapter_is_named_by_a_person_not_by_the_journal(workspace):
+    own = f"{__name__}:OwnAdapter"
+    workspace.set_goal(GOAL, adapter=f"{own},gain=0.5")
+    assert f"prior-reinforce ask {workspace.folder} --adapter {own}" in describe(workspace)
+    before = workspace.events
+    with pytest.raises(ConfigurationError, match=f"--adapter {own}"):
+        ask(workspace)
+    assert workspace.events == before
+    number = workspace.session(own_adapter=own).ask().number
+    tell(workspace, number, [0.06, 0.03])
+    again = workspace.session(own_adapter=own).ask()
+    np.testing.assert_allclose(again.condition, np.subtract(GOAL, [0.03, 0.015]))
 
 
 def test_bad_feedback_changes_nothing(workspace):

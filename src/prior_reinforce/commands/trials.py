@@ -41,6 +41,8 @@ class Ask:
     """After a crash while executing: a person saw that nothing moved."""
     generator: str | None = None
     """The generator that the model was learned by, where it is your own: module:Class."""
+    adapter: str | None = None
+    """The adapter that the goal was set with, where it is your own: module:Class."""
 
     def run(self) -> int:
         """Show the plan, write it, execute it."""
@@ -53,7 +55,7 @@ class Ask:
                 "--rate is of the file that --out writes; --run is given the plan's own frames"
             )
         with Workspace(self.folder) as workspace:
-            session = workspace.session(self.generator)
+            session = workspace.session(self.generator, self.adapter)
             self._check_out(session)
             did_not_move = self.arm_did_not_move
             if not did_not_move and _was_cut_off(workspace, session) and sys.stdin.isatty():

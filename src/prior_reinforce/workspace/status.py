@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 
+from prior_reinforce.registry import parse_choice
 from prior_reinforce.session import Session
 from prior_reinforce.trials import Goal, Stage, Trial
 from prior_reinforce.wording import in_words, say_error, say_place
@@ -78,7 +79,12 @@ def next_step(workspace: Workspace, session: Session) -> str:
         return f"{new_goal}, or prior-reinforce report {folder}"
     training = workspace.log.training
     own = training.own if training is not None else None
-    return f"prior-reinforce ask {folder}" + (f" --generator {own}" if own else "")
+    adapter, _ = parse_choice(session.goals[-1].adapter)
+    return (
+        f"prior-reinforce ask {folder}"
+        + (f" --generator {own}" if own else "")
+        + (f" --adapter {adapter}" if ":" in adapter else "")
+    )
 
 
 def tell_example(workspace: Workspace) -> str:

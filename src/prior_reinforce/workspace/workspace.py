@@ -31,6 +31,7 @@ from prior_reinforce.errors import (
 from prior_reinforce.files import named_disk_errors
 from prior_reinforce.plans.files import PlanFile
 from prior_reinforce.plans.motions import Demonstrations, Plan
+from prior_reinforce.registry import parse_choice
 from prior_reinforce.session import Session
 from prior_reinforce.trials import Event, Goal, Trial
 from prior_reinforce.workspace.log import Training, WorkspaceLog
@@ -43,6 +44,7 @@ from prior_reinforce.workspace.manifest import (
 from prior_reinforce.workspace.store import Store
 
 if TYPE_CHECKING:
+    from prior_reinforce.adapters.base import Adapter
     from prior_reinforce.generators.base import FitProgress, Generator
     from prior_reinforce.robots.executors.command import CommandResult
     from prior_reinforce.robots.report import LimitReport
@@ -134,23 +136,22 @@ class Workspace:
         """
         return self._demonstrations(self.log.trainings[model].fitted_to)
 
-    def session(self, own: str | None = None) -> Session:
+    def session(self, own: str | None = None, own_adapter: str | None = None) -> Session:
         """The trials of this workspace. Telling needs no model; asking loads it.
 
         Args:
             own: `module:Class` that the model was learned by, where it is one's own: nothing in the
                 folder may start code.
+            own_adapter: `module:Class` that the goal was set with, likewise.
 
         Raises:
             WorkspaceError: The journal is damaged.
             ConfigurationError: The manifest has another number of outcomes than the goals so far.
         """
-        from prior_reinforce.adapters import make_adapter
-
         training = self.log.training
         session = Session(
             lambda: self._generator(own),
-            lambda: make_adapter(session.goals[-1].adapter),
+            lambda: self._adapter(session.goals[-1].adapter, own_adapter),
             lambda: self.demonstrations,
             tolerance=self.manifest.tolerance,
             log=self.log,
@@ -333,6 +334,18 @@ class Workspace:
                 remedy = f"name it, for the journal starts no code: --generator {training.own}"
             raise ConfigurationError(f"the model was learned by {training.generator}; {remedy}")
         return self.store.model(training.model, own)
+
+    def _adapter(self, choice: str, own: str | None) -> Adapter:
+        """The adapter that a goal was set with."""
+        from prior_reinforce.adapters import make_adapter
+
+        name, _ = parse_choice(choice)
+        if (name if ":" in name else None) != own:
+            remedy = "drop --adapter, or set the goal again"
+            if ":" in name:
+                remedy = f"name it, for the journal starts no code: --adapter {name}"
+            raise ConfigurationError(f"the goal was set with the adapter {choice}; {remedy}")
+        return make_adapter(choice)
 
     def _demonstrations(self, sha256: str) -> Demonstrations:
         if sha256 not in self._read:
