@@ -109,7 +109,7 @@ def test_ones_own_is_named_by_its_module():
         ("rigged,battens=many", "rigged,battens=many: .*battens"),
         ("rigged,battens=0", "battens must be at least 1"),
         ("missing", "cannot import nowhere:Sail: .*PYTHONPATH"),
-        (f"{__name__}:Sails", "cannot import .*Sails"),
+        (f"{__name__}:Sails", "cannot find .*Sails.*check its spelling"),
         (f"{__name__}:Reef", "is not a Sail; derive it from"),
         ("pathlib:Path", "pathlib:Path is not a Sail; derive it from"),
     ],
