@@ -184,7 +184,7 @@ def test_trials_of_another_model_teach_nothing(session):
         FullStepAdapter(),
         DEMOS,
         log=session.log,
-        model="another",
+        in_use=lambda: ("another",),
     )
     np.testing.assert_array_equal(other.ask().condition, GOAL)
 
@@ -340,3 +340,44 @@ def test_trials_cannot_be_changed_from_outside(session):
     trial = session.ask()
     with pytest.raises(ValueError, match="read-only"):
         trial.plan[0, 0] = 1.0
+
+
+def test_a_session_cannot_be_asked_twice_at_once(session):
+    with pytest.raises(ConfigurationError, match="different ones"):
+        ask_all([session, session])
+    assert session.ask().number == 1
+
+
+class CallableAdapter(FullStepAdapter):
+    """As a network would be."""
+
+    def __call__(self, x):
+        raise AssertionError("is no function that loads an adapter")
+
+
+def test_a_member_that_can_be_called_is_not_called():
+    generator = RepeatingGenerator().fit(DEMOS, seed=0)
+    session = Session(generator, CallableAdapter(), DEMOS, GOAL, 0.015)
+    np.testing.assert_array_equal(session.ask().condition, GOAL)
+
+
+class Interrupted(FullStepAdapter):
+    """Stops once in the middle of observing."""
+
+    stops = True
+
+    def _observe(self, condition, outcome_seen):
+        super()._observe(condition, outcome_seen)
+        if self.stops:
+            self.stops = False
+            raise KeyboardInterrupt
+
+
+def test_what_an_interrupt_cut_off_is_observed_once():
+    generator = RepeatingGenerator().fit(DEMOS, seed=0)
+    session = Session(generator, Interrupted(), DEMOS, GOAL, 0.015)
+    session.tell(session.ask().number, [0.05, 0.0])
+    with pytest.raises(KeyboardInterrupt):
+        session.ask()
+    session.ask()
+    assert len(session.adapter.seen) == 1

@@ -97,33 +97,31 @@ def write_once(path: Path, content: bytes) -> Path:
     """
     if not path.parent.is_dir():
         raise WorkspaceError(f"cannot write {path}, there is no such folder; make the folder first")
-    try:
-        with named_disk_errors(path.parent), _unfinished(path) as unfinished:
-            unfinished.write_bytes(content)
-            unfinished.chmod(unfinished.stat().st_mode & 0o444)
-            _sync(unfinished)
+    with named_disk_errors(path.parent), _unfinished(path) as unfinished:
+        unfinished.write_bytes(content)
+        unfinished.chmod(unfinished.stat().st_mode & 0o444)
+        _sync(unfinished)
+        try:
             _link(unfinished, path)
-            _sync(path.parent)
-    except FileExistsError:
-        if not (path.is_file() and path.read_bytes() == content):
-            raise FileFormatError(
-                f"{path} is there already with another content and is never overwritten; choose "
-                "another name"
-            ) from None
+        except FileExistsError:
+            if not (path.is_file() and path.read_bytes() == content):
+                raise FileFormatError(
+                    f"{path} is there already with another content and is never overwritten; "
+                    "choose another name"
+                ) from None
+        _sync(path.parent)
     return path
 
 
 @contextmanager
 def named_disk_errors(folder: Path) -> Iterator[None]:
-    """Turn a full disk or a read-only folder into one line; an existing file stays what it is.
+    """Turn a full disk or a read-only folder into one line.
 
     Raises:
         WorkspaceError: The disk is full, or the folder cannot be written to.
     """
     try:
         yield
-    except FileExistsError:
-        raise
     except OSError as error:
         remedy = "make the folder writable, or choose another"
         if error.errno in (errno.ENOSPC, errno.EDQUOT):

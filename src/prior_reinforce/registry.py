@@ -77,7 +77,7 @@ class Registry(Generic[T]):
         given_config = context.pop("config", None)
         try:
             if config is None:
-                return kind(**context, **_checked_names(settings, takes, choice))
+                return kind(**context, **_checked_names(kind, settings, takes, choice))
             if isinstance(given_config, config):  # settings in the choice come on top
                 settings = {**asdict(given_config), **settings}
             if settings:  # else the class's own defaults, which may differ from its config's
@@ -113,9 +113,7 @@ class Registry(Generic[T]):
         kind = _resolve(name if member is None else member.target)
         base = pkgutil.resolve_name(self._base)
         if not (isinstance(kind, type) and issubclass(kind, base)):
-            raise ConfigurationError(
-                f"{name} is not a {base.__name__}; derive it from {self._base.replace(':', '.')}"
-            )
+            raise ConfigurationError(f"{name} must derive from {self._base.replace(':', '.')}")
         return kind
 
     def owns(self, choice: str) -> bool:
@@ -209,18 +207,22 @@ def _resolve(target: str) -> Any:
 
 
 def _checked_names(
-    settings: Mapping[str, Any], takes: Mapping[str, inspect.Parameter], choice: str
+    kind: type[Any], settings: Mapping[str, Any], takes: Mapping[str, Any], choice: str
 ) -> dict[str, Any]:
-    """Plain arguments of a constructor, read from text by the type of their default."""
+    """Plain arguments of a constructor, read from text by their annotations."""
+    import typing
+
     import msgspec
 
+    hints = typing.get_type_hints(kind.__init__)
     arguments: dict[str, Any] = {}
     for name, value in settings.items():
-        if name not in takes:
-            raise ConfigurationError(
-                f"{choice} has no setting {name!r}; it has {', '.join(takes) or 'none'}"
-            )
-        default = takes[name].default
-        kind = type(default) if isinstance(default, (int, float, str)) else type(value)
-        arguments[name] = msgspec.convert(value, kind, strict=False)
+        if name not in takes or hints.get(name) is None:
+            known = ", ".join(each for each in takes if each in hints) or "none"
+            raise ConfigurationError(f"{choice} has no setting {name!r}; it has {known}")
+        plain = None if value in ("none", "None") else value
+        try:
+            arguments[name] = msgspec.convert(plain, hints[name], strict=False)
+        except (TypeError, msgspec.ValidationError) as error:
+            raise ConfigurationError(f"{choice}: {name}: {error}") from error
     return arguments

@@ -20,6 +20,7 @@ from contextlib import ExitStack
 from dataclasses import replace
 from functools import cached_property
 from numbers import Integral, Real
+from types import FunctionType, MethodType
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -65,7 +66,7 @@ class Session:
         carry_over: bool = False,
         log: Log | None = None,
         gate: Callable[[Frames], Verdict | None] | None = None,
-        model: str = "",
+        in_use: Callable[[], tuple[str, ...]] = lambda: ("",),
     ) -> None:
         """Begin, or go on where a log ends.
 
@@ -81,8 +82,9 @@ class Session:
             carry_over: Let the adapter learn from the trials of earlier goals too.
             log: What happened so far, and where to write what happens; in memory if not given.
             gate: Holds a plan against a robot's limits whenever it is to leave; none by default.
-            model: Name of the generator's model in the log; trials of others teach nothing, since
-                their conditions mean other motions.
+            in_use: Returns the name of the model in use, and whatever else the functions above
+                load: when it changes, they are called again. Trials of other models teach nothing,
+                since their conditions mean other motions.
 
         Raises:
             InvalidGoalError: The goal has a wrong shape, or is not finite.
@@ -92,7 +94,8 @@ class Session:
         self.log: Log = MemoryLog() if log is None else log
         self._given: Any = (generator, adapter, demonstrations)
         self._gate = gate
-        self._model = model
+        self._in_use = in_use
+        self._loaded_for: tuple[str, ...] = ()
         self._carry_over = carry_over
         self._tolerance = tolerance
         self._history = History()
@@ -229,10 +232,7 @@ class Session:
                 said yet whether the arm moved.
             WorkspaceError: No goal is set, or the log cannot be written.
         """
-        trial = self.open_trial
-        if trial is not None and trial.stage is Stage.EXECUTING:
-            self._settle(trial, arm_did_not_move)
-        return ask_all([self])[0]
+        return ask_all([self], arm_did_not_move=arm_did_not_move)[0]
 
     def tell(self, number: int, error_seen: ArrayLike, *, hit: bool | None = None) -> Trial:
         """Report what was seen of the open trial.
@@ -312,11 +312,12 @@ class Session:
     def end_execution(self, number: int, result: Mapping[str, Any] | None) -> Trial:
         """Note how the command ended; None if it was never started, so that nothing moved."""
         with self._exclusive():
-            if self.trial(number).stage is Stage.EXECUTING:  # it may have been told meanwhile
+            trial = self.trial(number)
+            if trial.stage is Stage.EXECUTING:  # it may have been told meanwhile
                 if result is None:
-                    self.log.append("not_executed", {"trial": number})
+                    self.log.append("not_executed", {"trial": trial.number})
                 else:
-                    self.log.append("executed", {"trial": number, **result})
+                    self.log.append("executed", {"trial": trial.number, **result})
         return self._now(number)
 
     def refuse_open_trial(self, doing: str) -> None:
@@ -340,7 +341,14 @@ class Session:
         return goal
 
     def _refresh(self) -> None:
+        """Know all that the log says, and forget what was loaded if other things are in use."""
         self._history.update(self.log.events())
+        goal = self._history.goal
+        now = (*self._in_use(), "" if goal is None else goal.adapter)
+        if now != self._loaded_for:
+            self._loaded_for, self._observed = now, None
+            for name in ("generator", "adapter", "demonstrations"):
+                self.__dict__.pop(name, None)
 
     def _now(self, number: int) -> Trial:
         self._refresh()
@@ -365,7 +373,7 @@ class Session:
         self.log.append(kind, data)
 
     def _settle(self, trial: Trial, arm_did_not_move: bool) -> None:
-        """Find out whether a trial that was executing may be executed after all."""
+        """Note that a trial that was executing may be executed after all; within `_exclusive`."""
         if self.log.is_executing():
             raise TrialStateError(f"trial {trial.number} is executing now; wait for it")
         if not arm_did_not_move:
@@ -374,12 +382,12 @@ class Session:
                 f"If it did, tell or void trial {trial.number}; if it did not, ask again with "
                 "--arm-did-not-move"
             )
-        self.end_execution(trial.number, None)
+        self.log.append("not_executed", {"trial": trial.number})
 
     def _propose(self) -> Point:
         """M(g), after the adapter has seen every reading that counts."""
         readings = self._readings()
-        seen = self._observed
+        seen, self._observed = self._observed, None  # until it has seen them all
         if seen is None or seen != readings[: len(seen)]:  # one was voided or amended: start again
             self.adapter.start(self.demonstrations)
             seen = []
@@ -396,7 +404,7 @@ class Session:
             trial
             for trial in self._history.trials
             if trial.stage is Stage.TOLD
-            and trial.model == self._model
+            and trial.model == self._loaded_for[0]
             and (goal.carry_over or trial.goal_number == goal.number)
         ]
 
@@ -409,21 +417,20 @@ class Session:
             "trial": number,
             "goal": self._current_goal().number,
             "condition": condition.tolist(),
-            "model": self._model,
+            "model": self._loaded_for[0],
             "gate": None if verdict is None else verdict.as_json(),
             **self.log.keep_plan(number, plan),
         }
         self.log.append("asked", data)
 
-    def _with_plan(self, *, is_new: bool) -> Trial:
-        """The open trial with its plan, unless the gate refuses it now."""
-        trial = self.open_trial
-        assert trial is not None
+    def _with_plan(self, number: int, *, is_new: bool) -> Trial:
+        """A trial with its plan, unless the gate refuses it now."""
+        trial = self._now(number)
+        if not trial.open:
+            raise TrialStateError(f"trial {number} was {trial.stage.value} meanwhile; ask again")
         plan = self.log.plan(trial) if trial.plan is None else trial.plan
-        if not is_new and trial.stage is Stage.ASKED:
-            self._check(
-                plan, f"trial {trial.number} may not be executed now, void it and ask again"
-            )
+        if not is_new:
+            self._check(plan, f"trial {number} may not be executed now, void it and ask again")
         return trial if trial.plan is not None else replace(trial, plan=plan)
 
     def _check(self, plan: Frames, refusal: str) -> Verdict | None:
@@ -437,25 +444,33 @@ class Session:
         return verdict
 
 
-def ask_all(sessions: Sequence[Session]) -> list[Trial]:
+def ask_all(sessions: Sequence[Session], *, arm_did_not_move: bool = False) -> list[Trial]:
     """Ask many sessions at once: one call of the generator for all that have no open trial.
 
     Args:
-        sessions: Sessions that share one fitted generator.
+        sessions: Different sessions that share one fitted generator.
+        arm_did_not_move: See `Session.ask`.
 
     Returns:
         The open trial of each, in order.
 
     Raises:
-        ConfigurationError: The sessions have different generators.
+        ConfigurationError: The sessions have different generators, or one stands there twice.
     """
+    if len({id(session) for session in sessions}) < len(sessions):
+        raise ConfigurationError("sessions asked together must be different ones")
     for session in sessions:
-        if session.open_trial is None:
-            session.generator, session.goal  # noqa: B018  (loaded before the log is held)
-    new: list[Session] = []
+        session._refresh()
+        if session.open_trial is None:  # load before the log is held: others need not wait for it
+            session.generator, session.goal, session.adapter  # noqa: B018
     with ExitStack() as logs:
+        numbers = []
         for session in sessions:
             logs.enter_context(session._exclusive())
+            trial = session.open_trial
+            if trial is not None and trial.stage is Stage.EXECUTING:
+                session._settle(trial, arm_did_not_move)
+            numbers.append(session.n_trials_asked + 1 if trial is None else trial.number)
         new = [session for session in sessions if session.open_trial is None]
         if new:
             generator = new[0].generator
@@ -465,13 +480,15 @@ def ask_all(sessions: Sequence[Session]) -> list[Trial]:
             plans = generator.generate(conditions)
             for session, condition, plan in zip(new, conditions, plans, strict=True):
                 session._open(condition, plan)
-    for session in new:
-        session._refresh()
-    return [session._with_plan(is_new=session in new) for session in sessions]
+    return [
+        session._with_plan(number, is_new=session in new)
+        for session, number in zip(sessions, numbers, strict=True)
+    ]
 
 
 def _loaded(given: Any) -> Any:
-    return given() if callable(given) else given
+    """What was given, or what the function that was given loads; a network is callable too."""
+    return given() if isinstance(given, (FunctionType, MethodType)) else given
 
 
 def _as_tolerance(tolerance: Any) -> float:

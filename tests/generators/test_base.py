@@ -59,7 +59,7 @@ def test_remarks_are_of_the_last_fit_and_kept_on_disk(throws, tmp_path):
 
 
 def test_without_a_state_saving_says_what_is_missing(throws, tmp_path):
-    with pytest.raises(NotImplementedError, match=r"Constant has no state"):
+    with pytest.raises(ConfigurationError, match=r"a Constant cannot be saved; give the class"):
         Constant().fit(throws(3, 20), seed=0).save(tmp_path)
 
 

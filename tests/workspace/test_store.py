@@ -30,3 +30,12 @@ def test_a_reading_can_be_told_where_the_model_is_gone(workspace):
     assert tell(workspace, number, [0.0, 0.0]).hit
     with pytest.raises(FileFormatError, match="prior-reinforce learn"):
         ask(workspace)
+
+
+def test_learning_again_mends_a_damaged_model(workspace):
+    (model,) = (workspace.folder / "models").iterdir()
+    weights = model / "model.safetensors"
+    weights.write_bytes(weights.read_bytes()[:-1] + b"x")
+    assert workspace.learn("interpolation").model == model.name
+    assert ask(workspace).number == 1
+    assert [path.name for path in (workspace.folder / "models").iterdir()] == [model.name]

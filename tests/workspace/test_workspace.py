@@ -22,6 +22,7 @@ from prior_reinforce.errors import (
     WorkspaceError,
 )
 from prior_reinforce.generators import make_generator
+from prior_reinforce.generators.base import Generator
 from prior_reinforce.generators.interpolation import SmoothInterpolation
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 from prior_reinforce.session import Session
@@ -383,3 +384,49 @@ def test_a_controller_that_outlives_our_program_keeps_the_arm_to_itself(workspac
     assert (tmp_path / "runs").read_text() == "moved\n"
     assert workspace.execute(2, command, time_limit=60).succeeded
     assert workspace.session().trial(2).stage is Stage.EXECUTED
+
+
+class Unsavable(Generator):
+    """Knows how to learn, and not how to be kept."""
+
+    def _fit(self, demonstrations, seed, progress):
+        raise AssertionError("must be refused before it is fitted")
+
+    def _generate(self, conditions): ...
+
+
+def test_a_generator_that_cannot_be_kept_is_refused_before_it_is_fitted(workspace):
+    with pytest.raises(ConfigurationError, match=r"give the class state\(\) and from_state"):
+        workspace.learn(f"{__name__}:Unsavable")
+
+
+def test_one_long_session_follows_what_is_learned_and_chosen_meanwhile(tmp_path):
+    with Workspace.create(tmp_path / "planar", manifest()) as workspace:
+        workspace.import_demonstrations(demonstrations(), "made up")
+        session = workspace.session()
+        first = workspace.learn("interpolation").model
+        session.set_goal(GOAL)
+        alone = session.ask()
+        assert alone.model == first
+        session.tell(1, [0.06, 0.03])
+        assert not np.allclose(session.ask().condition, alone.condition)
+        session.void(2, "")
+        with Workspace(workspace.folder) as elsewhere:
+            second = elsewhere.learn("nearest").model
+        trial = session.ask()
+        assert trial.model == second
+        np.testing.assert_array_equal(trial.condition, alone.condition)
+        session.tell(3, [0.06, 0.03])
+        session.set_goal(GOAL, adapter="proportional,gain=0.5", carry_over=True)
+        expected = trial.condition - [0.03, 0.015]
+        np.testing.assert_allclose(session.ask().condition, expected)
+
+
+def test_a_session_that_was_open_sees_what_another_window_executes(workspace):
+    session = workspace.session()
+    session.ask()
+    workspace.session().begin_execution(1, "arm {plan}")
+    with pytest.raises(TrialStateError, match="did the arm move"):
+        session.ask()
+    assert session.ask(arm_did_not_move=True).stage is Stage.ASKED
+    assert session.end_execution(np.int64(1), None).stage is Stage.ASKED

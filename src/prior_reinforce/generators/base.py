@@ -87,12 +87,27 @@ class Generator(ABC):
         """
         return self._generate(as_conditions(conditions, self._fitted_to()))
 
+    def check_savable(self) -> None:
+        """Do nothing if this generator can be saved once it is fitted.
+
+        Raises:
+            ConfigurationError: Its class has no `state`, or no `from_state`.
+        """
+        kind = type(self)
+        base = Generator.from_state.__func__  # type: ignore[attr-defined]
+        if kind.state is Generator.state or kind.from_state.__func__ is base:  # type: ignore[attr-defined]
+            raise ConfigurationError(
+                f"a {kind.__name__} cannot be saved; give the class state() and from_state()"
+            )
+
     def save(self, folder: str | os.PathLike[str]) -> None:
         """Write `config.json` and `model.safetensors` into a folder, made if need be.
 
         Raises:
             NotFittedError: Before `fit`.
+            ConfigurationError: See `check_savable`.
         """
+        self.check_savable()
         write_model(Path(folder), self.pack())
 
     @classmethod
@@ -165,7 +180,7 @@ class Generator(ABC):
 
         Only a generator with `state` and `from_state` can be saved.
         """
-        raise NotImplementedError(f"{type(self).__name__} has no state(), so it cannot be saved")
+        raise NotImplementedError
 
     @classmethod
     def from_state(cls, settings: Mapping[str, Any], tensors: Tensors) -> Self:
@@ -174,7 +189,7 @@ class Generator(ABC):
         Raises:
             KeyError, TypeError, ValueError, RuntimeError: Something is missing, or does not fit.
         """
-        raise NotImplementedError(f"{cls.__name__} has no from_state(), so it cannot be loaded")
+        raise NotImplementedError
 
     def _fitted_to(self) -> int:
         """Return k of what was learned."""

@@ -81,6 +81,10 @@ class Timed(Generator):
         begins = np.clip(np.round(plans[:, 0, -1]), *self._starts).astype(int)
         return shift(plans[:, :, :-1], begins, self._horizon)
 
+    def check_savable(self) -> None:
+        """Do nothing if the wrapped generator can be saved; see `Generator.check_savable`."""
+        self.generator.check_savable()
+
     def to(self, device: str) -> Self:
         """Compute on another device from now on; see `Generator.to`."""
         self.generator.to(device)

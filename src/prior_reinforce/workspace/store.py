@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from prior_reinforce.errors import FileFormatError
-from prior_reinforce.files import in_place, named_disk_errors, sha256, sha256_of_folder
+from prior_reinforce.files import in_place, named_disk_errors, sha256, sha256_of_folder, sweep
 from prior_reinforce.plans.files import PlanFile, read_plan, write_plan
 from prior_reinforce.plans.motions import Demonstrations, Plan
 
@@ -64,12 +64,19 @@ class Store:
         Raises:
             WorkspaceError: The disk is full, or the folder read-only.
         """
-        with named_disk_errors(self._folder), tempfile.TemporaryDirectory() as scratch:
-            saved = Path(scratch) / "model"
-            generator.save(saved)
-            model = sha256_of_folder(saved)[:_DIGITS]
-            with in_place(self._folder / "models" / model) as unfinished:
-                shutil.copytree(saved, unfinished)
+        models = self._folder / "models"
+        with named_disk_errors(self._folder):
+            models.mkdir(exist_ok=True)
+            sweep(models)
+            with tempfile.TemporaryDirectory(dir=models, prefix=".new-") as scratch:
+                saved = Path(scratch) / "model"
+                generator.save(saved)
+                model = sha256_of_folder(saved)[:_DIGITS]
+                kept = models / model
+                if kept.is_dir() and sha256_of_folder(kept)[:_DIGITS] != model:
+                    shutil.rmtree(kept)  # damaged: nothing can read it, and this mends it
+                with in_place(kept) as unfinished:
+                    shutil.copytree(saved, unfinished)
         return model
 
     def model(self, model: str, own: str | None = None) -> Generator:

@@ -33,7 +33,7 @@ from prior_reinforce.plans.files import PlanFile
 from prior_reinforce.plans.motions import Demonstrations, Plan
 from prior_reinforce.registry import parse_choice
 from prior_reinforce.session import Session
-from prior_reinforce.trials import Event, Goal, Trial
+from prior_reinforce.trials import Event, Goal, Stage, Trial
 from prior_reinforce.workspace.log import Training, WorkspaceLog
 from prior_reinforce.workspace.manifest import (
     MANIFEST_FILE,
@@ -148,7 +148,6 @@ class Workspace:
             WorkspaceError: The journal is damaged.
             ConfigurationError: The manifest has another number of outcomes than the goals so far.
         """
-        training = self.log.training
         session = Session(
             lambda: self._generator(own),
             lambda: self._adapter(session.goals[-1].adapter, own_adapter),
@@ -156,7 +155,7 @@ class Workspace:
             tolerance=self.manifest.tolerance,
             log=self.log,
             gate=self.gate,
-            model="" if training is None else training.model,
+            in_use=self._in_use,
         )
         k = len(self.manifest.outcome_names)
         if any(goal.goal.size != k for goal in session.goals):
@@ -260,7 +259,9 @@ class Workspace:
 
         self.session().refuse_open_trial("learning")
         demonstrations = self.demonstrations
-        fitted = make_generator(generator).fit(demonstrations, seed=seed, progress=progress)
+        made = make_generator(generator)
+        made.check_savable()
+        fitted = made.fit(demonstrations, seed=seed, progress=progress)
         data = {
             "model": self.store.save_model(fitted),
             "generator": generator,
@@ -302,10 +303,11 @@ class Workspace:
         with executing_lock(self.folder) as lock:
             session = self.session()
             trial = session.trial(number)
-            verdict = self.gate(self.plan(trial).actions)
-            if verdict is not None:
-                verdict.require()
-            session.begin_execution(number, command)
+            if trial.stage is Stage.ASKED:
+                verdict = self.gate(self.plan(trial).actions)
+                if verdict is not None:
+                    verdict.require()
+            session.begin_execution(number, command)  # refuses every other stage
             plan_file = PlanFile(self.plan_path(trial), trial.kept["plan_sha256"])
             try:
                 result = run_command(command, plan_file, time_limit=time_limit, keep_open=(lock,))
@@ -314,6 +316,11 @@ class Workspace:
                 raise
             session.end_execution(number, result.as_json())
         return result
+
+    def _in_use(self) -> tuple[str, str]:
+        """The model and the demonstrations of now."""
+        training = self.log.training
+        return "" if training is None else training.model, self.log.demonstrations or ""
 
     def _generator(self, own: str | None) -> Generator:
         """The model in use."""
@@ -339,6 +346,7 @@ class Workspace:
         """The adapter that a goal was set with."""
         from prior_reinforce.adapters import make_adapter
 
+        choice = choice or "gp"
         name, _ = parse_choice(choice)
         if (name if ":" in name else None) != own:
             remedy = "drop --adapter, or set the goal again"
