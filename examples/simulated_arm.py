@@ -5,7 +5,7 @@
 It knows nothing of workspaces: it gets a plan file (NPZ with t, q, dq, ddq), lets the simulated
 Panda throw the ball with the disturbances of a real arm, and says where the ball came down as an
 operator at the table would, in words and to half a centimetre. `--call FILE` writes the same words
-to a file, so that they can be told without being typed.
+to a file, so that they can be told without being typed; a lost ball leaves no such file.
 """
 
 from __future__ import annotations
@@ -33,6 +33,8 @@ def main() -> int:
     options = parser.parse_args()
 
     task = pr.make_task(options.task)
+    if options.call is not None:  # the last throw's call is not this one's
+        options.call.unlink(missing_ok=True)
     rollout = throw(task, options.plan, options.seed)
     if not rollout.valid:
         print("the ball never came down at the hoop's height: void this trial")

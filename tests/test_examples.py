@@ -212,3 +212,13 @@ def test_the_arm_calls_where_the_ball_came_down(printed, tmp_path):
     error = pr.from_words(called.read_text(), 2)
     np.testing.assert_allclose(error, [0.2, -0.1], atol=0.03)
     assert called.read_text().strip() in text
+
+
+def test_a_lost_ball_leaves_no_call_of_an_earlier_throw(printed, tmp_path, monkeypatch):
+    called = tmp_path / "called.txt"
+    called.write_text("hit\n")
+    arm = importlib.import_module("simulated_arm")
+    monkeypatch.setattr(arm, "throw", lambda *_: Rollout(outcome=np.zeros(2), valid=False))
+    status, _ = printed("simulated_arm", "plan.npz", "--goal", "1", "0", "--call", str(called))
+    assert status == 1
+    assert not called.exists()

@@ -45,10 +45,23 @@ def mirrored():
     return {str(path.with_name(path.stem.removeprefix("test_"))) for path in found}
 
 
+def mirror(name):
+    """The test file of a module."""
+    return f"tests/{Path(name).with_name(f'test_{Path(name).name}.py')}"
+
+
 def test_every_module_has_its_test_file():
     untested = {name for name in modules() - mirrored() if Path(name).name != "init"}
-    assert untested == set(TESTED_ELSEWHERE)
+    missing, stale = untested - set(TESTED_ELSEWHERE), set(TESTED_ELSEWHERE) - untested
+    assert not missing, f"write {', '.join(map(mirror, sorted(missing)))}"
+    assert not stale, f"take out of TESTED_ELSEWHERE: {', '.join(sorted(stale))}"
 
 
 def test_every_test_file_has_its_module():
-    assert mirrored() - modules() == set(OF_THE_WHOLE)
+    alone = mirrored() - modules()
+    orphans, gone = alone - set(OF_THE_WHOLE), set(OF_THE_WHOLE) - alone
+    assert not orphans, (
+        f"{', '.join(map(mirror, sorted(orphans)))}: rename after a module, or say in OF_THE_WHOLE "
+        "what it is about"
+    )
+    assert not gone, f"write {', '.join(map(mirror, sorted(gone)))}, or take out of OF_THE_WHOLE"

@@ -44,6 +44,9 @@ def test_a_plan_can_be_put_elsewhere_trial_by_trial(run, folder, tmp_path):
     assert (status, out) == (2, "")
     assert "plan-1.csv is there already" in err
     assert "{trial}" in err
+    (tmp_path / "plan-3.csv").touch()
+    _, _, err = run("ask", folder, "--out", "plan-{trial}.csv")
+    assert err.endswith("choose another name\n")
     assert events_in(folder) == before
 
 

@@ -108,9 +108,10 @@ class Ask:
         check_plan_path(out, rate=self.rate)
         # The open trial's plan may be there from the last time it was asked for.
         if trial is None and out.exists():
+            hint = ', for instance with the trial\'s number: --out "plan-{trial}.npz"'
             raise FileFormatError(
-                f"{out} is there already, and plans are never overwritten; choose another name, "
-                'for instance with the trial\'s number: --out "plan-{trial}.npz"'
+                f"{out} is there already, and plans are never overwritten; choose another name"
+                + ("" if "{trial}" in str(self.out) else hint)
             )
 
     def _execute(self, workspace: Workspace, number: int, command: str) -> int:

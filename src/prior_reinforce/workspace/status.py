@@ -113,7 +113,13 @@ def _say_goal(workspace: Workspace, session: Session, goal: Goal, n: int) -> str
     told = [trial for trial in session.trials if trial.stage is Stage.TOLD]
     hits = [count for count, trial in enumerate(told, start=1) if trial.hit]
     if hits:
-        return f"{place}: reached, N = {n} demonstrations + {hits[0]} trials = {n + hits[0]}"
+        total = f"N = {n} demonstrations + {hits[0]} = {n + hits[0]}"
+        return f"{place}: reached in {_say_count(hits[0])} ({total})"
     carried = ", with earlier goals' trials" if goal.carry_over else ""
-    trials = "1 trial" if len(told) == 1 else f"{len(told)} trials"
-    return f"{place}: not reached yet, {trials} told; adapter {goal.adapter}{carried}"
+    return (
+        f"{place}: not reached yet, {_say_count(len(told))} told; adapter {goal.adapter}{carried}"
+    )
+
+
+def _say_count(trials: int) -> str:
+    return "1 trial" if trials == 1 else f"{trials} trials"
