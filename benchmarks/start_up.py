@@ -58,7 +58,9 @@ def main() -> None:
             taken["goal"].append(timed(*CLI, "goal", str(folder), "0.9", "0.05"))
             taken["ask"].append(timed(*CLI, "ask", str(folder)))
             taken["status"].append(timed(*CLI, "status", str(folder)))
-            taken["tell"].append(timed(*CLI, "tell", str(folder), str(number), "--error", "5cm long"))
+            taken["tell"].append(
+                timed(*CLI, "tell", str(folder), str(number), "--error", "5cm long")
+            )
     base = statistics.median(taken["import"])
     print(f"import numpy, scipy: {base * 1000:.0f} ms (median of {repeats})")
     for name, seconds in list(taken.items())[1:]:
