@@ -1,4 +1,4 @@
-"""How long `tell`, `status` and `goal` take, beside `python -c "import numpy, scipy"` in the same run.
+"""How long small commands take, beside `python -c "import numpy, scipy"` in the same run.
 
     python benchmarks/start_up.py
 
@@ -26,7 +26,7 @@ BASE = (sys.executable, "-c", "import numpy, scipy")
 
 def make_workspace(folder: Path) -> None:
     """Four planar throws, and a model of them."""
-    flags = "--action-names a b --dt 0.02 --robot none".split()
+    flags = ["--action-names", "a", "b", "--dt", "0.02", "--robot", "none"]
     subprocess.run([*CLI, "new", str(folder), *flags], check=True, capture_output=True)
     outcomes = np.array([[0.8, -0.2], [0.8, 0.2], [1.0, -0.2], [1.0, 0.2]])
     swing = np.sin(np.linspace(0, np.pi / 2, 24)) ** 2

@@ -98,3 +98,14 @@ def test_truth_is_shown_close_up_beside_what_was_seen():
         if line.get_color() == "white"
     ]
     np.testing.assert_allclose(places, [[-9.0, 96.0]])  # across y, up x, in [cm]
+
+
+def test_a_true_landing_beyond_what_was_seen_is_shown_and_a_lost_ball_moves_nothing():
+    goal = np.array([0.92, -0.10])
+    beyond, lost = np.add(goal, [-0.075, 0.01]), np.add(goal, [3.0, 0.0])
+    (near,) = draw_close_up(told([-0.05, 0.0], outcomes=(beyond,))).axes
+    low, high = near.get_ybound()
+    assert low < 100 * beyond[0] < high
+    (plain,) = draw_close_up(told([-0.05, 0.0])).axes
+    (far,) = draw_close_up(told([-0.05, 0.0], outcomes=(lost,))).axes
+    assert far.get_ybound() == plain.get_ybound()

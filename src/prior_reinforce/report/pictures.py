@@ -11,7 +11,7 @@ from matplotlib.legend_handler import HandlerTuple
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from prior_reinforce.arrays import Point
+from prior_reinforce.arrays import Point, Points
 from prior_reinforce.report.panels import Panel, views_of
 from prior_reinforce.report.record import AdaptationRecord, Box
 from prior_reinforce.report.style import (
@@ -70,6 +70,7 @@ def draw_close_up(record: AdaptationRecord, *, aims: bool = False) -> Figure:
     """Draw where each trial was seen to land, or, on the same scale, where it was aimed."""
     seen = [record.goal, *(point for point in record.landings if point is not None)]
     seen += [trial.condition for trial in record.trials]
+    seen += _near(np.stack(seen), record.true_outcomes)
     n_rows = 1 + len(record.trials)
     figure, panels = _panels(record, seen, margin=0.14, least=3, n_rows=n_rows)
     for panel in panels:
@@ -77,6 +78,12 @@ def draw_close_up(record: AdaptationRecord, *, aims: bool = False) -> Figure:
         panel.draw_goal(record)
         panel.draw_trials(record, aims=aims, with_truth=not aims)
     return figure
+
+
+def _near(seen: Points, truths: Sequence[Point | None]) -> list[Point]:
+    """The true outcomes that can be shown without making all else small, as a lost ball's would."""
+    middle, size = (seen.min(axis=0) + seen.max(axis=0)) / 2, np.ptp(seen, axis=0).max()
+    return [r for r in truths if r is not None and np.abs(r - middle).max() <= size]
 
 
 def _panels(
