@@ -1,12 +1,14 @@
 """Members by name: choices with settings, one's own, and what is wrong with a choice."""
 
 import hashlib
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
 import pytest
 
 from prior_reinforce.errors import ConfigurationError
+from prior_reinforce.generators import make_generator
+from prior_reinforce.generators.diffusion import DiffusionConfig
 from prior_reinforce.registry import Member, Registry, build, parse_choice, source_digest
 
 
@@ -164,3 +166,25 @@ def test_plain_settings_are_read_by_their_annotations():
     assert SAILS.make(f"{__name__}:Optional,memory=none").memory is None
     with pytest.raises(ConfigurationError, match="gain"):
         SAILS.make(f"{__name__}:Optional,gain=none")
+
+
+@dataclass(frozen=True)
+class WovenConfig:
+    threads: tuple[int, ...] = (4, 4)
+    angles: tuple[float, float] | None = None
+    reef: Reef = field(default_factory=lambda: Reef(points=7))
+
+
+def test_tuples_and_parts_can_be_written_in_a_choice():
+    _, settings = parse_choice("woven,threads=8:16:8,angles=0.5:1e-3")
+    assert build(WovenConfig, settings) == WovenConfig((8, 16, 8), (0.5, 1e-3))
+    _, settings = parse_choice("woven,reef.points=2,angles=none")
+    assert build(WovenConfig, settings) == WovenConfig(reef=Reef(2))
+    with pytest.raises(ConfigurationError, match=r"no setting 'sail\.points'"):
+        build(WovenConfig, {"sail.points": "2"})
+
+
+def test_a_part_of_a_network_leaves_the_rest_as_it_is_set():
+    made = make_generator("diffusion,network.widths=8:16,timing=none")
+    laptop = DiffusionConfig().network
+    assert made.config.network == replace(laptop, widths=(8, 16))

@@ -6,7 +6,7 @@ by its module, so that a list of names imports none of them.
 
 A class with settings takes a `config`, a frozen dataclass that its `config_type` names; one without
 may take plain arguments. A choice is written `name`, or `name,setting=value,...`: `gp`,
-`gp,memory_size=none`, `my_module:MyAdapter,gain=0.5`.
+`gp,memory_size=none`, `diffusion,network.widths=64:128`, `my_module:MyAdapter,gain=0.5`.
 """
 
 from __future__ import annotations
@@ -15,10 +15,11 @@ import hashlib
 import importlib.util
 import inspect
 import pkgutil
+import typing
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, is_dataclass
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, TypeVar, cast
 
 from prior_reinforce.errors import ConfigurationError
 
@@ -161,17 +162,36 @@ def build(config: type[Any], settings: Mapping[str, Any], choice: str = "") -> A
     """
     import msgspec
 
-    unknown = set(settings) - {f for f in config.__dataclass_fields__}
+    fields = config.__dataclass_fields__
+    unknown = [key for key in settings if key.partition(".")[0] not in fields]
     if unknown:
         raise ConfigurationError(
-            f"{choice or config.__name__} has no setting {sorted(unknown)[0]!r}; it has "
-            f"{', '.join(config.__dataclass_fields__)}"
+            f"{choice or config.__name__} has no setting {unknown[0]!r}; it has {', '.join(fields)}"
         )
-    plain = {k: None if v in ("none", "None") else v for k, v in settings.items()}
     try:
-        return msgspec.convert(plain, config, strict=False)
+        return msgspec.convert(_plain(config, settings), config, strict=False)
     except msgspec.ValidationError as error:
         raise ConfigurationError(f"{choice or config.__name__}: {error}") from error
+
+
+def _plain(config: type[Any], settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings as msgspec takes them: `none`, `64:128` for a tuple, `network.kernel` for a part."""
+    hints = typing.get_type_hints(config)
+    plain: dict[str, Any] = {}
+    for key, value in settings.items():
+        outer, _, inner = key.partition(".")
+        hint = hints[outer]
+        kinds: list[Any] = [typing.get_origin(each) for each in (hint, *typing.get_args(hint))]
+        if inner and is_dataclass(hint):
+            whole = plain[outer] if outer in plain else asdict(getattr(config(), outer))
+            plain[outer] = {**whole, **_plain(cast(type[Any], hint), {inner: value})}
+        elif value in ("none", "None"):
+            plain[outer] = None
+        elif isinstance(value, str) and tuple in kinds:
+            plain[outer] = value.split(":")
+        else:
+            plain[key] = value
+    return plain
 
 
 def source_digest(choice: str) -> str:
@@ -210,8 +230,6 @@ def _checked_names(
     kind: type[Any], settings: Mapping[str, Any], takes: Mapping[str, Any], choice: str
 ) -> dict[str, Any]:
     """Plain arguments of a constructor, read from text by their annotations."""
-    import typing
-
     import msgspec
 
     hints = typing.get_type_hints(kind.__init__)

@@ -110,7 +110,8 @@ class WorkspaceLog:
                     data["model"],
                     sha256,
                     data.get("fitted_to_sha256", sha256),
-                    data.get("generator", "diffusion"),  # the first journals knew no other
+                    data.get("generator", "diffusion")  # the first journals knew no other
+                    + (",timing=align" if data.get("fitted_to_sha256", sha256) != sha256 else ""),
                     tuple(data.get("remarks", ())),
                 )
         return trainings
