@@ -67,7 +67,7 @@ def test_settings_of_a_choice():
         ("nearest,timing=late", "late"),
         ("nearest,speed=3", "speed"),
         ("diffusion,training_steps=0", "training_steps"),
-        ("prior_reinforce.tasks:make_task", "not a Generator"),
+        ("prior_reinforce.tasks:make_task", "must derive from"),
     ],
 )
 def test_a_choice_that_cannot_be_made_is_named(choice, named):
