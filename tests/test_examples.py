@@ -97,7 +97,7 @@ def test_own_task_and_generator_run_by_name(tmp_path, capsys):
     ("flag", "name", "message"),
     [
         ("--task", "toss", "no task 'toss'; known are basketball-v1"),
-        ("--task", "own_task:Tos", "cannot import own_task:Tos: .*no attribute 'Tos'"),
+        ("--task", "own_task:Tos", "cannot find own_task:Tos: .*no attribute 'Tos'"),
         ("--task", "own_adapter:RidgeAdapter", "must derive from prior_reinforce.tasks.base.Task"),
         ("--generator", "neural", "no generator 'neural'; known are diffusion"),
     ],
