@@ -59,7 +59,7 @@ def load_learned(
         ) from error
     if record.demonstrations_sha256 != demonstrations.sha256:
         raise ConfigurationError(
-            f"the model in {folder} was learned from other demonstrations; learn anew with "
+            f"the model in {folder} was learned from other demonstrations; learn again with "
             "prior-reinforce learn, or name what it was learned from with --demonstrations"
         )
     return load_generator(folder, own=own_class(generator))
