@@ -1,3 +1,4 @@
+import itertools
 import os
 import warnings
 
@@ -10,6 +11,7 @@ from sklearn.gaussian_process.kernels import RBF, ConstantKernel
 from prior_reinforce.adapters.gaussian_process import GaussianProcessAdapter, GaussianProcessConfig
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
+from prior_reinforce.tasks import make_task
 
 DATA_SETS = int(os.environ.get("DATA_SETS", "50"))  # docs/decisions-adapter.md: 200
 REGION = np.array([[0.80, -0.25], [1.05, 0.25]])
@@ -118,6 +120,52 @@ def test_first_condition_is_the_goal(seed):
     assert max(np.linalg.norm(adapter.propose(goal) - goal) for goal in outside) < 0.001
 
 
+def largest_miss_between(outcomes: np.ndarray, units: tuple[str, ...] = ()) -> float:
+    """How far first conditions are from goals among the outcomes, in their spreads."""
+    adapter = GaussianProcessAdapter()
+    adapter.start(demonstrations(outcomes, units))
+    weights = np.random.default_rng(0).dirichlet(np.ones(len(outcomes)), size=8)
+    missed = [adapter.propose(goal) - goal for goal in weights @ outcomes]
+    return float(np.abs(missed / adapter._normalisation.scale).max())
+
+
+@pytest.mark.parametrize("prior_set", ["A", "B"])
+@pytest.mark.parametrize("task", ["basketball-v1", "curling", "fishing"])
+def test_the_first_condition_is_the_goal_for_every_subset_of_a_prior_set(task, prior_set):
+    outcomes = make_task(task).demonstrations(prior_set).outcomes_seen
+    for n in range(2, len(outcomes) + 1):
+        for subset in itertools.combinations(range(len(outcomes)), n):
+            assert largest_miss_between(outcomes[list(subset)]) < 0.02, subset
+
+
+@pytest.mark.parametrize("k", [1, 2, 3])
+@pytest.mark.parametrize("n", [2, 3, 4, 5, 6, 8])
+def test_the_first_condition_is_the_goal_however_few_demonstrations_there_are(n, k):
+    for seed in range(10):
+        outcomes = np.random.default_rng([k, n, seed]).uniform(size=(n, k)) * [0.5, 9.0, 0.4][:k]
+        assert largest_miss_between(outcomes, ("m", "s", "m")[:k]) < 0.02, seed
+
+
+def test_few_demonstrations_are_joined_by_points_of_the_convention_by_hand():
+    outcomes = np.array([[0.7, 0.0], [1.1, 0.2]])  # spread sqrt((0.04 + 0.01) / 2)
+    adapter = GaussianProcessAdapter()
+    adapter.start(demonstrations(outcomes))
+    around = 2 * np.sqrt(0.025) * np.array([[1, 0], [0, 1], [-1, 0], [0, -1]])
+    expected = np.vstack([outcomes, np.array([0.9, 0.1]) + around])
+    np.testing.assert_allclose(adapter._normalisation.undo(adapter.memory_outcomes_), expected)
+    np.testing.assert_array_equal(adapter.memory_conditions_, adapter.memory_outcomes_)
+
+
+def test_two_demonstrations_are_enough_to_follow_an_offset():
+    adapter = GaussianProcessAdapter()
+    adapter.start(demonstrations(np.array([[0.8, -0.2], [1.0, 0.2]])))
+    goal, offset = np.array([0.95, -0.05]), np.array([0.03, -0.02])
+    for _ in range(4):
+        condition = adapter.propose(goal)
+        adapter.observe(condition, condition + offset)
+    assert np.linalg.norm(adapter.propose(goal) + offset - goal) < 0.005
+
+
 def test_far_outside_a_condition_returns_to_the_demonstrations_mean():
     outcomes = spread_over_region(0)
     adapter = GaussianProcessAdapter()
@@ -155,13 +203,13 @@ def test_the_demonstrations_are_trusted_as_far_as_trials_obey_them_by_hand():
         GaussianProcessConfig(trial_jitter=0.5, demonstration_jitter_bounds=(1e-2, 0.4))
     )
     adapter.start(demonstrations(outcomes))
-    assert adapter.jitter_.tolist() == [1e-2] * 4
+    assert adapter.jitter_.tolist() == [1e-2] * 8  # four join them
     adapter.observe(np.array([0.02, 0.0]), np.array([0.06, 0.02]))  # (0.4, 0.2) spreads away
-    np.testing.assert_allclose(adapter.jitter_, [0.1] * 4 + [0.5])
+    np.testing.assert_allclose(adapter.jitter_, [0.1] * 8 + [0.5])
     adapter.observe(np.array([0.0, 0.0]), np.array([0.0, 0.0]))
-    np.testing.assert_allclose(adapter.jitter_, [0.05] * 4 + [0.5] * 2)
+    np.testing.assert_allclose(adapter.jitter_, [0.05] * 8 + [0.5] * 2)
     adapter.observe(np.array([0.0, 0.0]), np.array([3.0, 0.0]))  # lost
-    np.testing.assert_allclose(adapter.jitter_, [0.4] * 4 + [0.5] * 2)
+    np.testing.assert_allclose(adapter.jitter_, [0.4] * 8 + [0.5] * 2)
 
 
 def test_what_was_forgotten_leaves_no_trace():

@@ -19,6 +19,12 @@ from prior_reinforce.plans.motions import Demonstrations
 # Below this, the rounding of a kernel matrix of amplitude 1e5 comes near the diagonal term, and
 # the likelihood loses its fifth decimal.
 _LEAST_JITTER = 1e-6
+_CONVENTION_DISTANCE = 2.0
+"""How far from the demonstrations' mean c = r is added where they are too few, in their spreads
+(ours): of 1, 1.5 and 2 the one that took fewest trials (docs/decisions-adapter.md)."""
+_CONVENTION_ERROR = 0.02
+"""By how much the first condition may miss a goal between demonstrations before that is done, in
+their spreads (ours): 3 mm where 0.25 m x 0.5 m can be reached."""
 
 
 @dataclass(frozen=True)
@@ -83,9 +89,15 @@ class GaussianProcessAdapter(Adapter):
     hyperparameters of greatest marginal likelihood, found exactly instead of by 50 restarts.
 
     With nothing but demonstrations the fit is close to the identity: inside their hull, the first
-    condition is the goal to about a millimetre. Outside, the correction seen in trials fades over a
-    length scale, and beyond several of them a condition returns to the demonstrations' mean, which
-    is the prior: goals there need demonstrations, not trials.
+    condition is the goal to about a millimetre. That takes enough of them: of two or three points,
+    a kernel that calls them unrelated is likelier than one that sees the identity, and the first
+    condition would be up to half a metre off. So where it is off between demonstrations, they are
+    joined by 2k points around their mean at which c = r as well: that a condition is its outcome is
+    a convention everywhere, and trials show how far it holds.
+
+    Outside, the correction seen in trials fades over a length scale, and beyond several of them a
+    condition returns to the demonstrations' mean, which is the prior: goals there need
+    demonstrations, not trials.
 
     After `start` and every `observe`, what was fitted can be read as in scikit-learn:
     `GaussianProcessRegressor(ConstantKernel() * RBF(), alpha=jitter_).fit(memory_outcomes_,
@@ -104,7 +116,8 @@ class GaussianProcessAdapter(Adapter):
     jitter_: Float[np.ndarray, " n"]
     """What is added to the diagonal; scikit-learn's `alpha`."""
     memory_outcomes_: Points
-    """Perceived outcomes in normalised units: demonstrations, then trials by age."""
+    """Perceived outcomes in normalised units: demonstrations and what joins them where they are
+    few, then trials by age."""
     memory_conditions_: Points
     """Their conditions in normalised units."""
 
@@ -119,6 +132,11 @@ class GaussianProcessAdapter(Adapter):
         # observation does not bias the adapter for good.
         self._trials: deque[tuple[Point, Point]] = deque(maxlen=self.config.memory_size)
         self._refit()
+        if self._strays_between_demonstrations():
+            axes = _CONVENTION_DISTANCE * np.eye(demonstrations.outcome_dim)
+            around = self._normalisation.undo(np.vstack([axes, -axes]))
+            self._demonstrated = np.vstack([self._demonstrated, around])
+            self._refit()
 
     def _observe(self, condition: Point, outcome_seen: Point) -> None:
         self._trials.append((condition, outcome_seen))
@@ -129,6 +147,15 @@ class GaussianProcessAdapter(Adapter):
         goal = self._normalisation.apply(goal_seen)[None, :]
         mean = self._kernel(goal, self.memory_outcomes_) @ self._weights
         return self._normalisation.undo(mean[0])
+
+    def _strays_between_demonstrations(self) -> bool:
+        """Whether the first condition is off on the way from one of them to another."""
+        own = self.memory_outcomes_
+        i, j = np.nonzero(~np.eye(len(own), dtype=bool))
+        # Half-way alone says nothing of two points: there symmetry makes it right.
+        goals = np.vstack([(1 - share) * own[i] + share * own[j] for share in (0.25, 0.5)])
+        off = self._kernel(goals, own) @ self._weights - goals
+        return bool(np.abs(off).max() > _CONVENTION_ERROR)
 
     def _refit(self) -> None:
         conditions, outcomes = (

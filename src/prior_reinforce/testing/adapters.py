@@ -68,13 +68,17 @@ class AdapterContract:
         np.testing.assert_array_equal(used.propose(_goal(k)), fresh.propose(_goal(k)))
 
     @each_k
+    @pytest.mark.parametrize("n", [2, 3, 4, 5, 6, 8])
     def test_the_first_condition_is_the_goal_to_within_a_hundredth_of_the_region(
-        self, k: int
+        self, n: int, k: int
     ) -> None:
-        outcomes = _demonstrations(k).outcomes_seen
-        goal = outcomes.mean(axis=0)
-        off = np.abs(self._started(k).propose(goal) - goal)
-        assert np.all(off < 0.01 * np.ptp(outcomes, axis=0))
+        demonstrations = synthetic_demonstrations(n, k=k)
+        adapter = self.make()
+        adapter.start(demonstrations)
+        outcomes = demonstrations.outcomes_seen
+        for goal in (outcomes.mean(axis=0), 0.75 * outcomes[0] + 0.25 * outcomes[1]):
+            off = np.abs(adapter.propose(goal) - goal)
+            assert np.all(off < 0.01 * np.ptp(outcomes, axis=0))
 
     def test_before_start_it_says_what_to_call(self) -> None:
         with pytest.raises(NotFittedError, match=r"start\(demonstrations\)"):
