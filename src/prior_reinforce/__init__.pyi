@@ -10,6 +10,7 @@ from .errors import ConfigurationError as ConfigurationError
 from .errors import PerceptionFailedError as PerceptionFailedError
 from .errors import PriorReinforceError as PriorReinforceError
 from .errors import RenderingUnavailableError as RenderingUnavailableError
+from .errors import UnclearUnitsError as UnclearUnitsError
 from .experiments.learned import load_learned as load_learned
 from .experiments.protocol import GoalTrials as GoalTrials
 from .experiments.protocol import perceive_demonstrations as perceive_demonstrations
@@ -38,6 +39,7 @@ from .importing.importer import ImportResult as ImportResult
 from .importing.importer import import_demonstrations as import_demonstrations
 from .importing.importer import read_recordings as read_recordings
 from .importing.preprocessing import Preprocessing as Preprocessing
+from .importing.recording import HowToRead as HowToRead
 from .perception import make_perception as make_perception
 from .perception.amplified import Amplified as Amplified
 from .perception.base import Perception as Perception

@@ -29,6 +29,18 @@ class ConfigurationError(PriorReinforceError, ValueError):
     """A setting outside its range, or settings that contradict each other."""
 
 
+class UnclearUnitsError(ConfigurationError):
+    """Recorded units or times are not said and cannot be what they would be taken for.
+
+    `options` are the command-line options that say they are what they look like.
+    """
+
+    def __init__(self, message: str, options: str = "") -> None:
+        """Keep the options beside the message."""
+        self.options = options
+        super().__init__(message)
+
+
 class FileFormatError(PriorReinforceError, ValueError):
     """A file that is missing, truncated, or not of the format its name promises."""
 

@@ -1,6 +1,9 @@
 """`import`, from the first command on."""
 
-from tests.workspace.planar import recordings
+import numpy as np
+
+from prior_reinforce.workspace.workspace import Workspace
+from tests.workspace.planar import demonstrations, recordings
 
 NEW = (
     "--action-names", "joint1", "joint2", "--dt", "0.02", "--robot", "none",
@@ -22,3 +25,37 @@ def test_new_import_learn_and_what_comes_next(run, tmp_path, monkeypatch):
     status, out, _ = run("learn", "hoop", "--generator", small)
     assert status == 0
     assert "next: prior-reinforce goal hoop X Y" in out
+
+
+def in_milliseconds_and_degrees(folder):
+    """Recordings that do not say so."""
+    recordings(folder)
+    for i, plan in enumerate(demonstrations().plans):
+        t = np.arange(len(plan)) * 20
+        np.savez(folder / f"throw_{i}.npz", t=t, q=np.rad2deg(plan))
+
+
+def test_what_is_unclear_is_taken_only_when_said(run, folder, tmp_path):
+    in_milliseconds_and_degrees(tmp_path / "odd")
+    before = sorted((tmp_path / "planar").rglob("*"))
+    status, _, err = run("import", folder, "odd")
+    assert status == 2
+    options = "--time-unit ms --units deg"
+    assert err.rstrip().endswith(f"if so, add: {options}")
+    assert sorted((tmp_path / "planar").rglob("*")) == before
+    assert run("import", folder, "odd", "--no-trim", *options.split())[0] == 0
+    with Workspace(folder) as workspace:
+        np.testing.assert_allclose(workspace.demonstrations.plans, demonstrations().plans)
+
+
+def test_or_agreed_to_at_a_terminal(run, folder, tmp_path, monkeypatch):
+    in_milliseconds_and_degrees(tmp_path / "odd")
+    monkeypatch.setattr("sys.stdin.isatty", lambda: True)
+    answers = iter(["no", "yes"])
+    monkeypatch.setattr("builtins.input", lambda question: next(answers))
+    assert run("import", folder, "odd", "--no-trim")[0] == 2
+    status, out, _ = run("import", folder, "odd", "--no-trim")
+    assert status == 0
+    assert "joint1 [rad, recorded in deg]" in out
+    with Workspace(folder) as workspace:
+        np.testing.assert_allclose(workspace.demonstrations.plans, demonstrations().plans)

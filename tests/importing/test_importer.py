@@ -17,6 +17,7 @@ from prior_reinforce.errors import (
     InvalidDemonstrationsError,
     MissingExtraError,
     PriorReinforceError,
+    UnclearUnitsError,
 )
 from prior_reinforce.importing import (
     Recording,
@@ -165,6 +166,59 @@ def test_the_originals_are_good(originals, name):
 def test_the_rate_is_checked(originals, rate):
     with pytest.raises(PriorReinforceError, match="positive number of frames a second"):
         read_recordings(originals["npz"], rate=rate)
+
+
+def test_an_option_that_has_no_use_is_refused(originals):
+    with pytest.raises(ConfigurationError, match="--key q has no use for csv; drop it"):
+        read_recordings(originals["csv"], key="q")
+    with pytest.raises(ConfigurationError, match="--time-unit ms is of a column of times"):
+        read_recordings(originals["robomimic"] / "demos.hdf5", time_unit="ms")
+    with pytest.raises(ConfigurationError, match="time-unit must be one of s, ms"):
+        read_recordings(originals["csv"], time_unit="minutes")
+    for name, says in {
+        "npz": "t in s says 50 Hz",
+        "csv": "t in s says 50 Hz",
+        "droid": "in ms says 14.93 Hz",
+        "mcap": "header stamps in ns says 20 Hz",
+    }.items():
+        with pytest.raises(ConfigurationError, match=f"--rate 1000, but .*{says}; drop --rate"):
+            read_recordings(originals[name], rate=1000)
+
+
+def test_milliseconds_that_nobody_names_are_refused_until_said(tmp_path):
+    for i in range(N):
+        t, q = sampled(i, 100)
+        table = np.column_stack([1000 * t, q])
+        header = ",".join(["t", *JOINTS])
+        np.savetxt(tmp_path / f"{i}.csv", table, delimiter=",", header=header, comments="")
+    write_outcomes(tmp_path)
+    with pytest.raises(UnclearUnitsError, match=r"in ms 100 Hz .* add: --time-unit ms$"):
+        read_recordings(tmp_path)
+    with pytest.raises(ConfigurationError, match="drop --rate, say the unit with --time-unit"):
+        read_recordings(tmp_path, rate=50)
+    for said in ({"time_unit": "ms"}, {"take_guesses": True}):
+        assert read_recordings(tmp_path, **said)[0].times[-1] == pytest.approx(1.7)
+
+
+def test_all_that_is_unclear_is_said_at_once(tmp_path):
+    """Milliseconds, degrees and missing outcomes: one message, not three."""
+    for i in range(N):
+        t, q = sampled(i, 100)
+        np.savez(tmp_path / f"{i}.npz", t=1000 * t, q=np.rad2deg(q))
+    with pytest.raises(UnclearUnitsError) as caught:
+        import_demonstrations(tmp_path)
+    assert "add: --time-unit ms --units deg; and no outcomes for episodes" in str(caught.value)
+
+
+def test_episodes_are_left_out_by_name(originals):
+    names = [r.episode for r in read_recordings(originals["csv"], leave_out=["1", "4"])]
+    assert names == ["0", "2", "3", "5"]
+    result = import_demonstrations(originals["csv"], leave_out=["1"])
+    assert result.demonstrations.n == N - 1
+    with pytest.raises(InvalidDemonstrationsError, match=r"no episode 9 .* it has 0, 1, 2"):
+        read_recordings(originals["csv"], leave_out=["9"])
+    with pytest.raises(InvalidDemonstrationsError, match="no episode is left"):
+        read_recordings(originals["csv"], episodes=["1"], leave_out=["1"])
 
 
 damage = given(

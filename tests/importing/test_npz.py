@@ -65,7 +65,7 @@ def test_pickled_objects_are_never_loaded(tmp_path):
         ({"q": np.zeros((5, 2))}, "give the rate"),
         ({"angles": np.zeros((5, 2)), "dt": 0.01}, r"no array q .* it holds \['angles', 'dt'\]"),
         ({"q": np.zeros(5), "dt": 0.01}, r"expected numbers of shape \(T, D\)"),
-        ({"q": np.zeros((5, 2)), "t": np.zeros(4)}, "has times"),
+        ({"q": np.zeros((5, 2)), "t": np.zeros(4)}, "has 5 frames, but t of shape"),
         ({"q": np.zeros((5, 2)), "t": np.zeros(5)}, "time does not increase at frame 1"),
         ({"q": np.zeros((5, 2)), "t": np.full(5, np.nan)}, "time is nan at frame 0"),
         ({"q": np.zeros((5, 2)), "dt": np.zeros(3)}, "times t, or dt, or rate"),

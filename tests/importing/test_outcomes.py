@@ -7,6 +7,7 @@ from prior_reinforce.errors import (
     ConfigurationError,
     FileFormatError,
     InvalidDemonstrationsError,
+    UnclearUnitsError,
 )
 from prior_reinforce.importing import import_demonstrations
 from prior_reinforce.importing.outcomes import read_outcomes
@@ -54,10 +55,33 @@ def test_given_numbers(recording):
 
 
 def test_centimetres_in_a_columns_name_are_converted(tmp_path):
-    path = table(tmp_path, "episode,x_cm,y_mm,z_m,t,source\n0,92,-50,0.3,1.5,tape\n")
+    path = table(tmp_path, "episode,x_cm,y [mm],z_m,t,source,comment\n0,92,-50,0.3,1.5,tape,ok\n")
     outcomes = read_outcomes(path)
     assert outcomes.names == ("x", "y", "z", "t")
     np.testing.assert_allclose(outcomes.values["0"], (0.92, -0.05, 0.3, 1.5))
+    assert outcomes.units == ("m", "m", "m", None)
+
+
+def test_centimetres_that_nobody_names_are_refused_until_said(recording, tmp_path):
+    cm = {name: (100 * x, 100 * y) for name, (x, y) in OUTCOMES.items()}
+    path = write_outcomes(tmp_path, cm)
+    with pytest.raises(UnclearUnitsError, match=r"x in outcomes.csv reaches 105, too far for m: "):
+        import_demonstrations(recording, outcomes=path)
+    for said in ({"outcome_unit": "cm"}, {"take_guesses": True}):
+        result = import_demonstrations(recording, outcomes=path, **said)
+        np.testing.assert_allclose(result.demonstrations.outcomes_seen, list(OUTCOMES.values()))
+    named = table(tmp_path, path.read_text().replace("x,y", "x_cm,y_cm"))
+    with pytest.raises(ConfigurationError, match="--outcome-unit cm has no use"):
+        import_demonstrations(recording, outcomes=named, outcome_unit="cm")
+
+
+def test_an_angle_is_converted_to_the_unit_of_the_outcome(recording, tmp_path):
+    text = "\n".join(["episode,angle_deg", *(f"{i},{10 * i + 1}" for i in range(6))])
+    path = table(tmp_path, text)
+    kept = import_demonstrations(recording, outcomes=path, outcome_units=["deg"]).demonstrations
+    np.testing.assert_allclose(kept.outcomes_seen[:, 0], 10 * np.arange(6) + 1)
+    radians = import_demonstrations(recording, outcomes=path, outcome_units=["rad"]).demonstrations
+    np.testing.assert_allclose(radians.outcomes_seen[:, 0], np.deg2rad(10 * np.arange(6) + 1))
 
 
 def test_columns_in_another_order_are_matched_by_name(recording, tmp_path):

@@ -5,11 +5,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
+from prior_reinforce.errors import (
+    ConfigurationError,
+    InvalidDemonstrationsError,
+    UnclearUnitsError,
+)
 from prior_reinforce.importing import import_demonstrations
 from prior_reinforce.importing.preprocessing import Preprocessing, preprocess
 from prior_reinforce.importing.recording import Recording
 from tests.importing.recorded import (
+    AS_IS,
     BEFORE,
     OUTCOMES,
     SWING,
@@ -214,6 +219,53 @@ def test_joints_are_picked_renamed_and_converted(tmp_path):
     assert result.format.units == ("rad", "rad")
     np.testing.assert_allclose(result.plans[..., 0], np.deg2rad(plain.demonstrations.plans[..., 5]))
     np.testing.assert_array_equal(result.plans[..., 1], plain.demonstrations.plans[..., 3])
+
+
+def degrees(folder):
+    """Six throws in degrees, nothing saying so."""
+    for i in range(N):
+        t, q = sampled(i, 100)
+        np.savez(folder / f"throw_{i}.npz", t=t, q=np.rad2deg(q))
+    write_outcomes(folder)
+    return folder
+
+
+def test_degrees_that_nobody_names_are_refused_until_said(tmp_path):
+    folder = degrees(tmp_path)
+    with pytest.raises(UnclearUnitsError) as caught:
+        import_demonstrations(folder)
+    assert "joint1 to joint7 in rad would reach 167.6 (joint6 of throw_5)" in str(caught.value)
+    assert caught.value.options == "--units deg"
+    for said in ({"units": ["deg"]}, {"take_guesses": True}):
+        plans = import_demonstrations(folder, preprocessing=AS_IS, **said).demonstrations.plans
+        np.testing.assert_allclose(plans[0, :171], sampled(0, 100)[1], atol=1e-12)
+
+
+def test_plans_may_be_in_degrees(tmp_path):
+    units = ("deg",) * 7
+    result = import_demonstrations(
+        degrees(tmp_path), units=["deg"], plan_units=units, preprocessing=AS_IS
+    )
+    assert result.demonstrations.format.units == units
+    np.testing.assert_allclose(
+        result.demonstrations.plans[0, :171], np.rad2deg(sampled(0, 100)[1]), atol=1e-12
+    )
+    with pytest.raises(ConfigurationError, match="recorded in cm, but plans are in deg"):
+        import_demonstrations(tmp_path, units=["cm"], plan_units=units)
+
+
+def test_a_unit_in_a_channels_name_is_converted_and_may_not_be_contradicted(tmp_path):
+    names = [f"j{i}_deg" for i in range(7)]
+    for i in range(N):
+        t, q = sampled(i, 100)
+        np.savez(tmp_path / f"{i}.npz", t=t, q=np.rad2deg(q), joint_names=names)
+    write_outcomes(tmp_path)
+    result = import_demonstrations(tmp_path, preprocessing=AS_IS)
+    assert result.demonstrations.format.names == tuple(f"j{i}" for i in range(7))
+    assert "j0 [rad, recorded in deg]" in result.preview.text
+    np.testing.assert_allclose(result.demonstrations.plans[0, :171], sampled(0, 100)[1], atol=1e-12)
+    with pytest.raises(ConfigurationError, match="j0 of episode 0 is in deg, but --units says rad"):
+        import_demonstrations(tmp_path, units=["rad"])
 
 
 def test_joints_that_do_not_fit(folder):

@@ -6,7 +6,6 @@ import pytest
 from prior_reinforce.errors import FileFormatError, InvalidDemonstrationsError
 from prior_reinforce.importing import Recording, read_recordings
 from prior_reinforce.importing.recording import (
-    evenly,
     files_at,
     has_files,
     named_damage,
@@ -68,7 +67,18 @@ def test_damage_keeps_the_librarys_first_words_and_named_errors(tmp_path):
         raise InvalidDemonstrationsError("named already")
 
 
-def test_frames_without_times_need_a_rate():
-    np.testing.assert_allclose(evenly(3, 20.0, "a"), [0, 0.05, 0.1])
-    with pytest.raises(FileFormatError, match="episode a holds neither times nor a rate"):
-        evenly(3, None, "a")
+def test_frames_that_were_recorded_twice_count_once_and_others_at_one_time_are_an_error():
+    times = [0, 0.1, 0.1, 0.1, 0.2]
+    recording = Recording("a", times, [[0], [1], [1], [1], [2]])
+    np.testing.assert_allclose(recording.times, [0, 0.1, 0.2])
+    assert recording.remarks == ("a: 2 frames were recorded twice; once is kept",)
+    with pytest.raises(InvalidDemonstrationsError, match="time does not increase at frame 2"):
+        Recording("a", times, [[0], [1], [3], [3], [2]])
+
+
+def test_units_in_the_names_are_taken_out_of_them():
+    recording = Recording("a", [0, 1], np.zeros((2, 3)), ("x_cm", "q0 [deg]", "grip"))
+    assert recording.names == ("x", "q0", "grip")
+    assert recording.units == ("cm", "deg", None)
+    both = Recording("a", [0, 1], np.zeros((2, 2)), ("x_cm", "x_mm"))
+    assert both.names == ("x_cm", "x_mm")

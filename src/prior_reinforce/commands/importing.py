@@ -6,15 +6,18 @@ import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import tyro
 
 from prior_reinforce.commands.outcome_questions import ask_for_outcomes, keep_typed
 from prior_reinforce.commands.workspace import Folder, print_next
+from prior_reinforce.errors import UnclearUnitsError
 from prior_reinforce.files import named_disk_errors
 from prior_reinforce.importing import (
     FORMATS,
+    HowToRead,
+    ImportResult,
     Preprocessing,
     import_demonstrations,
     read_recordings,
@@ -40,18 +43,25 @@ class Import:
     outcomes: Path | None = None
     """CSV `episode,x,y` with where each object landed; if not given, `outcomes.csv` beside the
     source, and what it lacks is asked for on a terminal."""
+    outcome_unit: Literal["m", "cm", "mm", "rad", "deg"] | None = None
+    """Unit of the outcomes in that table, where its columns do not say it (`x_cm`)."""
     key: str | None = None
     """Where the motion is within the source (HDF5 data set, topic, column)."""
     rate: float | None = None
-    """Frames a second, where the source does not say."""
+    """Frames a second, where the source has no times."""
+    time_unit: Literal["s", "ms", "us", "ns", "frame"] | None = None
+    """Unit of the recorded times, where their name does not say it (`t_ms`); `frame` for a column
+    that counts frames."""
     episodes: tuple[str, ...] | None = None
     """Episodes to keep, in order; all if not given."""
+    leave_out: tuple[str, ...] | None = None
+    """Episodes to leave out."""
     joints: tuple[str, ...] | None = None
     """Recorded names of the channels to keep, in order; the manifest's action names if
     not given."""
     units: tuple[str, ...] | None = None
-    """Recorded units of those channels, `deg` is converted; a single one holds for all; the
-    manifest's if not given."""
+    """Recorded units of those channels: rad, deg, m, cm, mm; a single one holds for all. If not
+    given, what the source says, and the manifest's where it says nothing."""
     horizon: int | None = None
     """Frames of every plan; the longest recording's if not given."""
     trim: bool = True
@@ -60,25 +70,13 @@ class Import:
     def run(self) -> None:
         """Read, preview, take in."""
         with Workspace(self.folder) as workspace:
-            manifest = workspace.manifest
             workspace.session().refuse_open_trial("importing demonstrations")
-            names = manifest.format.names
-            result = import_demonstrations(
-                self.source,
-                format=self.format,
-                key=self.key,
-                rate=self.rate,
-                episodes=self.episodes,
-                outcomes=self._outcomes(workspace),
-                outcome_names=manifest.outcome_names,
-                outcome_units=manifest.outcome_units,
-                joints=self.joints or names,
-                names=names,
-                units=self._units(manifest.format.units),
-                preprocessing=Preprocessing(
-                    dt=manifest.format.dt, horizon=self.horizon, trim=self.trim
-                ),
-            )
+            try:
+                result = self._read(workspace, take_guesses=False)
+            except UnclearUnitsError as unclear:
+                if not _agrees(unclear):
+                    raise
+                result = self._read(workspace, take_guesses=True)
             workspace.import_demonstrations(result.demonstrations, str(self.source))
             print(result.preview.text)
             with named_disk_errors(self.folder):
@@ -86,26 +84,56 @@ class Import:
             print(f"picture: {self.folder / _PICTURE}  (look at it before you learn)")
             print_next(workspace)
 
-    def _units(self, of_manifest: tuple[str, ...]) -> tuple[str, ...]:
-        if self.units is None:
-            return of_manifest
-        return self.units * len(of_manifest) if len(self.units) == 1 else self.units
-
-    def _outcomes(self, workspace: Workspace) -> Path | Mapping[str, tuple[float, ...]] | None:
-        """What was given; on a terminal, with what a person types for the rest."""
-        if not sys.stdin.isatty():
-            return self.outcomes
-        recordings = read_recordings(
+    def _read(self, workspace: Workspace, *, take_guesses: bool) -> ImportResult:
+        manifest = workspace.manifest
+        return import_demonstrations(
             self.source,
+            outcomes=self._outcomes(workspace, take_guesses),
+            outcome_names=manifest.outcome_names,
+            outcome_units=manifest.outcome_units,
+            outcome_unit=self.outcome_unit,
+            names=manifest.format.names,
+            units=self.units,
+            plan_units=manifest.format.units,
+            preprocessing=Preprocessing(
+                dt=manifest.format.dt, horizon=self.horizon, trim=self.trim
+            ),
+            take_guesses=take_guesses,
+            **self._how(workspace),
+        )
+
+    def _how(self, workspace: Workspace) -> HowToRead:
+        return HowToRead(
             format=self.format,
             key=self.key,
             rate=self.rate,
+            time_unit=self.time_unit,
             episodes=self.episodes,
+            leave_out=self.leave_out,
             joints=self.joints or workspace.manifest.format.names,
         )
+
+    def _outcomes(
+        self, workspace: Workspace, take_guesses: bool
+    ) -> Path | Mapping[str, tuple[float, ...]] | None:
+        """What was given; on a terminal, with what a person types for the rest."""
+        if not sys.stdin.isatty():
+            return self.outcomes
+        recordings = read_recordings(self.source, take_guesses=take_guesses, **self._how(workspace))
         typed = ask_for_outcomes(self.source, self.outcomes, recordings, workspace.manifest)
         if not typed:
             return self.outcomes
         kept = keep_typed(workspace.folder, typed, workspace.manifest.outcome_names)
         print(f"outcomes kept in {kept}; to import again: --outcomes {kept}")
         return kept
+
+
+def _agrees(unclear: UnclearUnitsError) -> bool:
+    """Whether a person at the terminal says that it is as it looks."""
+    if not (sys.stdin.isatty() and unclear.options):
+        return False
+    print(unclear)
+    try:
+        return input("is it so? (yes/no) ").strip().lower() in {"y", "yes"}
+    except EOFError:
+        return False

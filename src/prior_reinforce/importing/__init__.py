@@ -8,10 +8,11 @@ from prior_reinforce.importing.importer import (
 )
 from prior_reinforce.importing.preprocessing import Preprocessing
 from prior_reinforce.importing.preview import Preview
-from prior_reinforce.importing.recording import Recording
+from prior_reinforce.importing.recording import HowToRead, Recording
 
 __all__ = [
     "FORMATS",
+    "HowToRead",
     "ImportResult",
     "Preprocessing",
     "Preview",

@@ -1,7 +1,7 @@
 """Recordings in CSV: a file an episode, or one file with a column `episode`.
 
-The first line names the columns: `t` (or `time`, `timestamp`) in [s], `episode` if the file holds
-several, and the channels.
+The first line names the columns: `t` (or `time`, `timestamp`, with a unit as in `t_ms`), `episode`
+if the file holds several, and the channels.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from prior_reinforce.errors import FileFormatError
 from prior_reinforce.importing.recording import (
     ReadOptions,
     Recording,
-    evenly,
     files_at,
     named_damage,
     natural_order,
 )
+from prior_reinforce.importing.units import SECONDS, split_unit
 
 _TIME_COLUMNS = ("t", "time", "timestamp")
 Rows = list[tuple[int, list[str]]]
@@ -71,7 +71,8 @@ def read_table(path: Path) -> tuple[list[str], Rows]:
 def _episode(
     path: Path, episode: str, header: list[str], rows: Rows, options: ReadOptions
 ) -> Recording:
-    time = next((i for i, name in enumerate(header) if name.lower() in _TIME_COLUMNS), None)
+    bare = [split_unit(name, SECONDS)[0].lower() for name in header]
+    time = next((i for i, name in enumerate(bare) if name in _TIME_COLUMNS), None)
     channels = [i for i, name in enumerate(header) if i != time and name != "episode"]
     if options.joints and set(options.joints) <= set(header):
         # Only these need to be numbers; a log may carry text beside them.
@@ -87,9 +88,10 @@ def _episode(
             ) from None
 
     positions = np.array([[number(*row, column) for column in channels] for row in rows])
-    times = (
-        evenly(len(rows), options.rate, episode)
-        if time is None
-        else np.array([number(*row, time) for row in rows])
+    stamps = None if time is None else np.array([number(*row, time) for row in rows])
+    name = "" if time is None else header[time]
+    clock = options.clock(episode, len(rows), stamps=stamps, name=name)
+    names = tuple(header[i] for i in channels)
+    return Recording(
+        episode, clock.times, positions, names, clock=clock.source, doubts=clock.doubts
     )
-    return Recording(episode, times, positions, tuple(header[i] for i in channels))

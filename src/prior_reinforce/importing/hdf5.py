@@ -17,7 +17,6 @@ from prior_reinforce.importing.recording import (
     Positions,
     ReadOptions,
     Recording,
-    evenly,
     files_at,
     has_files,
     named_damage,
@@ -65,7 +64,7 @@ def read_robomimic(source: Path, options: ReadOptions) -> list[Recording]:
                 "its format"
             )
         data = file["data"]
-        rate = options.rate or _control_rate(data)
+        rate = _control_rate(data)
         for episode in filter(options.wants, sorted(data, key=natural_order)):
             positions = _array(path, data[episode], key, f"data/{episode}")
             declared = data[episode].attrs.get("num_samples")
@@ -74,8 +73,8 @@ def read_robomimic(source: Path, options: ReadOptions) -> list[Recording]:
                     f"{path}: {episode} declares {int(declared)} samples but {key} holds "
                     f"{len(positions)}; copy the file again, or leave that episode out"
                 )
-            times = evenly(len(positions), rate, episode)
-            recordings.append(Recording(episode, times, positions))
+            clock = options.clock(episode, len(positions), name="control_freq", own_rate=rate)
+            recordings.append(Recording(episode, clock.times, positions, clock=clock.source))
     return recordings
 
 
@@ -94,11 +93,14 @@ def read_droid(source: Path, options: ReadOptions) -> list[Recording]:
         with named_damage(path, "DROID HDF5"), h5py.File(path, "r") as file:
             positions = _array(path, file, options.key or _DROID_KEY, "the file")
             stamps = next((name for name in _DROID_TIMES_MS if name in file), None)
-            if options.rate is None and stamps is not None:
-                times = np.asarray(file[stamps][()], dtype=np.float64) / 1000.0
-            else:
-                times = evenly(len(positions), options.rate, episode)
-            recordings.append(Recording(episode, times, positions))
+            clock = options.clock(
+                episode,
+                len(positions),
+                stamps=None if stamps is None else np.asarray(file[stamps][()]),
+                name=stamps or "",
+                unit="ms",
+            )
+            recordings.append(Recording(episode, clock.times, positions, clock=clock.source))
     return recordings
 
 

@@ -10,8 +10,10 @@ import math
 import os
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+
+from typing_extensions import Unpack
 
 from prior_reinforce.errors import (
     ConfigurationError,
@@ -20,10 +22,12 @@ from prior_reinforce.errors import (
     MissingExtraError,
 )
 from prior_reinforce.importing import csv, hdf5, lerobot, npz, ros, zarr
-from prior_reinforce.importing.outcomes import find_outcomes, in_order, outcomes_of
+from prior_reinforce.importing.clock import TIME_UNITS
+from prior_reinforce.importing.outcomes import find_outcomes, in_order, in_units, outcomes_of
 from prior_reinforce.importing.preprocessing import Preprocessing, preprocess, select
 from prior_reinforce.importing.preview import Preview
-from prior_reinforce.importing.recording import ReadOptions, Recording, has_files
+from prior_reinforce.importing.recording import HowToRead, ReadOptions, Recording, has_files
+from prior_reinforce.importing.units import Doubt, refuse_doubts
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 
 
@@ -38,13 +42,15 @@ class Format:
     """Optional library that reading needs, by the name of its module."""
     extra: str = ""
     """Extra of this package that installs it."""
+    key: bool = True
+    """Whether `key` says anything of this format."""
     whole: bool = False
     """A folder laid out like this is this format, whatever else lies in it."""
 
 
 FORMATS: Mapping[str, Format] = {
     "npz": Format(npz.read, lambda source: has_files(source, (".npz",))),
-    "csv": Format(csv.read, lambda source: has_files(source, (".csv",))),
+    "csv": Format(csv.read, lambda source: has_files(source, (".csv",)), key=False),
     "lerobot": Format(lerobot.read, lerobot.recognises, "pyarrow.parquet", "lerobot", whole=True),
     "robomimic": Format(hdf5.read_robomimic, hdf5.is_robomimic, "h5py", "hdf5"),
     "droid": Format(hdf5.read_droid, hdf5.is_droid, "h5py", "hdf5"),
@@ -70,52 +76,61 @@ class ImportResult:
 def import_demonstrations(
     source: str | os.PathLike[str],
     *,
-    format: str | None = None,
-    key: str | None = None,
-    rate: float | None = None,
-    episodes: Sequence[str] | None = None,
     outcomes: str | os.PathLike[str] | Mapping[str, Sequence[float]] | None = None,
     outcome_names: Sequence[str] | None = None,
     outcome_units: Sequence[str] | None = None,
-    joints: Sequence[str] | None = None,
+    outcome_unit: str | None = None,
     names: Sequence[str] | None = None,
     units: Sequence[str] | None = None,
+    plan_units: Sequence[str] | None = None,
     preprocessing: Preprocessing | None = None,
+    take_guesses: bool = False,
+    **how: Unpack[HowToRead],
 ) -> ImportResult:
     """Read, join with the outcomes, select joints, trim, resample, and preview.
 
     Args:
-        source: As in `read_recordings`, and so are the next four.
-        format: See there.
-        key: See there.
-        rate: See there.
-        episodes: See there.
+        source: As in `read_recordings`.
         outcomes: Where each demonstration's object landed: a CSV `episode,x,y[,z]`, or numbers by
             episode name. None takes `outcomes.csv` beside or inside the source.
         outcome_names: Names of the k components, in order, matched to the CSV's columns; None
             takes those as they stand.
         outcome_units: Unit of each component; None is metres.
-        joints: Recorded names to keep, in the plan's order; None keeps all as recorded. Where the
-            file names nothing, they name its columns in order.
-        names: What to call them in the plan format; None keeps the recorded names.
-        units: Recorded unit of each kept joint (`deg` is converted); None is radians.
+        outcome_unit: Unit in which a table holds those whose columns name none (`x_cm` does); None
+            is the component's own, and an error where nothing could land there.
+        names: What to call the joints in the plan format; None keeps the recorded names.
+        units: Recorded unit of each kept joint, or one for all: `rad`, `deg`, `m`, `cm`, `mm`, or
+            any other word. None takes what the recording says, and the plan's unit where it says
+            nothing; where no arm could be in that unit, that is an error.
+        plan_units: Unit of each joint in the plan; None is radians for angles, metres for lengths.
         preprocessing: Time step, horizon and trimming; None takes the defaults.
+        take_guesses: Take units and times as they look, where that would be an error.
+        how: As in `read_recordings`.
 
     Raises:
         FileFormatError: As in `read_recordings`, or a damaged `outcomes.csv`.
         InvalidDemonstrationsError: Missing outcomes or joints (named), or demonstrations that
             cannot be learned from.
+        UnclearUnitsError: Units or times that nobody said and that cannot be what they would be
+            taken for; the message has the options that say what they look like.
         ConfigurationError: Settings that contradict each other.
         MissingExtraError: The format's optional library is not installed.
     """
     source = Path(source)
-    kind = format or detect_format(source)
-    recordings = read_recordings(
-        source, format=kind, key=key, rate=rate, episodes=episodes, joints=joints
-    )
-    known = in_order(find_outcomes(source, recordings, outcomes), outcome_names)
-    outcomes_seen = outcomes_of(recordings, known, partial=episodes is not None)
-    kept = select(recordings, joints, names, units)
+    recordings, kind = _read(source, how)
+    kept = select(recordings, how.get("joints"), names, units, plan_units)
+    doubts = [] if take_guesses else [*_doubts_of(recordings), *kept.doubts]
+    try:
+        known = in_order(find_outcomes(source, recordings, outcomes), outcome_names)
+    except InvalidDemonstrationsError as missing:
+        refuse_doubts(doubts, also=str(missing))
+        raise
+    if not isinstance(outcomes, Mapping):
+        known, guessed = in_units(known, outcome_units, outcome_unit)
+        doubts += [] if take_guesses else guessed
+    refuse_doubts(doubts)
+    partial = how.get("episodes") is not None or how.get("leave_out") is not None
+    outcomes_seen = outcomes_of(recordings, known, partial=partial)
     done = preprocess(kept.recordings, kept.units, preprocessing or Preprocessing())
     demonstrations = Demonstrations(
         done.plans,
@@ -124,71 +139,91 @@ def import_demonstrations(
         tuple(outcome_names) if outcome_names is not None else known.names,
         tuple(outcome_units) if outcome_units is not None else (),
     )
-    preview = Preview(f"{source.name} ({kind})", kept.recordings, done, demonstrations, known.where)
+    preview = Preview(f"{source.name} ({kind})", kept, done, demonstrations, known.where)
     return ImportResult(demonstrations, preview.episodes, preview)
 
 
 def read_recordings(
-    source: str | os.PathLike[str],
-    *,
-    format: str | None = None,
-    key: str | None = None,
-    rate: float | None = None,
-    episodes: Sequence[str] | None = None,
-    joints: Sequence[str] | None = None,
+    source: str | os.PathLike[str], *, take_guesses: bool = False, **how: Unpack[HowToRead]
 ) -> list[Recording]:
     """Read every episode as it was recorded, for instance to ask for each one's outcome.
 
     Args:
         source: A file, or the folder that holds the recording.
-        format: What it is, a name of `FORMATS`; None detects it.
-        key: Where the motion is: the array of an NPZ, the column of a LeRobot data set, the path
-            of an HDF5 data set inside an episode, or the topic of a bag. None takes the only
-            candidate.
-        rate: Frames a second, for files that hold neither times nor a rate.
-        episodes: Names of the episodes to keep, in order; None keeps all.
-        joints: Recorded names that will be kept, so that the rest need not be there in every
-            message of a bag, nor be numbers in a CSV; None reads everything.
+        take_guesses: Take times as they look, where that would be an error.
+        how: What is said of the recordings; each as in `HowToRead`.
 
     Raises:
-        ConfigurationError: An unknown format, or a rate that is not positive.
+        ConfigurationError: An unknown format, an option that the format has no use for, or one
+            that contradicts the recording.
+        UnclearUnitsError: The unit of the times is not said, and they cannot be seconds.
         FileFormatError: Missing, truncated, of another format, or ambiguous without `key`.
         InvalidDemonstrationsError: An episode that cannot be used, or one asked for that is not
             there.
         MissingExtraError: The format's optional library is not installed.
     """
-    source = Path(source)
-    kind = format or detect_format(source)
+    recordings, _ = _read(Path(source), how)
+    if not take_guesses:
+        refuse_doubts(_doubts_of(recordings))
+    return recordings
+
+
+def _read(source: Path, how: HowToRead) -> tuple[list[Recording], str]:
+    """The recordings, their times perhaps guessed, and their format."""
+    kind = how.get("format") or detect_format(source)
     if kind not in FORMATS:
         raise ConfigurationError(f"unknown format {kind!r}; give one of {', '.join(FORMATS)}")
     if not source.exists():
         raise FileFormatError(f"no recording at {source}; give the path of a file or a folder")
+    rate, unit = how.get("rate"), how.get("time_unit")
     if rate is not None and not (math.isfinite(rate) and rate > 0):
         raise ConfigurationError(f"rate must be a positive number of frames a second, got {rate}")
-    _need(FORMATS[kind])
-    read, kept = FORMATS[kind].read, None if joints is None else tuple(joints)
-    wanted = None if episodes is None else tuple(map(str, episodes))
-    found = read(source, ReadOptions(key, rate, wanted, kept))
+    if unit is not None and unit not in TIME_UNITS:
+        raise ConfigurationError(f"time-unit must be one of {', '.join(TIME_UNITS)}, got {unit!r}")
+    format = FORMATS[kind]
+    if how.get("key") is not None and not format.key:
+        raise ConfigurationError(f"--key {how['key']} has no use for {kind}; drop it")
+    _need(format)
+    joints, wanted = how.get("joints"), how.get("episodes")
+    options = ReadOptions(
+        how.get("key"),
+        rate,
+        unit,
+        None if wanted is None else tuple(map(str, wanted)),
+        None if joints is None else tuple(joints),
+    )
+    return _chosen(source, kind, options, tuple(map(str, how.get("leave_out") or ()))), kind
+
+
+def _chosen(
+    source: Path, kind: str, options: ReadOptions, leave_out: tuple[str, ...]
+) -> list[Recording]:
+    """The episodes that were asked for, in order."""
+    read, wanted = FORMATS[kind].read, options.episodes
+    found = read(source, options)
     by_name = {recording.episode: recording for recording in found}
     twice = sorted(name for name, n in Counter(r.episode for r in found).items() if n > 1)
     if twice:
         raise InvalidDemonstrationsError(
             f"{source} holds more than one episode named {', '.join(twice)}; rename their files"
         )
-    if wanted is None:
-        if not found:
-            raise FileFormatError(f"{source} holds no episode of format {kind}; say its format")
-        return found
-    missing = [episode for episode in wanted if episode not in by_name]
-    if missing or not wanted:
-        there = [
-            recording.episode for recording in read(source, ReadOptions(key, rate, None, kept))
-        ]
-        raise InvalidDemonstrationsError(
-            f"no episode {', '.join(missing) or 'named'} in {source}; it has "
-            f"{', '.join(there) or 'none'}"
-        )
-    return [by_name[episode] for episode in wanted]
+    if wanted is None and not found:
+        raise FileFormatError(f"{source} holds no episode of format {kind}; say its format")
+    there = tuple(by_name) if wanted is None else wanted
+    missing = [e for e in (*there, *leave_out) if e not in by_name]
+    kept = [episode for episode in there if episode not in leave_out]
+    if missing or not kept:
+        every = found if wanted is None else read(source, replace(options, episodes=None))
+        names = ", ".join(recording.episode for recording in every) or "none"
+        what = f"no episode {', '.join(missing)}" if missing else "no episode is left"
+        raise InvalidDemonstrationsError(f"{what} in {source}; it has {names}: name those")
+    return [by_name[episode] for episode in kept]
+
+
+def _doubts_of(recordings: Sequence[Recording]) -> list[Doubt]:
+    """One of each kind: the first episode's stands for all with the same remedy."""
+    by_option = {d.option: d for r in reversed(recordings) for d in r.doubts}
+    return list(by_option.values())
 
 
 def detect_format(source: Path) -> str:

@@ -33,7 +33,7 @@ def read(source: Path, options: ReadOptions) -> list[Recording]:
     with named_damage(info_path, "LeRobot's meta/info.json"):
         info = json.loads(info_path.read_text(encoding="utf-8"))
         features = dict(info["features"])
-        rate = options.rate or float(info["fps"])
+        rate = float(info["fps"])
         if not 0 < rate < 1e6:
             raise ValueError(f"fps is {rate}")
     key = _column(source, features, options.key)
@@ -53,7 +53,11 @@ def read(source: Path, options: ReadOptions) -> list[Recording]:
                 "data/; copy the data set again, or name only the other episodes"
             )
         names = _names(features[key], positions.shape[1])
-        recordings.append(Recording(str(episode), index / rate, positions, names, remarks=remarks))
+        clock = options.clock(str(episode), len(index), name="fps", own_rate=rate)
+        times = index * clock.period  # by their own numbers, since frames may be missing
+        recordings.append(
+            Recording(str(episode), times, positions, names, remarks=remarks, clock=clock.source)
+        )
     return recordings
 
 

@@ -13,14 +13,14 @@ from pathlib import Path
 import numpy as np
 
 from prior_reinforce.errors import FileFormatError
+from prior_reinforce.importing.clock import Clock
 from prior_reinforce.importing.recording import (
     ReadOptions,
     Recording,
-    Times,
-    evenly,
     files_at,
     named_damage,
 )
+from prior_reinforce.importing.units import SECONDS, split_unit
 
 Arrays = Mapping[str, np.ndarray]
 _MOTION_KEYS = ("q", "plans", "positions", "actions")
@@ -59,17 +59,23 @@ def _episodes(path: Path, options: ReadOptions) -> list[Recording]:
                 f"({len(motions)}, k)"
             )
     episodes = [path.stem] if single else [str(index) for index in range(len(motions))]
-    return [
-        Recording(
-            episode,
-            _times(path, arrays, motions.shape[1], index, options.rate, episode),
-            motions[index],
-            () if names is None else tuple(map(str, np.ravel(names))),
-            None if outcomes is None else outcomes[index],
+    recordings = []
+    for index, episode in enumerate(episodes):
+        if not (single or options.wants(episode)):
+            continue
+        clock = _clock(path, arrays, motions.shape[1], index, episode, options)
+        recordings.append(
+            Recording(
+                episode,
+                clock.times,
+                motions[index],
+                () if names is None else tuple(map(str, np.ravel(names))),
+                None if outcomes is None else outcomes[index],
+                clock=clock.source,
+                doubts=clock.doubts,
+            )
         )
-        for index, episode in enumerate(episodes)
-        if single or options.wants(episode)
-    ]
+    return recordings
 
 
 def _arrays(path: Path) -> Arrays:
@@ -92,15 +98,17 @@ def _first(arrays: Arrays, keys: Sequence[str]) -> np.ndarray | None:
     return next((arrays[key] for key in keys if key in arrays), None)
 
 
-def _times(
-    path: Path, arrays: Arrays, count: int, index: int, rate: float | None, episode: str
-) -> Times:
+def _clock(
+    path: Path, arrays: Arrays, count: int, index: int, episode: str, options: ReadOptions
+) -> Clock:
     with named_damage(path, "NPZ with times t, or dt, or rate"):
-        if "t" in arrays:
-            times = arrays["t"]
-            return np.asarray(times[index] if times.ndim == 2 else times, dtype=np.float64)
+        name = next((n for n in arrays if split_unit(n, SECONDS)[0] == "t"), None)
+        if name is not None:
+            stamps = arrays[name]
+            stamps = stamps[index] if stamps.ndim == 2 else stamps
+            return options.clock(episode, count, stamps=stamps, name=name)
         if "dt" in arrays:
-            return np.arange(count) * float(arrays["dt"])
+            return options.clock(episode, count, name="dt", own_rate=1 / float(arrays["dt"]))
         if "rate" in arrays:
-            rate = float(arrays["rate"])
-    return evenly(count, rate, episode)
+            return options.clock(episode, count, name="rate", own_rate=float(arrays["rate"]))
+    return options.clock(episode, count)

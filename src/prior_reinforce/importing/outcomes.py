@@ -1,7 +1,8 @@
 """Where each demonstration's object landed: no recording format says, so a table beside it does.
 
 `outcomes.csv` has a line of column names, `episode` among them; every other column is a component
-of the outcome, except `source` and `note`. A column `x_cm` or `x_mm` is converted to `x` in metres.
+of the outcome, except `source`, `note` and `comment`. A column `x_cm` or `x [mm]` is converted to
+`x` in metres, and an angle likewise to radians.
 """
 
 from __future__ import annotations
@@ -23,10 +24,17 @@ from prior_reinforce.errors import (
 )
 from prior_reinforce.importing.csv import read_table
 from prior_reinforce.importing.recording import Recording
+from prior_reinforce.importing.units import (
+    CHANNEL_UNITS,
+    Doubt,
+    base_of,
+    conversion,
+    guess_unit,
+    split_unit,
+)
 
 OUTCOMES_FILE = "outcomes.csv"
-_NOT_COMPONENTS = ("episode", "source", "note")
-_METRES = {"_m": 1.0, "_cm": 0.01, "_mm": 0.001}
+_NOT_COMPONENTS = ("episode", "source", "note", "notes", "comment", "comments")
 _REMEDY = f"write {OUTCOMES_FILE} with the columns episode,x,y beside the recording, or pass them"
 
 
@@ -39,7 +47,9 @@ class Outcomes:
     names: tuple[str, ...]
     """Names of the k components; empty where the source names none."""
     values: Mapping[str, tuple[float, ...]]
-    """k numbers by episode."""
+    """k numbers by episode; metres and radians where their unit is said."""
+    units: tuple[str | None, ...] = ()
+    """Unit of each component; None where the source says none."""
 
 
 def find_outcomes(
@@ -95,16 +105,18 @@ def read_outcomes(path: Path) -> Outcomes:
         raise FileFormatError(
             f"{path} begins with {','.join(header)!r}, expected column names such as episode,x,y"
         )
-    units = [_unit(header[i]) for i in columns]
+    split = [split_unit(header[i], CHANNEL_UNITS) for i in columns]
+    bases = [base_of(unit) if unit else (None, 1.0) for _, unit in split]
     values: dict[str, tuple[float, ...]] = {}
     for line, row in rows:
         episode, cells = row[header.index("episode")], [row[i] for i in columns]
         if episode in values:
             raise FileFormatError(f"{path}, line {line}: episode {episode} again; drop one of them")
         if any(cells):
-            pairs = zip(cells, units, strict=True)
+            pairs = zip(cells, bases, strict=True)
             values[episode] = tuple(_number(path, line, cell) * u[1] for cell, u in pairs)
-    return Outcomes(path.name, tuple(name for name, _ in units), values)
+    names, units = tuple(name for name, _ in split), tuple(unit for unit, _ in bases)
+    return Outcomes(path.name, names, values, units)
 
 
 def in_order(outcomes: Outcomes, names: Sequence[str] | None) -> Outcomes:
@@ -127,7 +139,55 @@ def in_order(outcomes: Outcomes, names: Sequence[str] | None) -> Outcomes:
         )
     order = [outcomes.names.index(name) for name in names]
     values = {name: tuple(v[i] for i in order) for name, v in outcomes.values.items()}
-    return Outcomes(outcomes.where, tuple(names), values)
+    units = tuple(outcomes.units[i] for i in order)
+    return Outcomes(outcomes.where, tuple(names), values, units)
+
+
+def in_units(
+    outcomes: Outcomes, wanted: Sequence[str] | None, given: str | None
+) -> tuple[Outcomes, tuple[Doubt, ...]]:
+    """Return the outcomes in the units that are wanted, and what is only guessed of them.
+
+    Args:
+        outcomes: Their components in order.
+        wanted: Unit of each; None is metres.
+        given: Unit of the components whose source says none; None takes the wanted one, or where
+            nothing could land there, the one it looks like.
+
+    Raises:
+        ConfigurationError: A component is in a unit that cannot be converted, or `given` has no
+            use.
+    """
+    k = max((len(value) for value in outcomes.values.values()), default=0)
+    said = outcomes.units or (None,) * k
+    wanted = (
+        tuple(wanted) if wanted is not None else tuple(base_of(unit or "m")[0] for unit in said)
+    )
+    if len(wanted) != k or len(said) != k:
+        return outcomes, ()  # another number of components: said when they are joined
+    if given is not None and None not in said:
+        raise ConfigurationError(
+            f"--outcome-unit {given} has no use, since {outcomes.where} says its units; drop it"
+        )
+    names = outcomes.names or tuple(map(str, range(1, k + 1)))
+    scale, doubts = [], []
+    for i, (name, own, unit) in enumerate(zip(names, said, wanted, strict=True)):
+        reach = max((abs(value[i]) for value in outcomes.values.values()), default=0.0)
+        recorded = own or given or guess_unit(unit, reach) or unit
+        if own is None and given is None and recorded != unit:
+            doubts.append(
+                Doubt(
+                    f"{name} in {outcomes.where} reaches {reach:.4g}, too far for {unit}: it looks "
+                    f"like {recorded}",
+                    f"--outcome-unit {recorded}",
+                )
+            )
+        scale.append(conversion(recorded, unit, f"{name} in {outcomes.where}"))
+    values = {
+        episode: tuple(v * s for v, s in zip(value, scale, strict=False))
+        for episode, value in outcomes.values.items()
+    }
+    return Outcomes(outcomes.where, outcomes.names, values, wanted), tuple(doubts)
 
 
 def outcomes_of(recordings: Sequence[Recording], outcomes: Outcomes, *, partial: bool) -> Points:
@@ -184,14 +244,6 @@ def _matched(episodes: list[str], names: list[str]) -> dict[str, str]:
         elif number >= 0 and numbers.count(number) == 1 and there.count(number) == 1:
             picked[episode] = names[there.index(number)]
     return picked
-
-
-def _unit(column: str) -> tuple[str, float]:
-    """A column's component, and what its numbers are multiplied with."""
-    for ending, metres in _METRES.items():
-        if column.endswith(ending):
-            return column.removesuffix(ending), metres
-    return column, 1.0
 
 
 def _number(path: Path, line: int, text: str) -> float:

@@ -7,10 +7,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from jaxtyping import Float
 
 from prior_reinforce.arrays import Frames, Plans, Point
 from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
 from prior_reinforce.importing.recording import Recording
+from prior_reinforce.importing.units import (
+    Doubt,
+    base_of,
+    conversion,
+    guess_unit,
+    known_unit,
+    say_names,
+)
 from prior_reinforce.plans.timing import ends_in_motion, moving_rows, still_bands
 
 _ON_GRID = 0.02
@@ -29,6 +38,11 @@ class Selection:
     recordings: tuple[Recording, ...]
     names: tuple[str, ...]
     units: tuple[str, ...]
+    """Of the plan's columns."""
+    recorded_units: tuple[str, ...]
+    """In which they were recorded."""
+    doubts: tuple[Doubt, ...] = ()
+    """Which of those are only guessed."""
 
 
 @dataclass(frozen=True)
@@ -82,6 +96,7 @@ def select(
     joints: Sequence[str] | None = None,
     names: Sequence[str] | None = None,
     units: Sequence[str] | None = None,
+    plan_units: Sequence[str] | None = None,
 ) -> Selection:
     """Pick, order, convert and rename the channels of every recording.
 
@@ -90,28 +105,89 @@ def select(
         joints: Recorded names to keep, in order; None keeps those of the first recording. They
             name the columns, in order, of recordings that name nothing.
         names: What to call them; None keeps the recorded names.
-        units: Recorded units; `deg` is converted to `rad`; None is radians.
+        units: Recorded units; a single one holds for all. None takes those that the recordings
+            say, and for others the plan's; where an arm could not be in that unit, it is guessed.
+        plan_units: Units of the plan; None takes radians for angles and metres for lengths, and
+            radians for what has no unit.
 
     Raises:
         InvalidDemonstrationsError: A joint that a recording lacks.
-        ConfigurationError: Another number of names or units than of joints.
+        ConfigurationError: Another number of names or units than of joints, or units that
+            contradict each other.
     """
     joints = tuple(joints) if joints is not None else recordings[0].names
     names = tuple(names) if names is not None else joints
-    units = tuple(units) if units is not None else ("rad",) * len(joints)
     if not joints or len(set(joints)) != len(joints):
         raise ConfigurationError(f"joints must be names that differ, got {list(joints)}")
-    if len(names) != len(joints) or len(units) != len(joints):
+    if units is not None and len(units) == 1:
+        units = (units[0],) * len(joints)
+    n_units = len(joints) if units is None else len(units)
+    if len(names) != len(joints) or n_units != len(joints):
         raise ConfigurationError(
             f"{len(joints)} joints need as many names and units, got {len(names)} names and "
-            f"{len(units)} units: {list(joints)}"
+            f"{n_units} units: {list(joints)}"
         )
-    scale = np.where([unit == "deg" for unit in units], np.pi / 180, 1.0)
-    picked = tuple(
-        replace(r, positions=r.positions[:, _columns(r, joints)] * scale, names=joints)
-        for r in recordings
+    columns = [_columns(recording, joints) for recording in recordings]
+    said = [
+        _said_unit(recordings, columns, i, None if units is None else units[i])
+        for i in range(len(joints))
+    ]
+    wanted = [
+        plan_units[i] if plan_units is not None else base_of(unit or "rad")[0]
+        for i, unit in enumerate(said)
+    ]
+    picked = [r.positions[:, c] for r, c in zip(recordings, columns, strict=True)]
+    recorded, doubts = _guess_units(recordings, picked, names, said, wanted)
+    scale = [conversion(r, w, n) for r, w, n in zip(recorded, wanted, names, strict=True)]
+    kept = tuple(
+        replace(r, positions=q * np.array(scale), names=joints, units=tuple(wanted))
+        for r, q in zip(recordings, picked, strict=True)
     )
-    return Selection(picked, names, tuple("rad" if unit == "deg" else unit for unit in units))
+    return Selection(kept, names, tuple(wanted), tuple(recorded), doubts)
+
+
+def _said_unit(
+    recordings: Sequence[Recording], columns: list[list[int]], index: int, given: str | None
+) -> str | None:
+    """Unit of a channel that was given or that its file says; None where neither does."""
+    given = given if given is None else known_unit(given) or given
+    for recording, column in zip(recordings, columns, strict=True):
+        own = recording.units[column[index]]
+        if own is not None and given not in (None, own):
+            raise ConfigurationError(
+                f"{recording.names[column[index]]} of episode {recording.episode} is in {own}, but "
+                f"--units says {given}; correct or drop it"
+            )
+        given = given or own
+    return given
+
+
+def _guess_units(
+    recordings: Sequence[Recording],
+    picked: Sequence[Float[np.ndarray, "_ D"]],
+    names: Sequence[str],
+    said: Sequence[str | None],
+    wanted: Sequence[str],
+) -> tuple[list[str], tuple[Doubt, ...]]:
+    """Unit of every channel: as said, as wanted where that is possible, else as it looks."""
+    recorded, whats = [unit or "" for unit in said], []
+    for base in dict.fromkeys(w for w, unit in zip(wanted, said, strict=True) if unit is None):
+        open_ = [i for i, unit in enumerate(said) if unit is None and wanted[i] == base]
+        reach = np.array([np.abs(q[:, open_]).max(axis=0) for q in picked])
+        episode, channel = divmod(int(np.argmax(reach)), len(open_))
+        most = float(reach[episode, channel])
+        looks = guess_unit(base, most)
+        if looks != base:
+            seen = f"it looks like {looks}" if looks else "and as degrees neither"
+            whats.append(
+                f"{say_names([names[i] for i in open_])} in {base} would reach {most:.4g} "
+                f"({names[open_[channel]]} of {recordings[episode].episode}), which no arm does: "
+                f"{seen}"
+            )
+        for i in open_:
+            recorded[i] = looks or base
+    shown = recorded[:1] if len(set(recorded)) == 1 else recorded
+    return recorded, tuple(Doubt(what, f"--units {' '.join(shown)}") for what in whats)
 
 
 def _columns(recording: Recording, joints: tuple[str, ...]) -> list[int]:

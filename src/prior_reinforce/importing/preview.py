@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int
 
-from prior_reinforce.importing.preprocessing import Preprocessed
+from prior_reinforce.importing.preprocessing import Preprocessed, Selection
 from prior_reinforce.importing.recording import Recording
 from prior_reinforce.plans.motions import Demonstrations
 
@@ -29,7 +29,7 @@ class Preview:
 
     source: str
     """What was read, with its format."""
-    recordings: tuple[Recording, ...]
+    kept: Selection
     """N recordings with the plan's channels."""
     done: Preprocessed
     """What became of them."""
@@ -37,6 +37,11 @@ class Preview:
     """The result."""
     outcomes_from: str
     """Where the outcomes are from."""
+
+    @property
+    def recordings(self) -> tuple[Recording, ...]:
+        """N recordings with the plan's channels."""
+        return self.kept.recordings
 
     @property
     def episodes(self) -> tuple[str, ...]:
@@ -58,7 +63,8 @@ class Preview:
             "episodes": f"{demos.n} from {self.source}: {', '.join(self.episodes)}",
             "rate": self._rate(),
             "channels": ", ".join(
-                f"{n} [{u}]" for n, u in zip(form.names, form.units, strict=True)
+                f"{n} [{u}]" if u == r else f"{n} [{u}, recorded in {r}]"
+                for n, u, r in zip(form.names, form.units, self.kept.recorded_units, strict=True)
             ),
             "still ends": self._trimming(),
             "length": self._length(),
@@ -97,7 +103,9 @@ class Preview:
     def _rate(self) -> str:
         recorded = _span((1 / recording.period for recording in self.recordings), ".4g")
         dt = self.done.dt
-        return f"recorded at {recorded} Hz, plans at {1 / dt:.4g} Hz (dt {dt:.4g} s)"
+        clocks = " and ".join(dict.fromkeys(r.clock for r in self.recordings if r.clock))
+        by = f" ({clocks})" if clocks else ""
+        return f"recorded at {recorded} Hz{by}, plans at {1 / dt:.4g} Hz (dt {dt:.4g} s)"
 
     def _trimming(self) -> str:
         before = self.done.starts

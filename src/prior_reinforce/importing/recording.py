@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TypedDict
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from prior_reinforce.arrays import Point
 from prior_reinforce.errors import (
@@ -17,25 +18,72 @@ from prior_reinforce.errors import (
     InvalidDemonstrationsError,
     PriorReinforceError,
 )
+from prior_reinforce.importing.clock import Clock, Stamps, Times, clock_of
+from prior_reinforce.importing.units import CHANNEL_UNITS, Doubt, split_unit
 
-Times = Float[np.ndarray, " T"]
-"""Of T frames, [s]."""
 Positions = Float[np.ndarray, "T D"]
 """D channels at T times, in their units."""
 
 
+class HowToRead(TypedDict, total=False):
+    """What may be said of recordings; an option that the format has no use for is refused."""
+
+    format: str | None
+    """What it is, a name of `FORMATS`; None detects it."""
+    key: str | None
+    """Where the motion is: the array of an NPZ, the column of a LeRobot data set, the path of an
+    HDF5 data set inside an episode, or the topic of a bag. None takes the only candidate."""
+    rate: float | None
+    """Frames a second, for files that hold no times; where they do, it must agree with them."""
+    time_unit: str | None
+    """Unit of the times, one of `s`, `ms`, `us`, `ns`, or `frame` for a column that counts frames.
+    None takes it from the column's name (`t_ms`); where none stands there and seconds are not
+    possible for an arm, that is an error."""
+    episodes: Sequence[str] | None
+    """Names of the episodes to keep, in order; None keeps all."""
+    leave_out: Sequence[str] | None
+    """Names of episodes to leave out of those."""
+    joints: Sequence[str] | None
+    """Recorded names to keep, in the plan's order, so that the rest need not be there in every
+    message of a bag, nor be numbers in a CSV. None keeps all. Where the file names nothing, they
+    name its columns in order."""
+
+
 @dataclass(frozen=True)
 class ReadOptions:
-    """What the reader of a format is asked for; each field as in `read_recordings`."""
+    """What the reader of a format is asked for; each field as in `HowToRead`."""
 
     key: str | None = None
     rate: float | None = None
+    time_unit: str | None = None
     episodes: tuple[str, ...] | None = None
     joints: tuple[str, ...] | None = None
 
     def wants(self, episode: str) -> bool:
         """Whether that episode was asked for."""
         return self.episodes is None or episode in self.episodes
+
+    def clock(
+        self,
+        episode: str,
+        count: int,
+        *,
+        stamps: Stamps | None = None,
+        name: str = "",
+        unit: str | None = None,
+        own_rate: float | None = None,
+    ) -> Clock:
+        """Return the times of an episode, as in `clock_of`, with what was said of them."""
+        return clock_of(
+            episode,
+            count,
+            stamps=stamps,
+            name=name,
+            unit=unit,
+            own_rate=own_rate,
+            rate=self.rate,
+            time_unit=self.time_unit,
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,11 +97,19 @@ class Recording:
     positions: Positions
     """What was recorded, in the recorder's units."""
     names: tuple[str, ...] = ()
-    """Names of the D channels, as recorded; `joint1`, `joint2`, ... where the file names none."""
+    """Names of the D channels, as recorded but without a unit that stands in them (`x_cm` is `x`);
+    `joint1`, `joint2`, ... where the file names none."""
     outcome: Point | None = None
     """Where the object landed, for the rare file that says so."""
     remarks: tuple[str, ...] = ()
     """What a person should know about how it was read."""
+    units: tuple[str | None, ...] = ()
+    """Unit of each channel that the file says; None where it says none. Empty takes those that
+    stand in the names."""
+    clock: str = ""
+    """Where the times are from, for a person: `t in ms`."""
+    doubts: tuple[Doubt, ...] = ()
+    """What is only guessed of the times."""
     named: bool = field(init=False)
     """Whether the file names the channels."""
 
@@ -74,6 +130,7 @@ class Recording:
             ) from error
         width = positions.shape[1] if positions.ndim == 2 else 0
         names = tuple(map(str, self.names)) or tuple(f"joint{i + 1}" for i in range(width))
+        names, units = _without_units(names) if not self.units else (names, tuple(self.units))
         fits = positions.shape == (times.size, len(names)) and len(names) > 0
         if times.ndim != 1 or not fits or times.size < 2:
             raise InvalidDemonstrationsError(
@@ -93,6 +150,11 @@ class Recording:
                 f"{episode}: {(*names, 'time')[column]} is {numbers[frame, column]} at frame "
                 f"{frame}, expected a finite number; mend or drop that episode"
             )
+        again = _repeated(times, positions)
+        if np.any(again) and not np.all(again[1:]):
+            times, positions = times[~again], positions[~again]
+            remark = f"{self.episode}: {again.sum()} frames were recorded twice; once is kept"
+            object.__setattr__(self, "remarks", (*self.remarks, remark))
         backward = np.flatnonzero(np.diff(times) <= 0)
         if backward.size:
             frame = int(backward[0]) + 1
@@ -107,6 +169,7 @@ class Recording:
         times.setflags(write=False)
         positions.setflags(write=False)
         object.__setattr__(self, "named", bool(self.names))
+        object.__setattr__(self, "units", units)
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "positions", positions)
         object.__setattr__(self, "names", names)
@@ -122,17 +185,21 @@ class Recording:
         return float(np.median(np.diff(self.times)))
 
 
-def evenly(count: int, rate: float | None, episode: str) -> Times:
-    """Return times of frames that a file does not time, from the given rate.
+def _repeated(times: Times, positions: Positions) -> Bool[np.ndarray, " T"]:
+    """Which frames repeat the one before, time and all.
 
-    Raises:
-        FileFormatError: No rate was given.
+    A second, different frame at one time is not among them: it is an error.
     """
-    if rate is None:
-        raise FileFormatError(
-            f"episode {episode} holds neither times nor a rate; give the rate in frames a second"
-        )
-    return np.arange(count) / rate
+    same = (np.diff(times) == 0) & np.all(np.diff(positions, axis=0) == 0, axis=1)
+    return np.concatenate([[False], same])
+
+
+def _without_units(names: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[str | None, ...]]:
+    """Names and the units that stood in them; where two would be one, all stay as they are."""
+    split = [split_unit(name, CHANNEL_UNITS) for name in names]
+    stripped = tuple(name for name, _ in split)
+    units = tuple(unit for _, unit in split)
+    return (stripped if len(set(stripped)) == len(set(names)) else names), units
 
 
 @contextmanager

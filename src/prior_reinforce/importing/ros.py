@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 
 from prior_reinforce.errors import FileFormatError
+from prior_reinforce.importing.clock import Times
 from prior_reinforce.importing.recording import (
     ReadOptions,
     Recording,
-    Times,
     has_suffix,
     named_damage,
     natural_order,
@@ -58,9 +58,11 @@ def read(source: Path, options: ReadOptions) -> list[Recording]:
             if not messages:
                 raise FileFormatError(f"{bag}: topic {connections[0].topic} has no messages")
             if kind == _STATE:
-                recordings.append(_states(bag, name, messages, options.joints))
+                recordings.append(_states(bag, name, messages, options))
             else:
-                recordings.extend(_trajectories(name, [message for _, message in messages]))
+                recordings.extend(
+                    _trajectories(name, [message for _, message in messages], options)
+                )
     return [recording for recording in recordings if options.wants(recording.episode)]
 
 
@@ -92,11 +94,11 @@ def _topic(bag: Path, reader: Any, key: str | None) -> tuple[list[Any], str]:
 
 
 def _states(
-    bag: Path, name: str, messages: list[tuple[int, Any]], joints: tuple[str, ...] | None
+    bag: Path, name: str, messages: list[tuple[int, Any]], options: ReadOptions
 ) -> Recording:
     """One episode of JointStates; messages that lack a wanted joint are another publisher's."""
     kinds = Counter(tuple(sorted(message.name)) for _, message in messages)
-    wanted = joints
+    wanted = options.joints
     if wanted is None:
         common = kinds.most_common(1)[0][0]
         wanted = next(tuple(m.name) for _, m in messages if tuple(sorted(m.name)) == common)
@@ -115,23 +117,22 @@ def _states(
     positions = np.array(rows, dtype=np.float64)
     stamps = [m.header.stamp.sec * 10**9 + m.header.stamp.nanosec for _, m in kept]
     if stamps[0] > 0 and stamps[-1] > stamps[0] and sorted(stamps) == stamps:
-        times = _seconds(stamps)
+        times, source = _since_first(stamps), "header stamps"
     else:
-        times = _seconds([stamp for stamp, _ in kept])
+        times, source = _since_first([stamp for stamp, _ in kept]), "the recorder's stamps"
         remarks.append(f"{name}: header stamps unusable, times are those of the recorder")
-    # The same state may be published twice under one stamp; a second, different one is an error.
-    repeated = np.concatenate(
-        [[False], (np.diff(times) == 0) & np.all(np.diff(positions, axis=0) == 0, axis=1)]
+    clock = options.clock(name, len(kept), stamps=times, name=source, unit="ns")
+    return Recording(
+        name, clock.times, positions, names, remarks=tuple(remarks), clock=clock.source
     )
-    return Recording(name, times[~repeated], positions[~repeated], names, remarks=tuple(remarks))
 
 
-def _seconds(stamps: list[int]) -> Times:
-    """Nanoseconds since 1970 to seconds since the first; as floats they would be 0.2 us coarse."""
-    return np.array([stamp - stamps[0] for stamp in stamps]) * 1e-9
+def _since_first(stamps: list[int]) -> Times:
+    """Nanoseconds since the first stamp; since 1970 they would be 256 ns coarse as floats."""
+    return np.array([stamp - stamps[0] for stamp in stamps], dtype=np.float64)
 
 
-def _trajectories(name: str, messages: list[Any]) -> list[Recording]:
+def _trajectories(name: str, messages: list[Any], options: ReadOptions) -> list[Recording]:
     recordings = []
     for index, message in enumerate(messages):
         times = [p.time_from_start.sec + p.time_from_start.nanosec * 1e-9 for p in message.points]
@@ -139,5 +140,8 @@ def _trajectories(name: str, messages: list[Any]) -> list[Recording]:
         positions = positions.reshape(len(times), -1)
         episode = name if len(messages) == 1 else f"{name}-{index}"
         names = tuple(message.joint_names)
-        recordings.append(Recording(episode, np.array(times), positions, names))
+        clock = options.clock(
+            episode, len(times), stamps=np.array(times), name="time_from_start", unit="s"
+        )
+        recordings.append(Recording(episode, clock.times, positions, names, clock=clock.source))
     return recordings

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from prior_reinforce.errors import FileFormatError
-from prior_reinforce.importing.recording import ReadOptions, Recording, evenly, named_damage
+from prior_reinforce.importing.recording import ReadOptions, Recording, named_damage
 
 _ENDS = "meta/episode_ends"
 
@@ -52,10 +52,11 @@ def read(source: Path, options: ReadOptions) -> list[Recording]:
             f"{source}: episodes end at {ends[:8].tolist()} but there are {len(positions)} frames; "
             "copy the store again"
         )
-    return [
-        Recording(episode, evenly(end - start, options.rate, episode), positions[start:end])
-        for episode, start, end in zip(
-            map(str, range(len(ends))), starts.tolist(), ends.tolist(), strict=True
-        )
-        if options.wants(episode)
-    ]
+    recordings = []
+    for episode, (start, end) in enumerate(zip(starts.tolist(), ends.tolist(), strict=True)):
+        if options.wants(str(episode)):
+            clock = options.clock(str(episode), end - start)
+            recordings.append(
+                Recording(str(episode), clock.times, positions[start:end], clock=clock.source)
+            )
+    return recordings
