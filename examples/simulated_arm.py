@@ -1,6 +1,6 @@
 """A stand-in for an arm on another machine: throws one plan in simulation, and calls the landing.
 
-    prior-reinforce ask hoop --run "python examples/simulated_arm.py {plan} --goal 1.05 -0.10"
+    prior-reinforce ask hoop --yes --run "python examples/simulated_arm.py {plan} --goal 1.05 -0.10"
 
 It knows nothing of workspaces: it gets a plan file (NPZ with t, q, dq, ddq), lets the simulated
 Panda throw the ball with the disturbances of a real arm, and says where the ball came down as an

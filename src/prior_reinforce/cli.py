@@ -73,8 +73,8 @@ def main(args: Sequence[str] | None = None) -> int:
     except PriorReinforceError as error:
         print(f"prior-reinforce: {error}", file=sys.stderr)
         return 2
-    except KeyboardInterrupt:
-        print("prior-reinforce: interrupted", file=sys.stderr)
+    except KeyboardInterrupt as error:
+        print(f"prior-reinforce: interrupted{f'; {error}' if error.args else ''}", file=sys.stderr)
         return 130
 
 

@@ -293,8 +293,13 @@ class Session:
             self.log.append("voided", {"trial": trial.number, "reason": text})
         return self._now(number)
 
-    def begin_execution(self, number: int, command: str) -> Trial:
+    def begin_execution(self, number: int, command: str, folder: str = "") -> Trial:
         """Note that a trial's plan is given to a command now: a plan is executed once.
+
+        Args:
+            number: The trial.
+            command: Its text.
+            folder: Name of the folder for what it writes, if any.
 
         Raises:
             TrialStateError: There is no such trial, or it was executed already.
@@ -306,18 +311,24 @@ class Session:
                     f"trial {number} is {trial.stage.value} already; a plan runs once: tell it or "
                     "void it, then ask for the next"
                 )
-            self.log.append("executing", {"trial": trial.number, "command": command})
+            data = {"trial": trial.number, "command": command, "folder": folder}
+            self.log.append("executing", data)
         return self._now(number)
 
     def end_execution(self, number: int, result: Mapping[str, Any] | None) -> Trial:
-        """Note how the command ended; None if it was never started, so that nothing moved."""
+        """Note how the command ended.
+
+        Args:
+            number: The trial.
+            result: What came of it; None if it was never started. Where nothing moved, as then or
+                where its `outcome` is `not_moved`, the trial may be executed after all.
+        """
         with self._exclusive():
             trial = self.trial(number)
             if trial.stage is Stage.EXECUTING:  # it may have been told meanwhile
-                if result is None:
-                    self.log.append("not_executed", {"trial": trial.number})
-                else:
-                    self.log.append("executed", {"trial": trial.number, **result})
+                moved = result is not None and result.get("outcome") != "not_moved"
+                kind = "executed" if moved else "not_executed"
+                self.log.append(kind, {"trial": trial.number, **(result or {})})
         return self._now(number)
 
     def refuse_open_trial(self, doing: str) -> None:

@@ -80,6 +80,9 @@ class Trial:
     """Which model planned it: the name of its folder in a workspace, else empty."""
     kept: Mapping[str, Any] = field(default_factory=dict)
     """What its log keeps of the plan, for instance a file and its hash."""
+    execution: Mapping[str, Any] = field(default_factory=dict)
+    """What is known of its execution: how the command ended, what the driver said; empty where a
+    person executed it."""
 
     @property
     def open(self) -> bool:
@@ -224,6 +227,8 @@ class History:
             changes: dict[str, Any] = {"stage": _CHANGES[kind]}
             if kind in {"told", "amended"}:
                 changes |= {"error_seen": _read_only(data["error_seen"]), "hit": data["hit"]}
+            if kind in {"executing", "executed", "not_executed"}:
+                changes["execution"] = data
             if kind == "voided":
                 changes |= {"error_seen": None, "hit": False, "note": data["reason"]}
             index = range(1, len(self.trials) + 1).index(data["trial"])

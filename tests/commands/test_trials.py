@@ -1,5 +1,7 @@
 """`ask` and `export`: where plans go, and what runs them."""
 
+import sys
+
 import pytest
 
 from prior_reinforce.trials import Stage
@@ -14,7 +16,8 @@ from tests.workspace.planar import events_in, trials_in
         (("--out", "nowhere/plan.csv"), "make the folder first"),
         (("--out", "plan.csv", "--rate", "1e12"), "up to 100000"),
         (("--out", "plan.csv", "--rate", "nan"), "up to 100000"),
-        (("--run", "true {plan}", "--rate", "1000"), "--run is given the plan's own frames"),
+        (("--run", "true {plan}"), "or add --yes"),
+        (("--yes", "--run", "true {plan}", "--rate", "1000"), "--run is given the plan's own"),
         (("--run", "true"), "hold {plan}"),
         (("--run", "no-such-controller {plan}"), "give the path of a program"),
         (("--run", "true {plan}", "--time-limit", "0"), "must be a positive number"),
@@ -54,19 +57,109 @@ def test_a_command_that_fails_is_told_by_the_status(run, folder, tmp_path):
     run("goal", folder, "0.9", "0.05")
     script = tmp_path / "arm.py"
     script.write_text("import sys; print('moved', sys.argv[1][-4:]); sys.exit(int(sys.argv[2]))")
-    status, out, err = run("ask", folder, "--run", f"python3 {script} {{plan}} 3")
+    status, out, err = run("ask", folder, "--yes", "--run", f"python3 {script} {{plan}} 3")
     assert status == 1
     assert "moved .npz" in out
     assert "ended with status 3" in err
-    assert "prior-reinforce void planar 1" in err
-    status, out, err = run("ask", folder, "--run", f"python3 {script} {{plan}} 0")
+    assert "next: prior-reinforce void planar 1" in out
+    status, out, err = run("ask", folder, "--yes", "--run", f"python3 {script} {{plan}} 0")
     assert status == 2
     assert "a plan runs once" in err
     assert "it was executed already" in run("ask", folder)[1]
     run("void", folder, 1)
-    status, out, _ = run("ask", folder, "--run", f"python3 {script} {{plan}} 0")
+    status, out, _ = run("ask", folder, "--yes", "--run", f"python3 {script} {{plan}} 0")
     assert status == 0
     assert "next: prior-reinforce tell planar 2" in out
+
+
+@pytest.fixture
+def driver(tmp_path):
+    """A driver that says what it is told to say; its command."""
+    script = tmp_path / "arm.py"
+    script.write_text(
+        "import pathlib, sys\nfolder = pathlib.Path(sys.argv[2])\n"
+        "(folder / 'result.json').write_text(pathlib.Path('say.json').read_text())\n"
+        "open('motions', 'a').write('moved\\n')\n"
+    )
+    return f"{sys.executable} {script} {{plan}} {{result}}"
+
+
+def test_a_trial_whose_arm_did_not_move_stays_open(run, folder, driver, tmp_path):
+    run("goal", folder, "0.9", "0.05")
+    (tmp_path / "say.json").write_text('{"outcome": "not_moved", "reason": "door open"}')
+    status, _, err = run("ask", folder, "--yes", "--run", driver)
+    assert status == 1
+    assert "the arm did not move: door open" in err
+    assert trials_in(folder)[0].stage is Stage.ASKED
+    (tmp_path / "say.json").write_text('{"outcome": "done"}')
+    assert run("ask", folder, "--yes", "--run", driver)[0] == 0
+    assert trials_in(folder)[0].stage is Stage.EXECUTED
+    assert len(list((tmp_path / folder / "executions").iterdir())) == 2
+
+
+def test_bad_tracking_is_warned_of_before_a_reading_is_taken(run, folder, driver, tmp_path):
+    run("goal", folder, "0.9", "0.05")
+    (tmp_path / "say.json").write_text('{"outcome": "done", "tracking_rms": 0.09}')
+    status, _, err = run("ask", folder, "--yes", "--run", driver)
+    assert status == 0
+    assert "went 0.09 rad rms off the plan, more than 0.01" in err
+    _, _, err = run("tell", folder, 1, "--hit")
+    assert "warning: trial 1 was executed, but went 0.09 rad rms off the plan" in err
+
+
+def test_an_aborted_trial_is_proposed_to_be_voided(run, folder, driver, tmp_path):
+    run("goal", folder, "0.9", "0.05")
+    (tmp_path / "say.json").write_text('{"outcome": "aborted", "reason": "reflex"}')
+    status, _, err = run("ask", folder, "--yes", "--run", driver)
+    assert status == 1
+    assert "aborted: reflex" in err
+    assert "prior-reinforce void planar 1" in run("status", folder)[1]
+    assert run("void", folder, 1)[0] == 0
+
+
+@pytest.mark.parametrize("answer", ["no", "yes"])
+def test_a_person_says_that_the_arm_may_move(run, folder, driver, tmp_path, monkeypatch, answer):
+    run("goal", folder, "0.9", "0.05")
+    (tmp_path / "say.json").write_text('{"outcome": "done"}')
+    monkeypatch.setattr("sys.stdin.isatty", lambda: True)
+    monkeypatch.setattr("builtins.input", lambda question: answer)
+    status, _, _ = run("ask", folder, "--run", driver)
+    assert status == (0 if answer == "yes" else 1)
+    assert (tmp_path / "motions").exists() == (answer == "yes")
+
+
+def test_a_check_moves_nothing(run, folder, driver, tmp_path):
+    run("goal", folder, "0.9", "0.05")
+    status, out, _ = run("ask", folder, "--check", "--yes", "--run", driver)
+    assert status == 0
+    assert "it begins at joint1 0 rad, joint2 0 rad" in out
+    assert "checked; nothing moved" in out
+    assert not (tmp_path / "motions").exists()
+    assert trials_in(folder)[0].stage is Stage.ASKED
+
+
+@pytest.mark.parametrize(
+    ("pose", "status", "says"),
+    [
+        ('{"joint1": 0.001, "joint2": -0.004}', 0, "off it by up to 0.004 rad (joint2)"),
+        ("[0.0, 0.3]", 1, "off it by up to 0.3 rad (joint2), more than 0.02"),
+        ('{"joint1": 0.0}', 0, "nothing is said of joint2"),
+        ("[0.0]", 1, "must end with a line of JSON"),
+        ("nan", 1, "must end with a line of JSON"),
+        ("[NaN, 0]", 1, "must end with a line of JSON"),
+    ],
+)
+def test_the_arm_is_held_against_the_plans_first_pose(
+    run, folder, driver, tmp_path, pose, status, says
+):
+    run("goal", folder, "0.9", "0.05")
+    (tmp_path / "say.json").write_text('{"outcome": "done"}')
+    (tmp_path / "pose.json").write_text(f"connected\n{pose}\n")
+    where = f"cat {tmp_path}/pose.json"
+    found, out, err = run("ask", folder, "--yes", "--run", driver, "--where", where)
+    assert found == status
+    assert says in out + err
+    assert (tmp_path / "motions").exists() == (status == 0)
 
 
 def cut_off(folder):

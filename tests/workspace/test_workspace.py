@@ -263,6 +263,7 @@ def test_a_command_runs_once_and_its_end_is_kept(workspace):
     assert trials(workspace)[0].stage is Stage.EXECUTED
     with pytest.raises(TrialStateError, match="a plan runs once"):
         workspace.execute(number, "cat {plan}", time_limit=20)
+    assert len(list((workspace.folder / "executions").iterdir())) == 1
     tell(workspace, number, [0.02, 0.0])
     assert workspace.events[-2].data["exit_status"] == 0
 
@@ -384,6 +385,79 @@ def test_a_controller_that_outlives_our_program_keeps_the_arm_to_itself(workspac
     assert (tmp_path / "runs").read_text() == "moved\n"
     assert workspace.execute(2, command, time_limit=60).succeeded
     assert workspace.session().trial(2).stage is Stage.EXECUTED
+
+
+def test_an_execution_whose_program_was_killed_is_recorded_by_what_watched_over_it(
+    workspace, tmp_path
+):
+    workspace.session().ask()
+    (tmp_path / "arm.py").write_text(CONTROLLER)
+    command = f"{sys.executable} {tmp_path}/arm.py {tmp_path} {{plan}}"
+    program = subprocess.Popen([sys.executable, "-c", PROGRAM, workspace.folder, command])
+    wait_for((tmp_path / "runs").exists)
+    program.kill()
+    program.wait()
+    assert workspace.recover() is None  # it goes on
+    assert workspace.session().trial(1).stage is Stage.EXECUTING
+    (tmp_path / "stop").touch()
+    wait_for(lambda: not workspace.log.is_executing())
+    trial = workspace.recover()
+    assert trial.stage is Stage.EXECUTED
+    assert trial.execution["outcome"] == "done"
+    assert workspace.recover() is None
+
+
+def test_an_execution_that_was_interrupted_is_recorded_as_aborted(workspace, tmp_path):
+    workspace.session().ask()
+    (tmp_path / "arm.py").write_text(CONTROLLER)
+    command = f"{sys.executable} {tmp_path}/arm.py {tmp_path} {{plan}}"
+    program = subprocess.Popen(
+        [
+            *(sys.executable, "-m", "prior_reinforce.cli"),
+            *("ask", workspace.folder, "--yes", "--run", command),
+        ],
+        stderr=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    wait_for((tmp_path / "runs").exists)
+    program.send_signal(signal.SIGINT)
+    _, err = program.communicate(timeout=60)
+    assert program.returncode == 130
+    assert "interrupted; trial 1: aborted" in err
+    assert workspace.session().trial(1).stage is Stage.EXECUTED
+    assert "void" in describe(workspace).splitlines()[-1]
+    assert not workspace.log.is_executing()
+
+
+def test_nothing_moves_where_an_interruption_came_first(workspace, tmp_path, monkeypatch):
+    number = ask(workspace).number
+    begin = Session.begin_execution
+
+    def interrupted(session, *args):
+        begin(session, *args)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    monkeypatch.setattr(Session, "begin_execution", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        workspace.execute(number, f"touch {tmp_path}/ran {{plan}}", time_limit=20)
+    assert not (tmp_path / "ran").exists()
+    assert trials(workspace)[0].stage is Stage.ASKED
+
+
+def test_limits_that_were_narrowed_while_the_program_waited_are_the_ones_that_count(workspace):
+    number = ask(workspace).number
+    path = workspace.folder / "workspace.toml"
+    path.write_text(path.read_text().replace('model = "none"', SLOW, 1))
+    ran = workspace.folder / "ran"
+    for call in (
+        lambda: ask(workspace),
+        lambda: workspace.execute(number, f"touch {ran} {{plan}}", time_limit=20),
+    ):
+        with pytest.raises(RobotLimitError, match="velocity"):
+            call()
+    assert not ran.exists()
+    assert not (workspace.folder / "executions").exists()
 
 
 class Unsavable(Generator):

@@ -17,7 +17,7 @@ from prior_reinforce.plans.motions import Plan
 from prior_reinforce.session import Session
 from prior_reinforce.trials import Stage, Trial
 from prior_reinforce.wording import say_place
-from prior_reinforce.workspace.status import say_trial
+from prior_reinforce.workspace.status import execution_warning, say_trial
 from prior_reinforce.workspace.workspace import Workspace
 
 
@@ -33,8 +33,15 @@ class Ask:
     rate: float | None = None
     """Samples a second of --out; the plan's own frames if not given."""
     run_command: Annotated[str | None, tyro.conf.arg(name="run")] = None
-    """Execute the plan with this command, once, for instance "mycontroller {plan}"; {plan} stands
-    for the plan's file."""
+    """Execute the plan with this command, once, for instance "mycontroller {plan} {result}"; {plan}
+    stands for the plan's file, {result} for a folder where it may say how it went."""
+    yes: bool = False
+    """Execute it without asking whether the arm may move now."""
+    check: bool = False
+    """Check everything that --run needs, and move nothing."""
+    where: str | None = None
+    """Ask this command first where the arm stands, and compare: its last line is JSON such as
+    {"joint1": 0.1}. It must move nothing."""
     time_limit: float = 120.0
     """Seconds that the command may take."""
     arm_did_not_move: bool = False
@@ -46,17 +53,13 @@ class Ask:
 
     def run(self) -> int:
         """Show the plan, write it, execute it."""
-        from prior_reinforce.robots.executors.command import check_command
-
-        if self.run_command is not None:
-            check_command(self.run_command, time_limit=self.time_limit)
-        if self.rate is not None and self.out is None:
-            raise ConfigurationError(
-                "--rate is of the file that --out writes; --run is given the plan's own frames"
-            )
+        self._check_flags()
         with Workspace(self.folder) as workspace:
             session = workspace.session(self.generator, self.adapter)
             self._check_out(session)
+            recovered = workspace.recover()
+            if recovered is not None:
+                print(f"trial {recovered.number}: {say_trial(workspace, recovered)}")
             did_not_move = self.arm_did_not_move
             if not did_not_move and _was_cut_off(workspace, session) and sys.stdin.isatty():
                 if _ask_whether_it_moved(session):
@@ -66,14 +69,64 @@ class Ask:
             reached_before = session.solved
             trial = session.ask(arm_did_not_move=did_not_move)
             self._show(workspace, trial, reached_before)
-            if self.run_command is not None:
+            may_move = trial.stage is not Stage.EXECUTED
+            if may_move and self.where is not None and not self._is_there(workspace, trial):
+                return 1
+            if self.check and may_move:
+                print("checked; nothing moved")
+            elif self.run_command is not None:
+                if may_move and not self.yes and not _may_move():
+                    print("nothing moved; ask again when it may")
+                    return 1
                 return self._execute(workspace, trial.number, self.run_command)
-            if trial.stage is Stage.EXECUTED:
-                print("it was executed already")
-            else:
+            elif may_move:
                 print("execute it, then say where the object went:")
+            else:
+                print("it was executed already")
             print_next(workspace)
             return 0
+
+    def _check_flags(self) -> None:
+        """Say what cannot be before anything is changed."""
+        from prior_reinforce.robots.executors.command import check_command
+
+        if self.run_command is not None:
+            check_command(self.run_command, time_limit=self.time_limit)
+            if not (self.yes or self.check or sys.stdin.isatty()):
+                raise ConfigurationError(
+                    "a person says that the arm may move: run it in a terminal, or add --yes"
+                )
+        if self.rate is not None and self.out is None:
+            raise ConfigurationError(
+                "--rate is of the file that --out writes; --run is given the plan's own frames"
+            )
+
+    def _is_there(self, workspace: Workspace, trial: Trial) -> bool:
+        """Whether the arm stands where the plan begins, as far as it says."""
+        from prior_reinforce.robots.executors.command import read_pose
+
+        assert trial.plan is not None
+        assert self.where is not None
+        form, limit = workspace.manifest.format, workspace.manifest.gate.start_error
+        try:
+            pose = read_pose(self.where, form.names)
+        except ConfigurationError as error:
+            print(f"prior-reinforce: {error}; nothing moved", file=sys.stderr)
+            return False
+        off = {n: pose[n] - q for n, q in zip(form.names, trial.plan[0], strict=True) if n in pose}
+        name = max(off, key=lambda n: abs(off[n]))
+        unit = form.units[form.names.index(name)]
+        said = f"the arm is off it by up to {abs(off[name]):.3g} {unit} ({name})"
+        if missing := [n for n in form.names if n not in pose]:
+            said += f"; nothing is said of {', '.join(missing)}"
+        if abs(off[name]) <= limit:
+            print(said)
+            return True
+        print(
+            f"prior-reinforce: {said}, more than {limit:g}; move it there, then ask again",
+            file=sys.stderr,
+        )
+        return False
 
     def _show(self, workspace: Workspace, trial: Trial, reached_before: bool) -> None:
         """Print where the trial aims and what the gate says, and write --out."""
@@ -86,6 +139,13 @@ class Ask:
         report = workspace.gate(trial.plan)
         print("no robot in the manifest, no limits checked" if report is None else report.text())
         print(f"plan: {workspace.plan_path(trial)}")
+        begins = ", ".join(
+            f"{name} {q + 0.0:.4g} {unit}"
+            for name, q, unit in zip(
+                manifest.format.names, trial.plan[0].round(4), manifest.format.units, strict=True
+            )
+        )
+        print(f"it begins at {begins}")
         out = self._out_of(trial.number)
         if out is not None:
             plan = Plan(trial.plan, manifest.format)
@@ -115,20 +175,31 @@ class Ask:
             )
 
     def _execute(self, workspace: Workspace, number: int, command: str) -> int:
-        result = workspace.execute(number, command, time_limit=self.time_limit)
-        if result.output_tail:
-            print(result.output_tail.rstrip())
-        if result.succeeded:
-            print_next(workspace)
-            return 0
-        ended = f"ended with status {result.exit_status}"
-        why = "was stopped at its time limit" if result.timed_out else ended
-        print(
-            f"prior-reinforce: the command {why}; if the object flew, tell trial {number}; "
-            f"if not, void it: prior-reinforce void {self.folder} {number} --reason WHY",
-            file=sys.stderr,
+        result = workspace.execute(
+            number,
+            command,
+            time_limit=self.time_limit,
+            show=lambda text: print(text, end="", flush=True),
         )
-        return 1
+        if result.output_tail and not result.output_tail.endswith("\n"):
+            print()
+        why = f": {result.reason}" if result.reason else ""
+        if result.outcome == "not_moved":
+            said = f"the arm did not move{why}; trial {number} may be executed again"
+        elif result.outcome == "unknown":
+            said = f"trial {number}{why}; nobody knows what moved: look, then ask again"
+        else:
+            trial = workspace.session().trial(number)
+            said = f"trial {number}: {say_trial(workspace, trial)}"
+            if result.outcome == "aborted":
+                said += f"; if the object flew all the same, tell trial {number}"
+            elif not execution_warning(workspace, trial):
+                print_next(workspace)
+                return 0
+        print(f"prior-reinforce: {said}", file=sys.stderr)
+        if result.outcome != "unknown":
+            print_next(workspace)
+        return 0 if result.succeeded else 1
 
 
 @dataclass(frozen=True)
@@ -140,6 +211,7 @@ class Tell(Reading):
         with Workspace(self.folder) as workspace:
             session = workspace.session()
             error, hit = self.read(workspace, session)
+            _warn_of_its_execution(workspace, session, self.number)
             trial = session.tell(self.number, error, hit=hit)
             print(f"trial {trial.number}: {say_trial(workspace, trial)}")
             print_next(workspace)
@@ -208,6 +280,26 @@ def _was_cut_off(workspace: Workspace, session: Session) -> bool:
     trial = session.open_trial
     executing = trial is not None and trial.stage is Stage.EXECUTING
     return executing and not workspace.log.is_executing()
+
+
+def _warn_of_its_execution(workspace: Workspace, session: Session, number: int) -> None:
+    """Say before a reading is taken what could make it mislead."""
+    trial = session.trial(number)
+    warning = execution_warning(workspace, trial) if trial.open else ""
+    if warning:
+        print(
+            f"prior-reinforce: warning: trial {number} was executed, {warning}; if that spoiled "
+            "it, void it: a told trial can be voided too",
+            file=sys.stderr,
+        )
+
+
+def _may_move() -> bool:
+    """Whether a person says that the arm may move now."""
+    try:
+        return input("the arm will move; is the area clear? (yes/no) ").strip().lower() == "yes"
+    except EOFError:
+        return False
 
 
 def _ask_whether_it_moved(session: Session) -> bool:

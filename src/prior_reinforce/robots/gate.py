@@ -55,6 +55,12 @@ class GateSettings:
     """Lowest corner that the tool tip may reach, [m], base frame; None leaves the box unchecked."""
     box_high: tuple[float, float, float] | None = None
     """Highest corner that the tool tip may reach, [m], base frame."""
+    start_error: float = 0.02
+    """How far a joint may stand from a plan's first frame when it is to begin, [rad]. Ours: about
+    one degree, and what the FR3's interface refuses by itself is less."""
+    tracking_error: float = 0.01
+    """Distance of the executed from the planned motion, root mean square, [rad], from which on a
+    reading is warned of. Ours: good servos stay below 4 mrad, one that lags 100 ms is at 90."""
     tool_tip: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Tool tip in the flange's frame of the maker's kinematics, [m]; the Franka hand's frame is
     turned by -45 degrees about its z axis."""
@@ -69,6 +75,11 @@ class GateSettings:
             raise ConfigurationError(
                 "warn_above must be within (0, 1] and beyond_warn at most beyond_refuse, got "
                 f"{self.warn_above}, {self.beyond_warn} and {self.beyond_refuse}"
+            )
+        if not (self.start_error > 0 and self.tracking_error > 0):
+            raise ConfigurationError(
+                "start_error and tracking_error must be more than 0, got "
+                f"{self.start_error} and {self.tracking_error}"
             )
         if not (self.position_margin >= 0 and self.rest_speed >= 0):
             raise ConfigurationError(

@@ -55,8 +55,24 @@ def say_trial(workspace: Workspace, trial: Trial) -> str:
             return "is executing now"
         return "was executing when the program stopped: did the arm move?"
     if trial.stage is Stage.EXECUTED:
-        return "executed, waits to be told"
+        warning = execution_warning(workspace, trial)
+        return f"executed, {warning}" if warning else "executed, waits to be told"
     return "asked for, waits to be executed and told"
+
+
+def execution_warning(workspace: Workspace, trial: Trial) -> str:
+    """Why a reading of a trial might mislead: it was aborted, or went another way than planned."""
+    said, gate = trial.execution, workspace.manifest.gate
+    warnings = []
+    if said.get("outcome") == "aborted":
+        warnings.append(f"but aborted: {said.get('reason') or 'no reason was given'}")
+    for key, what, limit in (
+        ("start_error", "began {:.3g} rad from the plan's first frame", gate.start_error),
+        ("tracking_rms", "went {:.3g} rad rms off the plan", gate.tracking_error),
+    ):
+        if (said.get(key) or 0.0) > limit:
+            warnings.append(f"but {what.format(said[key])}, more than {limit:g}")
+    return "; ".join(warnings)
 
 
 def next_step(workspace: Workspace, session: Session) -> str:
@@ -74,6 +90,8 @@ def next_step(workspace: Workspace, session: Session) -> str:
         tell = f"prior-reinforce tell {folder} {trial.number} {tell_example(workspace)}"
         if trial.stage is Stage.EXECUTING and not workspace.log.is_executing():
             return f"if it moved: {tell}; if not: prior-reinforce ask {folder} --arm-did-not-move"
+        if trial.execution.get("outcome") == "aborted":
+            return f"prior-reinforce void {folder} {trial.number} --reason WHY"
         return f"{tell} (or --hit)"
     if session.solved:
         return f"{new_goal}, or prior-reinforce report {folder}"

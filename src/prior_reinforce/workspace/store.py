@@ -123,5 +123,26 @@ class Store:
         """
         return read_plan(self.plan_path(name), sha256=sha256)
 
+    def make_execution_folder(self, number: int) -> Path:
+        """Make an empty folder for what a command writes while it executes a trial.
+
+        Raises:
+            WorkspaceError: The disk is full, or the folder read-only.
+        """
+        with named_disk_errors(self._folder):
+            attempt = 1
+            while True:
+                folder = self.execution_folder(f"trial-{number:03d}-{attempt}")
+                try:
+                    folder.mkdir(parents=True)
+                except FileExistsError:
+                    attempt += 1
+                else:
+                    return folder
+
+    def execution_folder(self, name: str) -> Path:
+        """Where such a folder lies."""
+        return self._folder / "executions" / Path(name).name
+
     def _demonstrations_path(self, sha256: str) -> Path:
         return self._folder / "demonstrations" / f"{sha256[:_DIGITS]}.npz"

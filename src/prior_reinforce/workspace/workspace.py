@@ -5,6 +5,7 @@
     demonstrations/    what was imported      files that events name, written
     models/            what was learned       once and never changed (`store.py`)
     plans/             what was executed
+    executions/        what commands wrote while they executed it
 
 Every change is one journal event, appended while no other program may. What stands is a fold over
 the events, so closing the program, or a power cut, loses nothing. Here are the events that are not
@@ -15,6 +16,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -186,9 +188,14 @@ class Workspace:
     def gate(self, frames: Frames) -> LimitReport | None:
         """Hold a plan against the robot's limits of now; None where the manifest names no robot.
 
+        The manifest is read again: a person may have narrowed the limits while this program waits.
+
         Raises:
             InvalidDemonstrationsError: The manifest says otherwise since they were imported.
+            ConfigurationError: The manifest holds a wrong value by now.
+            FileFormatError: The manifest is gone, or no TOML any more.
         """
+        self.manifest = load_manifest(self.folder / MANIFEST_FILE)
         if self.manifest.robot is None:
             return None
         from prior_reinforce.robots import check_plan
@@ -276,17 +283,26 @@ class Workspace:
         assert training is not None
         return training
 
-    def execute(self, number: int, command: str, *, time_limit: float) -> CommandResult:
+    def execute(
+        self,
+        number: int,
+        command: str,
+        *,
+        time_limit: float,
+        show: Callable[[str], None] | None = None,
+    ) -> CommandResult:
         """Execute a trial's plan by a command, once.
 
-        The journal says `executing` before the command starts and `executed` after it ended, so a
-        program that dies in between leaves a trial of which only a person knows what moved. While
-        the command it left behind goes on, the trial still counts as executing.
+        The journal says `executing` before the command starts and `executed` after all that it
+        started ended, so a program that dies in between leaves a trial of which only a person knows
+        what moved (or `recover`). While what it left behind goes on, the trial still counts as
+        executing.
 
         Args:
             number: The open trial.
-            command: For instance `mycontroller {plan}`.
+            command: For instance `mycontroller {plan} {result}`.
             time_limit: Of the command, in [s].
+            show: Called with the command's output as it comes.
 
         Raises:
             TrialStateError: The trial was executed already, is not open, or another program
@@ -295,27 +311,82 @@ class Workspace:
             ConfigurationError: The command could not be started; nothing moved, and the journal
                 says so.
             FileFormatError: The plan's file is not what was written; nothing moved.
+            KeyboardInterrupt: Interrupted; the command was stopped, and the journal says so.
         """
-        from prior_reinforce.robots.executors.command import check_command, run_command
+        from prior_reinforce.robots.executors.command import (
+            Interruptions,
+            check_command,
+            run_command,
+        )
         from prior_reinforce.robots.executors.lock import executing_lock
 
         check_command(command, time_limit=time_limit)
-        with executing_lock(self.folder) as lock:
+        with executing_lock(self.folder) as lock, Interruptions() as interruptions:
             session = self.session()
             trial = session.trial(number)
             if trial.stage is Stage.ASKED:
                 verdict = self.gate(self.plan(trial).actions)
                 if verdict is not None:
                     verdict.require()
-            session.begin_execution(number, command)  # refuses every other stage
+            else:
+                session.begin_execution(number, command)  # refuses, and says why
+            folder = self.store.make_execution_folder(number)
+            session.begin_execution(number, command, folder.name)
             plan_file = PlanFile(self.plan_path(trial), trial.kept["plan_sha256"])
             try:
-                result = run_command(command, plan_file, time_limit=time_limit, keep_open=(lock,))
-            except (ConfigurationError, FileFormatError):
+                result = run_command(
+                    command,
+                    plan_file,
+                    time_limit=time_limit,
+                    keep_open=(lock,),
+                    folder=folder,
+                    show=show,
+                    interruptions=interruptions,
+                )
+            except (ConfigurationError, FileFormatError, KeyboardInterrupt):
                 session.end_execution(number, None)  # never started: nothing moved
                 raise
-            session.end_execution(number, result.as_json())
+            if result.outcome != "unknown":
+                result = self._measured(result, trial, folder)
+                session.end_execution(number, result.as_json())
+        if interruptions.came:
+            raise KeyboardInterrupt(f"trial {number}: {result.outcome} ({result.reason})")
         return result
+
+    def recover(self) -> Trial | None:
+        """Note how an execution ended whose program was killed, where its supervisor wrote it down.
+
+        Returns:
+            The trial as it stands now; None where there is nothing to recover.
+
+        Raises:
+            FileFormatError: What was written down is damaged.
+        """
+        from prior_reinforce.robots.executors.command import read_ended
+
+        session = self.session()
+        trial = session.open_trial
+        if trial is None or trial.stage is not Stage.EXECUTING or self.log.is_executing():
+            return None
+        name = trial.execution.get("folder", "")
+        result = None
+        if name:
+            folder = self.store.execution_folder(name)
+            result = read_ended(folder, trial.execution["command"])
+        if result is None:
+            return None
+        result = self._measured(result, trial, folder)
+        return session.end_execution(trial.number, result.as_json())
+
+    def _measured(self, result: CommandResult, trial: Trial, folder: Path) -> CommandResult:
+        """A result with the distance from the plan, where the driver measured its path."""
+        from prior_reinforce.robots.executors.result import measure_tracking
+
+        try:
+            rms = measure_tracking(folder, self.plan(trial))
+        except FileFormatError as error:
+            return replace(result, reason="; ".join(filter(None, [result.reason, str(error)])))
+        return result if rms is None else replace(result, tracking_rms=rms)
 
     def _in_use(self) -> tuple[str, str]:
         """The model and the demonstrations of now."""

@@ -25,20 +25,29 @@ def test_looking_keeps_nobody_from_executing(tmp_path):
         assert not is_executing(tmp_path)
 
 
-def test_what_a_command_left_running_does_not_hold_it(tmp_path):
-    """A driver may start a daemon that inherits everything; it executes no trial."""
+def test_what_holds_it_outlives_who_took_it(tmp_path):
+    """A driver that inherited it goes on, though we left the block."""
     with executing_lock(tmp_path) as lock:
-        daemon = subprocess.Popen(["sleep", "60"], pass_fds=(lock,))
+        driver = subprocess.Popen(["sleep", "60"], pass_fds=(lock,))
     try:
-        assert not is_executing(tmp_path)
+        assert is_executing(tmp_path)
     finally:
-        daemon.kill()
-        daemon.wait()
+        driver.kill()
+        driver.wait()
+    assert not is_executing(tmp_path)
+
+
+def test_there_is_no_file_to_delete(tmp_path):
+    with executing_lock(tmp_path):
+        assert not list(tmp_path.iterdir())
+        (tmp_path / "executing.lock").touch()  # what older versions used
+        (tmp_path / "executing.lock").unlink()
+        assert is_executing(tmp_path)
 
 
 def test_a_folder_that_is_not_there_is_named(tmp_path):
     with (
-        pytest.raises(WorkspaceError, match="make the folder writable"),
+        pytest.raises(WorkspaceError, match="make it a readable folder"),
         executing_lock(tmp_path / "none"),
     ):
         pass

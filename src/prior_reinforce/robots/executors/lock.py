@@ -2,9 +2,11 @@
 
 The journal cannot tell: its last word on such a trial is `executing`, whether the program that
 wrote it still runs or died. A lock can, because the system frees it when its last holder is gone.
-The command that moves the arm holds it too: where our program is killed and the controller goes
-on, the trial is still being executed. That takes `flock`, whose lock belongs to the open file that
-both share; SQLite's, as in the journal, would end with our program.
+The supervisor and the command that moves the arm hold it too: where our program is killed and the
+controller goes on, the trial is still being executed. That takes `flock`, whose lock belongs to the
+open file that all share; SQLite's, as in the journal, would end with our program.
+
+What is locked is the workspace's folder itself: there is no file that somebody could delete.
 """
 
 from __future__ import annotations
@@ -18,7 +20,6 @@ from typing import Literal
 
 from prior_reinforce.errors import TrialStateError, WorkspaceError
 
-_FILE = "executing.lock"
 # Ours: longer than `is_executing` ever holds it, shorter than any execution.
 _WAIT_S = 1.0
 _POLL_S = 0.01
@@ -29,27 +30,20 @@ def executing_lock(folder: Path) -> Iterator[int]:
     """Hold the right to execute a trial of the workspace in `folder`.
 
     Yields:
-        A file descriptor for the command to keep open: as long as it does, it holds the right too,
-        even where this program is killed. Leaving the block takes the right back from everyone.
+        A file descriptor for what is started to keep open: as long as anything does, it holds the
+        right too, even where this program is killed or leaves the block.
 
     Raises:
         TrialStateError: Another program holds it.
-        WorkspaceError: The folder is read-only, or its file system has no locks.
+        WorkspaceError: The folder cannot be opened, or its file system has no locks.
     """
-    path = folder / _FILE
+    descriptor = _open(folder)
     try:
-        descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
-    except OSError as error:
-        raise WorkspaceError(f"{path}: {error.strerror}; make the folder writable") from error
-    try:
-        if not _lock(path, descriptor, "alone", wait=_WAIT_S):
+        if not _lock(folder, descriptor, "alone", wait=_WAIT_S):
             raise TrialStateError(
                 f"a trial of {folder} is being executed right now; wait for it, or stop its command"
             )
-        try:
-            yield descriptor
-        finally:
-            _free(descriptor)
+        yield descriptor
     finally:
         os.close(descriptor)
 
@@ -58,22 +52,23 @@ def is_executing(folder: Path) -> bool:
     """Whether a trial of the workspace in `folder` is being executed right now.
 
     Raises:
-        WorkspaceError: The lock cannot be read, or the file system has no locks.
+        WorkspaceError: The folder cannot be opened, or its file system has no locks.
     """
-    path = folder / _FILE
+    descriptor = _open(folder)
     try:
-        descriptor = os.open(path, os.O_RDONLY)
-    except FileNotFoundError:
-        return False
-    except OSError as error:
-        raise WorkspaceError(f"{path}: {error.strerror}; make it readable") from error
-    try:
-        return not _lock(path, descriptor, "shared", wait=0.0)
+        return not _lock(folder, descriptor, "shared", wait=0.0)
     finally:
         os.close(descriptor)
 
 
-def _lock(path: Path, descriptor: int, kind: Literal["alone", "shared"], *, wait: float) -> bool:
+def _open(folder: Path) -> int:
+    try:
+        return os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    except OSError as error:
+        raise WorkspaceError(f"{folder}: {error.strerror}; make it a readable folder") from error
+
+
+def _lock(folder: Path, descriptor: int, kind: Literal["alone", "shared"], *, wait: float) -> bool:
     """Take a lock within `wait` seconds; False if another program holds it."""
     import fcntl  # not on Windows, where all commands but a workspace's work
 
@@ -88,14 +83,7 @@ def _lock(path: Path, descriptor: int, kind: Literal["alone", "shared"], *, wait
             time.sleep(_POLL_S)
         except OSError as error:
             raise WorkspaceError(
-                f"{path} cannot be locked ({error.strerror}); move the workspace to a local disk"
+                f"{folder} cannot be locked ({error.strerror}); move the workspace to a local disk"
             ) from error
         else:
             return True
-
-
-def _free(descriptor: int) -> None:
-    """Free a lock for all who share it, unlike closing the file."""
-    import fcntl
-
-    fcntl.flock(descriptor, fcntl.LOCK_UN)

@@ -1,0 +1,193 @@
+"""A program that runs one command and ends only after everything that the command started has.
+
+    python supervisor.py REQUEST
+
+Whoever moves the arm with it may be interrupted, killed or stopped: this process goes on, and with
+it the lock that it inherited. It adopts what detaches itself (Linux' child subreaper), so that a
+driver in the background, in a session of its own or orphaned is waited for like any other. It takes
+every signal that can be taken as the wish to stop: SIGTERM to all, SIGKILL to what is left after a
+grace period, however often it is asked. Killed itself (SIGKILL), it leaves the lock with the
+command, which has inherited it too.
+
+REQUEST is JSON: `arguments` of the command, `time_limit` and `grace` in [s], `keep_open`
+(descriptors that the command inherits), `output` (descriptor of a file for what it writes) and
+`ended` (path of the file that says how it ended). It imports nothing but the standard library, so
+that it starts fast and cannot fail by what is installed.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import json
+import os
+import select
+import signal
+import subprocess
+import sys
+import time
+import tty
+from pathlib import Path
+from typing import Any
+
+_SET_CHILD_SUBREAPER, _SET_PARENT_DEATH_SIGNAL = 36, 1  # linux/prctl.h
+_STOPS = (signal.SIGHUP, signal.SIGINT, signal.SIGQUIT, signal.SIGTERM)
+# A terminal sends these to all that it knows. The command is asked to stop by SIGTERM instead, as
+# its time limit does: one that knows only that signal would be cut off by Ctrl-C in mid-swing.
+_TERMINALS = (signal.SIGHUP, signal.SIGINT, signal.SIGQUIT, signal.SIGTSTP)
+_LOOK = 0.02
+"""How often it looks for output, ends and deadlines, in [s]."""
+_TAIL_BYTES = 4000
+"""Of its output in what says how it ended: the last screenful, where a driver says why."""
+_MOST_BYTES = 16_000_000
+"""Kept of its output; ours: hours of talk, and no full disk by a driver that runs wild."""
+_SAY_AFTER = 1.0
+"""After the command's end, in [s], what still runs is named."""
+
+
+def main(request: dict[str, Any]) -> None:
+    """Run the command; write how it ended."""
+    stop_asked: list[int] = []
+    for number in _STOPS:
+        signal.signal(number, lambda n, _: stop_asked.append(n))
+    signal.signal(signal.SIGTSTP, signal.SIG_IGN)
+    libc = ctypes.CDLL(None, use_errno=True)
+    if libc.prctl(_SET_CHILD_SUBREAPER, 1, 0, 0, 0) != 0:
+        raise OSError(ctypes.get_errno(), "cannot adopt what a command detaches")
+    # What started us blocked them, so that none came too early.
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, _STOPS)
+    # A terminal of its own for the output: programs write to one line by line.
+    master, slave = os.openpty()
+    tty.setraw(slave)
+    output = _Output(master, request["output"])
+
+    def in_the_child() -> None:
+        for number in _TERMINALS:
+            signal.signal(number, signal.SIG_IGN)
+        libc.prctl(_SET_PARENT_DEATH_SIGNAL, signal.SIGTERM, 0, 0, 0)
+
+    ended = Path(request["ended"])
+    start = time.monotonic()
+    try:
+        command = subprocess.Popen(
+            request["arguments"],
+            stdout=slave,
+            stderr=slave,
+            pass_fds=request["keep_open"],
+            preexec_fn=in_the_child,
+        ).pid
+    except (OSError, ValueError, subprocess.SubprocessError) as error:
+        _write(ended, {"started": False, "error": str(error)})
+        return
+    os.close(slave)
+    report: dict[str, Any] = {"started": True, "timed_out": False, "interrupted": False}
+    status, since, left = 0, 0.0, ""
+    kill_at: float | None = None
+    while True:
+        output.take(_LOOK)
+        try:
+            while (ended_now := os.waitpid(-1, os.WNOHANG))[0] != 0:
+                if ended_now[0] == command:
+                    status, since = os.waitstatus_to_exitcode(ended_now[1]), time.monotonic()
+        except ChildProcessError:
+            break  # whatever loses its parent becomes our child: nothing is left
+        now = time.monotonic()
+        if since and not left and kill_at is None and now > since + _SAY_AFTER:
+            left = _names(_descendants())
+            output.say(f"the command ended, but what it started still runs: {left}; waiting\n")
+        if kill_at is None and (stop_asked or now > start + request["time_limit"]):
+            report["interrupted" if stop_asked else "timed_out"] = True
+            kill_at = now + request["grace"]
+            running = _descendants()
+            if since:
+                left = _names(running)
+            for pid in running:  # once: what they start to come to rest may do its work
+                _send(pid, signal.SIGTERM)
+                _send(pid, signal.SIGCONT)  # one that waits for a terminal
+        if kill_at is not None and now > kill_at:
+            for pid in _descendants():
+                _send(pid, signal.SIGKILL)
+    output.take_rest()
+    seconds = (since or time.monotonic()) - start
+    report |= {"exit_status": status, "seconds": seconds, "left_running": left}
+    _write(ended, report | {"output_tail": output.tail.decode(errors="replace")})
+
+
+class _Output:
+    """What the command and all that it started write."""
+
+    def __init__(self, master: int, file: int) -> None:
+        self._master, self._file, self._written = master, file, 0
+        self.tail = b""
+
+    def take(self, seconds: float) -> bool:
+        """Take what comes within a time; False where nobody can write any more."""
+        if not select.select([self._master], [], [], seconds)[0]:
+            return True
+        try:
+            content = os.read(self._master, 65536)
+        except OSError:  # Linux says so when the last writer has closed it
+            time.sleep(seconds)
+            return False
+        self._keep(content)
+        return bool(content)
+
+    def take_rest(self) -> None:
+        """Take what was written and not read yet."""
+        while select.select([self._master], [], [], 0)[0] and self.take(0.0):
+            pass
+
+    def say(self, text: str) -> None:
+        """Words of our own among its output."""
+        self._keep(f"prior-reinforce: {text}".encode())
+
+    def _keep(self, content: bytes) -> None:
+        self.tail = (self.tail + content)[-_TAIL_BYTES:]
+        if self._written < _MOST_BYTES:
+            self._written += len(content)
+            with contextlib.suppress(OSError):  # a full disk stops no motion
+                os.write(self._file, content)
+
+
+def _descendants() -> dict[int, str]:
+    """Names of the processes that descend from this one, by their number."""
+    parents: dict[int, tuple[int, str]] = {}
+    for entry in os.listdir("/proc"):
+        if entry.isdecimal():
+            with contextlib.suppress(OSError):
+                text = Path("/proc", entry, "stat").read_text(errors="replace")
+                name, _, rest = text.partition("(")[2].rpartition(")")
+                parents[int(entry)] = int(rest.split()[1]), name
+    found: dict[int, str] = {}
+    here = os.getpid()
+    for pid, (ancestor, name) in parents.items():
+        for _ in parents:  # no longer than all of them, though they change while we read
+            if ancestor == here or ancestor not in parents:
+                break
+            ancestor = parents[ancestor][0]
+        if ancestor == here:
+            found[pid] = name
+    return found
+
+
+def _names(processes: dict[int, str]) -> str:
+    return ", ".join(f"{name} ({pid})" for pid, name in sorted(processes.items()))
+
+
+def _send(pid: int, number: int) -> None:
+    with contextlib.suppress(ProcessLookupError, PermissionError):
+        os.kill(pid, number)
+
+
+def _write(path: Path, report: dict[str, Any]) -> None:
+    """Put the report in place, whole, before the lock is given back."""
+    unfinished = path.with_name(f".{path.name}")
+    with unfinished.open("w", encoding="utf-8") as file:
+        json.dump(report, file)
+        file.flush()
+        os.fsync(file.fileno())
+    unfinished.replace(path)
+
+
+if __name__ == "__main__":
+    main(json.loads(sys.argv[1]))
