@@ -13,10 +13,12 @@ from hypothesis import strategies as st
 from prior_reinforce.errors import (
     ConfigurationError,
     FileFormatError,
+    InvalidPlanError,
     PriorReinforceError,
     WorkspaceError,
 )
 from prior_reinforce.plans.files import PlanFile, read_plan, write_plan
+from prior_reinforce.plans.interpolation import interpolate
 from prior_reinforce.plans.motions import Plan, PlanFormat
 
 DT = 0.01
@@ -54,6 +56,23 @@ def test_a_finer_rate(plan, tmp_path):
     assert back.horizon == 1001
     assert back.format.dt == 0.001
     np.testing.assert_allclose(back.actions[::10], plan.actions, atol=1e-12)
+
+
+@pytest.mark.parametrize("rate", [0.5, 3.0])
+def test_a_rate_that_makes_another_motion_is_refused(plan, tmp_path, rate):
+    """Two points, half a radian off what was checked."""
+    with pytest.raises(InvalidPlanError, match="is another motion"):
+        write_plan(plan, tmp_path / "coarse.npz", rate=rate)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("rate", [33.0, 80.0, 101.0, 1000.0])
+def test_a_motion_at_another_rate_is_the_same_motion(plan, tmp_path, rate):
+    back = read_plan(write_plan(plan, tmp_path / "other.npz", rate=rate).path)
+    again = interpolate(back.actions, back.format.dt)
+    here = interpolate(plan.actions, plan.format.dt)
+    n = min(len(again.q), len(here.q))
+    np.testing.assert_allclose(again.q[:n], here.q[:n], atol=1e-4)
 
 
 def test_csv_reads_back_exactly(plan, tmp_path):

@@ -1,5 +1,6 @@
 """The gate finds the joint, the time and the margin of plans whose peaks are known."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ from hypothesis import strategies as st
 
 import prior_reinforce.tasks
 from prior_reinforce.errors import ConfigurationError, InvalidPlanError, RobotLimitError
+from prior_reinforce.plans.interpolation import join_frames
 from prior_reinforce.plans.motions import Demonstrations, Plan, PlanFormat
 from prior_reinforce.robots import GateSettings, RobotLimits, check_plan, robot_limits
 
@@ -156,6 +158,49 @@ def test_demonstrations_of_other_columns_are_named():
     renamed = PlanFormat(tuple("abcdefg"), ("rad",) * 7, DT)
     with pytest.raises(InvalidPlanError, match="learned from"):
         check_plan(Plan(swing(4, 0.5, 1.0), renamed), PANDA, demonstrations())
+
+
+@pytest.mark.parametrize("frame", [1, 50, 99])
+def test_absurd_numbers_never_pass(frame):
+    """1e305 overflows in the spline; what is not a number is beyond every limit."""
+    plan = swing(4, 0.5, 1.0)
+    plan[frame, 3] = 1e305
+    assert check_plan(Plan(plan, FORMAT), PANDA).refused
+
+
+def test_frames_between_two_cycles_are_refused():
+    """A spike of 2 rad between two milliseconds, of which no sample at 1 kHz knows."""
+    plan = swing(4, 0.5, 1.0, frames=1_001)
+    plan[501, 3] += 2.0
+    quick = PlanFormat(FORMAT.names, FORMAT.units, 1e-6)
+    with pytest.raises(InvalidPlanError, match="closer than a cycle of the arm"):
+        check_plan(Plan(plan, quick), PANDA)
+
+
+def test_acceleration_is_exact_between_two_cycles():
+    """It is largest at a frame, here 0.5 ms from both cycles; half as large at these."""
+    form = PlanFormat(FORMAT.names, FORMAT.units, 0.0015)
+    plan = np.tile(HOME, (41, 1))
+    plan[20:23, 3] += np.array([1.0, 2.0, 1.0]) * 1e-6
+    found = lines(check_plan(Plan(plan, form), PANDA))["acceleration"]
+    exact = np.abs(join_frames(plan, 0.0015)(np.arange(41) * 0.0015, 2)).max()
+    assert found.value == pytest.approx(exact, rel=1e-12)
+
+
+def test_a_box_that_cannot_be_checked_refuses():
+    """It was asked for: a dash would pass the plan."""
+    box = GateSettings(box_low=(-1, -1, 0), box_high=(1, 1, 1.5))
+    swung = swing(4, 0.5, 1.0)
+    six = PlanFormat(FORMAT.names[1:], ("rad",) * 6, DT)
+    without = replace(box, absent_joints=("joint1",))
+    for plan, limits, settings_ in (
+        (Plan(swung, FORMAT), replace(PANDA, robot="own", chain=None), box),
+        (Plan(swung[:, 1:], six), PANDA, without),
+    ):
+        report = check_plan(plan, limits, settings=settings_)
+        assert lines(report)["box"].status == "refuse"
+        with pytest.raises(RobotLimitError, match="box: cannot be checked"):
+            report.require()
 
 
 def test_the_box_for_the_tool_tip():

@@ -67,7 +67,9 @@ def matched(*names, units=None):
 
 def test_joints_are_matched_by_name_and_never_guessed():
     assert matched("gripper", "panda_joint4", "joint2.pos", "Joint1", "j3") == {1: 2, 3: 1}
-    assert matched("fr3_joint1", "joint1") == {0: 1}
+    # Which of the two moves joint 1 would be a guess, and the other would go unchecked.
+    with pytest.raises(InvalidPlanError, match="all look like joint1 of panda"):
+        matched("left_joint1", "joint1")
     with pytest.raises(InvalidPlanError, match="all look like joint1 of panda"):
         matched("left_joint1", "right_joint1")
     with pytest.raises(InvalidPlanError, match="joint1 is in 'deg'"):

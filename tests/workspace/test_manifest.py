@@ -48,9 +48,37 @@ def test_limits_can_be_given(tmp_path):
     assert limits.jerk.tolist() == [5000, 5000]
 
 
+@pytest.mark.parametrize(
+    ("model", "given", "message"),
+    [
+        ("panda", "velocity = [1, 1]", r'velocity = .*: goes with model = "given"'),
+        ("fr3", 'joint_names = ["joint1"]', r'joint_names = .*: goes with model = "given"'),
+        ("none", "upper = [1, 1]", r'upper = .*: goes with model = "given"'),
+        ("given", "lower = [-170, -120]\nupper = [170, 120]", "lower = .*looks like degrees"),
+        ("given", "lower = [-3, -2]\nupper = [170, 120]", "upper = .*looks like degrees"),
+        ("given", "velocity = [150, 150]", "velocity = .*looks like degrees"),
+    ],
+)
+def test_a_limit_that_was_given_is_applied_or_refused(tmp_path, model, given, message):
+    names = {} if model == "given" else SEVEN
+    text = manifest(robot=model, **names)
+    start, end = text.index("# joint_names"), text.index("# The program's own")
+    lists = re.sub("^# ", "", text[start:end], flags=re.M) if model == "given" else ""
+    for line in given.splitlines():
+        lists = re.sub(rf"^{line.split()[0]} = .*\n", "", lists, flags=re.M) + line + "\n"
+    with pytest.raises(ConfigurationError, match=message):
+        load_manifest(write(tmp_path, text[:start] + lists + text[end:]))
+
+
+def test_a_box_without_a_robot_is_refused(tmp_path):
+    text = manifest() + "\nworkspace_low = [0, 0, 0]\nworkspace_high = [1, 1, 1]\n"
+    with pytest.raises(ConfigurationError, match=r"workspace_low.*no robot.*take it out"):
+        load_manifest(write(tmp_path, text))
+
+
 def test_the_box_for_the_tool_tip(tmp_path):
     """The template's own example, its comment signs taken away."""
-    text = manifest()
+    text = manifest(robot="panda", **SEVEN)
     start, end = text.index("# tool_tip"), text.index("# absent_joints")
     text = text[:start] + re.sub("^# ", "", text[start:end], flags=re.M) + text[end:]
     gate = load_manifest(write(tmp_path, text)).gate

@@ -37,6 +37,9 @@ if TYPE_CHECKING:
 PlanFileFormat = Literal["npz", "csv", "json"]
 _FILE_FORMAT = "prior-reinforce plan"
 _FILE_VERSION = 1
+_LARGEST_CHANGE = 1e-4
+"""By which a motion may change when fewer samples are written, in its units; ours: a twentieth of
+the offset that moves a throw by a millimetre."""
 _HIGHEST_RATE = 1e5
 """Samples a second; ours: a hundred times what the fastest arms are sent, in a file still small."""
 
@@ -89,11 +92,14 @@ def write_plan(
     Raises:
         ConfigurationError: An unknown format or suffix.
         FileFormatError: Another file is there already.
-        InvalidPlanError: A rate that is not a positive number.
+        InvalidPlanError: A rate that is not a positive number, or at which it is another motion.
         WorkspaceError: The disk is full or the folder read-only; nothing is left behind.
     """
     path = Path(path)
-    content = _encode(plan, check_plan_path(path, format=format, rate=rate), rate=rate)
+    kind = check_plan_path(path, format=format, rate=rate)
+    if rate is not None:
+        _check_rate(plan, rate)
+    content = _encode(plan, kind, rate=rate)
     write_once(path, content)
     return PlanFile(path, sha256(content))
 
@@ -160,6 +166,22 @@ def read_plan(path: str | os.PathLike[str], *, sha256: str | None = None) -> Pla
         raise FileFormatError(
             f"{path} is not a plan file ({error}); write one with write_plan or `export`"
         ) from error
+
+
+def _check_rate(plan: Plan, rate: float) -> None:
+    """Refuse a rate whose samples, joined as frames are, give another motion than was checked."""
+    from prior_reinforce.plans.interpolation import interpolate
+
+    same = interpolate(plan.actions, plan.format.dt)
+    samples = interpolate(plan.actions, plan.format.dt, rate=rate).q
+    again = interpolate(samples, 1 / rate)
+    n = min(len(same.q), len(again.q))
+    off = float(np.abs(again.q[:n] - same.q[:n]).max())
+    if not off <= _LARGEST_CHANGE:
+        raise InvalidPlanError(
+            f"at {rate:g} samples a second the plan is another motion, {off:.2g} off the one that "
+            f"was checked; give a multiple of {1 / plan.format.dt:g}"
+        )
 
 
 def _encode(plan: Plan, format: PlanFileFormat, *, rate: float | None = None) -> bytes:

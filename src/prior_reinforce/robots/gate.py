@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import Float
 
 from prior_reinforce.errors import ConfigurationError, InvalidPlanError
+from prior_reinforce.plans.interpolation import RATE, interpolate, join_frames
 from prior_reinforce.plans.motions import Demonstrations, Plan
 from prior_reinforce.robots.kinematics import tool_tip
 from prior_reinforce.robots.limits import RobotLimits, match_joints, missing_joints
@@ -24,6 +25,8 @@ _HOLD = 0.01
 
 Samples = Float[np.ndarray, "T d"]
 """Of d joints or axes at T times, 1 ms apart."""
+Times = Float[np.ndarray, " T"]
+"""Of as many samples, in [s]."""
 Ends = Float[np.ndarray, " d"]
 """Lower or upper ends of d ranges."""
 
@@ -122,13 +125,19 @@ def check_plan(
 
     Raises:
         InvalidPlanError: A joint in another unit than [rad], two columns that look like one joint,
-            or demonstrations of another format.
+            frames closer than the arm's cycles, or demonstrations of another format.
         ConfigurationError: `absent_joints` names no joint of the robot, or one that the plan moves.
     """
     settings = settings or GateSettings()
-    checks = _Checks(plan, limits, settings)
-    shown = _check_demonstrations(plan, demonstrations, settings)
-    lines = (checks.joints(), *checks.motion(), shown, checks.box())
+    if plan.format.dt < (1 - 1e-9) / RATE:
+        raise InvalidPlanError(
+            f"a frame every {plan.format.dt:g} s is closer than a cycle of the arm ({1 / RATE:g} s),"
+            " and what is between two cycles cannot be checked; give the plan fewer frames"
+        )
+    with np.errstate(over="ignore", invalid="ignore"):  # what is no number is refused below
+        checks = _Checks(plan, limits, settings)
+        shown = _check_demonstrations(plan, demonstrations, settings)
+        lines = (checks.joints(), *checks.motion(), shown, checks.box())
     return LimitReport(limits.robot, limits.firmware, limits.source, lines)
 
 
@@ -136,13 +145,12 @@ class _Checks:
     """The checks of one plan's joints against one robot."""
 
     def __init__(self, plan: Plan, limits: RobotLimits, settings: GateSettings) -> None:
-        from prior_reinforce.plans.interpolation import interpolate
-
         self._plan, self._limits, self._settings = plan, limits, settings
         self._columns = match_joints(plan.format, limits)
         self._rows, self._picked = list(self._columns), list(self._columns.values())
         self._names = [limits.joint_names[row] for row in self._rows]
         self._fine = interpolate(plan.actions, plan.format.dt, hold_before=_HOLD, hold_after=_HOLD)
+        self._at_frames = join_frames(plan.actions, plan.format.dt)(plan.times, 2)
 
     def joints(self) -> LimitLine:
         """Whether the plan has a column for every joint, but for those left out on purpose."""
@@ -183,11 +191,15 @@ class _Checks:
         everywhere = np.zeros((len(q), len(limits.joint_names)))
         everywhere[:, rows] = q
         low, high = limits.velocity_bounds(everywhere)
+        # Linear from frame to frame, it is largest at a frame, which may lie between two cycles.
+        t_ddq = np.concatenate([fine.t, self._plan.times])
+        ddq = np.concatenate([ddq, self._at_frames[:, self._picked]])
+        bounds = np.where(dq < 0, -low[:, rows], high[:, rows])
         return [
             self._range("position", "rad", q, limits.lower[rows], limits.upper[rows], self._names),
-            self._rate("velocity", "rad/s", dq, np.where(dq < 0, -low[:, rows], high[:, rows])),
-            self._rate("acceleration", "rad/s^2", ddq, limits.acceleration[rows]),
-            self._rate("jerk", "rad/s^3", dddq, limits.jerk[rows]),
+            self._rate("velocity", "rad/s", fine.t, dq, bounds),
+            self._rate("acceleration", "rad/s^2", t_ddq, ddq, limits.acceleration[rows]),
+            self._rate("jerk", "rad/s^3", fine.t, dddq, limits.jerk[rows]),
             self._rest("rest at start", 0, 0.0),
             self._rest("rest at end", -2, float(self._plan.times[-1])),
         ]
@@ -197,10 +209,15 @@ class _Checks:
         settings, limits, d = self._settings, self._limits, len(self._limits.joint_names)
         if settings.box_low is None or settings.box_high is None:
             return _unchecked("box", "no box given")
-        if limits.chain is None:
-            return _unchecked("box", f"the kinematics of {limits.robot} are not known")
-        if len(self._columns) < d:
-            return _unchecked("box", f"it needs all {d} joints")
+        if limits.chain is None or len(self._columns) < d:
+            why = f"it needs all {d} joints in the plan"
+            if limits.chain is None:
+                why = f"the kinematics of {limits.robot} are not known"
+            return LimitLine(
+                check="box",
+                status="refuse",
+                text=f"cannot be checked: {why}; take the box out, or guard it otherwise",
+            )
         tip = tool_tip(limits.chain, self._fine.q[:, self._picked], settings.tool_tip)
         low, high = np.array(settings.box_low, float), np.array(settings.box_high, float)
         return self._range("box", "m", tip, low, high, "xyz")
@@ -214,7 +231,7 @@ class _Checks:
         value, margin = float(values[sample, column]), float(distance[sample, column])
         near_low = value - low[column] < high[column] - value
         limit = float(low[column] if near_low else high[column])
-        name, time, beyond = names[column], float(self._fine.t[sample]), margin <= 0
+        name, time, beyond = names[column], float(self._fine.t[sample]), not margin > 0
         place, where, end = f"{name} at", "beyond" if beyond else "from", "its end"
         if check == "box":
             place, where, end = (
@@ -235,17 +252,19 @@ class _Checks:
             f"at {time:.3f} s",
         )
 
-    def _rate(self, check: str, unit: str, values: Samples, bound: Samples | Ends) -> LimitLine:
+    def _rate(
+        self, check: str, unit: str, t: Times, values: Samples, bound: Samples | Ends
+    ) -> LimitLine:
         bound = np.broadcast_to(bound, values.shape)
         # Next to a stop the bound is 0; a joint that rests there (to rounding) breaks nothing.
         used = np.where(np.abs(values) < 1e-6, 0.0, np.abs(values) / np.maximum(bound, 1e-12))
         sample, joint = _worst(used)
         share, value = float(used[sample, joint]), abs(float(values[sample, joint]))
-        limit, time = float(bound[sample, joint]), float(self._fine.t[sample])
+        limit, time = float(bound[sample, joint]), float(t[sample])
         here = " at that position" if check == "velocity" and self._limits.envelopes else ""
         return LimitLine(
             check=check,
-            status=_status(share >= 1, share > self._settings.warn_above),
+            status=_status(not share < 1, share > self._settings.warn_above),
             value=value,
             limit=limit,
             margin=limit - value,
@@ -268,7 +287,7 @@ class _Checks:
         limit = self._settings.rest_speed
         return LimitLine(
             check=check,
-            status=_status(speed > limit),
+            status=_status(not speed <= limit),
             value=speed,
             limit=limit,
             margin=limit - speed,
@@ -310,7 +329,7 @@ def _check_demonstrations(
     name, unit = form.names[column], plan.format.units[column]
     return LimitLine(
         check="demonstrations",
-        status=_status(value > settings.beyond_refuse, value > settings.beyond_warn),
+        status=_status(not value <= settings.beyond_refuse, value > settings.beyond_warn),
         value=value,
         limit=settings.beyond_refuse,
         margin=settings.beyond_refuse - value,

@@ -124,14 +124,13 @@ def match_joints(format: PlanFormat, limits: RobotLimits) -> dict[int, int]:
     for joint, name in enumerate(limits.joint_names):
         ending = re.compile(rf"(^|[_/.]){re.escape(name)}(\.pos)?$")
         found = [i for i, column in enumerate(format.names) if ending.search(column)]
-        exact = [i for i in found if format.names[i] == name]
-        if len(found) > 1 and not exact:
+        if len(found) > 1:
             raise InvalidPlanError(
                 f"columns {[format.names[i] for i in found]} all look like {name} of "
                 f"{limits.robot}; rename those that are not"
             )
         if found:
-            columns[joint] = (exact or found)[0]
+            columns[joint] = found[0]
     for column in columns.values():
         if format.units[column] != "rad":
             raise InvalidPlanError(

@@ -61,6 +61,8 @@ class Manifest:
 
 _TEXTS, _NUMBERS = tuple[str, ...], tuple[float, ...]
 _LISTS = ("lower", "upper", "velocity", "acceleration", "jerk")
+_LARGEST_PLAUSIBLE = {"lower": 13.0, "upper": 13.0, "velocity": 50.0}
+"""In [rad] and [rad/s]; ours: two turns either way, and twice what the fastest small joints do."""
 _BOX, _BOX_KEY = "box_", "workspace_"
 """How the two corners of the tool tip's box begin in `GateSettings` and in the file."""
 _SECTIONS: Mapping[str, Mapping[str, Any]] = {
@@ -142,10 +144,17 @@ class _Reader:
         settings = self.made("gate", lambda: GateSettings(**gate))
         if limits is not None:
             self.check_joints(form, limits, settings)
+        elif settings.box_low is not None:
+            why = "with no robot there is no tool tip to check; take it out, or name the robot"
+            raise self.error("gate", f"{_BOX_KEY}low", why)
         return Manifest(task["name"], form, names, units, tolerance, limits, settings)
 
     def limits(self, robot: dict[str, Any], task: str) -> RobotLimits | None:
         """Limits of the robot's model; None where there is none."""
+        if robot["model"] != "given":
+            for key in ("joint_names", *_LISTS):
+                if key in robot:
+                    raise self.error("robot", key, 'goes with model = "given"; take it out')
         if robot["model"] == "none":
             return None
         if robot["model"] != "given":
@@ -156,6 +165,9 @@ class _Reader:
             raise self.error(
                 "robot", missing[0], f"missing{also}; add it, `prior-reinforce new` shows how"
             )
+        for key, largest in _LARGEST_PLAUSIBLE.items():
+            if np.abs(robot[key]).max() > largest:
+                raise self.error("robot", key, "looks like degrees; give radians")
         low, high, speed, acceleration, jerk = (np.array(robot[key]) for key in _LISTS)
         names, source = robot["joint_names"], str(self.path)
         return RobotLimits(task, "as given", source, names, low, high, speed, acceleration, jerk)
