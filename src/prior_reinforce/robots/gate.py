@@ -131,8 +131,8 @@ def check_plan(
     settings = settings or GateSettings()
     if plan.format.dt < (1 - 1e-9) / RATE:
         raise InvalidPlanError(
-            f"a frame every {plan.format.dt:g} s is closer than a cycle of the arm ({1 / RATE:g} s),"
-            " and what is between two cycles cannot be checked; give the plan fewer frames"
+            f"a frame every {plan.format.dt:g} s is closer than a cycle of the arm ({1 / RATE:g} "
+            "s), and what is between two cycles cannot be checked; give the plan fewer frames"
         )
     with np.errstate(over="ignore", invalid="ignore"):  # what is no number is refused below
         checks = _Checks(plan, limits, settings)
