@@ -22,6 +22,12 @@ from sklearn.gaussian_process.kernels import RBF, ConstantKernel
 from prior_reinforce.adapters.gaussian_process import GaussianProcessAdapter
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 
+
+def observe(adapter: GaussianProcessAdapter, condition: np.ndarray, outcome: np.ndarray) -> None:
+    """Take in a trial by its outcome: seen from a goal at 0, that is the error."""
+    adapter.observe(condition, np.zeros(len(outcome)), outcome)
+
+
 N_DEMONSTRATIONS, N_TRIALS, OUTCOME_DIM = 6, 2, 2
 REGION = np.array([0.25, 0.50])  # [m]
 
@@ -41,7 +47,7 @@ def adapter_before_its_last_trial(
     conditions = goal + rng.normal(scale=0.02, size=(N_TRIALS, OUTCOME_DIM))
     outcomes = goal + rng.normal(scale=0.02, size=(N_TRIALS, OUTCOME_DIM))
     for condition, outcome in zip(conditions[:-1], outcomes[:-1], strict=True):
-        adapter.observe(condition, outcome)
+        observe(adapter, condition, outcome)
     return adapter, conditions[-1], outcomes[-1]
 
 
@@ -49,7 +55,7 @@ def time_ours(
     adapter: GaussianProcessAdapter, condition: np.ndarray, outcome: np.ndarray
 ) -> tuple[float, float]:
     start = time.perf_counter()
-    adapter.observe(condition, outcome)
+    observe(adapter, condition, outcome)
     return time.perf_counter() - start, adapter.log_marginal_likelihood_
 
 
@@ -87,7 +93,7 @@ def main() -> None:
         twin, *_ = adapter_before_its_last_trial(
             np.random.default_rng([arguments.seed, number + 3])
         )
-        twin.observe(condition, outcome)
+        observe(twin, condition, outcome)
         points = twin.memory_outcomes_, twin.memory_conditions_, twin.jitter_
         pair = {}
         for who in rng.permutation(["ours", "theirs"]):

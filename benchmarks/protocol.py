@@ -24,6 +24,7 @@ from prior_reinforce.adapters.gaussian_process import GaussianProcessAdapter
 from prior_reinforce.experiments.protocol import run_goals
 from prior_reinforce.generators import make_generator
 from prior_reinforce.perception.amplified import Amplified
+from prior_reinforce.readings import Reading
 from prior_reinforce.tasks import make_task
 
 
@@ -52,9 +53,9 @@ class TimedAdapter(GaussianProcessAdapter):
         """Return the next condition."""
         return self.watch(lambda: super(TimedAdapter, self).propose(goal_seen))
 
-    def observe(self, condition: np.ndarray, outcome_seen: np.ndarray) -> None:
+    def observe(self, condition: np.ndarray, goal: np.ndarray, reading: Reading) -> None:
         """Take in a trial."""
-        self.watch(lambda: super(TimedAdapter, self).observe(condition, outcome_seen))
+        self.watch(lambda: super(TimedAdapter, self).observe(condition, goal, reading))
 
 
 def main() -> None:

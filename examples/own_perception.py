@@ -48,8 +48,8 @@ class OverheadCamera(pr.Perception):
 
     def perceive(
         self, rollout: pr.Rollout, goal: np.ndarray, rng: np.random.Generator
-    ) -> np.ndarray:
-        """Return where the ball seems to be, minus the goal, shape (k,), in [m]."""
+    ) -> pr.Reading:
+        """Return where the ball seems to be, minus the goal, in [m]."""
         seen = np.array(rollout.outcome, dtype=float)
         below = np.array(self.below[: len(seen)])
         flat = slice(len(below))
@@ -60,7 +60,7 @@ class OverheadCamera(pr.Perception):
                 "look yourself"
             )
         seen[flat] += rng.normal(0.0, self.noise_sd, len(below))
-        return seen - goal
+        return pr.Reading.measured(seen - goal, self.noise_sd)
 
 
 def main() -> None:
@@ -74,6 +74,7 @@ def main() -> None:
     for x, y in task.region:
         hit = pr.Rollout(outcome=np.array([x, y]), valid=True)
         bias = OverheadCamera(noise_sd=0.0).perceive(hit, hit.outcome, np.random.default_rng(0))
+        bias = bias.error_seen
         print(f"a hit at ({x:.2f}, {y:.2f}) m seems to be {100 * np.linalg.norm(bias):.1f} cm off")
 
     demonstrations = task.demonstrations("A")

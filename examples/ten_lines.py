@@ -32,9 +32,9 @@ def main() -> int:
     while not session.solved and session.n_trials < options.rounds:
         trial = session.ask()
         rollout = task.rollout(trial.plan[None], rng)[0]
-        error_seen = eye.perceive(rollout, session.goal, rng)
-        session.tell(trial.number, error_seen)
-        long, left = 100 * error_seen
+        seen = eye.perceive(rollout, session.goal, rng)
+        session.tell(trial.number, seen)
+        long, left = 100 * seen.error_seen
         print(f"throw {trial.number}: seen {long:+.0f} cm long, {left:+.0f} cm left")
     outcome = "reached" if session.solved else "not reached"
     print(f"{outcome}, N = {demos.n} demonstrations + {session.n_trials} throws")

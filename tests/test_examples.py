@@ -119,7 +119,7 @@ def test_ridge_by_hand():
     )
     adapter = RidgeAdapter(penalty=0.1)
     adapter.start(demonstrations)
-    adapter.observe(np.array([0.5]), np.array([0.7]))
+    adapter.observe(np.array([0.5]), np.array([0.4]), np.array([0.3]))
     expected = 0.4 - 0.2 * (1 + 0.4 * 0.7) / (1 + 0.7**2 + 0.1)
     np.testing.assert_allclose(adapter.propose(np.array([0.4])), expected)
 
@@ -143,7 +143,7 @@ def test_parallax_by_hand():
     camera = OverheadCamera(below=(0.5, 0.0), height=1.0, ball_height=0.2, noise_sd=0.0)
     hit = Rollout(outcome=np.array([0.9, -0.2, 3.0]), valid=True)
     seen = camera.perceive(hit, hit.outcome, np.random.default_rng(0))
-    np.testing.assert_allclose(seen, [0.1, -0.05, 0.0], atol=1e-12)
+    np.testing.assert_allclose(seen.error_seen, [0.1, -0.05, 0.0], atol=1e-12)
 
 
 def test_the_catapults_ball_falls_as_one_thrown_by_hand():
@@ -210,7 +210,7 @@ def test_the_arm_calls_where_the_ball_came_down(printed, tmp_path):
     )
     assert status == 0
     error = pr.from_words(called.read_text(), 2)
-    np.testing.assert_allclose(error, [0.2, -0.1], atol=0.03)
+    np.testing.assert_allclose(error.error_seen, [0.2, -0.1], atol=0.03)
     assert called.read_text().strip() in text
 
 

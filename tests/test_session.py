@@ -14,6 +14,7 @@ from prior_reinforce.errors import (
 )
 from prior_reinforce.generators.base import Generator
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
+from prior_reinforce.readings import Reading
 from prior_reinforce.session import Session, ask_all
 from prior_reinforce.trials import MemoryLog, Stage
 
@@ -106,6 +107,90 @@ def test_hit_as_seen_overrides_the_judgement_by_error(session):
     session.ask()
     session.tell(2, [0.05, 0.0], hit=True)
     assert session.solved
+
+
+class Listening(FullStepAdapter):
+    """Keeps all that it hears."""
+
+    def _start(self, demonstrations):
+        super()._start(demonstrations)
+        self.heard = []
+
+    def _observe_reading(self, condition, goal, reading):
+        self.heard.append((goal, reading))
+        super()._observe_reading(condition, goal, reading)
+
+
+@pytest.fixture
+def listening():
+    return Session(RepeatingGenerator().fit(DEMOS, seed=0), Listening(), DEMOS, GOAL, 0.015)
+
+
+def test_words_and_readings_reach_the_adapter_as_they_were_said(listening):
+    for seen in ("5 cm long, 2 cm left", Reading.measured([0.05, 0.02], 0.001)):
+        listening.tell(listening.ask().number, seen)
+    listening.ask()
+    (_, by_eye), (_, measured) = listening.adapter.heard
+    np.testing.assert_allclose([by_eye.low, by_eye.high], [[0.035, 0.01], [0.075, 0.035]])
+    np.testing.assert_allclose(measured.sd, 0.001)
+    assert [trial.reading.said for trial in listening.trials[:2]] == ["5 cm long, 2 cm left", ""]
+
+
+def test_numbers_are_of_unknown_origin_to_two_thirds_of_the_tolerance(listening):
+    listening.tell(listening.ask().number, [0.0, -0.08])
+    np.testing.assert_allclose(listening.trials[0].reading.sd, [0.01, np.hypot(0.01, 0.02)])
+
+
+def test_a_hit_alone_is_a_reading_within_the_tolerance(listening):
+    listening.tell(listening.ask().number, hit=True)
+    listening.ask()
+    assert listening.solved
+    ((goal, reading),) = listening.adapter.heard
+    np.testing.assert_array_equal(goal, GOAL)
+    np.testing.assert_array_equal([reading.low, reading.high], [[-0.015] * 2, [0.015] * 2])
+
+
+def test_a_miss_alone_teaches_nobody_who_wants_numbers(session):
+    session.tell(session.ask().number, hit=False)
+    assert not session.solved
+    np.testing.assert_array_equal(session.ask().condition, GOAL)
+
+
+def test_a_hit_that_is_seen_overrules_what_the_reading_knows(session):
+    session.tell(session.ask().number, Reading.by_eye([0.05, 0.0], hit=False), hit=True)
+    assert session.trials[0].reading.hit is True
+    assert session.solved
+
+
+def test_nothing_at_all_cannot_be_told(session):
+    session.ask()
+    with pytest.raises(InvalidFeedbackError, match="whether it hit"):
+        session.tell(1)
+    with pytest.raises(InvalidFeedbackError, match="3"):
+        session.tell(1, Reading.by_eye([0.05, 0.0, 0.0]))
+    with pytest.raises(InvalidFeedbackError, match="cannot read"):
+        session.tell(1, "far away")
+    assert session.open_trial is not None
+
+
+MIXED = Demonstrations(
+    np.random.default_rng(0).normal(size=(4, 3, 2)),
+    [[0.8, 1.0], [1.0, 3.0], [0.8, 3.0], [1.0, 1.0]],  # spreads 0.1 m and 1 s
+    PlanFormat(("x", "y"), ("rad", "rad"), 0.02),
+    ("x", "t"),
+    ("m", "s"),
+)
+
+
+def test_metres_and_seconds_are_measured_by_their_spreads():
+    generator = RepeatingGenerator().fit(MIXED, seed=0)
+    session = Session(generator, FullStepAdapter(), MIXED, [0.9, 2.0], 0.02)
+    session.tell(session.ask().number, [0.0, 0.21])  # as bad as 2.1 cm
+    session.tell(session.ask().number, [0.012, 0.15])  # 1.92 cm
+    assert [trial.hit for trial in session.trials] == [False, True]
+    np.testing.assert_allclose(session.goals[0].radius, [0.02, 0.2])
+    with pytest.raises(InvalidFeedbackError, match="words are for lengths"):
+        session.tell(session.ask().number, "5 cm long")
 
 
 def test_the_tolerance_itself_is_a_hit(session):

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from jaxtyping import Float, TypeCheckError, jaxtyped
 
-from prior_reinforce.adapters.normalisation import Normalisation
 from prior_reinforce.arrays import Plans, Points
 from prior_reinforce.perception.exact import Exact
+from prior_reinforce.plans.normalisation import Normalisation
 from prior_reinforce.rollouts import Rollout
 from tests.shapes import arrays_only
 

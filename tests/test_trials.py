@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from prior_reinforce.errors import WorkspaceError
+from prior_reinforce.readings import Reading
 from prior_reinforce.trials import KINDS, History, MemoryLog, Stage
 
 GOAL = {"goal": [0.9, 0.1], "tolerance": 0.015, "memory": "goal", "adapter": "gp"}
@@ -55,6 +56,32 @@ def test_events_of_a_trial_say_where_it_stands(then, stage, error_seen):
     assert trial.open == (stage in {Stage.ASKED, Stage.EXECUTING, Stage.EXECUTED})
     assert error_seen == (None if trial.error_seen is None else trial.error_seen.tolist())
     assert trial.note == ("slipped" if stage is Stage.VOIDED else "")
+
+
+@pytest.mark.parametrize(("hit", "seen_directly"), [(False, None), (True, True)])
+def test_journals_without_readings_tell_numbers_of_unknown_origin(hit, seen_directly):
+    told = TOLD | {"error_seen": [0.08, 0.0], "hit": hit}
+    (trial,) = history(("goal_set", GOAL), ("asked", ASKED), ("told", told)).trials
+    np.testing.assert_allclose(trial.reading.sd, [np.hypot(0.01, 0.02), 0.01])
+    assert (trial.reading.hit, trial.hit) == (seen_directly, hit)
+
+
+def test_a_journal_keeps_what_was_said():
+    reading = Reading([0.05, 0.0], [0.01, -np.inf], [np.inf, np.inf], [0.0, 0.0], None, "long")
+    told = TOLD | {"error_seen": [0.05, 0.0], "reading": reading.as_json()}
+    (trial,) = history(("goal_set", GOAL), ("asked", ASKED), ("told", told)).trials
+    assert (trial.reading.said, trial.reading.high.tolist()) == ("long", [np.inf, np.inf])
+    damaged = {**told, "reading": {**told["reading"], "sd": [-1.0, 0.0]}}
+    with pytest.raises(WorkspaceError, match="does not fit"):
+        history(("goal_set", GOAL), ("asked", ASKED), ("told", damaged))
+
+
+def test_the_first_journals_measured_by_the_plain_distance():
+    goal = history(("goal_set", GOAL)).goal
+    assert goal.distance(np.array([0.3, 0.4])) == pytest.approx(0.5)
+    stretched = history(("goal_set", GOAL | {"metric": [1.0, 0.1]})).goal
+    assert stretched.distance(np.array([0.3, 4.0])) == pytest.approx(0.5)
+    np.testing.assert_allclose(stretched.radius, [0.015, 0.15])
 
 
 def test_numbers_run_over_all_goals():

@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from prior_reinforce.errors import InvalidFeedbackError
+from prior_reinforce.readings import Reading
 from prior_reinforce.wording import (
     from_words,
     in_words,
@@ -15,6 +16,7 @@ from prior_reinforce.wording import (
     say_error,
     say_length,
     say_place,
+    say_reading,
     to_words,
 )
 
@@ -49,16 +51,75 @@ def test_errors_are_said_in_centimetres(error, words):
     ],
 )
 def test_words_are_read(words, error):
-    np.testing.assert_allclose(from_words(words, 2), error, atol=1e-12)
+    np.testing.assert_allclose(from_words(words, 2).error_seen, error, atol=1e-12)
 
 
 @pytest.mark.parametrize(
     "words",
-    ["", "far", "5 cm", "long", "5 cm long, 2 cm short", "5cm high", "-5cm long", "5 km long"],
+    ["", "far", "5 cm", "long 5", "5 cm long, 2 cm short", "5cm high", "-5cm long", "5 km long"],
 )
 def test_other_words_are_refused_with_the_remedy(words):
     with pytest.raises(InvalidFeedbackError, match=r"cannot read|twice"):
         from_words(words, 2)
+
+
+INF = np.inf
+
+
+@pytest.mark.parametrize(
+    ("words", "low", "high", "sd", "hit"),
+    [
+        ("5cm long, 2cm left", [3.5, 1.0], [7.5, 3.5], [0, 0], None),
+        ("10 cm short", [-15, -1], [-7.5, 1], [0, 0], None),
+        ("2 cm right", [-1, -3.5], [1, -1 / np.sqrt(2)], [0, 0], None),
+        ("0", [-1, -1], [1, 1], [0, 0], None),
+        ("3 cm long", [3, -1], [3, 1], [1.25, 0], None),
+        ("5 +- 0.5 cm long, 2 cm left", [5, 1], [5, 3.5], [0.5, 0], None),
+        ("5 cm +- 3 mm long, 0.01m ± 0.2cm left", [5, 1], [5, 1], [0.3, 0.2], None),
+        ("long", [1, -INF], [INF, INF], [0, 0], None),
+        ("short, 5 cm left", [-INF, 3.5], [-1, 7.5], [0, 0], None),
+        ("5 cm left, somewhere", [-INF, 3.5], [INF, 7.5], [0, 0], None),
+        ("long, miss", [1, -INF], [INF, INF], [0, 0], False),
+        ("hit", [-INF, -INF], [INF, INF], [0, 0], True),
+        ("miss", [-INF, -INF], [INF, INF], [0, 0], False),
+        ("2 cm long, hit", [1 / np.sqrt(2), -1], [3.5, 1], [0, 0], True),
+    ],
+)
+def test_words_are_intervals_in_centimetres(words, low, high, sd, hit):
+    reading = from_words(words, 2)
+    np.testing.assert_allclose(100 * reading.low, low)
+    np.testing.assert_allclose(100 * reading.high, high)
+    np.testing.assert_allclose(100 * reading.sd, sd, atol=1e-12)
+    assert reading.hit is hit
+    assert reading.said == words
+
+
+def test_a_mere_direction_stands_for_five_centimetres():
+    np.testing.assert_allclose(from_words("long, right", 2).error_seen, [0.05, -0.05])
+
+
+def test_hit_and_miss_exclude_each_other():
+    with pytest.raises(InvalidFeedbackError, match="hit and miss"):
+        from_words("hit, miss", 2)
+
+
+def test_a_place_has_no_spread_and_no_mere_direction():
+    for text in ("92 +- 1 cm ahead", "ahead"):
+        with pytest.raises(InvalidFeedbackError, match="cannot read"):
+            read_place(text, XY, METRES)
+
+
+@pytest.mark.parametrize(
+    ("reading", "said"),
+    [
+        (from_words("long, somewhere", 2), "long, somewhere"),
+        (Reading.by_eye([0.05, -0.02]), "5 cm long, 2 cm right"),
+        (Reading.only(True, 2), "hit"),
+        (Reading.only(False, 2), "missed"),
+    ],
+)
+def test_a_reading_is_said_in_its_own_words_or_as_its_number(reading, said):
+    assert say_reading(reading, XY, METRES) == said
 
 
 @pytest.mark.parametrize("words", ["0.05 long", "5cm short, 0.02 left"])
@@ -70,13 +131,14 @@ def test_metres_without_their_unit_are_not_taken_for_a_hit(words):
 @given(st.lists(st.integers(-900, 900), min_size=1, max_size=3))
 def test_words_say_tenths_of_centimetres_without_loss(tenths):
     error = np.array(tenths) / 1000
-    np.testing.assert_allclose(from_words(to_words(error), len(tenths)), error, atol=1e-12)
+    read = from_words(to_words(error), len(tenths))
+    np.testing.assert_allclose(read.error_seen, error, atol=1e-12)
 
 
 @given(st.text(max_size=30))
 def test_no_text_causes_anything_but_the_named_error(text):
     with contextlib.suppress(InvalidFeedbackError):
-        assert from_words(text, 2).shape == (2,)
+        assert from_words(text, 2).error_seen.shape == (2,)
 
 
 @pytest.mark.parametrize(

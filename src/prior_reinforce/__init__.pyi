@@ -58,6 +58,7 @@ from .plans.files import write_plan as write_plan
 from .plans.motions import Demonstrations as Demonstrations
 from .plans.motions import Plan as Plan
 from .plans.motions import PlanFormat as PlanFormat
+from .readings import Reading as Reading
 from .robots.executors.command import CommandResult as CommandResult
 from .robots.executors.command import run_command as run_command
 from .robots.gate import GateSettings as GateSettings

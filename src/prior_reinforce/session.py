@@ -8,7 +8,7 @@ back.
 Notation (docs/notation.md):
     g tilde  `goal`        (k,)    [m], table frame
     c        `condition`   (k,)    [m], table frame
-    e tilde  `error_seen`  (k,)    [m], outcome minus goal, as perceived
+    e tilde  `reading`     (k,)    [m], outcome minus goal, as perceived
     A        `plan`        (H, D)  unit of the plan format
 """
 
@@ -34,7 +34,10 @@ from prior_reinforce.errors import (
     TrialStateError,
     WorkspaceError,
 )
+from prior_reinforce.plans.normalisation import Normalisation
+from prior_reinforce.readings import Reading
 from prior_reinforce.trials import Goal, History, Log, MemoryLog, Stage, Trial
+from prior_reinforce.wording import from_words, in_words
 
 if TYPE_CHECKING:
     from prior_reinforce.adapters.base import Adapter
@@ -78,7 +81,8 @@ class Session:
             adapter: M; owned by this session from now on.
             demonstrations: D_prior with its perceived outcomes.
             goal: g tilde, shape (k,), in the outcomes' units; the log's latest goal if not given.
-            tolerance: epsilon, largest perceived error that counts as reached, in the same units.
+            tolerance: epsilon, largest perceived error that counts as reached, in the same units;
+                where they are mixed, in the first one (see `Normalisation.metric`).
             carry_over: Let the adapter learn from the trials of earlier goals too.
             log: What happened so far, and where to write what happens; in memory if not given.
             gate: Holds a plan against a robot's limits whenever it is to leave; none by default.
@@ -208,6 +212,7 @@ class Session:
             data = {
                 "goal": checked.tolist(),
                 "tolerance": tolerance,
+                "metric": Normalisation.of(self.demonstrations).metric.tolist(),
                 "memory": "workspace" if carried else "goal",
                 "adapter": adapter,
             }
@@ -234,15 +239,20 @@ class Session:
         """
         return ask_all([self], arm_did_not_move=arm_did_not_move)[0]
 
-    def tell(self, number: int, error_seen: ArrayLike, *, hit: bool | None = None) -> Trial:
+    def tell(
+        self, number: int, seen: Reading | ArrayLike | None = None, *, hit: bool | None = None
+    ) -> Trial:
         """Report what was seen of the open trial.
 
         Args:
             number: The open trial's number.
-            error_seen: e tilde, outcome minus goal as perceived, shape (k,), in the outcomes'
-                units.
+            seen: What perception returned; or words, `5 cm long, 2 cm left`, where outcomes are
+                lengths (see `from_words`); or outcome minus goal as a number of unknown origin,
+                shape (k,), in the outcomes' units (see `Reading.estimated`). None where nothing
+                but `hit` is known.
             hit: Whether the goal was reached, where that is seen directly (the ball is in the
-                hoop); None judges it by the perceived error, as Algorithm 1 does.
+                hoop). None leaves it to `seen`; where that does not know, it is judged by the
+                perceived error, as Algorithm 1 does.
 
         Returns:
             The trial as it stands now.
@@ -258,11 +268,15 @@ class Session:
                     f"trial {number} is already {trial.stage.value}; "
                     + ("amend it to correct it" if trial.stage is Stage.TOLD else "ask for another")
                 )
-            self._append_reading("told", trial, error_seen, hit)
+            self._append_reading("told", trial, seen, hit)
         return self._now(number)
 
-    def amend(self, number: int, error_seen: ArrayLike, *, hit: bool | None = None) -> Trial:
+    def amend(
+        self, number: int, seen: Reading | ArrayLike | None = None, *, hit: bool | None = None
+    ) -> Trial:
         """Correct what was told of a trial, of any goal. An open trial keeps the plan it has.
+
+        Arguments as in `tell`.
 
         Raises:
             TrialStateError: There is no such trial, or it has not been told.
@@ -275,7 +289,7 @@ class Session:
                     f"trial {number} is {trial.stage.value}, only a told trial can be amended; "
                     + ("tell it" if trial.open else "ask for another")
                 )
-            self._append_reading("amended", trial, error_seen, hit)
+            self._append_reading("amended", trial, seen, hit)
         return self._now(number)
 
     def void(self, number: int, reason: str) -> Trial:
@@ -373,15 +387,43 @@ class Session:
             return stack.pop_all()
 
     def _append_reading(
-        self, kind: str, trial: Trial, error_seen: ArrayLike, hit: bool | None
+        self, kind: str, trial: Trial, seen: Reading | ArrayLike | None, hit: bool | None
     ) -> None:
         goal = self._history.goals[trial.goal_number - 1]
-        error = as_error(error_seen, goal.goal.size)
         if not (hit is None or isinstance(hit, (bool, np.bool_))):
             raise InvalidFeedbackError(f"hit must be True, False or None, got {hit!r}")
-        reached = np.linalg.norm(error) <= goal.tolerance if hit is None else hit
-        data = {"trial": trial.number, "error_seen": error.tolist(), "hit": bool(reached)}
+        reading = self._as_reading(seen, goal, hit).with_hit(hit)
+        reached = reading.hit
+        if reached is None:
+            reached = goal.distance(reading.error_seen) <= goal.tolerance
+        data = {
+            "trial": trial.number,
+            "error_seen": reading.error_seen.tolist(),
+            "reading": reading.as_json(),
+            "hit": bool(reached),
+        }
         self.log.append(kind, data)
+
+    def _as_reading(
+        self, seen: Reading | ArrayLike | None, goal: Goal, hit: bool | None
+    ) -> Reading:
+        k = goal.goal.size
+        if seen is None:
+            if hit is None:
+                raise InvalidFeedbackError("say what was seen, or whether it hit")
+            return Reading.only(bool(hit), k)
+        if isinstance(seen, str):
+            units = self.demonstrations.outcome_units
+            if not in_words(units):
+                raise InvalidFeedbackError(
+                    f"words are for lengths, these outcomes are in {', '.join(units)}; give {k} "
+                    "numbers"
+                )
+            return from_words(seen, k)
+        if not isinstance(seen, Reading):
+            return goal.estimated(as_error(seen, k))
+        as_error(seen.error_seen, k)
+        return seen
 
     def _settle(self, trial: Trial, arm_did_not_move: bool) -> None:
         """Note that a trial that was executing may be executed after all; within `_exclusive`."""
@@ -403,8 +445,10 @@ class Session:
             self.adapter.start(self.demonstrations)
             seen = []
         for trial in readings[len(seen) :]:
-            goal = self._history.goals[trial.goal_number - 1].goal
-            self.adapter.observe(trial.condition, goal + np.asarray(trial.error_seen))
+            goal = self._history.goals[trial.goal_number - 1]
+            assert trial.reading is not None
+            reading = trial.reading.within(goal.radius)
+            self.adapter.observe(trial.condition, goal.goal, reading)
         self._observed = readings
         return self.adapter.propose(self.goal)
 

@@ -5,10 +5,10 @@ can be brought back from its log alone. `MemoryLog` is a list; a workspace keeps
 
 | event | data |
 |---|---|
-| `goal_set` | goal, tolerance, memory (`goal`, or `workspace` to carry trials over), adapter |
+| `goal_set` | goal, tolerance, metric, memory (`workspace` carries trials over), adapter |
 | `asked` | trial, goal (its number), condition, model, gate, and what the log keeps of the plan |
 | `executing`, `executed`, `not_executed` | trial, and what executed it |
-| `told`, `amended` | trial, error_seen, hit |
+| `told`, `amended` | trial, error_seen, reading (what was said, `Reading.as_json`), hit |
 | `voided` | trial, reason |
 """
 
@@ -23,7 +23,8 @@ from typing import Any, Protocol
 import numpy as np
 
 from prior_reinforce.arrays import Frames, Point
-from prior_reinforce.errors import WorkspaceError
+from prior_reinforce.errors import InvalidFeedbackError, WorkspaceError
+from prior_reinforce.readings import Reading
 
 
 class Stage(Enum):
@@ -41,6 +42,11 @@ class Stage(Enum):
     """Not data: the ball slipped, the arm stopped, nothing was seen."""
 
 
+_LEAST_SD = 2 / 3
+"""Least sd of a number of unknown origin, in tolerances (ours): 1 cm of 1.5 cm, as for lengths in
+`readings`."""
+
+
 @dataclass(frozen=True, eq=False)
 class Goal:
     """One goal of a session."""
@@ -50,11 +56,27 @@ class Goal:
     goal: Point
     """g, in the outcomes' units."""
     tolerance: float
-    """epsilon, the largest perceived error that counts as reached, in the same units."""
+    """epsilon, the largest perceived error that counts as reached, in the first component's
+    unit."""
+    metric: Point
+    """What one unit of each component counts in a distance; 1 everywhere where all units agree."""
     carry_over: bool = False
     """Whether the adapter also learns from the trials of earlier goals."""
     adapter: str = ""
     """The adapter's name; empty where the session was given one by hand."""
+
+    def distance(self, error: Point) -> float:
+        """How far an error, outcome minus goal, is from the goal, in the first component's unit."""
+        return float(np.linalg.norm(self.metric * error))
+
+    @property
+    def radius(self) -> Point:
+        """The tolerance along each component alone, in its own unit."""
+        return np.asarray(self.tolerance / self.metric)
+
+    def estimated(self, error: Point) -> Reading:
+        """Return what a number of unknown origin says, whatever its unit."""
+        return Reading.estimated(error, _LEAST_SD * self.radius)
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,10 +92,10 @@ class Trial:
     plan: Frames | None = None
     """A = pi(c); read-only. None for a trial read back from a journal, until it is asked for."""
     stage: Stage = Stage.ASKED
-    error_seen: Point | None = None
-    """e tilde, outcome minus goal as perceived; None unless told."""
+    reading: Reading | None = None
+    """What was said of it; None unless told."""
     hit: bool = False
-    """Whether the goal was reached: as reported, or judged from `error_seen`."""
+    """Whether the goal was reached: as seen, or judged from `error_seen`."""
     note: str = ""
     """Why it was voided."""
     model: str = ""
@@ -83,6 +105,11 @@ class Trial:
     execution: Mapping[str, Any] = field(default_factory=dict)
     """What is known of its execution: how the command ended, what the driver said; empty where a
     person executed it."""
+
+    @property
+    def error_seen(self) -> Point | None:
+        """The error e tilde, outcome minus goal as perceived; None unless told."""
+        return None if self.reading is None else self.reading.error_seen
 
     @property
     def open(self) -> bool:
@@ -190,7 +217,7 @@ class History:
         for event in events[self._n_events :]:
             try:
                 self._apply(event.kind, event.data)
-            except (KeyError, IndexError, TypeError, ValueError) as error:
+            except (KeyError, IndexError, TypeError, ValueError, InvalidFeedbackError) as error:
                 raise WorkspaceError(
                     f"event {event.id} ({event.kind}) does not fit the ones before it: {error!r}; "
                     "restore the journal from a copy"
@@ -204,6 +231,7 @@ class History:
                     len(self.goals) + 1,
                     _read_only(data["goal"]),
                     data["tolerance"],
+                    _read_only(data.get("metric", [1.0] * len(data["goal"]))),
                     data["memory"] == "workspace",
                     data.get("adapter", "gp"),  # the first journals knew no other
                 )
@@ -226,13 +254,25 @@ class History:
         elif kind in _CHANGES:
             changes: dict[str, Any] = {"stage": _CHANGES[kind]}
             if kind in {"told", "amended"}:
-                changes |= {"error_seen": _read_only(data["error_seen"]), "hit": data["hit"]}
+                changes |= {"reading": self._reading(data), "hit": data["hit"]}
             if kind in {"executing", "executed", "not_executed"}:
                 changes["execution"] = data
             if kind == "voided":
-                changes |= {"error_seen": None, "hit": False, "note": data["reason"]}
+                changes |= {"reading": None, "hit": False, "note": data["reason"]}
             index = range(1, len(self.trials) + 1).index(data["trial"])
             self.trials[index] = replace(self.trials[index], **changes)
+
+    def _reading(self, data: Mapping[str, Any]) -> Reading:
+        """What was told; the first journals kept a number a component, and nothing of its origin.
+
+        Nor whether a hit was seen or judged: what differs from the judgement was seen.
+        """
+        if "reading" in data:
+            return Reading.from_json(data["error_seen"], data["reading"])
+        goal = self.goals[self.trials[data["trial"] - 1].goal_number - 1]
+        reading = goal.estimated(_read_only(data["error_seen"]))
+        judged = goal.distance(reading.error_seen) <= goal.tolerance
+        return reading.with_hit(data["hit"] if data["hit"] != judged else None)
 
 
 _CHANGES = {

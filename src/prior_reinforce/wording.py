@@ -17,12 +17,14 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
 from prior_reinforce.errors import InvalidFeedbackError
+from prior_reinforce.readings import EYE_BETWEEN, OPEN_ERROR, Reading
 
 WORDS: tuple[tuple[str, str], ...] = (("long", "short"), ("left", "right"), ("high", "low"))
 """For each component of an error: the word where it is positive, the word where it is negative."""
@@ -33,9 +35,16 @@ _Point = Float[np.ndarray, " k"]
 _LEAST_BARE_CM = 0.1
 """Ours: nobody sees a throw to a millimetre; a smaller number without a unit is in metres."""
 _CM_PER_UNIT = {"cm": 1.0, "m": 100.0, "mm": 0.1, "": 1.0}
+_NUMBER = r"\d{1,6}(?:\.\d*)?|\.\d+"
+_UNIT = r"cm|mm|m|"
 _TERM = re.compile(
-    r"(?P<value>\d{1,6}(?:\.\d*)?|\.\d+)\s*(?P<unit>cm|mm|m|)\s*(?:to the )?(?P<word>[a-z]+)"
+    rf"(?:(?P<value>{_NUMBER})\s*(?P<unit>{_UNIT})\s*"
+    rf"(?:(?:\+-|\+/-|±)\s*(?P<sd>{_NUMBER})\s*(?P<sd_unit>{_UNIT})\s*)?)?"
+    r"(?:to the )?(?P<word>[a-z]+)"
 )
+_SOMEWHERE = "somewhere"
+_ON_THE_GOAL = ("on the goal", "0")
+_HITS = {"hit": True, "miss": False}
 
 
 def in_words(units: Sequence[str]) -> bool:
@@ -61,6 +70,15 @@ def say_error(error: ArrayLike, names: Sequence[str], units: Sequence[str]) -> s
     return to_words(error) if in_words(units) else _components(error, names, units, sign="+")
 
 
+def say_reading(reading: Reading, names: Sequence[str], units: Sequence[str]) -> str:
+    """Say what was seen: in its own words where it has some, else as its number."""
+    if reading.said:
+        return reading.said
+    if not np.any(np.isfinite(reading.low) | np.isfinite(reading.high)):
+        return "hit" if reading.hit else "missed"
+    return say_error(reading.error_seen, names, units)
+
+
 def say_place(place: ArrayLike, names: Sequence[str], units: Sequence[str]) -> str:
     """Say a goal, a condition or an outcome: `92 cm ahead, 10 cm left`, or `x 0.92 m, t 0.3 s`."""
     if in_words(units):
@@ -76,16 +94,19 @@ def say_length(length: float, units: Sequence[str]) -> str:
     return f"{float(f'{length:.3g}'):g} {unit}".strip()
 
 
-def from_words(text: str, outcome_dim: int) -> _Point:
+def from_words(text: str, outcome_dim: int) -> Reading:
     """Read an error from words.
 
     Args:
-        text: For instance `5cm long, 2 cm left`, or `hit`. Numbers without a unit are centimetres.
-            A component that is not named is zero.
+        text: For instance `5cm long, 2 cm left`; numbers without a unit are centimetres, and a
+            component that is not named is zero. 0, 2, 5 cm and tens are an observer's words
+            (`Reading.by_eye`), other numbers estimates (`Reading.estimated`), `5 +- 0.5 cm long` is
+            a measurement. `long` is long by 1 cm or more, and says nothing of what is not named;
+            nor does `5 cm long, somewhere`. `hit` and `miss` stand alone or beside other terms.
         outcome_dim: k, at most 3.
 
     Returns:
-        Outcome minus goal, in [m].
+        What was said, in [m].
 
     Raises:
         InvalidFeedbackError: Words that are not understood, or one direction named twice.
@@ -95,9 +116,36 @@ def from_words(text: str, outcome_dim: int) -> _Point:
             f"words describe up to {len(WORDS)} components, this task has {outcome_dim}: give "
             "numbers"
         )
-    if text.strip().lower() in {"hit", "on the goal", "0"}:
-        return np.zeros(outcome_dim)
-    return _read(text, WORDS[:outcome_dim], 'for instance "5cm long, 2cm left", or "hit"')
+    words = WORDS[:outcome_dim]
+    hits, terms, rest_unknown = set(), [], False
+    for part in _parts(text):
+        if part in _HITS:
+            hits.add(_HITS[part])
+        elif part == _SOMEWHERE:
+            rest_unknown = True
+        elif part not in _ON_THE_GOAL:
+            terms.append(part)
+    if len(hits) > 1:
+        raise InvalidFeedbackError(f"{text!r} says hit and miss; say one of them")
+    hit = hits.pop() if hits else None
+    if hit is not None and not terms:
+        return replace(Reading.only(hit, outcome_dim), said=text)
+    said = _read(terms, text, words, 'for instance "5cm long, 2cm left", or "hit"', sizes=False)
+    rest_unknown |= any(term.size is None for term in said.values())
+    number = np.array([said[j].error if j in said else 0.0 for j in range(outcome_dim)])
+    eye = Reading.by_eye(number)
+    low, high, sd = eye.low.copy(), eye.high.copy(), eye.sd.copy()
+    for j in range(outcome_dim):
+        if j not in said:
+            if rest_unknown:
+                low[j], high[j], sd[j] = -math.inf, math.inf, 0.0
+        elif said[j].size is None:
+            ends = EYE_BETWEEN[0], math.inf
+            low[j], high[j] = ends if said[j].sign > 0 else (-ends[1], -ends[0])
+            sd[j] = 0.0
+        elif said[j].sd is not None:
+            low[j], high[j], sd[j] = number[j], number[j], said[j].sd
+    return Reading(number, low, high, sd, hit, text)
 
 
 def read_place(text: str, names: Sequence[str], units: Sequence[str]) -> _Point:
@@ -116,19 +164,49 @@ def read_place(text: str, names: Sequence[str], units: Sequence[str]) -> _Point:
         numbers = [float(part) for part in text.replace(",", " ").split()]
     except ValueError:
         if in_words(units):
-            return _read(text, PLACE_WORDS[: len(names)], 'for instance "92cm ahead, 10cm left"')
+            words, example = PLACE_WORDS[: len(names)], 'for instance "92cm ahead, 10cm left"'
+            said = _read(_parts(text), text, words, example, sizes=True)
+            return np.array([said[j].error if j in said else 0.0 for j in range(len(names))])
         raise InvalidFeedbackError(f"cannot read {text!r}; give {expected}") from None
     if len(numbers) != len(names) or not all(map(math.isfinite, numbers)):
         raise InvalidFeedbackError(f"{text!r} is not {expected}")
     return np.array(numbers)
 
 
-def _read(text: str, words: Sequence[tuple[str, str]], example: str) -> _Point:
+@dataclass(frozen=True)
+class _Term:
+    """What was said of one component, in [m]."""
+
+    sign: float
+    size: float | None
+    """None where only the direction was said."""
+    sd: float | None
+
+    @property
+    def error(self) -> float:
+        """The number that stands for it."""
+        return self.sign * (OPEN_ERROR if self.size is None else self.size)
+
+
+def _parts(text: str) -> list[str]:
+    return re.split(r"\s*(?:,|;|\band\b)\s*", text.strip().lower())
+
+
+def _read(
+    parts: Sequence[str],
+    text: str,
+    words: Sequence[tuple[str, str]],
+    example: str,
+    *,
+    sizes: bool,
+) -> dict[int, _Term]:
+    """Read the terms of a text by component; `sizes` wants a number for each, and no `+-`."""
     known = [word for pair in words for word in pair]
-    read: dict[int, float] = {}
-    for part in re.split(r"\s*(?:,|;|\band\b)\s*", text.strip().lower()):
+    read: dict[int, _Term] = {}
+    for part in parts:
         match = _TERM.fullmatch(part)
-        if match is None or match["word"] not in known:
+        understood = match is not None and match["word"] in known
+        if match is None or not understood or (sizes and (not match["value"] or match["sd"])):
             raise InvalidFeedbackError(
                 f"cannot read {part!r} in {text!r}; write a length and one of {', '.join(known)}, "
                 f"{example}"
@@ -138,14 +216,23 @@ def _read(text: str, words: Sequence[tuple[str, str]], example: str) -> _Point:
             raise InvalidFeedbackError(
                 f"{text!r} names {' and '.join(words[component])} twice; give each direction once"
             )
-        value = float(match["value"])
-        if not match["unit"] and 0 < value < _LEAST_BARE_CM:
-            raise InvalidFeedbackError(
-                f"{part!r} has no unit and would be {10 * value:g} mm; say m, cm or mm"
-            )
-        metres = value * _CM_PER_UNIT[match["unit"]] / 100
-        read[component] = -metres if negative else metres
-    return np.array([read.get(component, 0.0) for component in range(len(words))])
+        size = sd = None
+        if match["value"]:
+            unit = match["unit"] or match["sd_unit"] or ""
+            size = _metres(match["value"], unit, part)
+            if match["sd"]:
+                sd = _metres(match["sd"], match["sd_unit"] or unit, part)
+        read[component] = _Term(-1.0 if negative else 1.0, size, sd)
+    return read
+
+
+def _metres(number: str, unit: str, part: str) -> float:
+    value = float(number)
+    if not unit and 0 < value < _LEAST_BARE_CM:
+        raise InvalidFeedbackError(
+            f"{part!r} has no unit and would be {10 * value:g} mm; say m, cm or mm"
+        )
+    return value * _CM_PER_UNIT[unit] / 100
 
 
 def _terms(values: ArrayLike, words: Sequence[tuple[str, str]]) -> list[str]:

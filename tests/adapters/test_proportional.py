@@ -5,6 +5,12 @@ from prior_reinforce.adapters.proportional import ProportionalAdapter
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 
+
+def observe(adapter, condition, outcome):
+    """Take in a trial by its outcome: seen from a goal at 0, that is the error."""
+    adapter.observe(condition, np.zeros(len(outcome)), outcome)
+
+
 DEMONSTRATIONS = Demonstrations(
     np.random.default_rng(0).normal(size=(3, 4, 1)),
     np.array([[0.8, -0.2], [1.0, 0.0], [0.9, 0.2]]),
@@ -17,16 +23,16 @@ def test_the_paper_s_rule_by_hand():
     adapter.start(DEMONSTRATIONS)
     goal = np.array([0.9, 0.1])
     np.testing.assert_array_equal(adapter.propose(goal), goal)
-    adapter.observe(goal, goal + np.array([0.05, -0.02]))
+    observe(adapter, goal, goal + np.array([0.05, -0.02]))
     np.testing.assert_allclose(adapter.propose(goal), [0.86, 0.116])
-    adapter.observe(np.array([0.86, 0.116]), goal + np.array([-0.01, 0.0]))
+    observe(adapter, np.array([0.86, 0.116]), goal + np.array([-0.01, 0.0]))
     np.testing.assert_allclose(adapter.propose(goal), [0.868, 0.116])
 
 
 def test_for_another_goal_the_way_there_counts_as_error():
     adapter = ProportionalAdapter(gain=0.5)
     adapter.start(DEMONSTRATIONS)
-    adapter.observe(np.array([0.9, 0.1]), np.array([0.92, 0.1]))
+    observe(adapter, np.array([0.9, 0.1]), np.array([0.92, 0.1]))
     np.testing.assert_allclose(adapter.propose(np.array([1.0, 0.1])), [0.94, 0.1])
 
 

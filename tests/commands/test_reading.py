@@ -21,6 +21,12 @@ from tests.workspace.planar import events_in, trials_in
         (("--outcome", "0.9", "-0.1"), [0.0, -0.15]),
         (("--hit",), [0.0, 0.0]),
         (("--error", "2cm long", "--hit"), [0.02, 0.0]),
+        (("5 cm long, 2 cm left",), [0.05, 0.02]),
+        (("5", "cm", "long"), [0.05, 0.0]),
+        (("0.05", "-0.02"), [0.05, -0.02]),
+        (("-0.05", "-0.02"), [-0.05, -0.02]),
+        (("hit",), [0.0, 0.0]),
+        (("long",), [0.05, 0.0]),
     ],
 )
 def test_an_error_can_be_told_in_many_ways(run, folder, said, seen):
@@ -29,13 +35,18 @@ def test_an_error_can_be_told_in_many_ways(run, folder, said, seen):
     assert run("tell", folder, 1, *said)[0] == 0
     (trial,) = trials_in(folder)
     np.testing.assert_allclose(trial.error_seen, seen, atol=1e-12)
-    assert trial.hit == (np.linalg.norm(seen) <= 0.015 or "--hit" in said)
+    assert trial.hit == (np.linalg.norm(seen) <= 0.015 or "hit" in said[-1])
 
 
 @pytest.mark.parametrize(
     ("said", "remedy"),
     [
-        ((), "--error or --outcome"),
+        ((), "say what was seen"),
+        (("2cm long", "--error", "2cm long"), "say what was seen"),
+        (("0.05+-0.01", "0.02"), "give all or none"),
+        (("0.05+-0.01",), "needs 2 numbers"),
+        (("0.05+-x", "0.02"), "cannot read"),
+        (("5+-1", "0+-1"), "looks like centimetres"),
         (("--error", "5", "-2"), "looks like centimetres"),
         (("--outcome", "92", "10"), "looks like centimetres"),
         (("--error", "0.05"), "needs 2 numbers"),
@@ -57,3 +68,31 @@ def test_what_cannot_be_told_is_one_line_and_changes_nothing(run, folder, said, 
     assert remedy in err
     assert len(err.splitlines()) == 1
     assert events_in(folder) == before
+
+
+@pytest.mark.parametrize(
+    ("said", "low", "high", "sd"),
+    [
+        (("5 +- 0.5 cm long",), [0.05, -0.01], [0.05, 0.01], [0.005, 0.0]),
+        (("0.05+-0.003", "-0.02+-0.001"), [0.05, -0.02], [0.05, -0.02], [0.003, 0.001]),
+        (("0.05", "+-", "0.003,", "0", "±", "0.001"), [0.05, 0.0], [0.05, 0.0], [0.003, 0.001]),
+        (("long, somewhere",), [0.01, -np.inf], [np.inf, np.inf], [0.0, 0.0]),
+        (("--miss",), [-np.inf] * 2, [np.inf] * 2, [0.0, 0.0]),
+    ],
+)
+def test_the_journal_keeps_what_was_said(run, folder, said, low, high, sd):
+    run("goal", folder, "0.9", "0.05")
+    run("ask", folder)
+    assert run("tell", folder, 1, *said)[0] == 0
+    (trial,) = trials_in(folder)
+    np.testing.assert_allclose(trial.reading.low, low)
+    np.testing.assert_allclose(trial.reading.high, high)
+    np.testing.assert_allclose(trial.reading.sd, sd)
+    assert not trial.hit
+
+
+def test_a_direction_is_said_back_as_it_was_said(run, folder):
+    run("goal", folder, "0.9", "0.05")
+    run("ask", folder)
+    assert "trial 1: long, somewhere\n" in run("tell", folder, 1, "long, somewhere")[1]
+    assert "long, somewhere" in run("status", folder)[1]

@@ -17,7 +17,7 @@ from prior_reinforce.rollouts import Rollout
 from prior_reinforce.tasks import make_task
 
 
-class Reading:
+class Page:
     def save(self, folder, stem):
         (folder / f"{stem}.png").write_text("picture")
 
@@ -31,7 +31,7 @@ class Photographer(Exact):
     def perceive(self, rollout, goal, rng):
         if self.out_of_order:
             raise PerceptionFailedError("no picture")
-        self.last_reading = Reading()
+        self.last_reading = Page()
         if not rollout.valid:
             raise PerceptionFailedError("nothing to be seen")
         return super().perceive(rollout, goal, rng)
@@ -43,7 +43,7 @@ GOAL = np.zeros(2)
 def test_every_reading_is_kept_also_a_failed_one(tmp_path):
     camera = Photographer()
     kept = recording(camera, tmp_path / "seen", "trial")
-    assert kept.perceive(Rollout(np.ones(2), True), GOAL, None).tolist() == [1.0, 1.0]
+    assert kept.perceive(Rollout(np.ones(2), True), GOAL, None).error_seen.tolist() == [1.0, 1.0]
     assert kept.latest == tmp_path / "seen" / "trial1.png"
     with pytest.raises(PerceptionFailedError, match="nothing to be seen"):
         kept.perceive(Rollout(np.ones(2), False), GOAL, None)

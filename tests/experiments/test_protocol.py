@@ -24,6 +24,7 @@ from prior_reinforce.perception.base import Perception
 from prior_reinforce.perception.exact import Exact
 from prior_reinforce.perception.eye import Eye
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
+from prior_reinforce.readings import Reading
 from prior_reinforce.rollouts import Rollout
 from prior_reinforce.tasks import make_task
 from prior_reinforce.tasks.base import Task
@@ -58,7 +59,7 @@ def test_an_execution_of_its_own_is_seen():
 
 def test_outcomes_are_seen_from_the_middle_of_the_region():
     rng = np.random.default_rng(0)
-    errors = [Eye().perceive(Rollout(true, True), MIDDLE, rng) for true in seen(Exact())]
+    errors = [Eye().perceive(Rollout(true, True), MIDDLE, rng).error_seen for true in seen(Exact())]
     np.testing.assert_array_equal(seen(Eye()), MIDDLE + errors)
     assert np.abs(seen(Eye()) - seen(Exact())).max() > 0.02  # as coarse as that from far off
 
@@ -85,7 +86,7 @@ def test_a_lost_demonstration_is_named():
 def test_outcomes_that_look_the_same_are_told_with_what_to_do():
     class Asleep(Perception):
         def perceive(self, rollout, goal, rng):
-            return np.zeros(2)
+            return Reading.measured(np.zeros(2))
 
     with pytest.raises(InvalidDemonstrationsError) as raised:
         seen(Asleep(), seed=7)

@@ -10,7 +10,7 @@ def see(perception: Amplified, error: list[float], n: int, seed: int = 0) -> np.
     rng = np.random.default_rng(seed)
     rollout = Rollout(outcome=np.array(error), valid=True)
     goal = np.zeros(len(error))
-    return np.stack([perception.perceive(rollout, goal, rng) for _ in range(n)])
+    return np.stack([perception.perceive(rollout, goal, rng).error_seen for _ in range(n)])
 
 
 def test_one_factor_scales_the_whole_vector():
@@ -33,6 +33,26 @@ def test_the_noise_of_each_component_is_independent_and_of_the_stated_size():
 def test_without_scaling_or_noise_it_is_exact():
     seen = see(Amplified(scale_low=1.0, scale_high=1.0, noise_sd=0.0), [0.02, 0.5], n=1)
     np.testing.assert_array_equal(seen[0], [0.02, 0.5])
+
+
+def test_the_spread_of_a_reading_is_that_of_the_truth_behind_it():
+    perception, rng = Amplified(), np.random.default_rng(1)
+    true = rng.normal(scale=0.1, size=(4000, 1))
+    readings = [perception.perceive(Rollout(e, True), np.zeros(1), rng) for e in true]
+    off = [(e - r.low)[0] / r.sd[0] for e, r in zip(true, readings, strict=True)]
+    # Uniform factors are no Gaussian, and the error is not drawn beforehand: to 10 %.
+    assert np.std(off) == pytest.approx(1.0, abs=0.1)
+    assert np.mean(off) == pytest.approx(0.0, abs=0.1)
+
+
+def test_the_mean_of_the_truth_behind_a_reading_by_hand():
+    reading = Amplified(noise_sd=0.0).perceive(
+        Rollout(np.array([0.1]), True), np.zeros(1), np.random.default_rng(0)
+    )
+    mean = np.log(1.4 / 0.7) / 0.7
+    np.testing.assert_allclose(reading.low, mean * reading.error_seen)
+    spread = np.sqrt(1 / (0.7 * 1.4) - mean**2)
+    np.testing.assert_allclose(reading.sd, spread * reading.error_seen)
 
 
 @pytest.mark.parametrize(

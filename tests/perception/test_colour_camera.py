@@ -114,7 +114,7 @@ def test_the_error_of_real_trials_is_seen_to_a_centimetre_through_outliers(trial
     scene, pairs = trials
     rng = np.random.default_rng(0)
     with ColourCamera(scene, outlier_rate=0.1, seed=7) as perception:
-        seen = [perception.perceive(rollout, goal, rng) for rollout, goal in pairs]
+        seen = [perception.perceive(rollout, goal, rng).error_seen for rollout, goal in pairs]
     truth = [rollout.outcome - goal for rollout, goal in pairs]
     assert np.linalg.norm(np.subtract(seen, truth), axis=1).max() < 0.01
 

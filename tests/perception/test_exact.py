@@ -7,7 +7,7 @@ from prior_reinforce.rollouts import Rollout
 def test_sees_outcome_minus_goal():
     rollout = Rollout(outcome=np.array([0.75, -0.5]), valid=True)
     seen = Exact().perceive(rollout, np.array([0.5, 0.25]), np.random.default_rng(0))
-    np.testing.assert_array_equal(seen, [0.25, -0.75])
+    np.testing.assert_array_equal(seen.error_seen, [0.25, -0.75])
 
 
 def test_draws_nothing():

@@ -9,7 +9,8 @@ from prior_reinforce.rollouts import Rollout
 
 def seen_cm(error_cm: float, goal: float = 0.0) -> float:
     rollout = Rollout(outcome=np.array([goal + error_cm / 100.0]), valid=True)
-    return float(100.0 * Eye().perceive(rollout, np.array([goal]), np.random.default_rng(0))[0])
+    reading = Eye().perceive(rollout, np.array([goal]), np.random.default_rng(0))
+    return float(100.0 * reading.error_seen[0])
 
 
 @pytest.mark.parametrize(
@@ -34,12 +35,15 @@ def test_a_tie_counts_as_the_larger_whatever_the_rounding_of_floats(tie, seen, g
 @given(st.floats(-3.0, 3.0))
 def test_nothing_is_seen_further_off_than_half_a_step(error):
     rollout = Rollout(outcome=np.array([error]), valid=True)
-    seen = float(Eye().perceive(rollout, np.zeros(1), np.random.default_rng(0))[0])
+    said = Eye().perceive(rollout, np.zeros(1), np.random.default_rng(0))
+    seen = float(said.error_seen[0])
+    assert said.low[0] - 1e-9 <= error <= said.high[0] + 1e-9
     half_step = 0.01 if abs(error) < 0.02 else 0.015 if abs(error) < 0.05 else 0.025
     half_step = half_step if abs(error) < 0.1 else 0.05
     assert abs(seen - error) <= half_step + 1e-9
     again = Rollout(outcome=np.array([seen]), valid=True)
-    assert Eye().perceive(again, np.zeros(1), np.random.default_rng(0))[0] == pytest.approx(seen)
+    said = Eye().perceive(again, np.zeros(1), np.random.default_rng(0))
+    assert said.error_seen[0] == pytest.approx(seen)
 
 
 @pytest.mark.parametrize(
@@ -57,7 +61,9 @@ def test_nothing_is_seen_further_off_than_half_a_step(error):
 def test_a_miss_of_a_centimetre_is_never_called_none(error, seen):
     rollout = Rollout(outcome=np.array(error) / 100, valid=True)
     told = Eye().perceive(rollout, np.zeros(len(error)), np.random.default_rng(0))
-    np.testing.assert_allclose(100 * told, seen)
+    np.testing.assert_allclose(100 * told.error_seen, seen)
+    assert np.all(100 * told.low <= error)
+    assert np.all(error <= 100 * told.high)
 
 
 def test_a_small_miss_to_the_left_is_no_negative_zero():

@@ -8,6 +8,7 @@ from prior_reinforce.perception import make_perception
 from prior_reinforce.perception.base import Perception
 from prior_reinforce.perception.colour_camera import ColourCamera
 from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
+from prior_reinforce.readings import Reading
 from tests.perception.slanted_table import SCENE
 
 
@@ -20,7 +21,7 @@ class Closing(Perception):
         self.scene = scene
 
     def perceive(self, rollout, goal, rng):
-        return rollout.outcome - goal
+        return Reading.measured(rollout.outcome - goal)
 
     def close(self):
         self.closed += 1

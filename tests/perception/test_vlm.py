@@ -25,7 +25,7 @@ def test_every_family_sees_the_true_error(family, looking, frame_with_ball_at):
         perception = looking(server)
         for ball, goal in [(BALL, GOAL), (GOAL, BALL), ([0.5, -0.35], [1.2, 0.35])]:
             rollout = Rollout(np.array(ball), True, frame_with_ball_at(*ball))
-            error_seen = perception.perceive(rollout, np.array(goal), RNG)
+            error_seen = perception.perceive(rollout, np.array(goal), RNG).error_seen
             np.testing.assert_allclose(error_seen, np.subtract(ball, goal), atol=0.004)
 
 

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
+from prior_reinforce.readings import Reading
 from prior_reinforce.report import AdaptationRecord
 from prior_reinforce.session import Session
 from prior_reinforce.trials import Stage, Trial
@@ -42,8 +43,8 @@ class FullStep:
     def propose(self, goal_seen):
         return goal_seen.copy() if self.last is None else self.last - (self.seen - goal_seen)
 
-    def observe(self, condition, outcome_seen):
-        self.last, self.seen = condition.copy(), outcome_seen.copy()
+    def observe(self, condition, goal, reading):
+        self.last, self.seen = condition.copy(), goal + reading.error_seen
 
 
 def demonstrations(k: int = 2, action_dim: int = 7, units: tuple[str, ...] = ("m", "m")):
@@ -122,7 +123,13 @@ def told(
             seen = np.array(error)
             hit = bool(np.linalg.norm(seen) <= tolerance)
             trial = Trial(
-                number, 1, condition, plan=plan, stage=Stage.TOLD, error_seen=seen, hit=hit
+                number,
+                1,
+                condition,
+                plan=plan,
+                stage=Stage.TOLD,
+                reading=Reading.measured(seen),
+                hit=hit,
             )
         trials.append(trial)
     return AdaptationRecord(

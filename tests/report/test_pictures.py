@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from prior_reinforce.readings import Reading
 from prior_reinforce.report.pictures import draw_close_up, draw_table
 from tests.report.swing_world import adaptation, demonstrations, told
 
@@ -30,7 +31,7 @@ def record(request):
             outcome_units=units,
         )
         (trial,) = record.trials
-        trial = replace(trial, condition=outcomes[0], error_seen=np.full(4, 0.1))
+        trial = replace(trial, condition=outcomes[0], reading=Reading.measured(np.full(4, 0.1)))
         return replace(record, demonstrations=demos, goal=outcomes[0], trials=(trial,))
     return adaptation(seed=1, k=k, units=units, action_dim=1, most=3)
 

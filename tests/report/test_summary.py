@@ -83,7 +83,7 @@ def test_a_trial_that_hits_is_aimed_where_its_condition_lies():
     ],
 )
 def test_open_trials_say_what_they_wait_for(stage, seen):
-    trial = replace(MISSED.trials[0], stage=stage, error_seen=None)
+    trial = replace(MISSED.trials[0], stage=stage, reading=None)
     (row,) = trial_rows(replace(MISSED, trials=(trial,)))
     assert (row.seen, row.state, row.result, row.off) == (seen, "open", "open", "–")
 

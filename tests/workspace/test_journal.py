@@ -54,7 +54,7 @@ def test_a_reading_that_was_damaged_on_the_disk_is_never_believed(workspace):
     workspace.close()
     path = workspace.folder / "journal.sqlite"
     content = path.read_bytes()
-    assert content.count(b"0.0512") == 1
+    assert content.count(b"0.0512") > 0
     path.write_bytes(content.replace(b"0.0512", b"0.0112"))
     again = Workspace(workspace.folder)
     with pytest.raises(WorkspaceError, match="not what was written; restore"):

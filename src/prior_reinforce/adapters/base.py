@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 from prior_reinforce.arrays import Point, as_vector
 from prior_reinforce.errors import InvalidFeedbackError, InvalidGoalError, NotFittedError
 from prior_reinforce.plans.motions import Demonstrations
+from prior_reinforce.readings import Reading
 
 
 class Adapter(ABC):
@@ -17,8 +18,9 @@ class Adapter(ABC):
     It only ever receives perceived outcomes. It has no notion of a trial's number: to forget an
     amended or voided trial, the session starts it afresh and observes again (at most a dozen).
 
-    The checks stand here; a member implements `_start`, `_propose` and `_observe`, which receive
-    fresh, finite vectors of the right length, and only after `start`.
+    The checks stand here; a member implements `_start`, `_propose` and `_observe`, or
+    `_observe_reading`, which receive fresh, finite vectors of the right length, and only after
+    `start`.
     """
 
     _outcome_dim: int | None = None
@@ -43,21 +45,25 @@ class Adapter(ABC):
         """
         return self._propose(self._checked(goal_seen, "goal", InvalidGoalError))
 
-    def observe(self, condition: ArrayLike, outcome_seen: ArrayLike) -> None:
-        """Take in one trial: this condition gave that perceived outcome.
+    def observe(self, condition: ArrayLike, goal: ArrayLike, reading: Reading | ArrayLike) -> None:
+        """Take in one trial: what was perceived of outcome minus goal for this condition.
 
         Args:
             condition: c. Copied.
-            outcome_seen: r = g + e as perceived. Copied.
+            goal: g, which the reading is about. Copied.
+            reading: What was perceived; an array is a number of unknown origin.
 
         Raises:
             NotFittedError: Before `start`.
             InvalidFeedbackError: Wrong shape, or not finite.
         """
-        self._observe(
-            self._checked(condition, "condition", InvalidFeedbackError),
-            self._checked(outcome_seen, "perceived outcome", InvalidFeedbackError),
-        )
+        checked = self._checked(condition, "condition", InvalidFeedbackError)
+        about = self._checked(goal, "goal", InvalidFeedbackError)
+        seen = reading.error_seen if isinstance(reading, Reading) else reading
+        error = self._checked(seen, "perceived error", InvalidFeedbackError)
+        if not isinstance(reading, Reading):
+            reading = Reading.estimated(error)
+        self._observe_reading(checked, about, reading)
 
     @abstractmethod
     def _start(self, demonstrations: Demonstrations) -> None:
@@ -69,7 +75,15 @@ class Adapter(ABC):
 
     @abstractmethod
     def _observe(self, condition: Point, outcome_seen: Point) -> None:
-        """See `observe`; both may be kept."""
+        """Take in one trial as a number: the perceived outcome r = g + e; both may be kept."""
+
+    def _observe_reading(self, condition: Point, goal: Point, reading: Reading) -> None:
+        """See `observe`; for adapters that know what to do with more than a number.
+
+        Others get the number. They hear nothing of a trial of which there is none: "a miss".
+        """
+        if reading.has_number:
+            self._observe(condition, goal + reading.error_seen)
 
     def _checked(
         self,

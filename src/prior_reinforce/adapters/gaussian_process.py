@@ -11,10 +11,10 @@ from jaxtyping import Float
 
 from prior_reinforce.adapters.base import Adapter
 from prior_reinforce.adapters.marginal_likelihood import maximise
-from prior_reinforce.adapters.normalisation import Normalisation
 from prior_reinforce.arrays import Point, Points
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.plans.motions import Demonstrations
+from prior_reinforce.plans.normalisation import Normalisation
 
 # Below this, the rounding of a kernel matrix of amplitude 1e5 comes near the diagonal term, and
 # the likelihood loses its fifth decimal.

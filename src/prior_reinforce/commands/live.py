@@ -13,6 +13,7 @@ from rich.progress import BarColumn, Progress, TextColumn
 
 from prior_reinforce.arrays import Point
 from prior_reinforce.errors import InvalidFeedbackError, PerceptionFailedError
+from prior_reinforce.readings import Reading
 from prior_reinforce.wording import from_words, say_place, to_words
 
 if TYPE_CHECKING:
@@ -95,7 +96,7 @@ class Operator:
 
     def look(
         self, failure: PerceptionFailedError, rollout: Rollout, goal: Point, rng: object
-    ) -> Point:
+    ) -> Reading:
         """Ask for the error of an execution that perception could not see.
 
         Args:
@@ -105,7 +106,7 @@ class Operator:
             rng: Not used.
 
         Returns:
-            Error seen, in [m].
+            What is seen of the error, in [m].
 
         Raises:
             PerceptionFailedError: There is no terminal to ask at, or no answer.

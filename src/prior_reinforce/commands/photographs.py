@@ -73,7 +73,7 @@ class Look:
     def run(self) -> None:
         """Look, keep what was seen beside the photograph, and say what to tell."""
         from prior_reinforce.perception.calibration import TableCalibration
-        from prior_reinforce.perception.vlm import VisionLanguageModel
+        from prior_reinforce.perception.vlm import CAMERA_SD, VisionLanguageModel
 
         calibration = TableCalibration.load(self.calibration)
         scene = TableScene(
@@ -92,9 +92,9 @@ class Look:
             raise PerceptionFailedError(
                 f"{reading.problem}; look at {drawn} and tell what you see yourself"
             )
-        x, y = reading.error_seen
         print(f"seen: {to_words(reading.error_seen)}   boxes: {drawn}")
-        print(f"if the boxes are right: prior-reinforce tell FOLDER TRIAL --error {x:.4f} {y:.4f}")
+        numbers = " ".join(f"{component:.4f}+-{CAMERA_SD:g}" for component in reading.error_seen)
+        print(f"if the boxes are right: prior-reinforce tell FOLDER TRIAL {numbers}")
 
 
 def _read_points(path: Path) -> Float[np.ndarray, "n 4"]:

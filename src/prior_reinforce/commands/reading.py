@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
 import tyro
 
+from prior_reinforce.arrays import Point, as_error
 from prior_reinforce.commands.workspace import Folder
 from prior_reinforce.errors import ConfigurationError, InvalidFeedbackError
+from prior_reinforce.readings import Reading
 from prior_reinforce.session import Session
 from prior_reinforce.wording import from_words, in_words
 from prior_reinforce.workspace.status import tell_example
@@ -24,15 +27,18 @@ _LARGEST_SAYABLE_METRES = 5.0
 
 
 @dataclass(frozen=True)
-class Reading:
+class Seen:
     """Of which trial, and what was seen."""
 
     folder: Folder
     """Workspace."""
     number: Number
     """Number of the trial."""
+    seen: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="[SEEN]")] = ()
+    """What was seen, outcome minus goal: "5cm long, 2cm left", "5.2 +- 0.3 cm long", "long", "hit",
+    "miss"; or a number for each component, in its own unit: 0.05 -0.02, 0.05+-0.003 0.02+-0.003."""
     error: tuple[str, ...] | None = None
-    """What was seen, outcome minus goal: words ("5cm long, 2cm left") or metres (0.05 -0.02)."""
+    """The same, behind its name."""
     outcome: tuple[float, ...] | None = None
     """Or where the object ended, in the table frame, in the outcome's units."""
     hit: bool = False
@@ -40,13 +46,16 @@ class Reading:
     miss: bool = False
     """The goal was not reached, whatever the distance says."""
 
-    def read(self, workspace: Workspace, session: Session) -> tuple[np.ndarray, bool | None]:
-        """The error seen, and whether it was a hit if that was said."""
-        given = [self.error is not None, self.outcome is not None]
-        if sum(given) > 1 or not (any(given) or self.hit) or (self.hit and self.miss):
+    def read(
+        self, workspace: Workspace, session: Session
+    ) -> tuple[Reading | Point | None, bool | None]:
+        """What was seen, as `Session.tell` takes it, and whether it was a hit if that was said."""
+        given = [bool(self.seen), self.error is not None, self.outcome is not None]
+        said = any(given) or self.hit or self.miss
+        if sum(given) > 1 or not said or (self.hit and self.miss):
             raise ConfigurationError(
-                "say what was seen: --error or --outcome, with --hit or --miss if that was seen "
-                "as well, or --hit alone"
+                "say what was seen: words or numbers, or --error or --outcome, with --hit or "
+                "--miss if that was seen as well, or --hit alone"
             )
         hit = True if self.hit else False if self.miss else None
         goal = session.goals[session.trial(self.number).goal_number - 1].goal
@@ -57,23 +66,22 @@ class Reading:
                     f"{', '.join(workspace.manifest.outcome_names)}"
                 )
             return _plausible(workspace, np.array(self.outcome) - goal), hit
-        if self.error is None:
-            return np.zeros(goal.size), hit
-        return _read_error(workspace, " ".join(self.error)), hit
+        words = self.seen or self.error
+        return (None if words is None else _read_seen(workspace, " ".join(words))), hit
 
 
-def _read_error(workspace: Workspace, text: str) -> np.ndarray:
-    """Read outcome minus goal, shape (k,), in the outcome's units, from words or numbers.
+def _read_seen(workspace: Workspace, text: str) -> Reading | Point:
+    """Read outcome minus goal, in the outcome's units, from words or numbers.
 
     Raises:
         InvalidFeedbackError: It is neither, or another number of numbers.
     """
     names, units = workspace.manifest.outcome_names, workspace.manifest.outcome_units
     k = len(names)
-    try:
-        numbers = [float(word) for word in text.replace(",", " ").split()]
-    except ValueError:
-        numbers = None
+    alone = text.strip().lower()
+    if alone in ("hit", "miss"):
+        return Reading.only(alone == "hit", k)
+    numbers = _numbers(text)
     if numbers is None or (k > 1 and text == "0"):  # a lone 0 says: on the goal
         if in_words(units):
             return _sayable(text, from_words(text, k))
@@ -84,23 +92,41 @@ def _read_error(workspace: Workspace, text: str) -> np.ndarray:
     if len(numbers) != k:
         words = ", or words" if in_words(units) else ""
         raise InvalidFeedbackError(
-            f"--error needs {k} numbers, got {len(numbers)}: outcome minus goal in "
+            f"an error needs {k} numbers, got {len(numbers)}: outcome minus goal in "
             f"{', '.join(names)}{words}: {tell_example(workspace)}"
         )
-    return _plausible(workspace, np.array(numbers))
+    error = _plausible(workspace, np.array([number for number, _ in numbers]))
+    sds = [sd for _, sd in numbers if sd is not None]
+    if not sds:
+        return error
+    if len(sds) < k:
+        raise InvalidFeedbackError(
+            f"{text!r} has +- for {len(sds)} of {k} numbers; give all or none"
+        )
+    return Reading.measured(as_error(error, k), np.array(sds))
 
 
-def _sayable(text: str, error: np.ndarray) -> np.ndarray:
-    """The error, unless no throw is that far off."""
-    largest = np.abs(error).max(initial=0.0)
+def _numbers(text: str) -> list[tuple[float, float | None]] | None:
+    """Numbers, each with what stands behind its +-; None where the text is something else."""
+    parts = re.sub(r"\s*(\+-|\+/-|±)\s*", "±", text).replace(",", " ").split()
+    try:
+        split = [part.split("±") for part in parts]
+        return [(float(number), float(*sd) if sd else None) for number, *sd in split]
+    except (ValueError, TypeError):
+        return None
+
+
+def _sayable(text: str, reading: Reading) -> Reading:
+    """The reading, unless no throw is that far off."""
+    largest = np.abs(reading.error_seen).max(initial=0.0)
     if largest > _LARGEST_SAYABLE_METRES:
         raise InvalidFeedbackError(
             f"{text!r} is {largest:g} m; say it again, in cm, or void the trial if that is true"
         )
-    return error
+    return reading
 
 
-def _plausible(workspace: Workspace, error: np.ndarray) -> np.ndarray:
+def _plausible(workspace: Workspace, error: Point) -> Point:
     """The error, unless it looks like centimetres where words could say it as well."""
     largest = np.abs(error).max(initial=0.0)
     words = in_words(workspace.manifest.outcome_units)

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import tyro
 
-from prior_reinforce.commands.reading import Number, Reading
+from prior_reinforce.commands.reading import Number, Seen
 from prior_reinforce.commands.workspace import Folder, print_next
 from prior_reinforce.errors import ConfigurationError, FileFormatError
 from prior_reinforce.plans.files import check_plan_path, write_plan
@@ -203,30 +203,30 @@ class Ask:
 
 
 @dataclass(frozen=True)
-class Tell(Reading):
+class Tell(Seen):
     """Report what was seen of a trial."""
 
     def run(self) -> None:
         """Write it down."""
         with Workspace(self.folder) as workspace:
             session = workspace.session()
-            error, hit = self.read(workspace, session)
+            seen, hit = self.read(workspace, session)
             _warn_of_its_execution(workspace, session, self.number)
-            trial = session.tell(self.number, error, hit=hit)
+            trial = session.tell(self.number, seen, hit=hit)
             print(f"trial {trial.number}: {say_trial(workspace, trial)}")
             print_next(workspace)
 
 
 @dataclass(frozen=True)
-class Amend(Reading):
+class Amend(Seen):
     """Correct what was told of a trial."""
 
     def run(self) -> None:
         """Write it down."""
         with Workspace(self.folder) as workspace:
             session = workspace.session()
-            error, hit = self.read(workspace, session)
-            trial = session.amend(self.number, error, hit=hit)
+            seen, hit = self.read(workspace, session)
+            trial = session.amend(self.number, seen, hit=hit)
             print(f"trial {trial.number}, corrected: {say_trial(workspace, trial)}")
             print_next(workspace)
 

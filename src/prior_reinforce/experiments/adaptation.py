@@ -14,6 +14,7 @@ from prior_reinforce.errors import RenderingUnavailableError
 from prior_reinforce.experiments.protocol import GoalTrials
 from prior_reinforce.perception.base import Perception
 from prior_reinforce.plans.motions import Demonstrations
+from prior_reinforce.readings import Reading
 from prior_reinforce.report import AdaptationRecord, Film, record_film, write_report
 from prior_reinforce.rollouts import Rollout
 from prior_reinforce.tasks.base import Task
@@ -46,7 +47,7 @@ class RecordingPerception(Perception):
         self._n_readings = 0
         self.latest: Path | None = None
 
-    def perceive(self, rollout: Rollout, goal: Point, rng: np.random.Generator) -> Point:
+    def perceive(self, rollout: Rollout, goal: Point, rng: np.random.Generator) -> Reading:
         """Look, and keep what was shown and said, also where it failed."""
         self._n_readings += 1
         before, self.latest = self._perception.last_reading, None

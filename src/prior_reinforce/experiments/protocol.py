@@ -21,13 +21,14 @@ from prior_reinforce.generators.base import Generator
 from prior_reinforce.perception.base import Perception
 from prior_reinforce.perception.eye import Eye
 from prior_reinforce.plans.motions import Demonstrations
+from prior_reinforce.readings import Reading
 from prior_reinforce.rollouts import Rollout
 from prior_reinforce.session import Session, ask_all
 from prior_reinforce.tasks.base import Task
 from prior_reinforce.trials import Trial
 
-FailedReading = Callable[[PerceptionFailedError, Rollout, Point, np.random.Generator], Point]
-"""Who looks where perception gives up: why, rollout, goal, source of noise -> error seen."""
+FailedReading = Callable[[PerceptionFailedError, Rollout, Point, np.random.Generator], Reading]
+"""Who looks where perception gives up: why, rollout, goal, source of noise -> what is seen."""
 OnRound = Callable[[int, "list[GoalTrials]"], None]
 """Called after every round with its number and the results so far."""
 
@@ -66,7 +67,7 @@ def is_hit(rollout: Rollout, goal: Point, tolerance: float) -> bool:
 
 def estimate_by_eye(
     failure: PerceptionFailedError, rollout: Rollout, goal: Point, rng: np.random.Generator
-) -> Point:
+) -> Reading:
     """The simulated operator, who estimates by eye (`Eye`) what could not be read.
 
     Raises:
@@ -132,10 +133,10 @@ def perceive_demonstrations(
                 f"(seed {seed}); choose another seed"
             )
         try:
-            error_seen = perception.perceive(rollout, reference, rng)
+            reading = perception.perceive(rollout, reference, rng)
         except PerceptionFailedError as failure:
-            error_seen = on_failed_reading(failure, rollout, reference, rng)
-        seen.append(reference + error_seen)
+            reading = on_failed_reading(failure, rollout, reference, rng)
+        seen.append(reference + reading.error_seen)
     try:
         return replace(demonstrations, outcomes_seen=np.array(seen))
     except InvalidDemonstrationsError as error:
@@ -254,12 +255,12 @@ def _reach(
         for i, trial, rollout in zip(active, trials, executed, strict=True):
             goal = sessions[i].goal
             try:
-                error_seen = perception.perceive(rollout, goal, seers[i])
+                reading = perception.perceive(rollout, goal, seers[i])
             except PerceptionFailedError as failure:
                 failed[i] += 1
-                error_seen = on_failed_reading(failure, rollout, goal, seers[i])
+                reading = on_failed_reading(failure, rollout, goal, seers[i])
             rollouts[i].append(rollout)
-            sessions[i].tell(trial.number, error_seen, hit=is_hit(rollout, goal, task.tolerance))
+            sessions[i].tell(trial.number, reading, hit=is_hit(rollout, goal, task.tolerance))
         if on_round is not None:
             on_round(number, results())
     return results()

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from prior_reinforce.arrays import Point
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.perception.base import Perception
+from prior_reinforce.readings import Reading
 from prior_reinforce.rollouts import Rollout
+
+_LEAST_SCALE = 0.1
+"""Factors below it are taken for it when a reading is weighed (ours): 1/s has no variance at 0."""
 
 
 @dataclass(frozen=True)
@@ -41,8 +45,23 @@ class Amplified(Perception):
                 f"noise_sd must be 0 m or more, got {self.noise_sd}; 0.01 is the default"
             )
 
-    def perceive(self, rollout: Rollout, goal: Point, rng: np.random.Generator) -> Point:
-        """Return s (r - g) + n, with one s and k components of n drawn."""
+    def perceive(self, rollout: Rollout, goal: Point, rng: np.random.Generator) -> Reading:
+        """Return s (r - g) + n, with one s and k components of n drawn.
+
+        Seen e, the true error is e / s but for n / s: its mean is e E[1/s], its variance
+        e^2 Var[1/s] + noise_sd^2 / E[s]^2, each component taken for itself.
+        """
         error = rollout.outcome - goal
         scale = rng.uniform(self.scale_low, self.scale_high)
-        return scale * error + rng.normal(0.0, self.noise_sd, size=error.shape)
+        seen = scale * error + rng.normal(0.0, self.noise_sd, size=error.shape)
+        mean, sd = self._inverse_scale()
+        noise = 2.0 * self.noise_sd / (self.scale_low + self.scale_high)
+        return replace(Reading.measured(mean * seen, np.hypot(sd * seen, noise)), error_seen=seen)
+
+    def _inverse_scale(self) -> tuple[float, float]:
+        """Mean and standard deviation of 1/s, for s uniform between its bounds."""
+        low, high = max(self.scale_low, _LEAST_SCALE), max(self.scale_high, _LEAST_SCALE)
+        if low == high:
+            return 1.0 / low, 0.0
+        mean = math.log(high / low) / (high - low)
+        return mean, math.sqrt(max(1.0 / (low * high) - mean * mean, 0.0))

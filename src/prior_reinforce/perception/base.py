@@ -1,4 +1,4 @@
-"""The interface of P: what came of a trial in, the error that is seen out (paper, Section IV)."""
+"""The interface of P: what came of a trial in, what is seen of it out (paper, Section IV)."""
 
 from __future__ import annotations
 
@@ -8,15 +8,16 @@ import numpy as np
 from typing_extensions import Self
 
 from prior_reinforce.arrays import Point
+from prior_reinforce.readings import Reading
 from prior_reinforce.rollouts import Rollout
 
 
 class Perception(ABC):
-    """Perceives by how much a trial missed: e_seen = P(r - g)."""
+    """Perceives by how much a trial missed: e_seen = P(r - g), and how far that can be trusted."""
 
     @abstractmethod
-    def perceive(self, rollout: Rollout, goal: Point, rng: np.random.Generator) -> Point:
-        """Return the perceived error of one trial.
+    def perceive(self, rollout: Rollout, goal: Point, rng: np.random.Generator) -> Reading:
+        """Return what is perceived of one trial's error.
 
         Args:
             rollout: What came of the trial; its true outcome, or the picture of its key frame.
@@ -24,7 +25,7 @@ class Perception(ABC):
             rng: Source of perception noise.
 
         Returns:
-            Error seen, outcome minus goal, in [m].
+            The reading of outcome minus goal, in [m].
 
         Raises:
             PerceptionFailedError: Nothing could be recognised; ask an operator.

@@ -6,12 +6,13 @@ import numpy as np
 
 from prior_reinforce.arrays import Point
 from prior_reinforce.perception.base import Perception
+from prior_reinforce.readings import Reading
 from prior_reinforce.rollouts import Rollout
 
 
 class Exact(Perception):
     """The true error, outcome minus goal."""
 
-    def perceive(self, rollout: Rollout, goal: Point, rng: np.random.Generator) -> Point:
+    def perceive(self, rollout: Rollout, goal: Point, rng: np.random.Generator) -> Reading:
         """Return r - g; draws nothing from `rng`."""
-        return rollout.outcome - goal
+        return Reading.measured(rollout.outcome - goal)

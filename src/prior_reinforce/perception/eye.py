@@ -6,17 +6,12 @@ import numpy as np
 
 from prior_reinforce.arrays import Point
 from prior_reinforce.perception.base import Perception
+from prior_reinforce.readings import EYE_BETWEEN, EYE_NEAR, EYE_STEP, Reading
 from prior_reinforce.rollouts import Rollout
 
-_NEAR = np.array([0.0, 0.02, 0.05, 0.10])
-"""Distances distinguished near the goal, in [m] (paper: 0 cm, 2 cm, 5 cm, multiples of 10 cm)."""
-_BETWEEN_NEAR = (0.01, 0.035, 0.075)
-"""Half-way between them; written out, since the float (5 cm + 10 cm) / 2 is not 7.5 cm."""
-_LEAST = _NEAR[1]
-"""Reported for the larger component where the miss is `_BETWEEN_NEAR[0]` or more, but every
+_LEAST = EYE_NEAR[1]
+"""Reported for the larger component where the miss is `EYE_BETWEEN[0]` or more, but every
 component rounds to 0, in [m]."""
-_STEP = 0.10
-"""Distances beyond are multiples of this, in [m]."""
 _RESOLUTION_DECIMALS = 9
 """Errors are compared to the nanometre, so that 0.92 - 0.91 is a tie as 1 cm is on paper."""
 
@@ -30,15 +25,15 @@ class Eye(Perception):
     is random: the paper describes the rounding and no other error.
     """
 
-    def perceive(self, rollout: Rollout, goal: Point, rng: np.random.Generator) -> Point:
-        """Return the rounded error; draws nothing from `rng`."""
+    def perceive(self, rollout: Rollout, goal: Point, rng: np.random.Generator) -> Reading:
+        """Return the rounded error, and what it stands for; draws nothing from `rng`."""
         error = rollout.outcome - goal
         size = np.round(np.abs(error), _RESOLUTION_DECIMALS)
-        near = _NEAR[np.searchsorted(_BETWEEN_NEAR, size, side="right")]
-        far = _STEP * np.floor(np.round(size / _STEP + 0.5, _RESOLUTION_DECIMALS))
-        seen = np.where(size < _NEAR[-1], near, far)
+        near = EYE_NEAR[np.searchsorted(EYE_BETWEEN, size, side="right")]
+        far = EYE_STEP * np.floor(np.round(size / EYE_STEP + 0.5, _RESOLUTION_DECIMALS))
+        seen = np.where(size < EYE_NEAR[-1], near, far)
         distance = np.round(np.linalg.norm(size), _RESOLUTION_DECIMALS)
-        if not seen.any() and distance >= _BETWEEN_NEAR[0]:
+        if not seen.any() and distance >= EYE_BETWEEN[0]:
             seen[np.argmax(size)] = _LEAST
         # Adding 0 turns the -0.0 of a small negative error into 0.0.
-        return np.sign(error) * seen + 0.0
+        return Reading.by_eye(np.sign(error) * seen + 0.0)

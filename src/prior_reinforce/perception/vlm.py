@@ -33,10 +33,16 @@ from prior_reinforce.perception.vlm_formats import (
     read_box,
     size_to_send,
 )
-from prior_reinforce.perception.vlm_reading import Answer, Reading, Sighting
+from prior_reinforce.perception.vlm_reading import Answer, PictureReading, Sighting
+from prior_reinforce.readings import Reading
 from prior_reinforce.rendering import Picture
 from prior_reinforce.rollouts import KeyFrame, Rollout
 from prior_reinforce.scene import SeenObject, TableScene
+
+CAMERA_SD = 0.003
+"""Standard deviation of each component of an error that is read from a picture, in [m] (ours):
+twice what `benchmarks/vlm_accuracy.py` finds where objects are found by colour; no model was
+measured."""
 
 
 class VisionLanguageModel(Perception):
@@ -78,14 +84,14 @@ class VisionLanguageModel(Perception):
             )
         self.scene = scene
         self.config = config or VisionLanguageModelConfig()
-        self.last_reading: Reading | None = None
+        self.last_reading: PictureReading | None = None
         self._camera = camera or Camera()
         self._client = client or OpenAIClient(self.config)
         self._calibration = calibration
         self._scene_model: object = None
         """The model on which we calibrated ourselves; None where the calibration was given."""
 
-    def perceive(self, rollout: Rollout, goal: Point, rng: np.random.Generator) -> Point:
+    def perceive(self, rollout: Rollout, goal: Point, rng: np.random.Generator) -> Reading:
         """Photograph the key frame, with the goal's object at the goal, and read the picture.
 
         The randomness is the model's own; `rng` is not used.
@@ -111,9 +117,9 @@ class VisionLanguageModel(Perception):
         if reading.error_seen is None:
             kind = EndpointError if reading.unanswered else PerceptionFailedError
             raise kind(f"{reading.problem}; ask the operator for the error")
-        return reading.error_seen
+        return Reading.measured(reading.error_seen, CAMERA_SD)
 
-    def read(self, picture: Picture) -> Reading:
+    def read(self, picture: Picture) -> PictureReading:
         """Read the error from any picture of the calibrated camera, a photograph for instance.
 
         Args:
@@ -138,7 +144,7 @@ class VisionLanguageModel(Perception):
                 goal_place = goal.place + np.array(self.scene.goal_offset)
                 x, y = calibration.to_pixels(goal_place).tolist()
                 goal_pixel = (x, y)
-        self.last_reading = Reading(
+        self.last_reading = PictureReading(
             picture, self._client.model, reached, goal, goal_place, goal_pixel
         )
         return self.last_reading

@@ -60,7 +60,7 @@ class Sighting:
 
 
 @dataclass(frozen=True, eq=False)
-class Reading:
+class PictureReading:
     """One picture, read."""
 
     picture: Picture

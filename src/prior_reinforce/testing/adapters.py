@@ -12,6 +12,7 @@ from prior_reinforce.adapters.base import Adapter
 from prior_reinforce.arrays import Point
 from prior_reinforce.errors import InvalidFeedbackError, InvalidGoalError, NotFittedError
 from prior_reinforce.plans.motions import Demonstrations
+from prior_reinforce.readings import Reading
 from prior_reinforce.testing.synthetic import synthetic_demonstrations
 
 each_k = pytest.mark.parametrize("k", [1, 2, 3])
@@ -30,8 +31,8 @@ class AdapterContract:
         for _ in range(2):
             adapter = self._started(k)
             proposals.append([adapter.propose(goal)])
-            for condition, outcome in _trials(k):
-                adapter.observe(condition, outcome)
+            for trial in _trials(k):
+                adapter.observe(*trial)
                 proposals[-1].append(adapter.propose(goal))
         assert np.shape(proposals[0]) == (5, k)
         assert np.all(np.isfinite(proposals[0]))
@@ -40,9 +41,9 @@ class AdapterContract:
     @each_k
     def test_proposing_changes_nothing_and_aliases_nothing(self, k: int) -> None:
         adapter = self._started(k)
-        for condition, outcome in _trials(k):
-            given = condition.copy(), outcome.copy()
-            adapter.observe(*given)
+        for condition, about, reading in _trials(k):
+            given = condition.copy(), about.copy()
+            adapter.observe(*given, reading)
             given[0][:], given[1][:] = 1e3, -1e3
         goal = _goal(k)
         kept = goal.copy()
@@ -54,16 +55,16 @@ class AdapterContract:
         np.testing.assert_array_equal(goal, kept)
 
         clean = self._started(k)
-        for condition, outcome in _trials(k):
-            clean.observe(condition, outcome)
+        for trial in _trials(k):
+            clean.observe(*trial)
         np.testing.assert_array_equal(clean.propose(goal), value)
 
     @each_k
     def test_starting_again_forgets_every_trial(self, k: int) -> None:
         fresh, used = self._started(k), self.make()
         used.start(synthetic_demonstrations(8, k=k))
-        for condition, outcome in _trials(k):
-            used.observe(condition, outcome)
+        for trial in _trials(k):
+            used.observe(*trial)
         used.start(_demonstrations(k))
         np.testing.assert_array_equal(used.propose(_goal(k)), fresh.propose(_goal(k)))
 
@@ -84,7 +85,7 @@ class AdapterContract:
         with pytest.raises(NotFittedError, match=r"start\(demonstrations\)"):
             self.make().propose(np.zeros(2))
         with pytest.raises(NotFittedError, match=r"start\(demonstrations\)"):
-            self.make().observe(np.zeros(2), np.zeros(2))
+            self.make().observe(np.zeros(2), np.zeros(2), np.zeros(2))
 
     @pytest.mark.parametrize("bad", [np.zeros(3), np.zeros((1, 2)), np.array([0.1, np.nan]), "far"])
     def test_bad_vectors_are_named_errors_and_leave_no_trace(self, bad: Any) -> None:
@@ -95,9 +96,11 @@ class AdapterContract:
         with pytest.raises(InvalidGoalError, match="goal"):
             adapter.propose(bad)
         with pytest.raises(InvalidFeedbackError, match="condition"):
-            adapter.observe(bad, good[1])
-        with pytest.raises(InvalidFeedbackError, match="outcome"):
-            adapter.observe(good[0], bad)
+            adapter.observe(bad, *good[1:])
+        with pytest.raises(InvalidFeedbackError, match="goal"):
+            adapter.observe(good[0], bad, good[2])
+        with pytest.raises(InvalidFeedbackError, match="error"):
+            adapter.observe(*good[:2], bad)
         np.testing.assert_array_equal(adapter.propose(goal), before)
 
     def test_a_trial_repeated_to_the_last_bit_is_no_trouble(self) -> None:
@@ -105,6 +108,28 @@ class AdapterContract:
         for _ in range(5):
             adapter.observe(*_trials(2)[0])
         assert np.all(np.isfinite(adapter.propose(_goal(2))))
+
+    @each_k
+    def test_intervals_open_ends_and_mere_hits_are_no_trouble(self, k: int) -> None:
+        adapter = self._started(k)
+        goal, spread = _goal(k), np.ptp(_demonstrations(k).outcomes_seen, axis=0)
+        error, everywhere = 0.1 * spread, np.full(k, np.inf)
+        for reading in (
+            Reading(error, 0.5 * error, 2 * error, np.zeros(k)),
+            Reading(error, 0.5 * error, everywhere, 0.1 * error),
+            Reading.only(False, k),
+            Reading.only(True, k),
+        ):
+            adapter.observe(goal, goal, reading)
+            condition = adapter.propose(goal)
+            assert np.all(np.isfinite(condition))
+            assert np.all(np.abs(condition - goal) < spread)
+
+    def test_a_miss_of_which_nothing_else_is_known_moves_nobody_who_wants_numbers(self) -> None:
+        adapter = self._started(2)
+        before = adapter.propose(_goal(2))
+        adapter.observe(before, _goal(2), Reading.only(False, 2))
+        np.testing.assert_allclose(adapter.propose(_goal(2)), before, rtol=0.05)
 
     def _started(self, k: int) -> Adapter:
         adapter = self.make()
@@ -122,11 +147,11 @@ def _goal(k: int) -> Point:
     return np.asarray(outcomes.min(axis=0) + 0.4 * np.ptp(outcomes, axis=0))
 
 
-def _trials(k: int, n: int = 4) -> list[tuple[Point, Point]]:
-    """Conditions, and outcomes that missed them by about a twentieth of the region."""
+def _trials(k: int, n: int = 4) -> list[tuple[Point, Point, Point]]:
+    """Conditions, the goal, and numbers that say they missed by a twentieth of the region."""
     rng = np.random.default_rng(50 + k)
     outcomes = _demonstrations(k).outcomes_seen
     low, high = outcomes.min(axis=0), outcomes.max(axis=0)
     conditions = rng.uniform(low, high, size=(n, k))
-    errors = rng.normal(scale=0.05, size=(n, k)) * (high - low)
-    return list(zip(conditions, conditions + errors, strict=True))
+    missed = conditions + rng.normal(scale=0.05, size=(n, k)) * (high - low) - _goal(k)
+    return [(c, _goal(k), error) for c, error in zip(conditions, missed, strict=True)]

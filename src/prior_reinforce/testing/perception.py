@@ -6,10 +6,12 @@ from collections.abc import Callable
 from typing import ClassVar
 
 import numpy as np
+from jaxtyping import Float
 
 from prior_reinforce.arrays import Point
 from prior_reinforce.errors import PerceptionFailedError
 from prior_reinforce.perception.base import Perception
+from prior_reinforce.readings import Reading
 from prior_reinforce.rollouts import Rollout
 
 
@@ -34,17 +36,18 @@ class PerceptionContract:
             seen = []
             for _ in range(2):
                 with self.make() as perception:
-                    seen.append(perception.perceive(trial, goal, np.random.default_rng(3)))
-            assert seen[0].shape == (k,)
-            assert seen[0].dtype == float
-            assert np.all(np.isfinite(seen[0]))
+                    seen.append(_told(perception.perceive(trial, goal, np.random.default_rng(3))))
+            assert seen[0].shape == (4, k)
+            assert np.all(np.isfinite(seen[0][0]))
             np.testing.assert_array_equal(seen[0], seen[1])
 
-    def test_it_returns_a_fresh_array_and_leaves_its_inputs(self) -> None:
+    def test_it_returns_fresh_arrays_and_leaves_its_inputs(self) -> None:
         trial, goal = self.rollout(np.array([0.9, 0.1])), np.array([0.8, 0.3])
         with self.make() as perception:
             seen = perception.perceive(trial, goal, np.random.default_rng(0))
-        seen[:] = 99.0
+        for part in (seen.error_seen, seen.low, seen.high, seen.sd):
+            assert not np.shares_memory(part, trial.outcome)
+            assert not np.shares_memory(part, goal)
         np.testing.assert_array_equal(trial.outcome, [0.9, 0.1])
         np.testing.assert_array_equal(goal, [0.8, 0.3])
 
@@ -52,15 +55,30 @@ class PerceptionContract:
         trial, goal = self.rollout(np.array([1.1, 0.0])), np.array([0.9, 0.3])
         with self.make() as perception:
             for seed in range(20):
-                seen = perception.perceive(trial, goal, np.random.default_rng(seed))
+                seen = perception.perceive(trial, goal, np.random.default_rng(seed)).error_seen
                 assert seen[0] > 0.1
                 assert seen[1] < -0.15
+
+    def test_the_true_error_lies_where_the_reading_says(self) -> None:
+        for k in self.dims:
+            trial, goal = self.rollout(np.linspace(0.9, 0.3, k)), np.full(k, 0.55)
+            true, inside = trial.outcome - goal, 0
+            with self.make() as perception:
+                for seed in range(40):
+                    seen = perception.perceive(trial, goal, np.random.default_rng(seed))
+                    slack = 2.5 * seen.sd + 1e-9
+                    inside += bool(np.all((seen.low - slack <= true) & (true <= seen.high + slack)))
+            assert inside >= 34  # of 40
 
     def test_a_lost_object_is_seen_where_the_task_says_it_went_or_not_at_all(self) -> None:
         trial, goal = self.rollout(np.array([0.0, 0.0]), valid=False), np.array([0.9, 0.0])
         with self.make() as perception:
             try:
-                seen = perception.perceive(trial, goal, np.random.default_rng(1))
+                seen = perception.perceive(trial, goal, np.random.default_rng(1)).error_seen
             except PerceptionFailedError:
                 return  # it is out of the picture, and an operator is asked
         assert seen[0] < -0.5
+
+
+def _told(reading: Reading) -> Float[np.ndarray, "4 k"]:
+    return np.stack([reading.error_seen, reading.low, reading.high, reading.sd])

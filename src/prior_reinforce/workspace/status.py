@@ -7,7 +7,7 @@ import shlex
 from prior_reinforce.registry import parse_choice
 from prior_reinforce.session import Session
 from prior_reinforce.trials import Goal, Stage, Trial
-from prior_reinforce.wording import in_words, say_error, say_place
+from prior_reinforce.wording import in_words, say_place, say_reading
 from prior_reinforce.workspace.workspace import Workspace
 
 _TRIALS_SHOWN = 3
@@ -44,9 +44,9 @@ def describe(workspace: Workspace) -> str:
 
 def say_trial(workspace: Workspace, trial: Trial) -> str:
     """Say what became of a trial."""
-    if trial.error_seen is not None:
+    if trial.reading is not None:
         manifest = workspace.manifest
-        seen = say_error(trial.error_seen, manifest.outcome_names, manifest.outcome_units)
+        seen = say_reading(trial.reading, manifest.outcome_names, manifest.outcome_units)
         return f"reached ({seen})" if trial.hit else seen
     if trial.stage is Stage.VOIDED:
         return f"void: {trial.note}" if trial.note else "void"

@@ -1,7 +1,7 @@
 import numpy as np
 
-from prior_reinforce.adapters.normalisation import Normalisation
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
+from prior_reinforce.plans.normalisation import Normalisation
 
 
 def normalisation(outcomes: np.ndarray, units: tuple[str, ...]) -> Normalisation:

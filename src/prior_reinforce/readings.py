@@ -1,0 +1,229 @@
+"""What perception says of one trial: by how much it missed, and how far that can be trusted.
+
+    e = r - g, the true error  lies in [low, high], give or take sd, in each component
+    e tilde  `error_seen`      the one number a component that stands for it (the paper's)
+
+"5 cm long" by eye means anything from 3.5 to 7.5 cm; a tape measure's 5 cm means 5.0 give or take
+0.2; "long" alone has no upper end. Who wants numbers takes `error_seen`; who knows what to do with
+intervals takes those. That a trial hit is known for itself, where it is seen directly.
+
+Source: paper, Section IV and V-A, "Perception Process", for e tilde and the words by eye. Intervals
+are ours, because words are intervals: taken as numbers, repeated words count as independent
+evidence, and an adapter stands still.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+from numpy.typing import ArrayLike
+from typing_extensions import Self
+
+from prior_reinforce.arrays import Point, as_error
+from prior_reinforce.errors import InvalidFeedbackError
+
+EYE_NEAR = np.array([0.0, 0.02, 0.05, 0.10])
+"""Distances an observer distinguishes near the goal, in [m] (paper: 0 cm, 2 cm, 5 cm, multiples of
+10 cm)."""
+EYE_BETWEEN = (0.01, 0.035, 0.075)
+"""Half-way between them; written out, since the float (5 cm + 10 cm) / 2 is not 7.5 cm."""
+EYE_STEP = 0.10
+"""Distances beyond are multiples of this, in [m]."""
+LEAST_SD = 0.01
+"""Least sd of a length of unknown origin, in [m] (ours): half of an observer's finest step."""
+_SHARE_SD = 0.25
+"""What a number of unknown origin is off by, as a share of its size (ours): people misjudge
+lengths by 15 to 25 %, and the paper's amplified noise by 20 %."""
+OPEN_ERROR = 0.05
+"""What stands for a length of which only the direction is said, in [m] (ours): an observer's middle
+word."""
+_SAME = 1e-9
+"""Numbers are compared to the nanometre."""
+_MEASURED = 0.5
+"""A number whose sd is below this share of the tolerance says more of a hit than that it hit
+(ours)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """What was perceived of one trial's error, outcome minus goal; in the outcomes' units.
+
+    Raises:
+        InvalidFeedbackError: Shapes that differ, an interval from high to low, a negative sd, or a
+            number that is not finite where it must be.
+    """
+
+    error_seen: Point
+    """e tilde, one finite number a component; 0 where nothing is known of it."""
+    low: Point
+    """Least value of the true error, but for sd; -inf where it has no lower end."""
+    high: Point
+    """Greatest value; inf where it has no upper end, equal to `low` where a number was read."""
+    sd: Point
+    """Standard deviation by which the interval's ends are blurred; 0 where they are sharp."""
+    hit: bool | None = None
+    """Whether the goal was reached, where that was seen directly; None where it was not."""
+    said: str = ""
+    """The words, where words were said."""
+
+    def __post_init__(self) -> None:
+        """Check, copy, and make read-only."""
+        k = np.size(self.error_seen)
+        object.__setattr__(self, "error_seen", as_error(self.error_seen, k))
+        for name in ("low", "high", "sd"):
+            array = np.array(getattr(self, name), dtype=np.float64)
+            if array.shape != (k,) or np.any(np.isnan(array)):
+                raise InvalidFeedbackError(
+                    f"{name} must be {k} numbers, one for each component of the error, got "
+                    f"{array.tolist()}"
+                )
+            object.__setattr__(self, name, array)
+        if (
+            np.any(self.low > self.high)
+            or np.any(self.low == np.inf)
+            or np.any(-self.high == np.inf)
+        ):
+            raise InvalidFeedbackError(
+                f"the error cannot lie in [{self.low.tolist()}, {self.high.tolist()}]; give the "
+                "lower end first"
+            )
+        if not np.all((self.sd >= 0) & np.isfinite(self.sd)):
+            raise InvalidFeedbackError(f"sd must be 0 or more, got {self.sd.tolist()}")
+        if not (self.hit is None or isinstance(self.hit, (bool, np.bool_))):
+            raise InvalidFeedbackError(f"hit must be True, False or None, got {self.hit!r}")
+        for array in (self.error_seen, self.low, self.high, self.sd):
+            array.setflags(write=False)
+
+    @classmethod
+    def measured(cls, error: ArrayLike, sd: ArrayLike = 0.0, hit: bool | None = None) -> Self:
+        """A number that was measured, with the standard deviation of such a measurement.
+
+        Args:
+            error: Outcome minus goal, shape (k,), in the outcomes' units.
+            sd: In the same units, shape (k,), or one for all.
+            hit: See `Reading`.
+        """
+        number = np.array(error, dtype=np.float64)
+        return cls(
+            number, number, number, np.broadcast_to(np.asarray(sd, float), number.shape), hit
+        )
+
+    @classmethod
+    def estimated(
+        cls, error: ArrayLike, least_sd: ArrayLike = LEAST_SD, hit: bool | None = None
+    ) -> Self:
+        """A number of unknown origin: sd^2 = (a quarter of it)^2 + least_sd^2 (ours, see above).
+
+        Args:
+            error: Outcome minus goal, shape (k,), in the outcomes' units.
+            least_sd: In the same units; the default is for lengths.
+            hit: See `Reading`.
+        """
+        number = np.asarray(error, dtype=np.float64)
+        return cls.measured(number, np.hypot(_SHARE_SD * number, least_sd), hit)
+
+    @classmethod
+    def by_eye(cls, words: ArrayLike, hit: bool | None = None) -> Self:
+        """What an observer's words stand for (see `perception.eye`): intervals with sharp ends.
+
+        0 cm is anything within 1 cm, 2 cm from 1 to 3.5, 5 cm from 3.5 to 7.5, 10 cm from 7.5 to
+        15, 20 cm from 15 to 25, ... A 2 beside nothing but zeros may be a miss of 1 cm shared among
+        the components. A component that is none of these words is `estimated`.
+
+        Args:
+            words: Outcome minus goal, shape (k,), in [m].
+            hit: See `Reading`.
+        """
+        said = as_error(words, np.size(words))
+        size = np.abs(said)
+        tens = np.maximum(EYE_STEP * np.round(size / EYE_STEP), EYE_STEP)
+        word = np.argmin(np.abs(size[:, None] - EYE_NEAR), axis=1)
+        near = np.abs(size - EYE_NEAR[word]) < _SAME
+        low = np.where(near, np.array([-EYE_BETWEEN[0], *EYE_BETWEEN])[word], tens - EYE_STEP / 2)
+        high = np.where(near, np.array([*EYE_BETWEEN, EYE_STEP * 1.5])[word], tens + EYE_STEP / 2)
+        if np.count_nonzero(size > _SAME) == 1 and abs(size.max() - EYE_NEAR[1]) < _SAME:
+            low[np.argmax(size)] = EYE_BETWEEN[0] / math.sqrt(size.size)
+        left = said < 0
+        low, high = np.where(left, -high, low), np.where(left, -low, high)
+        unsaid = cls.estimated(said)
+        by_word = near | (np.abs(size - tens) < _SAME)
+        return cls(
+            said,
+            np.where(by_word, low, said),
+            np.where(by_word, high, said),
+            np.where(by_word, 0.0, unsaid.sd),
+            hit,
+        )
+
+    @classmethod
+    def only(cls, hit: bool, outcome_dim: int) -> Self:
+        """That it hit, or missed, and nothing else; `error_seen` is 0."""
+        everywhere = np.full(outcome_dim, np.inf)
+        return cls(np.zeros(outcome_dim), -everywhere, everywhere, np.zeros(outcome_dim), hit)
+
+    @property
+    def has_number(self) -> bool:
+        """Whether `error_seen` says something: some bound is known, or that it hit."""
+        return bool(self.hit or np.any(np.isfinite(self.low) | np.isfinite(self.high)))
+
+    def with_hit(self, hit: bool | None) -> Self:
+        """The same, where it was seen that the trial hit or missed; None changes nothing."""
+        return self if hit is None else replace(self, hit=hit)
+
+    def within(self, radius: Point) -> Self:
+        """What is left of the intervals once it counts whether the trial hit.
+
+        After a hit every component lies within the radius; where that contradicts what was seen,
+        the hit is believed. After a miss, what the other components cannot make up for must be
+        this one's: "2 cm long" that missed by more than 1.5 cm, and at most 1 cm to the side, was
+        1.1 cm long at least. The box around the ellipsoid stands for it: components stay
+        independent.
+
+        Args:
+            radius: Tolerance in each component, shape (k,), in the outcomes' units.
+        """
+        if self.hit is None:
+            return self
+        if self.hit:
+            measured = (self.low == self.high) & (self.sd < _MEASURED * radius)
+            low, high = np.clip(self.low, -radius, radius), np.clip(self.high, -radius, radius)
+            apart = ~measured & ((high - low < 0.1 * radius) | (self.low == self.high))
+            low, high = np.where(apart, -radius, low), np.where(apart, radius, high)
+            return replace(self, low=low, high=high, sd=np.where(apart, 0.0, self.sd))
+        farthest = np.square(np.maximum(np.abs(self.low), np.abs(self.high)) / radius)
+        others = np.array([np.delete(farthest, j).sum() for j in range(radius.size)])
+        least = radius * np.sqrt(np.maximum(1.0 - others, 0.0))
+        low = np.where(self.low > 0, np.maximum(self.low, least), self.low)
+        high = np.where(self.high < 0, np.minimum(self.high, -least), self.high)
+        sound = low < high
+        return replace(
+            self, low=np.where(sound, low, self.low), high=np.where(sound, high, self.high)
+        )
+
+    def as_json(self) -> dict[str, Any]:
+        """Plain data for a log, an open end as None; without `error_seen`."""
+        return {
+            "low": _ends_as_json(self.low),
+            "high": _ends_as_json(self.high),
+            "sd": self.sd.tolist(),
+            "hit": None if self.hit is None else bool(self.hit),
+            "said": self.said,
+        }
+
+    @classmethod
+    def from_json(cls, error_seen: Any, data: Mapping[str, Any]) -> Self:
+        """Read what `as_json` wrote, beside the error seen."""
+        ends = {
+            name: np.array([open_end if end is None else end for end in data[name]])
+            for name, open_end in (("low", -math.inf), ("high", math.inf))
+        }
+        return cls(error_seen, ends["low"], ends["high"], data["sd"], data["hit"], data["said"])
+
+
+def _ends_as_json(ends: Float[np.ndarray, " k"]) -> list[float | None]:
+    return [end if math.isfinite(end) else None for end in ends.tolist()]
