@@ -1,11 +1,27 @@
 """CSV files come back as the motions that were written, and say what is wrong with them."""
 
 import numpy as np
+import pandas as pd
 import pytest
 
-from prior_reinforce.errors import FileFormatError, PriorReinforceError
+from prior_reinforce.errors import (
+    ConfigurationError,
+    FileFormatError,
+    InvalidDemonstrationsError,
+    PriorReinforceError,
+    UnclearUnitsError,
+)
 from prior_reinforce.importing import import_demonstrations, read_recordings
-from tests.importing.recorded import AS_IS, check_motions, write_csv, write_outcomes
+from tests.importing.recorded import (
+    AS_IS,
+    JOINTS,
+    OUTCOMES,
+    N,
+    check_motions,
+    sampled,
+    write_csv,
+    write_outcomes,
+)
 
 
 def test_csv(tmp_path):
@@ -29,14 +45,14 @@ def test_csv_with_a_column_of_episodes_and_text_beside(tmp_path):
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("", "has 0 lines"),
-        ("t,a\n0,1\n", "has 2 lines"),
-        ("t,a\n0,1\n0.1\n", "line 3: 1 cells for 2 columns"),
+        ("", "has 0 frames"),
+        ("t,a\n0,1\n", "has 1 frames"),
+        ("t,a\n0,1\n0.1\n", "line 3: a is ''"),
         ("t,a\n0,1\n0.1,x\n", "line 3: a is 'x'"),
         ("a,b\n0,1\n1,2\n", "give the rate"),
         ("t,a\n0.1,1\n0.0,2\n", "time does not increase"),
         ("t,a,a\n0,1,1\n0.1,2,2\n", "repeats a channel name"),
-        ('t,a\n0,"1\n0.1,2\n', "as CSV in UTF-8"),
+        ('t,a\n0,"1\n0.1,2\n', "as a table .*EOF inside string"),
         ("t\n0\n1\n", "for 0 channels"),
     ],
 )
@@ -44,3 +60,135 @@ def test_csv_of_other_content(tmp_path, text, says):
     (tmp_path / "bad.csv").write_text(text)
     with pytest.raises(PriorReinforceError, match=says):
         read_recordings(tmp_path / "bad.csv")
+
+
+def test_a_workbook(tmp_path):
+    for i in range(N):
+        t, q = sampled(i, 100)
+        frame = pd.DataFrame(np.column_stack([t, q]), columns=["t", *JOINTS])
+        frame.to_excel(tmp_path / f"{i}.xlsx", index=False)
+    frame = pd.DataFrame([[name, *xy] for name, xy in OUTCOMES.items()], columns=[*"exy"])
+    frame.rename(columns={"e": "Episode"}).to_excel(tmp_path / "outcomes.xlsx", index=False)
+    check_motions(import_demonstrations(tmp_path, preprocessing=AS_IS), 100, tolerance=1e-12)
+
+
+def test_a_workbook_with_a_sheet_an_episode(tmp_path):
+    with pd.ExcelWriter(tmp_path / "all.xlsx") as writer:
+        for i in range(2):
+            t, q = sampled(i, 100)
+            frame = pd.DataFrame(np.column_stack([t, q]), columns=["t", *JOINTS])
+            frame.to_excel(writer, sheet_name=f"throw {i}", index=False)
+    recordings = read_recordings(tmp_path / "all.xlsx")
+    assert [r.episode for r in recordings] == ["throw 0", "throw 1"]
+
+
+def libfranka_log(path, q, *, prefix="state."):
+    """As `logToCSV` of libfranka 0.9 and later writes it: `time` in ms, blanks in the header."""
+    vectors = {f"{prefix}q": q, f"{prefix}q_d": q, f"{prefix}dq": 0 * q, "cmd.q_d": q + 1}
+    names = ["time", "success_rate"]
+    names += [f"{name}[{i}]" for name in vectors for i in range(7)]
+    rows = np.column_stack([np.arange(len(q)), np.ones(len(q)), *vectors.values()])
+    lines = [", ".join(names), *(",".join(f"{v:.10g}" for v in row) for row in rows)]
+    path.write_text("\n".join(lines))
+
+
+def test_libfrankas_log_is_known_by_its_columns(tmp_path):
+    libfranka_log(tmp_path / "0.csv", sampled(0, 1000)[1])
+    (recording,) = read_recordings(tmp_path, joints=JOINTS)
+    assert recording.period == pytest.approx(0.001)
+    assert recording.duration == pytest.approx(1.7)
+    np.testing.assert_allclose(recording.positions, sampled(0, 1000)[1], atol=1e-9)
+    assert recording.remarks == ("libfranka's log: time in ms, motion is state.q (measured)",)
+    commanded = read_recordings(tmp_path, key="cmd.q_d")[0]
+    np.testing.assert_allclose(commanded.positions, recording.positions + 1)
+    with pytest.raises(ConfigurationError, match="time is in ms, but --time-unit says s"):
+        read_recordings(tmp_path, time_unit="s")
+    with pytest.raises(ConfigurationError, match="time in ms says 1000 Hz"):
+        read_recordings(tmp_path, rate=100)
+
+
+def test_an_rtde_log_is_known_by_its_columns(tmp_path):
+    """As UR's own recorder writes it: blanks between cells, seconds since the start."""
+    t, q = sampled(0, 500)
+    names = [
+        "timestamp",
+        *(f"target_q_{i}" for i in range(6)),
+        *(f"actual_q_{i}" for i in range(6)),
+    ]
+    rows = np.column_stack([t + 4711.5, q[:, :6] + 1, q[:, :6]])
+    np.savetxt(tmp_path / "0.csv", rows, header=" ".join(names), comments="", fmt="%.9f")
+    (recording,) = read_recordings(tmp_path)
+    np.testing.assert_allclose(recording.positions, q[:, :6], atol=1e-8)
+    assert recording.period == pytest.approx(0.002)
+    assert not recording.named  # six columns are any six joints, in order
+
+
+def test_columns_without_names_are_in_order_and_their_time_is_a_doubt(tmp_path):
+    for i in range(N):
+        t, q = sampled(i, 100)
+        np.savetxt(tmp_path / f"{i}.csv", np.column_stack([1000 * t, np.rad2deg(q)]), delimiter=",")
+    write_outcomes(tmp_path)
+    with pytest.raises(UnclearUnitsError) as caught:
+        import_demonstrations(tmp_path, joints=JOINTS)
+    assert caught.value.options == "--time-column 1 --time-unit ms --units deg"
+    said = {"time_column": "1", "time_unit": "ms", "units": ["deg"]}
+    result = import_demonstrations(tmp_path, joints=JOINTS, preprocessing=AS_IS, **said)
+    check_motions(result, 100, tolerance=1e-12)
+
+
+def test_dates_count_as_times(tmp_path):
+    t, q = sampled(0, 100)
+    start = pd.Timestamp("2026-11-21T10:59:59.5")
+    frame = pd.DataFrame(q, columns=JOINTS)
+    frame.insert(0, "timestamp", start + pd.to_timedelta(t, unit="s"))
+    frame.to_csv(tmp_path / "0.csv", index=False, date_format="%Y-%m-%dT%H:%M:%S.%f")
+    (recording,) = read_recordings(tmp_path)
+    np.testing.assert_allclose(recording.times, t, atol=2e-6)
+
+
+def test_a_column_of_throws_by_another_name(tmp_path):
+    (tmp_path / "log.csv").write_text("throw_id,t,a\n1,0,1\n1,.1,2\n2,0,1\n2,.1,2\n")
+    assert [r.episode for r in read_recordings(tmp_path)] == ["1", "2"]
+    (tmp_path / "log.csv").write_text("wurf,t,a\n1,0,1\n1,.1,2\n2,0,1\n2,.1,2\n")
+    assert len(read_recordings(tmp_path, episode_column="wurf")) == 2
+    with pytest.raises(
+        ConfigurationError, match="no column 'nr' for --episode-column; it has wurf"
+    ):
+        read_recordings(tmp_path, episode_column="nr")
+
+
+def test_the_column_of_times_may_be_named_or_left_unread(tmp_path):
+    (tmp_path / "a.csv").write_text("clock,t,a\n0,5,1\n10,5,2\n20,5,4\n")
+    (recording,) = read_recordings(tmp_path, time_column="clock", time_unit="ms", joints=["a"])
+    np.testing.assert_allclose(recording.times, [0, 0.01, 0.02])
+    (recording,) = read_recordings(tmp_path, time_column="none", rate=50, joints=["a"])
+    np.testing.assert_allclose(recording.times, [0, 0.02, 0.04])
+
+
+def test_joints_by_the_gates_names_and_a_refusal_that_is_short(tmp_path):
+    names = [f"panda_joint{i}" for i in range(1, 8)]
+    t, q = sampled(0, 100)
+    table = np.column_stack([t, q])
+    header = ",".join(["t", *names])
+    np.savetxt(tmp_path / "0.csv", table, delimiter=",", header=header, comments="")
+    (recording,) = read_recordings(tmp_path, joints=JOINTS)
+    assert recording.names == tuple(names)
+    (other,) = read_recordings(tmp_path, key="panda_joint")
+    np.testing.assert_array_equal(other.positions, recording.positions)
+    with pytest.raises(FileFormatError, match=r"no columns q_0, q_1, .*; numbered columns are pan"):
+        read_recordings(tmp_path, key="q")
+    with pytest.raises(InvalidDemonstrationsError) as caught:
+        import_demonstrations(tmp_path, joints=[f"A{i}" for i in range(1, 8)])
+    assert str(caught.value) == (
+        "episode 0 has no joint A1 to A7; it has panda_joint1 to panda_joint7: give the recorded "
+        "names in the plan's order with --joints, or numbered columns at once: --key panda_joint"
+    )
+
+
+def test_other_endings_are_read_where_the_format_is_said(tmp_path):
+    write_csv(tmp_path)
+    for path in list(tmp_path.glob("*.csv")):
+        path.rename(path.with_suffix(".txt"))
+    with pytest.raises(FileFormatError, match="no format that can be read"):
+        read_recordings(tmp_path)
+    assert len(read_recordings(tmp_path, format="csv")) == N

@@ -169,8 +169,12 @@ def test_the_rate_is_checked(originals, rate):
 
 
 def test_an_option_that_has_no_use_is_refused(originals):
-    with pytest.raises(ConfigurationError, match="--key q has no use for csv; drop it"):
-        read_recordings(originals["csv"], key="q")
+    with pytest.raises(ConfigurationError, match="--delimiter tab has no use for npz; drop it"):
+        read_recordings(originals["npz"], delimiter="tab")
+    with pytest.raises(ConfigurationError, match="--time-column t has no use for droid; drop it"):
+        read_recordings(originals["droid"], time_column="t")
+    with pytest.raises(ConfigurationError, match="delimiter must be one of comma, semicolon"):
+        read_recordings(originals["csv"], delimiter="dash")
     with pytest.raises(ConfigurationError, match="--time-unit ms is of a column of times"):
         read_recordings(originals["robomimic"] / "demos.hdf5", time_unit="ms")
     with pytest.raises(ConfigurationError, match="time-unit must be one of s, ms"):

@@ -79,3 +79,21 @@ def test_npz_of_other_content(tmp_path, arrays, says):
     np.savez(tmp_path / "bad.npz", **arrays)
     with pytest.raises(PriorReinforceError, match=says):
         read_recordings(tmp_path / "bad.npz")
+
+
+def test_a_bare_array_is_the_motion_alone(tmp_path):
+    np.save(tmp_path / "throw_0.npy", np.arange(10.0).reshape(5, 2))
+    with pytest.raises(PriorReinforceError, match="give the rate"):
+        read_recordings(tmp_path)
+    (recording,) = read_recordings(tmp_path, rate=50, joints=["a", "b"])
+    np.testing.assert_array_equal(recording.positions[4], [8, 9])
+    assert (recording.episode, recording.named, recording.duration) == ("throw_0", False, 0.08)
+
+
+def test_the_array_of_times_may_be_named(tmp_path):
+    arrays = {"q": np.eye(3), "clock": np.arange(3) * 10.0}
+    np.savez(tmp_path / "a.npz", **arrays)
+    (recording,) = read_recordings(tmp_path, time_column="clock", time_unit="ms")
+    np.testing.assert_allclose(recording.times, [0, 0.01, 0.02])
+    with pytest.raises(FileFormatError, match=r"no array t; it holds \['clock', 'q'\]"):
+        read_recordings(tmp_path, time_column="t")

@@ -65,7 +65,9 @@ def test_centimetres_in_a_columns_name_are_converted(tmp_path):
 def test_centimetres_that_nobody_names_are_refused_until_said(recording, tmp_path):
     cm = {name: (100 * x, 100 * y) for name, (x, y) in OUTCOMES.items()}
     path = write_outcomes(tmp_path, cm)
-    with pytest.raises(UnclearUnitsError, match=r"x in outcomes.csv reaches 105, too far for m: "):
+    with pytest.raises(
+        UnclearUnitsError, match=r"x reaches 105 and y reaches 14, too far for an arm"
+    ):
         import_demonstrations(recording, outcomes=path)
     for said in ({"outcome_unit": "cm"}, {"take_guesses": True}):
         result = import_demonstrations(recording, outcomes=path, **said)
@@ -116,7 +118,7 @@ def test_numbers_that_two_names_share_match_nothing(recording, tmp_path):
         ("a,b\n1,2\n", "expected column names"),
         ("episode\n1\n", "expected column names"),
         ("episode,x,x\n1,2,3\n", "expected column names"),
-        ("episode,x,y\n1,2\n", "line 2: 2 cells for 3 columns"),
+        ("episode,x,y\n1,2\n", "line 2: '' is no finite number"),
         ("episode,x,y\n1,2,3\n1,2,4\n", "line 3: episode 1 again"),
         ("episode,x,y\n1,5cm,3\n", "line 2: '5cm' is no finite number"),
         ("episode,x,y\n1,inf,3\n", "line 2: 'inf' is no finite number"),

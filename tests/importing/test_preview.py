@@ -27,7 +27,7 @@ def test_the_text(folder):
     # Joint 6 of the largest throw: 0.9 * 1.25 rad; the fastest is 0.9 * 1.15 * 15/8 in 1.0 s.
     assert "joint6 moves most, over 1.12 rad" in rows["motion"]
     assert "joint6 of throw_3, 1.94 rad/s" in rows["motion"]
-    assert rows["outcomes"] == "x 0.8 to 1.05 m, y -0.09 to 0.14 m, from outcomes.csv"
+    assert rows["outcomes"] == f"x 0.8 to 1.05 m, y -0.09 to 0.14 m, from {folder}/outcomes.csv"
     assert rows["remarks"] == "none"
 
 

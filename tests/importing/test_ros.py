@@ -60,8 +60,17 @@ def test_bags_without_stamps_use_the_recorders_times(tmp_path):
 
 def test_a_bag_without_the_joint_names_those_it_has(tmp_path):
     bag = write_bag(tmp_path / "throw0", 0, kind="mcap", fingers=True)
-    with pytest.raises(FileFormatError, match=r"joints in it are .*'finger_left'.*'joint1'"):
-        read_recordings(bag, joints=["panda_joint1"])
+    with pytest.raises(
+        FileFormatError, match=r"joints in it are finger_left, joint1 to joint7, fin"
+    ):
+        read_recordings(bag, joints=["shoulder"])
+
+
+def test_joints_of_a_bag_are_found_by_the_same_rule_as_the_gates(tmp_path):
+    names = [f"panda_joint{i}" for i in range(1, 8)]
+    bag = write_bag(tmp_path / "throw0", 0, kind="mcap", names=names, fingers=True)
+    (recording,) = read_recordings(bag, joints=JOINTS)
+    assert set(names) < set(recording.names)
 
 
 def test_an_unknown_topic_lists_the_usable_ones(tmp_path):

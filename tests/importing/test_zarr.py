@@ -2,10 +2,11 @@
 
 import shutil
 
+import numpy as np
 import pytest
 import zarr
 
-from prior_reinforce.errors import FileFormatError
+from prior_reinforce.errors import ConfigurationError, FileFormatError
 from prior_reinforce.importing import import_demonstrations, read_recordings
 from tests.importing.recorded import AS_IS, JOINTS, check_motions, write_outcomes, write_zarr
 
@@ -32,3 +33,20 @@ def test_a_replay_buffer_whose_episodes_end_elsewhere(tmp_path):
     zarr.open_group(str(path), mode="r+")["meta/episode_ends"][1] = 5
     with pytest.raises(FileFormatError, match="episodes end at"):
         read_recordings(path, key="action", rate=50)
+
+
+def test_a_replay_buffers_own_times_are_used(tmp_path):
+    """As UMI writes them: seconds of a running clock in `data/timestamp`."""
+    path = write_zarr(tmp_path)
+    root = zarr.open_group(str(path), mode="r+")
+    count = root["data/joint_pos"].shape[0]
+    root["data"].create_array("timestamp", data=7.5 + np.arange(count) / 50)
+    (first, *_) = read_recordings(path, key="joint_pos")
+    assert first.clock == "timestamp in s"
+    assert first.period == pytest.approx(0.02)
+    with pytest.raises(ConfigurationError, match="timestamp in s says 50 Hz; drop --rate"):
+        read_recordings(path, key="joint_pos", rate=100)
+    given = read_recordings(path, key="joint_pos", rate=100, time_column="none")
+    assert given[0].period == pytest.approx(0.01)
+    with pytest.raises(FileFormatError, match="no array stamp in data/; it has"):
+        read_recordings(path, key="joint_pos", time_column="stamp")

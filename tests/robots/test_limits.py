@@ -8,6 +8,7 @@ import pytest
 from prior_reinforce.errors import ConfigurationError, InvalidPlanError
 from prior_reinforce.plans.motions import PlanFormat
 from prior_reinforce.robots import RobotLimits, match_joints, missing_joints, robot_limits
+from prior_reinforce.robots.limits import is_joint
 
 
 def test_velocity_of_an_fr3_shrinks_towards_its_stop():
@@ -83,3 +84,10 @@ def test_joints_without_a_column_are_missing_unless_left_out_on_purpose():
     for name, why in (("joint1", "the plan moves it"), ("elbow", "panda has no such joint")):
         with pytest.raises(ConfigurationError, match=f"absent_joints names '{name}', but {why}"):
             missing_joints(columns, PANDA, (name,))
+
+
+def test_one_rule_says_which_column_is_which_joint():
+    for name in ("joint4", "panda_joint4", "fr3/joint4", "joint4.pos", "arm.joint4"):
+        assert is_joint(name, "joint4")
+    for name in ("Joint4", "j4", "joint14", "joint41", "joint4_vel", "xjoint4"):
+        assert not is_joint(name, "joint4")

@@ -34,8 +34,8 @@ class Import:
     folder: Folder
     """Workspace."""
     source: Annotated[Path, tyro.conf.Positional]
-    """Recordings, a file or a folder: NPZ, CSV, LeRobot, robomimic or DROID HDF5, ROS 1, ROS 2 or
-    MCAP, or a replay buffer in zarr."""
+    """Recordings, a file or a folder: NPZ, NPY, CSV, a workbook, LeRobot, robomimic or DROID HDF5,
+    ROS 1, ROS 2 or MCAP, or a replay buffer in zarr."""
     format: Annotated[
         str | None,
         tyro.conf.arg(help=f"What it is, one of {', '.join(FORMATS)}; detected if not given."),
@@ -52,6 +52,15 @@ class Import:
     time_unit: Literal["s", "ms", "us", "ns", "frame"] | None = None
     """Unit of the recorded times, where their name does not say it (`t_ms`); `frame` for a column
     that counts frames."""
+    time_column: str | None = None
+    """Column or array of the times: its name, or its number from 1; none leaves all unread."""
+    episode_column: str | None = None
+    """Column that says which episode a row is of."""
+    delimiter: str | None = None
+    """What stands between two cells of a CSV: comma, semicolon, tab, space; found out if not
+    given."""
+    decimal: Literal[".", ","] | None = None
+    """Decimal sign of a CSV; found out if not given."""
     episodes: tuple[str, ...] | None = None
     """Episodes to keep, in order; all if not given."""
     leave_out: tuple[str, ...] | None = None
@@ -108,6 +117,10 @@ class Import:
             key=self.key,
             rate=self.rate,
             time_unit=self.time_unit,
+            time_column=self.time_column,
+            episode_column=self.episode_column,
+            delimiter=self.delimiter,
+            decimal=self.decimal,
             episodes=self.episodes,
             leave_out=self.leave_out,
             joints=self.joints or workspace.manifest.format.names,

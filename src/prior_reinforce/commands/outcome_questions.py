@@ -83,9 +83,10 @@ def _known(
     source: Path, given: Path | None, recordings: Sequence[Recording], manifest: Manifest
 ) -> Outcomes:
     if given is not None:
-        return in_order(read_outcomes(given), manifest.outcome_names)
+        return in_order(read_outcomes(given, manifest.outcome_names), manifest.outcome_names)
     try:
-        return in_order(find_outcomes(source, recordings), manifest.outcome_names)
+        names = manifest.outcome_names
+        return in_order(find_outcomes(source, recordings, None, names), names)
     except InvalidDemonstrationsError:
         return Outcomes("nothing", (), {})
 

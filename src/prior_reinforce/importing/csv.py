@@ -1,97 +1,208 @@
-"""Recordings in CSV: a file an episode, or one file with a column `episode`.
+"""Recordings in tables: CSV of any dialect, and workbooks (.xlsx, .xls, .ods).
 
-The first line names the columns: `t` (or `time`, `timestamp`, with a unit as in `t_ms`), `episode`
-if the file holds several, and the channels.
+A file an episode, or one with a column `episode`; of a workbook, a sheet an episode. One column may
+hold the time; all others are channels. Logs of libfranka and of RTDE are known by their columns.
 """
 
 from __future__ import annotations
 
-import csv
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from prior_reinforce.errors import FileFormatError
+from prior_reinforce.errors import ConfigurationError, FileFormatError
+from prior_reinforce.importing.clock import Clock
+from prior_reinforce.importing.naming import find_channels, vectors
 from prior_reinforce.importing.recording import (
+    NO_COLUMN,
     ReadOptions,
     Recording,
     files_at,
-    named_damage,
     natural_order,
 )
-from prior_reinforce.importing.units import SECONDS, split_unit
+from prior_reinforce.importing.tables import WORKBOOKS, Dialect, Table, read_tables
+from prior_reinforce.importing.units import CHANNEL_UNITS, SECONDS, Doubt, say_names, split_unit
 
-_TIME_COLUMNS = ("t", "time", "timestamp")
-Rows = list[tuple[int, list[str]]]
-"""Cells of each row, with the number of its line."""
+SUFFIXES = (".csv", ".tsv")
+_WHEN_SAID = (*SUFFIXES, ".txt", ".dat", ".log")
+"""Read where the format is said, because much else has such names."""
+_TIMES = (
+    "t", "time", "times", "timestamp", "timestamps", "stamp", "elapsed", "elapsed_time", "duration",
+    "datetime", "date",
+)  # fmt: skip
+EPISODE_COLUMNS = tuple(
+    name + ending
+    for name in ("episode", "throw", "trial", "demo", "run")
+    for ending in ("", "_id", "_index", "_number")
+)
+"""Names of a column that says of which episode a row is."""
+
+
+@dataclass(frozen=True)
+class _Log:
+    """A log whose columns are documented."""
+
+    name: str
+    columns: tuple[str, ...]
+    """Those that it is known by."""
+    key: str
+    """Which of its vectors is the measured motion."""
+    time_unit: str
+
+
+_LOGS = (
+    # libfranka, src/log.cpp: logToCSV writes time.toMSec().
+    _Log("libfranka's log", ("time", "success_rate", "state.q[0]"), "state.q", "ms"),
+    _Log("libfranka's log", ("duration", "success_rate", "q[0]"), "q", "ms"),
+    # UR's rtde/csv_writer.py and ur_rtde's recorder: seconds since the controller started.
+    _Log("an RTDE log", ("timestamp", "actual_q_0"), "actual_q", "s"),
+)
 
 
 def read(source: Path, options: ReadOptions) -> list[Recording]:
     """Read a CSV file, or every CSV file of a folder."""
-    paths = files_at(source, (".csv",))
-    recordings: list[Recording] = []
-    for path in paths:
-        header, rows = read_table(path)
-        if not header or len(rows) < 2:
+    paths = files_at(source, SUFFIXES) or files_at(source, _WHEN_SAID)
+    return [recording for path in paths for recording in _of_file(path, options, len(paths) == 1)]
+
+
+def read_workbooks(source: Path, options: ReadOptions) -> list[Recording]:
+    """Read a workbook, or every workbook of a folder."""
+    paths = files_at(source, WORKBOOKS)
+    return [recording for path in paths for recording in _of_file(path, options, len(paths) == 1)]
+
+
+def _of_file(path: Path, options: ReadOptions, alone: bool) -> list[Recording]:
+    tables = read_tables(path, Dialect(options.delimiter, options.decimal))
+    recordings = []
+    for table in tables:
+        if not table.names or len(table) < 2:
             raise FileFormatError(
-                f"{path} has {len(rows) + bool(header)} lines; expected a line of column names and "
-                "two frames or more"
+                f"{table.where} has {len(table)} frames; expected a line of column names and two "
+                "frames or more"
             )
-        if "episode" not in header:
-            if len(paths) == 1 or options.wants(path.stem):
-                recordings.append(_episode(path, path.stem, header, rows, options))
+        column = _episode_column(table, options)
+        if column is None:
+            sheet = table.where.removeprefix(f"{path} [").removesuffix("]")
+            episode = path.stem if len(tables) == 1 else sheet
+            if (alone and len(tables) == 1) or options.wants(episode):
+                recordings.append(_episode(table, episode, options))
             continue
-        at = header.index("episode")
-        for episode in sorted({row[at] for _, row in rows}, key=natural_order):
+        names = table.texts(column)
+        for episode in sorted(set(names), key=natural_order):
             if options.wants(episode):
-                own = [(line, row) for line, row in rows if row[at] == episode]
-                recordings.append(_episode(path, episode, header, own, options))
+                own = table.rows([i for i, name in enumerate(names) if name == episode])
+                recordings.append(_episode(own, episode, options, column))
     return recordings
 
 
-def read_table(path: Path) -> tuple[list[str], Rows]:
-    """Read column names and rows; empty lines do not count.
+def _episode_column(table: Table, options: ReadOptions) -> int | None:
+    if options.episode_column is not None:
+        return _named_column(table, options.episode_column, "--episode-column")
+    if not table.named:
+        return None
+    return next((i for i, n in enumerate(table.names) if n.lower() in EPISODE_COLUMNS), None)
 
-    Raises:
-        FileFormatError: No CSV, or a row of another length.
-    """
-    with named_damage(path, "CSV in UTF-8"), path.open(newline="", encoding="utf-8-sig") as file:
-        reader = csv.reader(file, strict=True)
-        stripped = ((reader.line_num, [cell.strip() for cell in row]) for row in reader)
-        lines = [(line, row) for line, row in stripped if any(row)]
-    header = lines[0][1] if lines else []
-    for line, row in lines[1:]:
-        if len(row) != len(header):
-            raise FileFormatError(
-                f"{path}, line {line}: {len(row)} cells for {len(header)} columns; mend that line"
-            )
-    return header, lines[1:]
+
+def _named_column(table: Table, name: str, option: str) -> int:
+    """A column by its name, with or without the unit in it, or by its number from 1."""
+    bare = [split_unit(n, SECONDS)[0] for n in table.names]
+    for names in (table.names, bare):
+        if name in names:
+            return names.index(name)
+    if name.isdigit() and 1 <= int(name) <= len(table.names):
+        return int(name) - 1
+    raise ConfigurationError(
+        f"{table.where} has no column {name!r} for {option}; it has {say_names(table.names)}"
+    )
 
 
 def _episode(
-    path: Path, episode: str, header: list[str], rows: Rows, options: ReadOptions
+    table: Table, episode: str, options: ReadOptions, episode_column: int | None = None
 ) -> Recording:
-    bare = [split_unit(name, SECONDS)[0].lower() for name in header]
-    time = next((i for i, name in enumerate(bare) if name in _TIME_COLUMNS), None)
-    channels = [i for i, name in enumerate(header) if i != time and name != "episode"]
-    if options.joints and set(options.joints) <= set(header):
-        # Only these need to be numbers; a log may carry text beside them.
-        channels = [header.index(name) for name in options.joints]
-
-    def number(line: int, row: list[str], column: int) -> float:
-        try:
-            return float(row[column])
-        except ValueError:
-            raise FileFormatError(
-                f"{path}, line {line}: {header[column]} is {row[column]!r}, expected a number; "
-                "mend that cell, or keep other columns"
-            ) from None
-
-    positions = np.array([[number(*row, column) for column in channels] for row in rows])
-    stamps = None if time is None else np.array([number(*row, time) for row in rows])
-    name = "" if time is None else header[time]
-    clock = options.clock(episode, len(rows), stamps=stamps, name=name)
-    names = tuple(header[i] for i in channels)
+    log = next((g for g in _LOGS if set(g.columns) <= set(table.names)), None)
+    time, guessed = _time_column(table, options)
+    clock = _clock(table, episode, time, options, None if log is None else log.time_unit)
+    others = [i for i in range(len(table.names)) if i not in (time, episode_column)]
+    channels, named = _channels(table, others, options, log)
+    remarks: tuple[str, ...] = ()
+    if log is not None:
+        remarks = (f"{log.name}: time in {log.time_unit}, motion is {log.key} (measured)",)
+    positions = np.column_stack([table.numbers(i) for i in channels] or [np.zeros((0, 0))])
+    units = tuple(table.units[i] or split_unit(table.names[i], CHANNEL_UNITS)[1] for i in channels)
+    names = tuple(split_unit(table.names[i], CHANNEL_UNITS)[0] for i in channels)
+    if len(set(names)) < len(names):
+        names = tuple(table.names[i] for i in channels)
     return Recording(
-        episode, clock.times, positions, names, clock=clock.source, doubts=clock.doubts
+        episode,
+        clock.times,
+        positions,
+        names if named else (),
+        remarks=remarks,
+        units=units,
+        clock=clock.source,
+        doubts=(*guessed, *clock.doubts),
     )
+
+
+def _time_column(table: Table, options: ReadOptions) -> tuple[int | None, tuple[Doubt, ...]]:
+    """The column of times, None where there is none, and what is only guessed of it."""
+    if options.time_column == NO_COLUMN:
+        return None, ()
+    if options.time_column is not None:
+        return _named_column(table, options.time_column, "--time-column"), ()
+    if table.named:
+        bare = [split_unit(name, SECONDS)[0].lower() for name in table.names]
+        return next((i for i, name in enumerate(bare) if name in _TIMES), None), ()
+    if len(table.names) < 2:
+        return None, ()
+    stamps = table.nanoseconds(0)
+    steps = np.diff(table.numbers(0) if stamps is None else stamps)
+    if np.all(steps > 0) and steps.max() < 10 * np.median(steps):
+        return 0, (
+            Doubt(
+                f"{table.where} does not name its columns, and column 1 looks like the time",
+                "--time-column 1",
+            ),
+        )
+    return None, ()
+
+
+def _clock(
+    table: Table, episode: str, time: int | None, options: ReadOptions, unit: str | None
+) -> Clock:
+    if time is None:
+        return options.clock(episode, len(table))
+    dates = table.nanoseconds(time)
+    name = table.names[time]
+    if dates is not None:
+        return options.clock(episode, len(table), stamps=dates, name=name, unit="ns")
+    stamps, unit = table.numbers(time), unit or table.units[time]
+    return options.clock(episode, len(table), stamps=stamps, name=name, unit=unit)
+
+
+def _channels(
+    table: Table, others: Sequence[int], options: ReadOptions, log: _Log | None
+) -> tuple[list[int], bool]:
+    """Columns of the motion, and whether their names are those of joints.
+
+    Only these need to be numbers; a log may carry text beside them.
+    """
+    names = [table.names[i] for i in others]
+    if not table.named:
+        return list(others), False
+    if options.key is None and options.joints:
+        found = find_channels(options.joints, names)
+        if found is not None:
+            return [others[i] for i in found], True
+    groups = vectors(names)
+    key = options.key or (log.key if log is not None else None)
+    if key is None:
+        return list(others), True
+    if key not in groups:
+        raise FileFormatError(
+            f"{table.where} has no columns {key}_0, {key}_1, ...; numbered columns are "
+            f"{', '.join(groups) or 'none'}: say which with the key"
+        )
+    return [others[i] for i in groups[key]], False

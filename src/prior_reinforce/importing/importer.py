@@ -27,6 +27,7 @@ from prior_reinforce.importing.outcomes import find_outcomes, in_order, in_units
 from prior_reinforce.importing.preprocessing import Preprocessing, preprocess, select
 from prior_reinforce.importing.preview import Preview
 from prior_reinforce.importing.recording import HowToRead, ReadOptions, Recording, has_files
+from prior_reinforce.importing.tables import DELIMITERS, WORKBOOKS
 from prior_reinforce.importing.units import Doubt, refuse_doubts
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 
@@ -42,20 +43,40 @@ class Format:
     """Optional library that reading needs, by the name of its module."""
     extra: str = ""
     """Extra of this package that installs it."""
-    key: bool = True
-    """Whether `key` says anything of this format."""
+    options: frozenset[str] = frozenset({"key"})
+    """Fields of `HowToRead` that say something of this format, beside those of every format."""
     whole: bool = False
     """A folder laid out like this is this format, whatever else lies in it."""
 
 
+_TABLE = frozenset({"key", "time_column", "episode_column"})
+_OPTIONAL = _TABLE | {"delimiter", "decimal"}
 FORMATS: Mapping[str, Format] = {
-    "npz": Format(npz.read, lambda source: has_files(source, (".npz",))),
-    "csv": Format(csv.read, lambda source: has_files(source, (".csv",)), key=False),
+    "npz": Format(
+        npz.read,
+        lambda source: has_files(source, npz.SUFFIXES),
+        options=frozenset({"key", "time_column"}),
+    ),
+    "csv": Format(csv.read, lambda source: has_files(source, csv.SUFFIXES), options=_OPTIONAL),
+    "excel": Format(
+        csv.read_workbooks,
+        lambda source: has_files(source, WORKBOOKS),
+        "python_calamine",
+        "excel",
+        options=_TABLE,
+    ),
     "lerobot": Format(lerobot.read, lerobot.recognises, "pyarrow.parquet", "lerobot", whole=True),
     "robomimic": Format(hdf5.read_robomimic, hdf5.is_robomimic, "h5py", "hdf5"),
     "droid": Format(hdf5.read_droid, hdf5.is_droid, "h5py", "hdf5"),
     "ros": Format(ros.read, ros.recognises, "rosbags.highlevel", "ros"),
-    "zarr": Format(zarr.read, zarr.recognises, "zarr", "zarr", whole=True),
+    "zarr": Format(
+        zarr.read,
+        zarr.recognises,
+        "zarr",
+        "zarr",
+        options=frozenset({"key", "time_column"}),
+        whole=True,
+    ),
 }
 """What can be read. `ros` covers ROS 1 bags, ROS 2 sqlite bags and MCAP; `zarr` is the replay
 buffer of Diffusion Policy."""
@@ -121,7 +142,7 @@ def import_demonstrations(
     kept = select(recordings, how.get("joints"), names, units, plan_units)
     doubts = [] if take_guesses else [*_doubts_of(recordings), *kept.doubts]
     try:
-        known = in_order(find_outcomes(source, recordings, outcomes), outcome_names)
+        known = in_order(find_outcomes(source, recordings, outcomes, outcome_names), outcome_names)
     except InvalidDemonstrationsError as missing:
         refuse_doubts(doubts, also=str(missing))
         raise
@@ -180,19 +201,33 @@ def _read(source: Path, how: HowToRead) -> tuple[list[Recording], str]:
         raise ConfigurationError(f"rate must be a positive number of frames a second, got {rate}")
     if unit is not None and unit not in TIME_UNITS:
         raise ConfigurationError(f"time-unit must be one of {', '.join(TIME_UNITS)}, got {unit!r}")
-    format = FORMATS[kind]
-    if how.get("key") is not None and not format.key:
-        raise ConfigurationError(f"--key {how['key']} has no use for {kind}; drop it")
-    _need(format)
+    said = {name: value for name, value in how.items() if value is not None}
+    for name in sorted(_OPTIONAL & said.keys() - FORMATS[kind].options):
+        option = name.replace("_", "-")
+        raise ConfigurationError(f"--{option} {said[name]} has no use for {kind}; drop it")
+    _need(FORMATS[kind])
     joints, wanted = how.get("joints"), how.get("episodes")
     options = ReadOptions(
         how.get("key"),
         rate,
         unit,
+        how.get("time_column"),
+        how.get("episode_column"),
+        _delimiter(how.get("delimiter")),
+        how.get("decimal"),
         None if wanted is None else tuple(map(str, wanted)),
         None if joints is None else tuple(joints),
     )
     return _chosen(source, kind, options, tuple(map(str, how.get("leave_out") or ()))), kind
+
+
+def _delimiter(given: str | None) -> str | None:
+    delimiter = given if given is None else DELIMITERS.get(given, given)
+    if delimiter is not None and delimiter not in DELIMITERS.values() and len(delimiter) != 1:
+        raise ConfigurationError(
+            f"delimiter must be one of {', '.join(DELIMITERS)}, or one character, got {given!r}"
+        )
+    return delimiter
 
 
 def _chosen(

@@ -1,13 +1,15 @@
-"""Recordings in NPZ: a file an episode, or one file whose motion array has shape (N, T, D).
+"""Recordings in NPZ or NPY: a file an episode, or one file whose motion has shape (N, T, D).
 
-Arrays: the motion (`key`, or `q`, `plans`, `positions`, `actions`), `t` or `dt` or `rate`, and
-where wanted `joint_names` or `names`, `outcome` or `outcomes` or `outcomes_seen`.
+An NPY holds the motion alone. Arrays of an NPZ: the motion (`key`, or `q`, `plans`, `positions`,
+`actions`), `t` or `dt` or `rate`, and where wanted `joint_names` or `names`, `outcome` or
+`outcomes` or `outcomes_seen`.
 """
 
 from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +17,7 @@ import numpy as np
 from prior_reinforce.errors import FileFormatError
 from prior_reinforce.importing.clock import Clock
 from prior_reinforce.importing.recording import (
+    NO_COLUMN,
     ReadOptions,
     Recording,
     files_at,
@@ -23,12 +26,14 @@ from prior_reinforce.importing.recording import (
 from prior_reinforce.importing.units import SECONDS, split_unit
 
 Arrays = Mapping[str, np.ndarray]
+SUFFIXES = (".npz", ".npy")
+_TIMES = ("t", "time", "timestamp", "timestamps")
 _MOTION_KEYS = ("q", "plans", "positions", "actions")
 
 
 def read(source: Path, options: ReadOptions) -> list[Recording]:
-    """Read an NPZ file, or every NPZ file of a folder as an episode."""
-    paths = files_at(source, (".npz",))
+    """Read a file, or every one of a folder as an episode."""
+    paths = files_at(source, SUFFIXES)
     wanted = [path for path in paths if len(paths) == 1 or options.wants(path.stem)]
     return [recording for path in wanted for recording in _episodes(path, options)]
 
@@ -83,8 +88,12 @@ def _arrays(path: Path) -> Arrays:
     with (
         named_damage(path, "NPZ with plain number arrays"),
         path.open("rb") as file,
-        np.load(file, allow_pickle=False) as archive,
+        ExitStack() as stack,
     ):
+        archive = np.load(file, allow_pickle=False)
+        if isinstance(archive, np.ndarray):
+            return {_MOTION_KEYS[0]: archive}
+        stack.enter_context(archive)
         content = {name: np.array(archive[name]) for name in archive.files}
         if "metadata" in content:
             metadata = json.loads(str(content.pop("metadata")))
@@ -102,7 +111,13 @@ def _clock(
     path: Path, arrays: Arrays, count: int, index: int, episode: str, options: ReadOptions
 ) -> Clock:
     with named_damage(path, "NPZ with times t, or dt, or rate"):
-        name = next((n for n in arrays if split_unit(n, SECONDS)[0] == "t"), None)
+        name = options.time_column
+        if name is None:
+            name = next((n for n in arrays if split_unit(n, SECONDS)[0] in _TIMES), None)
+        elif name not in (*arrays, NO_COLUMN):
+            raise FileFormatError(f"{path} has no array {name}; it holds {sorted(arrays)}")
+        if name == NO_COLUMN:
+            return options.clock(episode, count)
         if name is not None:
             stamps = arrays[name]
             stamps = stamps[index] if stamps.ndim == 2 else stamps

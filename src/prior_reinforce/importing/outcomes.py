@@ -22,8 +22,9 @@ from prior_reinforce.errors import (
     FileFormatError,
     InvalidDemonstrationsError,
 )
-from prior_reinforce.importing.csv import read_table
+from prior_reinforce.importing.csv import EPISODE_COLUMNS
 from prior_reinforce.importing.recording import Recording
+from prior_reinforce.importing.tables import Table, read_tables
 from prior_reinforce.importing.units import (
     CHANNEL_UNITS,
     Doubt,
@@ -56,6 +57,7 @@ def find_outcomes(
     source: Path,
     recordings: Sequence[Recording],
     given: str | os.PathLike[str] | Mapping[str, Sequence[float]] | None = None,
+    names: Sequence[str] | None = None,
 ) -> Outcomes:
     """Find outcomes: those given, `outcomes.csv` inside or beside the source, the recordings' own.
 
@@ -63,6 +65,7 @@ def find_outcomes(
         source: Where the recordings are from.
         recordings: Some hold their outcomes.
         given: A table, or numbers by episode.
+        names: Of the components that are wanted, as in `read_outcomes`.
 
     Raises:
         ConfigurationError: What was given are no numbers.
@@ -78,10 +81,11 @@ def find_outcomes(
             ) from error
         return Outcomes("the given outcomes", (), numbers)
     if given is not None:
-        return read_outcomes(Path(given))
+        return read_outcomes(Path(given), names)
     for folder in [source, source.parent] if source.is_dir() else [source.parent]:
-        if (folder / OUTCOMES_FILE).is_file():
-            return read_outcomes(folder / OUTCOMES_FILE)
+        for path in (folder / OUTCOMES_FILE, folder / "outcomes.xlsx"):
+            if path.is_file():
+                return read_outcomes(path, names)
     own = {r.episode: tuple(r.outcome.tolist()) for r in recordings if r.outcome is not None}
     if own:
         return Outcomes("the recording itself", (), own)
@@ -91,32 +95,43 @@ def find_outcomes(
     )
 
 
-def read_outcomes(path: Path) -> Outcomes:
-    """Read an `outcomes.csv`; rows whose cells are empty count as missing.
+def read_outcomes(path: Path, names: Sequence[str] | None = None) -> Outcomes:
+    """Read a table of outcomes; rows whose cells are empty count as missing.
+
+    Args:
+        path: A CSV of any dialect, or a workbook.
+        names: Of the components that are wanted; None takes all columns but `episode` and notes.
 
     Raises:
         FileFormatError: Missing, not such a table, or a cell that is no number.
     """
     if not path.is_file():
         raise FileFormatError(f"no outcomes at {path}; {_REMEDY}")
-    header, rows = read_table(path)
-    columns = [i for i, name in enumerate(header) if name not in _NOT_COMPONENTS]
-    if "episode" not in header or not columns or len(set(header)) != len(header):
+    table = read_tables(path)[0]
+    split = [split_unit(name, CHANNEL_UNITS) for name in table.names]
+    lower = [name.lower() for name in table.names]
+    episode = next((i for i, name in enumerate(lower) if name in EPISODE_COLUMNS), None)
+    columns = [i for i, name in enumerate(lower) if i != episode and name not in _NOT_COMPONENTS]
+    if names is not None and set(names) <= {split[i][0] for i in columns}:
+        columns = [i for i in columns if split[i][0] in names]
+    kept = [split[i][0] for i in columns]
+    if episode is None or not columns or len(set(kept)) != len(kept):
         raise FileFormatError(
-            f"{path} begins with {','.join(header)!r}, expected column names such as episode,x,y"
+            f"{path} begins with {','.join(table.names)!r}, expected column names such as "
+            "episode,x,y"
         )
-    split = [split_unit(header[i], CHANNEL_UNITS) for i in columns]
-    bases = [base_of(unit) if unit else (None, 1.0) for _, unit in split]
+    units = [table.units[i] or split[i][1] for i in columns]
+    bases = [base_of(unit) if unit else (None, 1.0) for unit in units]
     values: dict[str, tuple[float, ...]] = {}
-    for line, row in rows:
-        episode, cells = row[header.index("episode")], [row[i] for i in columns]
-        if episode in values:
-            raise FileFormatError(f"{path}, line {line}: episode {episode} again; drop one of them")
-        if any(cells):
-            pairs = zip(cells, bases, strict=True)
-            values[episode] = tuple(_number(path, line, cell) * u[1] for cell, u in pairs)
-    names, units = tuple(name for name, _ in split), tuple(unit for unit, _ in bases)
-    return Outcomes(path.name, names, values, units)
+    for row, name in enumerate(table.texts(episode)):
+        line = table.lines[row]
+        if name in values:
+            raise FileFormatError(f"{path}, line {line}: episode {name} again; drop one of them")
+        one = table.rows([row])
+        if any(one.texts(i)[0] for i in columns):
+            numbers = [_number(path, line, one, i) for i in columns]
+            values[name] = tuple(n * u[1] for n, u in zip(numbers, bases, strict=True))
+    return Outcomes(str(path), tuple(kept), values, tuple(unit for unit, _ in bases))
 
 
 def in_order(outcomes: Outcomes, names: Sequence[str] | None) -> Outcomes:
@@ -170,24 +185,26 @@ def in_units(
             f"--outcome-unit {given} has no use, since {outcomes.where} says its units; drop it"
         )
     names = outcomes.names or tuple(map(str, range(1, k + 1)))
-    scale, doubts = [], []
+    scale, looks = [], dict[str, list[str]]()
     for i, (name, own, unit) in enumerate(zip(names, said, wanted, strict=True)):
         reach = max((abs(value[i]) for value in outcomes.values.values()), default=0.0)
         recorded = own or given or guess_unit(unit, reach) or unit
         if own is None and given is None and recorded != unit:
-            doubts.append(
-                Doubt(
-                    f"{name} in {outcomes.where} reaches {reach:.4g}, too far for {unit}: it looks "
-                    f"like {recorded}",
-                    f"--outcome-unit {recorded}",
-                )
-            )
+            looks.setdefault(recorded, []).append(f"{name} reaches {reach:.4g}")
         scale.append(conversion(recorded, unit, f"{name} in {outcomes.where}"))
+    doubts = tuple(
+        Doubt(
+            f"in {outcomes.where}, {' and '.join(reached)}, too far for an arm: it looks like "
+            f"{unit}",
+            f"--outcome-unit {unit}",
+        )
+        for unit, reached in looks.items()
+    )
     values = {
         episode: tuple(v * s for v, s in zip(value, scale, strict=False))
         for episode, value in outcomes.values.items()
     }
-    return Outcomes(outcomes.where, outcomes.names, values, wanted), tuple(doubts)
+    return Outcomes(outcomes.where, outcomes.names, values, wanted), doubts
 
 
 def outcomes_of(recordings: Sequence[Recording], outcomes: Outcomes, *, partial: bool) -> Points:
@@ -246,15 +263,12 @@ def _matched(episodes: list[str], names: list[str]) -> dict[str, str]:
     return picked
 
 
-def _number(path: Path, line: int, text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
+def _number(path: Path, line: int, row: Table, column: int) -> float:
+    value = float(row.numbers(column)[0]) if row.is_number(column) else math.nan
     if not math.isfinite(value):
         raise FileFormatError(
-            f"{path}, line {line}: {text!r} is no finite number; measure that outcome, or empty "
-            "the whole row's numbers"
+            f"{path}, line {line}: {row.texts(column)[0]!r} is no finite number; measure that "
+            "outcome, or empty the whole row's numbers"
         )
     return value
 

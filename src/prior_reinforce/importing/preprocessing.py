@@ -11,6 +11,7 @@ from jaxtyping import Float
 
 from prior_reinforce.arrays import Frames, Plans, Point
 from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
+from prior_reinforce.importing.naming import find_channels, missing_channels, vectors
 from prior_reinforce.importing.recording import Recording
 from prior_reinforce.importing.units import (
     Doubt,
@@ -191,14 +192,15 @@ def _guess_units(
 
 
 def _columns(recording: Recording, joints: tuple[str, ...]) -> list[int]:
-    missing = [joint for joint in joints if joint not in recording.names]
-    if not missing:
-        return [recording.names.index(joint) for joint in joints]
-    there = ", ".join(recording.names)
+    found = find_channels(joints, recording.names)
+    if found is not None:
+        return found
+    there = say_names(recording.names)
     if recording.named:
+        missing = say_names(missing_channels(joints, recording.names))
         raise InvalidDemonstrationsError(
-            f"episode {recording.episode} has no joint {', '.join(missing)}; it has {there}: give "
-            "the recorded names"
+            f"episode {recording.episode} has no joint {missing}; it has {there}: give the "
+            f"recorded names in the plan's order with --joints{_by_key(recording, len(joints))}"
         )
     if len(recording.names) != len(joints):
         raise InvalidDemonstrationsError(
@@ -207,6 +209,12 @@ def _columns(recording: Recording, joints: tuple[str, ...]) -> list[int]:
             f"{there}"
         )
     return list(range(len(joints)))
+
+
+def _by_key(recording: Recording, count: int) -> str:
+    """A hint at numbered columns of which there are as many as joints."""
+    fitting = [stem for stem, group in vectors(recording.names).items() if len(group) == count]
+    return f", or numbered columns at once: --key {fitting[0]}" if fitting else ""
 
 
 def preprocess(

@@ -23,6 +23,8 @@ from prior_reinforce.importing.units import CHANNEL_UNITS, Doubt, split_unit
 
 Positions = Float[np.ndarray, "T D"]
 """D channels at T times, in their units."""
+NO_COLUMN = "none"
+"""What is said for the column of times where none shall be read."""
 
 
 class HowToRead(TypedDict, total=False):
@@ -39,6 +41,17 @@ class HowToRead(TypedDict, total=False):
     """Unit of the times, one of `s`, `ms`, `us`, `ns`, or `frame` for a column that counts frames.
     None takes it from the column's name (`t_ms`); where none stands there and seconds are not
     possible for an arm, that is an error."""
+    time_column: str | None
+    """Column or array of the times, by name, or by its number from 1; `none` leaves all unread.
+    None takes one that is called `t`, `time`, `timestamp` or the like."""
+    episode_column: str | None
+    """Column of a table that says which episode a row is of. None takes one that is called
+    `episode`, `throw_id` or the like."""
+    delimiter: str | None
+    """What stands between two cells of a CSV, a name of `DELIMITERS` or the character itself; None
+    finds it out."""
+    decimal: str | None
+    """Decimal sign of a CSV, `.` or `,`; None finds it out."""
     episodes: Sequence[str] | None
     """Names of the episodes to keep, in order; None keeps all."""
     leave_out: Sequence[str] | None
@@ -56,6 +69,10 @@ class ReadOptions:
     key: str | None = None
     rate: float | None = None
     time_unit: str | None = None
+    time_column: str | None = None
+    episode_column: str | None = None
+    delimiter: str | None = None
+    decimal: str | None = None
     episodes: tuple[str, ...] | None = None
     joints: tuple[str, ...] | None = None
 
@@ -235,7 +252,7 @@ def files_at(source: Path, suffixes: tuple[str, ...]) -> list[Path]:
     if not source.is_dir():
         return [source]
     found = [path for path in source.iterdir() if path.is_file() and has_suffix(path, suffixes)]
-    return sorted((path for path in found if path.name != "outcomes.csv"), key=natural_order)
+    return sorted((path for path in found if path.stem != "outcomes"), key=natural_order)
 
 
 def has_suffix(path: Path, suffixes: tuple[str, ...]) -> bool:

@@ -14,6 +14,7 @@ import numpy as np
 
 from prior_reinforce.errors import FileFormatError
 from prior_reinforce.importing.clock import Times
+from prior_reinforce.importing.naming import find_channels
 from prior_reinforce.importing.recording import (
     ReadOptions,
     Recording,
@@ -21,6 +22,7 @@ from prior_reinforce.importing.recording import (
     named_damage,
     natural_order,
 )
+from prior_reinforce.importing.units import say_names
 
 _SUFFIXES = (".bag", ".mcap", ".db3")
 _STATE, _TRAJECTORY = "sensor_msgs/msg/JointState", "trajectory_msgs/msg/JointTrajectory"
@@ -98,15 +100,18 @@ def _states(
 ) -> Recording:
     """One episode of JointStates; messages that lack a wanted joint are another publisher's."""
     kinds = Counter(tuple(sorted(message.name)) for _, message in messages)
-    wanted = options.joints
+    every = list(dict.fromkeys(joint for _, message in messages for joint in message.name))
+    # Only their recorded names are looked for in each message.
+    found = None if options.joints is None else find_channels(options.joints, every)
+    wanted = options.joints if found is None else tuple(every[i] for i in found)
     if wanted is None:
         common = kinds.most_common(1)[0][0]
         wanted = next(tuple(m.name) for _, m in messages if tuple(sorted(m.name)) == common)
     kept = [(stamp, m) for stamp, m in messages if set(wanted) <= set(m.name)]
     if not kept:
-        found = sorted({joint for names in kinds for joint in names})
         raise FileFormatError(
-            f"{bag}: no message holds all of {list(wanted)}; joints in it are {found}: name those"
+            f"{bag}: no message holds all of {list(wanted)}; joints in it are {say_names(every)}: "
+            "name those"
         )
     remarks = []
     if len(kept) < len(messages):

@@ -1,7 +1,8 @@
 """Diffusion Policy's replay buffers: zarr stores (format 2), as folders or zipped.
 
 Layout (real-stanford/diffusion_policy, common/replay_buffer.py): `data/<key>` holds all episodes
-one after the other, `meta/episode_ends` where each ends. It stores neither a rate nor names.
+one after the other, `meta/episode_ends` where each ends. It has no names, and times only where its
+writer adds `data/timestamp`, as UMI's does.
 """
 
 from __future__ import annotations
@@ -13,9 +14,10 @@ from typing import Any
 import numpy as np
 
 from prior_reinforce.errors import FileFormatError
-from prior_reinforce.importing.recording import ReadOptions, Recording, named_damage
+from prior_reinforce.importing.clock import Stamps
+from prior_reinforce.importing.recording import NO_COLUMN, ReadOptions, Recording, named_damage
 
-_ENDS = "meta/episode_ends"
+_ENDS, _TIMES = "meta/episode_ends", "timestamp"
 
 
 def recognises(source: Path) -> bool:
@@ -46,6 +48,7 @@ def read(source: Path, options: ReadOptions) -> list[Recording]:
         if ends.size == 0:
             raise FileFormatError(f"{source} holds no episode; copy the store again")
         positions = np.asarray(data[key][:], dtype=np.float64)
+        stamps = _stamps(source, data, options)
     starts = np.concatenate([[0], ends[:-1]])
     if np.any(ends <= starts) or ends[-1] != len(positions):
         raise FileFormatError(
@@ -55,8 +58,27 @@ def read(source: Path, options: ReadOptions) -> list[Recording]:
     recordings = []
     for episode, (start, end) in enumerate(zip(starts.tolist(), ends.tolist(), strict=True)):
         if options.wants(str(episode)):
-            clock = options.clock(str(episode), end - start)
+            own = None if stamps is None else stamps[start:end]
+            clock = options.clock(
+                str(episode), end - start, stamps=own, name=options.time_column or _TIMES
+            )
             recordings.append(
-                Recording(str(episode), clock.times, positions[start:end], clock=clock.source)
+                Recording(
+                    str(episode),
+                    clock.times,
+                    positions[start:end],
+                    clock=clock.source,
+                    doubts=clock.doubts,
+                )
             )
     return recordings
+
+
+def _stamps(source: Path, data: Any, options: ReadOptions) -> Stamps | None:
+    """Times of all frames, where the store has them."""
+    name = options.time_column or (_TIMES if _TIMES in data else NO_COLUMN)
+    if name == NO_COLUMN:
+        return None
+    if name not in data:
+        raise FileFormatError(f"{source} has no array {name} in data/; it has {sorted(data)}")
+    return np.asarray(data[name][:]).ravel()

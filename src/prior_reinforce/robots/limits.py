@@ -106,12 +106,19 @@ class RobotLimits:
         return low, high
 
 
+def is_joint(column: str, joint: str) -> bool:
+    """Whether a column moves a joint: `joint4`, `panda_joint4` (ROS) and `joint4.pos` (LeRobot) do.
+
+    Nothing else does, so that no column is held against another joint's limits.
+    """
+    return bool(re.search(rf"(^|[_/.]){re.escape(joint)}(\.pos)?$", column))
+
+
 def match_joints(format: PlanFormat, limits: RobotLimits) -> dict[int, int]:
     """Match a plan's columns to a robot's joints: by name, never guessed.
 
     Args:
-        format: Of the plan. `joint4`, `panda_joint4` (ROS) and `joint4.pos` (LeRobot) are joint4;
-            nothing else is, so that no column is held against another joint's limits.
+        format: Of the plan; its columns are held against `is_joint`.
         limits: Of the robot.
 
     Returns:
@@ -122,8 +129,7 @@ def match_joints(format: PlanFormat, limits: RobotLimits) -> dict[int, int]:
     """
     columns: dict[int, int] = {}
     for joint, name in enumerate(limits.joint_names):
-        ending = re.compile(rf"(^|[_/.]){re.escape(name)}(\.pos)?$")
-        found = [i for i, column in enumerate(format.names) if ending.search(column)]
+        found = [i for i, column in enumerate(format.names) if is_joint(column, name)]
         if len(found) > 1:
             raise InvalidPlanError(
                 f"columns {[format.names[i] for i in found]} all look like {name} of "

@@ -1,0 +1,38 @@
+"""Recorded channels are found by the gate's rule, in both directions, and never guessed."""
+
+import pytest
+
+from prior_reinforce.errors import InvalidDemonstrationsError
+from prior_reinforce.importing.naming import find_channels, missing_channels, vectors
+
+
+@pytest.mark.parametrize(
+    ("wanted", "there"),
+    [
+        ("joint4", "panda_joint4"),
+        ("joint4", "joint4.pos"),
+        ("panda_joint4", "joint4"),
+        ("joint4", "joint4_deg"),
+        ("x", "x [cm]"),
+        ("q0_deg", "q0"),
+    ],
+)
+def test_a_joint_by_another_spelling_of_its_name(wanted, there):
+    assert find_channels([wanted], ["other", there]) == [1]
+
+
+@pytest.mark.parametrize("there", ["Joint4", "j4", "q3", "joint14", "fr3_joint4x"])
+def test_a_guess_is_none(there):
+    assert find_channels(["joint4"], [there]) is None
+    assert missing_channels(["joint4", there], [there]) == ["joint4"]
+
+
+def test_the_exact_name_wins_and_two_others_are_ambiguous():
+    assert find_channels(["joint1"], ["left_joint1", "joint1"]) == [1]
+    with pytest.raises(InvalidDemonstrationsError, match="left_joint1, right_joint1 all look like"):
+        find_channels(["joint1"], ["left_joint1", "right_joint1"])
+
+
+def test_numbered_columns_are_vectors():
+    names = ["t", "q[1]", "q[0]", "actual_q_0", "actual_q_1", "x", "lone3"]
+    assert vectors(names) == {"q": [2, 1], "actual_q": [3, 4]}
