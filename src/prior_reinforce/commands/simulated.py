@@ -43,16 +43,16 @@ PerceptionChoice = Annotated[
 
 
 def open_task(task: str, demonstrations: str, seed: int) -> tuple[Task, Demonstrations]:
-    """Make a task and load demonstrations for it, a prior set by its name or a file.
+    """Make a task and load demonstrations for it, a prior set by its name or an `.npz` file.
 
     Raises:
-        ConfigurationError: An unknown task, a negative seed, or another plan format.
-        FileFormatError: No such demonstrations.
+        ConfigurationError: An unknown task or prior set, a negative seed, or another plan format.
+        FileFormatError: No such file.
     """
     if seed < 0:
         raise ConfigurationError(f"--seed must be 0 or more, got {seed}")
     made = make_task(task)
-    if demonstrations in made.demonstration_sets:
+    if not (demonstrations.endswith(".npz") or Path(demonstrations).is_file()):
         return made, made.demonstrations(demonstrations)
     loaded = Demonstrations.load(demonstrations)
     if loaded.format.names != made.format.names:
@@ -88,7 +88,8 @@ class Simulated:
 
     task: TaskChoice = "basketball-v1"
     demonstrations: str = "A"
-    """Prior set: A, B, or the path of a demonstrations file of the same plan format."""
+    """Prior set of the task (A or B; in the zoo KIND-COUNT-SEED, as clean-6-0), or the path of a
+    demonstrations file of the same plan format."""
     seed: int = 0
     """Seed of training, goals, disturbances and perception."""
 
@@ -327,18 +328,24 @@ class Rollout(Simulated):
             raise ConfigurationError(f"--film must name an .mp4 file, got {self.film}")
         plans = np.repeat(plan[None], self.repeats, axis=0)
         rollouts = task.rollout(plans, np.random.default_rng(self.seed))
+        units = task.outcome_units or ("m",) * len(task.outcome_names)
         for number, rollout in enumerate(rollouts, start=1):
             place = ", ".join(
-                f"{name} {value:.3f} m"
-                for name, value in zip(task.outcome_names, rollout.outcome, strict=True)
+                f"{name} {value:.3f} {unit}"
+                for name, value, unit in zip(
+                    task.outcome_names, rollout.outcome, units, strict=True
+                )
             )
             hit = "  within the tolerance" if is_hit(rollout, aim, task.tolerance) else ""
             lost = "" if rollout.valid else "  (lost: it has no place on the table)"
             console.print(f"rollout {number}: {place}{lost}{hit}")
         if self.repeats > 1:
             outcomes = np.array([rollout.outcome for rollout in rollouts])
-            spread = outcomes.std(axis=0, ddof=1) * 100
-            console.print("spread (sd): " + ", ".join(f"{value:.2f} cm" for value in spread))
+            spread = [
+                f"{100 * value:.2f} cm" if unit == "m" else f"{value:.4f} {unit}"
+                for value, unit in zip(outcomes.std(axis=0, ddof=1), units, strict=True)
+            ]
+            console.print("spread (sd): " + ", ".join(spread))
         if self.film is not None:
             from prior_reinforce.report import record_film
 

@@ -18,6 +18,7 @@ from prior_reinforce.readings import Reading
 from prior_reinforce.report import AdaptationRecord, Film, record_film, write_report
 from prior_reinforce.rollouts import Rollout
 from prior_reinforce.tasks.base import Task
+from prior_reinforce.wording import say_length
 
 if TYPE_CHECKING:
     from prior_reinforce.perception.vlm import VisionLanguageModel
@@ -104,6 +105,10 @@ def report_adaptation(
     Returns:
         Path of the page.
     """
+    units = demonstrations.outcome_units
+    tolerance = say_length(task.tolerance, units)
+    if set(units) == {"m"}:
+        tolerance = f"{task.tolerance * 100:g} cm"  # to the last digit, unlike an estimate
     records = [
         AdaptationRecord(
             title=f"Goal {i}",
@@ -122,7 +127,7 @@ def report_adaptation(
         records,
         title=f"{task.name}: {len(results)} new goal" + ("s" if len(results) > 1 else ""),
         facts={
-            "Task": f"{task.name}, tolerance {task.tolerance * 100:g} cm",
+            "Task": f"{task.name}, tolerance {tolerance}",
             **facts,
             "Version": version("prior-reinforce"),
         },

@@ -14,6 +14,7 @@ from jaxtyping import Float
 from numpy.typing import ArrayLike
 
 from prior_reinforce.arrays import Points
+from prior_reinforce.errors import RenderingUnavailableError
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 from prior_reinforce.rendering import Picture
 from prior_reinforce.rollouts import Rollout
@@ -33,12 +34,15 @@ class Task(ABC):
     """What a frame of a plan means, and how fast frames follow each other."""
     outcome_names: tuple[str, ...] = ("x", "y")
     """Names of the k components of an outcome."""
+    outcome_units: tuple[str, ...] = ()
+    """Unit of each component; metres where none are given."""
     tolerance: float
-    """epsilon of the paper: largest true error that counts as reached, in [m]."""
+    """epsilon of the paper: largest true error that counts as reached, in [m]. Where units differ,
+    the error is the length of a vector of plain numbers: a second weighs as much as a metre."""
     region: Float[np.ndarray, "2 k"]
-    """Reachable region of goals, a box: lower and upper corner, in [m]."""
+    """Reachable region of goals, a box: lower and upper corner, in the outcomes' units."""
     demonstration_sets: tuple[str, ...] = ("A", "B")
-    """Names of the shipped prior sets."""
+    """Names of the prior sets that it is usually learned from."""
     scene: TableScene | None = None
     """What tells the error in a picture from above; None where no picture does."""
 
@@ -59,13 +63,12 @@ class Task(ABC):
 
     @abstractmethod
     def demonstrations(self, name: str) -> Demonstrations:
-        """Load the shipped prior set `name`, one of `demonstration_sets`.
+        """Load the prior set `name`, one of `demonstration_sets` or another that the task knows.
 
         Raises:
             ConfigurationError: There is no such set.
         """
 
-    @abstractmethod
     def film(
         self,
         plan: ArrayLike,
@@ -79,6 +82,8 @@ class Task(ABC):
     ) -> Iterator[Picture]:
         """Execute one plan with the goal's object in place and draw it, frame by frame.
 
+        A task that is computed without a scene leaves this out.
+
         Args:
             plan: Action plan, shape (H, D).
             goal: Where the goal's object stands, shape (k,), in [m].
@@ -89,10 +94,14 @@ class Task(ABC):
             camera: A camera of the scene: `film` or `birdseye`.
 
         Raises:
-            RenderingUnavailableError: There is no OpenGL on this machine.
+            RenderingUnavailableError: The task has no pictures, or there is no OpenGL on this
+                machine.
             InvalidPlanError: Wrong shape, or values that are not finite.
             InvalidGoalError: Wrong shape, or values that are not finite.
         """
+        raise RenderingUnavailableError(
+            f"{self.name} has no pictures; it is computed without a scene"
+        )
 
     def sample_goals(self, n: int, rng: np.random.Generator) -> Points:
         """Draw n goals uniformly from the reachable region (paper, Evaluation Protocol)."""
