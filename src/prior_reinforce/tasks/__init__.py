@@ -1,10 +1,11 @@
-"""Env: dynamic manipulation tasks in contact physics. Each a `.py` with its `.xml`."""
+"""Env: dynamic manipulation tasks in contact physics, each a `.py` with its `.xml`; and `zoo`."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
 from prior_reinforce.registry import Member, Registry
+from prior_reinforce.tasks import zoo
 
 if TYPE_CHECKING:
     from prior_reinforce.tasks.base import Task
@@ -21,6 +22,7 @@ TASKS: Registry[Task] = Registry(
         "basketball-v3": Member(_SHOT, "a smaller ball and a cup", {"hardware": "v3"}),
         "curling": Member(f"{_HERE}.curling:Curling", "slide a stone to a target"),
         "fishing": Member(f"{_HERE}.fishing:Fishing", "swing a hook onto a magnet"),
+        **zoo.MEMBERS,
     },
 )
 

@@ -48,7 +48,7 @@ def record(meant: _Poses, dt: float, hand: Teleoperation, rng: np.random.Generat
     step = np.repeat([hand.resolution, hand.resolution_angle], 3)
     times = np.arange(len(meant)) * dt
     shaken = meant + amplitude * _tremor(times, hand.tremor_band, rng) * _engaged(times)
-    return _follow(np.round(shaken / step) * step, dt, hand.bandwidth)
+    return follow(np.round(shaken / step) * step, dt, hand.bandwidth)
 
 
 def _engaged(times: Float[np.ndarray, " H"]) -> Float[np.ndarray, "H 1"]:
@@ -79,8 +79,14 @@ def _tremor(
     return waves.sum(axis=1) * np.sqrt(2.0 / n_sines)
 
 
-def _follow(path: _Poses, dt: float, bandwidth: float) -> _Poses:
-    """Low-pass a path with a critically damped second-order filter, from rest."""
+def follow(path: Float[np.ndarray, "H D"], dt: float, bandwidth: float) -> Float[np.ndarray, "H D"]:
+    """Low-pass a path with a critically damped second-order filter, from rest.
+
+    Args:
+        path: What is to be followed, a row a frame.
+        dt: Time between frames, in [s].
+        bandwidth: Of the filter, in [Hz].
+    """
     w = 2 * np.pi * bandwidth
     numerator, denominator, _ = cont2discrete(([w * w], [1.0, 2 * w, w * w]), dt, method="bilinear")
     numerator = numerator.ravel()
