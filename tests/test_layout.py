@@ -21,6 +21,7 @@ TESTED_ELSEWHERE = {
 """Modules without a test file of their own, and where they are tested instead."""
 
 OF_THE_WHOLE = {
+    "dependencies": "floors of libraries, and calls that would run code from data",
     "documentation": "what the docs show, run as it stands",
     "examples": "the examples as a reader runs them",
     "extending": "a new member of each family",

@@ -124,7 +124,7 @@ def test_missing_truncated_flipped_and_foreign_files_are_named(tmp_path):
     bad = tmp_path / "bad.npz"
     for size in (0, 10, len(whole) // 2, len(whole) - 3):
         bad.write_bytes(whole[:size])
-        with pytest.raises(FileFormatError, match="not a demonstrations file"):
+        with pytest.raises(FileFormatError, match="must be a demonstrations file"):
             Demonstrations.load(bad)
     rng = np.random.default_rng(1)
     for position in rng.integers(0, len(whole), 100):

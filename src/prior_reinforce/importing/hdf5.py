@@ -17,6 +17,7 @@ from prior_reinforce.importing.recording import (
     Positions,
     ReadOptions,
     Recording,
+    check_size,
     files_at,
     has_files,
     named_damage,
@@ -63,11 +64,12 @@ def read_robomimic(source: Path, options: ReadOptions) -> list[Recording]:
                 f"{path} has no group `data` but {sorted(file)}; expected a robomimic file: say "
                 "its format"
             )
-        data = file["data"]
+        data = _own(path, file, "data")
         rate = _control_rate(data)
         for episode in filter(options.wants, sorted(data, key=natural_order)):
-            positions = _array(path, data[episode], key, f"data/{episode}")
-            declared = data[episode].attrs.get("num_samples")
+            group = _own(path, data, episode)
+            positions = _array(path, group, key, f"data/{episode}")
+            declared = group.attrs.get("num_samples")
             if declared is not None and int(declared) != len(positions):
                 raise FileFormatError(
                     f"{path}: {episode} declares {int(declared)} samples but {key} holds "
@@ -96,7 +98,7 @@ def read_droid(source: Path, options: ReadOptions) -> list[Recording]:
             clock = options.clock(
                 episode,
                 len(positions),
-                stamps=None if stamps is None else np.asarray(file[stamps][()]),
+                stamps=None if stamps is None else np.asarray(_own(path, file, stamps)[()]),
                 name=stamps or "",
                 unit="ms",
             )
@@ -113,15 +115,45 @@ def _array(path: Path, group: Any, key: str, where: str) -> Positions:
         if shape is not None and len(shape) == 2 and item.dtype.kind in "fiu":
             candidates.append(name)
 
-    if key not in group or len(getattr(group[key], "shape", ())) != 2:
+    found = _own(path, group, key)
+    if len(getattr(found, "shape", ())) != 2:
         group.visititems(collect)
         raise FileFormatError(
             f"{path} has no array (T, D) at {key} in {where}; arrays of that shape are "
             f"{sorted(candidates) or 'none'}: say which with the key"
         )
-    if group[key].dtype.kind not in "fiu":
-        raise FileFormatError(f"{path}: {key} holds {group[key].dtype}, expected numbers")
-    return np.asarray(group[key][()], dtype=np.float64)
+    if found.dtype.kind not in "fiu":
+        raise FileFormatError(f"{path}: {key} holds {found.dtype}, expected numbers")
+    check_size(path, key, found.shape)
+    return np.asarray(found[()], dtype=np.float64)
+
+
+def _own(path: Path, group: Any, key: str, depth: int = 8) -> Any:
+    """What stands under a key, None where nothing does; never anything of another file.
+
+    A file can name others (external links, external storage, virtual data sets), and reading it
+    would copy whatever they hold into the workspace.
+    """
+    import h5py
+
+    for part in filter(None, key.split("/")):
+        link = group.get(part, getlink=True) if isinstance(group, h5py.Group) else None
+        if isinstance(link, h5py.ExternalLink) or (link is not None and depth == 0):
+            raise FileFormatError(
+                f"{path}: {key} leads to another file ({getattr(link, 'filename', 'a circle')}), "
+                "which is not read; copy the data into one file"
+            )
+        if isinstance(link, h5py.SoftLink):
+            start = group.file if link.path.startswith("/") else group
+            group = _own(path, start, link.path, depth - 1)
+        else:
+            group = None if link is None else group[part]
+    if isinstance(group, h5py.Dataset) and (group.external or group.is_virtual):
+        raise FileFormatError(
+            f"{path}: the numbers of {key} are in another file, which is not read; copy the data "
+            "into one file"
+        )
+    return group
 
 
 def _control_rate(data: Any) -> float | None:

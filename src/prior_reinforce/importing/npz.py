@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from contextlib import ExitStack
 from pathlib import Path
 
 import numpy as np
 
 from prior_reinforce.errors import FileFormatError
+from prior_reinforce.files import open_npz
 from prior_reinforce.importing.clock import Clock
 from prior_reinforce.importing.recording import (
     NO_COLUMN,
@@ -85,15 +85,11 @@ def _episodes(path: Path, options: ReadOptions) -> list[Recording]:
 
 def _arrays(path: Path) -> Arrays:
     """Everything in a file; of our own demonstrations and plans also what their metadata says."""
-    with (
-        named_damage(path, "NPZ with plain number arrays"),
-        path.open("rb") as file,
-        ExitStack() as stack,
-    ):
-        archive = np.load(file, allow_pickle=False)
-        if isinstance(archive, np.ndarray):
-            return {_MOTION_KEYS[0]: archive}
-        stack.enter_context(archive)
+    if path.suffix.lower() == ".npy":
+        with named_damage(path, "NPY with plain numbers"), path.open("rb") as file:
+            return {_MOTION_KEYS[0]: np.load(file, allow_pickle=False)}
+    remedy = "it must be an NPZ with plain number arrays; copy it again, or say its format"
+    with open_npz(path, remedy) as archive:
         content = {name: np.array(archive[name]) for name in archive.files}
         if "metadata" in content:
             metadata = json.loads(str(content.pop("metadata")))

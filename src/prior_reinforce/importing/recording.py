@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -25,6 +26,10 @@ Positions = Float[np.ndarray, "T D"]
 """D channels at T times, in their units."""
 NO_COLUMN = "none"
 """What is said for the column of times where none shall be read."""
+
+
+_MOST_NUMBERS = 600_000_000
+"""Of one array; ours: seven joints for a day at 1 kHz."""
 
 
 class HowToRead(TypedDict, total=False):
@@ -217,6 +222,20 @@ def _without_units(names: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[str |
     stripped = tuple(name for name, _ in split)
     units = tuple(unit for _, unit in split)
     return (stripped if len(set(stripped)) == len(set(names)) else names), units
+
+
+def check_size(path: Path, name: str, shape: Sequence[int]) -> None:
+    """Refuse an array that could be no recording, before it is read: a header may claim anything.
+
+    Raises:
+        FileFormatError: It is larger than a day of an arm at 1 kHz.
+    """
+    numbers = math.prod(map(int, shape))
+    if numbers > _MOST_NUMBERS:
+        raise FileFormatError(
+            f"{path}: {name} has shape {tuple(shape)}, {numbers:.2g} numbers; that is no recording "
+            "of throws, copy the file again"
+        )
 
 
 @contextmanager

@@ -13,8 +13,6 @@ import io
 import json
 import math
 import os
-import zipfile
-import zlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, cast, get_args
@@ -25,10 +23,9 @@ from prior_reinforce.errors import (
     ConfigurationError,
     FileFormatError,
     InvalidPlanError,
-    PriorReinforceError,
     WorkspaceError,
 )
-from prior_reinforce.files import sha256, write_once
+from prior_reinforce.files import open_npz, sha256, write_once
 from prior_reinforce.plans.motions import Plan, PlanFormat
 
 if TYPE_CHECKING:
@@ -141,31 +138,14 @@ def read_plan(path: str | os.PathLike[str], *, sha256: str | None = None) -> Pla
         raise FileFormatError(f"no plan at {path}; give the path of an .npz plan file")
     if sha256 is not None:
         PlanFile(path, sha256).verify()
-    try:
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
-            q = np.array(archive["q"])
-            metadata = json.loads(str(archive["metadata"]))
+    remedy = "it must be a plan file; write one with write_plan or `export`"
+    with open_npz(path, remedy) as archive:
+        q = np.array(archive["q"])
+        metadata = json.loads(str(archive["metadata"]))
         if metadata["file_format"] != _FILE_FORMAT or metadata["version"] != _FILE_VERSION:
             raise ValueError(f"written as {metadata['file_format']} {metadata['version']}")
         names, units = tuple(metadata["joint_names"]), tuple(metadata["units"])
         return Plan(q, PlanFormat(names, units, float(metadata["dt"])))
-    except PriorReinforceError:
-        raise
-    except (
-        OSError,
-        EOFError,
-        ValueError,
-        KeyError,
-        TypeError,
-        MemoryError,
-        NotImplementedError,
-        RuntimeError,
-        zipfile.BadZipFile,
-        zlib.error,
-    ) as error:
-        raise FileFormatError(
-            f"{path} is not a plan file ({error}); write one with write_plan or `export`"
-        ) from error
 
 
 def _check_rate(plan: Plan, rate: float) -> None:

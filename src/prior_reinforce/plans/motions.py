@@ -28,6 +28,7 @@ from typing_extensions import Self
 
 from prior_reinforce.arrays import Frames, Plans, Point, Points, as_goal, as_outcomes, as_plans
 from prior_reinforce.errors import FileFormatError, InvalidDemonstrationsError, InvalidPlanError
+from prior_reinforce.files import open_npz
 
 _FILE_FORMAT = "prior-reinforce demonstrations"
 _FILE_VERSION = 1
@@ -245,19 +246,15 @@ class Demonstrations:
         path = Path(path)
         if not path.is_file():
             raise FileFormatError(f"no demonstrations at {path}; give the path of an .npz file")
-        try:
-            with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
-                plans, outcomes = archive["plans"], archive["outcomes_seen"]
-                metadata = json.loads(str(archive["metadata"]))
+        remedy = "it must be a demonstrations file; write one with Demonstrations.save"
+        with open_npz(path, remedy) as archive:
+            plans, outcomes = archive["plans"], archive["outcomes_seen"]
+            metadata = json.loads(str(archive["metadata"]))
             if metadata["file_format"] != _FILE_FORMAT or metadata["version"] != _FILE_VERSION:
                 raise ValueError(f"written as {metadata['file_format']} {metadata['version']}")
             format_ = PlanFormat(**metadata["format"])
             names = tuple(metadata["outcome_names"])
             units = tuple(metadata["outcome_units"])
-        except Exception as error:  # damaged bytes raise a dozen kinds in zipfile, zlib and numpy
-            raise FileFormatError(
-                f"{path} is not a demonstrations file ({error}); write one with Demonstrations.save"
-            ) from error
         return cls(plans, outcomes, format_, names, units)
 
     def _warn_about_units(self) -> None:
