@@ -107,7 +107,7 @@ def foreign(tmp_path, how):
 )
 def test_numbers_of_another_file_are_not_read(tmp_path, how):
     path = foreign(tmp_path, how)
-    with pytest.raises(FileFormatError, match="another file.*not read"):
+    with pytest.raises(FileFormatError, match=r"another file.*not read"):
         read_recordings(path)
 
 

@@ -97,3 +97,16 @@ def test_the_array_of_times_may_be_named(tmp_path):
     np.testing.assert_allclose(recording.times, [0, 0.01, 0.02])
     with pytest.raises(FileFormatError, match=r"no array t; it holds \['clock', 'q'\]"):
         read_recordings(tmp_path, time_column="t")
+
+
+@pytest.mark.parametrize("suffix", ["npz", "npy"])
+def test_python_objects_are_named_without_advice_to_load_them_all_the_same(tmp_path, suffix):
+    path = tmp_path / f"throw.{suffix}"
+    objects = np.array([[{}, 1.0]] * 3, dtype=object)
+    if suffix == "npz":
+        np.savez(path, q=objects, dt=0.01)
+    else:
+        np.save(path, objects)
+    with pytest.raises(FileFormatError, match="it holds Python objects") as caught:
+        read_recordings(path, rate=100)
+    assert "allow_pickle" not in str(caught.value)

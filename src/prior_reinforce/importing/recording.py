@@ -19,6 +19,7 @@ from prior_reinforce.errors import (
     InvalidDemonstrationsError,
     PriorReinforceError,
 )
+from prior_reinforce.files import without_advice
 from prior_reinforce.importing.clock import Clock, Stamps, Times, clock_of
 from prior_reinforce.importing.units import CHANNEL_UNITS, Doubt, split_unit
 
@@ -253,7 +254,7 @@ def named_damage(path: Path, what: str) -> Iterator[None]:
     except PriorReinforceError:
         raise
     except Exception as error:
-        words = str(error).split("\n")[0][:200] or "no reason given"
+        words = without_advice(error).split("\n")[0][:200] or "no reason given"
         raise FileFormatError(
             f"cannot read {path} as {what} ({type(error).__name__}: {words}); it is damaged or "
             "something else: copy it again from where it was recorded, or say its format"

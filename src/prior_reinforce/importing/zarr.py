@@ -54,7 +54,7 @@ def read(source: Path, options: ReadOptions) -> list[Recording]:
         arrays = _plain_arrays(source)
         newer = int(zarr.__version__.split(".")[0]) >= 3
         # Consolidated metadata would say it all a second time, and could say something else.
-        how = {"use_consolidated": False} if newer else {}
+        how: Any = {"use_consolidated": False} if newer else {}
         group: Any = zarr.open_group(store, mode="r", **how)
         vectors = sorted(
             name.removeprefix("data/")
