@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
-from prior_reinforce.importing import import_demonstrations
-from prior_reinforce.importing.preview import hull_corners
+from prior_reinforce.importing import Preprocessing, import_demonstrations
+from prior_reinforce.importing.preview import hull_corners, say_small
 from tests.importing.recorded import JOINTS, OUTCOMES, write_bags, write_npz, write_outcomes
 
 
@@ -18,7 +18,7 @@ def folder(tmp_path_factory):
 
 def test_the_text(folder):
     lines = import_demonstrations(folder).preview.text.splitlines()
-    assert 8 <= len(lines) <= 12
+    assert 8 <= len(lines) <= 13
     rows = {line[:11].strip(): line[12:] for line in lines}
     assert rows["episodes"].startswith(f"6 from {folder.name} (npz): throw_0, throw_1")
     assert rows["rate"] == "recorded at 100 Hz (t in s), plans at 100 Hz (dt 0.01 s)"
@@ -64,9 +64,30 @@ def test_points_on_a_line_have_no_hull():
     assert hull_corners(np.array([[0.0, 0], [1, 1], [2, 2]])).size == 0
 
 
-def test_many_remarks_are_counted(tmp_path):
+def test_no_remark_is_hidden_and_each_names_its_episodes_once(tmp_path):
     write_bags(tmp_path, kind="mcap", gripper_apart=True, rate=20)
     write_outcomes(tmp_path)
     preview = import_demonstrations(tmp_path, joints=JOINTS).preview
-    assert len(preview.remarks) == 6
-    assert preview.text.splitlines()[-1] == "  - and 2 more"
+    # Throws i and i + 3 are as long, so that as many messages of the gripper are between theirs.
+    assert preview.remarks == tuple(
+        f"throw{i}, throw{i + 3}: {n} messages without all joints skipped"
+        for i, n in enumerate((35, 37, 39))
+    )
+    assert preview.text.splitlines()[-3:] == [f"  - {remark}" for remark in preview.remarks]
+
+
+def test_noise_is_said_and_what_smoothing_changed(folder):
+    rows = dict(
+        line.split(None, 1) for line in import_demonstrations(folder).preview.text.splitlines()
+    )
+    assert rows["noise"] == "none; joint3, joint7 held"
+    smooth = import_demonstrations(folder, preprocessing=Preprocessing(smooth=20)).preview
+    assert "smoothing changed plans by " in smooth.text
+    most = 1000 * smooth.done.smoothed[:, 1].max()
+    assert f"at most {most:.2g} mrad" in smooth.text
+
+
+def test_small_numbers_are_said_in_thousandths():
+    assert say_small(2.13e-5, "rad") == "0.021 mrad"
+    assert say_small(0.0012, "m") == "1.2 mm"
+    assert say_small(3.0, "counts") == "3 counts"

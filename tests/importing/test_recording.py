@@ -71,7 +71,7 @@ def test_frames_that_were_recorded_twice_count_once_and_others_at_one_time_are_a
     times = [0, 0.1, 0.1, 0.1, 0.2]
     recording = Recording("a", times, [[0], [1], [1], [1], [2]])
     np.testing.assert_allclose(recording.times, [0, 0.1, 0.2])
-    assert recording.remarks == ("a: 2 frames were recorded twice; once is kept",)
+    assert recording.remarks == ("2 frames were recorded twice; once is kept",)
     with pytest.raises(InvalidDemonstrationsError, match="time does not increase at frame 2"):
         Recording("a", times, [[0], [1], [3], [3], [2]])
 

@@ -75,6 +75,8 @@ class Import:
     """Frames of every plan; the longest recording's if not given."""
     trim: bool = True
     """Drop the still ends of each recording."""
+    smooth: float | None = None
+    """Take out what is faster than so many Hz, such as an encoder's noise; says what it changed."""
 
     def run(self) -> None:
         """Read, preview, take in."""
@@ -105,7 +107,10 @@ class Import:
             units=self.units,
             plan_units=manifest.format.units,
             preprocessing=Preprocessing(
-                dt=manifest.format.dt, horizon=self.horizon, trim=self.trim
+                dt=manifest.format.dt,
+                horizon=self.horizon,
+                trim=self.trim,
+                smooth=self.smooth,
             ),
             take_guesses=take_guesses,
             **self._how(workspace),

@@ -12,6 +12,13 @@ from jaxtyping import Float
 from prior_reinforce.arrays import Frames, Plans, Point
 from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
 from prior_reinforce.importing.naming import find_channels, missing_channels, vectors
+from prior_reinforce.importing.noise import (
+    Channels,
+    held_channels,
+    is_step,
+    moving_ends,
+    noise_of,
+)
 from prior_reinforce.importing.recording import Recording
 from prior_reinforce.importing.units import (
     Doubt,
@@ -21,7 +28,7 @@ from prior_reinforce.importing.units import (
     known_unit,
     say_names,
 )
-from prior_reinforce.plans.timing import ends_in_motion, moving_rows, still_bands
+from prior_reinforce.plans.timing import moving_rows, still_bands
 
 _ON_GRID = 0.02
 """A frame within this share of a time step of where it should be is taken as recorded. Ours: at
@@ -57,6 +64,10 @@ class Preprocessing:
     a longer one is an error, never cut."""
     trim: bool = True
     """Drop the still time before the first and after the last movement of each recording."""
+    smooth: float | None = None
+    """Frequency above which plans are smoothed, in [Hz]: a Butterworth filter of order 2, run
+    forwards and backwards, so that nothing is delayed. Channels that jump are left alone. None
+    keeps every frame as recorded."""
     margin: float = 0.1
     """Still time that trimming keeps at either end, in [s]. Ours: enough for the plan to start
     and end at rest at 30 frames a second."""
@@ -71,6 +82,10 @@ class Preprocessing:
             raise ConfigurationError(f"dt must be a positive number of seconds, got {self.dt}")
         if self.horizon is not None and self.horizon < 2:
             raise ConfigurationError(f"horizon must be at least 2 frames, got {self.horizon}")
+        if self.smooth is not None and not (math.isfinite(self.smooth) and self.smooth > 0):
+            raise ConfigurationError(
+                f"smooth must be a positive frequency in Hz, got {self.smooth}"
+            )
         if not (math.isfinite(self.margin) and self.margin >= 0):
             raise ConfigurationError(f"margin must be 0 s or more, got {self.margin}")
 
@@ -88,8 +103,14 @@ class Preprocessed:
     """Where in its recording each plan ends, in [s], before the last pose is held."""
     held: int
     """How many plans hold their last pose to reach the horizon."""
+    held_channels: tuple[int, ...]
+    """Channels that no recording moves, noise aside."""
+    noise: Channels
+    """Standard deviation of each channel's noise at rest, in its unit; the median recording's."""
+    smoothed: Float[np.ndarray, "N 2 D"] | None
+    """What smoothing changed in each plan: rms and largest change; None where nothing was."""
     remarks: tuple[str, ...]
-    """What a person should look at."""
+    """What a person should know, the most important first: `episodes: what`."""
 
 
 def select(
@@ -231,43 +252,127 @@ def preprocess(
         InvalidDemonstrationsError: An episode that never moves, or is longer than the horizon.
     """
     dt = settings.dt or _common_dt(recordings)
-    remarks = [remark for recording in recordings for remark in recording.remarks]
+    every, units = [r.positions for r in recordings], tuple(units)
     spans = [(0.0, recording.duration) for recording in recordings]
     if settings.trim:
-        still = still_bands([recording.positions for recording in recordings], units)
+        still = still_bands(every, units)
         spans = [_moving_span(recording, still, settings.margin) for recording in recordings]
-    pieces = []
+    said = _Remarks()
+    pieces, changes = [], []
     for recording, (start, end) in zip(recordings, spans, strict=True):
         if (end - start) / dt > _MOST_FRAMES:
             raise InvalidDemonstrationsError(
                 f"episode {recording.episode} makes {(end - start) / dt:.0f} frames at dt {dt:g} s;"
                 " give a larger dt, or cut the recording"
             )
-        piece, stepwise = _resample(recording, start, end, dt)
+        piece, stepwise = _resample(recording, start, end, dt, units)
+        if settings.smooth is not None:
+            smooth = _smoothed(recording, piece, dt, settings.smooth, units)
+            changes.append(_change(piece, smooth))
+            piece = smooth
         pieces.append(piece)
-        remarks += _gaps(recording, start, end)
+        said.gap(recording, start, end)
         if stepwise:
-            remarks.append(f"{recording.episode}: {', '.join(stepwise)} stepwise, no spline")
+            said.add(_STEPS, recording, f"{', '.join(stepwise)} jumps; no spline goes through it")
+        for remark in recording.remarks:
+            said.add(_READING, recording, remark)
     longest = max(map(len, pieces))
     horizon = settings.horizon or longest
-    for recording, piece in zip(recordings, pieces, strict=True):
+    for recording, piece, span in zip(recordings, pieces, spans, strict=True):
         if len(piece) > horizon:
             raise InvalidDemonstrationsError(
                 f"episode {recording.episode} has {len(piece)} frames, more than the horizon "
                 f"{horizon}; give a horizon of {longest}, or a larger dt (motions are never cut)"
             )
-        if len(piece) < horizon and ends_in_motion(piece):
-            remarks.append(f"{recording.episode}: ends in motion, then holds its last pose")
+        said.ends(recording, span, units, held=len(piece) < horizon)
     if horizon > 400:
-        remarks.append(f"{horizon} frames are many; dt {dt * horizon / 140:.2g} s would make 140")
+        said.add(_LONG, None, f"{horizon} frames are many; dt {dt * horizon / 140:.2g} s makes 140")
+    held = np.all([held_channels(q, units) for q in every], axis=0)
     return Preprocessed(
         np.stack([np.pad(p, ((0, horizon - len(p)), (0, 0)), mode="edge") for p in pieces]),
         dt,
         tuple(start for start, _ in spans),
         tuple(end for _, end in spans),
         sum(len(piece) < horizon for piece in pieces),
-        tuple(dict.fromkeys(remarks)),
+        tuple(np.flatnonzero(held).tolist()),
+        np.median([noise_of(q) for q in every], axis=0),
+        np.array(changes) if changes else None,
+        said.lines(len(recordings)),
     )
+
+
+_ENDS, _GAPS, _READING, _STEPS, _LONG = range(5)
+"""Kinds of remarks, the most important first: what the gate will refuse, what is not known, what
+was left out or chosen."""
+
+
+class _Remarks:
+    """What there is to say, each once for all episodes that it is true of."""
+
+    def __init__(self) -> None:
+        self._said: dict[tuple[int, str], list[str]] = {}
+
+    def add(self, kind: int, recording: Recording | None, what: str) -> None:
+        """Note something of an episode, or of all."""
+        episodes = self._said.setdefault((kind, what), [])
+        if recording is not None:
+            episodes.append(recording.episode)
+
+    def gap(self, recording: Recording, start: float, end: float) -> None:
+        """The longest time within the motion without a frame, where that is no jitter."""
+        steps = np.diff(recording.times)
+        inside = (recording.times[1:] > start) & (recording.times[:-1] < end)
+        worst = int(np.argmax(np.where(inside, steps, 0.0)))
+        if steps[worst] > 3 * recording.period:
+            at = recording.times[worst]
+            self.add(_GAPS, recording, f"nothing recorded for {steps[worst]:.3f} s at {at:.2f} s")
+
+    def ends(
+        self, recording: Recording, span: tuple[float, float], units: tuple[str, ...], *, held: bool
+    ) -> None:
+        """Channels that are not at rest where the plan starts or ends."""
+        t = recording.times
+        kept = (t >= span[0]) & (t <= span[1])
+        if np.count_nonzero(kept) < 5:
+            return
+        starts, ends = moving_ends(t[kept], recording.positions[kept], units)
+        then = ", then holds its last pose" if held else ""
+        for moving, what in ((starts, "starts in motion"), (ends, f"ends in motion{then}")):
+            if np.any(moving):
+                names = [recording.names[i] for i in np.flatnonzero(moving)]
+                self.add(_ENDS, recording, f"{what} ({say_names(names)})")
+
+    def lines(self, n: int) -> tuple[str, ...]:
+        """One line each: which episodes, and what."""
+        ordered = sorted(self._said.items(), key=lambda item: item[0][0])
+        return tuple(
+            f"{'all' if len(e) in (0, n) and n > 1 else ', '.join(e)}: {what}"
+            for (_, what), e in ordered
+        )
+
+
+def _smoothed(
+    recording: Recording, frames: Frames, dt: float, frequency: float, units: tuple[str, ...]
+) -> Frames:
+    """Frames without what is faster than a frequency, but for channels that jump."""
+    from scipy.signal import butter, sosfiltfilt
+
+    if frequency >= 0.5 / dt:
+        raise ConfigurationError(
+            f"--smooth {frequency:g} Hz is no less than half the plans' {1 / dt:g} Hz, where "
+            "nothing is faster; give less, or leave it out"
+        )
+    sections = butter(2, frequency, fs=1 / dt, output="sos")
+    pad = min(len(frames) - 1, math.ceil(1 / (frequency * dt)))
+    smooth = np.asarray(sosfiltfilt(sections, frames, axis=0, padlen=pad))
+    jumps = is_step(recording.positions, units)
+    return np.where(jumps, frames, smooth)
+
+
+def _change(before: Frames, after: Frames) -> Float[np.ndarray, "2 D"]:
+    """Rms and largest change of each channel."""
+    off = after - before
+    return np.stack([np.sqrt(np.mean(off**2, axis=0)), np.abs(off).max(axis=0)])
 
 
 def _common_dt(recordings: Sequence[Recording]) -> float:
@@ -293,7 +398,7 @@ def _moving_span(recording: Recording, still: Point, margin: float) -> tuple[flo
 
 
 def _resample(
-    recording: Recording, start: float, end: float, dt: float
+    recording: Recording, start: float, end: float, dt: float, units: tuple[str, ...]
 ) -> tuple[Frames, list[str]]:
     """Frames at start, start + dt, ... until the end is covered, and names of stepwise channels."""
     t, q = recording.times, recording.positions
@@ -308,20 +413,10 @@ def _resample(
     frames = CubicSpline(t, q)(at) if len(t) > 3 else PchipInterpolator(t, q)(at)
     low, high = q.min(axis=0), q.max(axis=0)
     beyond = np.maximum(low - frames.min(axis=0), frames.max(axis=0) - high)
-    stepwise = beyond > _OVERSHOOT * (high - low)
+    # Splines leave the range of noise by about as much as there is noise.
+    stepwise = (beyond > _OVERSHOOT * (high - low)) & (beyond > 5 * noise_of(q))
+    stepwise &= ~held_channels(q, units)
     if np.any(stepwise):
         # PCHIP never leaves the range of its neighbours: right for grippers and switches.
         frames[:, stepwise] = PchipInterpolator(t, q[:, stepwise])(at)
     return frames, [n for n, s in zip(recording.names, stepwise, strict=True) if s]
-
-
-def _gaps(recording: Recording, start: float, end: float) -> list[str]:
-    steps = np.diff(recording.times)
-    inside = (recording.times[1:] > start) & (recording.times[:-1] < end)
-    worst = int(np.argmax(np.where(inside, steps, 0.0)))
-    if steps[worst] <= 3 * recording.period:
-        return []
-    return [
-        f"{recording.episode}: nothing recorded for {steps[worst]:.3f} s at "
-        f"{recording.times[worst]:.2f} s"
-    ]

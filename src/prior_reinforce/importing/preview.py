@@ -13,9 +13,9 @@ from jaxtyping import Float, Int
 
 from prior_reinforce.importing.preprocessing import Preprocessed, Selection
 from prior_reinforce.importing.recording import Recording
+from prior_reinforce.importing.units import say_names
 from prior_reinforce.plans.motions import Demonstrations
 
-_REMARKS_SHOWN = 4
 _COLUMNS = 4
 _LEAST_RANGE = 0.2
 """Smallest vertical range of a channel's panel, as a share of the largest motion."""
@@ -68,15 +68,14 @@ class Preview:
             ),
             "still ends": self._trimming(),
             "length": self._length(),
+            "noise": self._noise(),
             "motion": self._motion(),
             "outcomes": f"{ranges}, from {self.outcomes_from}",
             "coverage": self._coverage(),
             "remarks": "none" if not self.remarks else f"{len(self.remarks)}",
         }
         lines = [f"{name:<11} {text}" for name, text in rows.items()]
-        lines += [f"  - {remark}" for remark in self.remarks[:_REMARKS_SHOWN]]
-        if len(self.remarks) > _REMARKS_SHOWN:
-            lines.append(f"  - and {len(self.remarks) - _REMARKS_SHOWN} more")
+        lines += [f"  - {remark}" for remark in self.remarks]
         return "\n".join(lines)
 
     def draw(self, path: str | os.PathLike[str]) -> None:
@@ -123,6 +122,28 @@ class Preview:
         return (
             f"motions of {_span(lengths, '.2f')} s, plans of {horizon} frames "
             f"({(horizon - 1) * done.dt:.2f} s){held}"
+        )
+
+    def _noise(self) -> str:
+        form, done = self.demonstrations.format, self.done
+        noisiest = int(np.argmax(done.noise))
+        held = say_names([form.names[i] for i in done.held_channels]) or "no channel"
+        most = say_small(done.noise[noisiest], form.units[noisiest])
+        seen = (
+            f"up to {most} at rest ({form.names[noisiest]})"
+            if done.noise[noisiest] > 1e-9
+            else "none"
+        )
+        said = f"{seen}; {held} held"
+        if done.smoothed is None:
+            return said
+        rms, largest = done.smoothed[:, 0], done.smoothed[:, 1]
+        episode, channel = divmod(int(np.argmax(largest)), largest.shape[1])
+        unit = form.units[channel]
+        return (
+            f"{said}; smoothing changed plans by {say_small(rms.max(), unit)} rms, at most "
+            f"{say_small(largest[episode, channel], unit)} ({form.names[channel]} of "
+            f"{self.episodes[episode]})"
         )
 
     def _motion(self) -> str:
@@ -197,6 +218,12 @@ class Preview:
         axes.set_xlabel(f"{names[0]} [{units[0]}]", fontsize=8)
         axes.set_title("outcomes and their hull", fontsize=10)
         axes.tick_params(labelsize=8)
+
+
+def say_small(value: float, unit: str) -> str:
+    """Say a small number: in mrad or mm where it is an angle or a length."""
+    thousandth = {"rad": "mrad", "m": "mm"}.get(unit)
+    return f"{1000 * value:.2g} {thousandth}" if thousandth else f"{value:.2g} {unit}"
 
 
 def hull_corners(points: PlanePoints) -> Corners:

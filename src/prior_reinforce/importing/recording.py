@@ -176,7 +176,7 @@ class Recording:
         again = _repeated(times, positions)
         if np.any(again) and not np.all(again[1:]):
             times, positions = times[~again], positions[~again]
-            remark = f"{self.episode}: {again.sum()} frames were recorded twice; once is kept"
+            remark = f"{again.sum()} frames were recorded twice; once is kept"
             object.__setattr__(self, "remarks", (*self.remarks, remark))
         backward = np.flatnonzero(np.diff(times) <= 0)
         if backward.size:

@@ -115,7 +115,7 @@ def _states(
         )
     remarks = []
     if len(kept) < len(messages):
-        remarks.append(f"{name}: {len(messages) - len(kept)} messages without all joints skipped")
+        remarks.append(f"{len(messages) - len(kept)} messages without all joints skipped")
     # Everything else a message holds, such as fingers, stays available by name.
     names = tuple(n for n in kept[0][1].name if all(n in m.name for _, m in kept))
     rows = [[dict(zip(m.name, m.position, strict=True))[n] for n in names] for _, m in kept]
@@ -125,7 +125,7 @@ def _states(
         times, source = _since_first(stamps), "header stamps"
     else:
         times, source = _since_first([stamp for stamp, _ in kept]), "the recorder's stamps"
-        remarks.append(f"{name}: header stamps unusable, times are those of the recorder")
+        remarks.append("header stamps unusable, times are those of the recorder")
     clock = options.clock(name, len(kept), stamps=times, name=source, unit="ns")
     return Recording(
         name, clock.times, positions, names, remarks=tuple(remarks), clock=clock.source
