@@ -5,11 +5,22 @@ import os
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 
 from prior_reinforce import files
 from prior_reinforce.errors import FileFormatError, WorkspaceError
-from prior_reinforce.files import in_place, sha256_of_folder, sweep, write, write_once
+from prior_reinforce.files import (
+    claim_folder,
+    in_place,
+    inside,
+    open_npz,
+    refuse_foreign,
+    sha256_of_folder,
+    sweep,
+    write,
+    write_once,
+)
 
 
 def contents(folder):
@@ -123,3 +134,65 @@ def test_the_hash_of_a_folder_knows_names_and_contents_but_no_hidden_files(tmp_p
     assert sha256_of_folder(tmp_path / "b") == same
     (tmp_path / "b" / "weights").rename(tmp_path / "b" / "other")
     assert sha256_of_folder(tmp_path / "b") != same
+
+
+def test_what_somebody_else_wrote_is_not_replaced(tmp_path):
+    path = tmp_path / "table.json"
+    refuse_foreign(path, "ours 1")
+    path.write_text('{"kind": "ours 1"}')
+    refuse_foreign(path, "ours 1")
+    path.write_text("x,y,u,v")
+    with pytest.raises(FileFormatError, match="choose another name"):
+        refuse_foreign(path, "ours 1")
+    path.unlink()
+    path.symlink_to("nowhere")
+    with pytest.raises(FileFormatError, match="choose another name"):
+        refuse_foreign(path, "ours 1")
+
+
+def test_a_folder_of_somebody_elses_files_is_not_written_to(tmp_path):
+    for _ in range(2):  # what is ours once stays ours
+        claim_folder(tmp_path / "new")
+        write(tmp_path / "new" / "report.html", "page")
+    (tmp_path / "thesis").mkdir()
+    (tmp_path / "thesis" / "report.html").write_text("<title>My thesis</title>")
+    with pytest.raises(WorkspaceError, match="choose an empty or a new folder"):
+        claim_folder(tmp_path / "thesis")
+    assert contents(tmp_path / "thesis") == {"report.html": b"<title>My thesis</title>"}
+    (tmp_path / "thesis" / "report.html").write_text("<p>prior-reinforce 0.1</p>")
+    claim_folder(tmp_path / "thesis")
+
+
+def test_links_lead_nowhere_else(tmp_path):
+    folder = tmp_path / "workspace"
+    (folder / "models").mkdir(parents=True)
+    (folder / "latest").symlink_to("models")
+    for name in ("models", "latest", "latest/model", "not there"):
+        assert inside(folder / name, folder) == folder / name
+    (folder / "out").symlink_to(tmp_path)
+    for name in ("out", "out/model", ".."):
+        with pytest.raises(FileFormatError, match="is a link out of"):
+            inside(folder / name, folder)
+    (tmp_path / "linked").symlink_to(folder)
+    assert inside(tmp_path / "linked" / "models", tmp_path / "linked")
+
+
+def test_a_small_file_that_unpacks_to_a_flood_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(files, "_LARGEST_NPZ", 10_000)
+    np.savez_compressed(tmp_path / "bomb.npz", q=np.zeros(10_000))
+    assert (tmp_path / "bomb.npz").stat().st_size < 1_000
+    with (
+        pytest.raises(FileFormatError, match=r"unpacks to 8e\+04 bytes\); copy it again"),
+        open_npz(tmp_path / "bomb.npz", "copy it again"),
+    ):
+        pass
+
+
+@pytest.mark.parametrize("content", [b"", b"PK", b"not a zip file" * 100])
+def test_arrays_that_are_none_are_named(tmp_path, content):
+    (tmp_path / "q.npz").write_bytes(content)
+    with (
+        pytest.raises(FileFormatError, match=r"q\.npz cannot be read .*; copy it again"),
+        open_npz(tmp_path / "q.npz", "copy it again"),
+    ):
+        pass

@@ -16,7 +16,7 @@ import socket
 import tempfile
 import zipfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +24,11 @@ import numpy as np
 from prior_reinforce.errors import FileFormatError, PriorReinforceError, WorkspaceError
 
 _PREFIX = ".unfinished-"
+_CLAIM = ".prior-reinforce"
+"""In every folder of results: what is in it may be replaced."""
+_RESULTS = ("report.html", "evidence.html", "evidence.md", "config.json", "model/config.json")
+_MARK_WITHIN = 200_000
+"""Bytes of a file that are searched for a mark: a page's styles stand before its words."""
 _LARGEST_NPZ = 4_000_000_000
 """Bytes of all arrays in a file; ours: an hour of an arm at 1 kHz is a tenth of it. A small file
 that unpacks to more is a trap."""
@@ -168,6 +173,69 @@ def named_disk_errors(folder: Path) -> Iterator[None]:
             f"cannot write to {folder} ({error.strerror}); {remedy}; what was written before is "
             "safe"
         ) from error
+
+
+def refuse_foreign(path: Path, mark: str) -> None:
+    """Do nothing unless a file is there that this program did not write.
+
+    Args:
+        path: Where a file is to be written.
+        mark: Stands early in every such file of ours.
+
+    Raises:
+        FileFormatError: A file without the mark is there.
+    """
+    if path.is_symlink() or path.exists():
+        try:
+            with path.open("rb") as file:
+                ours = mark.encode() in file.read(_MARK_WITHIN)
+        except OSError:
+            ours = False
+        if not ours:
+            raise FileFormatError(
+                f"{path} is there already and was not written by this command; choose another name"
+            )
+
+
+def claim_folder(folder: Path) -> None:
+    """Make a folder for results, or take one that was claimed so: what is in it may be replaced.
+
+    Raises:
+        WorkspaceError: It holds what this program did not write, or cannot be written to.
+    """
+    with named_disk_errors(folder):
+        if folder.is_dir() and any(folder.iterdir()) and not _holds_results(folder):
+            raise WorkspaceError(
+                f"{folder} holds files that this program did not write and might replace; choose "
+                "an empty or a new folder"
+            )
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / _CLAIM).touch()
+
+
+def _holds_results(folder: Path) -> bool:
+    """Whether a folder was claimed, or looks like one of ours of before folders were."""
+    if (folder / _CLAIM).exists():
+        return True
+    for name in _RESULTS:
+        with suppress(OSError), (folder / name).open("rb") as file:
+            if b"prior-reinforce" in file.read(_MARK_WITHIN):
+                return True
+    return all((folder / name).is_dir() for name in ("units", "failures"))
+
+
+def inside(path: Path, folder: Path) -> Path:
+    """Return a path within a folder, unless a link leads it out.
+
+    Raises:
+        FileFormatError: A link does: who gave the folder away would have other files read or
+            written.
+    """
+    if not path.resolve().is_relative_to(folder.resolve()):
+        raise FileFormatError(
+            f"{path} is a link out of {folder}, which is not followed; put the file itself there"
+        )
+    return path
 
 
 def sweep(folder: Path) -> None:

@@ -50,6 +50,18 @@ def look(folder, url: str, *more: str) -> int:
     return main(["look", str(folder / "photo.png"), *flags, *more])
 
 
+def test_calibrate_replaces_only_what_it_wrote(tmp_path, run):
+    points = tmp_path / "points.csv"
+    points.write_text("x,y,u,v\n0,0,0,0\n1,0,0,9\n0,1,9,0\n1,1,9,9\n")
+    before = points.read_text()
+    status, _, err = run("calibrate", points, "--out", points)
+    assert status == 2
+    assert "choose another name" in err
+    assert points.read_text() == before
+    for _ in range(2):
+        assert run("calibrate", points, "--out", tmp_path / "table.json")[0] == 0
+
+
 @pytest.mark.slow
 def test_a_photograph_tells_the_error(table, capsys):
     folder, camera, truth = table

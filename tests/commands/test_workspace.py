@@ -29,3 +29,16 @@ def test_an_afternoon(run, folder):
     _, out, _ = run("log", folder)
     kinds = [json.loads(line)["kind"] for line in out.splitlines()]
     assert kinds[2:6] == ["goal_set", "asked", "told", "amended"]
+
+
+def test_a_report_replaces_only_what_it_wrote(run, folder, tmp_path):
+    run("goal", folder, "0.9", "0.05")
+    run("ask", folder)
+    (tmp_path / "thesis").mkdir()
+    (tmp_path / "thesis" / "overview.png").write_bytes(b"mine")
+    status, _, err = run("report", folder, "--out", "thesis")
+    assert status == 2
+    assert "choose an empty or a new folder" in err
+    assert (tmp_path / "thesis" / "overview.png").read_bytes() == b"mine"
+    for _ in range(2):
+        assert run("report", folder)[0] == 0

@@ -14,6 +14,7 @@ from prior_reinforce.adapters.gaussian_process import GaussianProcessAdapter
 from prior_reinforce.adapters.proportional import ProportionalAdapter
 from prior_reinforce.errors import (
     ConfigurationError,
+    FileFormatError,
     InvalidDemonstrationsError,
     InvalidFeedbackError,
     InvalidGoalError,
@@ -458,6 +459,35 @@ def test_limits_that_were_narrowed_while_the_program_waited_are_the_ones_that_co
             call()
     assert not ran.exists()
     assert not (workspace.folder / "executions").exists()
+
+
+@pytest.mark.parametrize(
+    "name", ["journal.sqlite", "models", "plans", "demonstrations.png", "report", "workspace.toml"]
+)
+def test_links_out_of_the_folder_are_refused_before_anything_is_read_or_written(
+    workspace, tmp_path, name
+):
+    workspace.close()
+    target = tmp_path / "elsewhere"
+    if (workspace.folder / name).exists():
+        (workspace.folder / name).rename(target)
+    (workspace.folder / name).symlink_to(target)
+    with pytest.raises(FileFormatError, match=f"{name} is a link out of"):
+        Workspace(workspace.folder)
+
+
+@pytest.mark.parametrize("part", ["plans", "models", "demonstrations"])
+def test_links_further_down_are_refused_too(workspace, tmp_path, part):
+    ask(workspace)
+    (path,) = (workspace.folder / part).iterdir()
+    path.rename(tmp_path / "elsewhere")
+    path.symlink_to(tmp_path / "elsewhere")
+    again = reopened(workspace)
+    if part != "plans":  # an open trial has its plan already
+        void(again, 1, "")
+    with pytest.raises(FileFormatError, match="is a link out of"):
+        ask(again)
+    again.close()
 
 
 class Unsavable(Generator):

@@ -12,6 +12,7 @@ from rich.console import Console
 from prior_reinforce.commands.live import fit_progress
 from prior_reinforce.commands.simulated import GeneratorChoice, TaskChoice, learn, open_task
 from prior_reinforce.errors import ConfigurationError
+from prior_reinforce.files import claim_folder
 from prior_reinforce.generators import make_generator
 
 
@@ -69,11 +70,13 @@ class Learn:
 
     def _learn_from_task(self, choice: str) -> None:
         source, console = self.simulated, Console()
+        generator = make_generator(choice)
         _, demonstrations = open_task(source.task, source.demonstrations, self.seed)
+        claim_folder(source.out)
         learn(
             demonstrations,
             source.out,
-            generator=make_generator(choice),
+            generator=generator,
             seed=self.seed,
             console=console,
         )

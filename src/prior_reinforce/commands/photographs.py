@@ -12,6 +12,7 @@ import tyro
 from jaxtyping import Float, UInt8
 
 from prior_reinforce.errors import ConfigurationError, FileFormatError, PerceptionFailedError
+from prior_reinforce.files import refuse_foreign
 from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
 from prior_reinforce.scene import SeenObject, TableScene
 from prior_reinforce.wording import to_words
@@ -39,6 +40,7 @@ class Calibrate:
         """Fit, save, and say how far each point lies from where the others put it."""
         from prior_reinforce.perception.calibration import TableCalibration
 
+        refuse_foreign(self.out, "prior-reinforce table calibration")
         table_points, pixels = np.hsplit(_read_points(self.points), 2)
         calibration = TableCalibration.fit(table_points, pixels, height=self.height)
         if self.outcome_height is not None:
@@ -75,6 +77,10 @@ class Look:
         from prior_reinforce.perception.calibration import TableCalibration
         from prior_reinforce.perception.vlm import CAMERA_SD, VisionLanguageModel
 
+        stem = f"{self.picture.stem}-seen"
+        drawn = self.picture.with_name(f"{stem}.png")
+        written = drawn.with_suffix(".json")
+        refuse_foreign(drawn if not written.exists() else written, "picture_size_px")
         calibration = TableCalibration.load(self.calibration)
         scene = TableScene(
             SeenObject(self.reached, self.reached_size),
@@ -85,9 +91,7 @@ class Look:
         picture = _read_picture(self.picture)
         with VisionLanguageModel(scene, self.vlm, calibration=calibration) as model:
             reading = model.read(picture)
-        stem = f"{self.picture.stem}-seen"
         reading.save(self.picture.parent, stem)
-        drawn = self.picture.with_name(f"{stem}.png")
         if reading.error_seen is None:
             raise PerceptionFailedError(
                 f"{reading.problem}; look at {drawn} and tell what you see yourself"

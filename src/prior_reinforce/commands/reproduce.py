@@ -24,7 +24,7 @@ from prior_reinforce.experiments.recipes import QUICK, RECIPES, Recipe, Run, Sca
 from prior_reinforce.experiments.recipes.base import Progress as OnProgress
 from prior_reinforce.experiments.recipes.trials import TrialsTable
 from prior_reinforce.experiments.units import Workers
-from prior_reinforce.files import write
+from prior_reinforce.files import claim_folder, write
 from prior_reinforce.generators import make_generator
 from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
 
@@ -105,7 +105,7 @@ class Reproduce:
         trainings = sorted(wanted, key=lambda t: _SLOWEST not in t.generator)
         for choice in dict.fromkeys(training.generator for training in trainings):
             make_generator(choice)  # a library that is not installed is told now, not in an hour
-        self.out.mkdir(parents=True, exist_ok=True)
+        claim_folder(self.out)
         if trainings:
             # What fails here fails again in the recipes that need it, and is told there.
             with suppress(UnitFailedError), _progress(console, "learn") as show:

@@ -13,7 +13,8 @@ from rich.console import Console
 from prior_reinforce.adapters import ADAPTERS, make_adapter
 from prior_reinforce.arrays import Frames, Point, Points
 from prior_reinforce.commands.live import LiveView, Operator, fit_progress
-from prior_reinforce.errors import ConfigurationError, InvalidGoalError
+from prior_reinforce.errors import ConfigurationError, FileFormatError, InvalidGoalError
+from prior_reinforce.files import claim_folder
 from prior_reinforce.generators import GENERATORS, make_generator
 from prior_reinforce.perception import PERCEPTIONS, make_perception
 from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
@@ -134,6 +135,7 @@ class Adapt(Simulated):
         with make_perception(
             self.perception, scene=task.scene, config=self.vlm, seed=self.seed
         ) as perception:
+            claim_folder(self.out)
             if self.model is None:
                 generator = learn(
                     demonstrations,
@@ -267,6 +269,7 @@ class Demo:
         with make_perception(
             self.perception, scene=task.scene, config=self.vlm, seed=self.seed
         ) as perception:
+            claim_folder(self.out)
             demonstrations = self._perceive(task, recorded, perception, console)
             generator = learn(
                 demonstrations,
@@ -326,6 +329,8 @@ class Rollout(Simulated):
             raise ConfigurationError(f"--repeats must be at least 1, got {self.repeats}")
         if self.film is not None and self.film.suffix != ".mp4":
             raise ConfigurationError(f"--film must name an .mp4 file, got {self.film}")
+        if self.film is not None and self.film.exists():
+            raise FileFormatError(f"{self.film} is there already; choose another name")
         plans = np.repeat(plan[None], self.repeats, axis=0)
         rollouts = task.rollout(plans, np.random.default_rng(self.seed))
         units = task.outcome_units or ("m",) * len(task.outcome_names)

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from prior_reinforce.errors import FileFormatError, WorkspaceError
-from prior_reinforce.files import named_disk_errors
+from prior_reinforce.files import claim_folder, named_disk_errors
 from prior_reinforce.report import AdaptationRecord, write_report
 from prior_reinforce.session import Session
 from prior_reinforce.trials import Goal, Trial
@@ -54,6 +54,7 @@ def report_workspace(workspace: Workspace, folder: Path) -> Path:
     }
     if training is not None and training.remarks:
         facts["Remarks"] = "; ".join(training.remarks)
+    claim_folder(folder)
     title = f"{workspace.manifest.name}: {len(goals)} goal" + "s" * (len(goals) > 1)
     with named_disk_errors(folder):
         return write_report(folder, records, title=title, facts=facts)

@@ -16,7 +16,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from prior_reinforce.errors import FileFormatError
-from prior_reinforce.files import in_place, named_disk_errors, sha256, sha256_of_folder, sweep
+from prior_reinforce.files import (
+    in_place,
+    inside,
+    named_disk_errors,
+    sha256,
+    sha256_of_folder,
+    sweep,
+)
 from prior_reinforce.plans.files import PlanFile, read_plan, write_plan
 from prior_reinforce.plans.motions import Demonstrations, Plan
 
@@ -92,7 +99,7 @@ class Store:
         """
         from prior_reinforce.generators import load_generator
 
-        folder = self._folder / "models" / model
+        folder = inside(self._folder / "models" / model, self._folder)
         if not folder.is_dir() or sha256_of_folder(folder)[:_DIGITS] != model:
             raise FileFormatError(
                 f"the model in {folder} is not the one that was learned; restore it from a copy, "
@@ -113,7 +120,7 @@ class Store:
 
     def plan_path(self, name: str) -> Path:
         """Where a plan lies."""
-        return self._folder / "plans" / name
+        return inside(self._folder / "plans" / name, self._folder)
 
     def plan(self, name: str, sha256: str) -> Plan:
         """Read a trial's plan.
@@ -142,7 +149,7 @@ class Store:
 
     def execution_folder(self, name: str) -> Path:
         """Where such a folder lies."""
-        return self._folder / "executions" / Path(name).name
+        return inside(self._folder / "executions" / Path(name).name, self._folder)
 
     def _demonstrations_path(self, sha256: str) -> Path:
-        return self._folder / "demonstrations" / f"{sha256[:_DIGITS]}.npz"
+        return inside(self._folder / "demonstrations" / f"{sha256[:_DIGITS]}.npz", self._folder)

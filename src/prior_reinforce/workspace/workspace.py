@@ -30,12 +30,13 @@ from prior_reinforce.errors import (
     InvalidDemonstrationsError,
     WorkspaceError,
 )
-from prior_reinforce.files import named_disk_errors
+from prior_reinforce.files import inside, named_disk_errors
 from prior_reinforce.plans.files import PlanFile
 from prior_reinforce.plans.motions import Demonstrations, Plan
 from prior_reinforce.registry import parse_choice
 from prior_reinforce.session import Session
 from prior_reinforce.trials import Event, Goal, Stage, Trial
+from prior_reinforce.workspace.journal import JOURNAL_FILE
 from prior_reinforce.workspace.log import Training, WorkspaceLog
 from prior_reinforce.workspace.manifest import (
     MANIFEST_FILE,
@@ -52,6 +53,13 @@ if TYPE_CHECKING:
     from prior_reinforce.robots.report import LimitReport
 
 
+_OWN = (
+    *(MANIFEST_FILE, JOURNAL_FILE, "demonstrations", "models", "plans", "executions", "report"),
+    *("demonstrations.png", "outcomes.csv"),
+)
+"""What is read and written in the folder."""
+
+
 class Workspace:
     """Trials of one task, on disk."""
 
@@ -60,10 +68,12 @@ class Workspace:
 
         Raises:
             WorkspaceError: There is none, or its journal cannot be used.
-            FileFormatError: Its manifest is no TOML.
+            FileFormatError: Its manifest is no TOML, or a part of it is a link out of it.
             ConfigurationError: Its manifest holds a wrong value.
         """
         self.folder = folder = Path(folder)
+        for name in _OWN:
+            inside(folder / name, folder)
         if not (folder / MANIFEST_FILE).is_file():
             raise WorkspaceError(
                 f"{folder} is not a workspace (it has no {MANIFEST_FILE}); make one with: "
