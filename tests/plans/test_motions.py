@@ -3,6 +3,7 @@
 import json
 import re
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -33,6 +34,22 @@ def test_round_trip_keeps_every_bit_and_the_meaning(tmp_path):
     assert loaded.format == FORMAT
     assert loaded.outcome_names == ("x", "t")
     assert loaded.outcome_units == ("m", "s")
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"format": PlanFormat(("a", "b"), ("rad", "rad"), 0.02)},
+        {"format": PlanFormat(("a", "c"), ("rad", "rad"), 0.01)},
+        {"format": PlanFormat(("a", "b"), ("rad", "m"), 0.01)},
+        {"outcome_names": ("y", "x")},
+        {"outcome_units": ("m", "rad")},
+    ],
+)
+def test_the_same_numbers_that_mean_something_else_are_other_demonstrations(change):
+    demos = replace(make(), format=PlanFormat(("a", "b"), ("rad", "rad"), 0.01))
+    assert replace(demos, **change).sha256 != demos.sha256
+    assert replace(demos).sha256 == demos.sha256
 
 
 def test_saving_twice_gives_the_same_arrays_and_no_pickle(tmp_path):

@@ -181,8 +181,9 @@ class Demonstrations:
 
     @property
     def sha256(self) -> str:
-        """Fingerprint of plans and outcomes, to tell which model was learned from them."""
-        digest = hashlib.sha256()
+        """Fingerprint of plans, outcomes and what they mean: names, units, tempo."""
+        about = [asdict(self.format), self.outcome_names, self.outcome_units]
+        digest = hashlib.sha256(json.dumps(about, sort_keys=True).encode())
         for array in (self.plans, self.outcomes_seen):
             digest.update(str(array.shape).encode())
             digest.update(array.tobytes())

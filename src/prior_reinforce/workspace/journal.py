@@ -71,6 +71,12 @@ class Journal:
         """Close the file."""
         self._connection.close()
 
+    @property
+    def empty(self) -> bool:
+        """Whether nothing has happened."""
+        with self._named_errors():
+            return self._connection.execute("SELECT 1 FROM events LIMIT 1").fetchone() is None
+
     def events(self) -> Sequence[Event]:
         """All events, in order; only what came since the last time is read from the disk.
 

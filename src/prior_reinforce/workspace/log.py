@@ -51,7 +51,23 @@ class WorkspaceLog:
             WorkspaceError: The journal cannot be used.
         """
         self._folder, self._store, self._format = folder, store, format
-        self.journal = Journal(folder / JOURNAL_FILE)
+        path = folder / JOURNAL_FILE
+        # A new workspace's journal is empty until the first import has ended.
+        if not path.exists() or path.stat().st_size == 0:
+            self._refuse_files(("demonstrations", "models", "plans"))
+        self.journal = Journal(path)
+        if self.journal.empty:
+            self._refuse_files(("models", "plans"))
+
+    def _refuse_files(self, parts: Sequence[str]) -> None:
+        """Refuse to begin anew beside what an earlier journal named."""
+        for part in parts:
+            folder = self._folder / part
+            if folder.is_dir() and any(path.name[0] != "." for path in folder.iterdir()):
+                raise WorkspaceError(
+                    f"{self._folder / JOURNAL_FILE} is missing or empty, but {folder} holds files "
+                    "that it named; restore the journal from a copy, or make another workspace"
+                )
 
     def events(self) -> Sequence[Event]:
         """The journal.
@@ -78,7 +94,8 @@ class WorkspaceLog:
 
     def keep_plan(self, number: int, plan: Frames) -> Mapping[str, Any]:
         """Write the plan's file, before the event that names it."""
-        file = self._store.save_plan(Plan(plan, self._format), number)
+        named = {event.data["plan_file"] for event in self.events() if event.kind == "asked"}
+        file = self._store.save_plan(Plan(plan, self._format), number, named)
         return {"plan_file": file.path.name, "plan_sha256": file.sha256}
 
     def plan(self, trial: Trial) -> Frames:

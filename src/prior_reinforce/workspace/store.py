@@ -10,8 +10,10 @@ leaves at worst a file that nothing names.
 
 from __future__ import annotations
 
+import hashlib
 import shutil
 import tempfile
+from collections.abc import Collection
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -59,7 +61,7 @@ class Store:
         """
         path = self._demonstrations_path(sha256)
         found = Demonstrations.load(path)
-        if found.sha256 != sha256:
+        if sha256 not in (found.sha256, _sha256_of_numbers(found)):
             raise FileFormatError(
                 f"{path} is not what was imported; restore it from a copy, or import again"
             )
@@ -79,9 +81,12 @@ class Store:
                 saved = Path(scratch) / "model"
                 generator.save(saved)
                 model = sha256_of_folder(saved)[:_DIGITS]
-                kept = models / model
-                if kept.is_dir() and sha256_of_folder(kept)[:_DIGITS] != model:
-                    shutil.rmtree(kept)  # damaged: nothing can read it, and this mends it
+                kept = inside(models / model, self._folder)
+                if not _is_model(kept, model):  # nothing can read it, and this mends it
+                    if kept.is_dir():
+                        shutil.rmtree(kept)
+                    else:
+                        kept.unlink(missing_ok=True)
                 with in_place(kept) as unfinished:
                     shutil.copytree(saved, unfinished)
         return model
@@ -100,15 +105,21 @@ class Store:
         from prior_reinforce.generators import load_generator
 
         folder = inside(self._folder / "models" / model, self._folder)
-        if not folder.is_dir() or sha256_of_folder(folder)[:_DIGITS] != model:
+        if not _is_model(folder, model):
             raise FileFormatError(
                 f"the model in {folder} is not the one that was learned; restore it from a copy, "
                 f"or run: prior-reinforce learn {self._folder}"
             )
         return load_generator(folder, own=own)
 
-    def save_plan(self, plan: Plan, number: int) -> PlanFile:
+    def save_plan(self, plan: Plan, number: int, named: Collection[str] = ()) -> PlanFile:
         """Keep a trial's plan.
+
+        Args:
+            plan: The plan.
+            number: The trial's.
+            named: Names of the plans that events name. Any other file is what a crash left before
+                its event, and is replaced.
 
         Raises:
             WorkspaceError: The disk is full, or the folder read-only.
@@ -116,6 +127,8 @@ class Store:
         path = self.plan_path(f"trial-{number:03d}-{sha256(plan.actions.tobytes())[:8]}.npz")
         with named_disk_errors(self._folder):
             path.parent.mkdir(exist_ok=True)
+            if path.name not in named:
+                path.unlink(missing_ok=True)
         return write_plan(plan, path)
 
     def plan_path(self, name: str) -> Path:
@@ -153,3 +166,20 @@ class Store:
 
     def _demonstrations_path(self, sha256: str) -> Path:
         return inside(self._folder / "demonstrations" / f"{sha256[:_DIGITS]}.npz", self._folder)
+
+
+def _is_model(folder: Path, model: str) -> bool:
+    """Whether a folder holds the model that its name says, and nothing else."""
+    try:
+        return folder.is_dir() and sha256_of_folder(folder)[:_DIGITS] == model
+    except FileFormatError:
+        return False
+
+
+def _sha256_of_numbers(demonstrations: Demonstrations) -> str:
+    """What the first journals knew demonstrations by: their numbers alone."""
+    digest = hashlib.sha256()
+    for array in (demonstrations.plans, demonstrations.outcomes_seen):
+        digest.update(str(array.shape).encode())
+        digest.update(array.tobytes())
+    return digest.hexdigest()

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -237,14 +238,12 @@ class Workspace:
         self._check_fit(demonstrations, source)
         with self.log.exclusive():
             self.session().refuse_open_trial("importing demonstrations")
-            before = self.log.demonstrations
-            if before is not None and any(event.kind == "asked" for event in self.events):
-                names = self._demonstrations(before).format.names
-                if names != demonstrations.format.names:
-                    raise InvalidDemonstrationsError(
-                        f"trials were made with {names}, but {source} has "
-                        f"{demonstrations.format.names}; make another workspace for it"
-                    )
+            names = self._names_of_plans()
+            if names not in (None, demonstrations.format.names):
+                raise InvalidDemonstrationsError(
+                    f"trials were made with {names}, but {source} has "
+                    f"{demonstrations.format.names}; make another workspace for it"
+                )
             self.store.save_demonstrations(demonstrations)
             self.log.append(
                 "demonstrations_imported",
@@ -275,7 +274,7 @@ class Workspace:
         from prior_reinforce.generators import make_generator
 
         self.session().refuse_open_trial("learning")
-        demonstrations = self.demonstrations
+        demonstrations, known_as = self.demonstrations, self.log.demonstrations
         made = make_generator(generator)
         made.check_savable()
         fitted = made.fit(demonstrations, seed=seed, progress=progress)
@@ -283,7 +282,7 @@ class Workspace:
             "model": self.store.save_model(fitted),
             "generator": generator,
             "seed": seed,
-            "demonstrations_sha256": demonstrations.sha256,
+            "demonstrations_sha256": known_as,
             "remarks": list(fitted.remarks),
         }
         with self.log.exclusive():
@@ -368,9 +367,6 @@ class Workspace:
 
         Returns:
             The trial as it stands now; None where there is nothing to recover.
-
-        Raises:
-            FileFormatError: What was written down is damaged.
         """
         from prior_reinforce.robots.executors.command import read_ended
 
@@ -398,6 +394,15 @@ class Workspace:
             return replace(result, reason="; ".join(filter(None, [result.reason, str(error)])))
         return result if rms is None else replace(result, tracking_rms=rms)
 
+    def _names_of_plans(self) -> tuple[str, ...] | None:
+        """Names of the columns of earlier trials' plans; None where none can be read."""
+        for event in self.events:
+            if event.kind == "asked":
+                with suppress(FileFormatError):
+                    plan = self.store.plan(event.data["plan_file"], event.data["plan_sha256"])
+                    return plan.format.names
+        return None
+
     def _in_use(self) -> tuple[str, str]:
         """The model and the demonstrations of now."""
         training = self.log.training
@@ -405,13 +410,13 @@ class Workspace:
 
     def _generator(self, own: str | None) -> Generator:
         """The model in use."""
-        demonstrations = self.demonstrations
+        self.demonstrations  # noqa: B018  (whether there are any that fit the manifest)
         training = self.log.training
         if training is None:
             raise WorkspaceError(
                 f"nothing is learned yet; run: prior-reinforce learn {self.folder}"
             )
-        if training.demonstrations != demonstrations.sha256:
+        if self.log.stale:
             raise WorkspaceError(
                 "other demonstrations were imported since the model was learned; run: "
                 f"prior-reinforce learn {self.folder}"

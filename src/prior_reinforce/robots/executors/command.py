@@ -200,20 +200,12 @@ def run_command(
 
 
 def read_ended(folder: Path, command: str) -> CommandResult | None:
-    """How the command of a folder ended, where its supervisor outlived the program; else None.
-
-    Raises:
-        FileFormatError: The folder's files are damaged.
-    """
+    """How the command of a folder ended, where its supervisor wrote it down; None if it did not."""
     try:
         ended = json.loads((folder / _ENDED_FILE).read_bytes())
         return _result(tuple(_split(command)), ended, folder) if ended["started"] else None
-    except FileNotFoundError:
-        return None
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise FileFormatError(
-            f"{folder / _ENDED_FILE} cannot be read ({error}); say whether the arm moved"
-        ) from error
+    except (OSError, ValueError, KeyError, TypeError):
+        return None  # a person has to say what moved
 
 
 def read_pose(
@@ -290,7 +282,7 @@ def _supervise(
 ) -> dict[str, Any] | None:
     """Run a command under the supervisor; what that wrote, None where it was killed."""
     ended = folder / _ENDED_FILE
-    with (folder / _OUTPUT_FILE).open("wb", buffering=0) as output:
+    with _named_refusal(), (folder / _OUTPUT_FILE).open("wb", buffering=0) as output:
         request = {
             "arguments": arguments,
             "time_limit": time_limit,
@@ -313,6 +305,17 @@ def _supervise(
             shown.go_on()
         shown.go_on()
     return json.loads(ended.read_bytes()) if ended.exists() else None
+
+
+@contextmanager
+def _named_refusal() -> Iterator[None]:
+    """Turn what the system refuses before anything is started into one line."""
+    try:
+        yield
+    except OSError as error:
+        raise ConfigurationError(
+            f"nothing can be started ({error.strerror}); close other programs, or make room"
+        ) from error
 
 
 @contextmanager
