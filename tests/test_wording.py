@@ -226,3 +226,37 @@ def test_places_are_read_from_numbers_or_words(text, place):
 def test_other_places_are_refused_with_the_remedy(text, units, message):
     with pytest.raises(InvalidFeedbackError, match=message):
         read_place(text, XY, units)
+
+
+@pytest.mark.parametrize(
+    ("text", "place"),
+    [
+        ("0.92 -0.1", (0.92, -0.1)),
+        ("92cm -10cm", (0.92, -0.1)),
+        ("92 cm, -10 cm", (0.92, -0.1)),
+        ("92 -10 cm", (0.92, -0.1)),
+        ("920mm, -0.1m", (0.92, -0.1)),
+    ],
+)
+def test_a_place_in_numbers_with_or_without_units(text, place):
+    np.testing.assert_allclose(read_place(text, ("x", "y"), ("m", "m")), place)
+
+
+def test_a_place_in_another_unit_is_converted():
+    assert read_place("30 deg", ("angle",), ("rad",)) == pytest.approx([np.pi / 6])
+    assert read_place("0.5rad", ("angle",), ("deg",)) == pytest.approx([90 / np.pi])
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("53, -13", "53 m is farther than any arm throws; say the unit, for instance 53cm"),
+        ("92cm", "is not 2 finite numbers"),
+        ("92cm 10deg", "cannot read"),
+        ("92cm -10", "cannot read"),
+        ("nan 1", "is not 2 finite numbers"),
+    ],
+)
+def test_a_place_that_cannot_be_meant_is_refused(text, says):
+    with pytest.raises(InvalidFeedbackError, match=says):
+        read_place(text, ("x", "y"), ("m", "m"))

@@ -37,6 +37,7 @@ from .generators.regression import UNetRegressionConfig as UNetRegressionConfig
 from .generators.timed import Timed as Timed
 from .importing.importer import ImportResult as ImportResult
 from .importing.importer import import_demonstrations as import_demonstrations
+from .importing.importer import inspect_recordings as inspect_recordings
 from .importing.importer import read_recordings as read_recordings
 from .importing.preprocessing import Preprocessing as Preprocessing
 from .importing.recording import HowToRead as HowToRead

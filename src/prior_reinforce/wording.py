@@ -42,6 +42,17 @@ _TERM = re.compile(
     rf"(?:(?:\+-|\+/-|±)\s*(?P<sd>{_NUMBER})\s*(?P<sd_unit>{_UNIT})\s*)?)?"
     r"(?:to the )?(?P<word>[a-z]+)"
 )
+_PLACE_TERM = re.compile(
+    rf"(?P<number>[+-]?(?:{_NUMBER}))\s*(?P<unit>cm|mm|m|deg|rad|)(?:\s*[,;]\s*|\s+|$)"
+)
+_TO_UNIT = {
+    ("cm", "m"): 0.01,
+    ("mm", "m"): 0.001,
+    ("deg", "rad"): math.pi / 180,
+    ("rad", "deg"): 180 / math.pi,
+}
+_FARTHEST_PLACE = 5.0
+"""Ours, in [m]: no arm on a table throws farther; such a number is centimetres."""
 _SOMEWHERE = "somewhere"
 _ON_THE_GOAL = ("on the goal", "0")
 _HITS = {"hit": True, "miss": False}
@@ -149,28 +160,58 @@ def from_words(text: str, outcome_dim: int) -> Reading:
 
 
 def read_place(text: str, names: Sequence[str], units: Sequence[str]) -> _Point:
-    """Read a place from numbers in the outcome's units, or from words.
+    """Read a place from numbers in the outcome's units, numbers with a unit, or words.
 
     Args:
-        text: For instance `0.92 0.10`, or `92cm ahead, 10cm left`.
+        text: For instance `0.92 0.10`, `92cm 10cm`, `92 10 cm`, or `92cm ahead, 10cm left`.
         names: Of the components.
         units: Of the components.
 
     Raises:
-        InvalidFeedbackError: It is neither.
+        InvalidFeedbackError: It is none of these, or metres that are farther than a table's.
     """
     expected = f"{len(names)} finite numbers: {', '.join(names)}"
-    try:
-        numbers = [float(part) for part in text.replace(",", " ").split()]
-    except ValueError:
+    numbers = _numbers_with_units(text, units)
+    if numbers is None:
         if in_words(units):
             words, example = PLACE_WORDS[: len(names)], 'for instance "92cm ahead, 10cm left"'
             said = _read(_parts(text), text, words, example, sizes=True)
             return np.array([said[j].error if j in said else 0.0 for j in range(len(names))])
-        raise InvalidFeedbackError(f"cannot read {text!r}; give {expected}") from None
+        raise InvalidFeedbackError(f"cannot read {text!r}; give {expected}")
     if len(numbers) != len(names) or not all(map(math.isfinite, numbers)):
         raise InvalidFeedbackError(f"{text!r} is not {expected}")
+    for number, unit in zip(numbers, units, strict=True):
+        if unit == "m" and abs(number) > _FARTHEST_PLACE:
+            raise InvalidFeedbackError(
+                f"{number:g} m is farther than any arm throws; say the unit, for instance "
+                f"{number:g}cm, or give metres"
+            )
     return np.array(numbers)
+
+
+def _numbers_with_units(text: str, units: Sequence[str]) -> list[float] | None:
+    """Numbers in the outcome's units, such as `0.92 0.1` or `92cm, 10 cm`; None where it is none.
+
+    A unit after the last number only is that of all.
+    """
+    try:
+        return [float(part) for part in text.replace(",", " ").split()]
+    except ValueError:
+        terms = list(_PLACE_TERM.finditer(text.strip()))
+    if "".join(term[0] for term in terms) != text.strip():
+        return None
+    said = [term["unit"] for term in terms]
+    if not any(said[:-1]):
+        said = said[-1:] * len(terms)
+    if len(said) != len(units):
+        return [math.nan] * len(said)
+    numbers = []
+    for term, unit, wanted in zip(terms, said, units, strict=True):
+        scale = 1.0 if unit in ("", wanted) else _TO_UNIT.get((unit, wanted))
+        if not unit or scale is None:
+            return None
+        numbers.append(float(term["number"]) * scale)
+    return numbers
 
 
 @dataclass(frozen=True)

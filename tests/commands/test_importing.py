@@ -59,3 +59,29 @@ def test_or_agreed_to_at_a_terminal(run, folder, tmp_path, monkeypatch):
     assert "joint1 [rad, recorded in deg]" in out
     with Workspace(folder) as workspace:
         np.testing.assert_allclose(workspace.demonstrations.plans, demonstrations().plans)
+
+
+def test_inspecting_says_what_to_type_next_and_writes_a_table_to_fill_in(run, folder, tmp_path):
+    in_milliseconds_and_degrees(tmp_path / "odd")
+    (tmp_path / "odd" / "outcomes.csv").unlink()
+    with Workspace(folder) as workspace:
+        before = workspace.events
+    status, out, _ = run("import", folder, "odd", "--inspect", "--no-trim")
+    assert status == 0
+    assert "outcomes: none yet; fill in odd/outcomes.csv" in out
+    following = "prior-reinforce import planar odd --no-trim --time-unit ms --units deg"
+    assert out.endswith(f"nothing was taken in; next: {following}\n")
+    with Workspace(folder) as workspace:
+        assert workspace.events == before
+    table = tmp_path / "odd" / "outcomes.csv"
+    assert table.read_text().startswith("episode,x [m],y [m],note\nthrow_0,,,\n")
+    assert (
+        "throw_0, throw_1, throw_2, throw_3 missing" in run("import", folder, "odd", "--inspect")[1]
+    )
+    filled = "episode,x [cm],y [cm],note\nthrow_0,80,-20,\nthrow_1,80,20,\n"
+    table.write_text(filled + "throw_2,100,-20,short\nthrow_3,100,20,\n")
+    assert run(*following.split()[1:])[0] == 0
+    with Workspace(folder) as workspace:
+        np.testing.assert_allclose(
+            workspace.demonstrations.outcomes_seen, demonstrations().outcomes_seen
+        )

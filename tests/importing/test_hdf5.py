@@ -48,7 +48,7 @@ def test_robomimic_with_frames_missing(tmp_path):
 
 def test_droid_at_another_rate(tmp_path):
     folder = write_droid(tmp_path / "droid")
-    write_outcomes(tmp_path)
+    write_outcomes(folder)
     result = import_demonstrations(folder, preprocessing=Preprocessing(dt=0.01, trim=False))
     demos = result.demonstrations
     # 15 Hz resampled to 100 Hz; times are whole milliseconds, worth 2 mrad at 2 rad/s.

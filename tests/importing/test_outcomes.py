@@ -10,7 +10,11 @@ from prior_reinforce.errors import (
     UnclearUnitsError,
 )
 from prior_reinforce.importing import import_demonstrations
-from prior_reinforce.importing.outcomes import read_outcomes
+from prior_reinforce.importing.outcomes import (
+    missing_outcomes,
+    read_outcomes,
+    write_outcome_table,
+)
 from tests.importing.recorded import OUTCOMES, write_csv, write_outcomes
 
 
@@ -137,3 +141,27 @@ def test_a_table_in_another_encoding(tmp_path):
         read_outcomes(path)
     with pytest.raises(FileFormatError, match="no outcomes at"):
         read_outcomes(tmp_path / "missing.csv")
+
+
+def test_only_a_table_that_stands_beside_the_recordings_is_taken(tmp_path):
+    folder = tmp_path / "today"
+    folder.mkdir()
+    write_outcomes(write_csv(folder).parent)  # in the folder above
+    with pytest.raises(InvalidDemonstrationsError) as caught:
+        import_demonstrations(folder)
+    assert f"write {folder}/outcomes.csv" in str(caught.value)
+    assert f"({tmp_path}/outcomes.csv is not beside them: name it with --outcomes" in str(
+        caught.value
+    )
+    named = import_demonstrations(folder, outcomes=tmp_path / "outcomes.csv")
+    assert f"from {tmp_path}/outcomes.csv" in named.preview.text
+
+
+def test_a_table_to_fill_in_has_the_episodes_names_and_the_units(tmp_path):
+    path = tmp_path / "outcomes.csv"
+    write_outcome_table(path, ["throw_1", "a,b"], ["x", "turns"], ["m", "counts"])
+    assert path.read_text() == 'episode,x [m],turns,note\nthrow_1,,,\n"a,b",,,\n'
+    assert read_outcomes(path).values == {}
+    path.write_text(path.read_text().replace("[m]", "[cm]").replace("1,,", "1,92,3"))
+    assert read_outcomes(path).values == {"throw_1": (0.92, 3.0)}
+    assert missing_outcomes(["throw_1", "a,b"], read_outcomes(path)) == ["a,b"]

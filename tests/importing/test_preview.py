@@ -5,7 +5,7 @@ import pytest
 from matplotlib.image import imread
 
 from prior_reinforce.importing import Preprocessing, import_demonstrations
-from prior_reinforce.importing.preview import hull_corners, say_small
+from prior_reinforce.importing.preview import hull_corners
 from tests.importing.recorded import JOINTS, OUTCOMES, write_bags, write_npz, write_outcomes
 
 
@@ -85,9 +85,3 @@ def test_noise_is_said_and_what_smoothing_changed(folder):
     assert "smoothing changed plans by " in smooth.text
     most = 1000 * smooth.done.smoothed[:, 1].max()
     assert f"at most {most:.2g} mrad" in smooth.text
-
-
-def test_small_numbers_are_said_in_thousandths():
-    assert say_small(2.13e-5, "rad") == "0.021 mrad"
-    assert say_small(0.0012, "m") == "1.2 mm"
-    assert say_small(3.0, "counts") == "3 counts"

@@ -2,26 +2,44 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Annotated, Literal
 
 import tyro
 
-from prior_reinforce.commands.outcome_questions import ask_for_outcomes, keep_typed
+from prior_reinforce.commands.outcome_questions import Answers, ask_for_outcomes
 from prior_reinforce.commands.workspace import Folder, print_next
-from prior_reinforce.errors import UnclearUnitsError
+from prior_reinforce.errors import InvalidDemonstrationsError, UnclearUnitsError
 from prior_reinforce.files import named_disk_errors
 from prior_reinforce.importing import (
     FORMATS,
     HowToRead,
     ImportResult,
+    Inspection,
     Preprocessing,
+    Recording,
     import_demonstrations,
+    inspect_recordings,
+    outcome_places,
     read_recordings,
 )
+from prior_reinforce.importing.outcomes import (
+    OUTCOMES_FILE,
+    Outcomes,
+    find_outcomes,
+    in_order,
+    in_units,
+    missing_outcomes,
+    read_outcomes,
+    table_beside,
+    write_outcome_table,
+)
+from prior_reinforce.importing.units import Doubt, refuse_doubts
+from prior_reinforce.workspace.manifest import Manifest
 from prior_reinforce.workspace.workspace import Workspace
 
 _PICTURE = "demonstrations.png"
@@ -78,42 +96,142 @@ class Import:
     smooth: float | None = None
     """Take out what is faster than so many Hz, such as an encoder's noise; says what it changed."""
 
+    inspect: bool = False
+    """Only say what is in the recordings and what an import would make of it; write a table of
+    outcomes to fill in where there is none."""
+
     def run(self) -> None:
-        """Read, preview, take in."""
+        """Read, show, take in."""
         with Workspace(self.folder) as workspace:
+            if self.inspect:
+                self._inspect(workspace)
+                return
             workspace.session().refuse_open_trial("importing demonstrations")
-            try:
-                result = self._read(workspace, take_guesses=False)
-            except UnclearUnitsError as unclear:
-                if not _agrees(unclear):
-                    raise
-                result = self._read(workspace, take_guesses=True)
-            workspace.import_demonstrations(result.demonstrations, str(self.source))
+            at_terminal = sys.stdin.isatty()
+            guesses = at_terminal and self._agreed(workspace)
+            answers = self._asked(workspace, guesses) if at_terminal else None
+            result = self._read(workspace, answers, take_guesses=guesses)
             print(result.preview.text)
+            workspace.import_demonstrations(result.demonstrations, str(self.source))
             with named_disk_errors(self.folder):
                 result.preview.draw(self.folder / _PICTURE)
             print(f"picture: {self.folder / _PICTURE}  (look at it before you learn)")
             print_next(workspace)
 
-    def _read(self, workspace: Workspace, *, take_guesses: bool) -> ImportResult:
+    def _inspection(self, workspace: Workspace) -> Inspection:
         manifest = workspace.manifest
-        return import_demonstrations(
+        return inspect_recordings(
             self.source,
-            outcomes=self._outcomes(workspace, take_guesses),
-            outcome_names=manifest.outcome_names,
-            outcome_units=manifest.outcome_units,
-            outcome_unit=self.outcome_unit,
             names=manifest.format.names,
             units=self.units,
             plan_units=manifest.format.units,
-            preprocessing=Preprocessing(
-                dt=manifest.format.dt,
-                horizon=self.horizon,
-                trim=self.trim,
-                smooth=self.smooth,
-            ),
-            take_guesses=take_guesses,
+            preprocessing=self._preprocessing(manifest),
+            robot=manifest.robot,
+            gate=manifest.gate,
             **self._how(workspace),
+        )
+
+    def _inspect(self, workspace: Workspace) -> None:
+        manifest, found = workspace.manifest, self._inspection(workspace)
+        print(f"{self.source}: {len(found.recordings)} episodes")
+        print(found.text)
+        print()
+        places = outcome_places(self.source, self.format)
+        table = self.outcomes or table_beside(places)
+        episodes = [recording.episode for recording in found.recordings]
+        if table is not None:
+            known = read_outcomes(table, manifest.outcome_names)
+            missing = missing_outcomes(episodes, known)
+            print(f"outcomes: {table}, {', '.join(missing) or 'none'} missing")
+        elif any(recording.outcome is not None for recording in found.recordings):
+            print("outcomes: in the recordings")
+        else:
+            table = places[0] / OUTCOMES_FILE
+            with named_disk_errors(places[0]):
+                write_outcome_table(table, episodes, manifest.outcome_names, manifest.outcome_units)
+            print(f"outcomes: none yet; fill in {table} (units are in its first line)")
+        options = list(dict.fromkeys(doubt.option for doubt in found.doubts))
+        said = " ".join(["prior-reinforce import", shlex.quote(str(self.folder))])
+        said = " ".join([said, shlex.quote(str(self.source)), *self._as_given(), *options])
+        print(f"nothing was taken in; next: {said}")
+
+    def _as_given(self) -> list[str]:
+        """The options that were given, for the command that comes next."""
+        given = []
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if field.name in ("folder", "source", "inspect") or value == field.default:
+                continue
+            option = field.name.replace("_", "-")
+            if isinstance(value, bool):
+                given.append(f"--{option}" if value else f"--no-{option}")
+            else:
+                values = value if isinstance(value, tuple) else (value,)
+                given.append(" ".join([f"--{option}", *(shlex.quote(str(v)) for v in values)]))
+        return given
+
+    def _preprocessing(self, manifest: Manifest) -> Preprocessing:
+        return Preprocessing(
+            dt=manifest.format.dt, horizon=self.horizon, trim=self.trim, smooth=self.smooth
+        )
+
+    def _agreed(self, workspace: Workspace) -> bool:
+        """Whether something was unclear, and the person at the terminal says it is as it looks.
+
+        Raises:
+            UnclearUnitsError: It is not, or nobody says so.
+        """
+        doubts = [*self._inspection(workspace).doubts, *self._known(workspace, ())[1]]
+        try:
+            refuse_doubts(doubts)
+        except UnclearUnitsError as unclear:
+            if not _agrees(unclear):
+                raise
+            return True
+        return False
+
+    def _known(
+        self, workspace: Workspace, recordings: Sequence[Recording]
+    ) -> tuple[Outcomes, tuple[Doubt, ...]]:
+        """The outcomes that a table or the recordings have, in the manifest's units."""
+        names, units = workspace.manifest.outcome_names, workspace.manifest.outcome_units
+        places = outcome_places(self.source, self.format)
+        try:
+            found = find_outcomes(places, recordings, self.outcomes, names)
+        except InvalidDemonstrationsError:
+            found = Outcomes("nothing", names, {}, (None,) * len(names))
+        return in_units(in_order(found, names), units, self.outcome_unit)
+
+    def _asked(self, workspace: Workspace, guesses: bool) -> Answers | None:
+        """What a person types where no table says it; None where nothing is missing."""
+        recordings = read_recordings(self.source, take_guesses=guesses, **self._how(workspace))
+        known, _ = self._known(workspace, recordings)
+        manifest = workspace.manifest
+        answers = ask_for_outcomes(workspace.folder, self.source, known, recordings, manifest)
+        if answers is not None:
+            print(f"outcomes kept in {answers.table}; to import again: --outcomes {answers.table}")
+        return answers
+
+    def _read(
+        self, workspace: Workspace, answers: Answers | None, *, take_guesses: bool
+    ) -> ImportResult:
+        manifest, how = workspace.manifest, self._how(workspace)
+        if answers is not None:
+            how["leave_out"] = (*(self.leave_out or ()), *answers.skipped) or None
+        return import_demonstrations(
+            self.source,
+            outcomes=self.outcomes if answers is None else answers.table,
+            outcome_names=manifest.outcome_names,
+            outcome_units=manifest.outcome_units,
+            outcome_unit=self.outcome_unit if answers is None else None,
+            names=manifest.format.names,
+            units=self.units,
+            plan_units=manifest.format.units,
+            preprocessing=self._preprocessing(manifest),
+            robot=manifest.robot,
+            gate=manifest.gate,
+            take_guesses=take_guesses,
+            **how,
         )
 
     def _how(self, workspace: Workspace) -> HowToRead:
@@ -130,20 +248,6 @@ class Import:
             leave_out=self.leave_out,
             joints=self.joints or workspace.manifest.format.names,
         )
-
-    def _outcomes(
-        self, workspace: Workspace, take_guesses: bool
-    ) -> Path | Mapping[str, tuple[float, ...]] | None:
-        """What was given; on a terminal, with what a person types for the rest."""
-        if not sys.stdin.isatty():
-            return self.outcomes
-        recordings = read_recordings(self.source, take_guesses=take_guesses, **self._how(workspace))
-        typed = ask_for_outcomes(self.source, self.outcomes, recordings, workspace.manifest)
-        if not typed:
-            return self.outcomes
-        kept = keep_typed(workspace.folder, typed, workspace.manifest.outcome_names)
-        print(f"outcomes kept in {kept}; to import again: --outcomes {kept}")
-        return kept
 
 
 def _agrees(unclear: UnclearUnitsError) -> bool:

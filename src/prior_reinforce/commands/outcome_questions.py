@@ -1,10 +1,15 @@
-"""Asking a person where each recorded object landed, since no recording format says."""
+"""Asking a person where each recorded object landed, since no recording format says.
+
+Every answer is on disk before the next question: what was typed for a source is taken again when
+the same source is imported again.
+"""
 
 from __future__ import annotations
 
 import csv
 import io
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from prior_reinforce.errors import (
@@ -16,79 +21,110 @@ from prior_reinforce.importing import Recording
 from prior_reinforce.importing.outcomes import (
     OUTCOMES_FILE,
     Outcomes,
-    find_outcomes,
-    in_order,
+    headed,
     outcomes_of,
-    read_outcomes,
 )
-from prior_reinforce.wording import in_words, read_place
+from prior_reinforce.wording import in_words, read_place, say_place
 from prior_reinforce.workspace.manifest import Manifest
+
+_SKIP, _BACK = ("skip", "s"), ("back", "b")
+_SOURCE = "source"
+
+
+@dataclass(frozen=True)
+class Answers:
+    """What is known of the outcomes after the questions."""
+
+    table: Path
+    """Where all of it is written."""
+    skipped: tuple[str, ...]
+    """Episodes that nobody could say anything of."""
 
 
 def ask_for_outcomes(
-    source: Path, given: Path | None, recordings: Sequence[Recording], manifest: Manifest
-) -> dict[str, tuple[float, ...]]:
+    folder: Path, source: Path, known: Outcomes, recordings: Sequence[Recording], manifest: Manifest
+) -> Answers | None:
     """Ask for the outcomes that no table has.
 
     Args:
+        folder: Of the workspace, where what is typed is kept.
         source: What the recordings were read from.
-        given: The table that was named, if any.
+        known: Outcomes of a table, in the manifest's units.
         recordings: Of the episodes in question.
         manifest: What an outcome is.
 
     Returns:
-        Outcomes of all episodes, known and typed, by name; empty where nothing was missing.
+        None where nothing was missing.
 
     Raises:
-        FileFormatError: The table is damaged.
-        InvalidDemonstrationsError: It has other columns, or the person stopped typing.
+        InvalidDemonstrationsError: The person stopped typing; the answers so far are kept.
+        WorkspaceError: The disk is full, or the folder read-only.
     """
-    known = _known(source, given, recordings, manifest)
     outcomes: dict[str, tuple[float, ...]] = {}
-    missing: list[str] = []
     for recording in recordings:
         try:
             found = outcomes_of([recording], known, partial=True)[0]
         except InvalidDemonstrationsError:
-            missing.append(recording.episode)
-        else:
-            outcomes[recording.episode] = tuple(found.tolist())
+            continue
+        outcomes[recording.episode] = tuple(found.tolist())
+    missing = [r.episode for r in recordings if r.episode not in outcomes]
     if not missing:
-        return {}
-    print(_explanation(manifest, missing))
-    for number, episode in enumerate(missing, start=1):
-        outcomes[episode] = _ask(f"{episode} ({number} of {len(missing)}): ", episode, manifest)
-    return {recording.episode: outcomes[recording.episode] for recording in recordings}
+        return None
+    table = folder / OUTCOMES_FILE
+    before = _typed_before(table, source, manifest)
+    again = [episode for episode in missing if episode in before]
+    outcomes |= {episode: before[episode] for episode in again}
+    if again:
+        print(f"typed before, in {table}: {', '.join(again)}")
+    missing = [episode for episode in missing if episode not in before]
+    if missing:
+        print(_explanation(manifest, missing))
+    skipped: set[str] = set()
+    number = 0
+    while number < len(missing):
+        episode = missing[number]
+        question = f"{episode} ({number + 1} of {len(missing)}): "
+        answer = _ask(question, episode, table, manifest)
+        if answer == _BACK[0]:
+            number = max(0, number - 1)
+            continue
+        if isinstance(answer, str):
+            skipped.add(episode)
+            outcomes.pop(episode, None)
+        else:
+            skipped.discard(episode)
+            outcomes[episode] = answer
+            print(f"  {say_place(answer, manifest.outcome_names, manifest.outcome_units)}")
+        _keep(folder, source, outcomes, manifest)
+        number += 1
+    _keep(folder, source, outcomes, manifest)
+    return Answers(table, tuple(episode for episode in missing if episode in skipped))
 
 
-def keep_typed(
-    folder: Path, outcomes: Mapping[str, tuple[float, ...]], names: Sequence[str]
-) -> Path:
-    """Write outcomes to a table in the workspace, so that nothing has to be typed twice.
-
-    Raises:
-        WorkspaceError: The disk is full, or the folder read-only.
-    """
+def _keep(
+    folder: Path, source: Path, outcomes: Mapping[str, tuple[float, ...]], manifest: Manifest
+) -> None:
+    """Write all that is known of a source to the table in the workspace."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["episode", *names])
-    writer.writerows([episode, *map(repr, values)] for episode, values in outcomes.items())
-    path = folder / OUTCOMES_FILE
+    writer.writerow(["episode", *headed(manifest.outcome_names, manifest.outcome_units), _SOURCE])
+    for episode, values in outcomes.items():
+        writer.writerow([episode, *map(repr, values), source.resolve()])
     with named_disk_errors(folder):
-        write(path, text.getvalue())
-    return path
+        write(folder / OUTCOMES_FILE, text.getvalue())
 
 
-def _known(
-    source: Path, given: Path | None, recordings: Sequence[Recording], manifest: Manifest
-) -> Outcomes:
-    if given is not None:
-        return in_order(read_outcomes(given, manifest.outcome_names), manifest.outcome_names)
+def _typed_before(table: Path, source: Path, manifest: Manifest) -> dict[str, tuple[float, ...]]:
+    """Outcomes that were typed for the same source."""
+    if not table.is_file():
+        return {}
+    names = headed(manifest.outcome_names, manifest.outcome_units)
+    with table.open(newline="", encoding="utf-8") as file:
+        rows = [row for row in csv.DictReader(file) if row.get(_SOURCE) == str(source.resolve())]
     try:
-        names = manifest.outcome_names
-        return in_order(find_outcomes(source, recordings, None, names), names)
-    except InvalidDemonstrationsError:
-        return Outcomes("nothing", (), {})
+        return {row["episode"]: tuple(float(row[name]) for name in names) for row in rows}
+    except (KeyError, TypeError, ValueError):
+        return {}  # changed by hand, or of another task: asked for again
 
 
 def _explanation(manifest: Manifest, missing: Sequence[str]) -> str:
@@ -96,23 +132,29 @@ def _explanation(manifest: Manifest, missing: Sequence[str]) -> str:
     units = ", ".join(dict.fromkeys(manifest.outcome_units))
     words = ""
     if in_words(manifest.outcome_units):
-        example = ("92cm ahead", "10cm left", "5cm up")[: len(manifest.outcome_names)]
-        words = f', or words such as "{", ".join(example)}"'
+        k = len(manifest.outcome_names)
+        example = ("92cm ahead", "10cm left", "5cm up")[:k]
+        words = f', "{" ".join(("92cm", "10cm", "5cm")[:k])}", or words such as '
+        words += f'"{", ".join(example)}"'
     return (
         f"{len(missing)} episodes have no outcome: where did the object land, in the table frame?\n"
-        f"type {names} [{units}]{words}"
+        f"type {names} [{units}]{words}; skip leaves an episode out, back goes back one"
     )
 
 
-def _ask(question: str, episode: str, manifest: Manifest) -> tuple[float, ...]:
+def _ask(question: str, episode: str, table: Path, manifest: Manifest) -> tuple[float, ...] | str:
+    """A place, `skip` or `back`."""
     while True:
         try:
-            text = input(question)
+            text = input(question).strip()
         except EOFError as error:
             raise InvalidDemonstrationsError(
-                f"no outcome for episode {episode}; write {OUTCOMES_FILE} beside the recording, or "
-                "leave it out with --episodes"
+                f"no outcome for episode {episode}; import again to go on (what was typed is kept "
+                f"in {table}), or leave it out with --leave-out"
             ) from error
+        for words in (_SKIP, _BACK):
+            if text.lower() in words:
+                return words[0]
         try:
             place = read_place(text, manifest.outcome_names, manifest.outcome_units)
             return tuple(place.tolist())

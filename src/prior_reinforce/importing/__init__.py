@@ -4,8 +4,11 @@ from prior_reinforce.importing.importer import (
     FORMATS,
     ImportResult,
     import_demonstrations,
+    inspect_recordings,
+    outcome_places,
     read_recordings,
 )
+from prior_reinforce.importing.inspection import Inspection
 from prior_reinforce.importing.preprocessing import Preprocessing
 from prior_reinforce.importing.preview import Preview
 from prior_reinforce.importing.recording import HowToRead, Recording
@@ -14,9 +17,12 @@ __all__ = [
     "FORMATS",
     "HowToRead",
     "ImportResult",
+    "Inspection",
     "Preprocessing",
     "Preview",
     "Recording",
     "import_demonstrations",
+    "inspect_recordings",
+    "outcome_places",
     "read_recordings",
 ]

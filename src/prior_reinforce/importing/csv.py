@@ -125,10 +125,15 @@ def _episode(
     time, guessed = _time_column(table, options)
     clock = _clock(table, episode, time, options, None if log is None else log.time_unit)
     others = [i for i in range(len(table.names)) if i not in (time, episode_column)]
+    texts = [i for i in others if table.is_text(i)]
+    others = [i for i in others if i not in texts]
     channels, named = _channels(table, others, options, log)
     remarks: tuple[str, ...] = ()
     if log is not None:
         remarks = (f"{log.name}: time in {log.time_unit}, motion is {log.key} (measured)",)
+    if texts:
+        left_out = say_names([table.names[i] for i in texts])
+        remarks = (*remarks, f"{left_out} left out, which holds no number")
     positions = np.column_stack([table.numbers(i) for i in channels] or [np.zeros((0, 0))])
     units = tuple(table.units[i] or split_unit(table.names[i], CHANNEL_UNITS)[1] for i in channels)
     names = tuple(split_unit(table.names[i], CHANNEL_UNITS)[0] for i in channels)
@@ -187,7 +192,7 @@ def _channels(
 ) -> tuple[list[int], bool]:
     """Columns of the motion, and whether their names are those of joints.
 
-    Only these need to be numbers; a log may carry text beside them.
+    Only these need to be numbers in every row; a log may carry others beside them.
     """
     names = [table.names[i] for i in others]
     if not table.named:

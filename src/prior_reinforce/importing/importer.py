@@ -23,13 +23,21 @@ from prior_reinforce.errors import (
 )
 from prior_reinforce.importing import csv, hdf5, lerobot, npz, ros, zarr
 from prior_reinforce.importing.clock import TIME_UNITS
+from prior_reinforce.importing.inspection import Inspection, hold_against
 from prior_reinforce.importing.outcomes import find_outcomes, in_order, in_units, outcomes_of
-from prior_reinforce.importing.preprocessing import Preprocessing, preprocess, select
+from prior_reinforce.importing.preprocessing import (
+    Preprocessed,
+    Preprocessing,
+    Selection,
+    preprocess,
+    select,
+)
 from prior_reinforce.importing.preview import Preview
 from prior_reinforce.importing.recording import HowToRead, ReadOptions, Recording, has_files
 from prior_reinforce.importing.tables import DELIMITERS, WORKBOOKS
 from prior_reinforce.importing.units import Doubt, refuse_doubts
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
+from prior_reinforce.robots import GateSettings, RobotLimits
 
 
 @dataclass(frozen=True)
@@ -105,6 +113,8 @@ def import_demonstrations(
     units: Sequence[str] | None = None,
     plan_units: Sequence[str] | None = None,
     preprocessing: Preprocessing | None = None,
+    robot: RobotLimits | None = None,
+    gate: GateSettings | None = None,
     take_guesses: bool = False,
     **how: Unpack[HowToRead],
 ) -> ImportResult:
@@ -125,6 +135,8 @@ def import_demonstrations(
             nothing; where no arm could be in that unit, that is an error.
         plan_units: Unit of each joint in the plan; None is radians for angles, metres for lengths.
         preprocessing: Time step, horizon and trimming; None takes the defaults.
+        robot: Limits that the preview holds every demonstration against; None checks none.
+        gate: The gate's settings for that.
         take_guesses: Take units and times as they look, where that would be an error.
         how: As in `read_recordings`.
 
@@ -142,7 +154,9 @@ def import_demonstrations(
     kept = select(recordings, how.get("joints"), names, units, plan_units)
     doubts = [] if take_guesses else [*_doubts_of(recordings), *kept.doubts]
     try:
-        known = in_order(find_outcomes(source, recordings, outcomes, outcome_names), outcome_names)
+        known = in_order(
+            find_outcomes(_places(source, kind), recordings, outcomes, outcome_names), outcome_names
+        )
     except InvalidDemonstrationsError as missing:
         refuse_doubts(doubts, also=str(missing))
         raise
@@ -160,8 +174,70 @@ def import_demonstrations(
         tuple(outcome_names) if outcome_names is not None else known.names,
         tuple(outcome_units) if outcome_units is not None else (),
     )
-    preview = Preview(f"{source.name} ({kind})", kept, done, demonstrations, known.where)
+    found = _inspection(kept, done, robot, gate)
+    preview = Preview(f"{source.name} ({kind})", found, demonstrations, known.where)
     return ImportResult(demonstrations, preview.episodes, preview)
+
+
+def inspect_recordings(
+    source: str | os.PathLike[str],
+    *,
+    names: Sequence[str] | None = None,
+    units: Sequence[str] | None = None,
+    plan_units: Sequence[str] | None = None,
+    preprocessing: Preprocessing | None = None,
+    robot: RobotLimits | None = None,
+    gate: GateSettings | None = None,
+    **how: Unpack[HowToRead],
+) -> Inspection:
+    """Say what recordings hold and what an import would make of them; nothing is needed but them.
+
+    Units and times that nobody said are taken as they look, and named as guesses.
+
+    Args:
+        source: As in `read_recordings`.
+        names: As in `import_demonstrations`, and so are the next four.
+        units: See there.
+        plan_units: See there.
+        preprocessing: See there.
+        robot: See there.
+        gate: See there.
+        how: As in `read_recordings`.
+
+    Raises:
+        FileFormatError: As in `read_recordings`.
+        InvalidDemonstrationsError: Missing joints (named), or an episode that never moves.
+        ConfigurationError: Settings that contradict each other.
+        MissingExtraError: The format's optional library is not installed.
+    """
+    recordings, _ = _read(Path(source), how)
+    kept = select(recordings, how.get("joints"), names, units, plan_units)
+    done = preprocess(kept.recordings, kept.units, preprocessing or Preprocessing())
+    found = _inspection(kept, done, robot, gate)
+    return replace(found, doubts=(*_doubts_of(recordings), *kept.doubts))
+
+
+def _inspection(
+    kept: Selection, done: Preprocessed, robot: RobotLimits | None, gate: GateSettings | None
+) -> Inspection:
+    reports = hold_against(kept, done, robot, gate)
+    return Inspection(kept, done, None if robot is None else robot.robot, reports)
+
+
+def outcome_places(source: str | os.PathLike[str], format: str | None = None) -> list[Path]:
+    """Return where a table of outcomes stands beside recordings: the first is where to write one.
+
+    A folder of recordings holds its own. A file, and a data set that is a folder, has it beside.
+    """
+    source = Path(source)
+    return _places(source, format or detect_format(source))
+
+
+def _places(source: Path, kind: str) -> list[Path]:
+    if source.is_file():
+        return [source.parent]
+    is_bag = (source / "metadata.yaml").is_file()
+    return [source.parent, source] if FORMATS[kind].whole or is_bag else [source]
 
 
 def read_recordings(

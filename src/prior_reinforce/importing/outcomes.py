@@ -7,6 +7,8 @@ of the outcome, except `source`, `note` and `comment`. A column `x_cm` or `x [mm
 
 from __future__ import annotations
 
+import csv
+import io
 import math
 import os
 import re
@@ -22,6 +24,7 @@ from prior_reinforce.errors import (
     FileFormatError,
     InvalidDemonstrationsError,
 )
+from prior_reinforce.files import write
 from prior_reinforce.importing.csv import EPISODE_COLUMNS
 from prior_reinforce.importing.recording import Recording
 from prior_reinforce.importing.tables import Table, read_tables
@@ -36,7 +39,6 @@ from prior_reinforce.importing.units import (
 
 OUTCOMES_FILE = "outcomes.csv"
 _NOT_COMPONENTS = ("episode", "source", "note", "notes", "comment", "comments")
-_REMEDY = f"write {OUTCOMES_FILE} with the columns episode,x,y beside the recording, or pass them"
 
 
 @dataclass(frozen=True)
@@ -54,15 +56,15 @@ class Outcomes:
 
 
 def find_outcomes(
-    source: Path,
+    places: Sequence[Path],
     recordings: Sequence[Recording],
     given: str | os.PathLike[str] | Mapping[str, Sequence[float]] | None = None,
     names: Sequence[str] | None = None,
 ) -> Outcomes:
-    """Find outcomes: those given, `outcomes.csv` inside or beside the source, the recordings' own.
+    """Find outcomes: those given, a table beside the recordings, the recordings' own.
 
     Args:
-        source: Where the recordings are from.
+        places: Folders beside the recordings.
         recordings: Some hold their outcomes.
         given: A table, or numbers by episode.
         names: Of the components that are wanted, as in `read_outcomes`.
@@ -80,19 +82,48 @@ def find_outcomes(
                 f"outcomes must be numbers by episode, such as {{'0': (0.9, 0.1)}}: {error}"
             ) from error
         return Outcomes("the given outcomes", (), numbers)
-    if given is not None:
-        return read_outcomes(Path(given), names)
-    for folder in [source, source.parent] if source.is_dir() else [source.parent]:
-        for path in (folder / OUTCOMES_FILE, folder / "outcomes.xlsx"):
-            if path.is_file():
-                return read_outcomes(path, names)
+    path = Path(given) if given is not None else table_beside(places)
+    if path is not None:
+        return read_outcomes(path, names)
     own = {r.episode: tuple(r.outcome.tolist()) for r in recordings if r.outcome is not None}
     if own:
         return Outcomes("the recording itself", (), own)
+    above = table_beside([place.parent for place in places])
+    hint = (
+        f" ({above} is not beside them: name it with --outcomes if it is theirs)" if above else ""
+    )
     raise InvalidDemonstrationsError(
         f"no outcomes for episodes {_listed([r.episode for r in recordings])}, and no recording "
-        f"format says where the object landed; {_REMEDY}"
+        f"format says where the object landed; write {places[0] / OUTCOMES_FILE} with the columns "
+        f"episode,x,y, or name a table with --outcomes{hint}"
     )
+
+
+def table_beside(places: Sequence[Path]) -> Path | None:
+    """Return the table of outcomes that stands in one of the folders; None where there is none."""
+    names = (OUTCOMES_FILE, "outcomes.xlsx")
+    return next((f / n for f in places for n in names if (f / n).is_file()), None)
+
+
+def headed(names: Sequence[str], units: Sequence[str]) -> list[str]:
+    """Return what a table calls its components: with their units, where those are known here."""
+    return [f"{n} [{u}]" if u in CHANNEL_UNITS else n for n, u in zip(names, units, strict=True)]
+
+
+def write_outcome_table(
+    path: Path, episodes: Sequence[str], names: Sequence[str], units: Sequence[str]
+) -> None:
+    """Write a table to be filled in: the episodes' names, and a column a component with its unit.
+
+    Raises:
+        OSError: It cannot be written.
+    """
+    heads = headed(names, units)
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(["episode", *heads, "note"])
+    writer.writerows([episode, *[""] * len(heads), ""] for episode in episodes)
+    write(path, text.getvalue())
 
 
 def read_outcomes(path: Path, names: Sequence[str] | None = None) -> Outcomes:
@@ -106,7 +137,7 @@ def read_outcomes(path: Path, names: Sequence[str] | None = None) -> Outcomes:
         FileFormatError: Missing, not such a table, or a cell that is no number.
     """
     if not path.is_file():
-        raise FileFormatError(f"no outcomes at {path}; {_REMEDY}")
+        raise FileFormatError(f"no outcomes at {path}; give the path of a table episode,x,y")
     table = read_tables(path)[0]
     split = [split_unit(name, CHANNEL_UNITS) for name in table.names]
     lower = [name.lower() for name in table.names]
@@ -205,6 +236,12 @@ def in_units(
         for episode, value in outcomes.values.items()
     }
     return Outcomes(outcomes.where, outcomes.names, values, wanted), doubts
+
+
+def missing_outcomes(episodes: Sequence[str], outcomes: Outcomes) -> list[str]:
+    """Return the episodes that a table says nothing of, by the rule of `outcomes_of`."""
+    picked = _matched(list(episodes), list(outcomes.values))
+    return [episode for episode in episodes if episode not in picked]
 
 
 def outcomes_of(recordings: Sequence[Recording], outcomes: Outcomes, *, partial: bool) -> Points:

@@ -364,9 +364,14 @@ def _smoothed(
         )
     sections = butter(2, frequency, fs=1 / dt, output="sos")
     pad = min(len(frames) - 1, math.ceil(1 / (frequency * dt)))
-    smooth = np.asarray(sosfiltfilt(sections, frames, axis=0, padlen=pad))
-    jumps = is_step(recording.positions, units)
-    return np.where(jumps, frames, smooth)
+    # Mirrored at an end, a channel keeps its rest there; turned about it, its speed.
+    at_rest, moving = (
+        np.asarray(sosfiltfilt(sections, frames, axis=0, padtype=padding, padlen=pad))
+        for padding in ("even", "odd")
+    )
+    starts, ends = moving_ends(np.arange(len(frames)) * dt, frames, units)
+    smooth = np.where(starts | ends, moving, at_rest)
+    return np.where(is_step(recording.positions, units), frames, smooth)
 
 
 def _change(before: Frames, after: Frames) -> Float[np.ndarray, "2 D"]:

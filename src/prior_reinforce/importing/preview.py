@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Int
 
-from prior_reinforce.importing.preprocessing import Preprocessed, Selection
+from prior_reinforce.importing.inspection import Inspection, in_rows
+from prior_reinforce.importing.preprocessing import Preprocessed
 from prior_reinforce.importing.recording import Recording
-from prior_reinforce.importing.units import say_names
 from prior_reinforce.plans.motions import Demonstrations
 
 _COLUMNS = 4
@@ -29,10 +28,8 @@ class Preview:
 
     source: str
     """What was read, with its format."""
-    kept: Selection
-    """N recordings with the plan's channels."""
-    done: Preprocessed
-    """What became of them."""
+    found: Inspection
+    """The N recordings, and what became of them."""
     demonstrations: Demonstrations
     """The result."""
     outcomes_from: str
@@ -41,7 +38,7 @@ class Preview:
     @property
     def recordings(self) -> tuple[Recording, ...]:
         """N recordings with the plan's channels."""
-        return self.kept.recordings
+        return self.found.recordings
 
     @property
     def episodes(self) -> tuple[str, ...]:
@@ -49,34 +46,28 @@ class Preview:
         return tuple(recording.episode for recording in self.recordings)
 
     @property
+    def done(self) -> Preprocessed:
+        """How the recordings became plans."""
+        return self.found.done
+
+    @property
     def remarks(self) -> tuple[str, ...]:
         """What a person should look at: gaps, ends in mid-swing, messages skipped."""
-        return self.done.remarks
+        return self.found.remarks
 
     @property
     def text(self) -> str:
         """About ten lines: episodes, rate, trimming, resampling, outcomes, remarks."""
-        demos, form = self.demonstrations, self.demonstrations.format
+        demos = self.demonstrations
         outcomes = zip(demos.outcome_names, demos.outcome_units, demos.outcomes_seen.T, strict=True)
         ranges = ", ".join(f"{n} {v.min():.3g} to {v.max():.3g} {u}" for n, u, v in outcomes)
         rows = {
             "episodes": f"{demos.n} from {self.source}: {', '.join(self.episodes)}",
-            "rate": self._rate(),
-            "channels": ", ".join(
-                f"{n} [{u}]" if u == r else f"{n} [{u}, recorded in {r}]"
-                for n, u, r in zip(form.names, form.units, self.kept.recorded_units, strict=True)
-            ),
-            "still ends": self._trimming(),
-            "length": self._length(),
-            "noise": self._noise(),
-            "motion": self._motion(),
+            **self.found.rows,
             "outcomes": f"{ranges}, from {self.outcomes_from}",
             "coverage": self._coverage(),
-            "remarks": "none" if not self.remarks else f"{len(self.remarks)}",
         }
-        lines = [f"{name:<11} {text}" for name, text in rows.items()]
-        lines += [f"  - {remark}" for remark in self.remarks]
-        return "\n".join(lines)
+        return in_rows(rows, self.remarks)
 
     def draw(self, path: str | os.PathLike[str]) -> None:
         """Write the picture (PNG): every joint over time, and the outcomes with their hull."""
@@ -98,65 +89,6 @@ class Preview:
             "and as recorded (grey)"
         )
         figure.savefig(path, format="png")
-
-    def _rate(self) -> str:
-        recorded = _span((1 / recording.period for recording in self.recordings), ".4g")
-        dt = self.done.dt
-        clocks = " and ".join(dict.fromkeys(r.clock for r in self.recordings if r.clock))
-        by = f" ({clocks})" if clocks else ""
-        return f"recorded at {recorded} Hz{by}, plans at {1 / dt:.4g} Hz (dt {dt:.4g} s)"
-
-    def _trimming(self) -> str:
-        before = self.done.starts
-        after = [r.duration - end for r, end in zip(self.recordings, self.done.ends, strict=True)]
-        if max(*before, *after) <= 0:
-            return "nothing dropped"
-        return (
-            f"dropped {_span(before, '.2f')} s before and {_span(after, '.2f')} s after the motion"
-        )
-
-    def _length(self) -> str:
-        done, horizon = self.done, self.demonstrations.horizon
-        lengths = [end - start for start, end in zip(done.starts, done.ends, strict=True)]
-        held = f"; {done.held} hold their last pose" if done.held else ""
-        return (
-            f"motions of {_span(lengths, '.2f')} s, plans of {horizon} frames "
-            f"({(horizon - 1) * done.dt:.2f} s){held}"
-        )
-
-    def _noise(self) -> str:
-        form, done = self.demonstrations.format, self.done
-        noisiest = int(np.argmax(done.noise))
-        held = say_names([form.names[i] for i in done.held_channels]) or "no channel"
-        most = say_small(done.noise[noisiest], form.units[noisiest])
-        seen = (
-            f"up to {most} at rest ({form.names[noisiest]})"
-            if done.noise[noisiest] > 1e-9
-            else "none"
-        )
-        said = f"{seen}; {held} held"
-        if done.smoothed is None:
-            return said
-        rms, largest = done.smoothed[:, 0], done.smoothed[:, 1]
-        episode, channel = divmod(int(np.argmax(largest)), largest.shape[1])
-        unit = form.units[channel]
-        return (
-            f"{said}; smoothing changed plans by {say_small(rms.max(), unit)} rms, at most "
-            f"{say_small(largest[episode, channel], unit)} ({form.names[channel]} of "
-            f"{self.episodes[episode]})"
-        )
-
-    def _motion(self) -> str:
-        demos, form = self.demonstrations, self.demonstrations.format
-        ranges = np.ptp(demos.plans, axis=(0, 1))
-        most = int(np.argmax(ranges))
-        speeds = np.abs(np.diff(demos.plans, axis=1)).max(axis=1) / form.dt
-        episode, joint = np.unravel_index(int(np.argmax(speeds)), speeds.shape)
-        return (
-            f"{form.names[most]} moves most, over {ranges[most]:.3g} {form.units[most]}; fastest "
-            f"is {form.names[joint]} of {self.episodes[episode]}, {speeds[episode, joint]:.3g} "
-            f"{form.units[joint]}/s"
-        )
 
     def _coverage(self) -> str:
         demos, points = self.demonstrations, self.demonstrations.outcomes_seen
@@ -220,12 +152,6 @@ class Preview:
         axes.tick_params(labelsize=8)
 
 
-def say_small(value: float, unit: str) -> str:
-    """Say a small number: in mrad or mm where it is an angle or a length."""
-    thousandth = {"rad": "mrad", "m": "mm"}.get(unit)
-    return f"{1000 * value:.2g} {thousandth}" if thousandth else f"{value:.2g} {unit}"
-
-
 def hull_corners(points: PlanePoints) -> Corners:
     """Return indices of the corners of the points' convex hull, in order; none where it is flat."""
     from scipy.spatial import ConvexHull, QhullError
@@ -234,9 +160,3 @@ def hull_corners(points: PlanePoints) -> Corners:
         return np.asarray(ConvexHull(points).vertices)
     except (QhullError, ValueError):
         return np.zeros(0, dtype=int)
-
-
-def _span(values: Iterable[float], form: str) -> str:
-    ordered = sorted(values)
-    first, last = format(ordered[0], form), format(ordered[-1], form)
-    return first if first == last else f"{first} to {last}"

@@ -96,6 +96,10 @@ class Table:
         """Whether every cell of a column is a number."""
         return not np.any(np.isnan(_numeric(self.cells[column], self.decimal)))
 
+    def is_text(self, column: int) -> bool:
+        """Whether no cell of a column is a number."""
+        return bool(np.all(np.isnan(_numeric(self.cells[column], self.decimal))))
+
     def nanoseconds(self, column: int) -> Int[np.ndarray, " T"] | None:
         """Return dates or times of day from the first on, in [ns]; None where it holds others."""
         if self.is_number(column):

@@ -1,0 +1,91 @@
+"""What recordings hold is said before anything is taken in."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from prior_reinforce.importing import Preprocessing, import_demonstrations, inspect_recordings
+from prior_reinforce.importing.inspection import say_small
+from prior_reinforce.robots import robot_limits
+from tests.importing.recorded import JOINTS, N, sampled, write_npz, write_outcomes
+
+
+@pytest.fixture
+def folder(tmp_path):
+    return write_npz(tmp_path)
+
+
+def table(text, head):
+    """A table's rows by their first cell."""
+    lines = text.splitlines()
+    start = next(i for i, line in enumerate(lines) if line.startswith(head))
+    rows = {}
+    for line in lines[start + 1 :]:
+        if not line:
+            break
+        rows[line.split()[0]] = line.split()[1:]
+    return rows
+
+
+def test_episodes_and_channels_are_tabled_without_outcomes(folder):
+    found = inspect_recordings(folder, preprocessing=Preprocessing(trim=False))
+    episodes = table(found.text, "episode ")
+    assert episodes["throw_1"] == ["181", "100", "1.80", "0.00", "0.00"]
+    channels = table(found.text, "channel ")
+    assert channels["joint3"][-1] == "held"
+    assert channels["joint4"][:4] == ["joint4", "rad", "-2", "-1"]
+    assert found.robot is None
+    assert "limits" not in found.rows
+
+
+def test_what_would_be_cut_is_told(folder):
+    cut = table(inspect_recordings(folder).text, "episode ")["throw_0"][-2:]
+    assert all(float(seconds) > 0.1 for seconds in cut)
+
+
+def test_guesses_are_named_with_the_options_that_settle_them(tmp_path):
+    for i in range(N):
+        t, q = sampled(i, 100)
+        np.savez(tmp_path / f"{i}.npz", t=1000 * t, q=np.rad2deg(q), joint_names=JOINTS)
+    found = inspect_recordings(tmp_path)
+    assert [doubt.option for doubt in found.doubts] == ["--time-unit ms", "--units deg"]
+    assert "(--time-unit ms)" in found.text
+    assert table(found.text, "channel ")["joint4"][:3] == ["joint4", "rad,", "from"]
+    assert found.recordings[0].duration == pytest.approx(1.7)
+
+
+def test_every_demonstration_is_held_against_the_robots_limits(folder):
+    panda = robot_limits("panda")
+    write_outcomes(folder)
+    passing = import_demonstrations(folder, robot=panda).preview
+    assert "panda: all 6 demonstrations pass" in passing.text
+    # Joint 6 of throw i turns 0.9 (1 + i / 20) rad in 1 + (i % 3) / 10 s; its peak is 15/8 of that
+    # on average, so 1.94 rad/s in throw 3 and 1.69 rad/s in throw 0.
+    slow = replace(panda, velocity=np.array([2.175] * 5 + [1.9, 2.61]))
+    found = inspect_recordings(folder, robot=slow)
+    assert [report.refused for report in found.reports] == [i == 3 for i in range(N)]
+    assert found.rows["limits"].startswith("panda: 1 of 6 demonstrations break a limit")
+    assert found.remarks[0].startswith("the gate refuses velocity: throw_3 (joint6 at 1.94")
+
+
+def test_noise_that_breaks_a_limit_is_offered_smoothing(tmp_path):
+    rng = np.random.default_rng(0)
+    for i in range(2):
+        t, q = sampled(i, 1000)
+        noisy = q + rng.normal(0, 1e-4, q.shape)
+        np.savez(tmp_path / f"{i}.npz", t=t, q=noisy, joint_names=JOINTS)
+    panda = robot_limits("panda")
+    found = inspect_recordings(tmp_path, robot=panda)
+    assert any(
+        r.startswith("the gate refuses acceleration") and r.endswith("try --smooth 20")
+        for r in found.remarks
+    )
+    smooth = inspect_recordings(tmp_path, robot=panda, preprocessing=Preprocessing(smooth=20.0))
+    assert not any(r.refused for r in smooth.reports)
+
+
+def test_small_numbers_are_said_in_thousandths():
+    assert say_small(2.13e-5, "rad") == "0.021 mrad"
+    assert say_small(0.0012, "m") == "1.2 mm"
+    assert say_small(3.0, "counts") == "3 counts"
