@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import pty
+import re
 import sys
 
 import imageio_ffmpeg
@@ -168,3 +169,29 @@ def test_a_film_that_is_no_mp4_is_refused_before_anything_is_written(tmp_path, c
 def test_a_demonstration_that_is_not_there_is_named(capsys):
     assert main(["rollout", "--demonstration", "6"]) == 2
     assert "--demonstration must be 0 to 5, got 6" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("task", "said"),
+    [("zoo-slide", "cm ahead"), ("zoo-arrival", "arrival"), ("zoo-gripper", "cm up")],
+)
+def test_a_task_without_pictures_is_adapted_and_says_so_in_a_line(tmp_path, capsys, task, said):
+    chosen = ["--task", task, "--demonstrations", "clean-5-1", "--generator", "interpolation"]
+    assert main(["adapt", *chosen, "--perception", "exact", "--out", str(tmp_path)]) in (0, 1)
+    told = capsys.readouterr().out
+    assert f"no film: {task} has no pictures" in told
+    assert said in told
+    assert (tmp_path / "report.html").is_file()
+
+
+def test_rollouts_are_printed_in_the_outcomes_units(capsys):
+    chosen = ["--task", "zoo-arrival", "--demonstrations", "clean-5-1", "--demonstration", "0"]
+    assert main(["rollout", *chosen, "--repeats", "2"]) == 0
+    told = capsys.readouterr().out
+    assert re.search(r"x \d\.\d{3} m, arrival \d\.\d{3} s", told)
+    assert re.search(r"spread \(sd\): \d\.\d\d cm, \d\.\d{4} s", told)
+
+
+def test_a_set_that_the_task_does_not_have_is_named_with_those_it_has(capsys):
+    assert main(["adapt", "--task", "zoo-lob"]) == 2
+    assert "no demonstration set 'A'; write KIND-COUNT-SEED" in capsys.readouterr().err

@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from prior_reinforce.tasks.zoo.physics import GRAVITY
-from prior_reinforce.tasks.zoo.pushes import Push, Slide
+from prior_reinforce.tasks.zoo.pushes import Curl, Push, Slide, Strike
 
 
 def outcome(task, plan):
@@ -92,3 +92,70 @@ def test_a_worn_table_moves_a_disc_by_centimetres():
     assert np.ptp(off) > 0.02
     later = np.concatenate([np.repeat(plans[0][:1], 6, axis=0), plans[0][:-6]])
     np.testing.assert_allclose(outcome(worn, later), outcome(worn, plans[0]), atol=1e-3)
+
+
+def stroke(task, spin):
+    """Increments of x = v t - c t^3 under a constant spin, and where and how fast it lets go."""
+    v, c = 1.2, 0.4
+    times = np.arange(60) * task.format.dt
+    path = np.stack([v * times - c * times**3, 0 * times, spin * times], axis=1)
+    time = task.friction * GRAVITY / (6 * c)
+    place = v * time - c * time**3
+    return np.diff(path, axis=0, prepend=path[:1]), place, v - 3 * c * time**2
+
+
+@pytest.mark.parametrize("spin", [0.0, 0.8, -2.0])
+def test_a_curling_stone_stops_where_its_equation_of_motion_does(spin):
+    task = Curl()
+    plan, place, speed = stroke(task, spin)
+    braking = task.friction * GRAVITY
+
+    def motion(_, state):
+        _, _, v, heading = state
+        return [v * np.cos(heading), v * np.sin(heading), -braking, task.curl * spin / v]
+
+    until = speed / braking * (1 - 1e-6)
+    path = solve_ivp(motion, (0, until), [place, 0.0, speed, 0.0], rtol=1e-9, atol=1e-12)
+    stopped = task._execute(plan, np.zeros(2))
+    np.testing.assert_allclose(stopped, path.y[:2, -1], atol=1e-5)
+
+
+def test_a_stone_that_is_spun_to_the_left_curls_to_the_left():
+    task = Curl()
+    left, straight, right = (task._execute(stroke(task, s)[0], np.zeros(2)) for s in (1, 0, -1))
+    assert left[1] > 0.05
+    np.testing.assert_allclose(right, left * [1, -1], atol=1e-9)
+    assert straight[0] > left[0]
+
+
+def test_a_putt_leaves_the_putter_with_its_speed_times_one_and_a_half():
+    task = Strike()
+    task.bandwidth = None
+    pace = -2.0  # the arm hangs: it swings forward as it leans back
+    contact = np.arcsin(task.radius / 0.60)
+    plan = np.zeros((120, 4))
+    plan[:, 1] = contact + pace * (np.arange(120) * 0.01 - 0.5)
+    # The face is level where the arm hangs; its way to the ball is shorter by the lean's cosine.
+    face_speed = 0.60 * abs(pace) * np.cos(contact)
+    rolled = (1.5 * face_speed) ** 2 / (2 * task.friction * GRAVITY)
+    assert task.execute(plan) == pytest.approx([rolled, 0.0], abs=1e-4)
+    aside = plan + np.eye(4)[0] * 0.4
+    np.testing.assert_allclose(
+        task.execute(aside), rolled * np.array([np.cos(0.4), np.sin(0.4)]), atol=1e-4
+    )
+
+
+def test_a_putter_that_passes_above_the_ball_misses_it():
+    task = Strike()
+    plan = np.zeros((120, 4))
+    plan[:, 1] = 0.6 - 2.0 * np.arange(120) * 0.01
+    plan[:, 2] = 1.2  # the elbow bent: the putter is 12 cm up
+    assert not task.rollout(plan[None], None)[0].valid
+
+
+@pytest.mark.parametrize("task", [Curl(), Strike()], ids=lambda task: task.name)
+def test_a_stroke_is_the_same_whenever_it_begins(task):
+    plan = task.demonstrations("clean-6-0").plans[0]
+    first = plan[:1] if isinstance(task, Strike) else np.zeros((1, 3))
+    later = np.concatenate([np.repeat(first, 5, axis=0), plan[:-5]])
+    np.testing.assert_allclose(outcome(task, later), outcome(task, plan), atol=2e-4)

@@ -5,7 +5,16 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from prior_reinforce.tasks.zoo.physics import GRAVITY, flight
-from prior_reinforce.tasks.zoo.throws import GripperThrow, Lob, Scoop
+from prior_reinforce.tasks.zoo.throws import (
+    Arrival,
+    Bounce,
+    Catapult,
+    Drag,
+    GripperThrow,
+    Hoop,
+    Lob,
+    Scoop,
+)
 
 
 def outcome(task, plan):
@@ -93,9 +102,81 @@ def test_a_gripper_that_stays_shut_keeps_the_ball():
     np.testing.assert_array_equal(rollout.outcome, np.zeros(3))
 
 
-@pytest.mark.parametrize("task", [Lob(), Scoop(), GripperThrow()], ids=lambda task: task.name)
+def test_a_ball_that_bounces_lands_where_two_parabolas_end():
+    task = Bounce()
+    task.bandwidth = None
+    plan = circling(task, task.latch, 4.0, 60, at=0.4)
+    start, velocity = on_a_circle(task.latch, 4.0, radius=0.6, centre=0.35)
+    (first, time) = flight(start, velocity)
+    up = task.restitution * (GRAVITY * time - velocity[2])
+    second = first[0] + task.slip * velocity[0] * 2 * up / GRAVITY
+    np.testing.assert_allclose(outcome(task, plan), [second, 0.0], atol=1e-5)
+
+
+def test_a_light_ball_falls_shorter_than_a_heavy_one_from_the_same_swing():
+    light, heavy = Drag(), Drag()
+    heavy.drag = 0.0
+    plan = np.zeros((40, 2))
+    plan[:, 0] = light.latch + 4.0 * (np.arange(40) * light.format.dt - 0.5)
+    start, velocity = on_a_circle(light.latch, 4.0, radius=0.75, centre=0.5)
+    assert outcome(heavy, plan)[0] == pytest.approx(flight(start, velocity)[0][0], abs=1e-4)
+    assert outcome(light, plan)[0] < 0.9 * outcome(heavy, plan)[0]
+
+
+def test_a_throw_that_begins_later_lands_in_the_same_place_later():
+    task = Arrival()
+    plan = circling(task, task.latch, 4.0, 80, at=0.7)
+    start, velocity = on_a_circle(task.latch, 4.0, radius=0.45, centre=0.65)
+    place, time = flight(start, velocity)
+    np.testing.assert_allclose(outcome(task, plan), [place[0], 0.7 + time], atol=1e-5)
+    plan = task.demonstrations("clean-6-0").plans[0]
+    moved = outcome(task, later(plan, 4)) - outcome(task, plan)
+    np.testing.assert_allclose(moved, [0.0, 4 * task.format.dt], atol=1e-6)
+
+
+def test_a_ball_passes_a_window_where_the_parabola_does():
+    task = Hoop()
+    plan = circling(task, -0.5, 4.0, 60, at=30 * task.format.dt)
+    plan[:, 6] = np.where(np.arange(60) < 29.5, 1.0, 0.0)
+    plan[30, 6] = 0.5
+    hand = task.arm.hand(plan[:, :6])
+    radius, lean = (
+        np.hypot(hand[30, 0], hand[30, 2] - 0.16),
+        np.arctan2(hand[30, 0], hand[30, 2] - 0.16),
+    )
+    start, velocity = on_a_circle(lean, 4.0, radius, centre=0.16)
+    time = (task.window - start[0]) / velocity[0]
+    height = start[2] + velocity[2] * time - GRAVITY * time**2 / 2
+    np.testing.assert_allclose(outcome(task, plan), [hand[30, 1], height, time], atol=1e-4)
+
+
+def test_a_catapult_depends_on_its_draw_and_elevation_at_the_trigger_alone():
+    task = Catapult()
+    plan = np.zeros((40, 3))
+    plan[:, :2] = np.random.default_rng(0).uniform(size=(40, 2))
+    plan[19:21, :2] = [0.12, 0.6]
+    plan[20:, 2] = 1.0
+    speed = task.stiffness * 0.12
+    velocity = speed * np.array([np.cos(0.6), 0.0, np.sin(0.6)])
+    landed = flight(np.array([0.0, 0.0, task.height]), velocity)[0][0]
+    assert outcome(task, plan)[0] == pytest.approx(landed)
+
+
+@pytest.mark.parametrize(
+    "task", [Bounce(), Drag(), GripperThrow(), Hoop(), Catapult()], ids=lambda task: task.name
+)
+def test_a_throw_without_a_clock_is_the_same_whenever_it_begins(task):
+    plan = task.demonstrations("clean-6-0").plans[0]
+    np.testing.assert_allclose(outcome(task, later(plan, 3)), outcome(task, plan), atol=2e-4)
+
+
+@pytest.mark.parametrize(
+    "task",
+    [Lob(), Scoop(), GripperThrow(), Bounce(), Drag(), Arrival(), Hoop(), Catapult()],
+    ids=lambda task: task.name,
+)
 def test_repeated_throws_spread_by_less_than_the_tolerance(task):
     plans = np.repeat(task.demonstrations("clean-6-0").plans[:1], 50, axis=0)
     rollouts = task.rollout(plans, np.random.default_rng(0))
     spread = np.linalg.norm(np.std([r.outcome for r in rollouts], axis=0))
-    assert 0.05 * task.tolerance < spread < 0.5 * task.tolerance
+    assert 0.05 * task.tolerance < spread < 0.7 * task.tolerance

@@ -18,7 +18,7 @@ from prior_reinforce.tasks.zoo.human import Strategy, demonstrate
 
 
 class ZooTask(Task):
-    """A small task that is computed, not drawn; a rollout takes about a millisecond.
+    """A small task that is computed, not drawn; a rollout takes milliseconds.
 
     A lost object's outcome is zero in every component, where no region of the zoo is.
     """
@@ -65,6 +65,10 @@ class ZooTask(Task):
         """The plan that a led path is recorded as; here the path itself."""
         return path
 
+    def held(self, plan: Frames) -> Float[np.ndarray, " D"]:
+        """The frame that stops the arm after the plan; here its last."""
+        return plan[-1]
+
     def aims(self, shares: Point) -> Point:
         """Aims at shares of their range."""
         low, high = np.array(self.aim_range).T
@@ -82,7 +86,7 @@ class ZooTask(Task):
         joints = np.array([unit == "rad" for unit in self.format.units])
         plan = plan + self.pose * joints * draws[: len(joints)]
         if self.bandwidth is not None:
-            still = np.tile(plan[-1:], (round(self.lead_out / self.format.dt), 1))
+            still = np.tile(self.held(plan), (round(self.lead_out / self.format.dt), 1))
             plan = follow(np.vstack([plan, still]), self.format.dt, self.bandwidth)
         outcome = self._execute(plan, draws[len(joints) :] * self.spread)
         return None if outcome is None else np.array(outcome, dtype=np.float64)

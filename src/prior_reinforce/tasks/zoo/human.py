@@ -68,11 +68,14 @@ class Strategy:
     """In order of their starts; the last one or two decide the outcome."""
     pause_at: float
     """Between its two phases, where a person may pause, in [s]."""
+    settle: float = 0.0
+    """Rest at the end that belongs to the motion: what is done early, for a person who aims at a
+    time, in [s]."""
 
     @property
     def duration(self) -> float:
         """Of the motion, in [s]."""
-        return max(move.start + move.duration for move in self.moves)
+        return max(move.start + move.duration for move in self.moves) + self.settle
 
 
 def reach_and_strike(

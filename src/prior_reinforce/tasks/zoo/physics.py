@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import CubicHermiteSpline, CubicSpline
 
 GRAVITY = 9.81
 """In [m/s^2]."""
@@ -106,3 +106,88 @@ def flight(start: Place, velocity: Place, height: float = 0.0) -> tuple[Place, f
 def on_parabola(start: Place, velocity: Place, time: float) -> Place:
     """Place after a time of free flight, in [m]."""
     return start + velocity * time - np.array([0.0, 0.0, GRAVITY * time**2 / 2.0])
+
+
+def flight_in_air(start: Place, velocity: Place, drag: float, step: float = 0.01) -> Place | None:
+    """Where a ball comes down to z = 0 against quadratic drag; None if it begins below.
+
+    Args:
+        start: In [m].
+        velocity: In [m/s].
+        drag: Deceleration over speed squared, in [1/m].
+        step: Of the classical Runge-Kutta rule, in [s].
+    """
+    if start[2] <= 0.0:
+        return None
+
+    def slope(state: Float[np.ndarray, "6"]) -> Float[np.ndarray, "6"]:
+        v = state[3:]
+        slower = -drag * math.sqrt(float(v @ v)) * v
+        slower[2] -= GRAVITY
+        return np.concatenate([v, slower])
+
+    state = np.concatenate([start, velocity])
+    while True:
+        a = slope(state)
+        b = slope(state + step / 2.0 * a)
+        c = slope(state + step / 2.0 * b)
+        d = slope(state + step * c)
+        after = state + step / 6.0 * (a + 2.0 * b + 2.0 * c + d)
+        if after[2] < 0.0:
+            # Between two steps the height is a cubic in all but the sixth digit.
+            times = np.array([0.0, step])
+            fall = CubicHermiteSpline(times, [state[2], after[2]], [state[5], after[5]])
+            down = max(float(t) for t in fall.solve(0.0, extrapolate=False))
+            along = CubicHermiteSpline(times, [state[:3], after[:3]], [state[3:], after[3:]])
+            return np.asarray(along(down))
+        state = after
+
+
+def hung(pivot: CubicSpline, length: float, until: float, step: float) -> tuple[Place, Place]:
+    """Place and velocity of a mass that hangs on a taut string from a moving pivot, from rest.
+
+    With r from the pivot and G = g - a the gravity that the pivot feels, r'' = G + s r, where s
+    keeps |r| the string's length: s = -(|r'|^2 + G r) / |r|^2.
+
+    Args:
+        pivot: Path of the pivot, in [m].
+        length: Of the string, in [m].
+        until: When to look, in [s].
+        step: Of the classical Runge-Kutta rule, about, in [s].
+    """
+    n = max(math.ceil(until / step), 1)
+    h = until / n
+    felt = -pivot(np.linspace(0.0, until, 2 * n + 1), 2)
+    felt[:, 2] -= GRAVITY
+    rows: list[tuple[float, float, float]] = [tuple(row) for row in felt.tolist()]
+    r, v = (0.0, 0.0, -length), (0.0, 0.0, 0.0)
+    for i in range(n):
+        first = _pulled(r, v, rows[2 * i])
+        r2, v2 = _on(r, v, h / 2), _on(v, first, h / 2)
+        second = _pulled(r2, v2, rows[2 * i + 1])
+        r3, v3 = _on(r, v2, h / 2), _on(v, second, h / 2)
+        third = _pulled(r3, v3, rows[2 * i + 1])
+        r4, v4 = _on(r, v3, h), _on(v, third, h)
+        fourth = _pulled(r4, v4, rows[2 * i + 2])
+        r = _on(r, _weighed(v, v2, v3, v4), h)
+        v = _on(v, _weighed(first, second, third, fourth), h)
+    return pivot(until) + r, pivot(until, 1) + v
+
+
+_Triple = tuple[float, float, float]
+
+
+def _on(a: _Triple, b: _Triple, h: float) -> _Triple:
+    return a[0] + h * b[0], a[1] + h * b[1], a[2] + h * b[2]
+
+
+def _weighed(a: _Triple, b: _Triple, c: _Triple, d: _Triple) -> _Triple:
+    x, y, z = ((p + 2 * q + 2 * r + s) / 6 for p, q, r, s in zip(a, b, c, d, strict=True))
+    return x, y, z
+
+
+def _pulled(r: _Triple, v: _Triple, felt: _Triple) -> _Triple:
+    squared = r[0] ** 2 + r[1] ** 2 + r[2] ** 2
+    speed = v[0] ** 2 + v[1] ** 2 + v[2] ** 2
+    s = -(speed + felt[0] * r[0] + felt[1] * r[1] + felt[2] * r[2]) / squared
+    return _on(felt, r, s)
