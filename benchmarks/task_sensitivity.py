@@ -59,13 +59,15 @@ def spread(rollouts: list[Rollout], copies: int) -> str:
 def main() -> None:
     """Measure every task named."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("tasks", nargs="*", metavar="TASK", help="all when none is named")
+    parser.add_argument(
+        "tasks", nargs="*", metavar="TASK", help="all that have a scene when none is named"
+    )
     parser.add_argument("--copies", type=int, default=8, help="of each plan, for each kind")
     parser.add_argument("--seed", type=int, default=0)
     arguments = parser.parse_args()
     if arguments.copies < 2:
         parser.error("--copies must be at least 2, or there is no spread")
-    for name in arguments.tasks or list(TASKS.members):
+    for name in arguments.tasks or [each for each in TASKS.members if TASKS.kind(each).scene]:
         task, rng = make_task(name), np.random.default_rng(arguments.seed)
         plans = np.concatenate([task.demonstrations(key).plans for key in task.demonstration_sets])
         outcomes = np.array([rollout.outcome for rollout in task.rollout(plans, None)])
