@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
+import gzip
+import json
+import socketserver
+import threading
+import time
+from contextlib import contextmanager, suppress
+
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from prior_reinforce.errors import ConfigurationError, EndpointError
-from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
+from prior_reinforce.perception.vlm_client import OpenAIClient, VisionLanguageModelConfig
 from prior_reinforce.rollouts import Rollout
 from tests.perception.slanted_table import BALL, GOAL
 from tests.perception.vision_server import VisionServer
@@ -96,3 +105,180 @@ def test_a_server_on_this_machine_is_asked_without_the_proxy_for_others(
 def test_settings_out_of_range_are_refused(settings, message):
     with pytest.raises(ConfigurationError, match=message):
         VisionLanguageModelConfig(**settings)
+
+
+SQUARE = np.zeros((8, 8, 3), dtype=np.uint8)
+OK = b"HTTP/1.1 200 OK\r\nContent-Type: application/json\r\n"
+
+
+@contextmanager
+def endpoint(reply):
+    """An address where `reply` gets each connection's writing end after the request's head."""
+    requests = []
+
+    class Handler(socketserver.StreamRequestHandler):
+        def handle(self):
+            head = []
+            while (line := self.rfile.readline()).strip():
+                head.append(line.decode())
+            requests.append(head)
+            length = next(line for line in head if line.lower().startswith("content-length"))
+            self.rfile.read(int(length.partition(":")[2]))
+            with suppress(OSError):  # nobody listens any more
+                reply(self.wfile)
+
+    class Server(socketserver.ThreadingTCPServer):
+        daemon_threads = True
+
+    with Server(("127.0.0.1", 0), Handler) as server:
+        thread = threading.Thread(target=server.serve_forever, args=(0.02,))
+        thread.start()
+        try:
+            yield f"127.0.0.1:{server.server_address[1]}/v1", requests
+        finally:
+            server.shutdown()
+            thread.join()
+
+
+def ask(address, **settings):
+    how = {"max_retries": 0, "timeout": 10.0} | settings
+    client = OpenAIClient(VisionLanguageModelConfig(base_url=f"http://{address}", **how))
+    try:
+        return client.ask("the ball", SQUARE)
+    finally:
+        client.close()
+
+
+def body(content, **head):
+    data = content if isinstance(content, bytes) else json.dumps(content).encode()
+    more = "".join(f"{name.replace('_', '-')}: {value}\r\n" for name, value in head.items())
+    return OK + more.encode() + f"Content-Length: {len(data)}\r\n\r\n".encode() + data
+
+
+@pytest.mark.parametrize(("begin", "part"), [(b"", b"X: y\r\n"), (b"\r\n", b" ")])
+def test_an_answer_that_trickles_in_is_given_up(begin, part):
+    """A byte before each limit from byte to byte; in the head, or in the body."""
+
+    def trickle(file):
+        file.write(OK + begin)
+        while True:
+            file.write(part)
+            time.sleep(0.05)
+
+    with endpoint(trickle) as (address, _), pytest.raises(EndpointError, match="raise timeout"):
+        ask(address, timeout=0.5)
+
+
+def test_an_endless_answer_is_not_read_to_its_end():
+    written = []
+
+    def flood(file):
+        file.write(OK + b"\r\n")
+        for _ in range(1000):
+            file.write(b" " * 100_000)
+            written.append(100_000)
+
+    with endpoint(flood) as (address, _), pytest.raises(EndpointError, match="4000000 bytes"):
+        ask(address)
+    assert sum(written) < 50_000_000
+
+
+@pytest.mark.parametrize("status", [b"200 OK", b"500 Oh"])
+def test_an_error_is_bounded_as_an_answer_is(status):
+    content = body(b" " * 5_000_000).replace(b"200 OK", status)
+    with (
+        endpoint(lambda file: file.write(content)) as (address, _),
+        pytest.raises(EndpointError, match="4000000 bytes"),
+    ):
+        ask(address)
+
+
+def test_a_packed_answer_is_not_unpacked():
+    content = body(gzip.compress(b" " * 10_000_000), Content_Encoding="gzip")
+    with (
+        endpoint(lambda file: file.write(content)) as (address, requests),
+        pytest.raises(EndpointError, match="packed"),
+    ):
+        ask(address)
+    assert any("accept-encoding: identity" in line.lower() for line in requests[0])
+
+
+def test_the_picture_goes_to_no_other_host():
+    with endpoint(lambda file: file.write(body({}))) as (elsewhere, requests):
+        moved = f"Moved\r\nLocation: http://{elsewhere}".encode()
+        content = body({}).replace(b"200 OK", b"307 " + moved)
+        with (
+            endpoint(lambda file: file.write(content)) as (address, _),
+            pytest.raises(EndpointError, match="HTTP 307"),
+        ):
+            ask(address)
+        assert not requests
+
+
+@pytest.mark.parametrize("status", [b"200 OK", b"400 Bad", b"401 No", b"500 Oh"])
+def test_a_key_that_is_sent_back_is_not_kept(monkeypatch, status):
+    key = "sk-very-secret-0123456789"
+    monkeypatch.setenv("A_KEY", key)
+    said = f"you sent Bearer {key}"
+    completion = {"choices": [{"message": {"content": said, "reasoning_content": said}}]}
+    content = body(completion | {"error": {"message": said}}).replace(b"200 OK", status)
+    with endpoint(lambda file: file.write(content)) as (address, requests):
+        try:
+            found = repr(ask(address, api_key_variable="A_KEY"))
+        except EndpointError as error:
+            found = f"{error} {error.__cause__!r} {error.__suppress_context__}"
+    assert any(key in line for line in requests[0])
+    assert key not in found
+
+
+def test_a_password_in_the_address_is_in_no_message():
+    with (
+        endpoint(lambda file: file.write(body({}))) as (address, _),
+        pytest.raises(EndpointError) as caught,
+    ):
+        ask(f"user:hunter2@{address}?token=hunter3")
+    assert "hunter" not in str(caught.value)
+    assert address.partition("/")[0] in str(caught.value)
+
+
+@pytest.mark.parametrize("url", ["", "127.0.0.1:8000", "http://", "http://[::1", "http://a:b/v1"])
+def test_what_is_no_address_is_refused(url):
+    with pytest.raises(ConfigurationError, match="is no address"):
+        VisionLanguageModelConfig(base_url=url)
+
+
+anything = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=20),
+    lambda each: (
+        st.lists(each, max_size=3) | st.dictionaries(st.text(max_size=9), each, max_size=3)
+    ),
+    max_leaves=6,
+)
+messages = st.fixed_dictionaries(
+    {}, optional={"content": anything, "reasoning_content": anything, "role": anything}
+)
+choices = st.fixed_dictionaries(
+    {}, optional={"message": messages | anything, "finish_reason": anything, "index": anything}
+)
+replies = st.fixed_dictionaries({}, optional={"choices": st.lists(choices | anything) | anything})
+
+
+@settings(
+    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+@given(st.one_of(replies, anything, st.binary(max_size=30)))
+def test_any_reply_is_an_answer_or_a_failed_reading(reply):
+    content = reply if isinstance(reply, bytes) else json.dumps(reply).encode()
+    with endpoint(lambda file: file.write(body(content))) as (address, _):
+        try:
+            said = ask(address).text
+        except EndpointError as error:
+            said = str(error).replace("\n", "more than a line")
+    assert isinstance(said, str)
+    assert "more than a line" not in said
+
+
+def test_a_reply_nested_beyond_all_depth_is_a_failed_reading():
+    content = body(b'{"choices":' + b"[" * 100_000 + b"]" * 100_000 + b"}")
+    with endpoint(lambda file: file.write(content)) as (address, _), pytest.raises(EndpointError):
+        ask(address)

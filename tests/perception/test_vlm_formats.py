@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from prior_reinforce.perception.vlm_formats import (
     FORMATS,
@@ -108,6 +112,43 @@ def test_the_scale_belongs_to_the_family():
     assert read_box(answer, FORMATS["qwen2.5-vl"], (504, 700)) == EXPECTED
     with pytest.raises(UnreadableAnswerError, match=r"ends at \(280, 700\)"):
         read_box(answer, FORMATS["qwen2.5-vl"], (280, 700))
+
+
+@pytest.mark.parametrize(
+    "answer",
+    [
+        "[" * 300_000,
+        "1" * 300_000,
+        "[1, 2, 3, 4] " * 20_000,
+        " " * 300_000 + "x",
+        "[" * 19_000,
+        "1" * 19_000,
+        "1, " * 6_000,
+        "[1,2,3,4]x" * 1_900,
+        "<|begin_of_box|>" * 1_200,
+        "<|" + "a" * 19_000,
+    ],
+)
+def test_no_answer_takes_long_to_search(answer):
+    """None of these ended within a minute, or their like at this length took seconds."""
+    with suppress(UnreadableAnswerError):
+        read_box(answer, GLM, (1000, 1000))
+
+
+def test_a_number_is_never_read_from_its_middle():
+    with pytest.raises(UnreadableAnswerError, match="no box"):
+        read_box("[1000000000100, 200, 300, 500]", GLM, (1000, 1000))
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.text(alphabet="[](){}<>,.-0123456789 |abox_nd", max_size=300))
+def test_any_text_is_a_box_in_the_picture_or_unreadable(text):
+    try:
+        left, top, right, bottom = read_box(text, GLM, (640, 480))
+    except UnreadableAnswerError:
+        return
+    assert 0 <= left < right <= 640
+    assert 0 <= top < bottom <= 480
 
 
 @pytest.mark.parametrize("width", [280, 640, 896, 1000, 1920, 6000])

@@ -17,7 +17,7 @@ from prior_reinforce.errors import ConfigurationError, FileFormatError, InvalidG
 from prior_reinforce.files import claim_folder
 from prior_reinforce.generators import GENERATORS, make_generator
 from prior_reinforce.perception import PERCEPTIONS, make_perception
-from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
+from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig, without_secrets
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.tasks import TASKS, make_task
 
@@ -216,7 +216,7 @@ class Adapt(Simulated):
 
     def _seen_by(self) -> str:
         if self.perception.split(",")[0] == "vlm":
-            return f"{self.perception}, {self.vlm.model} at {self.vlm.base_url}"
+            return f"{self.perception}, {self.vlm.model} at {without_secrets(self.vlm.base_url)}"
         return self.perception
 
     def _goals(self, task: Task, demonstrations: Demonstrations) -> Points:

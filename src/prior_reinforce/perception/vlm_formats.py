@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass
+from itertools import accumulate
 from typing import Literal
 
 from prior_reinforce.errors import PerceptionFailedError
@@ -102,7 +103,9 @@ def read_box(answer: str, box_format: BoxFormat, size: tuple[int, int]) -> Box:
         NotInPictureError: The answer is an empty list.
         UnreadableAnswerError: No box, several at once, or one that cannot be in the picture.
     """
-    said = _without_thinking(answer)
+    said = " ".join(_without_thinking(answer).split())
+    if len(said) > _LONGEST:
+        raise UnreadableAnswerError(f"an answer of {len(said)} characters to a plain question")
     marked = _MARKED.findall(said)
     boxes = _last_boxes(marked[-1] if marked else said)
     if boxes is None and marked:
@@ -116,9 +119,12 @@ def read_box(answer: str, box_format: BoxFormat, size: tuple[int, int]) -> Box:
     return _in_pixels(boxes[0], box_format, size)
 
 
-_NUMBER = r"(-?\d+(?:\.\d+)?)"
-_BETWEEN = r"\s*[\])>]?\s*,\s*[\[(<]?\s*"  # "(x1, y1), (x2, y2)" counts as one box
-_BOX_OR_EMPTY = re.compile(_BETWEEN.join([_NUMBER] * 4) + r"|\[[\s\[\]]*\]")
+_LONGEST = 20_000
+"""Characters of an answer that is read, without its thinking; ours: a box takes fifty."""
+# Every part has a limit, so that no answer takes long to search; white space is single by then.
+_NUMBER = r"(-?(?<![\d.])\d{1,9}(?:\.\d{1,20})?(?![\d]))"
+_BETWEEN = r" ?[\])>]? ?, ?[\[(<]? ?"  # "(x1, y1), (x2, y2)" counts as one box
+_BOX_OR_EMPTY = re.compile(_BETWEEN.join([_NUMBER] * 4) + r"|\[[ \[\]]{0,40}\]")
 _MARKED = re.compile(
     r"<\|(?:begin_of_box|box_start)\|>(.*?)(?:<\|(?:end_of_box|box_end)\|>|\Z)", re.DOTALL
 )
@@ -140,14 +146,15 @@ def _last_boxes(said: str) -> list[tuple[float, ...]] | None:
     Boxes belong to one list if they share an outer bracket, or follow each other with nothing but
     separators between them.
     """
-    text = _MARKER.sub(" ", said)
+    text = " ".join(_MARKER.sub(" ", said).split())
+    depths = list(accumulate((c in "[({") - (c in "])}") for c in text))
     last: list[tuple[float, ...]] | None = None
     end = None
     for found in _BOX_OR_EMPTY.finditer(text):
         if found[1] is None:
             last, end = [], None
             continue
-        if last is None or end is None or not _same_list(text, end, found.start()):
+        if last is None or end is None or not _same_list(text, depths, end, found.start()):
             last = []
         numbers = tuple(map(float, found.groups()))
         if numbers not in last:
@@ -156,16 +163,11 @@ def _last_boxes(said: str) -> list[tuple[float, ...]] | None:
     return last
 
 
-def _same_list(text: str, end: int, start: int) -> bool:
+def _same_list(text: str, depths: list[int], end: int, start: int) -> bool:
     between = text[end:start]
     if not re.search(r"[^\s,;\[\](){}<>]", between):
         return True
-    depth = sum((char in "[({") - (char in "])}") for char in text[:end])
-    for char in between:
-        depth += (char in "[({") - (char in "])}")
-        if depth <= 0:
-            return False
-    return True
+    return min(depths[end:start]) > 0
 
 
 def _in_pixels(numbers: tuple[float, ...], box_format: BoxFormat, size: tuple[int, int]) -> Box:

@@ -325,6 +325,7 @@ class Workspace:
         from prior_reinforce.robots.executors.command import (
             Interruptions,
             check_command,
+            hide_secrets,
             run_command,
         )
         from prior_reinforce.robots.executors.lock import executing_lock
@@ -338,9 +339,9 @@ class Workspace:
                 if verdict is not None:
                     verdict.require()
             else:
-                session.begin_execution(number, command)  # refuses, and says why
+                session.begin_execution(number, "")  # refuses, and says why
             folder = self.store.make_execution_folder(number)
-            session.begin_execution(number, command, folder.name)
+            session.begin_execution(number, hide_secrets(command), folder.name)
             plan_file = PlanFile(self.plan_path(trial), trial.kept["plan_sha256"])
             try:
                 result = run_command(

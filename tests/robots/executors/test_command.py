@@ -11,7 +11,11 @@ import pytest
 from prior_reinforce.errors import ConfigurationError, FileFormatError
 from prior_reinforce.plans.files import write_plan
 from prior_reinforce.plans.motions import Plan, PlanFormat
-from prior_reinforce.robots.executors.command import run_command, split_command
+from prior_reinforce.robots.executors.command import (
+    hide_secrets,
+    run_command,
+    split_command,
+)
 
 PYTHON = sys.executable
 
@@ -131,3 +135,22 @@ def test_commands_that_cannot_run(plan_file, command, says):
 def test_the_time_limit_is_checked(plan_file, limit):
     with pytest.raises(ConfigurationError, match="time limit"):
         run_command("true {plan}", plan_file, time_limit=limit)
+
+
+@pytest.mark.parametrize(
+    ("command", "hidden"),
+    [
+        ("arm --password hunter2 {plan}", "arm --password *** {plan}"),
+        ("arm --password=hunter2 {plan}", "arm --password=*** {plan}"),
+        ("arm --api-key 'hunter 2' {plan}", "arm --api-key *** {plan}"),
+        ("arm ROBOT_TOKEN=hunter2 {plan}", "arm ROBOT_TOKEN=*** {plan}"),
+        ("arm https://me:hunter2@10.0.0.2/ {plan}", "arm https://***@10.0.0.2/ {plan}"),
+        ("arm --speed 0.5 --tokens-file {plan}", "arm --speed 0.5 --tokens-file {plan}"),
+    ],
+)
+def test_passwords_do_not_go_to_the_journal(plan_file, command, hidden):
+    assert hide_secrets(command) == hidden
+    arguments = split_command(command.replace("arm", "true", 1), plan_file.path)
+    result = run_command(command.replace("arm", "true", 1), plan_file, time_limit=30)
+    assert result.command == arguments
+    assert "hunter" not in json.dumps(result.as_json())

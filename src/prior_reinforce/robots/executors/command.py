@@ -12,6 +12,7 @@ import codecs
 import contextlib
 import json
 import math
+import re
 import shlex
 import shutil
 import signal
@@ -20,7 +21,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -43,6 +44,11 @@ _GRACE = 2.0
 """Between asking a command to stop and killing it, in [s]: time to bring an arm to rest."""
 _LOOK = 0.02
 """How often the supervisor is looked at, in [s]."""
+_SECRET = re.compile(
+    r"((?:^|(?<=[\s\-_]))[\w-]*(?:password|passwd|passphrase|secret|token|api[-_]?key)[=:\s]\s*)"
+    r"(?:'[^']*'|\"[^\"]*\"|\S+)",
+    re.IGNORECASE,
+)
 _STOPS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
@@ -78,7 +84,7 @@ class CommandResult:
 
     def as_json(self) -> dict[str, Any]:
         """The same as plain data for the journal."""
-        return asdict(self) | {"command": list(self.command)}
+        return asdict(self) | {"command": split_hidden(self.command)}
 
 
 class Interruptions:
@@ -128,6 +134,20 @@ def split_command(command: str, plan: Path, result: Path = Path("result")) -> tu
     for name, path in paths.items():
         arguments = [argument.replace(name, path) for argument in arguments]
     return tuple(arguments)
+
+
+def hide_secrets(command: str) -> str:
+    """A command without what looks like passwords, keys and tokens in it, for the journal."""
+    command = re.sub(r"//[^/@\s]*@", "//***@", command)
+    return _SECRET.sub(lambda found: f"{found[1]}***", command)
+
+
+def split_hidden(command: Sequence[str]) -> list[str]:
+    """The same for program and arguments, one by one."""
+    return [
+        "***" if before.startswith("-") and _SECRET.match(f"{before} x") else hide_secrets(word)
+        for before, word in zip(("", *command), command, strict=False)
+    ]
 
 
 def check_command(command: str, *, time_limit: float) -> None:
