@@ -39,7 +39,7 @@ $(VENV)/.core: pyproject.toml constraints.txt
 	touch $@
 
 $(VENV)/.all: $(VENV)/.core
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev,baselines,vlm,lerobot,hdf5,ros,zarr,excel,ray]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev,baselines,vlm,lerobot,hdf5,ros,zarr,excel,urdf,ray]'
 	touch $@
 
 $(VENV)/.docs: $(VENV)/.core

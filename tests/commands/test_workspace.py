@@ -2,6 +2,12 @@
 
 import json
 
+import numpy as np
+import pytest
+
+from prior_reinforce.workspace.workspace import Workspace
+from tests.robots.arms import UR, ur5e, write_urdf
+
 
 def test_an_afternoon(run, folder):
     assert run("goal", folder, "0.9", "-0.05")[1].startswith("goal 1: 90 cm ahead, 5 cm right")
@@ -42,3 +48,28 @@ def test_a_report_replaces_only_what_it_wrote(run, folder, tmp_path):
     assert (tmp_path / "thesis" / "overview.png").read_bytes() == b"mine"
     for _ in range(2):
         assert run("report", folder)[0] == 0
+
+
+@pytest.mark.parametrize("robot", ["ur5e", "arm.urdf"])
+def test_any_arm_gives_a_workspace_its_joints_and_limits(run, tmp_path, monkeypatch, robot):
+    monkeypatch.chdir(tmp_path)
+    write_urdf(tmp_path / "arm.urdf", ur5e())
+    status, out, _ = run("new", "hoop", "--robot", robot)
+    assert status == 0
+    assert "shoulder_pan_joint, shoulder_lift_joint, elbow_joint" in out
+    assert "no limits of acceleration and jerk are known" in out
+    with Workspace("hoop") as workspace:
+        assert workspace.manifest.format.names == UR
+        np.testing.assert_allclose(workspace.manifest.robot.velocity, np.pi)
+        assert workspace.manifest.robot.chain is not None
+
+
+def test_an_arm_that_is_not_known_names_the_ways_to_give_it(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    status, _, err = run("new", "hoop", "--robot", "ur3")
+    assert status == 2
+    assert "known are panda, fr3, ur5e, ur10e, xarm6, xarm7" in err
+    assert "--robot path/to/arm.urdf" in err
+    assert run("new", "hoop", "--robot", "gone.urdf")[0] == 2
+    assert "--tip is a link of a URDF" in run("new", "hoop", "--tip", "tool0")[2]
+    assert not (tmp_path / "hoop").exists()

@@ -329,3 +329,34 @@ def test_the_shipped_demonstrations_of_joints_pass():
     for demos in checked:
         for frames in demos.plans:
             check_plan(Plan(frames, demos.format), PANDA, demos).require()
+
+
+def test_where_no_acceleration_is_published_a_plan_is_compared_with_the_demonstrations():
+    ur = robot_limits("ur5e")
+    form = PlanFormat(ur.joint_names, ("rad",) * 6, 0.01)
+    s = np.linspace(0, 1, 101)[:, None]
+    swing = 10 * s**3 - 15 * s**4 + 6 * s**5
+    plans = np.array([swing * a * np.eye(6)[1] for a in (0.8, 1.0)])
+    shown = Demonstrations(plans, [[0.8], [1.0]], form)
+    alone = check_plan(Plan(plans[0], form), ur)
+    assert {"acceleration", "jerk"} < set(alone.unchecked)
+    # Peak acceleration of this swing is 10 / sqrt(3) rad/s^2 a radian.
+    for size, status in ((1.2, "pass"), (2.0, "warn")):
+        report = check_plan(Plan(size * plans[1], form), ur, shown)
+        line = next(line for line in report.lines if line.check == "acceleration")
+        assert line.status == status
+        assert line.limit == pytest.approx(10 / np.sqrt(3), rel=0.01)
+        assert f"no limit of ur5e is known; shoulder_lift_joint at {line.value:.4g}" in line.text
+        assert f"{100 * size:.0f} % of the demonstrations' largest" in line.text
+
+
+def test_a_box_is_kept_by_any_arm_whose_kinematics_are_known():
+    ur = robot_limits("ur5e")
+    form = PlanFormat(ur.joint_names, ("rad",) * 6, 0.01)
+    still = Plan(np.zeros((50, 6)), form)
+    # Stretched out it is 0.817 m ahead.
+    for reach, refused in ((0.85, False), (0.8, True)):
+        box = GateSettings(box_low=(0, -1, -1), box_high=(reach, 1, 1))
+        (line,) = [x for x in check_plan(still, ur, None, box).lines if x.check == "box"]
+        assert (line.status == "refuse") == refused
+        assert line.value == pytest.approx(0.8172)

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 
 import prior_reinforce.tasks
-from prior_reinforce.robots.kinematics import tool_tip
+from prior_reinforce.robots.kinematics import Chain, tool_tip
 from prior_reinforce.robots.presets import FRANKA
 
 
@@ -48,3 +48,20 @@ def test_shapes_broadcast():
     tips = tool_tip(FRANKA, q)
     assert tips.shape == (4, 5, 3)
     np.testing.assert_allclose(tips[2, 3], tool_tip(FRANKA, q[2, 3]))
+
+
+def test_both_tables_of_denavit_and_hartenberg_say_the_same_arm():
+    # An elbow: two parallel axes 0.3 m apart, then 0.2 m to the flange along x.
+    standard = Chain.standard([(0.3, 0.1, 0.0), (0.2, 0.0, 0.0)])
+    craig = Chain.craig([(0.0, 0.1, 0.0), (0.3, 0.0, 0.0)], flange=0.0)
+    q = np.random.default_rng(3).uniform(-3, 3, (9, 2))
+    x = 0.3 * np.cos(q[:, 0]) + 0.2 * np.cos(q.sum(axis=1))
+    y = 0.3 * np.sin(q[:, 0]) + 0.2 * np.sin(q.sum(axis=1))
+    expected = np.column_stack([x, y, np.full(9, 0.1)])
+    np.testing.assert_allclose(tool_tip(standard, q), expected, atol=1e-12)
+    np.testing.assert_allclose(tool_tip(craig, q, (0.2, 0, 0)), expected, atol=1e-12)
+
+
+def test_a_base_may_be_turned():
+    turned = Chain.standard([(0.3, 0.1, 0.0)], yaw=np.pi)
+    np.testing.assert_allclose(tool_tip(turned, np.zeros(1)), [-0.3, 0, 0.1], atol=1e-12)

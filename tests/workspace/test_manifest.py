@@ -5,12 +5,15 @@ import re
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from prior_reinforce.errors import ConfigurationError, FileFormatError
-from prior_reinforce.workspace.manifest import load_manifest
+from prior_reinforce.robots import robot_limits
+from prior_reinforce.robots.kinematics import tool_tip
+from prior_reinforce.workspace.manifest import filled_in, load_manifest
 from tests.workspace.planar import manifest
 
 SEVEN = {"names": str([f"joint{i}" for i in range(1, 8)]), "units": str(["rad"] * 7)}
@@ -76,6 +79,55 @@ def test_a_box_without_a_robot_is_refused(tmp_path):
         load_manifest(write(tmp_path, text))
 
 
+def test_acceleration_and_jerk_may_be_left_out_and_then_are_not_known(tmp_path):
+    text = manifest(robot="given")
+    start, end = text.index("# joint_names"), text.index("# acceleration")
+    text = text[:start] + re.sub("^# ", "", text[start:end], flags=re.M) + text[end:]
+    limits = load_manifest(write(tmp_path, text)).robot
+    assert limits.velocity.tolist() == [2, 2]
+    assert (limits.acceleration, limits.jerk, limits.chain) == (None, None, None)
+    boxed = text + "workspace_low = [0, 0, 0]\nworkspace_high = [1, 1, 1]\n"
+    with pytest.raises(ConfigurationError, match="kinematics of planar are not known; take it out"):
+        load_manifest(write(tmp_path, boxed))
+
+
+@pytest.mark.parametrize("robot", ["ur5e", "panda"])
+def test_an_arm_that_is_written_out_is_read_back(tmp_path, robot):
+    arm = robot_limits(robot)
+    text = filled_in(
+        name="own",
+        names=arm.joint_names,
+        units=["rad"] * len(arm.joint_names),
+        dt=0.01,
+        outcome_names=["x"],
+        outcome_units=["m"],
+        tolerance=0.01,
+        robot=arm,
+    )
+    again = load_manifest(write(tmp_path, text)).robot
+    assert again.source == arm.source
+    for key in ("lower", "upper", "velocity", "acceleration", "jerk"):
+        written = getattr(again, key)
+        if getattr(arm, key) is None:
+            assert written is None
+        else:
+            np.testing.assert_allclose(written, getattr(arm, key), rtol=1e-8)
+    q = np.random.default_rng(0).uniform(-2, 2, (5, len(arm.joint_names)))
+    np.testing.assert_allclose(tool_tip(again.chain, q), tool_tip(arm.chain, q), atol=1e-9)
+    for old, new, says in [
+        ("flange = [", "flange = [1.0, ", "flange = .*must be six finite numbers"),
+        (
+            "kinematics = [\n  [",
+            "kinematics = [\n  [1.0, ",
+            "kinematics = .*must be a list with nine",
+        ),
+        (", 1.0],\n", ", 2.0],\n", "axes .* must have length 1"),
+    ]:
+        assert old in text
+        with pytest.raises(ConfigurationError, match=says):
+            load_manifest(write(tmp_path, text.replace(old, new, 1)))
+
+
 def test_the_box_for_the_tool_tip(tmp_path):
     """The template's own example, its comment signs taken away."""
     text = manifest(robot="panda", **SEVEN)
@@ -135,8 +187,12 @@ def test_joints_may_stay_still_on_purpose(tmp_path, absent, message):
         ('units = ["m", "m"]', 'units = ["m"]', "one unit for each"),
         ('name = "planar"', 'nmae = "planar"', r"nmae = 'planar'.*unknown; keys are name"),
         ('name = "planar"', 'name = " "', "must not be empty"),
-        ('model = "none"', 'model = "ur5"', r"\[robot\].*known are panda and fr3"),
-        ('model = "none"', 'model = "given"', r"joint_names: missing \(and lower, .*, jerk\)"),
+        ('model = "none"', 'model = "ur5"', r"\[robot\].*known are panda, fr3, ur5e"),
+        (
+            'model = "none"',
+            'model = "given"',
+            r"joint_names: missing \(and lower, upper, velocity\)",
+        ),
         ("dt = 0.02", f"dt = 1{'0' * 400}", "must be a number"),
         ("[gate]", "[gate]\nworkspace_low = [0, 0]", "must be a list of three finite numbers"),
         ("[gate]", "[gate]\nbox_low = [0, 0, 0]", r"box_low.*unknown; keys are .*workspace_low"),

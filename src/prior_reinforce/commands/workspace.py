@@ -10,8 +10,12 @@ from typing import Annotated, Literal
 import tyro
 
 from prior_reinforce.adapters import ADAPTERS
+from prior_reinforce.errors import ConfigurationError
+from prior_reinforce.robots import RobotLimits, robot_limits
+from prior_reinforce.robots.presets import PRESETS
+from prior_reinforce.robots.urdf import read_urdf
 from prior_reinforce.wording import say_place
-from prior_reinforce.workspace.manifest import TEMPLATE
+from prior_reinforce.workspace.manifest import filled_in
 from prior_reinforce.workspace.status import describe, next_step
 from prior_reinforce.workspace.workspace import Workspace
 
@@ -31,8 +35,8 @@ class New:
     """Folder to make."""
     name: str | None = None
     """Name of the task; the folder's name if not given."""
-    action_names: tuple[str, ...] = tuple(f"joint{i}" for i in range(1, 8))
-    """Names of the action dimensions."""
+    action_names: tuple[str, ...] | None = None
+    """Names of the action dimensions; the robot's joints if not given."""
     action_units: tuple[str, ...] = ("rad",)
     """Unit of each action dimension; a single one holds for all."""
     dt: float = 0.0125
@@ -43,24 +47,59 @@ class New:
     """Unit of each component; a single one holds for all."""
     tolerance: float = 0.015
     """Largest distance from the goal that counts as reached, in the outcome's units."""
-    robot: Literal["panda", "fr3", "none"] = "panda"
-    """Whose limits hold; write the limits of another arm into the manifest."""
+    robot: Annotated[
+        str,
+        tyro.conf.arg(
+            help=f"Whose limits hold: {', '.join(PRESETS)}, the path of a .urdf, or none."
+        ),
+    ] = "panda"
+    tip: str | None = None
+    """Link of the URDF that is the flange; tool0, flange or the last that turns if not given."""
 
     def run(self) -> None:
         """Write the folder."""
-        manifest = TEMPLATE.format(
-            name=_quoted(self.name or self.folder.resolve().name)[1:-1],
-            names=_list(self.action_names),
-            units=_list(_spread(self.action_units, len(self.action_names))),
+        robot = self._robot()
+        names = self.action_names
+        if names is None:
+            names = tuple(f"joint{i}" for i in range(1, 8)) if robot is None else robot.joint_names
+        is_given = robot is not None and self.robot.lower() not in (*PRESETS, "fer")
+        manifest = filled_in(
+            name=self.name or self.folder.resolve().name,
+            names=names,
+            units=_spread(self.action_units, len(names)),
             dt=self.dt,
-            outcome_names=_list(self.outcome_names),
-            outcome_units=_list(_spread(self.outcome_units, len(self.outcome_names))),
+            outcome_names=self.outcome_names,
+            outcome_units=_spread(self.outcome_units, len(self.outcome_names)),
             tolerance=self.tolerance,
-            robot=self.robot,
+            robot=robot if robot is not None and is_given else self.robot,
         )
         with Workspace.create(self.folder, manifest) as workspace:
             print(f"workspace made in {self.folder}; look through {self.folder / 'workspace.toml'}")
+            if robot is not None:
+                print(_say_robot(robot))
             print_next(workspace)
+
+    def _robot(self) -> RobotLimits | None:
+        """The arm that was named, None for none."""
+        is_file = self.robot.lower().endswith((".urdf", ".xml", ".xacro"))
+        if self.tip is not None and not is_file:
+            raise ConfigurationError(
+                f"--tip is a link of a URDF, and --robot is {self.robot}; drop it"
+            )
+        if self.robot == "none":
+            return None
+        return read_urdf(Path(self.robot), self.tip) if is_file else robot_limits(self.robot)
+
+
+def _say_robot(robot: RobotLimits) -> str:
+    unknown = [key for key in ("acceleration", "jerk") if getattr(robot, key) is None]
+    said = f"robot {robot.robot}: {', '.join(robot.joint_names)}; limits from {robot.source}"
+    if unknown:
+        said += (
+            f"; no limits of {' and '.join(unknown)} are known: plans are compared with the "
+            "demonstrations in these"
+        )
+    return said
 
 
 @dataclass(frozen=True)
@@ -135,15 +174,6 @@ class Report:
         with Workspace(self.folder) as workspace:
             page = report_workspace(workspace, self.out or self.folder / "report")
         print(f"report: {page}")
-
-
-def _quoted(text: str) -> str:
-    """A text in quotes, as TOML wants it: JSON's, but for one control character."""
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
-
-
-def _list(values: tuple[str, ...]) -> str:
-    return "[" + ", ".join(_quoted(value) for value in values) + "]"
 
 
 def _spread(values: tuple[str, ...], n: int) -> tuple[str, ...]:

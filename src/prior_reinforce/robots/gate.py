@@ -17,9 +17,12 @@ from prior_reinforce.errors import ConfigurationError, InvalidPlanError
 from prior_reinforce.plans.interpolation import RATE, interpolate, join_frames
 from prior_reinforce.plans.motions import Demonstrations, Plan
 from prior_reinforce.robots.kinematics import tool_tip
-from prior_reinforce.robots.limits import RobotLimits, match_joints, missing_joints
+from prior_reinforce.robots.limits import PerJoint, RobotLimits, match_joints, missing_joints
 from prior_reinforce.robots.report import LimitLine, LimitReport, Status
 
+_BEYOND_SHOWN = 1.5
+"""Share of the demonstrations' largest acceleration or jerk from which on the gate warns, where the
+maker publishes no limit. Ours: between demonstrations, a plan exceeds each of them by less."""
 _HOLD = 0.01
 """Held before and after the motion, in [s], so that the steps where they meet are seen."""
 
@@ -135,7 +138,7 @@ def check_plan(
             "s), and what is between two cycles cannot be checked; give the plan fewer frames"
         )
     with np.errstate(over="ignore", invalid="ignore"):  # what is no number is refused below
-        checks = _Checks(plan, limits, settings)
+        checks = _Checks(plan, limits, settings, demonstrations)
         shown = _check_demonstrations(plan, demonstrations, settings)
         lines = (checks.joints(), *checks.motion(), shown, checks.box())
     return LimitReport(limits.robot, limits.firmware, limits.source, lines)
@@ -144,7 +147,14 @@ def check_plan(
 class _Checks:
     """The checks of one plan's joints against one robot."""
 
-    def __init__(self, plan: Plan, limits: RobotLimits, settings: GateSettings) -> None:
+    def __init__(
+        self,
+        plan: Plan,
+        limits: RobotLimits,
+        settings: GateSettings,
+        shown: Demonstrations | None,
+    ) -> None:
+        self._shown = shown if shown is not None and shown.format == plan.format else None
         self._plan, self._limits, self._settings = plan, limits, settings
         self._columns = match_joints(plan.format, limits)
         self._rows, self._picked = list(self._columns), list(self._columns.values())
@@ -198,8 +208,10 @@ class _Checks:
         return [
             self._range("position", "rad", q, limits.lower[rows], limits.upper[rows], self._names),
             self._rate("velocity", "rad/s", fine.t, dq, bounds),
-            self._rate("acceleration", "rad/s^2", t_ddq, ddq, limits.acceleration[rows]),
-            self._rate("jerk", "rad/s^3", fine.t, dddq, limits.jerk[rows]),
+            self._derivative(
+                "acceleration", "rad/s^2", t_ddq, ddq, _picked(limits.acceleration, rows), 0
+            ),
+            self._derivative("jerk", "rad/s^3", fine.t, dddq, _picked(limits.jerk, rows), 1),
             self._rest("rest at start", 0, 0.0),
             self._rest("rest at end", -2, float(self._plan.times[-1])),
         ]
@@ -275,6 +287,35 @@ class _Checks:
             f"{limit:.4g}{here}, at {time:.3f} s",
         )
 
+    def _derivative(
+        self, check: str, unit: str, t: Times, values: Samples, limit: Ends | None, which: int
+    ) -> LimitLine:
+        """Against the maker's limit; where there is none, beside what was demonstrated.
+
+        What the arm did in the demonstrations is no limit, so that line warns and never refuses.
+        """
+        if limit is not None:
+            return self._rate(check, unit, t, values, limit)
+        missing = f"no limit of {self._limits.robot} is known"
+        if self._shown is None:
+            return _unchecked(check, f"{missing}, nor a demonstration to compare with")
+        bound = np.maximum(_largest_shown(self._shown, self._picked)[which], 1e-12)
+        used = np.abs(values) / bound
+        sample, joint = _worst(used)
+        share, value = float(used[sample, joint]), abs(float(values[sample, joint]))
+        return LimitLine(
+            check=check,
+            status=_status(False, not share <= _BEYOND_SHOWN),
+            value=value,
+            limit=float(bound[joint]),
+            margin=float(bound[joint]) - value,
+            unit=unit,
+            joint=self._names[joint],
+            time=float(t[sample]),
+            text=f"{missing}; {self._names[joint]} at {value:.4g} {unit}, {100 * share:.0f} % of "
+            f"the demonstrations' largest {bound[joint]:.4g}, at {float(t[sample]):.3f} s",
+        )
+
     def _rest(self, check: str, frame: int, time: float) -> LimitLine:
         """Speed over the interval after a frame, which should be rest.
 
@@ -340,6 +381,23 @@ def _check_demonstrations(
         f"of its demonstrated range, at {time:.3f} s"
         if value
         else "within the band of the demonstrations at every frame",
+    )
+
+
+def _picked(limit: PerJoint | None, rows: Sequence[int]) -> Ends | None:
+    """A limit of the joints that a plan has; None where none is known."""
+    return None if limit is None else limit[list(rows)]
+
+
+def _largest_shown(shown: Demonstrations, columns: Sequence[int]) -> tuple[Ends, Ends]:
+    """Largest acceleration and jerk of each column in any demonstration."""
+    fine = [
+        interpolate(p, shown.format.dt, hold_before=_HOLD, hold_after=_HOLD) for p in shown.plans
+    ]
+    picked = list(columns)
+    return (
+        np.max([np.abs(f.ddq[:, picked]).max(axis=0) for f in fine], axis=0),
+        np.max([np.abs(f.dddq[:, picked]).max(axis=0) for f in fine], axis=0),
     )
 
 

@@ -6,6 +6,7 @@ once, and spares `ask` the loading of a physics engine.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -18,16 +19,52 @@ Places = Float[np.ndarray, "*n 3"]
 """As many points in the base frame, [m]."""
 
 
+Pose = tuple[float, float, float, float, float, float]
+"""x, y, z in [m] and roll, pitch, yaw in [rad], as in URDF: R = Rz(yaw) Ry(pitch) Rx(roll)."""
+
+
 @dataclass(frozen=True)
 class Chain:
-    """Denavit-Hartenberg parameters in Craig's convention, a row a joint: (a [m], d [m], alpha).
+    """Revolute joints from the base to the flange, each a pose in the frame before and an axis.
 
-    Row i is the transform Rot_x(alpha) Trans_x(a) Rot_z(theta_i) Trans_z(d) from frame i-1.
+    That is URDF's way to say it, and holds any arm; `craig` and `standard` take the tables of
+    Denavit and Hartenberg.
     """
 
-    rows: tuple[tuple[float, float, float], ...]
-    flange: float
-    """Distance from the last joint's frame to the flange along its z axis, in [m]."""
+    origins: tuple[Pose, ...]
+    """Of each joint's frame in the frame before it."""
+    axes: tuple[tuple[float, float, float], ...]
+    """About which each joint turns, in its own frame; of length 1."""
+    flange: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    """Of the flange in the last joint's frame."""
+
+    @classmethod
+    def craig(cls, rows: Sequence[tuple[float, float, float]], flange: float) -> Chain:
+        """Make one from rows (a, d, alpha): Rot_x(alpha) Trans_x(a) Rot_z(theta) Trans_z(d).
+
+        Args:
+            rows: a and d in [m], alpha in [rad].
+            flange: Distance from the last joint's frame to the flange along its z axis, in [m].
+        """
+        origins = tuple(
+            (a, -math.sin(alpha) * d, math.cos(alpha) * d, alpha, 0.0, 0.0) for a, d, alpha in rows
+        )
+        return cls(origins, (_Z,) * len(rows), (0.0, 0.0, flange, 0.0, 0.0, 0.0))
+
+    @classmethod
+    def standard(cls, rows: Sequence[tuple[float, float, float]], yaw: float = 0.0) -> Chain:
+        """Make one from rows (a, d, alpha): Rot_z(theta) Trans_z(d) Trans_x(a) Rot_x(alpha).
+
+        Args:
+            rows: a and d in [m], alpha in [rad].
+            yaw: By which the maker's base frame is turned in the one that is wanted, in [rad].
+        """
+        poses = tuple((a, 0.0, d, alpha, 0.0, 0.0) for a, d, alpha in rows)
+        base = (0.0, 0.0, 0.0, 0.0, 0.0, yaw)
+        return cls((base, *poses[:-1]), (_Z,) * len(rows), poses[-1])
+
+
+_Z = (0.0, 0.0, 1.0)
 
 
 def tool_tip(
@@ -40,12 +77,29 @@ def tool_tip(
         joints: Joint positions.
         tip: The point in the flange's frame, in [m].
     """
-    x, y, z = (np.full(joints.shape[:-1], value) for value in tip)
-    z = z + chain.flange
-    # From the flange back to the base, each row's transform is applied to the point.
-    for index in reversed(range(len(chain.rows))):
-        a, d, alpha = chain.rows[index]
-        cos, sin = np.cos(joints[..., index]), np.sin(joints[..., index])
-        x, y, z = cos * x - sin * y + a, sin * x + cos * y, z + d
-        y, z = np.cos(alpha) * y - np.sin(alpha) * z, np.sin(alpha) * y + np.cos(alpha) * z
-    return np.stack([x, y, z], axis=-1)
+    place = _moved(chain.flange, np.broadcast_to(tip, (*joints.shape[:-1], 3)))
+    # From the flange back to the base, each joint turns the point and its origin moves it.
+    for index in reversed(range(len(chain.origins))):
+        axis = np.array(chain.axes[index])
+        cos, sin = np.cos(joints[..., index, None]), np.sin(joints[..., index, None])
+        along = (place @ axis)[..., None] * axis
+        place = _moved(
+            chain.origins[index], along + cos * (place - along) + sin * np.cross(axis, place)
+        )
+    return place
+
+
+def _moved(pose: Pose, points: Places) -> Places:
+    """Points of a frame, in the frame that its pose is given in."""
+    x, y, z, roll, pitch, yaw = pose
+    cr, sr, cp, sp, cy, sy = (
+        f(angle) for angle in (roll, pitch, yaw) for f in (math.cos, math.sin)
+    )
+    rotation = np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )
+    return np.asarray(points @ rotation.T + (x, y, z))

@@ -53,14 +53,14 @@ class RobotLimits:
     """Highest joint positions, [rad]."""
     velocity: PerJoint
     """Largest joint speeds, [rad/s]."""
-    acceleration: PerJoint
-    """Largest joint accelerations, [rad/s^2]."""
-    jerk: PerJoint
-    """Largest joint jerks, [rad/s^3]."""
+    acceleration: PerJoint | None = None
+    """Largest joint accelerations, [rad/s^2]; None where the maker publishes none."""
+    jerk: PerJoint | None = None
+    """Largest joint jerks, [rad/s^3]; None where the maker publishes none."""
     envelopes: tuple[VelocityEnvelope, ...] = ()
     """Position-dependent velocity bounds, where the robot has them; the narrowest counts."""
     chain: Chain | None = None
-    """Kinematics, for the tool tip; None leaves the box unchecked."""
+    """Kinematics, for the tool tip; None where they are not known, so that no box can be kept."""
 
     def __post_init__(self) -> None:
         """Copy and check.
@@ -75,6 +75,8 @@ class RobotLimits:
                 f"limits of {self.robot} need joint names that differ, got {self.joint_names}"
             )
         for name in ("lower", "upper", "velocity", "acceleration", "jerk"):
+            if getattr(self, name) is None and name in ("acceleration", "jerk"):
+                continue
             values = _per_joint(self.robot, name, getattr(self, name), d)
             object.__setattr__(self, name, values)
             if name not in ("lower", "upper") and np.any(values <= 0):
@@ -89,9 +91,10 @@ class RobotLimits:
         for envelope in self.envelopes:
             for item in fields(envelope):
                 _per_joint(self.robot, item.name, getattr(envelope, item.name), d)
-        if self.chain is not None and len(self.chain.rows) != d:
+        if self.chain is not None and not len(self.chain.origins) == len(self.chain.axes) == d:
             raise ConfigurationError(
-                f"the kinematics of {self.robot} have {len(self.chain.rows)} joints, its limits {d}"
+                f"the kinematics of {self.robot} have {len(self.chain.origins)} joints, its limits "
+                f"{d}; give one row a joint"
             )
 
     def velocity_bounds(self, q: JointPositions) -> tuple[JointPositions, JointPositions]:

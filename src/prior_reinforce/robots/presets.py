@@ -8,10 +8,10 @@ from math import pi
 import numpy as np
 
 from prior_reinforce.errors import ConfigurationError
-from prior_reinforce.robots.kinematics import Chain
+from prior_reinforce.robots.kinematics import Chain, Pose
 from prior_reinforce.robots.limits import RobotLimits, VelocityEnvelope
 
-FRANKA = Chain(
+FRANKA = Chain.craig(
     rows=(
         (0.0, 0.333, 0.0),
         (0.0, 0.0, -pi / 2),
@@ -99,14 +99,118 @@ FR3_ANY = replace(
 )
 """Franka Research 3 of unknown firmware: a plan within these numbers holds on both."""
 
-_KNOWN = (PANDA, FR3, FR3_BEFORE_5_9, FR3_ANY)
+_UR_JOINTS = (
+    "shoulder_pan_joint",
+    "shoulder_lift_joint",
+    "elbow_joint",
+    "wrist_1_joint",
+    "wrist_2_joint",
+    "wrist_3_joint",
+)
+_UR_SOURCE = (
+    "UniversalRobots/Universal_Robots_ROS2_Description, config/{}/joint_limits.yaml (user manual "
+    "5.8), read 22 Nov 2026; kinematics: universal-robots.com, DH parameters. Accelerations are "
+    "not published; the elbow is limited to half a turn by the arm itself"
+)
+
+
+def _ur(robot: str, a: tuple[float, float], d: tuple[float, ...], slow: float) -> RobotLimits:
+    """An e-series arm: lengths a2, a3 and d1, d4, d5, d6 in [m], speed of the shoulder in [deg/s].
+
+    The base frame is ROS's `base_link`, x forward; the controller's own is turned by half a turn.
+    """
+    turns = np.deg2rad([360.0, 360.0, 180.0, 360.0, 360.0, 360.0])
+    rows = (
+        (0.0, d[0], pi / 2),
+        (a[0], 0.0, 0.0),
+        (a[1], 0.0, 0.0),
+        (0.0, d[1], pi / 2),
+        (0.0, d[2], -pi / 2),
+        (0.0, d[3], 0.0),
+    )
+    return RobotLimits(
+        robot=robot,
+        firmware="any",
+        source=_UR_SOURCE.format(robot),
+        joint_names=_UR_JOINTS,
+        lower=-turns,
+        upper=turns,
+        velocity=np.deg2rad([slow, slow, 180.0, 180.0, 180.0, 180.0]),
+        chain=Chain.standard(rows, yaw=pi),
+    )
+
+
+UR5E = _ur("ur5e", (-0.425, -0.3922), (0.1625, 0.1333, 0.0997, 0.0996), 180.0)
+"""Universal Robots UR5e."""
+
+UR10E = _ur("ur10e", (-0.6127, -0.57155), (0.1807, 0.17415, 0.11985, 0.11655), 120.0)
+"""Universal Robots UR10e."""
+
+_XARM_SOURCE = (
+    "xArm-Developer/xarm_ros2, xarm_description/urdf/{0}/{0}.urdf.xacro and "
+    "config/kinematics/default/{0}_default_kinematics.yaml, read 22 Nov 2026. Accelerations are "
+    "not published there"
+)
+
+
+def _xarm(
+    robot: str, lower: list[float], upper: list[float], origins: tuple[Pose, ...]
+) -> RobotLimits:
+    """An xArm: every joint turns about its own z axis, at 180 deg/s at most."""
+    d = len(origins)
+    return RobotLimits(
+        robot=robot,
+        firmware="any",
+        source=_XARM_SOURCE.format(robot),
+        joint_names=tuple(f"joint{i}" for i in range(1, d + 1)),
+        lower=np.array(lower),
+        upper=np.array(upper),
+        velocity=np.full(d, 3.14),
+        chain=Chain(origins, ((0.0, 0.0, 1.0),) * d),
+    )
+
+
+XARM6 = _xarm(
+    "xarm6",
+    [-2 * pi, -2.059, -3.927, -2 * pi, -1.69297, -2 * pi],
+    [2 * pi, 2.0944, 0.19198, 2 * pi, pi, 2 * pi],
+    (
+        (0.0, 0.0, 0.267, 0.0, 0.0, 0.0),
+        (0.0, 0.0, 0.0, -pi / 2, 0.0, 0.0),
+        (0.0535, -0.2845, 0.0, 0.0, 0.0, 0.0),
+        (0.0775, 0.3425, 0.0, -pi / 2, 0.0, 0.0),
+        (0.0, 0.0, 0.0, pi / 2, 0.0, 0.0),
+        (0.076, 0.097, 0.0, -pi / 2, 0.0, 0.0),
+    ),
+)
+"""UFACTORY xArm 6."""
+
+XARM7 = _xarm(
+    "xarm7",
+    [-2 * pi, -2.059, -2 * pi, -0.19198, -2 * pi, -1.69297, -2 * pi],
+    [2 * pi, 2.0944, 2 * pi, 3.927, 2 * pi, pi, 2 * pi],
+    (
+        (0.0, 0.0, 0.267, 0.0, 0.0, 0.0),
+        (0.0, 0.0, 0.0, -pi / 2, 0.0, 0.0),
+        (0.0, -0.293, 0.0, pi / 2, 0.0, 0.0),
+        (0.0525, 0.0, 0.0, pi / 2, 0.0, 0.0),
+        (0.0775, -0.3425, 0.0, pi / 2, 0.0, 0.0),
+        (0.0, 0.0, 0.0, pi / 2, 0.0, 0.0),
+        (0.076, 0.097, 0.0, -pi / 2, 0.0, 0.0),
+    ),
+)
+"""UFACTORY xArm 7."""
+
+_KNOWN = (PANDA, FR3, FR3_BEFORE_5_9, FR3_ANY, UR5E, UR10E, XARM6, XARM7)
+PRESETS = tuple(dict.fromkeys(limits.robot for limits in _KNOWN))
+"""Names of the robots that are known here."""
 
 
 def robot_limits(robot: str, firmware: str = "any") -> RobotLimits:
     """Return the limits of a robot that is known here.
 
     Args:
-        robot: `panda` (or `fer`), or `fr3`.
+        robot: A name of `PRESETS`: `panda` (or `fer`), `fr3`, `ur5e`, `ur10e`, `xarm6`, `xarm7`.
         firmware: System image of an FR3: `>=5.9`, `<5.9`, or `any` for the narrower of both.
 
     Raises:
@@ -116,8 +220,8 @@ def robot_limits(robot: str, firmware: str = "any") -> RobotLimits:
     by_firmware = {limits.firmware: limits for limits in _KNOWN if limits.robot == name}
     if not by_firmware:
         raise ConfigurationError(
-            f"no limits for robot {robot!r}; known are panda and fr3: for another arm give its "
-            "limits as numbers"
+            f"no limits for robot {robot!r}; known are {', '.join(PRESETS)}: for another arm, "
+            'prior-reinforce new --robot path/to/arm.urdf, or model = "given" with its numbers'
         )
     if firmware not in by_firmware:
         known = ", ".join(map(repr, by_firmware))

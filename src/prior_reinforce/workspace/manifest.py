@@ -5,9 +5,10 @@ Every message names the file, the line, the value and the remedy.
 
 from __future__ import annotations
 
+import json
 import re
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar, get_type_hints
@@ -24,6 +25,7 @@ from prior_reinforce.robots import (
     missing_joints,
     robot_limits,
 )
+from prior_reinforce.robots.kinematics import Chain
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -60,17 +62,25 @@ class Manifest:
 
 
 _TEXTS, _NUMBERS = tuple[str, ...], tuple[float, ...]
-_LISTS = ("lower", "upper", "velocity", "acceleration", "jerk")
+_ROWS = tuple[tuple[float, float, float, float, float, float, float, float, float], ...]
+_SIX = tuple[float, float, float, float, float, float]
+_REQUIRED = ("lower", "upper", "velocity")
+_LISTS = (*_REQUIRED, "acceleration", "jerk")
+_GIVEN = ("joint_names", *_LISTS, "kinematics", "flange", "source")
+"""Keys that go with an arm whose numbers stand in the manifest."""
 _LARGEST_PLAUSIBLE = {"lower": 13.0, "upper": 13.0, "velocity": 50.0}
 """In [rad] and [rad/s]; ours: two turns either way, and twice what the fastest small joints do."""
+_LENGTH_OF_AXIS = 1e-3
+"""By how much an axis may differ from length 1: three written digits."""
 _BOX, _BOX_KEY = "box_", "workspace_"
 """How the two corners of the tool tip's box begin in `GateSettings` and in the file."""
 _SECTIONS: Mapping[str, Mapping[str, Any]] = {
     "task": {"name": str},
     "plan": {"names": _TEXTS, "units": _TEXTS, "dt": float},
     "outcome": {"names": _TEXTS, "units": _TEXTS, "tolerance": float},
-    "robot": {"model": str, "firmware": str, "joint_names": _TEXTS}
-    | dict.fromkeys(_LISTS, _NUMBERS),
+    "robot": {"model": str, "firmware": str, "joint_names": _TEXTS, "source": str}
+    | dict.fromkeys(_LISTS, _NUMBERS)
+    | {"kinematics": _ROWS, "flange": _SIX},
     "gate": {k.replace(_BOX, _BOX_KEY): v for k, v in get_type_hints(GateSettings).items()},
 }
 _WANTED = {
@@ -78,7 +88,80 @@ _WANTED = {
     float: "a number",
     _TEXTS: 'a list of texts, such as ["x", "y"]',
     _NUMBERS: "a list of finite numbers",
+    _ROWS: "a list with nine finite numbers a joint: x, y, z, roll, pitch, yaw and the axis",
+    _SIX: "six finite numbers: x, y, z, roll, pitch, yaw",
 }
+
+
+def filled_in(
+    *,
+    name: str,
+    names: Sequence[str],
+    units: Sequence[str],
+    dt: float,
+    outcome_names: Sequence[str],
+    outcome_units: Sequence[str],
+    tolerance: float,
+    robot: str | RobotLimits,
+) -> str:
+    """Return a manifest's text, the template filled in.
+
+    Args:
+        name: Of the task.
+        names: Of the action dimensions.
+        units: Of the action dimensions.
+        dt: Time between two frames of a plan, in [s].
+        outcome_names: Of the outcome's components.
+        outcome_units: Of the outcome's components.
+        tolerance: In the outcome's units.
+        robot: Name of a preset, `none`, or the limits of an arm, which are written out.
+    """
+    given = robot if isinstance(robot, RobotLimits) else None
+    text = TEMPLATE.format(
+        name=_quoted(name)[1:-1],
+        names=_list(names),
+        units=_list(units),
+        dt=dt,
+        outcome_names=_list(outcome_names),
+        outcome_units=_list(outcome_units),
+        tolerance=tolerance,
+        robot="given" if given is not None else robot,
+    )
+    if given is None:
+        return text
+    start, end = text.index("# joint_names ="), text.index("# The program's own lines")
+    return text[:start] + _written_out(given) + "\n" + text[end:]
+
+
+def _written_out(robot: RobotLimits) -> str:
+    """An arm's numbers as lines of the manifest."""
+    lines = [f"source = {_quoted(robot.source)}", f"joint_names = {_list(robot.joint_names)}"]
+    for key in _LISTS:
+        values = getattr(robot, key)
+        if values is None:
+            lines.append(
+                f"# {key} = []  # not published; the gate compares with the demonstrations"
+            )
+        else:
+            lines.append(f"{key} = {[float(f'{v:.9g}') for v in values]}")
+    if robot.chain is not None:
+        lines.append(
+            "# Of each joint: x, y, z [m], roll, pitch, yaw [rad] in the frame before, axis."
+        )
+        pairs = zip(robot.chain.origins, robot.chain.axes, strict=True)
+        rows = [[float(f"{v:.12g}") for v in (*o, *a)] for o, a in pairs]
+        lines += ["kinematics = [", *(f"  {row}," for row in rows), "]"]
+        lines.append(f"flange = {[float(f'{v:.12g}') for v in robot.chain.flange]}")
+    return "".join(f"{line}\n" for line in lines)
+
+
+def _quoted(text: str) -> str:
+    """A text in quotes, as TOML wants it: JSON's, but for one control character."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def _list(values: Sequence[str]) -> str:
+    return "[" + ", ".join(_quoted(value) for value in values) + "]"
 
 
 def load_manifest(path: Path) -> Manifest:
@@ -147,19 +230,25 @@ class _Reader:
         elif settings.box_low is not None:
             why = "with no robot there is no tool tip to check; take it out, or name the robot"
             raise self.error("gate", f"{_BOX_KEY}low", why)
+        if limits is not None and limits.chain is None and settings.box_low is not None:
+            why = (
+                f"cannot be checked, since the kinematics of {limits.robot} are not known; take it "
+                "out, or make the workspace with: prior-reinforce new --robot path/to/arm.urdf"
+            )
+            raise self.error("gate", f"{_BOX_KEY}low", why)
         return Manifest(task["name"], form, names, units, tolerance, limits, settings)
 
     def limits(self, robot: dict[str, Any], task: str) -> RobotLimits | None:
         """Limits of the robot's model; None where there is none."""
         if robot["model"] != "given":
-            for key in ("joint_names", *_LISTS):
+            for key in _GIVEN:
                 if key in robot:
                     raise self.error("robot", key, 'goes with model = "given"; take it out')
         if robot["model"] == "none":
             return None
         if robot["model"] != "given":
             return robot_limits(robot["model"], robot.get("firmware", "any"))
-        missing = [key for key in ("joint_names", *_LISTS) if key not in robot]
+        missing = [key for key in ("joint_names", *_REQUIRED) if key not in robot]
         if missing:
             also = f" (and {', '.join(missing[1:])})" if missing[1:] else ""
             raise self.error(
@@ -168,9 +257,31 @@ class _Reader:
         for key, largest in _LARGEST_PLAUSIBLE.items():
             if np.abs(robot[key]).max() > largest:
                 raise self.error("robot", key, "looks like degrees; give radians")
-        low, high, speed, acceleration, jerk = (np.array(robot[key]) for key in _LISTS)
-        names, source = robot["joint_names"], str(self.path)
-        return RobotLimits(task, "as given", source, names, low, high, speed, acceleration, jerk)
+        numbers: dict[str, Any] = {k: np.array(robot[k]) for k in _LISTS if k in robot}
+        return RobotLimits(
+            robot=task,
+            firmware="as given",
+            source=robot.get("source", str(self.path)),
+            joint_names=robot["joint_names"],
+            chain=self.chain(robot),
+            **numbers,
+        )
+
+    def chain(self, robot: dict[str, Any]) -> Chain | None:
+        """Kinematics that are given."""
+        if "kinematics" not in robot:
+            if "flange" in robot:
+                raise self.error(
+                    "robot", "flange", "goes with kinematics; add them, or take it out"
+                )
+            return None
+        rows = np.array(robot["kinematics"])
+        lengths = np.linalg.norm(rows[:, 6:], axis=1)
+        if np.any(np.abs(lengths - 1) > _LENGTH_OF_AXIS):
+            raise self.error("robot", "kinematics", "axes (the last three) must have length 1")
+        axes = [(x, y, z) for x, y, z in (rows[:, 6:] / lengths[:, None]).tolist()]
+        origins = tuple(row[:6] for row in robot["kinematics"])
+        return Chain(origins, tuple(axes), robot.get("flange", (0.0,) * 6))
 
     def check_joints(self, form: PlanFormat, robot: RobotLimits, gate: GateSettings) -> None:
         """Refuse a plan format that lacks joints of the robot: nothing of them would be checked."""
