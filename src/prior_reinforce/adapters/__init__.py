@@ -16,6 +16,10 @@ ADAPTERS: Registry[Adapter] = Registry(
     "adapter",
     "prior_reinforce.adapters.base:Adapter",
     {
+        "bayes": Member(
+            "prior_reinforce.adapters.bayesian:BayesianAdapter",
+            "readings as intervals, every trial remembered, P(hit) known",
+        ),
         "gp": Member(_GP, "Gaussian process, m = 2 trials remembered"),
         "gp-all": Member(_GP, "every trial remembered", {"memory_size": None}),
         "gp-one-term": Member(_GP, "one fixed diagonal term, as in the paper", _ONE_TERM),

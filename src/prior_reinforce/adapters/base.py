@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from dataclasses import dataclass
 
 from numpy.typing import ArrayLike
 
@@ -10,6 +11,16 @@ from prior_reinforce.arrays import Point, as_vector
 from prior_reinforce.errors import InvalidFeedbackError, InvalidGoalError, NotFittedError
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.readings import Reading
+
+
+@dataclass(frozen=True)
+class Expectation:
+    """What is expected of a trial before it is executed."""
+
+    p_hit: float
+    """Probability that it reaches the goal."""
+    trials: float
+    """Trials until the goal is reached, this one included."""
 
 
 class Adapter(ABC):
@@ -65,6 +76,30 @@ class Adapter(ABC):
             reading = Reading.estimated(error)
         self._observe_reading(checked, about, reading)
 
+    def expect(self, condition: ArrayLike, goal: ArrayLike, tolerance: float) -> Expectation | None:
+        """Return what is expected of a trial; None from adapters that expect nothing.
+
+        Args:
+            condition: c, mostly what was proposed.
+            goal: g.
+            tolerance: epsilon, in the first component's unit (`Normalisation.metric`).
+
+        Raises:
+            NotFittedError: Before `start`.
+            InvalidGoalError: Wrong shape, or not finite.
+        """
+        return self._expect(
+            self._checked(condition, "condition", InvalidGoalError),
+            self._checked(goal, "goal", InvalidGoalError),
+            tolerance,
+        )
+
+    def change_hardware(self) -> None:  # noqa: B027  # most know no difference
+        """Take note that the hardware changes between the trials before and those to come.
+
+        Nothing, for most: they tell no difference between what was learned and what has changed.
+        """
+
     @abstractmethod
     def _start(self, demonstrations: Demonstrations) -> None:
         """See `start`."""
@@ -84,6 +119,10 @@ class Adapter(ABC):
         """
         if reading.has_number:
             self._observe(condition, goal + reading.error_seen)
+
+    def _expect(self, condition: Point, goal: Point, tolerance: float) -> Expectation | None:
+        """See `expect`."""
+        return None
 
     def _checked(
         self,

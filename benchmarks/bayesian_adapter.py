@@ -1,0 +1,85 @@
+"""Processor time of one trial of the Bayesian adapter, beside a refit of the Gaussian process.
+
+    python benchmarks/bayesian_adapter.py [--repeats 20] [--seed 0]
+
+For each number of trials in memory, k = 2 and 3, seen by eye: one reading observed, the next
+condition proposed, and P(hit) evaluated; and the Gaussian process, m = 2, taking in the same
+reading. Both in this process, one after the other, in an order drawn anew each time. Printed are
+medians and the median of the ratios; other processes do not count. A session that is brought back
+observes every reading again: that is the last column.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from prior_reinforce.adapters.base import Adapter
+from prior_reinforce.adapters.bayesian import BayesianAdapter
+from prior_reinforce.adapters.gaussian_process import GaussianProcessAdapter
+from prior_reinforce.perception.eye import Eye
+from prior_reinforce.plans.motions import Demonstrations, PlanFormat
+from prior_reinforce.rollouts import Rollout
+
+REGION = np.array([0.25, 0.50, 0.40])  # [m]
+TOLERANCE = 0.015  # [m]
+
+
+def seconds(work: Callable[[], object]) -> float:
+    start = time.process_time()
+    work()
+    return time.process_time() - start
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--repeats", type=int, default=20)
+    parser.add_argument("--seed", type=int, default=0)
+    arguments = parser.parse_args()
+    print("k  trials  one trial  GP refit  ratio  all observed again")
+    for k in (2, 3):
+        for n in (1, 3, 10, 30, 100, 200):
+            times = []
+            for repeat in range(-2, arguments.repeats):  # two to warm up, not counted
+                rng = np.random.default_rng([arguments.seed, k, n, repeat + 2])
+                outcomes = rng.uniform(size=(6, k)) * REGION[:k]
+                format_ = PlanFormat(("joint1",), ("rad",), 0.02)
+                demonstrations = Demonstrations(rng.normal(size=(6, 4, 1)), outcomes, format_)
+                goals = rng.uniform(size=(n, k)) * REGION[:k]
+                conditions = goals + rng.normal(scale=0.02, size=(n, k))
+                landed = conditions + 0.03 + rng.normal(scale=0.01, size=(n, k))
+                seen = [
+                    Eye().perceive(Rollout(r, True), g, rng)
+                    for r, g in zip(landed, goals, strict=True)
+                ]
+                trials = list(zip(conditions, goals, seen, strict=True))
+                ours, theirs = BayesianAdapter(), GaussianProcessAdapter()
+                adapters: tuple[Adapter, ...] = (ours, theirs)
+
+                def again(adapter: Adapter) -> None:
+                    adapter.start(demonstrations)  # noqa: B023
+                    for trial in trials[:-1]:  # noqa: B023
+                        adapter.observe(*trial)
+
+                def one_more() -> None:
+                    ours.observe(*trials[-1])  # noqa: B023
+                    condition = ours.propose(goals[-1])  # noqa: B023
+                    ours.expect(condition, goals[-1], TOLERANCE)  # noqa: B023
+
+                replay = [seconds(lambda a=adapter: again(a)) for adapter in adapters]
+                pair = [one_more, lambda: theirs.observe(*trials[-1])]  # noqa: B023
+                taken = np.zeros(2)
+                for i in rng.permutation(2):
+                    taken[i] = seconds(pair[i])
+                if repeat >= 0:
+                    times.append([*taken, replay[0]])
+            one, refit, replayed = np.median(1e3 * np.array(times), axis=0)
+            ratio = np.median([row[0] / row[1] for row in times])
+            print(f"{k}  {n:6d}  {one:6.1f} ms  {refit:5.1f} ms  {ratio:5.1f}  {replayed:9.1f} ms")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,221 @@
+import numpy as np
+import pytest
+from scipy.stats import norm
+
+from prior_reinforce.adapters import bayesian
+from prior_reinforce.adapters.bayesian import BayesianAdapter, BayesianConfig
+from prior_reinforce.errors import ConfigurationError
+from prior_reinforce.plans.motions import Demonstrations, PlanFormat
+from prior_reinforce.readings import Reading
+
+CORNERS = np.array([[0.8, -0.2], [0.8, 0.0], [0.8, 0.2], [1.0, -0.2], [1.0, 0.0], [1.0, 0.2]])
+GOAL = np.array([0.9, 0.05])
+TOLERANCE = 0.015
+
+
+def started(outcomes=CORNERS, units=(), **settings) -> BayesianAdapter:
+    plans = np.random.default_rng(0).normal(size=(len(outcomes), 4, 1))
+    format_ = PlanFormat(("j1",), ("rad",), 0.02)
+    adapter = BayesianAdapter(BayesianConfig(**settings))
+    adapter.start(Demonstrations(plans, outcomes, format_, (), units))
+    return adapter
+
+
+def throw(adapter, goal, moved, seen=Reading.by_eye, words=True):
+    """One trial where outcomes are condition plus `moved`; by eye, or as `seen` makes a reading."""
+    condition = adapter.propose(goal)
+    error = condition + moved - goal
+    if words:
+        steps = np.array([0.0, 0.02, 0.05, 0.1, 0.2])
+        nearest = np.abs(np.abs(error)[:, None] - steps).argmin(axis=1)
+        error = np.sign(error) * steps[nearest] + 0.0
+    adapter.observe(condition, goal, seen(error))
+    return condition
+
+
+def test_the_first_condition_is_the_goal():
+    for goal in np.random.default_rng(0).uniform([0.7, -0.3], [1.1, 0.3], size=(20, 2)):
+        np.testing.assert_allclose(started().propose(goal), goal, atol=1e-9)
+
+
+def test_a_shift_of_six_centimetres_is_found_in_three_trials_by_eye():
+    adapter, shift = started(), np.array([-0.06, 0.02])
+    for _ in range(3):
+        throw(adapter, GOAL, shift)
+    assert np.linalg.norm(adapter.propose(GOAL) + shift - GOAL) < TOLERANCE
+
+
+def test_what_was_learned_for_one_goal_serves_another():
+    adapter, shift = started(), np.array([-0.06, 0.02])
+    for goal in (GOAL, [0.85, -0.1], [0.95, -0.05]):
+        for _ in range(3):
+            throw(adapter, np.array(goal), shift)
+    other = np.array([0.95, 0.15])
+    assert np.linalg.norm(adapter.propose(other) + shift - other) < 0.02
+
+
+def test_a_lost_ball_is_shrugged_off():
+    adapter, shift = started(), np.array([0.03, 0.0])
+    for _ in range(3):
+        throw(adapter, GOAL, shift, Reading.measured, words=False)
+    before = adapter.propose(GOAL)
+    adapter.observe(before, GOAL, Reading.by_eye([-0.7, 0.5]))
+    np.testing.assert_allclose(adapter.propose(GOAL), before, atol=0.005)
+
+
+def test_new_hardware_keeps_what_the_generator_gets_wrong_and_forgets_the_shift():
+    adapter, shift = started(), np.array([-0.07, 0.03])
+    rng = np.random.default_rng(1)
+    bump = np.array([0.02, -0.02])
+
+    def moved(condition):
+        near = np.exp(-0.5 * np.sum((condition - GOAL) ** 2) / 0.1**2)
+        return shift + bump * near
+
+    for condition in rng.uniform(CORNERS.min(axis=0), CORNERS.max(axis=0), size=(25, 2)):
+        outcome = condition + moved(condition)
+        adapter.observe(condition, outcome, Reading.measured([0.0, 0.0], 0.001))
+    known = adapter.propose(GOAL) - GOAL
+    assert np.linalg.norm(known + shift + bump) < 0.01
+    adapter.change_hardware()
+    forgotten = adapter.propose(GOAL) - GOAL
+    far = np.array([0.8, -0.2])
+    assert np.linalg.norm(adapter.propose(far) - far) < 0.5 * np.linalg.norm(shift)
+    assert np.linalg.norm(forgotten) < np.linalg.norm(known)
+    unsure, sure = (adapter.expect(GOAL + m, GOAL, TOLERANCE) for m in (forgotten, known))
+    assert unsure.p_hit < 0.5
+    assert sure.trials == pytest.approx(1 + 1.6 * (1 - sure.p_hit))
+
+
+def test_what_the_demonstrations_hardware_did_is_no_shift():
+    """Demonstrations say c = r of their own day: a shift of today does not contradict them."""
+    adapter, shift = started(), np.array([0.08, 0.0])
+    for goal in ([0.85, -0.1], [0.95, 0.1]):
+        for _ in range(2):
+            throw(adapter, np.array(goal), shift)
+    at_a_demonstration = CORNERS[1]
+    moved = at_a_demonstration - adapter.propose(at_a_demonstration)
+    np.testing.assert_allclose(moved, shift, atol=0.025)
+
+
+def test_p_hit_of_one_component_by_hand():
+    adapter = started(np.array([[0.0], [2.0], [1.0], [3.0]]), field_sd=(0.2,), hardware_sd=(0.1,),
+                      field_reach=(1.0,))  # fmt: skip
+    condition, goal = np.array([1.4]), np.array([1.5])
+    mean, variance = adapter._predict(adapter._normalisation.apply(condition[None]))
+    scale = adapter._normalisation.scale[0]
+    sd = scale * np.sqrt(variance[0, 0, 0] + 0.03**2)
+    middle = condition[0] + scale * mean[0, 0, 0]
+    expected = norm.cdf(1.6, middle, sd) - norm.cdf(1.4, middle, sd)
+    assert adapter.expect(condition, goal, 0.1).p_hit == pytest.approx(expected, abs=1e-3)
+
+
+@pytest.mark.parametrize("k", [2, 3])
+def test_p_hit_is_the_share_of_sampled_outcomes_within_the_tolerance(k):
+    rng = np.random.default_rng(k)
+    adapter = started(rng.uniform(size=(8, k)))
+    goal = np.full(k, 0.5)
+    for _ in range(3):
+        throw(adapter, goal, 0.05 * np.ones(k))
+    condition = adapter.propose(goal) + 0.03
+    mean, variance = adapter._predict(adapter._normalisation.apply(condition[None]))
+    models = rng.choice(len(mean), p=adapter._known().model_weights, size=200_000)
+    sd = np.sqrt(variance[models, :, 0] + 0.03**2)
+    moved = adapter._normalisation.scale * (mean[models, :, 0] + sd * rng.normal(size=sd.shape))
+    inside = np.linalg.norm(condition + moved - goal, axis=1) <= 0.05
+    assert adapter.expect(condition, goal, 0.05).p_hit == pytest.approx(inside.mean(), abs=0.01)
+
+
+def test_p_hit_grows_with_the_tolerance_and_with_what_is_known():
+    adapter = started()
+    p = [adapter.expect(GOAL, GOAL, tolerance).p_hit for tolerance in (0.005, 0.015, 0.05, 0.5)]
+    assert np.all(np.diff(p) > 0)
+    assert p[-1] == pytest.approx(1.0, abs=0.03)
+    for _ in range(4):
+        throw(adapter, GOAL, np.array([0.02, 0.0]), Reading.measured, words=False)
+    condition = adapter.propose(GOAL)
+    assert adapter.expect(condition, GOAL, 0.015).p_hit > 2 * p[1]
+    assert adapter.expect(condition + 0.1, GOAL, 0.015).p_hit < 0.05
+
+
+@pytest.mark.parametrize("k", [1, 2, 3, 4])
+@pytest.mark.parametrize("sd", [0.01, 0.1, 1.0])
+def test_the_share_within_a_ball_is_that_of_samples_whatever_its_size(k, sd):
+    rng = np.random.default_rng(k)
+    mean = 0.05 * rng.normal(size=k)
+    sds = sd * rng.uniform(0.5, 1.5, size=k)
+    share = bayesian._share_within(0.1, mean[None, :, None], sds[None, :, None])[0, 0]
+    samples = mean + sds * rng.normal(size=(400_000, k))
+    assert share == pytest.approx(np.mean(np.linalg.norm(samples, axis=1) < 0.1), abs=0.006)
+
+
+def many(adapter, n):
+    """Trials at random places of a smooth field, seen to 1 cm."""
+    rng = np.random.default_rng(3)
+    for condition in rng.uniform(CORNERS.min(axis=0), CORNERS.max(axis=0), size=(n, 2)):
+        moved = 0.03 * np.array([np.sin(9 * condition[1]), np.cos(9 * condition[0])])
+        low = np.floor(100 * moved) / 100
+        reading = Reading(moved, low, low + 0.01, np.zeros(2))
+        adapter.observe(condition, condition, reading)
+    return adapter
+
+
+def test_two_hundred_trials_are_merged_and_hardly_missed(monkeypatch):
+    merged = many(started(), 200)
+    assert np.count_nonzero(merged._memory.hardware) <= 24
+    monkeypatch.setattr(bayesian, "_TRIALS_KEPT", 10**6)
+    whole = many(started(), 60)
+    goals = np.random.default_rng(0).uniform([0.83, -0.17], [0.97, 0.17], size=(20, 2))
+    off, off_whole = (
+        [np.linalg.norm(c + 0.03 * np.array([np.sin(9 * c[1]), np.cos(9 * c[0])]) - goal)
+         for goal in goals for c in [adapter.propose(goal)]]
+        for adapter in (merged, whole)
+    )  # fmt: skip
+    assert np.median(off) < 0.004
+    assert np.median(off) < 2 * np.median(off_whole) + 0.001
+
+
+def test_trials_of_different_hardware_are_never_merged():
+    adapter = many(started(), 20)
+    adapter.change_hardware()
+    many(adapter, 40)
+    counts = np.bincount(adapter._memory.hardware)
+    assert counts[0] == len(CORNERS)
+    assert np.all(counts[1:] > 0)
+
+
+def test_proposals_depend_on_what_was_observed_alone():
+    asked, silent = started(), started()
+    for adapter in (asked, silent):
+        for i in range(40):
+            error = 0.02 * np.array([np.sin(i), np.cos(i)])
+            adapter.observe(GOAL + 0.05 * error, GOAL, Reading.by_eye(np.round(error, 2)))
+            if adapter is asked:
+                adapter.propose(GOAL)
+    np.testing.assert_array_equal(asked.propose(GOAL), silent.propose(GOAL))
+
+
+def test_metres_and_milliseconds_are_as_good_as_metres_and_seconds():
+    proposals, hits = [], []
+    for factor in ([1.0, 1.0], [1.0, 1000.0]):
+        adapter = started(factor * CORNERS, units=("m", "s"))
+        adapter.observe(factor * GOAL, factor * GOAL, Reading.measured(np.multiply(factor, 0.03)))
+        proposals.append(adapter.propose(factor * GOAL) / factor)
+        hits.append(adapter.expect(factor * GOAL, factor * GOAL, 0.02).p_hit)
+    np.testing.assert_allclose(*proposals, atol=1e-9)
+    assert hits[0] == pytest.approx(hits[1])
+
+
+@pytest.mark.parametrize(
+    ("settings", "word"),
+    [
+        ({"field_sd": ()}, "field_sd"),
+        ({"field_sd": (0.1, -0.1)}, "field_sd"),
+        ({"rough_reach": 0.0}, "rough_reach"),
+        ({"execution_sd": float("nan")}, "execution_sd"),
+        ({"outlier": 0.7}, "outlier"),
+    ],
+)
+def test_settings_out_of_range_are_refused(settings, word):
+    with pytest.raises(ConfigurationError, match=word):
+        BayesianConfig(**settings)

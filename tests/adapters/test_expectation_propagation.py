@@ -1,0 +1,131 @@
+"""Held against closed forms, numerical integration and sampling."""
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.stats import multivariate_normal, norm
+
+from prior_reinforce.adapters.expectation_propagation import Readings, infer, tilted
+
+INF = np.inf
+
+
+def likelihood(d, low, high, variance, e, width):
+    s = np.sqrt(variance)
+    if low == high:
+        return (1 - e) * norm.pdf(low, d, s) + e / width
+    read = norm.cdf((high - d) / s) - norm.cdf((low - d) / s)
+    return (1 - e) * read + e * min(high - low, width) / width
+
+
+def covariance(at: np.ndarray, reach: float = 0.8, sd: float = 0.3) -> np.ndarray:
+    return sd**2 * np.exp(-0.5 * np.square(at[:, None] - at) / reach**2)
+
+
+@pytest.mark.parametrize("e", [1e-12, 0.01, 0.3])
+@pytest.mark.parametrize(
+    ("low", "high", "variance"),
+    [
+        (0.1, 0.4, 0.001),
+        (-0.4, -0.1, 0.04),
+        (0.2, 0.2, 0.01),
+        (0.3, INF, 0.002),
+        (-INF, -0.2, 0.002),
+        (-INF, INF, 0.01),
+        (1.5, 1.6, 0.0009),
+    ],
+)
+def test_tilted_moments_are_those_of_numerical_integration(low, high, variance, e):
+    mean, prior = 0.05, 0.09
+    readings = Readings(np.array([[low]]), np.array([[high]]), np.array([[variance]]), e, 8.0)
+    shape = np.full((1, 1, 1), 1.0)
+    log_z, new_mean, new_variance = tilted(mean * shape, prior * shape, readings)
+
+    def moment(power, about=0.0):
+        def density(d):
+            read = likelihood(d, low, high, variance, e, 8.0)
+            return (d - about) ** power * norm.pdf(d, mean, np.sqrt(prior)) * read
+
+        breaks = [p for p in (low, high, mean) if np.isfinite(p)]
+        return quad(density, -4, 4, points=breaks, limit=500, epsabs=1e-16)[0]
+
+    z = moment(0)
+    assert log_z[0, 0, 0] == pytest.approx(np.log(z), abs=1e-6)
+    expected = moment(1) / z
+    assert new_mean[0, 0, 0] == pytest.approx(expected, abs=1e-6)
+    assert new_variance[0, 0, 0] == pytest.approx(moment(2, expected) / z, rel=1e-4)
+
+
+def test_moments_are_finite_however_far_the_interval_lies():
+    low = np.array([[50.0, -60.0, 1e3]])
+    readings = Readings(low, low + 0.01, np.full((1, 3), 1e-6), 0.01)
+    shape = np.ones((1, 1, 3))
+    for moment in tilted(0 * shape, 0.01 * shape, readings):
+        assert np.all(np.isfinite(moment))
+
+
+def test_numbers_give_gaussian_process_regression():
+    rng = np.random.default_rng(0)
+    at, y = rng.uniform(-1, 1, 7), rng.normal(scale=0.3, size=(2, 7))
+    variance = rng.uniform(0.001, 0.02, size=(2, 7))
+    models = np.stack([covariance(at), covariance(at, 0.4, 0.5)])
+    posterior = infer(models, Readings(y, y, variance, outlier=1e-9))
+    evidence = []
+    for m, K in enumerate(models):
+        evidence.append(0.0)
+        for k in range(2):
+            total = K + np.diag(variance[k])
+            np.testing.assert_allclose(
+                posterior.weights[m, k], np.linalg.solve(total, y[k]), rtol=1e-3, atol=1e-3
+            )
+            np.testing.assert_allclose(
+                K @ posterior.precision[m, k] @ K, K @ np.linalg.solve(total, K), atol=1e-6
+            )
+            evidence[-1] += multivariate_normal.logpdf(y[k], np.zeros(7), total)
+    gap = posterior.log_evidence[0] - posterior.log_evidence[1]
+    assert gap == pytest.approx(evidence[0] - evidence[1], abs=1e-3)
+    share = np.exp(evidence - np.max(evidence))
+    np.testing.assert_allclose(posterior.model_weights, share / share.sum(), atol=1e-3)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_means_spreads_and_evidence_are_those_of_a_million_samples(seed):
+    rng = np.random.default_rng(seed)
+    at = rng.uniform(-1, 1, 5)
+    K = covariance(at, rng.uniform(0.4, 1.2), 0.3) + 1e-9 * np.eye(5)
+    truth = rng.multivariate_normal(np.zeros(5), K)
+    edges = np.array([-INF, -0.75, -0.35, -0.1, 0.1, 0.35, 0.75, INF])
+    bin_ = np.searchsorted(edges, truth) - 1
+    low, high, variance = edges[bin_], edges[bin_ + 1], np.full(5, 0.001)
+    readings = Readings(low[None], high[None], variance[None], 0.01, 8.0)
+    posterior = infer(K[None], readings)
+    samples = rng.multivariate_normal(np.zeros(5), K, size=1_000_000)
+    weight = np.prod(
+        [likelihood(samples[:, i], low[i], high[i], 0.001, 0.01, 8.0) for i in range(5)], axis=0
+    )
+    mean = np.average(samples, weights=weight, axis=0)
+    sd = np.sqrt(np.average((samples - mean) ** 2, weights=weight, axis=0))
+    ours = K @ posterior.weights[0, 0]
+    spread = np.sqrt(np.diag(K - K @ posterior.precision[0, 0] @ K))
+    np.testing.assert_allclose(ours, mean, atol=0.06 * sd.max())
+    np.testing.assert_allclose(spread, sd, rtol=0.06)
+    assert posterior.log_evidence[0] == pytest.approx(np.log(weight.mean()), abs=0.1)
+
+
+def test_what_says_nothing_changes_nothing():
+    K = covariance(np.array([0.0, 0.5]))
+    far = np.full((1, 2), INF)
+    posterior = infer(K[None], Readings(-far, far, np.full((1, 2), 0.01)))
+    np.testing.assert_allclose(posterior.weights, 0.0, atol=1e-6)
+    np.testing.assert_allclose(posterior.precision, 0.0, atol=1e-6)
+
+
+def test_ten_times_the_same_word_say_less_than_ten_numbers():
+    K = covariance(np.zeros(10)) + 1e-9 * np.eye(10)
+    low, high = np.full((1, 10), 0.2), np.full((1, 10), 0.5)
+    number, spread = np.full((1, 10), 0.35), np.full((1, 10), 0.3**2 / 12 + 1e-4)
+    sds = []
+    for readings in (Readings(low, high, 0 * low + 1e-4), Readings(number, number, spread)):
+        posterior = infer(K[None], readings)
+        sds.append(np.sqrt(K[0, 0] - K[0] @ posterior.precision[0, 0] @ K[0]))
+    assert sds[0] > 1.5 * sds[1]
