@@ -179,7 +179,7 @@ def read_place(text: str, names: Sequence[str], units: Sequence[str]) -> _Point:
             return np.array([said[j].error if j in said else 0.0 for j in range(len(names))])
         raise InvalidFeedbackError(f"cannot read {text!r}; give {expected}")
     if len(numbers) != len(names) or not all(map(math.isfinite, numbers)):
-        raise InvalidFeedbackError(f"{text!r} is not {expected}")
+        raise InvalidFeedbackError(f"{text!r} is not {expected}; give those")
     for number, unit in zip(numbers, units, strict=True):
         if unit == "m" and abs(number) > _FARTHEST_PLACE:
             raise InvalidFeedbackError(

@@ -85,3 +85,28 @@ def test_inspecting_says_what_to_type_next_and_writes_a_table_to_fill_in(run, fo
         np.testing.assert_allclose(
             workspace.demonstrations.outcomes_seen, demonstrations().outcomes_seen
         )
+
+
+def test_more_recordings_are_appended(run, folder, tmp_path):
+    with Workspace(folder) as workspace:
+        before = workspace.demonstrations
+    longer = np.concatenate([before.plans[0], before.plans[0][-1:] + np.linspace(0, 1, 9)[:, None]])
+    (tmp_path / "more").mkdir()
+    t = np.arange(len(longer)) * 0.02
+    for i in range(2):
+        q = longer * (1 + i)
+        np.savez(tmp_path / "more" / f"{i}.npz", t=t, q=q, joint_names=["joint1", "joint2"])
+    (tmp_path / "more" / "outcomes.csv").write_text("episode,x,y\n0,0.7,0.1\n1,0.75,0\n")
+    status, out, _ = run("import", folder, "more", "--append", "--no-trim")
+    assert status == 0
+    assert "4 demonstrations were there, now 6" in out
+    with Workspace(folder) as workspace:
+        after = workspace.demonstrations
+    assert after.plans.shape == (6, 33, 2)
+    np.testing.assert_array_equal(after.plans[:4, :24], before.plans)
+    np.testing.assert_array_equal(after.plans[:4, 24:], before.plans[:, -1:].repeat(9, axis=1))
+    np.testing.assert_allclose(after.plans[5], 2 * longer)
+    np.testing.assert_allclose(after.outcomes_seen[4:], [[0.7, 0.1], [0.75, 0]])
+    status, _, err = run("import", folder, "more", "--append", "--no-trim")
+    assert status == 2  # the same once more
+    assert "outcome" in err

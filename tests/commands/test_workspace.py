@@ -73,3 +73,16 @@ def test_an_arm_that_is_not_known_names_the_ways_to_give_it(run, tmp_path, monke
     assert run("new", "hoop", "--robot", "gone.urdf")[0] == 2
     assert "--tip is a link of a URDF" in run("new", "hoop", "--tip", "tool0")[2]
     assert not (tmp_path / "hoop").exists()
+
+
+@pytest.mark.parametrize("place", [("90cm", "-5cm"), ("90 -5 cm",), ("90cm ahead, 5cm right",)])
+def test_a_goal_may_be_said_with_a_unit_or_in_words(run, folder, place):
+    assert run("goal", folder, *place)[1].startswith("goal 1: 90 cm ahead, 5 cm right")
+
+
+def test_a_goal_in_centimetres_without_a_unit_is_refused(run, folder):
+    status, _, err = run("goal", folder, "65", "15")
+    assert status == 2
+    assert "65 m is farther than any arm throws; say the unit, for instance 65cm" in err
+    with Workspace(folder) as workspace:
+        assert not workspace.session().goals

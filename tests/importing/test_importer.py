@@ -21,6 +21,7 @@ from prior_reinforce.errors import (
 )
 from prior_reinforce.importing import (
     Recording,
+    appended,
     import_demonstrations,
     importer,
     read_recordings,
@@ -331,3 +332,12 @@ def test_a_format_is_one_entry_of_the_table(tmp_path, monkeypatch):
     (tmp_path / "throw.yours").touch()
     with pytest.raises(FileFormatError, match=r"one of npz, .*, mine"):
         read_recordings(tmp_path / "throw.yours")
+
+
+def test_only_demonstrations_of_one_kind_are_joined(originals):
+    fifty = import_demonstrations(originals["npz"]).demonstrations
+    twenty = import_demonstrations(originals["robomimic"] / "demos.hdf5").demonstrations
+    with pytest.raises(
+        InvalidDemonstrationsError, match=r"plans of .*dt=0.02.*import all together"
+    ):
+        appended(fifty, twenty)

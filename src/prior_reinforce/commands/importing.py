@@ -22,6 +22,7 @@ from prior_reinforce.importing import (
     Inspection,
     Preprocessing,
     Recording,
+    appended,
     import_demonstrations,
     inspect_recordings,
     outcome_places,
@@ -96,6 +97,8 @@ class Import:
     smooth: float | None = None
     """Take out what is faster than so many Hz, such as an encoder's noise; says what it changed."""
 
+    append: bool = False
+    """Keep the demonstrations in use and add these to them."""
     inspect: bool = False
     """Only say what is in the recordings and what an import would make of it; write a table of
     outcomes to fill in where there is none."""
@@ -112,7 +115,13 @@ class Import:
             answers = self._asked(workspace, guesses) if at_terminal else None
             result = self._read(workspace, answers, take_guesses=guesses)
             print(result.preview.text)
-            workspace.import_demonstrations(result.demonstrations, str(self.source))
+            demonstrations, source = result.demonstrations, str(self.source)
+            if self.append:
+                before = workspace.demonstrations
+                demonstrations = appended(before, demonstrations)
+                source = f"{source}, appended to {before.n}"
+                print(f"appended    {before.n} demonstrations were there, now {demonstrations.n}")
+            workspace.import_demonstrations(demonstrations, source)
             with named_disk_errors(self.folder):
                 result.preview.draw(self.folder / _PICTURE)
             print(f"picture: {self.folder / _PICTURE}  (look at it before you learn)")

@@ -10,11 +10,15 @@ from typing import Annotated, Literal
 import tyro
 
 from prior_reinforce.adapters import ADAPTERS
-from prior_reinforce.errors import ConfigurationError
+from prior_reinforce.errors import (
+    ConfigurationError,
+    InvalidFeedbackError,
+    InvalidGoalError,
+)
 from prior_reinforce.robots import RobotLimits, robot_limits
 from prior_reinforce.robots.presets import PRESETS
 from prior_reinforce.robots.urdf import read_urdf
-from prior_reinforce.wording import say_place
+from prior_reinforce.wording import read_place, say_place
 from prior_reinforce.workspace.manifest import filled_in
 from prior_reinforce.workspace.status import describe, next_step
 from prior_reinforce.workspace.workspace import Workspace
@@ -108,8 +112,9 @@ class Goal:
 
     folder: Folder
     """Workspace."""
-    goal: Annotated[tuple[float, ...], tyro.conf.Positional]
-    """Its place in the outcome's units, for instance 0.92 0.10 (metres ahead, metres left)."""
+    goal: Annotated[tuple[str, ...], tyro.conf.Positional]
+    """Its place: 0.92 0.10 (metres ahead, metres left, or the outcome's units), 92cm 10cm, or
+    "92cm ahead, 10cm left"."""
     memory: Literal["goal", "workspace"] = "goal"
     """Which trials the adapter learns from: this goal's, or earlier goals' as well."""
     adapter: Annotated[
@@ -119,12 +124,16 @@ class Goal:
     def run(self) -> None:
         """Set it."""
         with Workspace(self.folder) as workspace:
-            goal = workspace.set_goal(
-                self.goal, carry_over=self.memory == "workspace", adapter=self.adapter
-            )
             manifest = workspace.manifest
-            place = say_place(goal.goal, manifest.outcome_names, manifest.outcome_units)
-            print(f"goal {goal.number}: {place}")
+            names, units = manifest.outcome_names, manifest.outcome_units
+            try:
+                place = read_place(" ".join(self.goal), names, units)
+            except InvalidFeedbackError as error:
+                raise InvalidGoalError(f"goal: {error}") from error
+            goal = workspace.set_goal(
+                place, carry_over=self.memory == "workspace", adapter=self.adapter
+            )
+            print(f"goal {goal.number}: {say_place(goal.goal, names, units)}")
             print_next(workspace)
 
 

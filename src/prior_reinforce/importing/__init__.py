@@ -3,6 +3,7 @@
 from prior_reinforce.importing.importer import (
     FORMATS,
     ImportResult,
+    appended,
     import_demonstrations,
     inspect_recordings,
     outcome_places,
@@ -21,6 +22,7 @@ __all__ = [
     "Preprocessing",
     "Preview",
     "Recording",
+    "appended",
     "import_demonstrations",
     "inspect_recordings",
     "outcome_places",

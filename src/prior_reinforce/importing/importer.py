@@ -13,6 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
 from typing_extensions import Unpack
 
 from prior_reinforce.errors import (
@@ -222,6 +223,31 @@ def _inspection(
 ) -> Inspection:
     reports = hold_against(kept, done, robot, gate)
     return Inspection(kept, done, None if robot is None else robot.robot, reports)
+
+
+def appended(before: Demonstrations, more: Demonstrations) -> Demonstrations:
+    """Return demonstrations with more of them; the shorter motions hold their last pose.
+
+    Raises:
+        InvalidDemonstrationsError: They mean other numbers, or have an outcome twice.
+    """
+    for what, one, other in (
+        ("plans of", before.format, more.format),
+        ("outcomes", before.outcome_names, more.outcome_names),
+        ("outcomes in", before.outcome_units, more.outcome_units),
+    ):
+        if one != other:
+            raise InvalidDemonstrationsError(
+                f"the demonstrations so far have {what} {one}, the new ones {other}; import all "
+                "together"
+            )
+    horizon = max(before.horizon, more.horizon)
+    plans = [
+        np.pad(d.plans, ((0, 0), (0, horizon - d.horizon), (0, 0)), mode="edge")
+        for d in (before, more)
+    ]
+    outcomes = np.concatenate([before.outcomes_seen, more.outcomes_seen])
+    return replace(more, plans=np.concatenate(plans), outcomes_seen=outcomes)
 
 
 def outcome_places(source: str | os.PathLike[str], format: str | None = None) -> list[Path]:
