@@ -1,5 +1,7 @@
 """Algorithm 1 as a state machine, on a closed-form world."""
 
+import threading
+
 import numpy as np
 import pytest
 
@@ -8,6 +10,7 @@ from prior_reinforce.errors import (
     ConfigurationError,
     InvalidFeedbackError,
     InvalidGoalError,
+    InvalidPlanError,
     RobotLimitError,
     TrialStateError,
     WorkspaceError,
@@ -466,3 +469,67 @@ def test_what_an_interrupt_cut_off_is_observed_once():
         session.ask()
     session.ask()
     assert len(session.adapter.seen) == 1
+
+
+def test_absurd_errors_are_refused_before_anything_is_told(session):
+    number = session.ask().number
+    for error in ([1e308, 1e308], [2e6, 0.0]):
+        with pytest.raises(InvalidFeedbackError, match="absurd in any unit"):
+            session.tell(number, error)
+    assert session.trials[0].stage is Stage.ASKED
+    session.tell(number, [0.05, 0.0])
+
+
+def test_two_sessions_that_share_an_adapter_go_as_if_each_had_its_own(session):
+    adapter = FullStepAdapter()
+    generator = session.generator
+    shared = [Session(generator, adapter, DEMOS, GOAL, 0.015) for _ in range(2)]
+    alone = [Session(generator, FullStepAdapter(), DEMOS, GOAL, 0.015) for _ in range(2)]
+    errors = np.array([[[0.05, -0.02], [0.01, 0.03]], [[-0.04, 0.0], [0.02, 0.02]]])
+    for error in (*errors, np.zeros((2, 2))):
+        for sessions in (shared, alone):
+            for each, seen in zip(sessions, error, strict=True):
+                each.tell(each.ask().number, seen)
+    for ours, theirs in zip(shared, alone, strict=True):
+        for trial, expected in zip(ours.trials, theirs.trials, strict=True):
+            np.testing.assert_array_equal(trial.condition, expected.condition)
+
+
+class BrokenGenerator(RepeatingGenerator):
+    """As a network whose weights were lost."""
+
+    def generate(self, conditions):
+        return super().generate(conditions) * np.nan
+
+
+def test_a_plan_that_holds_no_numbers_is_never_given_out():
+    generator = BrokenGenerator().fit(DEMOS, seed=0)
+    session = Session(generator, FullStepAdapter(), DEMOS, GOAL, 0.015)
+    with pytest.raises(InvalidPlanError, match="hold no numbers"):
+        session.ask()
+    assert not session.trials
+
+
+def test_threads_may_share_a_session(session):
+    """Each tells what it asked for; of each trial one telling counts, and none is lost."""
+    told, problems = [], []
+
+    def work():
+        for _ in range(25):
+            try:
+                trial = session.ask()
+                session.tell(trial.number, [0.05, 0.0])
+                told.append(trial.number)
+            except TrialStateError:
+                pass  # another was quicker
+            except Exception as error:
+                problems.append(error)
+
+    threads = [threading.Thread(target=work) for _ in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not problems
+    assert sorted(told) == list(range(1, len(told) + 1))
+    assert session.n_trials == len(told)

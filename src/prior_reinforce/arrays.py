@@ -20,6 +20,9 @@ from prior_reinforce.errors import (
     PriorReinforceError,
 )
 
+LARGEST = 1e6
+"""Of plans, outcomes, goals and errors, in any unit; ours: an encoder's counts stay below it, and
+squares of it are still exact. What is larger is a damaged file or a slip, and overflows later."""
 Plans = Float[np.ndarray, "n H D"]
 """Action plans A, one for each of n conditions, in the units of their `PlanFormat`."""
 Frames = Float[np.ndarray, "H D"]
@@ -205,10 +208,16 @@ def as_vector(
 def _as_numbers(
     values: ArrayLike, problem: type[PriorReinforceError], expected: str
 ) -> Float[np.ndarray, ...]:
+    if np.ma.isMaskedArray(values) and np.any(np.ma.getmaskarray(values)):
+        raise problem(f"{expected}, got a masked array; leave out what is masked")
     try:
-        return np.array(values, dtype=np.float64)
-    except (TypeError, ValueError) as error:
+        array = np.array(values, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError) as error:
         raise problem(f"{expected}, got {values!r:.80}: {error}") from error
+    if np.any(np.abs(array) > LARGEST, where=np.isfinite(array)):
+        largest = float(np.abs(array[np.isfinite(array)]).max())
+        raise problem(f"{expected}, got {largest:.4g}, which is absurd in any unit; check it")
+    return array
 
 
 def _first_not_finite(rows: Points) -> int:

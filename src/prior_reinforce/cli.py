@@ -59,7 +59,8 @@ def main(args: Sequence[str] | None = None) -> int:
         args: The command line without the program's name; None takes the process's own.
 
     Returns:
-        The exit status: 0 done, 1 not solved, 2 wrong input, 130 interrupted, 141 nobody read on.
+        The exit status: 0 done, 1 not all of it, 2 wrong input and nothing changed, 130
+        interrupted, 141 nobody read on.
     """
     warnings.showwarning = _print_warning
     try:
@@ -71,8 +72,9 @@ def main(args: Sequence[str] | None = None) -> int:
             raise
         return _NOBODY_READS
     except PriorReinforceError as error:
-        print(f"prior-reinforce: {error}", file=sys.stderr)
-        return 2
+        stays = "; what was recorded before stays" if error.changed else ""
+        print(f"prior-reinforce: {error}{stays}", file=sys.stderr)
+        return 1 if error.changed else 2
     except KeyboardInterrupt as error:
         print(f"prior-reinforce: interrupted{f'; {error}' if error.args else ''}", file=sys.stderr)
         return 130

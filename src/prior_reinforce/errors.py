@@ -1,12 +1,15 @@
 """Every error a caller can cause, in one tree.
 
 A message is one line that names the value, what was expected and the remedy; the command line
-prints it as it stands and exits with status 2. Errors are raised before anything is written.
+prints it as it stands and exits with status 2, or 1 if something was written before it.
 """
 
 
 class PriorReinforceError(Exception):
     """Base of all errors that this package raises on purpose."""
+
+    changed = False
+    """Whether something was written before; what then failed was another step of the same call."""
 
 
 class InvalidPlanError(PriorReinforceError, ValueError):

@@ -20,6 +20,7 @@ from contextlib import ExitStack
 from dataclasses import replace
 from functools import cached_property
 from numbers import Integral, Real
+from threading import RLock
 from types import FunctionType, MethodType
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -30,6 +31,7 @@ from prior_reinforce.arrays import Frames, Point, as_error
 from prior_reinforce.errors import (
     ConfigurationError,
     InvalidFeedbackError,
+    InvalidPlanError,
     RobotLimitError,
     TrialStateError,
     WorkspaceError,
@@ -56,7 +58,10 @@ class Verdict(Protocol):
 
 
 class Session:
-    """Reaching goals, one after another, trial by trial (paper, Algorithm 1, Stage 2)."""
+    """Reaching goals, one after another, trial by trial (paper, Algorithm 1, Stage 2).
+
+    Threads may share a session: one call at a time changes it, and the others wait.
+    """
 
     def __init__(
         self,
@@ -104,6 +109,8 @@ class Session:
         self._tolerance = tolerance
         self._history = History()
         self._observed: list[Trial] | None = None
+        self._lock = RLock()
+        self._mark = object()
         self._refresh()
         if goal is not None:
             self.set_goal(goal)
@@ -367,13 +374,14 @@ class Session:
 
     def _refresh(self) -> None:
         """Know all that the log says, and forget what was loaded if other things are in use."""
-        self._history.update(self.log.events())
-        goal = self._history.goal
-        now = (*self._in_use(), "" if goal is None else goal.adapter)
-        if now != self._loaded_for:
-            self._loaded_for, self._observed = now, None
-            for name in ("generator", "adapter", "demonstrations"):
-                self.__dict__.pop(name, None)
+        with self._lock:
+            self._history.update(self.log.events())
+            goal = self._history.goal
+            now = (*self._in_use(), "" if goal is None else goal.adapter)
+            if now != self._loaded_for:
+                self._loaded_for, self._observed = now, None
+                for name in ("generator", "adapter", "demonstrations"):
+                    self.__dict__.pop(name, None)
 
     def _now(self, number: int) -> Trial:
         self._refresh()
@@ -382,6 +390,7 @@ class Session:
     def _exclusive(self) -> ExitStack:
         """Hold the log, and know all that it says."""
         with ExitStack() as stack:
+            stack.enter_context(self._lock)
             stack.enter_context(self.log.exclusive())
             self._refresh()
             return stack.pop_all()
@@ -441,6 +450,9 @@ class Session:
         """M(g), after the adapter has seen every reading that counts."""
         readings = self._readings()
         seen, self._observed = self._observed, None  # until it has seen them all
+        # Another session's readings are in it, where two share it by mistake.
+        if vars(self.adapter).get("_used_by") is not self._mark:
+            vars(self.adapter)["_used_by"], seen = self._mark, None
         if seen is None or seen != readings[: len(seen)]:  # one was voided or amended: start again
             self.adapter.start(self.demonstrations)
             seen = []
@@ -533,6 +545,10 @@ def ask_all(sessions: Sequence[Session], *, arm_did_not_move: bool = False) -> l
                 raise ConfigurationError("sessions asked together must share one generator object")
             conditions = np.stack([session._propose() for session in new])
             plans = generator.generate(conditions)
+            if not np.all(np.isfinite(plans)):
+                raise InvalidPlanError(
+                    "the generator gives plans that hold no numbers (nan or inf); learn again"
+                )
             for session, condition, plan in zip(new, conditions, plans, strict=True):
                 session._open(condition, plan)
     return [

@@ -8,7 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from prior_reinforce.errors import FileFormatError, InvalidDemonstrationsError, InvalidPlanError
+from prior_reinforce.errors import (
+    FileFormatError,
+    InvalidDemonstrationsError,
+    InvalidGoalError,
+    InvalidPlanError,
+)
 from prior_reinforce.plans.motions import Demonstrations, Plan, PlanFormat
 
 FORMAT = PlanFormat(names=("joint1", "joint2"), units=("rad", "rad"), dt=0.01)
@@ -126,11 +131,31 @@ def test_goal_far_outside_warns_and_says_how_far_and_a_near_one_is_silent():
         demos.check_goal([1.5, 0.0])
 
 
-@pytest.mark.parametrize("value", [3e304, -1.7e308])
-def test_how_far_outside_a_goal_is_can_be_said_however_far(value):
-    with pytest.warns(UserWarning, match=re.escape(f"goal [{value:.4g}")) as warned:
-        make().check_goal([value, 0.7])
+def test_how_far_outside_a_goal_is_can_be_said_however_far():
+    with pytest.warns(UserWarning, match=re.escape("goal [9e+05")) as warned:
+        make().check_goal([9e5, 0.7])
     assert len(warned) == 1
+
+
+@pytest.mark.parametrize("value", [3e304, -1.7e308, 1.1e6])
+def test_absurd_numbers_are_refused_on_entry(value):
+    """By one rule: whatever their unit, they are no plan, outcome or goal, and overflow later."""
+    demos = make()
+    with pytest.raises(InvalidGoalError, match="absurd in any unit"):
+        demos.check_goal([value, 0.7])
+    with pytest.raises(InvalidDemonstrationsError, match="absurd in any unit"):
+        replace(demos, outcomes_seen=demos.outcomes_seen + value)
+    with pytest.raises(InvalidDemonstrationsError, match="absurd in any unit"):
+        replace(demos, plans=demos.plans + value)
+    with pytest.raises(InvalidPlanError, match="absurd in any unit"):
+        Plan(demos.plans[0] + value, FORMAT)
+
+
+def test_what_is_masked_is_no_data():
+    demos = make()
+    masked = np.ma.masked_greater(demos.outcomes_seen, 0.7)
+    with pytest.raises(InvalidDemonstrationsError, match="leave out what is masked"):
+        replace(demos, outcomes_seen=masked)
 
 
 def test_missing_truncated_flipped_and_foreign_files_are_named(tmp_path):

@@ -1,10 +1,11 @@
 """The journal: append-only, one writer at a time, and no damage is believed."""
 
 import sqlite3
+import threading
 
 import pytest
 
-from prior_reinforce.errors import WorkspaceError
+from prior_reinforce.errors import TrialStateError, WorkspaceError
 from prior_reinforce.trials import Stage
 from prior_reinforce.workspace.workspace import Workspace
 from tests.workspace.planar import ask, tell, trials, void
@@ -66,3 +67,34 @@ def test_a_commit_waits_for_the_disk(workspace):
     """EXTRA (3): the rollback journal's folder is synced too; a power cut cannot be tested here."""
     connection = workspace.log.journal._connection
     assert connection.execute("PRAGMA synchronous").fetchone() == (3,)
+
+
+def test_threads_may_share_a_workspace(workspace):
+    session, problems = workspace.session(), []
+
+    def work():
+        for _ in range(5):
+            try:
+                session.tell(session.ask().number, [0.05, 0.0])
+            except TrialStateError:
+                pass  # another was quicker
+            except Exception as error:
+                problems.append(error)
+
+    threads = [threading.Thread(target=work) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not problems
+    assert all(trial.stage is Stage.TOLD for trial in trials(workspace))
+
+
+def test_it_knows_whether_anything_became_durable(workspace):
+    with Workspace(workspace.folder) as other:
+        assert not other.log.journal.appended
+        with pytest.raises(TypeError), other.log.journal.exclusive():
+            other.log.journal.append("goal_set", {"goal": object()})
+        assert not other.log.journal.appended
+        ask(other)
+        assert other.log.journal.appended

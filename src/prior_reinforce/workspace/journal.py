@@ -15,6 +15,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from datetime import datetime, timezone
 from pathlib import Path
+from threading import RLock
 from typing import Any
 
 from prior_reinforce.errors import WorkspaceError
@@ -52,8 +53,14 @@ class Journal:
         self._path = path
         self._events: list[Event] = []
         self._last_digest = ""
+        self._lock = RLock()
+        self.appended = False
+        """Whether anything became durable since it was opened here."""
+        self._pending = False
         with self._named_errors():
-            self._connection = sqlite3.connect(path, timeout=_LOCK_TIMEOUT_S, isolation_level=None)
+            self._connection = sqlite3.connect(
+                path, timeout=_LOCK_TIMEOUT_S, isolation_level=None, check_same_thread=False
+            )
             # A commit returns only when the rollback journal and its folder are on the disk.
             self._connection.execute("PRAGMA synchronous = EXTRA")
             version = self._connection.execute("PRAGMA user_version").fetchone()[0]
@@ -83,7 +90,7 @@ class Journal:
         Raises:
             WorkspaceError: The file is damaged.
         """
-        with self._named_errors():
+        with self._lock, self._named_errors():
             rows = self._connection.execute(
                 "SELECT id, time, kind, data, digest FROM events WHERE id > ? ORDER BY id",
                 (self._events[-1].id if self._events else 0,),
@@ -109,17 +116,22 @@ class Journal:
         Raises:
             WorkspaceError: Another program holds it, or the disk refuses.
         """
-        with self._named_errors():
-            self._connection.execute("BEGIN IMMEDIATE")
-        try:
-            yield
+        with self._lock:
             with self._named_errors():
-                self._connection.execute("COMMIT")
-        except BaseException:
-            # A full disk has made SQLite roll back by itself already.
-            if self._connection.in_transaction:
-                self._connection.execute("ROLLBACK")
-            raise
+                self._connection.execute("BEGIN IMMEDIATE")
+            self._pending = False
+            try:
+                yield
+                with self._named_errors():
+                    self._connection.execute("COMMIT")
+                self.appended |= self._pending
+            except BaseException:
+                # A full disk has made SQLite roll back by itself already.
+                if self._connection.in_transaction:
+                    self._connection.execute("ROLLBACK")
+                else:
+                    self.appended |= self._pending  # committed, then interrupted
+                raise
 
     def append(self, kind: str, data: Mapping[str, Any]) -> None:
         """Add an event; call it inside `exclusive`.
@@ -139,6 +151,7 @@ class Journal:
                 "INSERT INTO events (time, kind, data, digest) VALUES (?, ?, ?, ?)",
                 (now, kind, text, digest),
             )
+        self._pending = True
 
     @contextmanager
     def _named_errors(self) -> Iterator[None]:

@@ -29,6 +29,7 @@ from prior_reinforce.errors import (
     ConfigurationError,
     FileFormatError,
     InvalidDemonstrationsError,
+    PriorReinforceError,
     WorkspaceError,
 )
 from prior_reinforce.files import inside, named_disk_errors
@@ -111,8 +112,12 @@ class Workspace:
         """Use it for the length of a block."""
         return self
 
-    def __exit__(self, *_: object) -> None:
-        """Close the journal."""
+    def __exit__(self, _: object, error: BaseException | None, __: object) -> None:
+        """Close the journal; an error that ends the block says whether something was recorded."""
+        if self.log.journal.appended and isinstance(error, PriorReinforceError):
+            error.changed = True
+        elif self.log.journal.appended and isinstance(error, KeyboardInterrupt):
+            error.args = error.args or ("what was recorded before stays",)
         self.close()
 
     @property
