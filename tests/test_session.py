@@ -5,7 +5,7 @@ import threading
 import numpy as np
 import pytest
 
-from prior_reinforce.adapters.base import Adapter
+from prior_reinforce.adapters.base import Adapter, Expectation
 from prior_reinforce.errors import (
     ConfigurationError,
     InvalidFeedbackError,
@@ -275,6 +275,71 @@ def test_trials_of_another_model_teach_nothing(session):
         in_use=lambda: ("another",),
     )
     np.testing.assert_array_equal(other.ask().condition, GOAL)
+
+
+class Carrying(FullStepAdapter):
+    """Wants earlier goals' trials, counts changes of hardware, and expects something."""
+
+    carries_over = True
+
+    def _start(self, demonstrations):
+        super()._start(demonstrations)
+        self.events = []
+
+    def change_hardware(self):
+        self.events.append("changed")
+
+    def _observe(self, condition, outcome_seen):
+        super()._observe(condition, outcome_seen)
+        self.events.append(round(outcome_seen[0], 2))
+
+    def _expect(self, condition, goal, tolerance):
+        return Expectation(0.25, 2.5)
+
+
+def carrying(log=None):
+    generator = RepeatingGenerator().fit(DEMOS, seed=0)
+    return Session(generator, Carrying(), DEMOS, None if log else [0.8, 0.0], 0.015, log=log)
+
+
+def test_trials_are_carried_over_where_they_serve_the_adapter():
+    session = carrying()
+    session.tell(session.ask().number, [0.05, 0.0])
+    session.set_goal(GOAL)
+    assert session.goals[-1].carry_over
+    session.ask()
+    assert session.adapter.events == [0.85]
+    session.void(2, "")
+    assert not session.set_goal(GOAL, carry_over=False).carry_over
+
+
+def test_the_adapter_hears_of_new_hardware_between_the_trials_before_and_after():
+    session = carrying()
+    session.tell(session.ask().number, [0.05, 0.0])
+    for note, error in (("another ball", 0.01), (None, 0.02), ("gripper", 0.03)):
+        session.set_goal([0.8, 0.0], new_hardware=note)
+        session.tell(session.ask().number, [error, 0.0], hit=False)
+    session.ask()
+    heard = [0.85, "changed", 0.81, 0.82, "changed", 0.83]
+    assert session.adapter.events == heard
+    assert [goal.new_hardware for goal in session.goals] == [None, "another ball", None, "gripper"]
+    again = carrying(session.log)
+    again.void(5, "")
+    again.ask()
+    assert again.adapter.events == heard
+    again.amend(2, [-0.05, 0.0])  # an earlier goal's
+    again.void(3, "misread")
+    again.tell(6, [0.0, 0.0])
+    again.ask()
+    assert again.adapter.events == [0.85, "changed", 0.75, "changed", 0.83, 0.8]
+
+
+def test_what_was_expected_is_kept_with_the_trial(session):
+    assert session.ask().p_hit is None
+    expecting = carrying()
+    trial = expecting.ask()
+    assert (trial.p_hit, trial.expected_trials) == (0.25, 2.5)
+    assert carrying(expecting.log).open_trial.p_hit == 0.25
 
 
 def test_a_goal_waits_for_the_open_trial(session):

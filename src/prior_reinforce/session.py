@@ -27,6 +27,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
+from prior_reinforce.adapters import ADAPTERS
 from prior_reinforce.arrays import Frames, Point, as_error
 from prior_reinforce.errors import (
     ConfigurationError,
@@ -71,7 +72,7 @@ class Session:
         goal: ArrayLike | None = None,
         tolerance: float | None = None,
         *,
-        carry_over: bool = False,
+        carry_over: bool | None = None,
         log: Log | None = None,
         gate: Callable[[Frames], Verdict | None] | None = None,
         in_use: Callable[[], tuple[str, ...]] = lambda: ("",),
@@ -88,7 +89,8 @@ class Session:
             goal: g tilde, shape (k,), in the outcomes' units; the log's latest goal if not given.
             tolerance: epsilon, largest perceived error that counts as reached, in the same units;
                 where they are mixed, in the first one (see `Normalisation.metric`).
-            carry_over: Let the adapter learn from the trials of earlier goals too.
+            carry_over: Let the adapter learn from the trials of earlier goals too; by default it
+                does where they serve it (`Adapter.carries_over`).
             log: What happened so far, and where to write what happens; in memory if not given.
             gate: Holds a plan against a robot's limits whenever it is to leave; none by default.
             in_use: Returns the name of the model in use, and whatever else the functions above
@@ -111,6 +113,8 @@ class Session:
         self._observed: list[Trial] | None = None
         self._lock = RLock()
         self._mark = object()
+        self._on_hardware_of = 0
+        """The latest goal whose change of hardware the adapter knows of."""
         self._refresh()
         if goal is not None:
             self.set_goal(goal)
@@ -197,6 +201,7 @@ class Session:
         *,
         carry_over: bool | None = None,
         adapter: str = "",
+        new_hardware: str | None = None,
     ) -> Goal:
         """Set the goal that the next trials are for.
 
@@ -205,6 +210,9 @@ class Session:
             tolerance: epsilon; the session's own if not given.
             carry_over: As in the constructor; the session's own if not given.
             adapter: Name of the adapter, for a log that is gone on with later.
+            new_hardware: What was changed on the hardware, a note; None where nothing was. What
+                had changed since the demonstrations is then unknown anew to adapters that know the
+                difference (`Adapter.change_hardware`), and the rest stays known.
 
         Raises:
             InvalidGoalError: Wrong shape, or not finite.
@@ -214,6 +222,9 @@ class Session:
         checked = self.demonstrations.check_goal(goal)
         tolerance = _as_tolerance(self._tolerance if tolerance is None else tolerance)
         carried = self._carry_over if carry_over is None else carry_over
+        if carried is None:
+            kind = ADAPTERS.kind(adapter) if adapter else type(self.adapter)
+            carried = kind.carries_over
         with self._exclusive():
             self.refuse_open_trial("setting a goal")
             data = {
@@ -223,6 +234,8 @@ class Session:
                 "memory": "workspace" if carried else "goal",
                 "adapter": adapter,
             }
+            if new_hardware is not None:
+                data["new_hardware"] = new_hardware
             self.log.append("goal_set", data)
         self._refresh()
         return self._history.goals[-1]
@@ -455,14 +468,23 @@ class Session:
             vars(self.adapter)["_used_by"], seen = self._mark, None
         if seen is None or seen != readings[: len(seen)]:  # one was voided or amended: start again
             self.adapter.start(self.demonstrations)
-            seen = []
+            seen, self._on_hardware_of = [], 0
         for trial in readings[len(seen) :]:
             goal = self._history.goals[trial.goal_number - 1]
             assert trial.reading is not None
+            self._change_hardware_until(goal.number)
             reading = trial.reading.within(goal.radius)
             self.adapter.observe(trial.condition, goal.goal, reading)
         self._observed = readings
+        self._change_hardware_until(self._current_goal().number)
         return self.adapter.propose(self.goal)
+
+    def _change_hardware_until(self, goal_number: int) -> None:
+        """Tell the adapter of every change of hardware up to a goal, once."""
+        for goal in self._history.goals[self._on_hardware_of : goal_number]:
+            if goal.new_hardware is not None:
+                self.adapter.change_hardware()
+        self._on_hardware_of = max(self._on_hardware_of, goal_number)
 
     def _readings(self) -> list[Trial]:
         """Told trials of this goal, and of earlier ones if they are carried over, oldest first."""
@@ -480,12 +502,16 @@ class Session:
         at = (np.round(condition, 4) + 0.0).tolist()  # -0 is 0
         verdict = self._check(plan, f"no plan for the condition {at}")
         number = len(self._history.trials) + 1
+        goal = self._current_goal()
+        expected = self.adapter.expect(condition, goal.goal, goal.tolerance)
         data = {
             "trial": number,
-            "goal": self._current_goal().number,
+            "goal": goal.number,
             "condition": condition.tolist(),
             "model": self._loaded_for[0],
             "gate": None if verdict is None else verdict.as_json(),
+            "p_hit": None if expected is None else expected.p_hit,
+            "expected_trials": None if expected is None else expected.trials,
             **self.log.keep_plan(number, plan),
         }
         self.log.append("asked", data)

@@ -5,8 +5,8 @@ can be brought back from its log alone. `MemoryLog` is a list; a workspace keeps
 
 | event | data |
 |---|---|
-| `goal_set` | goal, tolerance, metric, memory (`workspace` carries trials over), adapter |
-| `asked` | trial, goal (its number), condition, model, gate, and what the log keeps of the plan |
+| `goal_set` | goal, tolerance, metric, memory (`workspace` carries over), adapter, new_hardware |
+| `asked` | trial, goal (its number), condition, model, gate, p_hit, expected_trials, and its plan |
 | `executing`, `executed`, `not_executed` | trial, and what executed it |
 | `told`, `amended` | trial, error_seen, reading (what was said, `Reading.as_json`), hit |
 | `voided` | trial, reason |
@@ -64,6 +64,8 @@ class Goal:
     """Whether the adapter also learns from the trials of earlier goals."""
     adapter: str = ""
     """The adapter's name; empty where the session was given one by hand."""
+    new_hardware: str | None = None
+    """What was changed on the hardware before its first trial; None where nothing was."""
 
     def distance(self, error: Point) -> float:
         """How far an error, outcome minus goal, is from the goal, in the first component's unit."""
@@ -98,6 +100,10 @@ class Trial:
     """Whether the goal was reached: as seen, or judged from `error_seen`."""
     note: str = ""
     """Why it was voided."""
+    p_hit: float | None = None
+    """Probability that it hits, as its adapter saw it; None from one that expects nothing."""
+    expected_trials: float | None = None
+    """Trials until the goal is reached, this one included, likewise."""
     model: str = ""
     """Which model planned it: the name of its folder in a workspace, else empty."""
     kept: Mapping[str, Any] = field(default_factory=dict)
@@ -234,6 +240,7 @@ class History:
                     _read_only(data.get("metric", [1.0] * len(data["goal"]))),
                     data["memory"] == "workspace",
                     data.get("adapter", "gp"),  # the first journals knew no other
+                    data.get("new_hardware"),
                 )
             )
         elif kind == "asked":
@@ -247,6 +254,8 @@ class History:
                     data["goal"],
                     _read_only(data["condition"]),
                     None if plan is None else _read_only(plan),
+                    p_hit=data.get("p_hit"),
+                    expected_trials=data.get("expected_trials"),
                     model=data.get("model", ""),
                     kept=data,
                 )

@@ -16,9 +16,13 @@ TASK = SimpleNamespace(outcome_names=("x", "y"))
 GOAL = np.array([1.0, 0.1])
 
 
-def trial(number, condition, error_seen, hit=False):
+def trial(number, condition, error_seen, hit=False, p_hit=None):
     return SimpleNamespace(
-        number=number, condition=np.array(condition), error_seen=np.array(error_seen), hit=hit
+        number=number,
+        condition=np.array(condition),
+        error_seen=np.array(error_seen),
+        hit=hit,
+        p_hit=p_hit,
     )
 
 
@@ -49,6 +53,14 @@ def test_a_trial_tells_how_the_aim_moved_and_what_was_seen(view, n, line):
     assert told.getvalue().strip() == line
 
 
+def test_a_trial_of_a_later_goal_is_counted_for_its_goal_and_tells_its_chance(view):
+    shown, told = view
+    first = trial(7, [1.0, 0.1], [0.05, 0.0], p_hit=0.523)
+    shown.trial(GoalTrials(GOAL, (first,), ()))
+    line = "trial 1  aim at the goal                      chance  52%  seen: 5 cm long"
+    assert told.getvalue().strip() == line
+
+
 def test_the_papers_count_is_demonstrations_plus_trials(view):
     shown, told = view
     shown.goal(2, 3, GOAL)
@@ -60,6 +72,7 @@ def test_the_papers_count_is_demonstrations_plus_trials(view):
     assert "goal 2 of 3: 100 cm ahead, 10 cm left" in said
     assert "N = 6 demonstrations + 3 trials = 9" in said
     assert "not reached in 2 trials" in said
+    assert "trials by goal: 3, 2+" in said
     assert "1 of 2 goals reached, on average N = 6 + 3.0 = 9.0 trials" in said
 
 

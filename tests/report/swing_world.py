@@ -43,6 +43,9 @@ class FullStep:
     def propose(self, goal_seen):
         return goal_seen.copy() if self.last is None else self.last - (self.seen - goal_seen)
 
+    def expect(self, condition, goal, tolerance):
+        return None
+
     def observe(self, condition, goal, reading):
         self.last, self.seen = condition.copy(), goal + reading.error_seen
 

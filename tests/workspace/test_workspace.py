@@ -10,7 +10,7 @@ import time
 import numpy as np
 import pytest
 
-from prior_reinforce.adapters.gaussian_process import GaussianProcessAdapter
+from prior_reinforce.adapters.bayesian import BayesianAdapter
 from prior_reinforce.adapters.proportional import ProportionalAdapter
 from prior_reinforce.errors import (
     ConfigurationError,
@@ -26,6 +26,7 @@ from prior_reinforce.generators import make_generator
 from prior_reinforce.generators.base import Generator
 from prior_reinforce.generators.interpolation import SmoothInterpolation
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
+from prior_reinforce.readings import Reading
 from prior_reinforce.session import Session
 from prior_reinforce.trials import Stage
 from prior_reinforce.workspace.status import describe
@@ -80,7 +81,7 @@ def test_ask_gives_the_same_plan_also_from_another_program(workspace):
 def test_the_next_condition_is_the_sessions(workspace):
     """The workspace adds nothing to Algorithm 1: a session in memory goes the same way."""
     generator = workspace.session().generator
-    session = Session(generator, GaussianProcessAdapter(), demonstrations(), GOAL, 0.015)
+    session = Session(generator, BayesianAdapter(), demonstrations(), GOAL, 0.015)
     for error in ([0.05, 0.0], [0.01, -0.02]):
         trial = session.ask()
         session.tell(trial.number, error)
@@ -98,14 +99,42 @@ def test_numbers_run_over_all_goals_and_an_earlier_goals_trial_can_be_amended(wo
     np.testing.assert_array_equal(trials(workspace)[0].error_seen, [0.03, 0.0])
 
 
-@pytest.mark.parametrize("carry_over", [False, True])
-def test_earlier_goals_serve_a_later_one_only_when_asked_to(workspace, carry_over):
+@pytest.mark.parametrize(
+    ("adapter", "carry_over", "carried"),
+    [
+        ("bayes", None, True),
+        ("bayes", False, False),
+        ("gp", None, False),
+        ("gp", True, True),
+    ],
+)
+def test_earlier_goals_serve_a_later_one_where_they_serve_its_adapter(
+    workspace, adapter, carry_over, carried
+):
     tell(workspace, ask(workspace).number, [0.06, 0.03])
-    workspace.set_goal([0.91, 0.05], carry_over=carry_over)
-    generator = workspace.session().generator
-    alone = Session(generator, GaussianProcessAdapter(), demonstrations(), [0.91, 0.05], 0.015)
-    moved = np.linalg.norm(ask(workspace).condition - alone.ask().condition)
-    assert moved > 0.01 if carry_over else moved == 0.0
+    goal = workspace.set_goal([0.91, 0.05], carry_over=carry_over, adapter=adapter)
+    assert goal.carry_over is carried
+    moved = np.linalg.norm(ask(workspace).condition - [0.91, 0.05])
+    assert moved > 0.01 if carried else moved < 0.0005
+
+
+def test_new_hardware_is_noted_and_forgets_the_shift_alone(workspace):
+    for goal in ([0.9, 0.05], [0.95, -0.05], [0.85, 0.0]):
+        workspace.set_goal(goal)
+        for _ in range(2):
+            number = ask(workspace).number
+            session = workspace.session()
+            error = session.trials[-1].condition - np.subtract(goal, [0.08, 0.0])
+            session.tell(number, Reading.measured(error, 0.001), hit=False)
+    shifted = workspace.set_goal([0.9, 0.0])
+    known = ask(workspace).condition - shifted.goal
+    void(workspace, ask(workspace).number, "")
+    goal = workspace.set_goal([0.9, 0.0], new_hardware="another ball")
+    assert goal.new_hardware == "another ball"
+    anew = ask(workspace).condition - shifted.goal
+    assert known[0] < -0.06
+    assert -0.04 < anew[0] < 0.0
+    assert "another ball" in describe(workspace)
 
 
 def test_the_adapter_is_the_goals(workspace):

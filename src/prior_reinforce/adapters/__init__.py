@@ -36,4 +36,8 @@ ADAPTERS: Registry[Adapter] = Registry(
     },
 )
 
+DEFAULT_ADAPTER = "bayes"
+"""Of a workspace's goals, and of `adapt`: as good on one goal, and better on the next ones
+(docs/decisions-adapter.md)."""
+
 make_adapter = ADAPTERS.make

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from typing import ClassVar
 
 from numpy.typing import ArrayLike
 
@@ -34,6 +35,9 @@ class Adapter(ABC):
     `start`.
     """
 
+    carries_over: ClassVar[bool] = False
+    """Whether trials of earlier goals serve it, so that a session gives it those unless told
+    otherwise."""
     _outcome_dim: int | None = None
 
     def start(self, demonstrations: Demonstrations) -> None:

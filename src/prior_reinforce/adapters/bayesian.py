@@ -153,6 +153,7 @@ class BayesianAdapter(Adapter):
     """
 
     config_type: ClassVar[type[BayesianConfig]] = BayesianConfig
+    carries_over: ClassVar[bool] = True
 
     def __init__(self, config: BayesianConfig | None = None) -> None:
         """Take the settings, or the defaults."""

@@ -53,7 +53,10 @@ class LiveView:
             seen = "[bold green]HIT[/bold green]"
         elif seen == "on the goal":
             seen = "a near miss"
-        self._console.print(f"  trial {trial.number}  {aim:<36} seen: {seen}", highlight=False)
+        chance = "" if trial.p_hit is None else f"chance {trial.p_hit:4.0%}  "
+        self._console.print(
+            f"  trial {len(result.trials)}  {aim:<36} {chance}seen: {seen}", highlight=False
+        )
 
     def end(self, result: GoalTrials) -> None:
         """Print the paper's count for this goal."""
@@ -78,6 +81,12 @@ class LiveView:
             f"N = {self._n} + {mean:.1f} = {self._n + mean:.1f} trials",
             highlight=False,
         )
+        self._console.print(f"trials by goal: {trials_by_goal(results)}", highlight=False)
+
+
+def trials_by_goal(results: Sequence[GoalTrials]) -> str:
+    """Say how many trials each goal took, in order; `10+` where it was not reached."""
+    return ", ".join(str(r.solved_at or f"{len(r.trials)}+") for r in results)
 
 
 def place(task: Task, point: Point) -> str:

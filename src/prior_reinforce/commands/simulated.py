@@ -10,9 +10,9 @@ import numpy as np
 import tyro
 from rich.console import Console
 
-from prior_reinforce.adapters import ADAPTERS, make_adapter
+from prior_reinforce.adapters import ADAPTERS, DEFAULT_ADAPTER, make_adapter
 from prior_reinforce.arrays import Frames, Point, Points
-from prior_reinforce.commands.live import LiveView, Operator, fit_progress
+from prior_reinforce.commands.live import LiveView, Operator, fit_progress, trials_by_goal
 from prior_reinforce.errors import ConfigurationError, FileFormatError, InvalidGoalError
 from prior_reinforce.files import claim_folder
 from prior_reinforce.generators import GENERATORS, make_generator
@@ -101,10 +101,11 @@ class Simulated:
 
 @dataclass(frozen=True)
 class Adapt(Simulated):
-    """Reach a new goal on a simulated task, trial by trial (Stage 2), and write the report."""
+    """Reach new goals on a simulated task, trial by trial (Stage 2), and write the report."""
 
     goal: tuple[str, ...] = ("random",)
-    """The goal in metres, for instance `0.92 0.10` (forward, left), or `random`."""
+    """The goal in metres, for instance `0.92 0.10` (forward, left), or `random`. Several are worked
+    through one after another, as in one afternoon: `0.92 0.10 1.05 -0.10`, `random random`."""
     generator: GeneratorChoice = "diffusion"
     model: Path | None = None
     """Folder of a model learned before; None learns one now. It knows its generator itself, unless
@@ -112,7 +113,7 @@ class Adapt(Simulated):
     perception: PerceptionChoice = "eye"
     vlm: VisionLanguageModelConfig = field(default_factory=VisionLanguageModelConfig)
     """Endpoint and model for --perception vlm (docs/perception.md)."""
-    adapter: AdapterChoice = "gp"
+    adapter: AdapterChoice = DEFAULT_ADAPTER
     rounds: int = 10
     """Trials at most."""
     out: Path = Path("runs/adapt")
@@ -161,6 +162,9 @@ class Adapt(Simulated):
     ) -> int:
         """Work through goals one after another, with a live view, and write the report.
 
+        It is one session: the trials of earlier goals serve later ones where they serve the
+        adapter.
+
         `outcomes` says in the report how those of the demonstrations are known.
 
         Returns:
@@ -171,22 +175,22 @@ class Adapt(Simulated):
             recording,
             report_adaptation,
         )
-        from prior_reinforce.experiments.protocol import run_goals
+        from prior_reinforce.experiments.protocol import reach_goals
+        from prior_reinforce.session import Session
 
         view = LiveView(console, task, demonstrations.n)
+        session = Session(generator, make_adapter(self.adapter), demonstrations)
         results: list[GoalTrials] = []
         films: list[FilmOrWhyNot] = []
         for i, goal in enumerate(goals, start=1):
             view.goal(i, len(goals), goal)
             seed = self.seed + i - 1
             recorded = recording(perception, self.out / SEEN, f"goal{i}-trial")
-            (result,) = run_goals(
+            session.set_goal(goal, task.tolerance)
+            (result,) = reach_goals(
                 task,
-                generator,
-                lambda: make_adapter(self.adapter),
+                [session],
                 recorded,
-                demonstrations,
-                goal[None],
                 rounds=self.rounds,
                 seed=seed,
                 on_round=lambda _, so_far: view.trial(so_far[0]),
@@ -207,6 +211,8 @@ class Adapt(Simulated):
             "Adapter": self.adapter,
             "Perception": self._seen_by(),
             "Seed": str(self.seed),
+            "Trials by goal": trials_by_goal(results),
+            "Earlier goals' trials used": "yes" if session.goals[-1].carry_over else "no",
         }
         page = report_adaptation(self.out, task, demonstrations, results, films, facts)
         console.print(f"report: {page}", soft_wrap=True)
@@ -220,15 +226,16 @@ class Adapt(Simulated):
         return self.perception
 
     def _goals(self, task: Task, demonstrations: Demonstrations) -> Points:
-        if self.goal == ("random",):
-            return task.sample_goals(1, np.random.default_rng([self.seed, 2]))
+        if set(self.goal) == {"random"}:
+            return task.sample_goals(len(self.goal), np.random.default_rng([self.seed, 2]))
         try:
-            goal = [float(word) for word in self.goal]
+            numbers = [float(word) for word in self.goal]
         except ValueError as error:
             raise InvalidGoalError(
                 f"--goal {' '.join(self.goal)} is neither numbers in metres nor `random`"
             ) from error
-        return demonstrations.check_goal(goal)[None]
+        k = max(len(numbers) // demonstrations.outcome_dim, 1)  # a goal that is cut off is named
+        return np.array([demonstrations.check_goal(goal) for goal in np.array_split(numbers, k)])
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from prior_reinforce.plans.motions import Plan
 from prior_reinforce.session import Session
 from prior_reinforce.trials import Stage, Trial
 from prior_reinforce.wording import say_place
-from prior_reinforce.workspace.status import execution_warning, say_trial
+from prior_reinforce.workspace.status import execution_warning, say_expectation, say_trial
 from prior_reinforce.workspace.workspace import Workspace
 
 
@@ -68,7 +68,7 @@ class Ask:
                 did_not_move = True
             reached_before = session.solved
             trial = session.ask(arm_did_not_move=did_not_move)
-            self._show(workspace, trial, reached_before)
+            self._show(workspace, session, trial, reached_before)
             may_move = trial.stage is not Stage.EXECUTED
             if may_move and self.where is not None and not self._is_there(workspace, trial):
                 return 1
@@ -128,11 +128,15 @@ class Ask:
         )
         return False
 
-    def _show(self, workspace: Workspace, trial: Trial, reached_before: bool) -> None:
+    def _show(
+        self, workspace: Workspace, session: Session, trial: Trial, reached_before: bool
+    ) -> None:
         """Print where the trial aims and what the gate says, and write --out."""
         manifest = workspace.manifest
         place = say_place(trial.condition, manifest.outcome_names, manifest.outcome_units)
         print(f"trial {trial.number}: aimed at {place}")
+        for line in say_expectation(session, trial):
+            print(line)
         if reached_before:
             print("the goal is reached already: this trial repeats it")
         assert trial.plan is not None

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 
 import tyro
 
-from prior_reinforce.adapters import ADAPTERS
+from prior_reinforce.adapters import ADAPTERS, DEFAULT_ADAPTER
 from prior_reinforce.errors import (
     ConfigurationError,
     InvalidFeedbackError,
@@ -115,11 +115,15 @@ class Goal:
     goal: Annotated[tuple[str, ...], tyro.conf.Positional]
     """Its place: 0.92 0.10 (metres ahead, metres left, or the outcome's units), 92cm 10cm, or
     "92cm ahead, 10cm left"."""
-    memory: Literal["goal", "workspace"] = "goal"
-    """Which trials the adapter learns from: this goal's, or earlier goals' as well."""
+    memory: Literal["goal", "workspace"] | None = None
+    """Which trials the adapter learns from: this goal's, or earlier goals' as well; by default
+    earlier ones too where they serve the adapter, as they do bayes."""
     adapter: Annotated[
         str, tyro.conf.arg(help=f"How the condition is corrected: {ADAPTERS.help}.")
-    ] = "gp"
+    ] = DEFAULT_ADAPTER
+    new_hardware: str | None = None
+    """What was changed on the hardware since the last trial, a note: another ball, a new gripper.
+    What had changed before is then unknown anew, and all else stays known."""
 
     def run(self) -> None:
         """Set it."""
@@ -131,7 +135,10 @@ class Goal:
             except InvalidFeedbackError as error:
                 raise InvalidGoalError(f"goal: {error}") from error
             goal = workspace.set_goal(
-                place, carry_over=self.memory == "workspace", adapter=self.adapter
+                place,
+                carry_over=None if self.memory is None else self.memory == "workspace",
+                adapter=self.adapter,
+                new_hardware=self.new_hardware,
             )
             print(f"goal {goal.number}: {say_place(goal.goal, names, units)}")
             print_next(workspace)

@@ -77,7 +77,9 @@ def film_last_trial(
     last = result.trials[-1]
     assert last.plan is not None
     try:
-        frames = task.film(last.plan, result.goal, np.random.default_rng([seed, 0, last.number]))
+        frames = task.film(
+            last.plan, result.goal, np.random.default_rng([seed, 0, len(result.trials)])
+        )
         film = record_film(frames, folder, name)
     except RenderingUnavailableError as error:
         return None, f"no film: {error}"

@@ -179,7 +179,15 @@ def run_goals(
     sessions = [
         Session(generator, make_adapter(), demonstrations, goal, task.tolerance) for goal in goals
     ]
-    return _reach(task, sessions, perception, rounds, seed, on_round, on_failed_reading)
+    return reach_goals(
+        task,
+        sessions,
+        perception,
+        rounds=rounds,
+        seed=seed,
+        on_round=on_round,
+        on_failed_reading=on_failed_reading,
+    )
 
 
 def run_sequences(
@@ -221,20 +229,31 @@ def run_sequences(
         for session, goals in zip(sessions, sequences, strict=True):
             session.set_goal(goals[j], task.tolerance)
         own_seed = int(np.random.SeedSequence([seed, j]).generate_state(1)[0])
-        by_place.append(_reach(task, sessions, perception, rounds, own_seed))
+        by_place.append(reach_goals(task, sessions, perception, rounds=rounds, seed=own_seed))
     return [list(results) for results in zip(*by_place, strict=True)]
 
 
-def _reach(
+def reach_goals(
     task: Task,
     sessions: Sequence[Session],
     perception: Perception,
+    *,
     rounds: int,
     seed: int,
     on_round: OnRound | None = None,
     on_failed_reading: FailedReading = estimate_by_eye,
 ) -> list[GoalTrials]:
-    """Try the goal that each session works on, in lock step; see `run_goals`."""
+    """Try the goal that each session works on, in lock step; arguments and result as `run_goals`.
+
+    Args:
+        task: See `run_goals`, like the arguments that are not named here.
+        sessions: With one fitted generator, and a goal each.
+        perception: P.
+        rounds: Largest number of trials a goal.
+        seed: Of the disturbances and of perception.
+        on_round: Called after every round.
+        on_failed_reading: Called where perception gives up.
+    """
     seers = [np.random.default_rng([seed, 1, i]) for i in range(len(sessions))]
     rollouts: list[list[Rollout]] = [[] for _ in sessions]
     failed = [0] * len(sessions)

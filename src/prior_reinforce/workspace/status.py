@@ -11,6 +11,10 @@ from prior_reinforce.wording import in_words, say_place, say_reading
 from prior_reinforce.workspace.workspace import Workspace
 
 _TRIALS_SHOWN = 3
+_POOR_TRIALS = 3
+_POOR_CHANCE = 0.35
+"""Probability of a hit below which another trial like the last ones is no good plan (ours): words
+by eye leave a chance of a half where all else is known."""
 _EXAMPLE = ("5cm long", "2cm left", "1cm high")
 
 
@@ -58,6 +62,20 @@ def say_trial(workspace: Workspace, trial: Trial) -> str:
         warning = execution_warning(workspace, trial)
         return f"executed, {warning}" if warning else "executed, waits to be told"
     return "asked for, waits to be executed and told"
+
+
+def say_expectation(session: Session, trial: Trial) -> list[str]:
+    """Say what the adapter expected of a trial, and after poor ones what would help."""
+    if trial.p_hit is None or trial.expected_trials is None:
+        return []
+    lines = [f"hits with probability {trial.p_hit:.2f}; {trial.expected_trials:.1f} trials to go"]
+    missed = sum(told.stage is Stage.TOLD for told in session.trials)
+    if missed >= _POOR_TRIALS and not session.solved and trial.p_hit < _POOR_CHANCE:
+        lines.append(
+            "what would help: a demonstration near this goal, or a finer look at the next trial "
+            '("5.2 +- 0.3 cm long")'
+        )
+    return lines
 
 
 def execution_warning(workspace: Workspace, trial: Trial) -> str:
@@ -133,10 +151,10 @@ def _say_goal(workspace: Workspace, session: Session, goal: Goal, n: int) -> str
     if hits:
         total = f"N = {n} demonstrations + {hits[0]} = {n + hits[0]}"
         return f"{place}: reached in {_say_count(hits[0])} ({total})"
+    changed = f", new hardware: {goal.new_hardware}" if goal.new_hardware is not None else ""
     carried = ", with earlier goals' trials" if goal.carry_over else ""
-    return (
-        f"{place}: not reached yet, {_say_count(len(told))} told; adapter {goal.adapter}{carried}"
-    )
+    so_far = f"not reached yet, {_say_count(len(told))} told"
+    return f"{place}: {so_far}; adapter {goal.adapter}{carried}{changed}"
 
 
 def _say_count(trials: int) -> str:

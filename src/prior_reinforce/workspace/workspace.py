@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING
 from numpy.typing import ArrayLike
 from typing_extensions import Self
 
+from prior_reinforce.adapters import ADAPTERS, DEFAULT_ADAPTER
 from prior_reinforce.arrays import Frames
 from prior_reinforce.errors import (
     ConfigurationError,
@@ -168,7 +169,7 @@ class Workspace:
         """
         session = Session(
             lambda: self._generator(own),
-            lambda: self._adapter(session.goals[-1].adapter, own_adapter),
+            lambda: self._adapter(session.goals[-1].adapter if session.goals else "", own_adapter),
             lambda: self.demonstrations,
             tolerance=self.manifest.tolerance,
             log=self.log,
@@ -183,23 +184,33 @@ class Workspace:
             )
         return session
 
-    def set_goal(self, goal: ArrayLike, *, carry_over: bool = False, adapter: str = "gp") -> Goal:
+    def set_goal(
+        self,
+        goal: ArrayLike,
+        *,
+        carry_over: bool | None = None,
+        adapter: str = DEFAULT_ADAPTER,
+        new_hardware: str | None = None,
+    ) -> Goal:
         """Set the goal that the next trials are for.
 
         Args:
             goal: g, shape (k,), in the outcome's units.
-            carry_over: Let earlier goals' trials serve this one.
+            carry_over: Let earlier goals' trials serve this one; by default where they serve the
+                adapter.
             adapter: Choice of the adapter, for instance `gp` or `proportional,gain=0.6`.
+            new_hardware: What was changed on the hardware since the last trial; see
+                `Session.set_goal`.
 
         Raises:
             InvalidGoalError: Wrong shape, or not finite.
             ConfigurationError: There is no such adapter.
             TrialStateError: A trial for the goal before waits to be told.
         """
-        from prior_reinforce.adapters import ADAPTERS
-
         ADAPTERS.check(adapter)
-        return self.session().set_goal(goal, carry_over=carry_over, adapter=adapter)
+        return self.session().set_goal(
+            goal, carry_over=carry_over, adapter=adapter, new_hardware=new_hardware
+        )
 
     def gate(self, frames: Frames) -> LimitReport | None:
         """Hold a plan against the robot's limits of now; None where the manifest names no robot.
@@ -438,7 +449,7 @@ class Workspace:
         """The adapter that a goal was set with."""
         from prior_reinforce.adapters import make_adapter
 
-        choice = choice or "gp"
+        choice = choice or DEFAULT_ADAPTER
         name, _ = parse_choice(choice)
         if (name if ":" in name else None) != own:
             remedy = "drop --adapter, or set the goal again"
