@@ -1,6 +1,8 @@
 """The program: exit statuses, one line for what was wrong, and a reader that leaves."""
 
 import os
+import subprocess
+import sys
 
 import pytest
 
@@ -39,7 +41,23 @@ def test_a_reader_may_leave_before_the_end(folder, monkeypatch, capsys, args, bu
         ("goal", "planar", "x", "y"),
         ("status", "nowhere"),
         ("import", "planar", "nowhere"),
+        ("tell", "planar"),
+        ("tell", "planar", "one", "--hit"),
+        ("ask", "planar", "--nope"),
+        ("ask", "planar", "--rate", "fast"),
+        ("goal", "planar", "0.9", "0", "--memory", "all"),
+        ("learn", "planar", "--seed", str(2**64)),
+        ("learn", "planar", "--seed", "-1"),
+        ("learn", "planar", "--seed", "9" * 5000),
+        ("rollout", "--repeats", "9" * 300),
+        ("nope",),
+        ("status", "x" * 300),
+        ("status", "a/" * 2000),
+        ("status", "planar\x1b[2J\nprior-reinforce: forged"),
+        ("import", "planar", "no\nwhere"),
         ("new", "planar"),
+        ("new", "other", "--name", "a\x1b]0;b"),
+        ("new", "other", "--outcome-names", "x", "x"),
         ("new", "other", "--tolerance", "-1"),
         ("new", "other", "--dt", "inf"),
         ("new", "other", "--action-names", "a", "a"),
@@ -48,12 +66,10 @@ def test_a_reader_may_leave_before_the_end(folder, monkeypatch, capsys, args, bu
 )
 def test_bad_input_ends_with_status_2_and_leaves_nothing_behind(folder, capsys, tmp_path, args):
     before = events_in(folder)
-    try:
-        status = main(args)
-    except SystemExit as end:  # tyro's own, for what is no number
-        status = end.code
-    assert status == 2
-    assert capsys.readouterr().err
+    assert main(args) == 2
+    err = capsys.readouterr().err
+    assert err.startswith("prior-reinforce: ")
+    assert len(err.splitlines()) == 1
     assert events_in(folder) == before
     assert not (tmp_path / "other").exists()
 
@@ -89,3 +105,51 @@ def test_an_interruption_after_the_commit_says_so(run, folder, monkeypatch):
     assert events_in(folder)[-1].kind == "told"
     status, _, err = run("tell", folder, 9, "--hit")
     assert (status, events_in(folder)[-1].kind) == (2, "told")
+
+
+@pytest.mark.parametrize("args", [("--help",), ("ask", "--help")])
+def test_help_is_shown_as_it_is(capsys, args):
+    with pytest.raises(SystemExit) as end:
+        main(args)
+    assert end.value.code in (0, None)
+    assert capsys.readouterr().out.startswith("usage: prior-reinforce")
+
+
+def run_program(*args, **how):
+    program = [sys.executable, "-m", "prior_reinforce.cli", *args]
+    return subprocess.run(program, capture_output=True, **how)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="a disk that is always full")
+@pytest.mark.parametrize(
+    ("redirections", "status"),
+    [("> /dev/full", 2), (">&-", 0), ("2>&-", 0), ("<&-", 0), ("<&- >&- 2>&-", 0)],
+)
+def test_streams_may_be_closed_or_full(folder, redirections, status):
+    command = f"{sys.executable} -m prior_reinforce.cli status {folder} {redirections}"
+    done = subprocess.run(["sh", "-c", command], capture_output=True, text=True)
+    assert done.returncode == status, done.stderr
+    assert "Traceback" not in done.stderr
+    assert len(done.stderr.splitlines()) == (status != 0)
+
+
+@pytest.mark.slow
+def test_names_that_are_no_text_can_be_printed(folder, tmp_path):
+    strange = os.fsencode(str(tmp_path)) + b"/\xff\xfe"
+    os.rename(folder, strange)
+    done = run_program("status", strange)
+    assert done.returncode == 0, done.stderr
+    done = run_program("status", strange + b"2")
+    assert (done.returncode, done.stderr.count(b"\n")) == (2, 1)
+
+
+def test_what_a_person_writes_forges_no_line(run, folder):
+    run("goal", folder, "0.9", "0.05")
+    run("ask", folder)
+    forged = "slipped\nnext: rm -rf \x1b[2J\u202e"
+    status, out, _ = run("void", folder, 1, "--reason", forged)
+    assert status == 0
+    for said in (out, run("status", folder)[1]):
+        assert "slipped\\nnext: rm -rf \\x1b[2J\\u202e" in said
+        assert "\x1b" not in said

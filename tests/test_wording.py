@@ -12,6 +12,7 @@ from prior_reinforce.readings import Reading
 from prior_reinforce.wording import (
     from_words,
     in_words,
+    plain,
     read_place,
     say_error,
     say_length,
@@ -260,3 +261,18 @@ def test_a_place_in_another_unit_is_converted():
 def test_a_place_that_cannot_be_meant_is_refused(text, says):
     with pytest.raises(InvalidFeedbackError, match=says):
         read_place(text, ("x", "y"), ("m", "m"))
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("ball slipped, 5 cm", "ball slipped, 5 cm"),
+        ("Würfel → 球", "Würfel → 球"),
+        ("a\nb\tc", "a\\nb\\tc"),
+        ("\x1b[31mred", "\\x1b[31mred"),
+        ("\x9b31m \u202e \u2028 \udcff", "\\x9b31m \\u202e \\u2028 \\udcff"),
+    ],
+)
+def test_control_characters_are_shown_and_not_done(text, shown):
+    assert plain(text) == shown
+    assert plain(f"{text}\n", keep="\n").endswith("\n")

@@ -6,16 +6,20 @@ What a user did wrong is one line on standard error and exit status 2.
 
 from __future__ import annotations
 
+import io
 import os
 import pkgutil
 import sys
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, redirect_stderr
+from dataclasses import fields, is_dataclass
 from typing import Protocol
 
 import tyro
 
-from prior_reinforce.errors import PriorReinforceError
+from prior_reinforce.errors import ConfigurationError, PriorReinforceError
+from prior_reinforce.wording import plain
 
 
 class Command(Protocol):
@@ -47,6 +51,9 @@ COMMANDS = {
     "look": f"{_HERE}.photographs:Look",
 }
 """Where each command's class is: only the one that is called is imported."""
+_LARGEST_WHOLE = 2**32 - 1
+"""Of a whole number on the command line: numpy's and torch's largest common seed, and no sensible
+size reaches it."""
 _NOBODY_READS = 141
 """Exit status where the reader of our output left before the end: a shell's for SIGPIPE (128 + 13),
 since what the command still had to do was not done."""
@@ -63,6 +70,7 @@ def main(args: Sequence[str] | None = None) -> int:
         interrupted, 141 nobody read on.
     """
     warnings.showwarning = _print_warning
+    _open_streams()
     try:
         command = _parse(list(sys.argv[1:] if args is None else args))
         status = command.run() or 0
@@ -72,29 +80,120 @@ def main(args: Sequence[str] | None = None) -> int:
             raise
         return _NOBODY_READS
     except PriorReinforceError as error:
-        stays = "; what was recorded before stays" if error.changed else ""
-        print(f"prior-reinforce: {error}{stays}", file=sys.stderr)
-        return 1 if error.changed else 2
+        return _refuse(str(error), error)
+    except OSError as error:
+        where = f"{error.filename}: " if error.filename is not None else ""
+        what = f"{where}{error.strerror or error}"
+        return _refuse(f"{what}; check the path, its permissions and the room on the disk", error)
+    except (MemoryError, RecursionError) as error:
+        return _refuse(f"too much for this machine ({error or 'no memory'}); give less", error)
     except KeyboardInterrupt as error:
-        print(f"prior-reinforce: interrupted{f'; {error}' if error.args else ''}", file=sys.stderr)
+        _complain(f"interrupted{f'; {error}' if error.args else ''}")
         return 130
 
 
 def _parse(args: list[str]) -> Command:
     """Make the command that was called; all of them are imported only to list them."""
     name = args[0] if args else ""
-    if name in COMMANDS:
-        kind = pkgutil.resolve_name(COMMANDS[name])
-        command: Command = tyro.cli(kind, prog=f"prior-reinforce {name}", args=args[1:])
-        return command
-    kinds = {name: pkgutil.resolve_name(target) for name, target in COMMANDS.items()}
-    chosen: Command = tyro.extras.subcommand_cli_from_dict(
-        kinds,
-        prog="prior-reinforce",
-        description="Hit a goal a robot arm has never hit, in about ten real trials.",
-        args=args,
-    )
-    return chosen
+    with _in_one_line():
+        if name in COMMANDS:
+            kind = pkgutil.resolve_name(COMMANDS[name])
+            command: Command = tyro.cli(kind, prog=f"prior-reinforce {name}", args=args[1:])
+        else:
+            kinds = {name: pkgutil.resolve_name(target) for name, target in COMMANDS.items()}
+            command = tyro.extras.subcommand_cli_from_dict(
+                kinds,
+                prog="prior-reinforce",
+                description="Hit a goal a robot arm has never hit, in about ten real trials.",
+                args=args,
+            )
+    _check_numbers(command)
+    return command
+
+
+@contextmanager
+def _in_one_line() -> Iterator[None]:
+    """Say in a line what is wrong with a command line, for which tyro draws a box.
+
+    Raises:
+        ConfigurationError: It is wrong.
+    """
+    box = io.StringIO()
+    try:
+        with redirect_stderr(box):
+            yield
+    except SystemExit as end:
+        if end.code != 2:
+            raise
+        raise ConfigurationError(_without_box(box.getvalue())) from None
+    except (ValueError, OverflowError) as error:  # numbers of hundreds of digits
+        raise ConfigurationError(f"cannot read the command line ({error}); see --help") from error
+    finally:
+        if sys.exc_info()[0] is not ConfigurationError:
+            sys.stderr.write(box.getvalue() if "\u256d" not in box.getvalue() else "")
+
+
+def _without_box(text: str) -> str:
+    """The words of a box: what is wrong, what may have been meant, and where more is said."""
+    lines = [line.strip("\u2502 ") for line in text.splitlines()]
+    parts: list[list[str]] = [[]]
+    for line in lines:
+        if line.startswith("\u256d"):
+            continue
+        if set(line) <= set("\u2500\u2570\u256f"):
+            parts.append([])
+        else:
+            parts[-1].append(line)
+    said = [" ".join(part) for part in parts if part and "helptext:" not in part[0]]
+    return "; ".join(" ".join(part.split()) for part in said) or "wrong; see --help"
+
+
+def _check_numbers(given: object, name: str = "") -> None:
+    """Refuse whole numbers that no seed, number of trials or size of an array can be.
+
+    Raises:
+        ConfigurationError: One is given.
+    """
+    if is_dataclass(given):
+        for each in fields(given):
+            _check_numbers(getattr(given, each.name), each.name)
+    elif isinstance(given, tuple):
+        for each in given:
+            _check_numbers(each, name)
+    elif isinstance(given, int):
+        low = 0 if name == "seed" else -_LARGEST_WHOLE
+        if not low <= given <= _LARGEST_WHOLE:
+            shown = f"{given}" if abs(given) < 10**30 else "a number of many digits"
+            raise ConfigurationError(
+                f"--{name.replace('_', '-')} must be a whole number from {low} to "
+                f"{_LARGEST_WHOLE}, got {shown}"
+            )
+
+
+def _open_streams() -> None:
+    """Have all three, closed or not, and able to print whatever a file is called."""
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        stream = getattr(sys, name)
+        if stream is None or stream.closed:
+            setattr(sys, name, open(os.devnull, mode))  # noqa: SIM115  (as long as the program)
+        elif mode == "w" and hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="backslashreplace")
+
+
+def _refuse(message: str, error: BaseException) -> int:
+    """Print why nothing more is done; the exit status says whether something was before."""
+    changed = getattr(error, "changed", False)
+    _complain(f"{message}{'; what was recorded before stays' if changed else ''}")
+    try:
+        sys.stdout.flush()
+    except OSError:  # a full disk: what Python would still write when it exits goes nowhere
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    return 1 if changed else 2
+
+
+def _complain(message: str) -> None:
+    """One line on standard error, whatever names and reasons hold."""
+    print(f"prior-reinforce: {plain(message)}", file=sys.stderr)
 
 
 def _flushed() -> bool:
@@ -111,7 +210,7 @@ def _flushed() -> bool:
 
 
 def _print_warning(message: Warning | str, *_: object, **__: object) -> None:
-    print(f"prior-reinforce: warning: {message}", file=sys.stderr)
+    _complain(f"warning: {message}")
 
 
 if __name__ == "__main__":

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import math
 import re
+import unicodedata
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -31,6 +32,8 @@ WORDS: tuple[tuple[str, str], ...] = (("long", "short"), ("left", "right"), ("hi
 PLACE_WORDS: tuple[tuple[str, str], ...] = (("ahead", "behind"), ("left", "right"), ("up", "down"))
 """The same for a place."""
 
+_UNPRINTED = frozenset({"Cc", "Cf", "Cs", "Zl", "Zp"})
+"""Unicode's control and format characters, halves of pairs, and separators of lines."""
 _Point = Float[np.ndarray, " k"]
 _LEAST_BARE_CM = 0.1
 """Ours: nobody sees a throw to a millimetre; a smaller number without a unit is in metres."""
@@ -56,6 +59,23 @@ _FARTHEST_PLACE = 5.0
 _SOMEWHERE = "somewhere"
 _ON_THE_GOAL = ("on the goal", "0")
 _HITS = {"hit": True, "miss": False}
+
+
+def plain(text: str, keep: str = "") -> str:
+    """Somebody else's text for a terminal: what would move its cursor or forge a line is shown.
+
+    Args:
+        text: A name, a reason, a message that holds one.
+        keep: Control characters that stay.
+    """
+    return "".join(
+        char if char in keep or unicodedata.category(char) not in _UNPRINTED else _shown(char)
+        for char in text
+    )
+
+
+def _shown(char: str) -> str:
+    return char.encode("unicode_escape").decode()
 
 
 def in_words(units: Sequence[str]) -> bool:

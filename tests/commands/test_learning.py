@@ -62,7 +62,7 @@ def test_align_is_short_for_a_setting(learn):
         (["--generator", "diffusion,steps=3"], "has no setting 'steps'"),
         (["--generator", "nearest,timing=never"], "timing"),
         (["--generator", "none"], "no generator 'none'; known are diffusion"),
-        (["--generator", "nearest", "--seed", "-1"], "--seed must be 0 or more"),
+        (["--generator", "nearest", "--seed", "-1"], "--seed must be a whole number from 0"),
         (["folder", "--task", "curling"], "drop one of the two"),
     ],
 )

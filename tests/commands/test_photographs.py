@@ -73,7 +73,7 @@ def test_a_photograph_tells_the_error(table, capsys):
     with VisionServer() as server:
         assert look(folder, server.base_url) == 0
         said = capsys.readouterr().out
-        told = re.search(r"--error (\S+) (\S+)", said)
+        told = re.search(r"TRIAL ([-.\d]+)\+-\S+ ([-.\d]+)\+-", said)
         assert told is not None
         seen = np.array([float(told[1]), float(told[2])])
         np.testing.assert_allclose(seen, truth, atol=0.006)

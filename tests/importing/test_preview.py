@@ -1,5 +1,7 @@
 """The preview says what was found, in about ten lines and one picture."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from matplotlib.image import imread
@@ -85,3 +87,13 @@ def test_noise_is_said_and_what_smoothing_changed(folder):
     assert "smoothing changed plans by " in smooth.text
     most = 1000 * smooth.done.smoothed[:, 1].max()
     assert f"at most {most:.2g} mrad" in smooth.text
+
+
+def test_dollar_signs_in_names_are_no_mathematics(folder, tmp_path):
+    names = ["$\\frac$", "$x", *JOINTS[2:]]
+    result = import_demonstrations(folder, joints=JOINTS)
+    demos = result.demonstrations
+    form = replace(demos.format, names=tuple(names))
+    preview = replace(result.preview, demonstrations=replace(demos, format=form))
+    preview.draw(tmp_path / "preview.png")
+    assert (tmp_path / "preview.png").stat().st_size > 10_000

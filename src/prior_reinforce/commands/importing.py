@@ -40,6 +40,7 @@ from prior_reinforce.importing.outcomes import (
     write_outcome_table,
 )
 from prior_reinforce.importing.units import Doubt, refuse_doubts
+from prior_reinforce.wording import plain
 from prior_reinforce.workspace.manifest import Manifest
 from prior_reinforce.workspace.workspace import Workspace
 
@@ -114,7 +115,7 @@ class Import:
             guesses = at_terminal and self._agreed(workspace)
             answers = self._asked(workspace, guesses) if at_terminal else None
             result = self._read(workspace, answers, take_guesses=guesses)
-            print(result.preview.text)
+            print(plain(result.preview.text, keep="\n"))
             demonstrations, source = result.demonstrations, str(self.source)
             if self.append:
                 before = workspace.demonstrations
@@ -143,7 +144,7 @@ class Import:
     def _inspect(self, workspace: Workspace) -> None:
         manifest, found = workspace.manifest, self._inspection(workspace)
         print(f"{self.source}: {len(found.recordings)} episodes")
-        print(found.text)
+        print(plain(found.text, keep="\n"))
         print()
         places = outcome_places(self.source, self.format)
         table = self.outcomes or table_beside(places)
@@ -263,7 +264,7 @@ def _agrees(unclear: UnclearUnitsError) -> bool:
     """Whether a person at the terminal says that it is as it looks."""
     if not (sys.stdin.isatty() and unclear.options):
         return False
-    print(unclear)
+    print(plain(str(unclear)))
     try:
         return input("is it so? (yes/no) ").strip().lower() in {"y", "yes"}
     except EOFError:

@@ -71,6 +71,12 @@ class Preview:
 
     def draw(self, path: str | os.PathLike[str]) -> None:
         """Write the picture (PNG): every joint over time, and the outcomes with their hull."""
+        from matplotlib import rc_context
+
+        with rc_context({"text.parse_math": False}):  # a name may hold dollar signs
+            self._draw(path)
+
+    def _draw(self, path: str | os.PathLike[str]) -> None:
         from matplotlib import colormaps
         from matplotlib.figure import Figure
 

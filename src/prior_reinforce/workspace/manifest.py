@@ -26,6 +26,7 @@ from prior_reinforce.robots import (
     robot_limits,
 )
 from prior_reinforce.robots.kinematics import Chain
+from prior_reinforce.wording import plain
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -217,6 +218,8 @@ class _Reader:
         names, units, tolerance = outcome["names"], outcome["units"], outcome["tolerance"]
         if len(names) != len(units):
             raise self.error("outcome", "units", f"must name one unit for each of {list(names)}")
+        if len(set(names)) < len(names):
+            raise self.error("outcome", "names", "must differ from each other")
         if tolerance <= 0:
             raise self.error("outcome", "tolerance", "must be more than 0")
         if set(units) == {"m"} and tolerance >= _IMPLAUSIBLE_METRES:
@@ -318,6 +321,9 @@ class _Reader:
             value = msgspec.convert(given, kind)
         except msgspec.ValidationError:
             value = ()
+        texts = (value,) if kind is str else value if kind == _TEXTS else ()
+        if any(plain(text) != text for text in texts):
+            raise self.error(section, key, "must hold no control characters")
         if value == ():
             raise self.error(section, key, f"must be {wanted}")
         if kind not in (str, _TEXTS) and not np.all(np.isfinite(value)):

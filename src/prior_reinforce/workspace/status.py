@@ -7,7 +7,7 @@ import shlex
 from prior_reinforce.registry import parse_choice
 from prior_reinforce.session import Session
 from prior_reinforce.trials import Goal, Stage, Trial
-from prior_reinforce.wording import in_words, say_place, say_reading
+from prior_reinforce.wording import in_words, plain, say_place, say_reading
 from prior_reinforce.workspace.workspace import Workspace
 
 _TRIALS_SHOWN = 3
@@ -43,11 +43,15 @@ def describe(workspace: Workspace) -> str:
             for trial in session.trials[-_TRIALS_SHOWN:]
         ]
     rows.append(("next", next_step(workspace, session)))
-    return "\n".join(f"{name:<15} {text}" for name, text in rows)
+    return "\n".join(plain(f"{name:<15} {text}") for name, text in rows)
 
 
 def say_trial(workspace: Workspace, trial: Trial) -> str:
-    """Say what became of a trial."""
+    """Say what became of a trial, in a line."""
+    return plain(_say_trial(workspace, trial))
+
+
+def _say_trial(workspace: Workspace, trial: Trial) -> str:
     if trial.reading is not None:
         manifest = workspace.manifest
         seen = say_reading(trial.reading, manifest.outcome_names, manifest.outcome_units)
@@ -118,8 +122,8 @@ def next_step(workspace: Workspace, session: Session) -> str:
     adapter, _ = parse_choice(session.goals[-1].adapter)
     return (
         f"prior-reinforce ask {folder}"
-        + (f" --generator {own}" if own else "")
-        + (f" --adapter {adapter}" if ":" in adapter else "")
+        + (f" --generator {shlex.quote(own)}" if own else "")
+        + (f" --adapter {shlex.quote(adapter)}" if ":" in adapter else "")
     )
 
 

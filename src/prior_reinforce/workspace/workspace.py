@@ -115,8 +115,8 @@ class Workspace:
 
     def __exit__(self, _: object, error: BaseException | None, __: object) -> None:
         """Close the journal; an error that ends the block says whether something was recorded."""
-        if self.log.journal.appended and isinstance(error, PriorReinforceError):
-            error.changed = True
+        if self.log.journal.appended and isinstance(error, (PriorReinforceError, OSError)):
+            error.changed = True  # type: ignore[union-attr]
         elif self.log.journal.appended and isinstance(error, KeyboardInterrupt):
             error.args = error.args or ("what was recorded before stays",)
         self.close()
