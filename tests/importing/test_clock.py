@@ -102,3 +102,9 @@ def test_nanoseconds_since_1970_keep_their_order():
     np.testing.assert_allclose(
         clock_of("a", 5, stamps=stamps, name="t_ns").times, np.arange(5) * 0.01, atol=1e-6
     )
+
+
+def test_times_that_are_no_numbers_are_left_to_the_recording():
+    clock = clock_of("a", 3, stamps=np.array([0.0, np.inf, np.inf]), name="t")
+    assert clock.doubts == ()
+    np.testing.assert_array_equal(clock.times, [0, np.inf, np.inf])

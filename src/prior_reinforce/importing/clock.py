@@ -96,8 +96,10 @@ def clock_of(
         if rate is None:
             raise ConfigurationError(f"{name} counts frames, so the rate is wanted: add --rate")
         return Clock(numbers / rate, f"{name}, frames at {rate:g} Hz")
+    if not np.all(np.isfinite(numbers)):
+        return Clock(numbers, name)  # the recording names the frame
     steps = np.diff(numbers)
-    period = float(np.median(steps)) if steps.size and np.all(np.isfinite(steps)) else 0.0
+    period = float(np.median(steps)) if steps.size else 0.0
     doubts: tuple[Doubt, ...] = ()
     if chosen is None:
         chosen = _guess(period)
