@@ -46,6 +46,7 @@ COMMANDS = {
     "status": f"{_HERE}.workspace:Status",
     "log": f"{_HERE}.workspace:Log",
     "report": f"{_HERE}.workspace:Report",
+    "advise": f"{_HERE}.advice:Advise",
     "export": f"{_HERE}.trials:Export",
     "calibrate": f"{_HERE}.photographs:Calibrate",
     "look": f"{_HERE}.photographs:Look",

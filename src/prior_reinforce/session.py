@@ -459,8 +459,25 @@ class Session:
             )
         self.log.append("not_executed", {"trial": trial.number})
 
+    def informed_adapter(self) -> Adapter:
+        """The adapter, after it has seen every reading that counts for the goal of now.
+
+        For asking it what it knows; what else is done to it is undone by nothing.
+
+        Raises:
+            WorkspaceError: No goal is set.
+        """
+        with self._exclusive():
+            self._inform()
+        return self.adapter
+
     def _propose(self) -> Point:
         """M(g), after the adapter has seen every reading that counts."""
+        self._inform()
+        return self.adapter.propose(self.goal)
+
+    def _inform(self) -> None:
+        """Let the adapter see every reading that counts."""
         readings = self._readings()
         seen, self._observed = self._observed, None  # until it has seen them all
         # Another session's readings are in it, where two share it by mistake.
@@ -477,7 +494,6 @@ class Session:
             self.adapter.observe(trial.condition, goal.goal, reading)
         self._observed = readings
         self._change_hardware_until(self._current_goal().number)
-        return self.adapter.propose(self.goal)
 
     def _change_hardware_until(self, goal_number: int) -> None:
         """Tell the adapter of every change of hardware up to a goal, once."""

@@ -184,6 +184,28 @@ def test_trials_of_different_hardware_are_never_merged():
     assert np.all(counts[1:] > 0)
 
 
+def test_what_a_reading_would_teach_is_what_it_takes_off_the_variance():
+    adapter = started(field_sd=(0.25,), field_reach=(1.0,), hardware_sd=(0.3,))
+    throw(adapter, GOAL, np.array([0.03, 0.0]))
+    region = np.random.default_rng(0).uniform([0.8, -0.2], [1.0, 0.2], size=(40, 2))
+    at = np.array([0.85, -0.12])
+    (gain,) = adapter.gain(at[None], region)
+    known = adapter._normalisation.apply(region)
+    before = adapter._predict(known)[1].mean()
+    sd = 0.1 * adapter._normalisation.scale
+    adapter.observe(at, at, Reading.measured([0.0, 0.0], sd))
+    after = adapter._predict(known)[1].mean()
+    assert gain == pytest.approx(1 - after / before, abs=0.02)
+
+
+def test_a_throw_teaches_more_than_a_demonstration_where_hardware_changed():
+    adapter = started(hardware_sd=(0.5,))
+    region = np.random.default_rng(0).uniform([0.8, -0.2], [1.0, 0.2], size=(40, 2))
+    throws, shown = (adapter.gain(region, region, demonstrations=d) for d in (False, True))
+    assert throws.max() > 3 * shown.max()
+    assert np.all(shown > 0)
+
+
 def test_proposals_depend_on_what_was_observed_alone():
     asked, silent = started(), started()
     for adapter in (asked, silent):

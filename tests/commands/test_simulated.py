@@ -103,6 +103,23 @@ def test_a_model_at_an_endpoint_sees_the_trials_and_its_readings_are_kept(adapt,
     assert "seen: HIT" in capsys.readouterr().out
 
 
+def test_several_goals_are_one_afternoon(model, tmp_path, capsys):
+    goals = ("--goal", *GOAL, "0.95", "0.1")
+    where = ("--model", str(model), "--out", str(tmp_path), "--no-film", "--rounds", "4")
+    assert main(["adapt", *goals, *where]) in (0, 1)
+    told = capsys.readouterr().out
+    assert "goal 1 of 2" in told
+    assert "goal 2 of 2" in told
+    assert re.search(r"trials by goal: \d\+?, \d\+?\n", told)
+    assert "chance" in told
+    assert "Trials by goal" in next(tmp_path.glob("*.html")).read_text()
+
+
+def test_a_goal_that_is_cut_off_is_refused(model, tmp_path, capsys):
+    assert main(["adapt", "--goal", *GOAL, "0.95", "--model", str(model)]) == 2
+    assert "goal" in capsys.readouterr().err
+
+
 def test_without_a_terminal_a_failed_reading_ends_in_one_line(adapt, tmp_path, capsys):
     assert adapt(*NOBODY) == 2
     said = capsys.readouterr().err.strip()

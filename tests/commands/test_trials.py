@@ -33,6 +33,25 @@ def test_what_ask_cannot_do_is_said_before_a_trial_is_made(run, folder, flags, r
     assert events_in(folder) == before
 
 
+def test_ask_says_what_the_trial_may_expect(run, folder):
+    run("goal", folder, "0.9", "0.05")
+    out = run("ask", folder)[1]
+    (trial,) = trials_in(folder)
+    assert f"hits with probability {trial.p_hit:.2f}; {trial.expected_trials:.1f} trials" in out
+    run("tell", folder, 1, "5 cm long")
+    run("void", folder, 1)
+    run("goal", folder, "0.9", "0.05", "--adapter", "gp")
+    assert "probability" not in run("ask", folder)[1]
+
+
+def test_after_three_poor_trials_it_is_said_what_would_help(run, folder):
+    run("goal", folder, "0.9", "0.05")
+    for number in range(1, 4):
+        assert "would help" not in run("ask", folder)[1]
+        run("tell", folder, number, "20 cm long" if number % 2 else "20 cm short")
+    assert "would help: a demonstration near this goal" in run("ask", folder)[1]
+
+
 def test_a_plan_can_be_put_elsewhere_trial_by_trial(run, folder, tmp_path):
     run("goal", folder, "0.9", "0.05")
     for number in (1, 2):

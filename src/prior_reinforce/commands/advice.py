@@ -1,0 +1,94 @@
+"""What the adapter of a workspace knows of the whole region, and where to learn more."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import tyro
+from jaxtyping import Float
+
+from prior_reinforce.arrays import Points
+from prior_reinforce.commands.workspace import Folder
+from prior_reinforce.errors import ConfigurationError
+from prior_reinforce.wording import say_place
+from prior_reinforce.workspace.workspace import Workspace
+
+_ACROSS = 25
+"""Goals along each side of the region (ours)."""
+_MOST_GOALS = 1000
+"""Goals in all: more than two components have fewer along a side."""
+_MARGIN = 0.1
+"""How far beyond the demonstrated outcomes is looked, as a share of their range (ours)."""
+
+
+@dataclass(frozen=True)
+class Advise:
+    """Say where first throws would hit, and where one more throw or demonstration teaches most."""
+
+    folder: Folder
+    """Workspace whose goal was set with the adapter bayes."""
+    adapter: Annotated[str | None, tyro.conf.arg(metavar="module:Class")] = None
+    """The adapter that the goal was set with, where it is your own: module:Class."""
+    out: Path | None = None
+    """Picture, a .png; advice.png in the workspace if not given."""
+
+    def run(self) -> None:
+        """Look over the region, print, and draw."""
+        out = self.out or self.folder / "advice.png"
+        if out.suffix != ".png":
+            raise ConfigurationError(f"--out must name a .png file, got {out}")
+        with Workspace(self.folder) as workspace:
+            session = workspace.session(own_adapter=self.adapter)
+            adapter = session.informed_adapter()
+            p_hit, gain = getattr(adapter, "p_hit", None), getattr(adapter, "gain", None)
+            if p_hit is None or gain is None:
+                raise ConfigurationError(
+                    f"the adapter {session.goals[-1].adapter} knows no probabilities; set the "
+                    "goal with --adapter bayes"
+                )
+            outcomes = session.demonstrations.outcomes_seen
+            goals = _region(outcomes)
+            conditions = np.array([adapter.propose(goal) for goal in goals])
+            p = p_hit(conditions, goals, session.tolerance)
+            throws = gain(conditions, conditions)
+            shown = gain(goals, conditions, demonstrations=True)
+            names, units = workspace.manifest.outcome_names, workspace.manifest.outcome_units
+
+            def at(place: int) -> str:
+                return say_place(goals[place], names, units)
+
+            best, throw, demonstration = (int(np.argmax(of)) for of in (p, throws, shown))
+            worst = int(np.argmin(p))
+            print(
+                f"first throws hit with probability {p.mean():.2f} on average over the "
+                f"demonstrated region: {p[best]:.2f} at {at(best)}, {p[worst]:.2f} at {at(worst)}"
+            )
+            print(
+                f"the throw that teaches most: {at(throw)} "
+                f"({throws[throw]:.0%} of what is unknown; half of all places teach less than "
+                f"{np.median(throws):.0%})"
+            )
+            print(
+                f"the demonstration that teaches most: one that ends at {at(demonstration)} "
+                f"({shown[demonstration]:.0%} of what is unknown)"
+            )
+            if goals.shape[1] == 2:
+                from prior_reinforce.report.advice import draw_advice
+
+                picture = draw_advice(
+                    out, goals, p, outcomes, goals[throw], goals[demonstration], (names, units)
+                )
+                print(f"picture: {picture}")
+
+
+def _region(outcomes: Points) -> Float[np.ndarray, "m k"]:
+    """A grid over the demonstrated outcomes and a little beyond, the last component fastest."""
+    low, high = outcomes.min(axis=0), outcomes.max(axis=0)
+    margin = _MARGIN * (high - low)
+    k = len(low)
+    across = min(_ACROSS, int(_MOST_GOALS ** (1 / k)))
+    axes = [np.linspace(a, b, across) for a, b in zip(low - margin, high + margin, strict=True)]
+    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, k)

@@ -1,0 +1,31 @@
+"""What is said and drawn of a region, and what it needs."""
+
+import re
+
+from tests.workspace.planar import events_in
+
+
+def test_advice_names_places_and_draws_the_region(run, folder):
+    run("goal", folder, "0.9", "0.05")
+    run("ask", folder)
+    run("tell", folder, 1, "5 cm long")
+    before = events_in(folder)
+    status, out, _ = run("advise", folder, "--out", "map.png")
+    assert status == 0
+    assert re.search(r"first throws hit with probability 0\.\d\d on average", out)
+    assert re.search(r"throw that teaches most: \d+(\.\d)? cm ahead", out)
+    assert "demonstration that teaches most: one that ends at" in out
+    assert "picture: map.png" in out
+    assert events_in(folder) == before
+
+
+def test_advice_needs_an_adapter_that_knows_probabilities(run, folder):
+    run("goal", folder, "0.9", "0.05", "--adapter", "gp")
+    status, out, err = run("advise", folder)
+    assert (status, out) == (2, "")
+    assert "--adapter bayes" in err
+
+
+def test_advice_needs_a_goal_and_a_png(run, folder):
+    assert "set one" in run("advise", folder)[2]
+    assert ".png" in run("advise", folder, "--out", "map.jpg")[2]
