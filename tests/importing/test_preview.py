@@ -97,3 +97,32 @@ def test_dollar_signs_in_names_are_no_mathematics(folder, tmp_path):
     preview = replace(result.preview, demonstrations=replace(demos, format=form))
     preview.draw(tmp_path / "preview.png")
     assert (tmp_path / "preview.png").stat().st_size > 10_000
+
+
+def outcome_axes(folder, outcomes, units=None):
+    """The axes that outcomes are drawn in, by title."""
+    drawn = []
+
+    def keep(figure, *_, **__):
+        drawn.append(figure)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("matplotlib.figure.Figure.savefig", keep)
+        result = import_demonstrations(folder, outcomes=outcomes, outcome_units=units)
+        result.preview.draw("nowhere.png")
+    return {a.get_title(): a for a in drawn[0].axes if a.get_title().startswith("outcomes")}
+
+
+def test_outcomes_lie_as_in_a_report_x_up_and_left_to_the_left(folder):
+    (axes,) = outcome_axes(folder, OUTCOMES).values()
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("y [m]", "x [m]")
+    left, right = axes.get_xlim()
+    assert left > right
+
+
+def test_three_components_are_seen_from_above_and_from_the_side(folder):
+    rng = np.random.default_rng(0)
+    outcomes = {name: rng.uniform(0, 1, 3) for name in OUTCOMES}
+    axes = outcome_axes(folder, outcomes)
+    assert list(axes) == ["outcomes from above", "outcomes from the side"]
+    assert axes["outcomes from the side"].get_ylabel() == "z [m]"

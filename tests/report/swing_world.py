@@ -37,6 +37,8 @@ class Swing:
 class FullStep:
     """An adapter that subtracts the whole last error."""
 
+    carries_over = False
+
     def start(self, demonstrations):
         self.last = None
 

@@ -12,6 +12,7 @@ from PIL import Image
 
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.report import page, record_film, write_report
+from prior_reinforce.report.record import CheckRow
 from prior_reinforce.report.style import PICTURE_DPI
 from tests.report.swing_world import FullStep, adaptation, demonstrations, pictures
 
@@ -197,3 +198,15 @@ def test_bad_input_is_named_and_writes_nothing(tmp_path):
     with pytest.raises(ConfigurationError, match=r"region must have shape \(2, 2\)"):
         write_report(folder, [adaptation(adapter=FullStep(), most=1)], title="x", region=[1, 2])
     assert not folder.exists()
+
+
+def test_what_the_gate_said_stands_beside_the_plans(records, tmp_path):
+    checks = (
+        CheckRow("velocity", "warn", 2, "joint4 at 2.1 rad/s, 97 % of 2.175"),
+        CheckRow("box", "unchecked", 1, "not checked: no box given"),
+    )
+    words = read(write_report(tmp_path, [replace(records[0], checks=checks)], title="x")).words
+    assert "What the gate said of these plans" in words
+    assert "velocity passes, warns joint4 at 2.1 rad/s, 97 % of 2.175 2" in words
+    assert "box not checked" in words
+    assert "What the gate said" not in read(write_report(tmp_path, records, title="x")).words

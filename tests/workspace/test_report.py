@@ -1,5 +1,10 @@
 """The report of a workspace."""
 
+import numpy as np
+
+from prior_reinforce.trials import Stage, Trial
+from prior_reinforce.workspace.report import _checks
+
 
 def test_the_report_shows_every_goal_and_the_voided_trials(run, folder, tmp_path):
     run("goal", folder, "0.9", "0.05")
@@ -26,3 +31,22 @@ def test_the_report_shows_every_goal_and_the_voided_trials(run, folder, tmp_path
     path.unlink()
     run("void", folder, 1)
     assert run("report", folder)[0] == 0
+
+
+def trial(number, **lines):
+    """A trial whose gate said this of each check: its status and margin."""
+    said = [
+        {"check": check, "status": status, "margin": margin, "text": f"{check} of {number}"}
+        for check, (status, margin) in lines.items()
+    ]
+    return Trial(number, 1, np.zeros(2), stage=Stage.ASKED, kept={"gate": {"lines": said}})
+
+
+def test_the_plan_that_came_nearest_to_a_limit_is_shown():
+    trials = [
+        trial(1, velocity=("pass", 0.5), jerk=("warn", 0.1), box=("unchecked", None)),
+        trial(2, velocity=("pass", 0.2), jerk=("pass", 0.05), box=("pass", 0.3)),
+        Trial(3, 1, np.zeros(2), stage=Stage.ASKED, kept={"gate": None}),
+    ]
+    rows = [(row.check, row.status, row.trial) for row in _checks(trials)]
+    assert rows == [("velocity", "pass", 2), ("jerk", "warn", 1), ("box", "pass", 2)]

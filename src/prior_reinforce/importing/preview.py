@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -15,9 +15,12 @@ from prior_reinforce.importing.preprocessing import Preprocessed
 from prior_reinforce.importing.recording import Recording
 from prior_reinforce.plans.motions import Demonstrations
 
+if TYPE_CHECKING:
+    from prior_reinforce.report.panels import View
+
 _COLUMNS = 4
 _LEAST_RANGE = 0.2
-"""Smallest vertical range of a channel's panel, as a share of the largest motion."""
+"""Smallest vertical range of a channel's panel, as a share of the largest motion in its unit."""
 Corners = Int[np.ndarray, " corners"]
 PlanePoints = Float[np.ndarray, "n 2"]
 
@@ -80,15 +83,19 @@ class Preview:
         from matplotlib import colormaps
         from matplotlib.figure import Figure
 
+        from prior_reinforce.report.panels import views_of
+
         demos = self.demonstrations
-        rows = math.ceil((demos.action_dim + 1) / _COLUMNS)
+        views = views_of(demos.outcome_units)
+        rows = math.ceil((demos.action_dim + len(views)) / _COLUMNS)
         figure = Figure(figsize=(3.4 * _COLUMNS, 2.6 * rows + 0.5), layout="constrained", dpi=110)
         axes = figure.subplots(rows, _COLUMNS, squeeze=False).ravel()
         colours = [colormaps["tab10"](i % 10) for i in range(demos.n)]
         for channel in range(demos.action_dim):
             self._draw_channel(axes[channel], channel, colours)
-        self._draw_outcomes(axes[demos.action_dim], colours)
-        for spare in axes[demos.action_dim + 1 :]:
+        for at, view in enumerate(views, start=demos.action_dim):
+            self._draw_outcomes(axes[at], view, colours)
+        for spare in axes[demos.action_dim + len(views) :]:
             spare.set_axis_off()
         figure.suptitle(
             f"{demos.n} demonstrations as they will be learned (colour, dot where the motion ends) "
@@ -127,34 +134,36 @@ class Preview:
             axes.plot(times[end], plan[end, channel], "o", color=colour, markersize=3, zorder=3)
         # A channel that hardly moves must not look as if it did.
         low, high = axes.get_ylim()
-        least = _LEAST_RANGE * float(np.ptp(demos.plans, axis=(0, 1)).max())
+        like = np.array(form.units) == form.units[channel]
+        least = _LEAST_RANGE * float(np.ptp(demos.plans, axis=(0, 1))[like].max())
         if high - low < least:
             axes.set_ylim((low + high - least) / 2, (low + high + least) / 2)
         axes.set_title(f"{form.names[channel]} [{form.units[channel]}]", fontsize=10)
         axes.set_xlabel("time from the plan's start [s]", fontsize=8)
         axes.tick_params(labelsize=8)
 
-    def _draw_outcomes(self, axes: Any, colours: list[Any]) -> None:
-        """Outcomes with the hull of their first two components; a single one on a line."""
-        demos = self.demonstrations
+    def _draw_outcomes(self, axes: Any, view: View, colours: list[Any]) -> None:
+        """Outcomes as a report draws them, with their hull; a single component on a line."""
+        demos, (across, up) = self.demonstrations, (view.across, view.up)
         names, units = demos.outcome_names, demos.outcome_units
-        points = demos.outcomes_seen[:, :2]
-        if demos.outcome_dim == 1:
-            points = np.column_stack([points[:, 0], np.zeros(demos.n)])
+        height = np.zeros(demos.n) if up is None else demos.outcomes_seen[:, up]
+        points = np.column_stack([demos.outcomes_seen[:, across], height])
+        if up is None:
             axes.set_yticks([])
         else:
             corners = hull_corners(points)
-            if corners.size:
-                axes.fill(*points[corners].T, color="0.9", zorder=1)
-                axes.set_ylabel(f"{names[1]} [{units[1]}]", fontsize=8)
-            if units[0] == units[1]:
+            axes.fill(*points[corners].T, color="0.9", zorder=1)
+            axes.set_ylabel(f"{names[up]} [{units[up]}]", fontsize=8)
+            if units[across] == units[up]:
                 axes.set_aspect("equal", adjustable="datalim")
         axes.scatter(*points.T, c=colours, s=30, zorder=2)
         for point, episode in zip(points, self.episodes, strict=True):
             axes.annotate(episode, point, textcoords="offset points", xytext=(5, 4), fontsize=7)
         axes.margins(0.25)
-        axes.set_xlabel(f"{names[0]} [{units[0]}]", fontsize=8)
-        axes.set_title("outcomes and their hull", fontsize=10)
+        if view.mirrored:
+            axes.invert_xaxis()
+        axes.set_xlabel(f"{names[across]} [{units[across]}]", fontsize=8)
+        axes.set_title(f"outcomes {view.title}".strip(), fontsize=10)
         axes.tick_params(labelsize=8)
 
 

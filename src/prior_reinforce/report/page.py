@@ -117,6 +117,7 @@ def _section(
         "colours": [trial_colour(i, n, hit=trial.hit) for i, trial in enumerate(record.trials)],
         "joints": record.demonstrations.format.names,
         "knows_truth": _knows_truth(record),
+        "checks": record.checks,
         "strip": record.film and data_uri(record.film.strip),
         "video": record.film and _video(folder, record.film.video),
         "film_caption": record.film_caption,

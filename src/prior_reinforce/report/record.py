@@ -33,6 +33,20 @@ class Film:
     """PNG of its key moments."""
 
 
+@dataclass(frozen=True)
+class CheckRow:
+    """What the gate said in one check, of the plan that came nearest to its limit."""
+
+    check: str
+    """For instance `velocity`."""
+    status: str
+    """`pass`, `warn`, `refuse` or `unchecked`."""
+    trial: int
+    """Whose plan it was."""
+    text: str
+    """The gate's own line."""
+
+
 @dataclass(frozen=True, eq=False)
 class AdaptationRecord:
     """One goal and all its trials, ready to be reported."""
@@ -49,6 +63,8 @@ class AdaptationRecord:
     """What to call this goal; `Goal 1`, `Goal 2`, ... where empty."""
     outcomes: tuple[Point | None, ...] | None = None
     """True outcome of each trial where known; None as a whole on a real arm."""
+    checks: tuple[CheckRow, ...] = ()
+    """What the gate said of the plans; empty where no robot is named."""
     film: Film | None = None
     """Film of a trial, usually of the one that reached the goal."""
     film_caption: str = ""

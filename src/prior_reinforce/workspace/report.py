@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from prior_reinforce.errors import FileFormatError, WorkspaceError
 from prior_reinforce.files import claim_folder, named_disk_errors
 from prior_reinforce.report import AdaptationRecord, write_report
+from prior_reinforce.report.record import CheckRow
 from prior_reinforce.session import Session
 from prior_reinforce.trials import Goal, Trial
 from prior_reinforce.workspace.workspace import Workspace
@@ -75,5 +78,24 @@ def _record(workspace: Workspace, session: Session, goal: Goal) -> AdaptationRec
         tolerance=goal.tolerance,
         trials=tuple(trials),
         title=f"Goal {goal.number}",
+        checks=_checks(trials),
         film_caption="; ".join(remarks),
     )
+
+
+def _checks(trials: Sequence[Trial]) -> tuple[CheckRow, ...]:
+    """Each check of the gate, with the plan that came nearest to its limit, as it was asked for."""
+    said = [
+        (t.number, line) for t in trials for line in (t.kept.get("gate") or {}).get("lines", ())
+    ]
+    rows = []
+    for check in dict.fromkeys(line["check"] for _, line in said):
+        number, line = max((x for x in said if x[1]["check"] == check), key=lambda x: _worse(x[1]))
+        rows.append(CheckRow(check, line["status"], number, line["text"]))
+    return tuple(rows)
+
+
+def _worse(line: Mapping[str, Any]) -> tuple[int, float]:
+    """Orders what the gate said of one check in several plans."""
+    rank = ("unchecked", "pass", "warn", "refuse").index(line["status"])
+    return rank, 0.0 if line["margin"] is None else -float(line["margin"])
