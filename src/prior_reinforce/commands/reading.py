@@ -32,7 +32,7 @@ class Seen:
 
     folder: Folder
     """Workspace."""
-    number: Number
+    number: Annotated[int | None, tyro.conf.Positional, tyro.conf.arg(metavar="[TRIAL]")] = None
     """Number of the trial."""
     seen: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="[SEEN]")] = ()
     """What was seen, outcome minus goal: "5cm long, 2cm left", "5.2 +- 0.3 cm long", "long", "hit",
@@ -46,6 +46,17 @@ class Seen:
     miss: bool = False
     """The goal was not reached, whatever the distance says."""
 
+    @property
+    def trial(self) -> int:
+        """Number of the trial.
+
+        Raises:
+            ConfigurationError: None was given.
+        """
+        if self.number is None:
+            raise ConfigurationError("say which trial: its number comes after the workspace")
+        return self.number
+
     def read(
         self, workspace: Workspace, session: Session
     ) -> tuple[Reading | Point | None, bool | None]:
@@ -58,19 +69,19 @@ class Seen:
                 "--miss if that was seen as well, or --hit alone"
             )
         hit = True if self.hit else False if self.miss else None
-        goal = session.goals[session.trial(self.number).goal_number - 1].goal
+        goal = session.goals[session.trial(self.trial).goal_number - 1].goal
         if self.outcome is not None:
             if len(self.outcome) != goal.size:
                 raise InvalidFeedbackError(
                     f"--outcome needs {goal.size} numbers, got {len(self.outcome)}: "
                     f"{', '.join(workspace.manifest.outcome_names)}"
                 )
-            return _plausible(workspace, np.array(self.outcome) - goal), hit
+            return plausible(workspace, np.array(self.outcome) - goal), hit
         words = self.seen or self.error
-        return (None if words is None else _read_seen(workspace, " ".join(words))), hit
+        return (None if words is None else read_seen(workspace, " ".join(words))), hit
 
 
-def _read_seen(workspace: Workspace, text: str) -> Reading | Point:
+def read_seen(workspace: Workspace, text: str) -> Reading | Point:
     """Read outcome minus goal, in the outcome's units, from words or numbers.
 
     Raises:
@@ -95,7 +106,7 @@ def _read_seen(workspace: Workspace, text: str) -> Reading | Point:
             f"an error needs {k} numbers, got {len(numbers)}: outcome minus goal in "
             f"{', '.join(names)}{words}: {tell_example(workspace)}"
         )
-    error = _plausible(workspace, np.array([number for number, _ in numbers]))
+    error = plausible(workspace, np.array([number for number, _ in numbers]))
     sds = [sd for _, sd in numbers if sd is not None]
     if not sds:
         return error
@@ -126,7 +137,7 @@ def _sayable(text: str, reading: Reading) -> Reading:
     return reading
 
 
-def _plausible(workspace: Workspace, error: Point) -> Point:
+def plausible(workspace: Workspace, error: Point) -> Point:
     """The error, unless it looks like centimetres where words could say it as well."""
     largest = np.abs(error).max(initial=0.0)
     words = in_words(workspace.manifest.outcome_units)

@@ -10,6 +10,7 @@ from typing import Annotated
 import tyro
 
 from prior_reinforce.commands.reading import Number, Seen
+from prior_reinforce.commands.tracked import rows_to_tell
 from prior_reinforce.commands.workspace import Folder, print_next
 from prior_reinforce.errors import ConfigurationError, FileFormatError
 from prior_reinforce.plans.files import check_plan_path, write_plan
@@ -210,15 +211,34 @@ class Ask:
 class Tell(Seen):
     """Report what was seen of a trial."""
 
+    table: Annotated[Path | None, tyro.conf.arg(name="from")] = None
+    """Or a table with a row a trial, such as a tracker writes: trial, x, y (where the object ended,
+    units as in x_cm) or said (words), and hit. Rows that were told already are passed over."""
+
     def run(self) -> None:
         """Write it down."""
         with Workspace(self.folder) as workspace:
             session = workspace.session()
-            seen, hit = self.read(workspace, session)
-            _warn_of_its_execution(workspace, session, self.number)
-            trial = session.tell(self.number, seen, hit=hit)
-            print(f"trial {trial.number}: {say_trial(workspace, trial)}")
+            if self.table is not None:
+                self._tell_table(workspace, session, self.table)
+            else:
+                seen, hit = self.read(workspace, session)
+                _warn_of_its_execution(workspace, session, self.trial)
+                trial = session.tell(self.trial, seen, hit=hit)
+                print(f"trial {trial.number}: {say_trial(workspace, trial)}")
             print_next(workspace)
+
+    def _tell_table(self, workspace: Workspace, session: Session, path: Path) -> None:
+        given = (self.number, self.seen, self.error, self.outcome, self.hit, self.miss)
+        if given != (None, (), None, None, False, False):
+            raise ConfigurationError("--from tells what its table says; drop what else was given")
+        rows = rows_to_tell(path, workspace, session)
+        for row in rows:
+            _warn_of_its_execution(workspace, session, row.number)
+            trial = session.tell(row.number, row.seen, hit=row.hit)
+            print(f"trial {trial.number}: {say_trial(workspace, trial)}")
+        if not rows:
+            print(f"{path} says nothing that was not told already")
 
 
 @dataclass(frozen=True)
@@ -230,7 +250,7 @@ class Amend(Seen):
         with Workspace(self.folder) as workspace:
             session = workspace.session()
             seen, hit = self.read(workspace, session)
-            trial = session.amend(self.number, seen, hit=hit)
+            trial = session.amend(self.trial, seen, hit=hit)
             print(f"trial {trial.number}, corrected: {say_trial(workspace, trial)}")
             print_next(workspace)
 
