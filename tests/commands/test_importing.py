@@ -56,7 +56,7 @@ def test_or_agreed_to_at_a_terminal(run, folder, tmp_path, monkeypatch):
     assert run("import", folder, "odd", "--no-trim")[0] == 2
     status, out, _ = run("import", folder, "odd", "--no-trim")
     assert status == 0
-    assert "joint1 [rad, recorded in deg]" in out
+    assert "joint1 to joint2 [rad, recorded in deg]" in out
     with Workspace(folder) as workspace:
         np.testing.assert_allclose(workspace.demonstrations.plans, demonstrations().plans)
 

@@ -320,7 +320,7 @@ def test_a_unit_in_a_channels_name_is_converted_and_may_not_be_contradicted(tmp_
     write_outcomes(tmp_path)
     result = import_demonstrations(tmp_path, preprocessing=AS_IS)
     assert result.demonstrations.format.names == tuple(f"j{i}" for i in range(7))
-    assert "j0 [rad, recorded in deg]" in result.preview.text
+    assert "j0 to j6 [rad, recorded in deg]" in result.preview.text
     np.testing.assert_allclose(result.demonstrations.plans[0, :171], sampled(0, 100)[1], atol=1e-12)
     with pytest.raises(ConfigurationError, match="j0 of episode 0 is in deg, but --units says rad"):
         import_demonstrations(tmp_path, units=["rad"])

@@ -46,12 +46,7 @@ class Inspection:
         """The essential, a line each, by what it is about."""
         rows = {
             "rate": self._rate(),
-            "channels": ", ".join(
-                f"{n} [{u}]" if u == r else f"{n} [{u}, recorded in {r}]"
-                for n, u, r in zip(
-                    self.kept.names, self.kept.units, self.kept.recorded_units, strict=True
-                )
-            ),
+            "channels": self._units(),
             "still ends": self._trimming(),
             "length": self._length(),
             "noise": self._noise(),
@@ -91,6 +86,15 @@ class Inspection:
                 unit = f"{unit}, from {kept.recorded_units[i]}"
             rows.append([name, recorded, unit, *ranges, noise, held])
         return _columns(rows)
+
+    def _units(self) -> str:
+        """Channels by their units."""
+        groups: dict[str, list[str]] = {}
+        kept = self.kept
+        for name, unit, recorded in zip(kept.names, kept.units, kept.recorded_units, strict=True):
+            said = unit if unit == recorded else f"{unit}, recorded in {recorded}"
+            groups.setdefault(said, []).append(name)
+        return "; ".join(f"{say_names(names)} [{unit}]" for unit, names in groups.items())
 
     def _limits(self) -> str:
         refused = [r for r in self.reports if r.refused]
