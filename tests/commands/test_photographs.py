@@ -11,7 +11,9 @@ import pytest
 from prior_reinforce.cli import main
 from prior_reinforce.perception.camera import Camera
 from prior_reinforce.tasks import make_task
+from prior_reinforce.workspace.workspace import Workspace
 from tests.perception.vision_server import VisionServer
+from tests.workspace.planar import demonstrations, manifest
 
 GOAL = np.array([1.0, 0.05])
 SCENE = make_task("basketball-v1").scene
@@ -79,6 +81,22 @@ def test_a_photograph_tells_the_error(table, capsys):
         np.testing.assert_allclose(seen, truth, atol=0.006)
         assert (folder / "photo-seen.png").stat().st_size > 10_000
 
+        # The goal that is set counts, 4 cm nearer than the hoop that is seen.
+        with Workspace.create(folder / "hoop", manifest()) as workspace:
+            workspace.import_demonstrations(demonstrations(), "made up")
+            workspace.learn("interpolation")
+            workspace.set_goal([0.96, 0.05])
+            workspace.session().ask()
+        of_trial = ("--workspace", str(folder / "hoop"), "--trial", "1")
+        assert look(folder, server.base_url, *of_trial) == 0
+        said = capsys.readouterr()
+        told = re.search(r"hoop 1 ([-.\d]+)\+-\S+ ([-.\d]+)\+-", said.out)
+        assert told is not None
+        seen = np.array([float(told[1]), float(told[2])])
+        np.testing.assert_allclose(seen, truth + np.array([0.04, 0]), atol=0.006)
+        assert re.search(r"the red hoop is seen [345]\.\d cm from the goal that is set", said.err)
+        assert (folder / "hoop" / "pictures" / "trial-001-seen.png").stat().st_size > 10_000
+
         assert look(folder, server.base_url, "--reached-size", "0.6") == 2
         assert "photo-seen.png and tell what you see" in capsys.readouterr().err
 
@@ -109,3 +127,23 @@ def test_wrong_files_are_named(tmp_path, capsys, monkeypatch):
         *("look", "photo.png", "--reached", "a ball", "--reached-size", "0.1"),
         *("--goal", "a hoop", "--goal-size", "0.1", "--calibration", "table.json"),
     )
+
+
+def test_a_trial_is_named_with_its_workspace(folder, tmp_path, run):
+    (tmp_path / "photo.png").write_text("not looked at yet")
+    common = (
+        "look",
+        "photo.png",
+        "--reached",
+        "a ball",
+        "--reached-size",
+        "0.1",
+        "--goal",
+        "a hoop",
+    )
+    common = (*common, "--goal-size", "0.1")
+    assert "say together which trial" in run(*common, "--trial", "1")[2]
+    status, _, err = run(*common, "--workspace", folder, "--trial", "4")
+    assert status == 2
+    assert "4" in err
+    assert not (tmp_path / "planar" / "pictures").exists()

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import csv
+import shlex
+import sys
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
@@ -11,13 +13,16 @@ import numpy as np
 import tyro
 from jaxtyping import Float, UInt8
 
+from prior_reinforce.arrays import Point
 from prior_reinforce.errors import ConfigurationError, FileFormatError, PerceptionFailedError
-from prior_reinforce.files import refuse_foreign
+from prior_reinforce.files import named_disk_errors, refuse_foreign
 from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
 from prior_reinforce.scene import SeenObject, TableScene
 from prior_reinforce.wording import to_words
 
 _COLUMNS = ("x", "y", "u", "v")
+_SAME_GOAL = 0.02
+"""By how far what stands at the goal may be seen from it, in [m]; ours: twice a camera's error."""
 
 
 @dataclass(frozen=True)
@@ -69,6 +74,11 @@ class Look:
     """From that object's centre to the goal, forward and left, in [m]."""
     calibration: Path = Path("table.json")
     """What `calibrate` wrote."""
+    workspace: Path | None = None
+    """Workspace whose trial it was: the error is seen from the goal that is set there, and what was
+    seen is kept there, in pictures/."""
+    trial: int | None = None
+    """Number of that trial."""
     vlm: VisionLanguageModelConfig = field(default_factory=VisionLanguageModelConfig)
     """Endpoint and model (docs/perception.md)."""
 
@@ -77,8 +87,8 @@ class Look:
         from prior_reinforce.perception.calibration import TableCalibration
         from prior_reinforce.perception.vlm import CAMERA_SD, VisionLanguageModel
 
-        stem = f"{self.picture.stem}-seen"
-        drawn = self.picture.with_name(f"{stem}.png")
+        goal, folder, stem = self._of_trial()
+        drawn = folder / f"{stem}.png"
         written = drawn.with_suffix(".json")
         refuse_foreign(drawn if not written.exists() else written, "picture_size_px")
         calibration = TableCalibration.load(self.calibration)
@@ -91,14 +101,47 @@ class Look:
         picture = _read_picture(self.picture)
         with VisionLanguageModel(scene, self.vlm, calibration=calibration) as model:
             reading = model.read(picture)
-        reading.save(self.picture.parent, stem)
+        with named_disk_errors(folder):
+            folder.mkdir(exist_ok=True)
+            reading.save(folder, stem)
         if reading.error_seen is None:
             raise PerceptionFailedError(
                 f"{reading.problem}; look at {drawn} and tell what you see yourself"
             )
-        print(f"seen: {to_words(reading.error_seen)}   boxes: {drawn}")
-        numbers = " ".join(f"{component:.4f}+-{CAMERA_SD:g}" for component in reading.error_seen)
-        print(f"if the boxes are right: prior-reinforce tell FOLDER TRIAL {numbers}")
+        error = reading.error_seen
+        if goal is not None and reading.reached.place is not None:
+            error = reading.reached.place - goal
+            moved = float(np.linalg.norm(error - reading.error_seen))
+            if moved > _SAME_GOAL:
+                print(
+                    f"prior-reinforce: warning: {self.goal} is seen {100 * moved:.1f} cm from the "
+                    "goal that is set; check the calibration, or move it there",
+                    file=sys.stderr,
+                )
+        print(f"seen: {to_words(error)}   boxes: {drawn}")
+        numbers = " ".join(f"{component:.4f}+-{CAMERA_SD:g}" for component in error)
+        told = (
+            "FOLDER TRIAL" if goal is None else f"{shlex.quote(str(self.workspace))} {self.trial}"
+        )
+        print(f"if the boxes are right: prior-reinforce tell {told} {numbers}")
+
+    def _of_trial(self) -> tuple[Point | None, Path, str]:
+        """The goal that the trial was for, where to keep what is seen, and its name there."""
+        if self.workspace is None and self.trial is None:
+            return None, self.picture.parent, f"{self.picture.stem}-seen"
+        if self.workspace is None or self.trial is None:
+            raise ConfigurationError("--workspace and --trial say together which trial it was")
+        from prior_reinforce.workspace.workspace import Workspace
+
+        with Workspace(self.workspace) as workspace:
+            session, units = workspace.session(), workspace.manifest.outcome_units
+            if tuple(units) != ("m", "m"):
+                raise ConfigurationError(
+                    f"a photograph from above shows two lengths, but outcomes are in {list(units)};"
+                    " leave --workspace out, and tell what you see"
+                )
+            goal = session.goals[session.trial(self.trial).goal_number - 1].goal
+        return goal, self.workspace / "pictures", f"trial-{self.trial:03d}-seen"
 
 
 def _read_points(path: Path) -> Float[np.ndarray, "n 4"]:

@@ -10,7 +10,6 @@ from typing import Annotated
 import tyro
 
 from prior_reinforce.commands.reading import Number, Seen
-from prior_reinforce.commands.tracked import rows_to_tell
 from prior_reinforce.commands.workspace import Folder, print_next
 from prior_reinforce.errors import ConfigurationError, FileFormatError
 from prior_reinforce.plans.files import check_plan_path, write_plan
@@ -232,6 +231,8 @@ class Tell(Seen):
         given = (self.number, self.seen, self.error, self.outcome, self.hit, self.miss)
         if given != (None, (), None, None, False, False):
             raise ConfigurationError("--from tells what its table says; drop what else was given")
+        from prior_reinforce.commands.tracked import rows_to_tell
+
         rows = rows_to_tell(path, workspace, session)
         for row in rows:
             _warn_of_its_execution(workspace, session, row.number)
