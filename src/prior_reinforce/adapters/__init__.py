@@ -30,6 +30,13 @@ ADAPTERS: Registry[Adapter] = Registry(
             "prior_reinforce.adapters.proportional:ProportionalAdapter",
             "a fixed share of the last error",
         ),
+        "offset": Member(
+            "prior_reinforce.adapters.offset:MeanOffsetAdapter",
+            "the mean of what all trials were off by",
+        ),
+        "broyden": Member(
+            "prior_reinforce.adapters.broyden:BroydenAdapter", "secants along the steps made"
+        ),
         "frozen": Member(
             "prior_reinforce.adapters.frozen:FrozenAdapter", "no adaptation: the goal itself"
         ),

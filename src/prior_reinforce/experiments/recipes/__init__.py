@@ -1,10 +1,11 @@
-"""Recipes: one a figure or table of the paper, one file each."""
+"""Recipes: one a figure or table of the paper, and what goes beyond it, one file each."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
 from prior_reinforce.experiments.recipes import (
+    adaptation,
     adapters,
     alignment,
     displacement,
@@ -25,7 +26,16 @@ from prior_reinforce.experiments.recipes.base import (
 
 RECIPES: Mapping[str, Recipe] = {
     module.RECIPE.name: module.RECIPE
-    for module in (zero_shot, generators, adapters, alignment, displacement, trials, process)
+    for module in (
+        zero_shot,
+        generators,
+        adapters,
+        alignment,
+        displacement,
+        trials,
+        process,
+        adaptation,
+    )
 }
 """Every recipe by its name, in the order of the evidence page."""
 

@@ -1,0 +1,80 @@
+"""Afternoons: goals worked through one after another, with or without what came before.
+
+Ours; the paper starts every goal from the demonstrations alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from prior_reinforce.adapters import make_adapter
+from prior_reinforce.experiments.evaluation import GOAL_SEED, Training
+from prior_reinforce.experiments.protocol import run_sequences
+from prior_reinforce.experiments.units import Unit
+from prior_reinforce.perception import make_perception
+from prior_reinforce.registry import source_digest
+from prior_reinforce.tasks import make_task
+
+
+@dataclass(frozen=True)
+class Afternoons(Unit):
+    """Work through sequences of goals with one learned generator and one adapter."""
+
+    training: Training
+    """What was learned."""
+    task: str
+    """Where it is tried; another hardware variant than the training's, perhaps."""
+    adapter: str
+    """Adapter, by its choice."""
+    perception: str
+    """Perception, by its choice."""
+    carry_over: bool
+    """Whether earlier goals' trials serve later ones."""
+    sequences: int
+    """Number of afternoons."""
+    goals: int = 8
+    """Goals in each."""
+    rounds: int = 10
+    """Trials a goal at most."""
+    seed: int = GOAL_SEED
+    """Of the goals; what is decided is decided on others than the reported ones."""
+
+    @property
+    def label(self) -> str:
+        """What it is, for a progress line."""
+        carried = ", carried" if self.carry_over else ""
+        return f"{self.task}: sequences with {self.adapter}{carried}, {self.training.label}"
+
+    @property
+    def own_sources(self) -> tuple[str, ...]:
+        """Hashes of your own files behind what is tried; see `Unit`."""
+        own = (self.task, self.adapter, self.perception)
+        return super().own_sources + tuple(source_digest(choice) for choice in own)
+
+    def run(self, folder: Path) -> Mapping[str, Any]:
+        """Run them in lock step, and keep plain numbers, a row a sequence."""
+        task, learned = make_task(self.task), self.training.learned(folder)
+        goals = task.sample_goals(self.sequences * self.goals, np.random.default_rng(self.seed))
+        seed = self.seed + self.training.seed
+        with make_perception(self.perception, scene=task.scene, seed=seed) as perception:
+            results = run_sequences(
+                task,
+                learned.generator,
+                lambda: make_adapter(self.adapter),
+                perception,
+                learned.prior,
+                goals.reshape(self.sequences, self.goals, -1),
+                carry_over=self.carry_over,
+                rounds=self.rounds,
+                seed=seed,
+            )
+        trials = [trial for of_one in results for goal in of_one for trial in goal.trials]
+        return {
+            "solved_at": [[goal.solved_at or 0 for goal in of_one] for of_one in results],
+            "expected": [[trial.p_hit, trial.hit] for trial in trials if trial.p_hit is not None],
+        }

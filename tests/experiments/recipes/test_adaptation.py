@@ -1,0 +1,36 @@
+"""Afternoons in the mean, and what was said of P(hit)."""
+
+import json
+
+import numpy as np
+import pytest
+
+from prior_reinforce.experiments.recipes import Run, Scale
+from prior_reinforce.experiments.recipes.adaptation import RECIPE, Adaptation, _reliability
+
+SMALL = Scale(goals=8, seeds=(0,), sets=("A",), rounds=2)
+
+
+def test_reliability_by_hand():
+    expected = np.array([[0.2, 0], [0.2, 0], [0.2, 1], [0.8, 1]], dtype=float)
+    found = _reliability(expected)
+    assert found["brier"] == pytest.approx((0.04 + 0.04 + 0.64 + 0.04) / 4)
+    assert found["base_rate"] == 0.25
+    assert [b["n"] for b in found["bins"]] == [3, 1]
+    assert found["bins"][0]["hit"] == pytest.approx(1 / 3)
+
+
+@pytest.mark.slow
+def test_one_afternoon_of_every_rule_gives_table_picture_and_remark(tmp_path):
+    measurement = Adaptation(tasks=("basketball-v3",), seed=3001)
+    figures = json.loads(json.dumps(measurement.run(Run(tmp_path, SMALL, include=("gp",)))))
+    table = RECIPE.table(figures)
+    assert table.rows[0][0] == "Bayesian, earlier goals too"
+    assert table.rows[-1][0] == "gp"  # the one that was included
+    assert table.rows[0][-1] == ""
+    frozen = figures["trials"]["no adapter"]["mean"]["value"]
+    assert figures["trials"]["Bayesian, earlier goals too"]["mean"]["value"] < frozen
+    (picture,) = RECIPE.draw(figures, tmp_path)
+    assert picture.path.is_file()
+    (remark,) = RECIPE.remarks(figures)
+    assert "Brier" in remark
