@@ -56,3 +56,14 @@ def test_a_jump_is_told_from_a_motion_and_from_noise():
     noise = np.random.default_rng(0).normal(0, 2e-5, 100)
     q = np.column_stack([0.08 * (t > 0.5), np.sin(3 * t), noise])
     assert is_step(q, ("m", "rad", "rad")).tolist() == [True, False, False]
+
+
+def test_coarse_noise_at_rest_is_no_speed():
+    """A milliradian at 50 Hz: two frames apart it looks like 0.07 rad/s."""
+    t = np.arange(150) / 50
+    s = np.clip(t - 1, 0, 1)
+    swing = 10 * s**3 - 15 * s**4 + 6 * s**5
+    noise = np.random.default_rng(0).normal(0, 1e-3, (30, 150))
+    starts, ends = moving_ends(t, (swing + noise).T, RAD * 30)
+    assert not starts.any()
+    assert not ends.any()
