@@ -54,6 +54,8 @@ RULES = (
 """The adapters compared, whether earlier goals' trials serve them, and what each is called."""
 _OURS = "Bayesian, earlier goals too"
 _GOALS = 8
+_DASHES = ("-", "--", ":", "-.", (0, (6, 1, 1, 1, 1, 1)))
+"""Of the rivals' lines, all in one grey."""
 _BINS = (0.0, 0.1, 0.3, 0.45, 0.6, 0.75, 0.9, 1.0)
 """Of the reliability table."""
 
@@ -193,22 +195,22 @@ def draw(figures: Figures, folder: Path) -> list[Picture]:
             left.plot([mean.value], [place], "o", color=colour)
             curve = figures["by_place"][name]
             if name == _OURS or min(curve) < 2 * min(figures["by_place"][_OURS]):
-                label = name if name in (_OURS, "GP, m = 2, each goal alone") else None
-                line = 2.5 if name == _OURS else 1.0
-                goals = range(1, len(curve) + 1)
-                right.plot(goals, curve, color=colour, linewidth=line, label=label)
+                style = {"linewidth": 2.5} if name == _OURS else {"linestyle": _DASHES[place % 5]}
+                right.plot(range(1, _GOALS + 1), curve, color=colour, label=name, **style)
         left.set_yticks(range(len(shown)), list(shown))
         left.invert_yaxis()
         left.set_xscale("log")
         left.set_xticks([1.5, 2, 3, 5, 10], ["1.5", "2", "3", "5", "10"])
         left.minorticks_off()
         left.set_xlabel("trials a goal, goals 2 to 8, mean of the tasks")
+        right.set_xticks(range(1, _GOALS + 1))
+        right.legend(frameon=False, fontsize=7.5, labelcolor=INK_SOFT)
         right.set_xlabel("goal of the afternoon")
         right.set_ylabel("trials")
     caption = (
         "Left: mean trials a goal on goals 2 to 8 of an afternoon, by eye, in the mean of the "
         "tasks, with 95 % intervals over trainings and goals. Right: the mean by place of the "
-        f"goal; thick: {_OURS}, thin: the other rules that come near it."
+        "goal, for the rules that come within twice our best."
     )
     return [Picture(save(figure, folder / "adaptation.png"), caption)]
 
