@@ -38,8 +38,10 @@ def test_csv_with_a_column_of_episodes_and_text_beside(tmp_path):
     assert [r.episode for r in recordings] == ["b9", "b10"]
     np.testing.assert_array_equal(recordings[0].positions[:, 0], -np.arange(5))
     np.testing.assert_array_equal(recordings[1].positions[:, 1], np.arange(5) + 3)
-    assert recordings[0].remarks == ("phase left out, which holds no number",)
-    assert read_recordings(tmp_path / "log.csv")[0].names == ("joint2", "joint1")
+    assert recordings[0].remarks == ()
+    every = read_recordings(tmp_path / "log.csv")[0]
+    assert every.names == ("joint2", "joint1")
+    assert every.remarks == ("phase left out, which holds no number",)
     text = (tmp_path / "log.csv").read_text().replace("-3", "three")
     (tmp_path / "log.csv").write_text(text)
     with pytest.raises(FileFormatError, match="line 10: joint1 is 'three', expected a number"):

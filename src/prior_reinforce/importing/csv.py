@@ -125,13 +125,13 @@ def _episode(
     time, guessed = _time_column(table, options)
     clock = _clock(table, episode, time, options, None if log is None else log.time_unit)
     others = [i for i in range(len(table.names)) if i not in (time, episode_column)]
-    texts = [i for i in others if table.is_text(i)]
-    others = [i for i in others if i not in texts]
     channels, named = _channels(table, others, options, log)
     remarks: tuple[str, ...] = ()
     if log is not None:
         remarks = (f"{log.name}: time in {log.time_unit}, motion is {log.key} (measured)",)
+    texts = [i for i in channels if table.is_text(i)] if channels == others else []
     if texts:
+        channels = [i for i in channels if i not in texts]
         left_out = say_names([table.names[i] for i in texts])
         remarks = (*remarks, f"{left_out} left out, which holds no number")
     positions = np.column_stack([table.numbers(i) for i in channels] or [np.zeros((0, 0))])

@@ -280,12 +280,12 @@ def _are_units(cells: list[str], decimal: str) -> bool:
 
 def _is_padding(name: str, column: Sequence[Any]) -> bool:
     """Whether a column is what a trailing delimiter leaves, or the running count of pandas."""
-    texts = [_as_text(cell) for cell in column]
-    if name.startswith("column "):
-        return not any(texts)
+    numbered = name.startswith("column ")
     unnamed = not name or name.startswith("Unnamed:") or name == "index"
-    counts = [str(i) for i in range(len(texts))]
-    return unnamed and (not any(texts) or texts == counts)
+    if not (numbered or unnamed):
+        return False
+    texts = [_as_text(cell) for cell in column]
+    return not any(texts) or (unnamed and texts == [str(i) for i in range(len(texts))])
 
 
 def _is_date(cell: Any) -> bool:
