@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 # Pictures are drawn without a display (EGL); without OpenGL the report says so in one line.
 export MUJOCO_GL ?= egl
 
-.PHONY: demo install test check reproduce docs clean
+.PHONY: demo install test attack check reproduce docs clean
 
 demo: $(VENV)/.core
 	$(BIN)/prior-reinforce demo --out runs/demo $(ARGS)
@@ -17,6 +17,13 @@ install: $(VENV)/.core
 # Two processes share the tests; who is done early takes over from the other.
 test: $(VENV)/.all
 	$(BIN)/python -m pytest -n 2 --dist worksteal $(ARGS)
+
+# CASES generated attacks with a table by class, a sixth as many on the way to the arm, a tenth kills.
+CASES ?= 3000
+attack: $(VENV)/.all
+	$(BIN)/python -m tests.attacks.table $(CASES)
+	$(BIN)/python -m tests.attacks.execution $$(($(CASES) / 6))
+	$(BIN)/python -m tests.attacks.kills $$(($(CASES) / 10))
 
 check: $(VENV)/.all
 	$(BIN)/ruff format --check .

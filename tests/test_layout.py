@@ -21,6 +21,8 @@ TESTED_ELSEWHERE = {
 """Modules without a test file of their own, and where they are tested instead."""
 
 OF_THE_WHOLE = {
+    "attacks/attacks": "generated attacks by class, and on the way to the arm",
+    "attacks/kills": "kill -9 at random moments of every command that writes",
     "dependencies": "floors of libraries, and calls that would run code from data",
     "documentation": "what the docs show, run as it stands",
     "examples": "the examples as a reader runs them",

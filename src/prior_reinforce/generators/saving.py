@@ -94,6 +94,9 @@ def _read_config(path: Path) -> dict[str, Any]:
         if content["file_format"] != _FILE_FORMAT or content["version"] != _FILE_VERSION:
             raise ValueError(f"it says {content['file_format']!r} {content['version']!r}")
         digest = content.pop("config_sha256")
+        for name, kind in (("generator", str), ("settings", dict), ("tensors_sha256", str)):
+            if not isinstance(content[name], kind):
+                raise TypeError(f"{name} is {content[name]!r:.40}")
     except (ValueError, KeyError, TypeError, RecursionError) as error:
         raise FileFormatError(
             f"{path} is not the {CONFIG_FILE} of a saved generator (version {_FILE_VERSION}): "

@@ -157,7 +157,8 @@ class Journal:
     def _named_errors(self) -> Iterator[None]:
         try:
             yield
-        except sqlite3.Error as error:
+        # A damaged file has texts that are none, also in the errors themselves.
+        except (sqlite3.Error, UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
             text = str(error)
             remedy = "restore it from a copy"
             if "locked" in text or "busy" in text:

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
 from prior_reinforce.arrays import Frames
 from prior_reinforce.errors import WorkspaceError
 from prior_reinforce.plans.motions import Plan, PlanFormat
@@ -17,6 +19,61 @@ from prior_reinforce.workspace.journal import JOURNAL_FILE, Journal
 from prior_reinforce.workspace.store import Store
 
 _KINDS = KINDS | {"demonstrations_imported", "model_trained"}
+
+
+class _Imported(msgspec.Struct):
+    n: int
+    sha256: str
+
+
+class _Trained(msgspec.Struct):
+    model: str
+    demonstrations_sha256: str
+    fitted_to_sha256: str = ""
+    generator: str = ""
+    remarks: list[str] = []
+
+
+class _Asked(msgspec.Struct):
+    trial: int
+    goal: int
+    condition: list[float]
+    plan_file: str
+    plan_sha256: str
+    model: str = ""
+
+
+class _GoalSet(msgspec.Struct):
+    goal: list[float]
+    tolerance: float
+    adapter: str = ""
+
+
+class _Executing(msgspec.Struct):
+    trial: int
+    command: str
+    folder: str = ""
+
+
+class _Ended(msgspec.Struct):
+    trial: int
+    outcome: str = ""
+    reason: str = ""
+    start_error: float | None = None
+    tracking_rms: float | None = None
+
+
+_SHAPES: Mapping[str, Any] = {
+    "goal_set": _GoalSet,
+    "executing": _Executing,
+    "executed": _Ended,
+    "not_executed": _Ended,
+    "voided": _Ended,
+    "demonstrations_imported": _Imported,
+    "model_trained": _Trained,
+    "asked": _Asked,
+}
+"""What is read of events here; the others are the session's (`trials.py`)."""
 
 
 @dataclass(frozen=True)
@@ -51,6 +108,7 @@ class WorkspaceLog:
             WorkspaceError: The journal cannot be used.
         """
         self._folder, self._store, self._format = folder, store, format
+        self._checked = 0
         path = folder / JOURNAL_FILE
         # A new workspace's journal is empty until the first import has ended.
         if not path.exists() or path.stat().st_size == 0:
@@ -76,12 +134,20 @@ class WorkspaceLog:
             WorkspaceError: The journal is damaged, or a newer version wrote it.
         """
         events = self.journal.events()
-        for event in events:
+        for event in events[self._checked :]:
             if event.kind not in _KINDS:
                 raise WorkspaceError(
                     f"event {event.id} is a {event.kind!r}, which this version does not know; use "
                     "the version that wrote it, or restore the journal from a copy"
                 )
+            try:
+                msgspec.convert(event.data, _SHAPES.get(event.kind, dict))
+            except msgspec.ValidationError as error:
+                raise WorkspaceError(
+                    f"event {event.id} ({event.kind}) does not say what it should ({error}); "
+                    "restore the journal from a copy"
+                ) from error
+            self._checked += 1
         return events
 
     def exclusive(self) -> AbstractContextManager[None]:

@@ -33,7 +33,7 @@ from prior_reinforce.errors import (
     PriorReinforceError,
     WorkspaceError,
 )
-from prior_reinforce.files import inside, named_disk_errors
+from prior_reinforce.files import inside, named_disk_errors, sweep, write
 from prior_reinforce.plans.files import PlanFile
 from prior_reinforce.plans.motions import Demonstrations, Plan
 from prior_reinforce.registry import parse_choice
@@ -99,10 +99,11 @@ class Workspace:
         folder = Path(folder)
         parse_manifest(manifest, folder / MANIFEST_FILE)
         with named_disk_errors(folder):
+            sweep(folder)
             if folder.is_file() or (folder.is_dir() and any(folder.iterdir())):
                 raise WorkspaceError(f"{folder} exists and is not empty; choose a new folder")
             folder.mkdir(parents=True, exist_ok=True)
-            (folder / MANIFEST_FILE).write_text(manifest, encoding="utf-8")
+            write(folder / MANIFEST_FILE, manifest)
         return cls(folder)
 
     def close(self) -> None:

@@ -1,0 +1,259 @@
+"""The attacks, by class: each tries one thing in an empty folder, and says whether it held."""
+
+from __future__ import annotations
+
+import json
+import random
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from prior_reinforce.files import sha256, sha256_of_folder
+from prior_reinforce.generators import load_generator
+from prior_reinforce.perception.vlm_formats import FORMATS, read_box
+from prior_reinforce.workspace.workspace import Workspace
+from tests.attacks.harness import HELD, NASTY, call, command, damage
+from tests.importing import recorded
+from tests.workspace.planar import manifest
+
+Attack = Callable[[random.Random, Path, Path], str]
+"""Of a source of chance, an empty folder, and a workspace with one open trial to copy from."""
+
+
+def flags(rng: random.Random, here: Path, asked: Path) -> str:
+    """Any command of a workspace with any words behind it."""
+    shutil.copytree(asked, here / "planar")
+    words = {
+        "goal": ["--memory", "--adapter", "--tolerance", "0.9", "0.05"],
+        "ask": [
+            "--out",
+            "--rate",
+            "--check",
+            "--where",
+            "--time-limit",
+            "--generator",
+            "--adapter",
+        ],
+        "tell": ["--error", "--outcome", "--hit", "--miss"],
+        "amend": ["--error", "--outcome", "--hit", "--miss"],
+        "void": ["--reason"],
+        "status": [],
+        "log": [],
+        "export": ["plan.csv", "plan.npz", "plan.json", "--rate"],
+        "import": [
+            "--outcomes",
+            "--format",
+            "--key",
+            "--rate",
+            "--episodes",
+            "--joints",
+            "--units",
+        ],
+        "new": ["--name", "--action-names", "--dt", "--outcome-names", "--tolerance", "--robot"],
+        "calibrate": ["--height", "--outcome-height", "--camera", "--out"],
+    }
+    name = rng.choice(list(words))
+    args = [] if name in ("new", "calibrate") else ["planar"]
+    args += [rng.choice(words[name] + NASTY) for _ in range(rng.randrange(6))]
+    args = [arg for arg in args if arg not in ("/", "//", "/dev/null")]  # we may be root
+    return command(here, name, *args)
+
+
+_VALUES = [
+    *map(json.dumps, [[], [0], ["a", "a"], {}, True, -1, 0, 1e308, "", "x" * 1000]),
+    *("[[1]]", "9" * 400, "nan", "inf", "1979-05-27", "{a=1}", '"\\u001b[2J"', '"$\\\\frac$"'),
+]
+
+
+def manifests(rng: random.Random, here: Path, asked: Path) -> str:
+    """A manifest that somebody edited."""
+    shutil.copytree(asked, here / "planar")
+    seven = {"names": str([f"joint{i}" for i in range(1, 8)]), "units": str(["rad"] * 7)}
+    text = manifest(robot=rng.choice(["panda", "fr3"]), **seven)
+    if rng.random() < 0.7:
+        text = (here / "planar" / "workspace.toml").read_text()
+    lines = [line.removeprefix("# ") if " = " in line else line for line in text.splitlines()]
+    if rng.random() < 0.5:
+        lines = text.splitlines()
+    for _ in range(rng.randrange(1, 4)):
+        at = rng.randrange(len(lines))
+        key = lines[at].split("=")[0]
+        value = rng.choice(_VALUES)
+        lines[at] = rng.choice([f"{key} = {value}", "", f"[{value}]", lines[at] + value])
+    content = "\n".join(lines)
+    if rng.random() < 0.2:
+        (here / "planar" / "workspace.toml").write_bytes(damage(rng, content.encode()))
+    else:
+        (here / "planar" / "workspace.toml").write_text(content, encoding="utf-8")
+    return command(here, rng.choice(["status", "ask", "log", "report"]), "planar")
+
+
+def recordings(rng: random.Random, here: Path, asked: Path) -> str:
+    """Recordings of any format that were damaged or crafted."""
+    shutil.copytree(asked.parent / "learned", here / "planar")
+    source = here / "source"
+    source.mkdir()
+    write = rng.choice(
+        [
+            recorded.write_npz,
+            recorded.write_csv,
+            recorded.write_robomimic,
+            recorded.write_zarr,
+            recorded.write_lerobot,
+        ]
+    )
+    path = write(source)
+    recorded.write_outcomes(source)
+    files = sorted(file for file in source.rglob("*") if file.is_file())
+    for _ in range(rng.randrange(1, 3)):
+        file = rng.choice(files)
+        if file.suffix == ".npz" and rng.random() < 0.5:
+            np.savez(file, **_crafted(rng))
+        elif file.suffix in (".json", "") and rng.random() < 0.5:
+            _edit_json(rng, file)
+        else:
+            file.write_bytes(damage(rng, file.read_bytes()))
+    more = ["--joints", "joint1", "joint2", "--rate", "100"] if rng.random() < 0.8 else []
+    return command(here, "import", "planar", str(path), *more)
+
+
+def _crafted(rng: random.Random) -> dict[str, Any]:
+    arrays: list[Any] = [
+        np.zeros((3, 2)),
+        np.array([[np.nan, 1.0]] * 4),
+        np.full((4, 2), 1e305),
+        np.array([[{}, 1]] * 3, dtype=object),
+        np.array(["a", "b"]),
+        np.zeros((0, 2)),
+        np.zeros((2, 2, 2, 2)),
+        np.array(5),
+        np.arange(8.0).reshape(4, 2) * 1j,
+        np.linspace(0, 1, 40)[:, None] * [1.0, 2.0],
+    ]
+    names = ("q", "t", "dt", "rate", "joint_names", "outcome", "metadata", "plans")
+    return {name: rng.choice(arrays) for name in rng.sample(names, rng.randrange(1, 5))}
+
+
+def _edit_json(rng: random.Random, file: Path) -> None:
+    try:
+        content = json.loads(file.read_text())
+    except ValueError:
+        return
+    _edit(rng, content)
+    file.write_text(json.dumps(content))
+
+
+def _edit(rng: random.Random, content: Any) -> None:
+    """Change one value somewhere in JSON."""
+    values = [None, [], {}, "", -1, 0, 1e308, 10**30, "x", [1, 2], True, [[[]]], {"a": {}}]
+    while isinstance(content, (dict, list)) and content:
+        key = rng.choice(list(content) if isinstance(content, dict) else range(len(content)))
+        if rng.random() < 0.5 or not isinstance(content[key], (dict, list)):
+            if rng.random() < 0.2:
+                del content[key]
+            else:
+                content[key] = rng.choice(values)
+            return
+        content = content[key]
+
+
+def models(rng: random.Random, here: Path, asked: Path) -> str:
+    """A model's folder that was damaged, or crafted with hashes that fit."""
+    from safetensors.numpy import load, save
+
+    source = next((asked / "models").iterdir())
+    folder = here / "model"
+    shutil.copytree(source, folder)
+    config, weights = folder / "config.json", folder / "model.safetensors"
+    content = json.loads(config.read_text())
+    how = rng.randrange(3)
+    if how == 0:
+        file = rng.choice([config, weights])
+        file.write_bytes(damage(rng, file.read_bytes()))
+        if rng.random() < 0.5:
+            return call(lambda: load_generator(folder))
+        content["tensors_sha256"] = sha256(weights.read_bytes())
+    elif how == 1:
+        _edit(rng, content)
+    else:
+        tensors = dict(load(weights.read_bytes()))
+        name = rng.choice(list(tensors))
+        tensors[name] = rng.choice(
+            [
+                np.zeros(0),
+                np.zeros((3, 3, 3)),
+                tensors[name] * np.nan,
+                tensors[name][:1],
+                tensors[name].astype(np.int8),
+            ]
+        )
+        if rng.random() < 0.3:
+            del tensors[name]
+        weights.write_bytes(save({key: np.ascontiguousarray(v) for key, v in tensors.items()}))
+        content["tensors_sha256"] = sha256(weights.read_bytes())
+    if isinstance(content, dict):
+        content.pop("config_sha256", None)
+        digest = sha256(json.dumps(content, sort_keys=True).encode())
+        config.write_text(json.dumps(content | {"config_sha256": digest}))
+
+    def use() -> None:
+        plans = load_generator(folder).generate(np.array([[0.9, 0.05]]))
+        assert plans.ndim == 3
+
+    verdict = call(use)
+    if verdict != HELD:
+        return verdict
+    # The same as a workspace's model: it is not the one that was learned.
+    shutil.copytree(asked, here / "planar")
+    if sha256_of_folder(folder)[:16] != source.name:
+        shutil.rmtree(here / "planar" / "models" / source.name)
+        shutil.copytree(folder, here / "planar" / "models" / source.name)
+        with Workspace(here / "planar") as workspace:
+            workspace.session().void(1, "")
+        verdict = command(here, "ask", "planar")
+    return verdict
+
+
+def replies(rng: random.Random, here: Path, asked: Path) -> str:
+    """What a model may say of where an object is."""
+    pieces = ["[", "]", "(", ")", ",", " ", "1000", "0", "-1", "1e3", "0.5", "<|begin_of_box|>"]
+    pieces += ["<|end_of_box|>", "<think>", "</think>", "{", "}", '"bbox_2d"', "x", "\n", "9" * 50]
+    count = rng.choice([5, 20, 2_000, 100_000])
+    text = (
+        "".join(rng.choices(pieces, k=count)) if rng.random() < 0.8 else rng.choice(pieces) * count
+    )
+    family = FORMATS[rng.choice(list(FORMATS))]
+    return call(lambda: read_box(text, family, (640, 480)))
+
+
+def journals(rng: random.Random, here: Path, asked: Path) -> str:
+    """A journal that was damaged, or holds well-formed events that cannot be."""
+    folder = here / "planar"
+    shutil.copytree(asked, folder)
+    journal = folder / "journal.sqlite"
+    if rng.random() < 0.4:
+        journal.write_bytes(damage(rng, journal.read_bytes()))
+    else:
+        kinds = ["goal_set", "asked", "executing", "executed", "not_executed", "told", "amended"]
+        kinds += ["voided", "demonstrations_imported", "model_trained", "unknown"]
+        with Workspace(folder) as workspace:
+            whole = [(event.kind, dict(event.data)) for event in workspace.events]
+            kind, data = rng.choice(whole)
+            data = json.loads(json.dumps(data))
+            if rng.random() < 0.5:
+                data |= {"trial": rng.choice([0, 1, 2, -1, "1", None, 1.5]), "hit": True}
+                data |= {"error_seen": rng.choice([[0.1, 0.2], [], "x", [1e308, 0], None])}
+            _edit(rng, data)
+            with workspace.log.exclusive():
+                workspace.log.append(rng.choice([kind, rng.choice(kinds)]), data)
+    name = rng.choice(["status", "ask", "log", "report", "tell", "void", "export"])
+    more = {"tell": ["1", "--hit"], "void": ["1"], "export": ["1", "plan.csv"]}.get(name, [])
+    return command(here, name, "planar", *more)
+
+
+CLASSES: dict[str, Attack] = {
+    attack.__name__: attack for attack in (flags, manifests, recordings, models, replies, journals)
+}

@@ -1,0 +1,151 @@
+"""What every attack is held against: one line, no traceback, no hang, nothing changed by a refusal.
+
+An attack is a function of a `random` source; the same seed makes the same attack.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import io
+import os
+import random
+import signal
+import time
+import traceback
+import unicodedata
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from prior_reinforce.cli import main
+from prior_reinforce.errors import PriorReinforceError
+
+LIMIT_S = 30.0
+"""For one attack; nothing here takes a second on a quiet machine."""
+HELD = "held"
+
+NASTY = [
+    *("", " ", "nan", "inf", "-inf", "-1", "0", "1e308", "1e309", "9" * 400, "-0.0", "1_000"),
+    *("\x1b[2J", "a\nb", "a\rb", "\x00", "\u202e", "\ufeff", "ü", "球", "\udcff", "$\\frac$"),
+    *("../x", "..", ".", "/", "//", "~", "a/b/c", "x" * 300, "a/" * 3000, "planar", "-", "--"),
+    *("'", '"', "{", "}", "{plan}", "{trial}", "%s", "%n", "[red]", "<b>", "&", ";", "|", "$(x)"),
+    *("None", "True", "[]", "{}", "null", "0.9", "0.05", "hit", "5cm long", "1", "2", "3"),
+]
+
+
+class HangError(BaseException):
+    """An attack took longer than its limit."""
+
+
+@contextlib.contextmanager
+def limited(seconds: float = LIMIT_S) -> Iterator[None]:
+    """End what takes too long, from the main thread."""
+
+    def expire(*_: object) -> None:
+        raise HangError
+
+    before = signal.signal(signal.SIGALRM, expire)
+    signal.setitimer(signal.ITIMER_REAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
+
+
+def tree(folder: Path) -> dict[str, str]:
+    """Every file of a folder by its content."""
+    found = {}
+    for path in sorted(folder.rglob("*")):
+        if path.is_file():
+            found[str(path.relative_to(folder))] = hashlib.sha256(path.read_bytes()).hexdigest()
+    return found
+
+
+def command(folder: Path, *args: str) -> str:
+    """Call a command in a folder; `held`, or how it broke."""
+    before, here = tree(folder), Path.cwd()
+    out, err = io.StringIO(), io.StringIO()
+    os.chdir(folder)
+    try:
+        with limited(), contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+            status = main(list(args))
+    except HangError:
+        return "hang"
+    except SystemExit as end:
+        status = end.code or 0
+    except BaseException as error:
+        return _broken(error)
+    finally:
+        os.chdir(here)
+    refusal = [line for line in err.getvalue().split("\n") if "warning: " not in line and line]
+    if status not in (0, 1, 2):
+        return f"status {status}"
+    if status == 2 and len(refusal) != 1:
+        return f"{len(refusal)} lines"
+    if status == 2 and tree(folder) != before:
+        return "changed by a refusal"
+    said = out.getvalue() + err.getvalue()
+    if any(unicodedata.category(c) in ("Cc", "Cs") and c not in "\n" for c in said):
+        return "control characters"
+    if "allow_pickle" in said:
+        return "advice to load unsafely"
+    return HELD
+
+
+def call(function: Callable[[], object]) -> str:
+    """Call something of the library; `held` if it returns, or refuses in one line."""
+    try:
+        with limited():
+            function()
+    except HangError:
+        return "hang"
+    except PriorReinforceError as error:
+        return HELD if "allow_pickle" not in str(error) else "advice to load unsafely"
+    except BaseException as error:
+        return _broken(error)
+    return HELD
+
+
+def _broken(error: BaseException) -> str:
+    # The tests' own check of shapes, which refuses a crafted array before numpy does.
+    if type(error).__name__ == "TypeCheckError":
+        return HELD
+    return f"traceback: {type(error).__name__}: {where(error)}"
+
+
+def where(error: BaseException) -> str:
+    """The last place in our own code."""
+    frames = traceback.extract_tb(error.__traceback__)
+    ours = [frame for frame in frames if "prior_reinforce" in frame.filename] or frames
+    return f"{Path(ours[-1].filename).name}:{ours[-1].lineno} {str(error)[:80]!r}"
+
+
+def damage(rng: random.Random, content: bytes) -> bytes:
+    """The bytes of a file after something happened to it."""
+    data = bytearray(content)
+    how = rng.randrange(6)
+    at = rng.randrange(len(data) + 1)
+    if how == 0:
+        del data[at:]
+    elif how == 1 and data:
+        data[at % len(data)] ^= 1 << rng.randrange(8)
+    elif how == 2:
+        data[at:at] = rng.randbytes(rng.randrange(1, 50))
+    elif how == 3:
+        data[at : at + rng.randrange(1, 200)] = b""
+    elif how == 4:
+        data[at : at + 8] = rng.choice([b"\x00", b"\xff"]) * 8
+    else:
+        data = bytearray(rng.randbytes(rng.randrange(100)))
+    return bytes(data)
+
+
+def wait_until(what: Callable[[], object], seconds: float = 20.0) -> bool:
+    """Whether something comes true within a time."""
+    deadline = time.monotonic() + seconds
+    while not what():
+        if time.monotonic() > deadline:
+            return False
+        time.sleep(0.01)
+    return True
