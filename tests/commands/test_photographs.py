@@ -64,6 +64,26 @@ def test_calibrate_replaces_only_what_it_wrote(tmp_path, run):
         assert run("calibrate", points, "--out", tmp_path / "table.json")[0] == 0
 
 
+@pytest.mark.parametrize(
+    ("scale", "flags", "says"),
+    [
+        (100, (), "looks like centimetres"),
+        (1, ("--height", "nan"), "--height must be metres"),
+        (1, ("--height", "10"), "--height must be metres"),
+        (1, ("--outcome-height", "inf", "--camera", "0", "0", "2"), "--outcome-height must be"),
+    ],
+)
+def test_calibrate_takes_no_nonsense(tmp_path, run, scale, flags, says):
+    points = tmp_path / "points.csv"
+    corners = [(0, 0, 0, 0), (1, 0, 0, 9), (0, 1, 9, 0), (1, 1, 9, 9)]
+    rows = "\n".join(f"{x * scale},{y * scale},{u},{v}" for x, y, u, v in corners)
+    points.write_text(f"x,y,u,v\n{rows}\n")
+    status, _, err = run("calibrate", points, "--out", tmp_path / "table.json", *flags)
+    assert status == 2
+    assert says in err
+    assert not (tmp_path / "table.json").exists()
+
+
 @pytest.mark.slow
 def test_a_photograph_tells_the_error(table, capsys):
     folder, camera, truth = table
