@@ -52,9 +52,12 @@ def test_what_was_typed_is_kept_answer_by_answer(run, folder, tmp_path, monkeypa
             workspace.demonstrations.outcomes_seen, demonstrations().outcomes_seen
         )
     recordings(tmp_path / "others", outcomes=[])
-    typing(monkeypatch, [])
+    typed = (tmp_path / "planar" / "outcomes.csv").read_text()
+    typing(monkeypatch, ["0.7 0"])
     _, out, _ = run("import", folder, "others")
     assert "4 episodes have no outcome" in out  # of another source nothing is known
+    assert (tmp_path / "planar" / "outcomes.csv").read_text() == typed
+    assert "0.7" in (tmp_path / "planar" / "outcomes-2.csv").read_text()
 
 
 def test_an_answer_may_be_taken_back_and_an_episode_skipped(run, folder, tmp_path, monkeypatch):

@@ -10,6 +10,7 @@ import csv
 import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import count
 from pathlib import Path
 
 from prior_reinforce.errors import (
@@ -70,7 +71,7 @@ def ask_for_outcomes(
     missing = [r.episode for r in recordings if r.episode not in outcomes]
     if not missing:
         return None
-    table = folder / OUTCOMES_FILE
+    table = _table_of(folder, source)
     before = _typed_before(table, source, manifest)
     again = [episode for episode in missing if episode in before]
     outcomes |= {episode: before[episode] for episode in again}
@@ -95,14 +96,27 @@ def ask_for_outcomes(
             skipped.discard(episode)
             outcomes[episode] = answer
             print(f"  {say_place(answer, manifest.outcome_names, manifest.outcome_units)}")
-        _keep(folder, source, outcomes, manifest)
+        _keep(table, source, outcomes, manifest)
         number += 1
-    _keep(folder, source, outcomes, manifest)
+    _keep(table, source, outcomes, manifest)
     return Answers(table, tuple(episode for episode in missing if episode in skipped))
 
 
+def _table_of(folder: Path, source: Path) -> Path:
+    """Where what is typed of a source is kept: a table of its own, since another's stays."""
+    for number in count(1):
+        table = folder / (OUTCOMES_FILE if number == 1 else f"outcomes-{number}.csv")
+        if not table.is_file():
+            return table
+        with table.open(newline="", encoding="utf-8", errors="replace") as file:
+            sources = {row.get(_SOURCE) for row in csv.DictReader(file)}
+        if sources == {str(source.resolve())}:
+            return table
+    raise AssertionError("numbers do not end")
+
+
 def _keep(
-    folder: Path, source: Path, outcomes: Mapping[str, tuple[float, ...]], manifest: Manifest
+    table: Path, source: Path, outcomes: Mapping[str, tuple[float, ...]], manifest: Manifest
 ) -> None:
     """Write all that is known of a source to the table in the workspace."""
     text = io.StringIO()
@@ -110,8 +124,8 @@ def _keep(
     writer.writerow(["episode", *headed(manifest.outcome_names, manifest.outcome_units), _SOURCE])
     for episode, values in outcomes.items():
         writer.writerow([episode, *map(repr, values), source.resolve()])
-    with named_disk_errors(folder):
-        write(folder / OUTCOMES_FILE, text.getvalue())
+    with named_disk_errors(table.parent):
+        write(table, text.getvalue())
 
 
 def _typed_before(table: Path, source: Path, manifest: Manifest) -> dict[str, tuple[float, ...]]:
