@@ -45,7 +45,7 @@ RULES = (
     ("gp", True, "GP, m = 2, earlier goals too"),
     ("gp-all", True, "GP, no forgetting, earlier goals too"),
     ("gp", False, "GP, m = 2, each goal alone"),
-    ("offset", True, "mean offset, earlier goals too"),
+    ("offset", False, "mean offset, each goal alone"),
     ("proportional", False, "proportional, 0.8"),
     ("proportional,gain=0.6", False, "proportional, 0.6"),
     ("broyden", False, "Broyden, 0.8"),
