@@ -24,9 +24,11 @@ from .experiments.statistics import bootstrap_difference as bootstrap_difference
 from .experiments.statistics import bootstrap_mean as bootstrap_mean
 from .generators import load_generator as load_generator
 from .generators import make_generator as make_generator
+from .generators.auto import Auto as Auto
 from .generators.base import FitProgress as FitProgress
 from .generators.base import Generator as Generator
 from .generators.config import UNetSize as UNetSize
+from .generators.corrected import Corrected as Corrected
 from .generators.diffusion import DiffusionConfig as DiffusionConfig
 from .generators.diffusion import DiffusionGenerator as DiffusionGenerator
 from .generators.dmp import DynamicMovementPrimitives as DynamicMovementPrimitives

@@ -8,9 +8,11 @@ import pytest
 
 from prior_reinforce.errors import ConfigurationError, FileFormatError
 from prior_reinforce.generators import GENERATORS, load_generator, make_generator
+from prior_reinforce.generators.auto import Auto
 from prior_reinforce.generators.diffusion import DiffusionConfig
 from prior_reinforce.generators.interpolation import NearestNeighbours
 from prior_reinforce.generators.timed import Timed
+from prior_reinforce.generators.wrapping import Wrapper
 
 
 class Own(NearestNeighbours):
@@ -31,12 +33,13 @@ def test_a_name_is_that_of_its_class(name):
 @pytest.mark.parametrize(
     ("choice", "timing"),
     [
-        ("diffusion", "start"),
-        ("regression", "start"),
+        ("diffusion", "auto"),
+        ("regression", "auto"),
+        ("auto", None),
         ("diffusion-paper", None),
         ("dmp", None),
         ("nearest", None),
-        ("interpolation", None),
+        ("interpolation", "auto"),
         ("diffusion,timing=none", None),
         ("regression,timing=align", "align"),
         ("nearest,timing=start,neighbours=2", "start"),
@@ -46,25 +49,28 @@ def test_a_name_is_that_of_its_class(name):
 def test_timing_of_a_choice(choice, timing):
     generator = make_generator(choice)
     assert (generator.timing if isinstance(generator, Timed) else None) == timing
-    inner = generator.generator if isinstance(generator, Timed) else generator
+    inner = generator
+    while isinstance(inner, Wrapper) and not isinstance(inner, Auto):
+        inner = inner.generator
     assert GENERATORS.name_of(generator) == GENERATORS.name_of(inner)
     if "neighbours" in choice:
         assert inner.config.neighbours == 2
 
 
 def test_settings_of_a_choice():
-    config = make_generator("diffusion,training_steps=7,sampler=ddim,timing=none").config
+    config = make_generator("diffusion,training_steps=7,sampler=ddim,timing=none,exact=no").config
     assert config == DiffusionConfig(training_steps=7, sampler="ddim")
-    assert make_generator("dmp,segmented=false").config.segmented is False
+    assert make_generator("dmp,segmented=false,exact=no").config.segmented is False
     assert make_generator("diffusion-paper").config == DiffusionConfig.preset("paper")
-    assert make_generator("regression", threads=2, device="cpu").generator._threads == 2
+    assert make_generator("regression", threads=2, device="cpu").generator.generator._threads == 2
 
 
 @pytest.mark.parametrize(
     ("choice", "named"),
     [
-        ("difusion", "known are diffusion, diffusion-paper"),
+        ("difusion", "known are auto, diffusion, diffusion-paper"),
         ("nearest,timing=late", "late"),
+        ("nearest,exact=perhaps", "exact must be yes or no"),
         ("nearest,speed=3", "speed"),
         ("diffusion,training_steps=0", "training_steps"),
         ("prior_reinforce.tasks:make_task", "must derive from"),

@@ -31,7 +31,7 @@ def test_inverse_distance_survives_great_powers_and_tiny_distances():
     np.testing.assert_allclose(weights, np.eye(6), atol=1e-12)
 
 
-@pytest.mark.parametrize("kernel", ["linear", "thin-plate"])
+@pytest.mark.parametrize("kernel", ["linear", "thin-plate", "cubic"])
 def test_smooth_weights_interpolate_as_scipy_does(kernel: str):
     """SciPy's RBFInterpolator of the same kernel and tail, on outcomes scaled the same way."""
     values = np.random.default_rng(2).normal(size=(6, 3))
@@ -39,19 +39,28 @@ def test_smooth_weights_interpolate_as_scipy_does(kernel: str):
     theirs = RBFInterpolator(
         OUTCOMES / scale,
         values,
-        kernel={"linear": "linear", "thin-plate": "thin_plate_spline"}[kernel],
+        kernel={"thin-plate": "thin_plate_spline"}.get(kernel, kernel),
         degree=1,
     )
     ours = smooth_weights(CONDITIONS, OUTCOMES, kernel=kernel) @ values
     np.testing.assert_allclose(ours, theirs(CONDITIONS / scale), atol=1e-9)
 
 
-@pytest.mark.parametrize("kernel", ["linear", "thin-plate"])
+@pytest.mark.parametrize("kernel", ["linear", "thin-plate", "cubic"])
 def test_smooth_weights_reproduce_an_affine_dependence_everywhere(kernel: str):
     slope = np.array([[0.4, -1.0], [2.0, 0.3]])
     weights = smooth_weights(CONDITIONS, OUTCOMES, kernel=kernel)
     np.testing.assert_allclose(weights @ (OUTCOMES @ slope + 3), CONDITIONS @ slope + 3, atol=1e-10)
     np.testing.assert_allclose(weights.sum(axis=1), 1, atol=1e-12)
+
+
+def test_an_uncertain_outcome_counts_for_less_at_its_place_and_what_is_affine_stays():
+    noise = np.zeros_like(OUTCOMES)
+    noise[2] = 0.2 * np.ptp(OUTCOMES, axis=0)
+    weights = smooth_weights(OUTCOMES, OUTCOMES, noise=noise)
+    assert weights[2, 2] < 0.9
+    np.testing.assert_allclose(np.delete(weights, 2, 0), np.delete(np.eye(6), 2, 0), atol=1e-9)
+    np.testing.assert_allclose(weights @ OUTCOMES, OUTCOMES, atol=1e-9)
 
 
 def test_two_demonstrations_of_two_components_are_joined_without_an_affine_tail():

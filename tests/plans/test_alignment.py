@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
+from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.plans.alignment import AlignmentConfig, align
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 
@@ -91,7 +91,7 @@ def test_constant_plans_are_left_as_they_are():
     plans = np.stack([np.full((140, 2), value) for value in (0.1, -0.3, 1.5)])
     alignment = align(demonstrations(plans))
     np.testing.assert_array_equal(alignment.shifts, 0)
-    np.testing.assert_array_equal(alignment.demonstrations.plans, plans)
+    np.testing.assert_allclose(alignment.demonstrations.plans, plans, atol=1e-12)
 
 
 def test_a_constant_plan_among_moving_ones_does_not_disturb_them():
@@ -99,7 +99,7 @@ def test_a_constant_plan_among_moving_ones_does_not_disturb_them():
     plans = np.concatenate([before.plans, np.full((1, 140, 4), 0.4)])
     alignment = align(demonstrations(plans))
     assert np.abs(errors_in_frames(alignment.shifts[:6])).max() < 1e-3
-    np.testing.assert_array_equal(alignment.demonstrations.plans[6], plans[6])
+    np.testing.assert_allclose(alignment.demonstrations.plans[6], plans[6], atol=1e-12)
 
 
 def test_the_horizon_grows_rather_than_cut_a_motion_off():
@@ -127,11 +127,16 @@ def test_a_step_like_channel_does_not_overshoot():
     assert gripper.max() <= 1
 
 
-def test_a_demonstration_that_ends_in_mid_swing_is_refused():
-    plans = misaligned().plans.copy()
-    plans[4, :, 0] += np.where(FRAMES > 120, (FRAMES - 120) * DT, 0)
-    with pytest.raises(InvalidDemonstrationsError, match="demonstration 4 still moves at its last"):
-        align(demonstrations(plans))
+def test_a_demonstration_that_ends_in_mid_swing_goes_on():
+    """Moved earlier, it shows frames that nobody recorded: they keep its velocity."""
+    plans = misaligned().plans[:, :100]
+    aligned = align(demonstrations(plans))
+    assert np.abs(errors_in_frames(aligned.shifts)).max() < 1.5
+    earliest = int(np.argmin(aligned.shifts))
+    steps = np.diff(aligned.demonstrations.plans[earliest, :, 0])
+    recorded = np.diff(plans[earliest, :, 0])
+    if recorded[-1] > 1e-3:
+        assert steps[-2] == pytest.approx(recorded[-4:].mean(), rel=0.3)
 
 
 @pytest.mark.parametrize("smoothing", [-0.01, float("nan")])

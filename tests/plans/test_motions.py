@@ -57,10 +57,22 @@ def test_the_same_numbers_that_mean_something_else_are_other_demonstrations(chan
     assert replace(demos).sha256 == demos.sha256
 
 
+def test_some_demonstrations_keep_their_outcomes_and_noise():
+    demos = make()
+    noisy = replace(demos, outcome_noise=0.01 + 0 * demos.outcomes_seen)
+    some = noisy.only((2, 0))
+    np.testing.assert_array_equal(some.plans, demos.plans[[2, 0]])
+    np.testing.assert_array_equal(some.outcomes_seen, demos.outcomes_seen[[2, 0]])
+    assert some.outcome_noise.shape == some.outcomes_seen.shape
+    assert noisy.sha256 != demos.sha256
+    with pytest.raises(InvalidDemonstrationsError, match="outcome_noise"):
+        replace(demos, outcome_noise=-noisy.outcome_noise)
+
+
 def test_saving_twice_gives_the_same_arrays_and_no_pickle(tmp_path):
     make().save(tmp_path / "demos.npz")
     with np.load(tmp_path / "demos.npz", allow_pickle=False) as archive:
-        assert set(archive.files) == {"plans", "outcomes_seen", "metadata"}
+        assert set(archive.files) == {"plans", "outcomes_seen", "outcome_noise", "metadata"}
         assert json.loads(str(archive["metadata"]))["format"]["dt"] == 0.01
 
 

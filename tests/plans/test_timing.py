@@ -5,9 +5,7 @@ import pytest
 
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 from prior_reinforce.plans.timing import (
-    CannotShiftError,
-    check_ends_rest,
-    cut_out,
+    Continued,
     ends_in_motion,
     frames_at_rest,
     middle,
@@ -16,7 +14,6 @@ from prior_reinforce.plans.timing import (
     onset,
     recorded_speeds,
     resting_dimensions,
-    shift,
     speeds,
     still_bands,
     velocity_profiles,
@@ -76,13 +73,6 @@ def test_a_motion_at_the_ends_of_its_recording_keeps_them():
     np.testing.assert_array_equal(motion_span(np.zeros(30)), [0, 29])
 
 
-def test_only_a_frame_that_is_to_be_held_has_to_rest():
-    moving_at_its_end = np.array([[0.0, 1.0, 0.5], [0.05, 1.0, 0.0]])
-    check_ends_rest(moving_at_its_end, np.array([[True, False], [True, True]]))
-    with pytest.raises(CannotShiftError, match=r"demonstration 0 .* last frame, with 50%"):
-        check_ends_rest(moving_at_its_end, np.array([[False, True], [False, False]]))
-
-
 def test_dimensions_rest_each_on_its_own():
     plans = np.zeros((2, 5, 2))
     plans[0, :, 0] = [0, 0, 1, 2, 3]
@@ -110,31 +100,18 @@ def test_moving_rows_of_a_motion_that_returns():
     assert moving_rows(np.zeros((4, 1)), np.array([0.01])) is None
 
 
-def test_whole_frames_are_shifted_without_a_change_and_ends_held():
-    plans = np.random.default_rng(0).normal(size=(2, 5, 1))
-    later = shift(plans, np.array([2, -1]), 7, before=1)
-    np.testing.assert_array_equal(later[0, :, 0], plans[0, [0, 0, 0, 0, 1, 2, 3], 0])
-    np.testing.assert_array_equal(later[1, :, 0], plans[1, [0, 1, 2, 3, 4, 4, 4], 0])
-
-
-def test_parts_of_frames_are_interpolated():
-    line = np.arange(6.0)[None, :, None]
-    half = shift(line, np.array([0.5]), 6)[0, :, 0]
-    np.testing.assert_allclose(half, [0, 0.5, 1.5, 2.5, 3.5, 4.5])
-
-
-def test_a_cut_holds_every_motion_and_shifting_it_back_loses_nothing():
+def test_a_plan_holds_where_it_rests_and_goes_on_where_it_moves():
     demos = demonstrations()
-    cut = cut_out(demos, STARTS - 23)
-    motions = cut.motions(demos.plans)
-    assert motions.shape == (4, cut.length, 3)
-    np.testing.assert_allclose(shift(motions, cut.begins, 90), demos.plans, atol=1e-15)
-    assert cut.before == 4
-    np.testing.assert_array_equal(cut.begins, STARTS - cut.before)
+    continued = Continued(demos.plans[:, :45], demos.format.units, speeds(demos)[:, :45])
+    at_rest, moving = continued(3, np.array([-9.0, 0.0])), continued(1, np.array([44.0, 46.0]))
+    np.testing.assert_allclose(at_rest[0], at_rest[1], atol=1e-12)
+    velocity = (demos.plans[1, 44] - demos.plans[1, 41]) / 3
+    np.testing.assert_allclose(moving[1], demos.plans[1, 44] + 2 * velocity, atol=1e-12)
 
 
-def test_what_trembles_is_held_and_what_moves_is_not():
-    cut = cut_out(demonstrations(tremor=0.006), STARTS - 23)
-    np.testing.assert_allclose(cut.begins, STARTS - cut.before, atol=3)
-    with pytest.raises(CannotShiftError, match=r"would change it by .* of the largest range"):
-        cut_out(demonstrations(tremor=0.02), STARTS - 23)
+def test_whole_frames_are_as_recorded_and_parts_between():
+    demos = demonstrations()
+    continued = Continued(demos.plans, demos.format.units, speeds(demos))
+    np.testing.assert_allclose(continued(0, np.arange(90.0)), demos.plans[0], atol=1e-12)
+    (half,) = continued(0, np.array([20.5]))
+    assert demos.plans[0, 20, 0] < half[0] < demos.plans[0, 21, 0]

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, cast
 
-from prior_reinforce.errors import FileFormatError
+from prior_reinforce.errors import ConfigurationError, FileFormatError
+from prior_reinforce.generators.auto import Auto as Auto
 from prior_reinforce.generators.base import FitProgress as FitProgress
 from prior_reinforce.generators.base import Generator as Generator
 from prior_reinforce.generators.config import UNetSize as UNetSize
+from prior_reinforce.generators.corrected import Corrected as Corrected
 from prior_reinforce.generators.diffusion import PAPER
 from prior_reinforce.generators.diffusion import DiffusionConfig as DiffusionConfig
 from prior_reinforce.generators.diffusion import DiffusionGenerator as DiffusionGenerator
@@ -19,29 +21,34 @@ from prior_reinforce.generators.interpolation import NearestNeighbours as Neares
 from prior_reinforce.generators.interpolation import SmoothInterpolation as SmoothInterpolation
 from prior_reinforce.generators.regression import UNetRegression as UNetRegression
 from prior_reinforce.generators.regression import UNetRegressionConfig as UNetRegressionConfig
-from prior_reinforce.generators.saving import read_model
+from prior_reinforce.generators.saving import SavedModel, read_model
 from prior_reinforce.generators.timed import Timed as Timed
 from prior_reinforce.generators.timed import Timing
+from prior_reinforce.generators.wrapping import Wrapper
 from prior_reinforce.registry import Member, Registry, parse_choice
 
 _HERE = "prior_reinforce.generators"
 
 
 class GeneratorRegistry(Registry[Generator]):
-    """All generators; each can be chosen with `timing`, which wraps it in `Timed`."""
+    """All generators; each can be chosen with `timing` and `exact`, which wrap it."""
 
-    def __init__(self, members: Mapping[str, Member], timing: Mapping[str, Timing]) -> None:
-        """Name the members, and the `timing` of those that are timed by default."""
+    def __init__(
+        self, members: Mapping[str, Member], timing: Mapping[str, Timing], exact: Sequence[str]
+    ) -> None:
+        """Name the members, the `timing` of those that have one by default, and which are exact."""
         super().__init__("generator", f"{_HERE}.base:Generator", members)
-        self._timing = timing
+        self._timing, self._exact = timing, exact
 
     @property
     def help(self) -> str:
         """The choices in one sentence, for help texts."""
         return (
-            f"{super().help}; each also with timing=start (learn when a motion starts apart from "
-            "the motion), timing=align (align the demonstrations first) or timing=none; default: "
-            f"start for {' and '.join(self._timing)}, none for the others"
+            f"{super().help}; each also with timing=start, tempo or warp (learn when and how fast "
+            "a motion runs apart from its shape), timing=auto (what the demonstrations ask for), "
+            "timing=align (align the demonstrations first) or timing=none, and with exact=yes "
+            "(demonstrations come back as recorded) or exact=no; default: timing=auto for "
+            f"{' and '.join(self._timing)}, exact=yes for {' and '.join(self._exact)}"
         )
 
     def make(self, choice: str, **context: Any) -> Generator:
@@ -50,20 +57,33 @@ class GeneratorRegistry(Registry[Generator]):
         Args:
             choice: `name` or `module:Class`, with settings if need be: `nearest,timing=align`.
             context: `device` and `threads`, for those that take them.
+
+        Raises:
+            ConfigurationError: Also where `exact` is neither yes nor no.
         """
         name, settings = parse_choice(choice)
         timing = settings.pop("timing", self._timing.get(name, "none"))
+        exact = settings.pop("exact", "yes" if name in self._exact else "no")
+        if exact not in ("yes", "no"):
+            raise ConfigurationError(f"exact must be yes or no, got {exact!r}")
         plain = ",".join([name, *(f"{key}={value}" for key, value in settings.items())])
         generator = super().make(plain, **context)
+        if exact == "yes":
+            generator = Corrected(generator)
         return generator if timing == "none" else Timed(generator, cast(Timing, timing))
 
     def name_of(self, made: Generator) -> str:
-        """Return the name of a generator's class, timed or not; `module:Class` for one's own."""
-        return super().name_of(made.generator if isinstance(made, Timed) else made)
+        """Return the name of a generator's class, wrapped or not; `module:Class` for one's own."""
+        while isinstance(made, Wrapper) and not isinstance(made, Auto):
+            made = made.generator
+        return super().name_of(made)
 
 
 GENERATORS = GeneratorRegistry(
     {
+        "auto": Member(
+            f"{_HERE}.auto:Auto", "what the demonstrations ask for: closed form, or diffusion"
+        ),
         "diffusion": Member(
             f"{_HERE}.diffusion:DiffusionGenerator", "the paper's method, sized for a laptop"
         ),
@@ -79,7 +99,8 @@ GENERATORS = GeneratorRegistry(
             f"{_HERE}.interpolation:SmoothInterpolation", "all demonstrations, mixed by a spline"
         ),
     },
-    timing={"diffusion": "start", "regression": "start"},
+    timing={"diffusion": "auto", "regression": "auto", "interpolation": "auto"},
+    exact=("diffusion", "regression", "dmp"),
 )
 make_generator = GENERATORS.make
 
@@ -99,11 +120,18 @@ def load_generator(
         FileFormatError: Files are missing, damaged, or of a generator that is not known here.
         ConfigurationError: The device is not there, or the generator does not run on it.
     """
-    saved = read_model(Path(folder))
-    if saved.generator == Timed.name:
-        inner = class_named(Timed.wrapped(saved), own)
-        return Timed.unpack(saved, kind=inner).to(device)
-    return class_named(saved.generator, own).unpack(saved).to(device)
+    return _rebuilt(read_model(Path(folder)), own).to(device)
+
+
+_WRAPPERS: dict[str, type[Wrapper]] = {kind.name: kind for kind in (Auto, Timed, Corrected)}
+
+
+def _rebuilt(saved: SavedModel, own: str | None) -> Generator:
+    """The generator that was saved, with all that is wrapped around it."""
+    wrapper = _WRAPPERS.get(saved.generator)
+    if wrapper is None:
+        return class_named(saved.generator, own).unpack(saved)
+    return wrapper.unpack(saved, generator=_rebuilt(wrapper.wrapped(saved), own))
 
 
 def class_named(name: str, own: str | None = None) -> type[Generator]:

@@ -55,8 +55,9 @@ class NearestNeighboursConfig(Checked):
 class SmoothInterpolationConfig(Checked):
     """How plans are interpolated; docs/baselines.md tells what was tried."""
 
-    kernel: Kernel = "thin-plate"
-    """Radial function: of least bending (`thin-plate`), or of distance itself (`linear`)."""
+    kernel: Kernel = "cubic"
+    """Radial function: the cube of distance, of least bending (`thin-plate`), or distance itself
+    (`linear`)."""
 
 
 class _Mixture(Generator):
@@ -65,6 +66,7 @@ class _Mixture(Generator):
     config_type: ClassVar[type[Any]]
     _plans: Plans
     _outcomes: Points
+    _noise: Points
 
     def __init__(self, config: Any = None) -> None:
         """Choose settings; the defaults when None."""
@@ -78,6 +80,7 @@ class _Mixture(Generator):
         """Keep the demonstrations; nothing is random and nothing takes time."""
         self._plans = demonstrations.plans.copy()
         self._outcomes = demonstrations.outcomes_seen.copy()
+        self._noise = demonstrations.outcome_noise.copy()
         at_once(progress, loss=0.0)
 
     def _generate(self, conditions: Points) -> Plans:
@@ -85,7 +88,11 @@ class _Mixture(Generator):
 
     def state(self) -> tuple[dict[str, Any], Tensors]:
         """The demonstrations; see `Generator.state`."""
-        return {"config": asdict(self.config)}, {"plans": self._plans, "outcomes": self._outcomes}
+        return {"config": asdict(self.config)}, {
+            "plans": self._plans,
+            "outcomes": self._outcomes,
+            "noise": self._noise,
+        }
 
     @classmethod
     def from_state(cls, settings: Mapping[str, Any], tensors: Tensors) -> Self:
@@ -94,7 +101,7 @@ class _Mixture(Generator):
         plans, outcomes = tensors["plans"], tensors["outcomes"]
         if plans.ndim != 3 or outcomes.ndim != 2 or len(plans) != len(outcomes):
             raise ValueError(f"plans {plans.shape} and outcomes {outcomes.shape} do not fit")
-        generator._plans, generator._outcomes = plans, outcomes
+        generator._plans, generator._outcomes, generator._noise = plans, outcomes, tensors["noise"]
         return generator
 
 
@@ -123,5 +130,7 @@ class SmoothInterpolation(_Mixture):
     config: SmoothInterpolationConfig
 
     def _weights(self, conditions: Points) -> Float[np.ndarray, "n N"]:
-        """Weigh all plans; at a demonstration's outcome its own alone, to rounding."""
-        return smooth_weights(conditions, self._outcomes, kernel=self.config.kernel)
+        """Weigh all plans; at an outcome that was measured its own alone, to rounding."""
+        return smooth_weights(
+            conditions, self._outcomes, kernel=self.config.kernel, noise=self._noise
+        )

@@ -93,6 +93,7 @@ class NetworkGenerator(Generator):
         plan_format, outcomes = demonstrations.format, demonstrations.outcomes_seen
         codec = PlanCodec.fit(
             demonstrations.plans,
+            units=plan_format.units,
             per_plan=[name in plan_format.per_plan for name in plan_format.names],
             representation=self.config.representation,
             frames_per_point=self.config.frames_per_point,

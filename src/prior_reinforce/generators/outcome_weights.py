@@ -16,8 +16,14 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
-Kernel = Literal["thin-plate", "linear"]
-"""Of `smooth_weights`."""
+Kernel = Literal["cubic", "thin-plate", "linear"]
+"""Of `smooth_weights`: the radial function is d^3, d^2 log d, or d."""
+_MEASURED = 0.01
+"""Noise below this part of the demonstrated range is none: the outcome was measured. Ours: 3 mm of
+30 cm, several times what a camera or a tape is off by."""
+_SMOOTHING = 100.0
+"""Smoothing of an outcome whose noise is the demonstrated range. Ours, see
+docs/decisions-generator.md."""
 
 
 def inverse_distance_weights(
@@ -65,7 +71,11 @@ def inverse_distance_weights(
 
 
 def smooth_weights(
-    conditions: Float[np.ndarray, "n k"], outcomes: Float[np.ndarray, "N k"], *, kernel: Kernel
+    conditions: Float[np.ndarray, "n k"],
+    outcomes: Float[np.ndarray, "N k"],
+    *,
+    kernel: Kernel = "cubic",
+    noise: Float[np.ndarray, "N k"] | None = None,
 ) -> Float[np.ndarray, "n N"]:
     r"""Return the cardinal weights of a polyharmonic spline with an affine tail.
 
@@ -77,9 +87,11 @@ def smooth_weights(
 
     Args:
         conditions: c.
-        outcomes: r. With N <= k the tail is constant, and the kernel linear, because the other one
-            needs an affine tail to be solvable.
-        kernel: :math:`\varphi(d)` is d^2 log d (`thin-plate`) or d (`linear`).
+        outcomes: r. With N <= k the tail is constant, and the kernel linear, because the others
+            need an affine tail to be solvable.
+        kernel: Which :math:`\varphi`.
+        noise: Standard deviation of each outcome. What is uncertain is smoothed: its weight at its
+            own outcome is below one.
 
     Source: Wendland, "Scattered Data Approximation", 2005, chapter 8 (ours to use it here).
     """
@@ -88,10 +100,18 @@ def smooth_weights(
     n, k = outcomes.shape
     affine = n > k
     scale = np.ptp(outcomes, axis=0)
+    spread = np.zeros(n)
+    if noise is not None:
+        relative = np.where(noise > _MEASURED * scale, noise / scale, 0.0)
+        spread = _SMOOTHING * np.mean(relative**2, axis=1)
     spline = RBFInterpolator(
         outcomes / scale,
         np.eye(n),  # one value a demonstration: what is interpolated are the weights themselves
-        kernel="thin_plate_spline" if affine and kernel == "thin-plate" else "linear",
+        kernel=_SCIPY[kernel] if affine else "linear",
         degree=1 if affine else 0,
+        smoothing=spread,
     )
     return np.asarray(spline(conditions / scale)).reshape(len(conditions), n)
+
+
+_SCIPY = {"cubic": "cubic", "thin-plate": "thin_plate_spline", "linear": "linear"}

@@ -247,7 +247,8 @@ def appended(before: Demonstrations, more: Demonstrations) -> Demonstrations:
         for d in (before, more)
     ]
     outcomes = np.concatenate([before.outcomes_seen, more.outcomes_seen])
-    return replace(more, plans=np.concatenate(plans), outcomes_seen=outcomes)
+    noise = np.concatenate([before.outcome_noise, more.outcome_noise])
+    return replace(more, plans=np.concatenate(plans), outcomes_seen=outcomes, outcome_noise=noise)
 
 
 def outcome_places(source: str | os.PathLike[str], format: str | None = None) -> list[Path]:

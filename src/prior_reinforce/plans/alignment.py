@@ -2,8 +2,8 @@
 
 The paper aligns by hand ("Timeline Aligned Variants", Fig. "Timeline Alignment"); here the shifts
 come from the motions themselves. A demonstration is only moved, never stretched: its speed decides
-where the object goes. What a shift uncovers is filled by holding the first or the last frame, so
-both ends must rest.
+where the object goes. What a shift uncovers is held where the demonstration rests, and goes on with
+its velocity where it does not (`timing.Continued`).
 
 Notation:
     A_i  plan of demonstration i               (H, D)  unit of its format
@@ -15,19 +15,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Annotated
 
-import msgspec
 import numpy as np
 from jaxtyping import Complex, Float
 
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.plans.timing import (
-    LARGEST_END_SPEED,
     SMOOTHING,
-    check_ends_rest,
+    Continued,
     frames_at_rest,
-    shift,
     velocity_profiles,
 )
 from prior_reinforce.settings import Checked, NonNegative
@@ -48,9 +44,6 @@ class AlignmentConfig(Checked):
     smoothing: NonNegative = SMOOTHING
     """Standard deviation of the Gaussian that smooths velocities before they are compared, in [s].
     The plans stay unsmoothed."""
-    largest_end_speed: Annotated[float, msgspec.Meta(gt=0, le=1)] = LARGEST_END_SPEED
-    """A demonstration whose first or last frame moves faster than this part of its peak speed does
-    not rest there and is refused, in [-]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,23 +67,19 @@ def align(demonstrations: Demonstrations, config: AlignmentConfig | None = None)
     zero, or the nearest to it that cuts no motion off.
 
     Args:
-        demonstrations: N plans, each at rest at both ends.
+        demonstrations: N plans.
         config: Settings; the defaults if None.
 
     Returns:
         Aligned demonstrations, and the shifts.
-
-    Raises:
-        CannotShiftError: A demonstration that has to be moved does not rest at the end that would
-            be held; an InvalidDemonstrationsError.
 
     Source: ours; the paper aligns by hand.
     """
     config = config or AlignmentConfig()
     plans, dt = demonstrations.plans, demonstrations.format.dt
     units = demonstrations.format.units
-    profiles = _unit_energy(velocity_profiles(plans, units, config.smoothing / dt))
-    lags = _common_lags(profiles)
+    profiles = velocity_profiles(plans, units, config.smoothing / dt)
+    lags = correlation_lags(profiles)
     speeds = np.linalg.norm(profiles, axis=2)
     rest = np.array([frames_at_rest(speed) for speed in speeds])  # (N, 2) start, end
     # Moving earlier than the rest at the start, or later than that at the end, cuts motion off.
@@ -100,9 +89,9 @@ def align(demonstrations: Demonstrations, config: AlignmentConfig | None = None)
     before = math.ceil(max(0.0, float(np.max(-rest[:, 0] - lags)) - _CONVERGED))
     after = math.ceil(max(0.0, float(np.max(lags - rest[:, 1])) - _CONVERGED))
     lags[np.abs(lags) < _CONVERGED] = 0.0
-    held = np.stack([lags + before > 0, lags - after < 0], axis=1)
-    check_ends_rest(speeds, held, config.largest_end_speed)
-    aligned = shift(plans, lags, before + demonstrations.horizon + after, before)
+    clock = np.arange(-before, demonstrations.horizon + after, dtype=float)
+    continued = Continued(plans, units, speeds)
+    aligned = np.stack([continued(i, clock - lag) for i, lag in enumerate(lags)])
     return Alignment(demonstrations.with_plans(aligned), lags * dt)
 
 
@@ -111,8 +100,16 @@ def _unit_energy(profiles: Float[np.ndarray, "N H D"]) -> Float[np.ndarray, "N H
     return np.asarray(profiles / np.where(energy > 0, energy, 1.0))
 
 
-def _common_lags(profiles: Float[np.ndarray, "N H D"]) -> Float[np.ndarray, " N"]:
-    """Lags [frames], mean zero, that maximise the sum of all pairwise correlations."""
+def correlation_lags(profiles: Float[np.ndarray, "N H D"]) -> Float[np.ndarray, " N"]:
+    """Find the lags that maximise the sum of all pairwise correlations.
+
+    Args:
+        profiles: Smoothed velocities; each demonstration's count alike.
+
+    Returns:
+        How many frames later each is to be moved, mean zero.
+    """
+    profiles = _unit_energy(profiles)
     n, horizon, _ = profiles.shape
     spectra = np.fft.rfft(profiles, n=2 * horizon, axis=1)  # padded: a lag never wraps around
     frequencies = 2 * np.pi * np.fft.rfftfreq(2 * horizon)  # [rad/frame]

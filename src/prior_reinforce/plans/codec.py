@@ -1,10 +1,11 @@
 """Plans as the network sees them: codes of a few numbers a dimension, scaled to [-1, 1].
 
-A smooth dimension is coded by the control points of a cubic B-spline, about one for every four
-frames; one that a spline cannot follow (a gripper that opens, recorded jitter) by its frames,
-folded so that several consecutive frames share one position of the code. Which it is, is decided
-for each dimension when the codec is fitted, from the demonstrations alone. A dimension that is one
-number a plan is coded by that number at every position, and decoded by their mean.
+Each dimension has a code of its own, decided when the codec is fitted, from the demonstrations
+alone. A smooth one is coded by the control points of a cubic B-spline, about one for every four
+frames, or twice or three times as many where the motion is fast; one that no spline follows (a
+gripper that opens, recorded jitter) by its frames. Where there are more numbers than positions,
+several consecutive ones are folded into one position. A dimension that is one number a plan, or is
+held but for noise, is coded by that number at every position, and decoded by their mean.
 """
 
 from __future__ import annotations
@@ -12,13 +13,15 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any, Literal, cast
 
 import numpy as np
 from jaxtyping import Float
 from typing_extensions import Self
 
 from prior_reinforce.arrays import Plans
+from prior_reinforce.plans.channels import HELD, MOST_LEVELS, noise
+from prior_reinforce.plans.channels import kinds as kinds_of
 from prior_reinforce.plans.timing import resting_dimensions
 
 Representation = Literal["splines", "frames"]
@@ -37,8 +40,12 @@ _LARGEST_SPLINE_RESIDUAL = 2e-3
 
 Ours: minimum-jerk throws are missed by 1e-5 to 1e-4, a step by 3e-2 or more; 2e-3 of a swing of
 1.2 rad is 2.4 mrad, about what moves a landing point by its measuring noise."""
-_MOST_LEVELS = 4
-"""A dimension that is not smooth and takes no more values than these is a switch."""
+_SPLINE_FOLDS = (1, 2, 3)
+"""Control points for each position of the code: more where fewer do not follow the motion. Ours."""
+_NOISE_RESIDUAL = 3.0
+"""A spline may miss a dimension by so many standard deviations of its noise, rms. Ours."""
+_MOST_NOISE = 0.02
+"""But by no more than this part of its range: what is nothing but noise comes back too. Ours."""
 _TIED = 3
 """Equal control points at a resting end: velocity and acceleration vanish there."""
 _STIFFNESS = 0.3
@@ -48,7 +55,7 @@ acceleration by a third or less of what it did."""
 _CONSTANT = 1e-9
 """A dimension whose range is below this, relative to its values, is constant."""
 
-_SETTINGS = ("horizon", "length", "kinds", "rest_start", "rest_end", "levels")
+_SETTINGS = ("horizon", "length", "kinds", "folds", "rest_start", "rest_end", "levels")
 """What a codec is beside its two arrays."""
 
 
@@ -62,6 +69,8 @@ class PlanCodec:
     """T."""
     kinds: tuple[Kind, ...]
     """For each of the D dimensions, how it is coded."""
+    folds: tuple[int, ...]
+    """For each dimension, how many numbers share one position of the code."""
     rest_start: tuple[bool, ...]
     """For each dimension: every demonstration starts at rest."""
     rest_end: tuple[bool, ...]
@@ -79,6 +88,7 @@ class PlanCodec:
         cls,
         plans: Plans,
         *,
+        units: Sequence[str] | None = None,
         per_plan: Sequence[bool] | None = None,
         representation: Representation,
         frames_per_point: int,
@@ -89,6 +99,7 @@ class PlanCodec:
 
         Args:
             plans: Of the demonstrations.
+            units: Of the D dimensions; pure numbers by default.
             per_plan: Which of the D dimensions are one number a plan; none by default.
             representation: `splines` where they fit, or `frames` for every dimension.
             frames_per_point: Frames for each control point.
@@ -102,20 +113,40 @@ class PlanCodec:
         else:
             length = max(1, round(horizon / frames_per_point / length_multiple)) * length_multiple
         starts, ends = resting_dimensions(plans)
-        splines = representation == "splines" and _DEGREE < length < horizon
+        units = tuple(units or ("1",) * action_dim)
+        found, trembling = kinds_of(plans, units), noise(plans)
         kinds: list[Kind] = []
+        folds: list[int] = []
         for d in range(action_dim):
-            if per_plan is not None and per_plan[d]:
-                kinds.append("number")
-            else:
-                fits = splines and _is_smooth(plans[:, :, d], length, starts[d], ends[d])
-                kinds.append("spline" if fits else "frames")
+            values, kind, fold = plans[:, :, d], "frames", math.ceil(horizon / length)
+            if (per_plan is not None and per_plan[d]) or (
+                found[d] == "held" and representation == "splines"
+            ):
+                kind, fold = "number", 1
+            elif representation == "splines" and found[d] == "smooth":
+                largest = max(
+                    _LARGEST_SPLINE_RESIDUAL * float(np.ptp(values)),
+                    min(
+                        _NOISE_RESIDUAL * float(trembling[d]),
+                        _MOST_NOISE * float(np.ptp(values)),
+                    ),
+                    HELD if units[d] in ("rad", "m") else 0.0,
+                )
+                for more in _SPLINE_FOLDS:
+                    if _DEGREE < more * length < horizon and _fits(
+                        values, more * length, starts[d], ends[d], largest
+                    ):
+                        kind, fold = "spline", more
+                        break
+            kinds.append(cast(Kind, kind))
+            folds.append(fold)
         low, high = plans.min(axis=(0, 1)), plans.max(axis=(0, 1))
         slack = margin * (high - low)
         raw = cls(
             horizon=horizon,
             length=length,
             kinds=tuple(kinds),
+            folds=tuple(folds),
             rest_start=starts,
             rest_end=ends,
             levels=tuple(
@@ -150,22 +181,20 @@ class PlanCodec:
         raw = codes * half + centre
         plans = np.empty((len(codes), self.horizon, len(self.kinds)))
         channel = 0
-        for d, kind in enumerate(self.kinds):
+        for d, (kind, fold) in enumerate(zip(self.kinds, self.folds, strict=True)):
+            unfolded = raw[:, channel : channel + fold].transpose(0, 2, 1).reshape(len(codes), -1)
             if kind == "spline":
-                ends = _ends(self.length, self.rest_start[d], self.rest_end[d])
-                free = raw[:, channel] @ np.linalg.pinv(ends).T
+                ends = _ends(fold * self.length, self.rest_start[d], self.rest_end[d])
+                free = unfolded @ np.linalg.pinv(ends).T
                 plans[:, :, d] = free @ _synthesis(self.horizon, ends).T
-                channel += 1
             elif kind == "number":
                 number = codes[:, channel].mean(axis=1) * half[channel] + centre[channel]
                 plans[:, :, d] = number[:, None]
-                channel += 1
             else:
-                folded = raw[:, channel : channel + self._fold].transpose(0, 2, 1)
-                frames = folded.reshape(len(codes), -1)[:, : self.horizon]
+                frames = unfolded[:, : self.horizon].copy()
                 # Two equal frames are no velocity at that end.
-                plans[:, :, d] = _tie(frames.copy(), 2, self.rest_start[d], self.rest_end[d])
-                channel += self._fold
+                plans[:, :, d] = _tie(frames, 2, self.rest_start[d], self.rest_end[d])
+            channel += fold
             if self.levels[d]:
                 levels = np.array(self.levels[d])
                 nearest = np.abs(plans[:, :, d, None] - levels).argmin(axis=-1)
@@ -191,10 +220,6 @@ class PlanCodec:
         known = {name: _as_tuples(settings[name]) for name in _SETTINGS}
         return cls(**known, plan_range=plan_range, code_range=code_range)
 
-    @property
-    def _fold(self) -> int:
-        return math.ceil(self.horizon / self.length)
-
     def _scale(self) -> tuple[Float[np.ndarray, "C 1"], Float[np.ndarray, "C 1"]]:
         low, high = self.code_range
         half = (high - low) / 2
@@ -205,12 +230,14 @@ class PlanCodec:
     def _code(self, values: _Values, d: int) -> Float[np.ndarray, "n c T"]:
         """Unscaled code of one dimension; c = 1, or the fold."""
         if self.kinds[d] == "number":
-            return np.repeat(values[:, :1, None], self.length, axis=2)
+            return np.repeat(values.mean(axis=1)[:, None, None], self.length, axis=2)
+        fold = self.folds[d]
         if self.kinds[d] == "spline":
-            return _fit_spline(values, self.length, self.rest_start[d], self.rest_end[d])[:, None]
-        missing = self.length * self._fold - self.horizon
-        padded = np.pad(values, ((0, 0), (0, missing)), mode="edge")
-        return padded.reshape(len(values), self.length, self._fold).transpose(0, 2, 1)
+            flat = _fit_spline(values, fold * self.length, self.rest_start[d], self.rest_end[d])
+        else:
+            missing = self.length * fold - self.horizon
+            flat = np.pad(values, ((0, 0), (0, missing)), mode="edge")
+        return flat.reshape(len(values), self.length, fold).transpose(0, 2, 1)
 
 
 def _basis(horizon: int, n_points: int) -> _Matrix:
@@ -271,18 +298,19 @@ def _tie(values: _Values, n_tied: int, at_start: bool, at_end: bool) -> _Values:
     return values
 
 
-def _is_smooth(values: _Values, n_points: int, at_start: bool, at_end: bool) -> bool:
+def _fits(values: _Values, n_points: int, at_start: bool, at_end: bool, largest: float) -> bool:
+    """Whether a spline misses no plan by more than that, rms."""
     matrix = _synthesis(values.shape[1], _ends(n_points, at_start, at_end))
     residual = matrix @ np.linalg.lstsq(matrix, values.T, rcond=None)[0] - values.T
     rms = np.sqrt(np.mean(residual**2, axis=0)).max()
     constant = np.ptp(values) <= _CONSTANT * max(1.0, float(np.abs(values).max()))
-    return bool(constant or rms <= _LARGEST_SPLINE_RESIDUAL * np.ptp(values))
+    return bool(constant or rms <= largest)
 
 
 def _levels(values: _Values) -> tuple[float, ...]:
     """The values of a switch; empty where there are too many for one."""
     distinct = np.unique(values)
-    return tuple(distinct.tolist()) if distinct.size <= _MOST_LEVELS else ()
+    return tuple(distinct.tolist()) if distinct.size <= MOST_LEVELS else ()
 
 
 def _as_tuples(value: Any) -> Any:

@@ -17,7 +17,8 @@ import json
 import math
 import os
 import warnings
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -58,8 +59,8 @@ class PlanFormat:
         Raises:
             InvalidPlanError: No names, repeated names, or another number of units than of names.
         """
-        for field in ("names", "units", "per_plan"):
-            object.__setattr__(self, field, tuple(getattr(self, field)))
+        for name in ("names", "units", "per_plan"):
+            object.__setattr__(self, name, tuple(getattr(self, name)))
         if not self.names:
             raise InvalidPlanError("a plan format needs at least one action name, got none")
         if len(set(self.names)) != len(self.names):
@@ -121,6 +122,9 @@ class Demonstrations:
     """Names of the k components; `x`, `y`, `z` where none are given."""
     outcome_units: tuple[str, ...] = ()
     """Unit of each component; metres where none are given."""
+    outcome_noise: Points = field(default_factory=lambda: np.empty((0, 0)))
+    """How uncertain each outcome is, as a standard deviation, shape (N, k); zero where none is
+    given: measured. What is learned is exact at the demonstrations only where they are."""
 
     def __post_init__(self) -> None:
         """Copy and check everything; warn about units that look wrong.
@@ -153,6 +157,15 @@ class Demonstrations:
             raise InvalidDemonstrationsError(
                 f"outcomes have {k} components; got names {names} and units {units}"
             )
+        noise = np.array(self.outcome_noise, dtype=np.float64)
+        noise = noise if noise.size else np.zeros_like(outcomes)
+        if noise.shape != outcomes.shape or not np.all(np.isfinite(noise) & (noise >= 0)):
+            raise InvalidDemonstrationsError(
+                f"outcome_noise must be one number of at least 0 for each of the outcomes "
+                f"{outcomes.shape}, got shape {noise.shape}"
+            )
+        noise.flags.writeable = False
+        object.__setattr__(self, "outcome_noise", noise)
         object.__setattr__(self, "plans", plans)
         object.__setattr__(self, "outcomes_seen", outcomes)
         object.__setattr__(self, "outcome_names", names)
@@ -181,10 +194,11 @@ class Demonstrations:
 
     @property
     def sha256(self) -> str:
-        """Fingerprint of plans, outcomes and what they mean: names, units, tempo."""
+        """Fingerprint of plans, outcomes, their noise, and what they mean: names, units, tempo."""
         about = [asdict(self.format), self.outcome_names, self.outcome_units]
         digest = hashlib.sha256(json.dumps(about, sort_keys=True).encode())
-        for array in (self.plans, self.outcomes_seen):
+        noise = (self.outcome_noise,) if np.any(self.outcome_noise) else ()
+        for array in (self.plans, self.outcomes_seen, *noise):
             digest.update(str(array.shape).encode())
             digest.update(array.tobytes())
         return digest.hexdigest()
@@ -194,6 +208,20 @@ class Demonstrations:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             return replace(self, plans=plans, format=format or self.format)
+
+    def only(self, chosen: Sequence[int]) -> Self:
+        """Return some of the demonstrations.
+
+        Args:
+            chosen: Their numbers, from 0.
+        """
+        members = list(chosen)
+        return replace(
+            self,
+            plans=self.plans[members],
+            outcomes_seen=self.outcomes_seen[members],
+            outcome_noise=self.outcome_noise[members],
+        )
 
     def check_goal(self, goal: ArrayLike) -> Point:
         """Return the goal as a fresh float array, warning when it lies far outside the outcomes.
@@ -231,6 +259,7 @@ class Demonstrations:
         arrays: dict[str, Any] = {
             "plans": self.plans,
             "outcomes_seen": self.outcomes_seen,
+            "outcome_noise": self.outcome_noise,
             "metadata": np.array(json.dumps(metadata)),
         }
         with open(path, "wb") as file:
@@ -250,13 +279,14 @@ class Demonstrations:
         remedy = "it must be a demonstrations file; write one with Demonstrations.save"
         with open_npz(path, remedy) as archive:
             plans, outcomes = archive["plans"], archive["outcomes_seen"]
+            noise = archive["outcome_noise"] if "outcome_noise" in archive else np.empty((0, 0))
             metadata = json.loads(str(archive["metadata"]))
             if metadata["file_format"] != _FILE_FORMAT or metadata["version"] != _FILE_VERSION:
                 raise ValueError(f"written as {metadata['file_format']} {metadata['version']}")
             format_ = PlanFormat(**metadata["format"])
             names = tuple(metadata["outcome_names"])
             units = tuple(metadata["outcome_units"])
-        return cls(plans, outcomes, format_, names, units)
+        return cls(plans, outcomes, format_, names, units, noise)
 
     def _warn_about_units(self) -> None:
         metres = np.array([unit == "m" for unit in self.outcome_units])

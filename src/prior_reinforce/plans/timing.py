@@ -9,27 +9,23 @@ Three measures of rest, because there are three kinds of data:
 - *The distance from an end pose*, where a recording has any rate and no frames yet: `STILL_SHARE`,
   `STILL_FLOOR`.
 
-They differ because mistakes cost differently: a frame that is cut away or held as if it rested is
-lost (so a low threshold), an onset that is only compared is not.
+They differ because mistakes cost differently: a frame that is cut away is lost (so a low
+threshold), an onset that is only compared is not.
 
 Notation:
-    s   speed            (H,)    relative to the pooled rms of its unit [-]
-    b   begins           (N,)    frame at which a cut-out motion begins
-    L   cut-out length   frames
+    s   speed   (H,)   relative to the pooled rms of its unit [-]
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from contextlib import suppress
-from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Int, Shaped
+from jaxtyping import Float
 
 from prior_reinforce.arrays import Frames, Plans
-from prior_reinforce.errors import InvalidDemonstrationsError
+from prior_reinforce.plans.channels import kinds
 from prior_reinforce.plans.motions import Demonstrations
 
 SMOOTHING = 0.03
@@ -42,8 +38,8 @@ MOVING = 0.05
 tremor of the shipped tele-operated sets reaches 0.03, and their motions start within two frames of
 this crossing."""
 LARGEST_END_SPEED = 0.1
-"""A first or last frame that is faster, relative to the peak, is not at rest and cannot be held.
-Ours."""
+"""A first or last frame that is faster, relative to the peak, is not at rest: the motion goes on
+beyond it. Ours."""
 RESTING_STEP = 0.01
 """A dimension rests at an end of a plan if its step there is at most this part of its largest step.
 Ours: a plan is then generated at rest there too."""
@@ -61,32 +57,12 @@ _NO_MOTION = 1e-12
 _EDGE = 0.1
 """A motion's span includes the rest next to it for this part of its duration, so that nothing
 slower than `MOVING` is lost."""
-_PADDING = 4
-"""Resting frames kept at either end of a cut-out motion, if there are as many: about one control
-point, which a spline needs to come to rest."""
-_TREMOR_PADDING = 12
-"""The same where rest is told from speed: a motion's slow onset is then kept well inside."""
-_TREMOR_LOST = 0.01
-"""What holding may change of any demonstration, rms: this part of the largest range among the
-dimensions of that unit. Ours: the shipped tele-operated sets lose at most 0.008, and land within
-5 mm of where they did."""
+_JUMPS = ("step", "switch")
+_SLOPE_FRAMES = 3
+"""Steps at an end over which its velocity is averaged. Ours."""
 
 Speed = Float[np.ndarray, " H"]
 """How fast one plan moves at each frame, relative to the pooled rms of each unit."""
-
-
-class CannotShiftError(InvalidDemonstrationsError):
-    """Demonstrations cannot be moved in time."""
-
-    def __init__(self, reason: str, remedy: str = "") -> None:
-        """Say why.
-
-        Args:
-            reason: Which demonstration, and what of it, as a clause.
-            remedy: What follows, and what to do.
-        """
-        self.reason = reason
-        super().__init__(reason + remedy)
 
 
 # --- speed ---
@@ -181,33 +157,6 @@ def frames_at_rest(speed: Speed) -> tuple[int, int]:
     return int(moving[0]), len(speed) - 1 - int(moving[-1])
 
 
-def check_ends_rest(
-    speeds: Float[np.ndarray, "N H"],
-    held: Bool[np.ndarray, "N 2"],
-    largest: float = LARGEST_END_SPEED,
-) -> None:
-    """Refuse to hold a frame at which a demonstration is still moving.
-
-    Args:
-        speeds: Of each demonstration.
-        held: Whether its first, and its last, frame is to be held.
-        largest: Speed of a frame that may be held, relative to the demonstration's peak.
-
-    Raises:
-        CannotShiftError: One moves faster there.
-    """
-    for i, speed in enumerate(speeds):
-        for frame, name, is_held in ((0, "first", held[i, 0]), (-1, "last", held[i, 1])):
-            if is_held and speed[frame] > largest * speed.max():
-                raise CannotShiftError(
-                    f"demonstration {i} still moves at its {name} frame, with "
-                    f"{speed[frame] / speed.max():.0%} of its peak speed (at most {largest:.0%} "
-                    "counts as rest)",
-                    ", so that frame cannot be held while the rest moves in time; record from "
-                    "rest to rest, raise largest_end_speed, or do not align",
-                )
-
-
 # --- one dimension ---
 
 
@@ -263,130 +212,47 @@ def moving_rows(
     return int(left[0]), int(ahead[-1] if ahead.size else left[-1])
 
 
-# --- moving and holding ---
+# --- before a plan begins, and after it has ended ---
 
 
-def shift(
-    plans: Plans, later: Shaped[np.ndarray, " n"], length: int, before: int = 0
-) -> Float[np.ndarray, "n L D"]:
-    """Return plans that many frames later, their ends held.
+class Continued:
+    """Plans as functions of time, also outside the frames that were recorded.
 
-    Whole numbers of frames change no value; parts are interpolated by monotone cubics: second-order
-    accurate at extrema, fourth elsewhere, and a step (a gripper channel) does not overshoot.
-
-    Args:
-        plans: Plans.
-        later: Frames, of integer type where they are whole.
-        length: L, frames that are returned.
-        before: How many of these come before the plans' first frame.
+    Where a plan rests at an end it holds there; where it does not, it goes on with the velocity of
+    its last frames. Whole frames are recorded values; parts of frames are on a cubic spline, those
+    of a step between two frames on a line, so that it does not overshoot.
     """
-    horizon = plans.shape[1]
-    frames = np.clip(np.arange(-before, length - before) - later[:, None], 0, horizon - 1)
-    if np.issubdtype(later.dtype, np.integer):
-        return plans[np.arange(len(plans))[:, None], frames]
-    from scipy.interpolate import PchipInterpolator
 
-    clock = np.arange(horizon)
-    return np.stack(
-        [PchipInterpolator(clock, p, axis=0)(at) for p, at in zip(plans, frames, strict=True)]
-    )
+    def __init__(
+        self, plans: Plans, units: tuple[str, ...], speeds: Float[np.ndarray, "n H"]
+    ) -> None:
+        """Tell where each plan rests.
 
-
-@dataclass(frozen=True, eq=False)
-class Cut:
-    """Where motions are cut out of their resting ends, all of one length."""
-
-    begins: Int[np.ndarray, " N"]
-    """b, frame at which each demonstration's cut-out begins."""
-    length: int
-    """L; outside its cut-out a demonstration holds its ends."""
-    before: int
-    """Frames of it before the first motion begins."""
-    after: int
-    """Frames of it after the last motion has ended."""
-
-    def motions(self, plans: Plans) -> Float[np.ndarray, "n L D"]:
-        """Cut the motions out; they grow out of their first frame and die down to their last.
-
-        Where ends rest exactly nothing changes; tremor cut in mid-swing would jerk the arm.
+        Args:
+            plans: A, of the demonstrations.
+            units: Of the D dimensions.
+            speeds: How fast each moves at each frame.
         """
-        from scipy.special import betainc
+        from scipy.interpolate import make_interp_spline
 
-        motions = shift(plans, -self.begins, self.length)
-        frames = np.arange(self.length)
-        rise = betainc(3, 3, np.minimum(1.0, frames / max(1, self.before)))[:, None]
-        fall = betainc(3, 3, np.minimum(1.0, frames[::-1] / max(1, self.after)))[:, None]
-        first, last = motions[:, :1], motions[:, -1:]
-        settled = first + rise * (motions - first)
-        return np.asarray(last + fall * (settled - last))
+        horizon = plans.shape[1]
+        clock, n = np.arange(horizon, dtype=float), min(_SLOPE_FRAMES, horizon - 1)
+        self.plans = plans
+        self._splines = [make_interp_spline(clock, plan, k=min(3, horizon - 1)) for plan in plans]
+        self._steps = [d for d, kind in enumerate(kinds(plans, units)) if kind in _JUMPS]
+        moving = speeds[:, [0, -1]] > LARGEST_END_SPEED * speeds.max(axis=1, keepdims=True)
+        slopes = np.stack([plans[:, n] - plans[:, 0], plans[:, -1] - plans[:, -1 - n]]) / n
+        self._slopes = slopes * moving.T[:, :, None]
 
-
-def cut_out(demonstrations: Demonstrations, delays: Int[np.ndarray, " N"]) -> Cut:
-    """Find the shortest common cut-out that holds every motion.
-
-    Where hands tremble to the very ends no frame rests exactly; what is slow there is then held.
-
-    Args:
-        demonstrations: N of them.
-        delays: How many frames later than the others each one's motion comes.
-
-    Raises:
-        CannotShiftError: The longest motion with the latest start would not end within the plan, or
-            a demonstration moves where it would have to be held.
-    """
-    plans, horizon = demonstrations.plans, demonstrations.horizon
-    moving = [np.flatnonzero(np.any(plan[1:] != plan[:-1], axis=1)) for plan in plans]
-    with suppress(CannotShiftError):
-        return _window(moving, delays, horizon, _PADDING)
-    moving = [np.flatnonzero(speed > MOVING * speed.max()) for speed in speeds(demonstrations)]
-    cut = _window(moving, delays, horizon, _TREMOR_PADDING)
-    _check_tremor(cut, demonstrations)
-    return cut
-
-
-def _window(
-    moving: list[Int[np.ndarray, " _"]], delays: Int[np.ndarray, " N"], horizon: int, padding: int
-) -> Cut:
-    """The shortest common cut-out, if it fits into the plan at any demonstrated start.
-
-    A slower motion may be generated with a later start than any demonstrated pair of the two: the
-    cut-out has to lie within the plan at every start, so that no rest is ever cut off.
-    """
-    some = [i for i, frames in enumerate(moving) if frames.size]
-    firsts = {i: int(moving[i][0] - delays[i]) for i in some}
-    lasts = {i: int(moving[i][-1]) + 1 - int(delays[i]) for i in some}
-    first, last = min(firsts.values()), max(lasts.values())
-    before = min(padding, int(delays.min()) + first)
-    after = min(padding, horizon - 1 - int(delays.max()) - last)
-    if before < 0:
-        raise CannotShiftError(
-            f"demonstration {min(firsts, key=firsts.__getitem__)}'s motion, begun as early as "
-            f"demonstration {int(delays.argmin())}'s, would begin {-before} frames before the plan"
-        )
-    if after < 0:
-        raise CannotShiftError(
-            f"demonstration {max(lasts, key=lasts.__getitem__)}'s motion, begun as late as "
-            f"demonstration {int(delays.argmax())}'s, would end {-after} frames after the plan"
-        )
-    return Cut(delays + first - before, last - first + 1 + before + after, before, after)
-
-
-def _check_tremor(cut: Cut, demonstrations: Demonstrations) -> None:
-    """Refuse to hold ends that do not tremble but move."""
-    plans, plan_format = demonstrations.plans, demonstrations.format
-    back = shift(cut.motions(plans), cut.begins, demonstrations.horizon)
-    squares = (back - plans) ** 2
-    ranges, units = np.ptp(plans, axis=(0, 1)), np.array(plan_format.units)
-    largest = np.array([ranges[units == unit].max() for unit in units])
-    lost = np.sqrt(np.mean(squares, axis=1))
-    if np.all(lost <= _TREMOR_LOST * largest):
-        return
-    share = lost / np.where(largest > 0, largest, 1.0)
-    i, d = np.unravel_index(share.argmax(), share.shape)
-    middle = int(cut.begins[i]) + cut.length // 2
-    end = "before" if squares[i, :middle, d].sum() > squares[i, middle:, d].sum() else "after"
-    raise CannotShiftError(
-        f"demonstration {i} does not rest {end} its motion: holding {plan_format.names[d]} still "
-        f"there would change it by {share[i, d]:.1%} of the largest range, rms (at most "
-        f"{_TREMOR_LOST:.0%} counts as tremor)"
-    )
+    def __call__(self, i: int, t: Float[np.ndarray, " L"]) -> Float[np.ndarray, "L D"]:
+        """Return plan i at times t, in frames."""
+        last = self.plans.shape[1] - 1
+        before, after = self._slopes[:, i]
+        outside = np.minimum(t, 0.0)[:, None] * before + np.maximum(t - last, 0.0)[:, None] * after
+        inside = np.clip(t, 0.0, last)
+        values = self._splines[i](inside)
+        for d in self._steps:
+            values[:, d] = np.interp(inside, np.arange(last + 1), self.plans[i, :, d])
+        whole = inside == np.floor(inside)
+        values[whole] = self.plans[i, inside[whole].astype(int)]
+        return np.asarray(values + outside)

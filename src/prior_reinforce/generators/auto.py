@@ -1,0 +1,92 @@
+"""The generator that demonstrations ask for: closed form, or diffusion where patterns are mixed.
+
+One motion pattern is learned in closed form, in less than a second: plans are mixed by a cubic
+spline over outcomes, timing apart (`timing_evidence`). Because the weights reproduce affine
+functions, whatever else differs between demonstrations (posture, tempo, a second manner, an
+outlier) cancels to first order, as long as outcomes were measured. Where demonstrations show
+patterns that do not mix (`patterns`), the largest is learned if it is large enough, and the others
+are named; else diffusion learns all of them, which keeps patterns apart. Ours; on which evidence,
+docs/decisions-generator.md tells.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+from typing_extensions import Self
+
+from prior_reinforce.arrays import Plans, Points
+from prior_reinforce.generators.base import Generator, Report
+from prior_reinforce.generators.corrected import Corrected
+from prior_reinforce.generators.diffusion import DiffusionGenerator
+from prior_reinforce.generators.interpolation import SmoothInterpolation
+from prior_reinforce.generators.patterns import patterns
+from prior_reinforce.generators.saving import Tensors
+from prior_reinforce.generators.timed import Timed
+from prior_reinforce.generators.wrapping import Wrapper
+from prior_reinforce.plans.motions import Demonstrations
+
+_MORE_THAN_AFFINE = 2
+"""A pattern is learned alone if it has k + 1 demonstrations and this many more. Ours: an affine
+function of the outcome, and something to tell its bending by."""
+
+
+class Auto(Wrapper):
+    """Closed form or diffusion, with the timing and the pattern that demonstrations ask for."""
+
+    name: ClassVar[str] = "auto"
+
+    def __init__(
+        self, generator: Generator | None = None, *, device: str = "cpu", threads: int = 1
+    ) -> None:
+        """Choose where a network would be trained, if one is needed.
+
+        Args:
+            generator: What was chosen, of a saved model; `fit` chooses anew.
+            device: See `NetworkGenerator`.
+            threads: See `NetworkGenerator`.
+        """
+        super().__init__(generator or Timed(SmoothInterpolation()))
+        self._device, self._threads = device, threads
+
+    def _fit(self, demonstrations: Demonstrations, seed: int, progress: Report) -> None:
+        groups = patterns(demonstrations)
+        largest, rest = groups[0], [i + 1 for group in groups[1:] for i in group]
+        learned, remarks = demonstrations, []
+        if len(groups) == 1:
+            self.generator = Timed(SmoothInterpolation())
+            remarks.append("generator: closed form, since the demonstrations show one pattern")
+        elif len(largest) >= demonstrations.outcome_dim + 1 + _MORE_THAN_AFFINE:
+            self.generator = Timed(SmoothInterpolation())
+            learned = demonstrations.only(largest)
+            remarks.append(
+                f"generator: closed form, of {len(largest)} demonstrations of one pattern; "
+                f"demonstrations {_listed(rest)} move in another way, which does not mix with it, "
+                "and are left out: demonstrate those outcomes again, or learn all with diffusion"
+            )
+        else:
+            self.generator = Timed(
+                Corrected(DiffusionGenerator(device=self._device, threads=self._threads))
+            )
+            remarks.append(
+                f"generator: diffusion, since the demonstrations show {len(groups)} patterns that "
+                "do not mix: " + "; ".join(_listed([i + 1 for i in group]) for group in groups)
+            )
+        self.generator.fit(learned, seed=seed, progress=progress)
+        self.remarks = (*remarks, *self.generator.remarks)
+
+    def _generate(self, conditions: Points) -> Plans:
+        return self.generator.generate(conditions)
+
+    def state(self) -> tuple[dict[str, Any], Tensors]:
+        """Nothing of its own; see `Generator.state`."""
+        return {}, {}
+
+    @classmethod
+    def _around(cls, generator: Generator, settings: Mapping[str, Any], tensors: Tensors) -> Self:
+        return cls(generator)
+
+
+def _listed(numbers: list[int]) -> str:
+    return ", ".join(map(str, numbers))

@@ -1,0 +1,145 @@
+"""Which timing demonstrations ask for: the one in which their outcomes can be told from the motion.
+
+What is mixed of several plans has the outcome that is mixed of theirs only where the outcome is an
+affine function of the motion. So each demonstration is left out, and its outcome told from the
+others by an affine function of what the arm does at one phase: the decisive one, such as a release,
+which is not known and is taken where this works best. A release that is clocked is told best from
+plans as recorded; one that the motion itself brings about, from plans that start together.
+
+A start that is learned apart is the rule; other timings have to do clearly better, since six
+demonstrations tell little.
+
+Notation:
+    x_i  state at one phase: positions, and velocities times a time   (2 C,)  [-]
+    r_i  outcomes, each component scaled to unit variance             (k,)    [-]
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from prior_reinforce.errors import InvalidDemonstrationsError
+from prior_reinforce.plans.motions import Demonstrations
+from prior_reinforce.plans.timing import motion_span, speeds
+from prior_reinforce.plans.warping import Apart, WarpKind, take_apart
+
+_WORTH: dict[WarpKind, float] = {"none": 0.9, "start": 1.0, "tempo": 0.5}
+"""A timing's error must be below this part of `start`'s to be taken instead. Ours, chosen on the
+zoo's development tasks (docs/decisions-generator.md), where `warp` never earned its time."""
+_ON_TIME = 0.08
+"""People who keep to a clock start within this part of their motion's length of each other,
+standard deviation; where they do not, `none` is out of the question. Ours: 0.01 to 0.07 on the
+zoo's clocked tasks, a tenth and more where demonstrations were not timed."""
+_TELLS = 0.7
+"""An error above this tells nothing: the mean of all outcomes is as good. Ours."""
+_FEWEST = 5
+"""With fewer demonstrations than this, or than k + 3, none can be left out. Ours."""
+_FLIGHT = 0.1
+"""Velocities count as much as the way made in this time, in [s]. Ours: a thrown object flies for a
+few times as long."""
+_INSTANT = 0.04
+"""A state is a mean over this time before and after, in [s]. Ours: an object takes about so long to
+leave a hand."""
+_BEST = 3
+"""Of all phases the best so many are averaged, against luck. Ours."""
+_RIDGE = 1e-3
+"""Ridge of the affine function, relative to the states' mean square. Ours."""
+_WORDS: dict[WarpKind, str] = {
+    "none": "as recorded",
+    "start": "starts learned apart from the motion",
+    "tempo": "starts and tempos learned apart from the motion",
+    "warp": "warps of time learned apart from the motion",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class TimingChoice:
+    """The timing that was taken, and why."""
+
+    apart: Apart
+    reason: str
+    """In one line, for people."""
+
+
+def choose_timing(demonstrations: Demonstrations) -> TimingChoice:
+    """Take the timing in which outcomes can best be told from the motion.
+
+    Args:
+        demonstrations: N of them; with few, starts are learned apart, as a rule.
+    """
+    n = demonstrations.n
+    try:
+        usual = take_apart(demonstrations, "start")
+    except InvalidDemonstrationsError as error:
+        return TimingChoice(take_apart(demonstrations, "none"), f"timing as recorded: {error}")
+    if n < max(_FEWEST, demonstrations.outcome_dim + 3):
+        return TimingChoice(
+            usual, f"timing: {_WORDS['start']}, as a rule; {n} demonstrations tell no better"
+        )
+    apart: dict[WarpKind, Apart] = {
+        kind: usual if kind == "start" else take_apart(demonstrations, kind) for kind in _WORTH
+    }
+    errors = {kind: outcome_error(demonstrations, each) for kind, each in apart.items()}
+    able = [kind for kind in errors if kind == "start" or errors[kind] < _TELLS]
+    if float(np.std(usual.numbers[:, 0])) > _ON_TIME * _length(demonstrations):
+        able = [kind for kind in able if kind != "none"]
+    best = min(able, key=lambda kind: errors[kind] / _WORTH[kind])
+    others = ", ".join(f"{errors[kind]:.0%} {kind}" for kind in errors if kind != best)
+    return TimingChoice(
+        apart[best],
+        f"timing: {_WORDS[best]} ({best}); outcomes of left-out demonstrations are then told from "
+        f"the motion to {errors[best]:.0%} of their spread ({others})",
+    )
+
+
+def _length(demonstrations: Demonstrations) -> float:
+    """Of the motions, in frames."""
+    return float(np.median([np.ptp(motion_span(speed)) for speed in speeds(demonstrations)]))
+
+
+def outcome_error(demonstrations: Demonstrations, apart: Apart) -> float:
+    """Return how far left-out outcomes are missed, relative to their spread.
+
+    Args:
+        demonstrations: N of them.
+        apart: The same, taken apart.
+
+    Returns:
+        Root mean square at the decisive phase; 1 is what the mean of the others would do.
+    """
+    states = _states(demonstrations, apart)
+    outcomes = demonstrations.outcomes_seen / demonstrations.outcomes_seen.std(axis=0)
+    n, squares = demonstrations.n, np.zeros(len(states))
+    for i in range(n):
+        others = np.delete(np.arange(n), i)
+        x = states[:, others] - states[:, others].mean(axis=1, keepdims=True)
+        gram = x @ x.transpose(0, 2, 1)
+        size = np.trace(gram, axis1=1, axis2=2) / len(others)
+        ridge = (_RIDGE * size + 1e-12)[:, None, None] * np.eye(len(others))
+        left_out = states[:, i] - states[:, others].mean(axis=1)
+        weights = np.linalg.solve(gram + ridge, x @ left_out[:, :, None])[:, :, 0]
+        mean = outcomes[others].mean(axis=0)
+        told = mean + weights @ (outcomes[others] - mean)
+        squares += np.sum((told - outcomes[i]) ** 2, axis=1)
+    errors = np.sqrt(squares / (n * outcomes.shape[1]))
+    return float(np.mean(np.sort(errors)[:_BEST]))
+
+
+def _states(demonstrations: Demonstrations, apart: Apart) -> Float[np.ndarray, "T N F"]:
+    """What the arm does at each phase: positions and velocities, of all units alike."""
+    from scipy.ndimage import uniform_filter1d
+
+    plan_format = demonstrations.format
+    shapes = apart.shapes[:, :: apart.timeline.per_frame]
+    units = np.array(apart.names(plan_format)[1][: shapes.shape[2]])
+    variances = shapes.var(axis=1).mean(axis=0)
+    for unit in set(units.tolist()):
+        pooled = float(np.sqrt(variances[units == unit].sum()))
+        shapes = np.where(units == unit, shapes / (pooled or 1.0), shapes)
+    velocities = np.gradient(shapes, plan_format.dt, axis=1) * _FLIGHT
+    states = np.concatenate([shapes, velocities], axis=2)
+    size = 2 * max(1, round(_INSTANT / plan_format.dt)) + 1
+    return uniform_filter1d(states, size, axis=1, mode="nearest").transpose(1, 0, 2)

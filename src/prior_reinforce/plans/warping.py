@@ -1,0 +1,427 @@
+r"""Phase and amplitude: a plan is a shape played through a monotone warp of time.
+
+    A_i(t) = shape_i(tau_i(t))
+
+People do not repeat a motion at the same time, nor at the same tempo. A `Timeline` takes
+demonstrations apart into shapes on one common phase tau and a few numbers each, the warp, so that
+both can be learned; it plays any shape through any warp. The inverse map is what is parametrised:
+
+    t(tau) = start + integral from 0 to tau of exp(rho(u)) du
+
+- `none`: t = tau.
+- `start`: rho = 0; one number, when it moves.
+- `tempo`: rho constant; two numbers.
+- `warp`: rho piecewise linear over the motion, constant outside; `_KNOTS` numbers more.
+
+Phase 0 is the middle of the motion, so that start and tempo hardly depend on each other. Outside
+its recording a plan holds where it rests, and goes on with its last velocity where it does not, so
+no rest is needed at either end, and nothing is cut off. A channel that rests but for short
+transitions (`channels`) is timed by itself: its shape is split at its transitions, and when each of
+them comes is one number more. Where there is one, its last transition is phase 0: a hand that opens
+decides where the object goes, and what the arm does just then is what has to be mixed.
+
+Notation:
+    t      time of a plan               [frames]
+    tau    phase, common to all plans   [frames]
+    theta  `numbers`: the warp of a plan (P,)  start [frames], then rho at each knot [-]
+
+Source: ours; learning phase and amplitude apart is functional data analysis [Srivastava2011], with
+its square-root velocities as what is compared.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, Literal, get_args
+
+import numpy as np
+from jaxtyping import Float
+
+from prior_reinforce.arrays import Plans
+from prior_reinforce.errors import InvalidDemonstrationsError
+from prior_reinforce.plans.alignment import correlation_lags
+from prior_reinforce.plans.channels import kinds, transitions
+from prior_reinforce.plans.motions import Demonstrations, PlanFormat
+from prior_reinforce.plans.timing import (
+    SMOOTHING,
+    Continued,
+    middle,
+    motion_span,
+    velocity_profiles,
+)
+
+WarpKind = Literal["none", "start", "tempo", "warp"]
+"""What a warp may do: nothing, move, stretch as a whole, stretch in parts."""
+Numbers = Float[np.ndarray, "n P"]
+
+_KNOTS = 6
+"""Knots of rho over the motion. Ours: two phases and a pause between them need five."""
+_STIFFNESS = 0.02
+"""Weight of rho's variance over the knots, against a motion's unit energy. Ours, see
+docs/decisions-generator.md."""
+_LARGEST_TEMPO = 0.7
+"""Bound of |rho|: tempos differ by a factor of two at most. Ours."""
+_ROUNDS = 4
+"""Rounds of "mean of all motions, then each to it". Ours: later rounds change starts by less than a
+tenth of a frame on the zoo's sets."""
+_COMPARED = 40.0
+"""Phases over the motion at which velocities are compared. Ours: they are smooth."""
+_FINE = 8
+"""Points a frame at which a warp is tabulated."""
+_EXACT = 2e-5
+"""Demonstrations come back from shape and warp to this part of the largest range of their unit,
+rms, or the shapes are sampled more finely. Ours: a tenth of a milliradian of 5 rad."""
+_OVERSAMPLING = (1, 2, 4)
+
+
+@dataclass(frozen=True)
+class Step:
+    """A channel that is timed by itself: split at its transitions."""
+
+    channel: int
+    phases: tuple[int, ...]
+    """Where on the common phase each transition stands, in whole frames."""
+
+
+@dataclass(frozen=True, eq=False)
+class Timeline:
+    """The common phase of demonstrations, and how to take plans apart and play them."""
+
+    kind: WarpKind
+    horizon: int
+    """H."""
+    span: float
+    """Length of the motion between the first and the last knot, in frames."""
+    first: int
+    """Phase of a shape's first frame."""
+    per_frame: int
+    """Samples of a shape for each frame of phase."""
+    length: int
+    """L, samples of a shape."""
+    steps: tuple[Step, ...]
+    lowest: tuple[float, ...]
+    """Least that each number may be: as far below the demonstrated ones as these are apart. Ours:
+    beyond the demonstrations timing is extrapolated like shapes, but no further."""
+    highest: tuple[float, ...]
+    """Greatest, likewise."""
+
+    @property
+    def n_numbers(self) -> int:
+        """P, numbers of a warp, those of steps included."""
+        return len(self.lowest)
+
+    def play(self, shapes: Float[np.ndarray, "n L C"], numbers: Numbers) -> Plans:
+        """Play shapes through warps: the plans that they make.
+
+        Args:
+            shapes: From `take_apart`, or like them.
+            numbers: theta of each; kept between `lowest` and `highest`.
+        """
+        numbers = np.clip(numbers, self.lowest, self.highest)
+        n_steps = sum(len(step.phases) for step in self.steps)
+        warp, events = np.split(numbers, [numbers.shape[1] - n_steps], axis=1)
+        t = np.arange(self.horizon, dtype=float)
+        n_channels = shapes.shape[2] - sum(len(step.phases) - 1 for step in self.steps)
+        plans = np.zeros((len(shapes), self.horizon, n_channels))
+        smooth = _others(n_channels, self.steps)
+        at = (self._phases(warp, t) - self.first) * self.per_frame
+        for i in range(len(shapes)):
+            plans[i][:, smooth] = _sample(shapes[i][:, : len(smooth)], at[i])
+        parts, event = shapes[:, :, len(smooth) :], 0
+        for step in self.steps:
+            for phase in step.phases:
+                at = (t + phase - events[:, event, None] - self.first) * self.per_frame
+                for i in range(len(shapes)):
+                    plans[i, :, step.channel] += _linear(parts[i, :, event], at[i])
+                event += 1
+        return plans
+
+    def settings(self) -> dict[str, Any]:
+        """Everything as JSON types."""
+        fields = {name: getattr(self, name) for name in self.__dataclass_fields__}
+        return {**fields, "steps": [[step.channel, list(step.phases)] for step in self.steps]}
+
+    @classmethod
+    def restore(cls, settings: Any) -> Timeline:
+        """Rebuild it from `settings`.
+
+        Raises:
+            KeyError, TypeError, ValueError: Something is missing, or does not fit.
+        """
+        known = {name: settings[name] for name in cls.__dataclass_fields__}
+        if known["kind"] not in get_args(WarpKind):
+            raise ValueError(f"no warp {known['kind']!r}")
+        known["steps"] = tuple(
+            Step(int(channel), tuple(map(int, phases))) for channel, phases in known["steps"]
+        )
+        for name in ("lowest", "highest"):
+            known[name] = tuple(map(float, known[name]))
+        return cls(**known)
+
+    def _phases(self, warp: Numbers, t: Float[np.ndarray, " H"]) -> Float[np.ndarray, "n H"]:
+        """tau(t) of each plan."""
+        return np.stack([_inverse(theta, self.span, t) for theta in warp])
+
+
+@dataclass(frozen=True, eq=False)
+class Apart:
+    """Demonstrations taken apart into shapes and warps."""
+
+    timeline: Timeline
+    shapes: Float[np.ndarray, "N L C"]
+    """Smooth channels first, then the parts of those that are timed by themselves."""
+    numbers: Numbers
+    """theta of each demonstration."""
+
+    def names(self, plan_format: PlanFormat) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """Name and unit of each of the C channels of a shape, then of the P numbers."""
+        steps = self.timeline.steps
+        smooth = _others(plan_format.action_dim, steps)
+        names = [plan_format.names[d] for d in smooth]
+        units = [plan_format.units[d] for d in smooth]
+        events = []
+        for step in steps:
+            name = plan_format.names[step.channel]
+            for m in range(len(step.phases)):
+                names.append(f"{name}, change {m + 1}")
+                units.append(plan_format.units[step.channel])
+                events.append(f"time of {name}, change {m + 1}")
+        n_warp = self.timeline.n_numbers - len(events)
+        numbers = [*(["start"] if n_warp else []), *(f"tempo {m + 1}" for m in range(n_warp - 1))]
+        kinds_ = [*(["frame"] if n_warp else []), *["log"] * max(0, n_warp - 1)]
+        return (
+            (*names, *_unused([*numbers, *events], names)),
+            (*units, *kinds_, *["frame"] * len(events)),
+        )
+
+
+def take_apart(demonstrations: Demonstrations, kind: WarpKind) -> Apart:
+    """Find the warp of each demonstration, and its shape on the common phase.
+
+    Args:
+        demonstrations: N of them, of any kind of channel.
+        kind: What the warps may do.
+
+    Raises:
+        InvalidDemonstrationsError: Nothing moves, so nothing can be timed.
+    """
+    plan_format, plans = demonstrations.format, demonstrations.plans
+    found = kinds(plans, plan_format.units)
+    events = {
+        d: found_times
+        for d, each in enumerate(found)
+        if each in ("step", "switch") and (found_times := transitions(plans[:, :, d])) is not None
+    }
+    if len(events) == len(found):  # nothing but steps: they are the motion
+        events = {}
+    smooth = [d for d in range(len(found)) if d not in events]
+    profiles = velocity_profiles(
+        plans[:, :, smooth], tuple(plan_format.units[d] for d in smooth), SMOOTHING / plan_format.dt
+    )
+    decisive = [each[:, -1] for each in events.values() if each.shape[1]]
+    warp, span = _warps(profiles, kind, decisive[-1] if decisive else None)
+    # Whole frames, so that a transition comes back as recorded.
+    times = {d: np.round(each).astype(int) for d, each in events.items()}
+    steps = tuple(
+        Step(d, tuple(round(float(phase)) for phase in each.mean(axis=0)))
+        for d, each in times.items()
+        if each.shape[1]
+    )
+    numbers = np.concatenate([warp, *(times[step.channel] for step in steps)], axis=1)
+    horizon = demonstrations.horizon
+    ends = np.array([0.0, horizon - 1.0])
+    phases = np.stack([_inverse(theta, span, ends) for theta in warp])
+    least, most = phases[:, 0].min(), phases[:, 1].max()
+    for step in steps:
+        offsets = np.array(step.phases) - times[step.channel]
+        least, most = min(least, offsets.min()), max(most, horizon - 1 + offsets.max())
+    first, last = int(np.floor(least)), int(np.ceil(most))
+    timeline = Timeline(
+        kind=kind,
+        horizon=horizon,
+        span=span,
+        first=first,
+        per_frame=1,
+        length=last - first + 1,
+        steps=steps,
+        lowest=tuple((numbers.min(axis=0) - np.ptp(numbers, axis=0)).tolist()),
+        highest=tuple((numbers.max(axis=0) + np.ptp(numbers, axis=0)).tolist()),
+    )
+    continued = Continued(plans, plan_format.units, np.linalg.norm(profiles, axis=2))
+    for per_frame in _OVERSAMPLING:
+        timeline = replace(timeline, per_frame=per_frame, length=(last - first) * per_frame + 1)
+        shapes = _shapes(timeline, continued, warp, times)
+        if _comes_back(timeline.play(shapes, numbers), demonstrations):
+            break
+    return Apart(timeline, shapes, numbers)
+
+
+def _shapes(
+    timeline: Timeline, plans: Continued, warp: Numbers, times: dict[int, np.ndarray]
+) -> Float[np.ndarray, "N L C"]:
+    """Sample every plan on the common phase."""
+    tau = timeline.first + np.arange(timeline.length) / timeline.per_frame
+    smooth = _others(plans.plans.shape[2], timeline.steps)
+    shapes = []
+    for i, theta in enumerate(warp):
+        parts = [plans(i, _times(theta, timeline.span, tau))[:, smooth]]
+        for step in timeline.steps:
+            values = plans.plans[i, :, step.channel]
+            parts.append(_parts(values, step, times[step.channel][i], tau))
+        shapes.append(np.concatenate(parts, axis=1))
+    return np.stack(shapes)
+
+
+def _parts(
+    values: Float[np.ndarray, " H"], step: Step, at: np.ndarray, tau: Float[np.ndarray, " L"]
+) -> Float[np.ndarray, "L M"]:
+    """A step's transitions apart: the first with the value before it, the others as changes."""
+    borders = np.concatenate([[0], (at[1:] + at[:-1]) // 2, [len(values) - 1]])
+    found = []
+    for m, phase in enumerate(step.phases):
+        part = _linear(values, np.clip(tau - phase + at[m], borders[m], borders[m + 1]))
+        found.append(part if m == 0 else part - values[borders[m]])
+    return np.stack(found, axis=1)
+
+
+def _warps(
+    profiles: Float[np.ndarray, "N H S"],
+    kind: WarpKind,
+    decisive: Float[np.ndarray, " N"] | None,
+) -> tuple[Numbers, float]:
+    """Return theta of each demonstration, and the span of the knots."""
+    if kind == "none":
+        return np.zeros((len(profiles), 0)), 1.0
+    speeds = np.linalg.norm(profiles, axis=2)
+    if not np.all(speeds.max(axis=1) > 0):
+        raise InvalidDemonstrationsError("a demonstration does not move, so it cannot be timed")
+    if decisive is not None:
+        starts = decisive
+    else:  # phase 0 is the middle of the motion, in the mean
+        starts = np.mean([middle(speed) for speed in speeds]) - correlation_lags(profiles)
+    if kind == "start":
+        return starts[:, None], 1.0
+    span = float(np.median([np.ptp(motion_span(speed)) for speed in speeds]))
+    warp = _refine(profiles, np.stack([starts, np.zeros_like(starts)], axis=1), span)
+    if kind == "warp":
+        warp = np.concatenate([warp[:, :1], np.repeat(warp[:, 1:], _KNOTS, axis=1)], axis=1)
+        warp = _refine(profiles, warp, span)
+    return warp, span
+
+
+def _refine(profiles: Float[np.ndarray, "N H S"], warp: Numbers, span: float) -> Numbers:
+    """Move each demonstration's warp to where its square-root velocity fits the mean of all."""
+    from scipy.optimize import least_squares
+
+    horizon = profiles.shape[1]
+    tau = np.arange(-horizon / 2, horizon / 2 + 1, max(1.0, span / _COMPARED))
+    clock = np.arange(horizon, dtype=float)
+    scales = np.sqrt(np.sum(profiles**2, axis=(1, 2)))
+    unit = profiles / scales[:, None, None]
+
+    def root_velocity(i: int, theta: np.ndarray) -> np.ndarray:
+        t = _times(theta, span, tau)
+        slope = np.exp(_rho(theta, span, tau))
+        played = np.stack([np.interp(t, clock, p, left=0.0, right=0.0) for p in unit[i].T], axis=1)
+        return np.asarray(played * np.sqrt(slope)[:, None])
+
+    bound = np.full(warp.shape[1], _LARGEST_TEMPO)
+    bound[0] = horizon
+    warp = np.clip(warp, -bound, bound)
+    for _ in range(_ROUNDS):
+        mean = np.mean([root_velocity(i, theta) for i, theta in enumerate(warp)], axis=0)
+        moved = []
+        for i, theta in enumerate(warp):
+
+            def misfit(x: np.ndarray, i: int = i, mean: np.ndarray = mean) -> np.ndarray:
+                off = (root_velocity(i, x) - mean).ravel()
+                rho = x[1:]
+                return np.concatenate([off, np.sqrt(_STIFFNESS / len(rho)) * (rho - rho.mean())])
+
+            scale = np.where(np.arange(len(theta)) == 0, 1.0, 0.05)
+            moved.append(
+                least_squares(misfit, theta, bounds=(-bound, bound), x_scale=scale, max_nfev=12).x
+            )
+        warp = np.array(moved)
+        warp[:, 1:] -= warp[:, 1:].mean(axis=0)
+        warp = np.clip(warp, -bound, bound)
+    return warp
+
+
+def _rho(theta: np.ndarray, span: float, tau: np.ndarray) -> np.ndarray:
+    if len(theta) < 2:
+        return np.zeros_like(tau)
+    knots = np.linspace(-span / 2, span / 2, len(theta) - 1) if len(theta) > 2 else np.zeros(1)
+    return np.interp(tau, knots, theta[1:])
+
+
+def _table(theta: np.ndarray, span: float, reach: float) -> tuple[np.ndarray, np.ndarray]:
+    """Phase and time on a fine grid that covers `reach` frames to either side."""
+    half = int(np.ceil(reach * _FINE))
+    tau = np.arange(-half, half + 1) / _FINE
+    slope = np.exp(_rho(theta, span, tau))
+    steps = (slope[1:] + slope[:-1]) / (2 * _FINE)
+    t = np.concatenate([[0.0], np.cumsum(steps)])
+    return tau, theta[0] + t - t[half]
+
+
+def _times(theta: np.ndarray, span: float, tau: np.ndarray) -> np.ndarray:
+    """t(tau)."""
+    if len(theta) < 1:
+        return tau
+    if len(theta) <= 2:
+        return np.asarray(theta[0] + np.exp(_rho(theta, span, tau)) * tau)
+    table, t = _table(theta, span, np.abs(tau).max() + 1)
+    return np.interp(tau, table, t)
+
+
+def _inverse(theta: np.ndarray, span: float, t: np.ndarray) -> np.ndarray:
+    """tau(t)."""
+    if len(theta) < 1:
+        return t
+    if len(theta) <= 2:
+        return np.asarray((t - theta[0]) / np.exp(_rho(theta, span, np.zeros(1))))
+    reach = np.abs(t - theta[0]).max() * np.exp(_LARGEST_TEMPO) + 1
+    table, at = _table(theta, span, reach)
+    return np.interp(t, at, table)
+
+
+def _sample(values: Float[np.ndarray, "L C"], at: Float[np.ndarray, " H"]) -> np.ndarray:
+    """Smooth channels at parts of frames; their ends are held."""
+    from scipy.interpolate import make_interp_spline
+
+    if not values.shape[1]:
+        return np.empty((len(at), 0))
+    at = np.clip(at, 0.0, len(values) - 1)
+    spline = make_interp_spline(
+        np.arange(len(values), dtype=float), values, k=min(3, len(values) - 1)
+    )
+    return np.asarray(spline(at))
+
+
+def _linear(values: Float[np.ndarray, " L"], at: Float[np.ndarray, " H"]) -> np.ndarray:
+    """A step at parts of frames: it never overshoots."""
+    return np.interp(at, np.arange(len(values)), values)
+
+
+def _comes_back(plans: Plans, demonstrations: Demonstrations) -> bool:
+    units = np.array(demonstrations.format.units)
+    ranges = np.ptp(demonstrations.plans, axis=(0, 1))
+    largest = np.array([ranges[units == unit].max() for unit in units])
+    off = np.sqrt(np.mean((plans - demonstrations.plans) ** 2, axis=1))
+    return bool(np.all(off <= _EXACT * np.where(largest > 0, largest, 1.0)))
+
+
+def _others(n_channels: int, steps: tuple[Step, ...]) -> list[int]:
+    own = {step.channel for step in steps}
+    return [d for d in range(n_channels) if d not in own]
+
+
+def _unused(names: list[str], taken: list[str]) -> list[str]:
+    """The names, each with underscores until no channel has it."""
+    found = []
+    for name in names:
+        while name in taken:
+            name += "_"
+        found.append(name)
+    return found

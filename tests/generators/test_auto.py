@@ -1,0 +1,55 @@
+"""What demonstrations ask for: said, kept, and exact at the demonstrations."""
+
+import numpy as np
+import pytest
+
+from prior_reinforce.generators import load_generator, make_generator
+from prior_reinforce.generators.auto import Auto
+from prior_reinforce.generators.corrected import Corrected
+from prior_reinforce.generators.diffusion import DiffusionGenerator
+from prior_reinforce.generators.interpolation import SmoothInterpolation
+from prior_reinforce.plans.motions import Demonstrations
+from prior_reinforce.tasks import make_task
+from tests.generators.test_patterns import throws
+
+
+@pytest.mark.parametrize("task", ["zoo-push", "zoo-gripper", "zoo-strike"])
+def test_one_pattern_is_learned_in_closed_form_and_comes_back(task):
+    demos = make_task(task).demonstrations("mixed-8-0")
+    made = Auto().fit(demos, seed=0)
+    assert isinstance(made.generator.generator, SmoothInterpolation)
+    off = made.generate(demos.outcomes_seen) - demos.plans
+    assert np.sqrt(np.mean(off**2, axis=1)).max() < 1e-4
+    assert made.remarks[0].startswith("generator: closed form")
+    assert made.remarks[1].startswith("timing:")
+
+
+def test_the_larger_pattern_is_learned_and_the_odd_ones_are_named():
+    demos = throws((1, -1, 1, 1, 1, 1))
+    made = Auto().fit(demos, seed=0)
+    assert "demonstrations 2 move in another way" in made.remarks[0]
+    kept = [0, 2, 3, 4, 5]
+    np.testing.assert_allclose(
+        made.generate(demos.outcomes_seen[kept]), demos.plans[kept], atol=1e-4
+    )
+
+
+def test_patterns_too_small_to_stand_alone_go_to_diffusion(monkeypatch):
+    started = []
+    monkeypatch.setattr(DiffusionGenerator, "_fit", lambda self, *a: started.append(self))
+    monkeypatch.setattr(Corrected, "_fit", lambda self, d, *a: self.generator.fit(d, seed=0))
+    made = Auto().fit(throws((1, -1, -1, 1, 1, -1)), seed=0)
+    assert len(started) == 1
+    assert made.remarks[0].startswith("generator: diffusion, since the demonstrations show ")
+    assert made.remarks[0].endswith("; 1")
+
+
+def test_it_is_loaded_as_it_was_learned(tmp_path):
+    demos: Demonstrations = make_task("zoo-slide").demonstrations("tempo-5-1")
+    made = make_generator("auto").fit(demos, seed=0)
+    made.save(tmp_path)
+    loaded = load_generator(tmp_path)
+    assert loaded.remarks == made.remarks
+    np.testing.assert_array_equal(
+        loaded.generate(demos.outcomes_seen), made.generate(demos.outcomes_seen)
+    )

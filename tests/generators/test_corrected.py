@@ -1,0 +1,52 @@
+"""Corrected at its demonstrations, whatever the generator within leaves there."""
+
+import numpy as np
+
+from prior_reinforce.generators.corrected import Corrected
+from prior_reinforce.generators.interpolation import NearestNeighbours, SmoothInterpolation
+from prior_reinforce.plans.motions import Demonstrations, PlanFormat
+
+OUTCOMES = np.array([[0.8, -0.2], [0.8, 0.2], [1.0, -0.1], [1.0, 0.2], [0.9, 0.0]])
+
+
+class Off(NearestNeighbours):
+    """Off by a smooth motion that depends on the condition."""
+
+    name = "off"
+
+    def _generate(self, conditions):
+        plans = super()._generate(conditions)
+        bump = np.sin(np.linspace(0, np.pi, plans.shape[1]))[:, None]
+        return plans + 0.002 * bump * (1 + conditions.sum(axis=1))[:, None, None]
+
+
+def demonstrations(noise=None) -> Demonstrations:
+    rng = np.random.default_rng(0)
+    plans = np.cumsum(rng.normal(size=(5, 30, 2)), axis=1) * 0.05
+    extra = {} if noise is None else {"outcome_noise": np.full((5, 2), noise)}
+    return Demonstrations(plans, OUTCOMES, PlanFormat(("a", "b"), ("rad",) * 2, 0.02), **extra)
+
+
+def test_demonstrations_come_back():
+    demos = demonstrations()
+    assert np.abs(Off().fit(demos, seed=0).generate(OUTCOMES) - demos.plans).max() > 1e-3
+    exact = Corrected(Off()).fit(demos, seed=0)
+    np.testing.assert_allclose(exact.generate(OUTCOMES), demos.plans, atol=1e-12)
+
+
+def test_what_is_off_by_an_affine_function_is_right_everywhere():
+    demos = demonstrations()
+    conditions = np.array([[0.86, 0.07], [0.95, -0.05]])
+    right = NearestNeighbours().fit(demos, seed=0).generate(conditions)
+    exact = Corrected(Off()).fit(demos, seed=0).generate(conditions)
+    np.testing.assert_allclose(exact, right, atol=1e-12)
+
+
+def test_what_was_seen_coarsely_is_smoothed():
+    """Two plans of nearly one outcome must not make the field steep."""
+    measured, coarse = demonstrations(), demonstrations(noise=0.03)
+    steep = SmoothInterpolation().fit(measured, seed=0)
+    smooth = SmoothInterpolation().fit(coarse, seed=0)
+    np.testing.assert_allclose(steep.generate(OUTCOMES), measured.plans, atol=1e-12)
+    off = np.abs(smooth.generate(OUTCOMES) - coarse.plans).max()
+    assert off > 1e-3

@@ -1,0 +1,49 @@
+"""One pattern stays one, however people vary; motions that do not mix are told apart."""
+
+import numpy as np
+import pytest
+
+from prior_reinforce.generators.patterns import patterns
+from prior_reinforce.plans.motions import Demonstrations, PlanFormat
+from prior_reinforce.tasks import make_task
+
+OUTCOMES = np.array([[0.8, -0.2], [0.8, 0.2], [1.0, -0.1], [1.0, 0.2], [0.9, 0.0], [0.7, 0.1]])
+
+
+def throws(signs) -> Demonstrations:
+    """Swings of 40 frames at other times, from above (1) or from below (-1)."""
+    starts = np.array([5, 31, 12, 24, 18, 9])[:, None]
+    s = np.clip((np.arange(90) - starts) / 40, 0, 1)
+    swing = 10 * s**3 - 15 * s**4 + 6 * s**5
+    size = np.asarray(signs)[:, None] * (0.6 + 0.5 * OUTCOMES[:, :1])
+    plans = np.stack([size * swing, 0.5 * swing * size], axis=-1)
+    return Demonstrations(plans, OUTCOMES, PlanFormat(("a", "b"), ("rad",) * 2, 0.02))
+
+
+def test_one_motion_is_one_pattern():
+    assert patterns(throws((1,) * 6)) == (tuple(range(6)),)
+
+
+def test_a_throw_from_below_does_not_mix_with_one_from_above():
+    assert patterns(throws((1, -1, 1, 1, -1, 1))) == ((0, 2, 3, 5), (1, 4))
+
+
+def test_pushes_to_either_side_are_one_pattern():
+    """Opposite motions that an affine function of the outcome tells."""
+    s = np.clip(np.arange(60) / 40, 0, 1)
+    outcomes = np.array([[-0.3], [-0.2], [-0.1], [0.1], [0.2], [0.3]])
+    plans = outcomes[:, :, None] * (10 * s**3 - 15 * s**4 + 6 * s**5)[None, :, None]
+    demos = Demonstrations(plans, outcomes, PlanFormat(("x",), ("m",), 0.02))
+    assert patterns(demos) == (tuple(range(6)),)
+
+
+@pytest.mark.parametrize("kind", ["styles-9-0", "outlier-8-0", "mixed-8-0"])
+def test_two_manners_of_one_throw_are_one_pattern(kind):
+    assert len(patterns(make_task("zoo-scoop").demonstrations(kind))) == 1
+
+
+def test_what_does_not_move_is_one_pattern():
+    still = Demonstrations(
+        np.ones((6, 20, 2)), OUTCOMES, PlanFormat(("a", "b"), ("rad",) * 2, 0.02)
+    )
+    assert patterns(still) == (tuple(range(6)),)

@@ -1,0 +1,66 @@
+"""Timing is chosen by what tells outcomes, and starts are learned apart where nothing tells."""
+
+import numpy as np
+import pytest
+
+from prior_reinforce.generators.timing_evidence import choose_timing, outcome_error
+from prior_reinforce.plans.motions import Demonstrations, PlanFormat
+from prior_reinforce.plans.warping import take_apart
+from prior_reinforce.tasks import make_task
+
+RNG = np.random.default_rng(0)
+AIMS = RNG.uniform(-1, 1, size=(8, 2))
+STARTS = RNG.uniform(20, 30, size=8)
+
+
+def demonstrations(release: int | None, n: int = 8) -> Demonstrations:
+    """Swings of two joints; the outcome is the state at a frame, or at the end of the motion."""
+    s = np.clip((np.arange(100) - STARTS[:, None]) / 50, 0, 1)
+    swing = 10 * s**3 - 15 * s**4 + 6 * s**5
+    sizes = np.stack([1 + 0.3 * AIMS[:, :1], 0.6 + 0.3 * AIMS[:, 1:]])
+    plans = np.stack([size * swing for size in sizes], axis=-1)
+    outcomes = plans[:, -1] if release is None else plans[:, release]
+    return Demonstrations(plans[:n], outcomes[:n], PlanFormat(("a", "b"), ("rad",) * 2, 0.02))
+
+
+def test_a_release_that_the_motion_brings_about_asks_for_starts_apart():
+    choice = choose_timing(demonstrations(None))
+    assert choice.apart.timeline.kind == "start"
+    assert "starts learned apart from the motion (start)" in choice.reason
+
+
+def test_a_clocked_release_asks_for_plans_as_recorded():
+    demos = demonstrations(42)
+    errors = {kind: outcome_error(demos, take_apart(demos, kind)) for kind in ("none", "start")}
+    assert errors["none"] < 0.5 * errors["start"]
+    assert choose_timing(demos).apart.timeline.kind == "none"
+
+
+def test_people_who_start_when_they_like_keep_to_no_clock():
+    """However well plans as recorded seem to tell outcomes."""
+    demos = demonstrations(42)
+    late = [np.pad(plan, ((0, 15 * (i % 4)), (0, 0)), "edge") for i, plan in enumerate(demos.plans)]
+    plans = np.stack([np.pad(p, ((145 - len(p), 0), (0, 0)), "edge") for p in late])
+    moved = Demonstrations(plans, demos.outcomes_seen, demos.format)
+    assert choose_timing(moved).apart.timeline.kind != "none"
+
+
+def test_few_demonstrations_tell_nothing():
+    choice = choose_timing(demonstrations(42, n=4))
+    assert choice.apart.timeline.kind == "start"
+    assert "as a rule; 4 demonstrations tell no better" in choice.reason
+
+
+def test_what_does_not_move_keeps_its_timing():
+    still = Demonstrations(
+        np.ones((6, 20, 2)), AIMS[:6], PlanFormat(("a", "b"), ("rad",) * 2, 0.02)
+    )
+    choice = choose_timing(still)
+    assert choice.apart.timeline.kind == "none"
+    assert "does not move" in choice.reason
+
+
+@pytest.mark.parametrize("task", ["basketball-v1", "curling", "fishing"])
+@pytest.mark.parametrize("name", ["A", "B"])
+def test_our_own_demonstrations_differ_in_their_starts(task, name):
+    assert choose_timing(make_task(task).demonstrations(name)).apart.timeline.kind == "start"

@@ -1,0 +1,132 @@
+"""Shapes and warps: known starts and tempos come back, and so does every plan, however it ends."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from prior_reinforce.errors import InvalidDemonstrationsError
+from prior_reinforce.plans.motions import Demonstrations, PlanFormat
+from prior_reinforce.plans.warping import Timeline, take_apart
+
+STARTS = np.array([5.3, 31.0, 12.7, 24.1])
+TEMPOS = np.array([1.0, 1.15, 0.85, 1.05])
+SIZES = np.array([0.9, 1.0, 1.1, 0.95])
+OUTCOMES = np.array([[0.8, -0.2], [0.8, 0.2], [1.0, -0.1], [1.0, 0.2]])
+KINDS = ("none", "start", "tempo", "warp")
+
+
+def swings(tempos=(1.0,) * 4, horizon=90) -> np.ndarray:
+    """Two joints of a minimum-jerk swing of 40 frames, at STARTS."""
+    durations = 40 * np.asarray(tempos)[:, None]
+    s = np.clip((np.arange(horizon) - STARTS[:, None]) / durations, 0, 1)
+    swing = SIZES[:, None] * (10 * s**3 - 15 * s**4 + 6 * s**5)
+    return np.stack([0.2 + swing, 1.5 - 0.7 * swing], axis=-1)
+
+
+def demonstrations(plans, units=("rad", "rad")) -> Demonstrations:
+    names = tuple(f"joint{d + 1}" for d in range(plans.shape[2]))
+    return Demonstrations(plans, OUTCOMES, PlanFormat(names, units, 0.0125))
+
+
+def with_gripper(opens) -> Demonstrations:
+    ramp = (0.0, 0.05, 0.24, 0.54, 0.83, 0.98, 1.0)
+    channel = [np.interp(np.arange(90) - at, np.arange(7), ramp) for at in opens]
+    return demonstrations(np.dstack([swings(), np.stack(channel)]), ("rad", "rad", "1"))
+
+
+def played(demos, kind):
+    apart = take_apart(demos, kind)
+    return apart, apart.timeline.play(apart.shapes, apart.numbers)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("horizon", [90, 55], ids=["at rest", "cut in mid-swing"])
+def test_demonstrations_come_back_to_a_tenth_of_a_milliradian(kind, horizon):
+    demos = demonstrations(swings(TEMPOS, horizon))
+    _, plans = played(demos, kind)
+    assert np.sqrt(np.mean((plans - demos.plans) ** 2, axis=1)).max() < 1e-4
+
+
+def test_starts_come_back():
+    apart = take_apart(demonstrations(swings()), "start")
+    off = apart.numbers[:, 0] - STARTS
+    np.testing.assert_allclose(off, off.mean(), atol=0.02)
+
+
+def test_tempos_come_back():
+    apart = take_apart(demonstrations(swings(TEMPOS)), "tempo")
+    expected = np.log(TEMPOS) - np.log(TEMPOS).mean()
+    np.testing.assert_allclose(apart.numbers[:, 1], expected, atol=0.015)
+
+
+def test_a_warp_takes_a_pause_out_of_a_motion():
+    """Two phases, and between them a rest of other lengths: their shapes are one."""
+
+    def two_phases(pause: float) -> np.ndarray:
+        a = np.clip((np.arange(120) - 20) / 25, 0, 1)
+        b = np.clip((np.arange(120) - 45 - pause) / 25, 0, 1)
+        return sum(10 * s**3 - 15 * s**4 + 6 * s**5 for s in (a, b))
+
+    plans = np.stack([two_phases(p)[:, None] * np.ones(2) for p in (2.0, 8.0, 5.0, 11.0)])
+    spread = {}
+    for kind in ("start", "warp"):
+        apart = take_apart(demonstrations(plans), kind)
+        spread[kind] = apart.shapes.std(axis=0).max()
+    assert spread["warp"] < 0.5 * spread["start"]
+
+
+def test_beyond_its_recording_a_motion_goes_on():
+    """Cut at full speed: a later start uncovers frames that nobody recorded."""
+    demos = demonstrations(swings(horizon=45))
+    apart = take_apart(demos, "start")
+    latest = np.argmax(STARTS)
+    numbers = apart.numbers[[latest]] - 6.0
+    (plan,) = apart.timeline.play(apart.shapes[[latest]], numbers)
+    steps = np.diff(plan[:, 0])
+    assert steps[-6:].min() > 0.8 * np.diff(demos.plans[latest, :, 0])[-1]
+
+
+def test_a_gripper_is_timed_by_itself_and_comes_back_as_recorded():
+    demos = with_gripper((30, 60, 41, 52))
+    apart, plans = played(demos, "start")
+    assert apart.timeline.n_numbers == 2
+    np.testing.assert_allclose(plans[:, :, 2], demos.plans[:, :, 2], atol=1e-12)
+    names, units = apart.names(demos.format)
+    assert names[-1] == "time of joint3, change 1"
+    assert units[-2:] == ("frame", "frame")
+
+
+def test_between_two_openings_the_gripper_opens_once_and_as_fast():
+    demos = with_gripper((30, 60, 41, 52))
+    apart = take_apart(demos, "start")
+    (plan,) = apart.timeline.play(
+        apart.shapes[:2].mean(axis=0)[None], apart.numbers[:2].mean(axis=0)[None]
+    )
+    steps = np.diff(plan[:, 2])
+    assert steps.min() >= -1e-12
+    assert np.count_nonzero(steps > 0.01) == 6
+    assert np.argmax(plan[:, 2] > 0.5) == pytest.approx(48, abs=1)
+
+
+def test_what_does_not_move_has_no_timing():
+    still = swings()
+    still[2] = 0.4
+    with pytest.raises(InvalidDemonstrationsError, match="does not move"):
+        take_apart(demonstrations(still), "start")
+
+
+def test_numbers_are_kept_near_the_demonstrated_ones():
+    apart = take_apart(demonstrations(swings()), "start")
+    far = apart.timeline.play(apart.shapes[:1], np.array([[1e6]]))
+    farthest = apart.timeline.play(apart.shapes[:1], np.array([apart.timeline.highest]))
+    np.testing.assert_array_equal(far, farthest)
+
+
+def test_a_timeline_survives_its_settings():
+    demos = with_gripper((30, 60, 41, 52))
+    apart, plans = played(demos, "tempo")
+    again = Timeline.restore(apart.timeline.settings())
+    np.testing.assert_array_equal(again.play(apart.shapes, apart.numbers), plans)
+    with pytest.raises(ValueError, match="no warp"):
+        Timeline.restore({**replace(apart.timeline).settings(), "kind": "late"})
