@@ -99,7 +99,7 @@ def test_own_task_and_generator_run_by_name(tmp_path, capsys):
         ("--task", "toss", "no task 'toss'; known are basketball-v1"),
         ("--task", "own_task:Tos", "cannot find own_task:Tos: .*no attribute 'Tos'"),
         ("--task", "own_adapter:RidgeAdapter", "must derive from prior_reinforce.tasks.base.Task"),
-        ("--generator", "neural", "no generator 'neural'; known are diffusion"),
+        ("--generator", "neural", "no generator 'neural'; known are auto, diffusion"),
     ],
 )
 def test_a_name_that_is_nobodys_is_told(flag, name, message, tmp_path, capsys):

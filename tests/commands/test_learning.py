@@ -29,22 +29,25 @@ def learn(tmp_path, capsys):
     return run
 
 
-@pytest.mark.parametrize("generator", ["diffusion", "regression"])
-def test_a_recording_cut_off_in_mid_swing_is_told_in_a_line(learn, generator):
-    told, model = learn("--generator", f"{generator},{TINY}", frames=80)
-    assert "start times are not learned" in " ".join(told.split())
+@pytest.mark.parametrize("generator", [f"diffusion,{TINY}", "interpolation"])
+@pytest.mark.parametrize("frames", [140, 80], ids=["rest to rest", "cut off in mid-swing"])
+def test_the_timing_that_was_chosen_is_told_in_a_line_and_kept(learn, generator, frames):
+    told, model = learn("--generator", generator, frames=frames)
+    assert "timing: starts learned apart from the motion" in " ".join(told.split())
     assert len(model.remarks) == 1
 
 
-@pytest.mark.parametrize(
-    ("generator", "frames"),
-    [(f"diffusion,{TINY}", 140), (f"diffusion,{TINY},timing=none", 80), ("nearest", 80)],
-    ids=["all is well", "switched off", "knows no start times"],
-)
-def test_nothing_is_told_where_nothing_is_lost(learn, generator, frames):
-    told, model = learn("--generator", generator, frames=frames)
-    assert "start times" not in told
+@pytest.mark.parametrize("generator", [f"diffusion,{TINY},timing=none", "nearest"])
+def test_nothing_is_told_where_nothing_was_chosen(learn, generator):
+    told, model = learn("--generator", generator, frames=80)
+    assert "timing" not in told
     assert model.remarks == ()
+
+
+def test_by_default_the_generator_is_chosen_and_told(learn):
+    told, model = learn(frames=80)
+    assert "generator: closed form, since the demonstrations show one pattern" in told
+    assert model.name == "auto"
 
 
 def test_align_is_short_for_a_setting(learn):
@@ -61,7 +64,7 @@ def test_align_is_short_for_a_setting(learn):
     [
         (["--generator", "diffusion,steps=3"], "has no setting 'steps'"),
         (["--generator", "nearest,timing=never"], "timing"),
-        (["--generator", "none"], "no generator 'none'; known are diffusion"),
+        (["--generator", "none"], "no generator 'none'; known are auto, diffusion"),
         (["--generator", "nearest", "--seed", "-1"], "--seed must be a whole number from 0"),
         (["folder", "--task", "curling"], "drop one of the two"),
     ],
@@ -81,7 +84,7 @@ def test_another_generator_can_be_learned(run, folder):
     assert "interpolation" in run("status", folder)[1]
     before = events_in(folder)
     for args, remedy in (
-        (("--generator", "spline"), "known are diffusion"),
+        (("--generator", "spline"), "known are auto, diffusion"),
         (("--generator", "nearest,training_steps=5"), "has no setting 'training_steps'"),
         (("--generator", "nearest,neighbours=0"), ">= 1 - at `$.neighbours`"),
     ):

@@ -35,7 +35,7 @@ class Learn:
         None
     )
     """Workspace whose demonstrations to learn from; without it, the simulated task's."""
-    generator: GeneratorChoice = "diffusion"
+    generator: GeneratorChoice = "auto"
     align: bool = False
     """Align the demonstrations in time first; short for the generator's setting timing=align."""
     seed: int = 0

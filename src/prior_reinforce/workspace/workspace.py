@@ -269,7 +269,7 @@ class Workspace:
 
     def learn(
         self,
-        generator: str = "diffusion",
+        generator: str = "auto",
         *,
         seed: int = 0,
         progress: Callable[[FitProgress], None] | None = None,
@@ -277,7 +277,7 @@ class Workspace:
         """Fit a generator to the demonstrations and put it in use.
 
         Args:
-            generator: Choice of the generator, for instance `diffusion`,
+            generator: Choice of the generator, for instance `auto`, `diffusion`,
                 `interpolation,timing=align` or `module:Class`.
             seed: Of the fit.
             progress: Called now and then while fitting.
