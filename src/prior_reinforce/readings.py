@@ -71,6 +71,12 @@ class Reading:
     said: str = ""
     """The words, where words were said."""
 
+    @property
+    def spread(self) -> Point:
+        """Standard deviation of the error given this reading; inf where an end is open."""
+        width = self.high - self.low
+        return np.asarray(np.sqrt(width**2 / 12.0 + self.sd**2))
+
     def __post_init__(self) -> None:
         """Check, copy, and make read-only."""
         k = np.size(self.error_seen)

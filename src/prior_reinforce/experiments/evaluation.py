@@ -80,7 +80,11 @@ class PerceivedDemonstrations(Unit):
                 seed=seed,
                 on_failed_reading=count_and_estimate,
             )
-        return {"outcomes_seen": perceived.outcomes_seen.tolist(), "failed_readings": len(failures)}
+        return {
+            "outcomes_seen": perceived.outcomes_seen.tolist(),
+            "outcome_noise": perceived.outcome_noise.tolist(),
+            "failed_readings": len(failures),
+        }
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,16 +171,13 @@ class Training(Unit):
         """The demonstrations that are learned from."""
         demonstrations = self.recorded()
         if self.perceived is not None:
-            outcomes = np.array(result_of(folder, self.perceived)["outcomes_seen"])
-            demonstrations = replace(demonstrations, outcomes_seen=outcomes)
-        if self.subset is not None:
-            chosen = list(self.subset)
+            seen = result_of(folder, self.perceived)
             demonstrations = replace(
                 demonstrations,
-                plans=demonstrations.plans[chosen],
-                outcomes_seen=demonstrations.outcomes_seen[chosen],
+                outcomes_seen=np.array(seen["outcomes_seen"]),
+                outcome_noise=np.array(seen["outcome_noise"]),
             )
-        return demonstrations
+        return demonstrations if self.subset is None else demonstrations.only(self.subset)
 
 
 @dataclass(frozen=True)

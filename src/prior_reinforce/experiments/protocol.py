@@ -117,14 +117,14 @@ def perceive_demonstrations(
         on_failed_reading: Called where perception gives up.
 
     Returns:
-        The same plans with the outcomes seen.
+        The same plans with the outcomes seen, and how uncertain each is.
 
     Raises:
         InvalidDemonstrationsError: An execution was lost, or outcomes looked the same.
     """
     reference = task.region.mean(axis=0)
     rng = np.random.default_rng([seed, 5])
-    seen = []
+    seen, noise = [], []
     rollouts = task.rollout(demonstrations.plans, np.random.default_rng([seed, 4]))
     for number, rollout in enumerate(rollouts):
         if not rollout.valid:
@@ -137,8 +137,9 @@ def perceive_demonstrations(
         except PerceptionFailedError as failure:
             reading = on_failed_reading(failure, rollout, reference, rng)
         seen.append(reference + reading.error_seen)
+        noise.append(reading.spread)
     try:
-        return replace(demonstrations, outcomes_seen=np.array(seen))
+        return replace(demonstrations, outcomes_seen=np.array(seen), outcome_noise=np.array(noise))
     except InvalidDemonstrationsError as error:
         raise InvalidDemonstrationsError(
             f"as {type(perception).__name__} saw {task.name} (seed {seed}), {error}; choose "

@@ -56,14 +56,14 @@ class Method:
 
 METHODS = (
     Method("diffusion", "diffusion", "method"),
-    Method("diffusion on whole plans", "diffusion,timing=none", "method"),
+    Method("diffusion on whole plans", "diffusion,timing=none,exact=no", "method"),
     Method("nearest neighbours", "nearest"),
-    Method("DMP", "dmp,segmented=false"),
-    Method("U-Net regression", "regression,timing=none"),
-    Method("segmented DMP", "dmp", "other"),
+    Method("DMP", "dmp,segmented=false,exact=no"),
+    Method("U-Net regression", "regression,timing=none,exact=no"),
+    Method("segmented DMP", "dmp,exact=no", "other"),
     Method("nearest neighbours, aligned", "nearest,timing=align"),
-    Method("DMP, aligned", "dmp,segmented=false,timing=align"),
-    Method("U-Net regression, aligned", "regression,timing=align"),
+    Method("DMP, aligned", "dmp,segmented=false,timing=align,exact=no"),
+    Method("U-Net regression, aligned", "regression,timing=align,exact=no"),
     Method("smooth interpolation, aligned", "interpolation,timing=align", "other"),
 )
 """Our default, and the same network on whole plans; the paper's baselines; and, so that nothing is
