@@ -178,19 +178,10 @@ def test_a_workspace_plans_as_its_generator_does_by_itself(tmp_path, choice):
         assert f"{model}, {choice}" in describe(workspace)
 
 
-def test_what_a_fit_could_not_do_is_kept_and_shown(tmp_path):
-    """Demonstrations that end in mid-swing: start times cannot be learned apart."""
-    demos = demonstrations()
-    cut = np.stack([np.roll(p, n, axis=0) for n, p in enumerate(demos.plans[:, :16])])
-    for n, plan in enumerate(cut):
-        plan[:n] = plan[n]
-    with Workspace.create(tmp_path / "planar", manifest()) as workspace:
-        workspace.import_demonstrations(
-            Demonstrations(cut, demos.outcomes_seen, demos.format), "made up"
-        )
-        training = workspace.learn("interpolation,timing=start")
-        assert training.remarks
-        assert training.remarks[0] in describe(workspace)
+def test_what_a_fit_chose_is_kept_and_shown(workspace):
+    training = workspace.learn()
+    assert [remark.split(":")[0] for remark in training.remarks] == ["generator", "timing"]
+    assert all(remark in describe(workspace) for remark in training.remarks)
 
 
 def test_ones_own_generator_is_named_by_a_person_not_by_the_journal(workspace):

@@ -124,15 +124,15 @@ class Timeline:
         n_channels = shapes.shape[2] - sum(len(step.phases) - 1 for step in self.steps)
         plans = np.zeros((len(shapes), self.horizon, n_channels))
         smooth = _others(n_channels, self.steps)
-        at = (self._phases(warp, t) - self.first) * self.per_frame
-        for i in range(len(shapes)):
-            plans[i][:, smooth] = _sample(shapes[i][:, : len(smooth)], at[i])
+        for i, theta in enumerate(warp):
+            at = (_inverse(theta, self.span, t) - self.first) * self.per_frame
+            plans[i][:, smooth] = _sample(shapes[i][:, : len(smooth)], at)
         parts, event = shapes[:, :, len(smooth) :], 0
         for step in self.steps:
             for phase in step.phases:
-                at = (t + phase - events[:, event, None] - self.first) * self.per_frame
-                for i in range(len(shapes)):
-                    plans[i, :, step.channel] += _linear(parts[i, :, event], at[i])
+                for i, came in enumerate(events[:, event]):
+                    at = (t + phase - came - self.first) * self.per_frame
+                    plans[i, :, step.channel] += _linear(parts[i, :, event], at)
                 event += 1
         return plans
 
@@ -157,10 +157,6 @@ class Timeline:
         for name in ("lowest", "highest"):
             known[name] = tuple(map(float, known[name]))
         return cls(**known)
-
-    def _phases(self, warp: Numbers, t: Float[np.ndarray, " H"]) -> Float[np.ndarray, "n H"]:
-        """tau(t) of each plan."""
-        return np.stack([_inverse(theta, self.span, t) for theta in warp])
 
 
 @dataclass(frozen=True, eq=False)
