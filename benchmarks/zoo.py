@@ -33,7 +33,9 @@ def first_throws(task: Task, kind: str, sets: int, goals: int, seed: int) -> flo
     timing = "start" if task.name == "zoo-arrival" else "none"
     for number in range(sets):
         prior = task.demonstrations(f"{kind}-6-{number}")
-        generator = make_generator(f"interpolation,timing={timing}").fit(prior, seed=0)
+        generator = make_generator(f"interpolation,kernel=thin-plate,timing={timing}").fit(
+            prior, seed=0
+        )
         aims = task.sample_goals(goals, rng)
         for rollout, aim in zip(task.rollout(generator.generate(aims), rng), aims, strict=True):
             near = np.linalg.norm(rollout.outcome - aim) <= task.tolerance
