@@ -45,7 +45,7 @@ class SoftmaxBlend(pr.Generator):
     def _fit(self, demonstrations, seed, progress):
         """Keep the demonstrations and how far each is shifted; nothing is random."""
         # Ends are held, whether they rest or not: a plan that ends in mid-swing is welcome.
-        shifts = pr.align(demonstrations, pr.AlignmentConfig(largest_end_speed=1.0)).shifts
+        shifts = pr.align(demonstrations).shifts
         self.plans = demonstrations.plans.copy()
         self.outcomes = demonstrations.outcomes_seen.copy()
         self.shifts = shifts / demonstrations.format.dt  # [frames]

@@ -50,6 +50,13 @@ def test_by_default_the_generator_is_chosen_and_told(learn):
     assert model.name == "auto"
 
 
+def test_align_alone_aligns_what_is_taken_for_one_pattern(learn):
+    _, model = learn("--align")
+    _, same = learn("--generator", "interpolation,timing=align")
+    conditions = RECORDED.outcomes_seen
+    assert (model.generate(conditions) == same.generate(conditions)).all()
+
+
 def test_align_is_short_for_a_setting(learn):
     _, model = learn("--generator", "nearest", "--align")
     _, same = learn("--generator", "nearest,timing=align")

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.generators import load_generator, make_generator
 from prior_reinforce.generators.auto import Auto
 from prior_reinforce.generators.corrected import Corrected
@@ -53,3 +54,21 @@ def test_it_is_loaded_as_it_was_learned(tmp_path):
     np.testing.assert_array_equal(
         loaded.generate(demos.outcomes_seen), made.generate(demos.outcomes_seen)
     )
+
+
+def test_a_large_pattern_with_outcomes_on_a_line_goes_to_diffusion_with_the_rest(monkeypatch):
+    demos = throws((1, 1, 1, 1, 1, 1))
+    plans, outcomes = demos.plans.repeat(2, axis=0)[:9].copy(), np.zeros((9, 2))
+    plans[5:] *= -1
+    outcomes[:5, 0] = [0.7, 0.8, 0.9, 1.0, 1.1]
+    outcomes[5:] = [[0.9, 0.3], [0.8, -0.3], [1.0, 0.2], [0.85, -0.2]]
+    monkeypatch.setattr(DiffusionGenerator, "_fit", lambda *a: None)
+    monkeypatch.setattr(Corrected, "_fit", lambda self, d, *a: self.generator.fit(d, seed=0))
+    made = Auto().fit(Demonstrations(plans, outcomes, demos.format), seed=0)
+    assert made.remarks[0].startswith("generator: diffusion")
+
+
+@pytest.mark.parametrize("setting", ["timing=align", "exact=no"])
+def test_what_it_chooses_itself_is_not_set(setting):
+    with pytest.raises(ConfigurationError, match="auto chooses its timing itself"):
+        make_generator(f"auto,{setting}")

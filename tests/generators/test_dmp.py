@@ -12,7 +12,10 @@ from prior_reinforce.generators.dmp import (
     DynamicMovementPrimitivesConfig,
     _Response,
 )
-from prior_reinforce.generators.interpolation import SmoothInterpolation
+from prior_reinforce.generators.interpolation import (
+    SmoothInterpolation,
+    SmoothInterpolationConfig,
+)
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 
 pytest.importorskip("movement_primitives")
@@ -101,7 +104,11 @@ def test_unsegmented_primitives_of_one_duration_mix_motions_and_nothing_else():
     goals = np.random.default_rng(0).uniform([0.9, -0.3], [1.2, 0.3], size=(5, 2))
     config = DynamicMovementPrimitivesConfig(segmented=False)
     primitives = DynamicMovementPrimitives(config).fit(demos, seed=0).generate(goals)
-    mixture = SmoothInterpolation().fit(demos, seed=0).generate(goals)
+    mixture = (
+        SmoothInterpolation(SmoothInterpolationConfig(kernel="thin-plate"))
+        .fit(demos, seed=0)
+        .generate(goals)
+    )
     np.testing.assert_allclose(primitives, mixture, atol=2e-3)
 
 

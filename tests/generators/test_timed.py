@@ -130,7 +130,7 @@ def test_it_is_saved_with_the_generator_within(timing, tmp_path):
     timed = Timed(inner, timing).fit(demos, seed=0)
     timed.save(tmp_path)
     conditions = np.array([[0.9, 0.1]])
-    for loaded in (load_generator(tmp_path),):
+    for loaded in (load_generator(tmp_path), Timed.load(tmp_path)):
         assert isinstance(loaded, Timed)
         assert isinstance(loaded.generator, DiffusionGenerator)
         assert loaded.timing == timing

@@ -130,3 +130,29 @@ def test_a_timeline_survives_its_settings():
     np.testing.assert_array_equal(again.play(apart.shapes, apart.numbers), plans)
     with pytest.raises(ValueError, match="no warp"):
         Timeline.restore({**replace(apart.timeline).settings(), "kind": "late"})
+
+
+def test_a_step_that_has_just_changed_does_not_go_on():
+    """Cut in mid-swing, a valve that closes in the last frames stays between its values."""
+    plans = swings(horizon=40)
+    valve = np.zeros((4, 40, 1))
+    for i, (opens, closes) in enumerate([(10, 38), (20, 34), (14, 35), (12, 36)]):
+        valve[i, opens:closes] = 1.0
+    demos = demonstrations(np.dstack([plans, valve]), ("rad", "rad", "1"))
+    _, back = played(demos, "start")
+    assert back[:, :, 2].min() >= -1e-9
+    assert back[:, :, 2].max() <= 1 + 1e-9
+    np.testing.assert_allclose(back[:, :, 2], valve[:, :, 0], atol=1e-9)
+
+
+def test_a_gripper_that_keeps_to_a_clock_is_no_start():
+    """Closed at frame 8 in all demonstrations, whenever the arm starts."""
+    demos = with_gripper((2, 2, 2, 2))
+    apart = take_apart(demos, "start")
+    off = apart.numbers[:, 0] - STARTS
+    np.testing.assert_allclose(off, off.mean(), atol=0.05)
+
+
+def test_a_few_frames_are_kept_as_recorded():
+    demos = demonstrations(swings(horizon=90)[:, ::18])
+    assert take_apart(demos, "start").timeline.kind == "none"

@@ -44,7 +44,9 @@ class Learn:
 
     def run(self) -> None:
         """Fit and save."""
-        choice = f"{self.generator},timing=align" if self.align else self.generator
+        choice = self.generator
+        if self.align:  # what auto takes for one pattern, aligned
+            choice = f"{'interpolation' if choice == 'auto' else choice},timing=align"
         if self.folder is None:
             self._learn_from_task(choice)
         elif self.simulated == FromTask():

@@ -44,11 +44,11 @@ class GeneratorRegistry(Registry[Generator]):
     def help(self) -> str:
         """The choices in one sentence, for help texts."""
         return (
-            f"{super().help}; each also with timing=start, tempo or warp (learn when and how fast "
-            "a motion runs apart from its shape), timing=auto (what the demonstrations ask for), "
-            "timing=align (align the demonstrations first) or timing=none, and with exact=yes "
-            "(demonstrations come back as recorded) or exact=no; default: timing=auto for "
-            f"{' and '.join(self._timing)}, exact=yes for {' and '.join(self._exact)}"
+            f"{super().help}; each but auto also with timing=start, tempo or warp (learn when and "
+            "how fast a motion runs apart from its shape), timing=auto (what the demonstrations "
+            "ask for), timing=align (align the demonstrations first) or timing=none, and with "
+            "exact=yes (demonstrations come back as recorded) or exact=no; default: timing=auto "
+            f"for {' and '.join(self._timing)}, exact=yes for {' and '.join(self._exact)}"
         )
 
     def make(self, choice: str, **context: Any) -> Generator:
@@ -62,6 +62,11 @@ class GeneratorRegistry(Registry[Generator]):
             ConfigurationError: Also where `exact` is neither yes nor no.
         """
         name, settings = parse_choice(choice)
+        if name == Auto.name and settings.keys() & {"timing", "exact"}:
+            raise ConfigurationError(
+                "auto chooses its timing itself, and is exact; name the generator that is to have "
+                "another, for instance interpolation,timing=align"
+            )
         timing = settings.pop("timing", self._timing.get(name, "none"))
         exact = settings.pop("exact", "yes" if name in self._exact else "no")
         if exact not in ("yes", "no"):

@@ -12,11 +12,13 @@ docs/decisions-generator.md tells.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import Any, ClassVar
 
 from typing_extensions import Self
 
 from prior_reinforce.arrays import Plans, Points
+from prior_reinforce.errors import InvalidDemonstrationsError
 from prior_reinforce.generators.base import Generator, Report
 from prior_reinforce.generators.corrected import Corrected
 from prior_reinforce.generators.diffusion import DiffusionGenerator
@@ -54,12 +56,16 @@ class Auto(Wrapper):
         groups = patterns(demonstrations)
         largest, rest = groups[0], [i + 1 for group in groups[1:] for i in group]
         learned, remarks = demonstrations, []
+        alone = None
+        if len(largest) >= demonstrations.outcome_dim + 1 + _MORE_THAN_AFFINE:
+            with suppress(InvalidDemonstrationsError):  # its outcomes may lie on a line
+                alone = demonstrations.only(largest)
         if len(groups) == 1:
             self.generator = Timed(SmoothInterpolation())
             remarks.append("generator: closed form, since the demonstrations show one pattern")
-        elif len(largest) >= demonstrations.outcome_dim + 1 + _MORE_THAN_AFFINE:
+        elif alone is not None:
             self.generator = Timed(SmoothInterpolation())
-            learned = demonstrations.only(largest)
+            learned = alone
             remarks.append(
                 f"generator: closed form, of {len(largest)} demonstrations of one pattern; "
                 f"demonstrations {_listed(rest)} move in another way, which does not mix with it, "

@@ -62,6 +62,10 @@ class Corrected(Wrapper):
         corrected = cls(generator)
         corrected._residuals, corrected._outcomes = tensors["residuals"], tensors["outcomes"]
         corrected._noise = tensors["noise"]
-        if corrected._residuals.ndim != 3 or len(corrected._residuals) != len(corrected._outcomes):
+        if (
+            corrected._residuals.ndim != 3
+            or len(corrected._residuals) != len(corrected._outcomes)
+            or corrected._noise.shape != corrected._outcomes.shape
+        ):
             raise ValueError("residuals and outcomes do not fit")
         return corrected

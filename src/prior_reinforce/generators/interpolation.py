@@ -101,6 +101,8 @@ class _Mixture(Generator):
         plans, outcomes = tensors["plans"], tensors["outcomes"]
         if plans.ndim != 3 or outcomes.ndim != 2 or len(plans) != len(outcomes):
             raise ValueError(f"plans {plans.shape} and outcomes {outcomes.shape} do not fit")
+        if tensors["noise"].shape != outcomes.shape:
+            raise ValueError(f"noise {tensors['noise'].shape} does not fit outcomes")
         generator._plans, generator._outcomes, generator._noise = plans, outcomes, tensors["noise"]
         return generator
 

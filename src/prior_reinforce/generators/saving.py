@@ -19,7 +19,7 @@ from prior_reinforce.errors import FileFormatError
 from prior_reinforce.files import sha256, write
 
 _FILE_FORMAT = "prior-reinforce generator"
-_FILE_VERSION = 3
+_FILE_VERSION = 4
 """3: start times and alignment are a `timed` generator around another, no setting of its own."""
 CONFIG_FILE = "config.json"
 TENSOR_FILE = "model.safetensors"

@@ -99,7 +99,13 @@ class Timed(Wrapper):
             self.remarks = (choice.reason,)
             return choice.apart
         assert self.timing != "align"
-        return take_apart(demonstrations, self.timing)
+        apart = take_apart(demonstrations, self.timing)
+        if apart.timeline.kind != self.timing:
+            self.remarks = (
+                f"timing: as recorded, since {demonstrations.horizon} frames are too few to be "
+                "moved without a loss",
+            )
+        return apart
 
 
 def _as_plans(apart: Apart, demonstrations: Demonstrations) -> Demonstrations:

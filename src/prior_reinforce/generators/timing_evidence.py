@@ -77,7 +77,8 @@ def choose_timing(demonstrations: Demonstrations) -> TimingChoice:
         return TimingChoice(take_apart(demonstrations, "none"), f"timing as recorded: {error}")
     if n < max(_FEWEST, demonstrations.outcome_dim + 3):
         return TimingChoice(
-            usual, f"timing: {_WORDS['start']}, as a rule; {n} demonstrations tell no better"
+            usual,
+            f"timing: {_WORDS[usual.timeline.kind]}, as a rule; {n} demonstrations tell no better",
         )
     apart: dict[WarpKind, Apart] = {
         kind: usual if kind == "start" else take_apart(demonstrations, kind) for kind in _WORTH
@@ -88,9 +89,10 @@ def choose_timing(demonstrations: Demonstrations) -> TimingChoice:
         able = [kind for kind in able if kind != "none"]
     best = min(able, key=lambda kind: errors[kind] / _WORTH[kind])
     others = ", ".join(f"{errors[kind]:.0%} {kind}" for kind in errors if kind != best)
+    words = _WORDS[apart[best].timeline.kind]
     return TimingChoice(
         apart[best],
-        f"timing: {_WORDS[best]} ({best}); outcomes of left-out demonstrations are then told from "
+        f"timing: {words} ({best}); outcomes of left-out demonstrations are then told from "
         f"the motion to {errors[best]:.0%} of their spread ({others})",
     )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from typing import Any
 
@@ -48,6 +49,20 @@ class Wrapper(Generator):
             {**own.settings, "generator": inner.generator, "settings": dict(inner.settings)},
             {**inner.tensors, **{self._key(name): value for name, value in own.tensors.items()}},
         )
+
+    @classmethod
+    def load(cls, folder: str | os.PathLike[str]) -> Self:
+        """Read what `save` wrote, with the generator within; see `Generator.load`.
+
+        Raises:
+            FileFormatError: Files are missing, truncated, or of another generator.
+        """
+        from prior_reinforce.generators import load_generator
+
+        loaded = load_generator(folder)
+        if not isinstance(loaded, cls):
+            raise FileFormatError(f"the model in {folder} is of a {loaded.name} generator")
+        return loaded
 
     @classmethod
     def wrapped(cls, saved: SavedModel) -> SavedModel:

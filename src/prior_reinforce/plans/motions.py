@@ -158,10 +158,10 @@ class Demonstrations:
                 f"outcomes have {k} components; got names {names} and units {units}"
             )
         noise = np.array(self.outcome_noise, dtype=np.float64)
-        noise = noise if noise.size else np.zeros_like(outcomes)
+        noise = noise if noise.any() else np.zeros_like(outcomes)
         if noise.shape != outcomes.shape or not np.all(np.isfinite(noise) & (noise >= 0)):
             raise InvalidDemonstrationsError(
-                f"outcome_noise must be one number of at least 0 for each of the outcomes "
+                f"outcome_noise must be one finite number of at least 0 for each of the outcomes "
                 f"{outcomes.shape}, got shape {noise.shape}"
             )
         noise.flags.writeable = False

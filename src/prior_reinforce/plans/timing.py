@@ -243,6 +243,7 @@ class Continued:
         moving = speeds[:, [0, -1]] > LARGEST_END_SPEED * speeds.max(axis=1, keepdims=True)
         slopes = np.stack([plans[:, n] - plans[:, 0], plans[:, -1] - plans[:, -1 - n]]) / n
         self._slopes = slopes * moving.T[:, :, None]
+        self._slopes[:, :, self._steps] = 0.0  # a step that has just changed does not go on
 
     def __call__(self, i: int, t: Float[np.ndarray, " L"]) -> Float[np.ndarray, "L D"]:
         """Return plan i at times t, in frames."""
