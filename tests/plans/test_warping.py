@@ -156,3 +156,15 @@ def test_a_gripper_that_keeps_to_a_clock_is_no_start():
 def test_a_few_frames_are_kept_as_recorded():
     demos = demonstrations(swings(horizon=90)[:, ::18])
     assert take_apart(demos, "start").timeline.kind == "none"
+
+
+def test_a_switch_takes_no_values_but_its_own():
+    switch = np.array([np.arange(90) > at for at in (30, 61, 42, 55)], dtype=float)
+    demos = demonstrations(np.dstack([swings(), switch]), ("rad", "rad", "1"))
+    apart, back = played(demos, "start")
+    np.testing.assert_array_equal(back[:, :, 2], switch)
+    weights = np.array([[0.31, 0.27, 0.22, 0.2]])
+    (plan,) = apart.timeline.play(
+        np.tensordot(weights, apart.shapes, axes=1), weights @ apart.numbers
+    )
+    assert set(plan[:, 2]) == {0.0, 1.0}

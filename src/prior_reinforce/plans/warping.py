@@ -88,6 +88,8 @@ class Step:
     channel: int
     phases: tuple[int, ...]
     """Where on the common phase each transition stands, in whole frames."""
+    levels: tuple[float, ...] = ()
+    """The values of a switch, which takes no others; empty where there are more."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,6 +146,10 @@ class Timeline:
                     at = (t + phase - came - self.first) * self.per_frame
                     plans[i, :, step.channel] += _linear(parts[i, :, event], at)
                 event += 1
+            if step.levels:
+                levels, values = np.array(step.levels), plans[:, :, step.channel]
+                nearest = np.abs(values[:, :, None] - levels).argmin(axis=-1)
+                plans[:, :, step.channel] = levels[nearest]
         return plans
 
     def n_channels(self, shapes: Float[np.ndarray, "n L C"]) -> int:
@@ -153,7 +159,10 @@ class Timeline:
     def settings(self) -> dict[str, Any]:
         """Everything as JSON types."""
         fields = {name: getattr(self, name) for name in self.__dataclass_fields__}
-        return {**fields, "steps": [[step.channel, list(step.phases)] for step in self.steps]}
+        return {
+            **fields,
+            "steps": [[step.channel, step.phases, step.levels] for step in self.steps],
+        }
 
     @classmethod
     def restore(cls, settings: Any) -> Timeline:
@@ -166,7 +175,8 @@ class Timeline:
         if known["kind"] not in get_args(WarpKind):
             raise ValueError(f"no warp {known['kind']!r}")
         known["steps"] = tuple(
-            Step(int(channel), tuple(map(int, phases))) for channel, phases in known["steps"]
+            Step(int(channel), tuple(map(int, phases)), tuple(map(float, levels)))
+            for channel, phases, levels in known["steps"]
         )
         for name in ("lowest", "highest"):
             known[name] = tuple(map(float, known[name]))
@@ -234,7 +244,11 @@ def take_apart(demonstrations: Demonstrations, kind: WarpKind) -> Apart:
     # Whole frames, so that a transition comes back as recorded.
     times = {d: np.round(each).astype(int) for d, each in events.items()}
     steps = tuple(
-        Step(d, tuple(round(float(phase)) for phase in each.mean(axis=0)))
+        Step(
+            d,
+            tuple(round(float(phase)) for phase in each.mean(axis=0)),
+            tuple(np.unique(plans[:, :, d]).tolist()) if found[d] == "switch" else (),
+        )
         for d, each in times.items()
         if each.shape[1]
     )
