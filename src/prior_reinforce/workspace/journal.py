@@ -39,6 +39,8 @@ BEGIN SELECT RAISE(ABORT, 'the journal is append-only'); END;
 CREATE TRIGGER IF NOT EXISTS events_are_never_deleted BEFORE DELETE ON events
 BEGIN SELECT RAISE(ABORT, 'the journal is append-only'); END;
 """
+_HEADER_BYTES = 100
+"""Of any SQLite file that has something in it (sqlite.org/fileformat.html, section 1.3)."""
 
 
 class Journal:
@@ -57,6 +59,11 @@ class Journal:
         self.appended = False
         """Whether anything became durable since it was opened here."""
         self._pending = False
+        # SQLite takes a file of a few bytes for an empty one, and would write over it.
+        if path.exists() and 0 < path.stat().st_size < _HEADER_BYTES:
+            raise WorkspaceError(
+                f"the journal {path} is damaged (shorter than its header); restore it from a copy"
+            )
         with self._named_errors():
             self._connection = sqlite3.connect(
                 path, timeout=_LOCK_TIMEOUT_S, isolation_level=None, check_same_thread=False
