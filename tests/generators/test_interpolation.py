@@ -75,3 +75,15 @@ def test_nearest_refuses_senseless_settings(setting: str, value: float):
 def test_interpolation_refuses_an_unknown_kernel():
     with pytest.raises(ConfigurationError, match=r"kernel.*gaussian"):
         SmoothInterpolationConfig(kernel="gaussian")  # type: ignore[arg-type]
+
+
+def test_plans_of_nearly_one_outcome_are_not_steep_where_outcomes_were_seen_coarsely():
+    rng = np.random.default_rng(5)
+    outcomes = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.5, 0.5], [0.5, 0.52]])
+    plans = rng.normal(size=(6, 11, 2))
+    steep = {}
+    for noise in (0.0, 0.1):
+        demos = Demonstrations(plans, outcomes, FORMAT, outcome_noise=np.full((6, 2), noise))
+        near = SmoothInterpolation().fit(demos, seed=0).generate(outcomes[4:])
+        steep[noise] = np.abs(near[1] - near[0]).max()
+    assert steep[0.1] < 0.2 * steep[0.0]

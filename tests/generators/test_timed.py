@@ -1,5 +1,7 @@
 """Timing apart from the motion, for any generator: nothing is lost, whatever was recorded."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -144,3 +146,10 @@ def test_timing_is_one_of_its_names_and_once():
         Timed(NearestNeighbours(), "late")
     with pytest.raises(ConfigurationError, match="once"):
         Timed(make_generator("regression"))
+
+
+def test_what_is_one_number_a_plan_stays_one_for_the_generator_within():
+    demos = demonstrations()
+    demos = replace(demos, format=replace(demos.format, per_plan=("c",)))
+    timed, _ = recalled(demos)
+    assert timed.generator.learned.format.per_plan[0] == "c"

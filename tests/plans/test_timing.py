@@ -6,7 +6,6 @@ import pytest
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 from prior_reinforce.plans.timing import (
     Continued,
-    ends_in_motion,
     frames_at_rest,
     middle,
     motion_span,
@@ -80,12 +79,6 @@ def test_dimensions_rest_each_on_its_own():
     starts, ends = resting_dimensions(plans)
     assert starts == (True, False)
     assert ends == (False, True)
-
-
-def test_a_recording_ends_in_motion_if_one_channel_does():
-    still = np.array([[0.0, 0], [1, 1], [1.04, 1]])
-    assert not ends_in_motion(still)
-    assert ends_in_motion(still + np.array([[0, 0], [0, 0], [0, 0.06]]))
 
 
 def test_still_bands_follow_the_largest_range_of_a_unit_and_have_a_floor():

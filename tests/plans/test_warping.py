@@ -168,3 +168,13 @@ def test_a_switch_takes_no_values_but_its_own():
         np.tensordot(weights, apart.shapes, axes=1), weights @ apart.numbers
     )
     assert set(plan[:, 2]) == {0.0, 1.0}
+
+
+def test_a_switch_that_changes_in_some_demonstrations_only_does_not_overshoot():
+    switch = np.array([np.arange(90) > at for at in (30, 61, 99, 55)], dtype=float)
+    demos = demonstrations(np.dstack([swings(), switch]), ("rad", "rad", "1"))
+    apart = take_apart(demos, "start")
+    assert apart.timeline.linear == (2,)
+    plans = apart.timeline.play(apart.shapes, apart.numbers + 0.4)
+    assert plans[:, :, 2].min() >= 0
+    assert plans[:, :, 2].max() <= 1

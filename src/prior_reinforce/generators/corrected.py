@@ -28,7 +28,10 @@ from prior_reinforce.plans.motions import Demonstrations
 
 
 class Corrected(Wrapper):
-    """A generator whose plans at demonstrated outcomes are the demonstrated plans."""
+    """A generator whose plans at measured outcomes are the demonstrated ones.
+
+    Switches are left as they were generated: between their values they have none.
+    """
 
     name: ClassVar[str] = "corrected"
     _residuals: Plans

@@ -112,8 +112,16 @@ def _as_plans(apart: Apart, demonstrations: Demonstrations) -> Demonstrations:
     """Shapes, with the numbers of their warps as further dimensions, constant over each."""
     names, units = apart.names(demonstrations.format)
     n_channels, length = apart.shapes.shape[2], apart.shapes.shape[1]
+    shapes = apart.shapes.copy()
+    for name in demonstrations.format.per_plan:  # to the last digit, also where resampled
+        shapes[:, :, names.index(name)] = shapes[:, :1, names.index(name)]
     numbers = np.repeat(apart.numbers[:, None], length, axis=1)
     return demonstrations.with_plans(
-        np.concatenate([apart.shapes, numbers], axis=2),
-        replace(demonstrations.format, names=names, units=units, per_plan=names[n_channels:]),
+        np.concatenate([shapes, numbers], axis=2),
+        replace(
+            demonstrations.format,
+            names=names,
+            units=units,
+            per_plan=(*demonstrations.format.per_plan, *names[n_channels:]),
+        ),
     )

@@ -5,7 +5,7 @@ Three measures of rest, because there are three kinds of data:
 - *Speed*, of all dimensions together, smoothed and relative to its peak, where motions are compared
   or cut out: `AT_REST`, `MOVING`, `LARGEST_END_SPEED`.
 - *The step of one dimension* from frame to frame, relative to its largest, where only that
-  dimension matters: `RESTING_STEP`, `STILL_MOVING_STEP`.
+  dimension matters: `RESTING_STEP`.
 - *The distance from an end pose*, where a recording has any rate and no frames yet: `STILL_SHARE`,
   `STILL_FLOOR`.
 
@@ -24,7 +24,7 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
-from prior_reinforce.arrays import Frames, Plans
+from prior_reinforce.arrays import Plans
 from prior_reinforce.plans.channels import kinds
 from prior_reinforce.plans.motions import Demonstrations
 
@@ -43,9 +43,6 @@ beyond it. Ours."""
 RESTING_STEP = 0.01
 """A dimension rests at an end of a plan if its step there is at most this part of its largest step.
 Ours: a plan is then generated at rest there too."""
-STILL_MOVING_STEP = 0.05
-"""A recording ends in motion if the last step of a dimension is over this part of its largest: five
-times `RESTING_STEP`, because it only warns, and of jitter it should not. Ours."""
 STILL_SHARE = 0.005
 """A channel is still within this share of the largest range of any channel of its unit. Ours: above
 encoder noise, and reached by a smooth start within its first tenth."""
@@ -166,12 +163,6 @@ def resting_dimensions(plans: Plans) -> tuple[tuple[bool, ...], tuple[bool, ...]
     slow = RESTING_STEP * steps.max(axis=(0, 1))
     start, end = (steps[:, 0] <= slow).all(axis=0), (steps[:, -1] <= slow).all(axis=0)
     return tuple(start.tolist()), tuple(end.tolist())
-
-
-def ends_in_motion(plan: Frames) -> bool:
-    """Tell whether a dimension is still moving at the last frame."""
-    steps = np.abs(np.diff(plan, axis=0))
-    return bool(np.any(steps[-1] > STILL_MOVING_STEP * np.maximum(steps.max(axis=0), 1e-9)))
 
 
 # --- recordings ---

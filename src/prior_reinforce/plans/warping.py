@@ -17,8 +17,9 @@ Phase 0 is the middle of the motion, so that start and tempo hardly depend on ea
 its recording a plan holds where it rests, and goes on with its last velocity where it does not, so
 no rest is needed at either end, and nothing is cut off. A channel that rests but for short
 transitions (`channels`) is timed by itself: its shape is split at its transitions, and when each of
-them comes is one number more. Where there is one, its last transition is phase 0: a hand that opens
-decides where the object goes, and what the arm does just then is what has to be mixed.
+them comes is one number more. If it goes with the motion, its last transition is phase 0 of
+`start`, and where `tempo` and `warp` begin their search: a hand that opens decides where the object
+goes, and what the arm does just then is what has to be mixed.
 
 Notation:
     t      time of a plan               [frames]
@@ -57,17 +58,16 @@ Numbers = Float[np.ndarray, "n P"]
 _KNOTS = 6
 """Knots of rho over the motion. Ours: two phases and a pause between them need five."""
 _STIFFNESS = 0.02
-"""Weight of rho's variance over the knots, against a motion's unit energy. Ours, see
-docs/decisions-generator.md."""
+"""Weight of rho's variance over the knots, against a motion's unit energy. Ours, not tuned."""
 _LARGEST_TEMPO = 0.7
 """Bound of |rho|: tempos differ by a factor of two at most. Ours."""
 _ROUNDS = 4
-"""Rounds of "mean of all motions, then each to it". Ours: later rounds change starts by less than a
-tenth of a frame on the zoo's sets."""
+"""Rounds of "mean of all motions, then each to it". Ours: two more change starts by 0.12
+frames at most, on six sets of the zoo's development tasks."""
 _GOES_WITH = 0.15
 """A step goes with the motion if it comes at the same time in it, to this part of the motion's
-length, standard deviation. Ours: people's grippers differ by 0.03 to 0.08 on the zoo; a gripper
-that closes by the clock, long before the motion, goes with nothing."""
+length, standard deviation. Ours: 0.02 to 0.03 on five sets of zoo-gripper; a gripper that closes by
+the clock, whenever the arm starts, goes with nothing."""
 _COMPARED = 40.0
 """Phases over the motion at which velocities are compared. Ours: they are smooth."""
 _FINE = 8
@@ -103,10 +103,11 @@ class Timeline:
     """Length of the motion between the first and the last knot, in frames."""
     first: int
     """Phase of a shape's first frame."""
+    linear: tuple[int, ...]
+    """Channels that jump, but not equally often in all demonstrations: they share the warp, and are
+    played on lines, so that they do not overshoot."""
     per_frame: int
     """Samples of a shape for each frame of phase."""
-    length: int
-    """L, samples of a shape."""
     steps: tuple[Step, ...]
     lowest: tuple[float, ...]
     """Least that each number may be: as far below the demonstrated ones as these are apart. Ours:
@@ -139,6 +140,8 @@ class Timeline:
         for i, theta in enumerate(warp):
             at = (_inverse(theta, self.span, t) - self.first) * self.per_frame
             plans[i][:, smooth] = _sample(shapes[i][:, : len(smooth)], at)
+            for d in self.linear:
+                plans[i, :, d] = _linear(shapes[i, :, smooth.index(d)], at)
         parts, event = shapes[:, :, len(smooth) :], 0
         for step in self.steps:
             for phase in step.phases:
@@ -178,6 +181,7 @@ class Timeline:
             Step(int(channel), tuple(map(int, phases)), tuple(map(float, levels)))
             for channel, phases, levels in known["steps"]
         )
+        known["linear"] = tuple(map(int, known["linear"]))
         for name in ("lowest", "highest"):
             known[name] = tuple(map(float, known[name]))
         return cls(**known)
@@ -267,15 +271,18 @@ def take_apart(demonstrations: Demonstrations, kind: WarpKind) -> Apart:
         span=span,
         first=first,
         per_frame=1,
-        length=last - first + 1,
+        linear=tuple(
+            d for d, each in enumerate(found) if each in ("step", "switch") and d not in times
+        ),
         steps=steps,
         lowest=tuple((numbers.min(axis=0) - np.ptp(numbers, axis=0)).tolist()),
         highest=tuple((numbers.max(axis=0) + np.ptp(numbers, axis=0)).tolist()),
     )
     continued = Continued(plans, plan_format.units, np.linalg.norm(profiles, axis=2))
     for per_frame in _OVERSAMPLING:
-        timeline = replace(timeline, per_frame=per_frame, length=(last - first) * per_frame + 1)
-        shapes = _shapes(timeline, continued, warp, times)
+        timeline = replace(timeline, per_frame=per_frame)
+        tau = first + np.arange((last - first) * per_frame + 1) / per_frame
+        shapes = _shapes(timeline, continued, warp, times, tau)
         if _comes_back(timeline.play(shapes, numbers), demonstrations):
             return Apart(timeline, shapes, numbers)
     if kind == "none" or timeline.horizon >= _FEW_FRAMES:
@@ -284,10 +291,13 @@ def take_apart(demonstrations: Demonstrations, kind: WarpKind) -> Apart:
 
 
 def _shapes(
-    timeline: Timeline, plans: Continued, warp: Numbers, times: dict[int, np.ndarray]
+    timeline: Timeline,
+    plans: Continued,
+    warp: Numbers,
+    times: dict[int, np.ndarray],
+    tau: Float[np.ndarray, " L"],
 ) -> Float[np.ndarray, "N L C"]:
     """Sample every plan on the common phase."""
-    tau = timeline.first + np.arange(timeline.length) / timeline.per_frame
     smooth = _others(plans.plans.shape[2], timeline.steps)
     shapes = []
     for i, theta in enumerate(warp):
