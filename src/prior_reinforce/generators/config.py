@@ -65,9 +65,11 @@ class UNetConfig(Checked):
     """Frames for each spline control point."""
     margin: NonNegative = 0.05
     """How far plans may leave the demonstrated range of a dimension, as a fraction of it."""
+    trend: Literal["affine", "zero"] = "affine"
+    """The network learns what an affine function of the outcome leaves of codes, or all of them."""
     network: UNetSize = field(default_factory=_laptop)
     """Size of the U-Net."""
-    training_steps: Count = 1000
+    training_steps: Count = 500
     """Optimiser steps."""
     learning_rate: Positive = 1e-3
     """Peak of the cosine schedule."""

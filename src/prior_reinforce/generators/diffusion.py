@@ -34,6 +34,7 @@ Sampler = Literal["mean_shift", "ddim", "ddpm"]
 PAPER: dict[str, Any] = {
     "representation": "frames",
     "margin": 0.0,
+    "trend": "zero",
     "network": {},  # the reference's
     "prediction": "epsilon",
     "sampler": "ddpm",

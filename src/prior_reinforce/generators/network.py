@@ -20,6 +20,7 @@ from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.generators.base import ConditionScale, Generator, Report
 from prior_reinforce.generators.config import UNetConfig
 from prior_reinforce.generators.saving import Tensors
+from prior_reinforce.generators.trend import AffineTrend
 from prior_reinforce.plans.codec import PlanCodec
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.registry import build
@@ -38,6 +39,7 @@ class Learned:
 
     codec: PlanCodec
     scale: ConditionScale
+    trend: AffineTrend
     network: nn.Module
     """In evaluation mode, on the device to compute on."""
     seed: int
@@ -80,11 +82,11 @@ class NetworkGenerator(Generator):
     def _train(
         self, network: nn.Module, codes: Tensor, conditions: Tensor, seed: int, progress: Report
     ) -> nn.Module:
-        """Fit the network to codes (N, C, T) of scaled conditions (N, k)."""
+        """Fit the network to what the trend leaves of codes (N, C, T), and conditions (N, k)."""
 
     @abstractmethod
     def _codes(self, learned: Learned, conditions: Tensor) -> Tensor:
-        """Make codes (n, C, T) for scaled conditions (n, k)."""
+        """Make what the trend leaves of codes (n, C, T) for scaled conditions (n, k)."""
 
     def _fit(self, demonstrations: Demonstrations, seed: int, progress: Report) -> None:
         from prior_reinforce.generators.threads import torch_threads
@@ -101,30 +103,35 @@ class NetworkGenerator(Generator):
             margin=self.config.margin,
         )
         scale = ConditionScale.fit(outcomes)
+        scaled, codes = scale.scale(outcomes), codec.encode(demonstrations.plans)
+        shape = codec.channels, codec.length, outcomes.shape[1]
+        if self.config.trend == "affine":
+            trend = AffineTrend.fit(scaled, codes)
+        else:
+            trend = AffineTrend.zero(outcomes.shape[1], codec.channels, codec.length)
         with torch_threads(self._threads):
-            shape = codec.channels, codec.length, outcomes.shape[1]
             network = self._train(
                 build(lambda: self._build(*shape), seed).to(self._device),
-                self._tensor(codec.encode(demonstrations.plans)),
-                self._tensor(scale.scale(outcomes)),
+                self._tensor(trend.remove(scaled, codes)),
+                self._tensor(scaled),
                 seed,
                 progress,
             )
-        self._learned = Learned(codec, scale, network, seed)
+        self._learned = Learned(codec, scale, trend, network, seed)
 
     def _generate(self, conditions: Points) -> Plans:
         from prior_reinforce.generators.threads import torch, torch_threads
 
         assert self._learned is not None
         learned, codec = self._learned, self._learned.codec
-        scaled = self._tensor(learned.scale.scale(conditions))
+        scaled = learned.scale.scale(conditions)
         plans = [np.empty((0, codec.horizon, len(codec.kinds)))]
         # One thread: a plan's last digits would depend on their number.
         with torch_threads(1), torch.no_grad():
-            for chunk in torch.split(scaled, _CHUNK):
-                if len(chunk):
-                    codes = self._codes(learned, chunk)
-                    plans.append(codec.decode(codes.double().cpu().numpy()))
+            for first in range(0, len(scaled), _CHUNK):
+                chunk = scaled[first : first + _CHUNK]
+                residuals = self._codes(learned, self._tensor(chunk)).double().cpu().numpy()
+                plans.append(codec.decode(learned.trend.restore(chunk, residuals)))
         return np.concatenate(plans)
 
     def state(self) -> tuple[dict[str, Any], Tensors]:
@@ -143,6 +150,8 @@ class NetworkGenerator(Generator):
                 "plan_range": learned.codec.plan_range,
                 "code_range": learned.codec.code_range,
                 "condition_range": learned.scale.range,
+                "trend": learned.trend.coefficients,
+                "trend_scale": learned.trend.scale,
             },
         )
 
@@ -155,6 +164,7 @@ class NetworkGenerator(Generator):
         generator = cls(build(cls.config_type, settings["config"]))
         codec = PlanCodec.restore(settings["codec"], tensors["plan_range"], tensors["code_range"])
         scale = ConditionScale(tensors["condition_range"])
+        trend = AffineTrend(tensors["trend"], tensors["trend_scale"])
         shape = codec.channels, codec.length, scale.range.shape[1]
         network = build_network(lambda: generator._build(*shape), seed=0)
         weights = {
@@ -164,7 +174,7 @@ class NetworkGenerator(Generator):
         }
         network.load_state_dict(weights)  # refuses missing, unknown and misshapen tensors
         network.eval().requires_grad_(False)
-        generator._learned = Learned(codec, scale, network, int(settings["seed"]))
+        generator._learned = Learned(codec, scale, trend, network, int(settings["seed"]))
         return generator
 
     def to(self, device: str) -> Self:

@@ -42,10 +42,10 @@ def test_without_variants_the_papers_comparison_and_own_methods_are_left():
     small = Scale(goals=5, seeds=(0,), sets=("A",), variants=False)
     assert [t.generator for t in Generators().trainings(small, (OWN, "nearest"))] == [
         "diffusion",
-        *("nearest", "dmp,segmented=false,exact=no", "regression,timing=none,exact=no"),
+        *("nearest", "dmp,segmented=false,exact=no", "regression,timing=none,exact=no,trend=zero"),
         "nearest,timing=align",
         "dmp,segmented=false,timing=align,exact=no",
-        "regression,timing=align,exact=no",
+        "regression,timing=align,exact=no,trend=zero",
         OWN,
     ]
 
