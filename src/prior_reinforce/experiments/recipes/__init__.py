@@ -12,6 +12,7 @@ from prior_reinforce.experiments.recipes import (
     generators,
     process,
     trials,
+    variation,
     zero_shot,
 )
 from prior_reinforce.experiments.recipes.base import (
@@ -35,6 +36,7 @@ RECIPES: Mapping[str, Recipe] = {
         trials,
         process,
         adaptation,
+        variation,
     )
 }
 """Every recipe by its name, in the order of the evidence page."""

@@ -115,6 +115,46 @@ def _draw_panel(axes: Axes, panel: Panel) -> None:
     axes.tick_params(labelcolor=INK_SOFT)
 
 
+@drawing()
+def draw_kinds(kinds: Sequence[str], panels: Mapping[str, Sequence[Line]], path: Path) -> Path:
+    """Draw a value by kind, panels side by side: a mark a method with its interval.
+
+    Args:
+        kinds: What stands below each group of marks.
+        panels: Label of the vertical axis, and the methods' values by kind.
+        path: PNG to write.
+    """
+    figure = new_figure(5.6 * len(panels), 4.6)
+    subplots = figure.subplots(1, len(panels), squeeze=False)[0]
+    for axes, (label, lines) in zip(subplots, panels.items(), strict=True):
+        calm_axes(axes)
+        for line, offset in zip(lines, np.linspace(-0.3, 0.3, len(lines)), strict=True):
+            value, low, high = (
+                np.array([point[key] for point in line.curve]) for key in ("value", "low", "high")
+            )
+            axes.errorbar(
+                np.arange(len(kinds)) + offset,
+                value,
+                yerr=[value - low, high - value],
+                color=_COLOURS[line.place % len(_COLOURS)],
+                marker=_MARKERS[line.place % len(_MARKERS)],
+                markersize=6,
+                linestyle="none",
+                elinewidth=1.3,
+                label=line.label,
+            )
+        axes.set_xticks(range(len(kinds)), kinds)
+        axes.set_ylim(bottom=0)
+        axes.set_ylabel(label)
+        axes.tick_params(labelcolor=INK_SOFT)
+    handles, labels = subplots[0].get_legend_handles_labels()
+    figure.legend(
+        handles, labels, loc="outside lower center", ncols=len(labels),
+        frameon=False, fontsize=9.5, labelcolor=INK,
+    )  # fmt: skip
+    return save_png(figure, path)
+
+
 @dataclass(frozen=True)
 class TrialsRow:
     """One line of the table of trials."""
