@@ -114,3 +114,9 @@ def test_names_are_read_without_torch_or_scipy():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize("choice", ["nearest", "interpolation,timing=start", "dmp"])
+def test_what_computes_on_the_cpu_refuses_another_device(choice):
+    with pytest.raises(ConfigurationError, match="computes on the CPU"):
+        make_generator(choice, device="cuda")

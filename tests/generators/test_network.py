@@ -8,7 +8,7 @@ import pytest
 import torch
 
 from prior_reinforce.errors import ConfigurationError, FileFormatError
-from prior_reinforce.generators import load_generator
+from prior_reinforce.generators import load_generator, training
 from prior_reinforce.generators.config import UNetSize
 from prior_reinforce.generators.diffusion import DiffusionConfig, DiffusionGenerator
 from prior_reinforce.generators.regression import UNetRegression, UNetRegressionConfig
@@ -105,3 +105,26 @@ def test_what_was_learned_on_a_gpu_is_loaded_on_either(make, throws, tmp_path):
     np.testing.assert_array_equal(on_gpu.generate(demos.outcomes_seen), plans)
     on_cpu = load_generator(tmp_path)
     np.testing.assert_allclose(on_cpu.generate(demos.outcomes_seen), plans, atol=1e-2)
+
+
+@each
+def test_a_killed_fit_goes_on_where_it_was(make, throws, tmp_path, monkeypatch):
+    monkeypatch.setattr(training, "_SAVED_EVERY", 0.0)
+    demos, states = throws(3, 20), tmp_path / "states"
+    whole = make().fit(demos, seed=0).generate(demos.outcomes_seen)
+    steps = []
+
+    def killed(progress):
+        steps.append(progress.step)
+        if len(steps) == 2:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        make(states=states).fit(demos, seed=0, progress=killed)
+    (kept,) = states.iterdir()
+    make(states=states).fit(demos, seed=1)  # another training, which leaves the state alone
+    assert list(states.iterdir()) == [kept]
+    again = make(states=states).fit(demos, seed=0, progress=lambda p: steps.append(p.step))
+    assert steps == [1, 2, 2]
+    assert np.array_equal(again.generate(demos.outcomes_seen), whole)
+    assert not list(states.iterdir())

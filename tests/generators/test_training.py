@@ -4,8 +4,11 @@ import itertools
 from dataclasses import replace
 
 import pytest
+import safetensors.torch
 import torch
 
+from prior_reinforce.errors import FileFormatError
+from prior_reinforce.generators import training
 from prior_reinforce.generators.config import UNetConfig
 from prior_reinforce.generators.training import build, learning_rate_factor, optimise
 
@@ -62,6 +65,42 @@ def test_a_minimum_is_found_and_the_mean_loss_falls():
     assert heard[-1].loss < 0.1 * heard[0].loss
     assert len(heard) == 200
     assert (heard[-1].step, heard[-1].n_steps) == (400, 400)
+
+
+def interrupted(path, config, at):
+    """Fit a line to random points until the `at`-th step; None: to the end."""
+    network, rng, asked = linear(), torch.Generator().manual_seed(5), itertools.count(1)
+
+    def loss():
+        if next(asked) == at:
+            raise KeyboardInterrupt
+        x = torch.randn((4, 1), generator=rng)
+        return ((network(x) - 3 * x) ** 2).mean()
+
+    heard = []
+    how = {"decay": lambda n: 1 - (1 + n) ** -0.75, "rng": rng, "state": path}
+    fitted = optimise(network, loss, config, heard.append, **how)
+    return fitted.weight.item(), heard[-1]
+
+
+def test_an_interrupted_training_goes_on_to_the_same_last_digit(tmp_path, monkeypatch):
+    monkeypatch.setattr(training, "_SAVED_EVERY", 0.0)
+    config = replace(CONFIG, training_steps=20)
+    whole, _ = interrupted(None, config, None)
+    for at in (8, 3, 6):
+        with pytest.raises(KeyboardInterrupt):
+            interrupted(tmp_path / "state", config, at)
+    weight, last = interrupted(tmp_path / "state", config, None)
+    assert weight == whole
+    assert last.step == 20
+
+
+def test_the_state_of_another_training_is_refused_by_its_path(tmp_path):
+    path = tmp_path / "state"
+    for content in (b"", b"x" * 64, safetensors.torch.save({"progress": torch.zeros(2)})):
+        path.write_bytes(content)
+        with pytest.raises(FileFormatError, match=str(path)):
+            interrupted(path, CONFIG, None)
 
 
 def test_a_network_is_drawn_from_its_seed_and_the_global_generator_stays():

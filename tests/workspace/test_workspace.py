@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 
 import numpy as np
 import pytest
@@ -22,7 +23,7 @@ from prior_reinforce.errors import (
     TrialStateError,
     WorkspaceError,
 )
-from prior_reinforce.generators import make_generator
+from prior_reinforce.generators import make_generator, training
 from prior_reinforce.generators.base import Generator
 from prior_reinforce.generators.interpolation import SmoothInterpolation
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
@@ -554,3 +555,24 @@ def test_a_session_that_was_open_sees_what_another_window_executes(workspace):
         session.ask()
     assert session.ask(arm_did_not_move=True).stage is Stage.ASKED
     assert session.end_execution(np.int64(1), None).stage is Stage.ASKED
+
+
+def test_a_training_that_was_interrupted_goes_on_where_it_was(tmp_path, monkeypatch):
+    monkeypatch.setattr(training, "_SAVED_EVERY", 0.0)
+    choice = "regression,training_steps=4,network.widths=8,network.groups=2,timing=none"
+    steps = []
+
+    def interrupt(progress):
+        steps.append(progress.step)
+        if len(steps) == 2:
+            raise KeyboardInterrupt
+
+    models = []
+    for folder, progresses in ((tmp_path / "a", (None,)), (tmp_path / "b", (interrupt,) * 2)):
+        with Workspace.create(folder, manifest()) as workspace:
+            workspace.import_demonstrations(demonstrations(), "made up")
+            for progress in progresses:
+                with suppress(KeyboardInterrupt):
+                    models.append(workspace.learn(choice, progress=progress).model)
+    assert steps == [1, 2, 2, 3, 4]
+    assert models[0] == models[1]

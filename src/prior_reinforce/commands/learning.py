@@ -40,6 +40,8 @@ class Learn:
     """Align the demonstrations in time first; short for the generator's setting timing=align."""
     seed: int = 0
     """Seed of the training."""
+    device: str = "cpu"
+    """Where a network is trained: cpu, or cuda for a GPU."""
     simulated: Annotated[FromTask, tyro.conf.arg(name="")] = field(default_factory=FromTask)
 
     def run(self) -> None:
@@ -61,10 +63,12 @@ class Learn:
         from prior_reinforce.commands.workspace import print_next
         from prior_reinforce.workspace.workspace import Workspace
 
-        make_generator(choice)
+        make_generator(choice, device=self.device)
         with Workspace(folder) as workspace:
             with fit_progress(Console()) as progress:
-                learned = workspace.learn(choice, seed=self.seed, progress=progress)
+                learned = workspace.learn(
+                    choice, seed=self.seed, device=self.device, progress=progress
+                )
             for remark in learned.remarks:
                 print(remark)
             print(f"model {learned.model} is in use")
@@ -72,7 +76,7 @@ class Learn:
 
     def _learn_from_task(self, choice: str) -> None:
         source, console = self.simulated, Console()
-        generator = make_generator(choice)
+        generator = make_generator(choice, device=self.device)
         _, demonstrations = open_task(source.task, source.demonstrations, self.seed)
         claim_folder(source.out)
         learn(

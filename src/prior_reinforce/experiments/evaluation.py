@@ -156,7 +156,8 @@ class Training(Unit):
         home = self._home(folder)
         if not home.is_dir():
             prior = self._prior(folder)
-            generator = make_generator(self.generator).fit(prior, seed=self.seed)
+            generator = make_generator(self.generator, states=folder / "training")
+            generator.fit(prior, seed=self.seed)
             with in_place(home) as unfinished:
                 unfinished.mkdir()
                 generator.save(unfinished / "generator")

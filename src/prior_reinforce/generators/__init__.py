@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -56,12 +57,16 @@ class GeneratorRegistry(Registry[Generator]):
 
         Args:
             choice: `name` or `module:Class`, with settings if need be: `nearest,timing=align`.
-            context: `device` and `threads`, for those that take them.
+            context: `device`, `threads` and `states`, for those that take them.
 
         Raises:
-            ConfigurationError: Also where `exact` is neither yes nor no.
+            ConfigurationError: Also where `exact` is neither yes nor no, or another device is asked
+                for than the generator computes on.
         """
         name, settings = parse_choice(choice)
+        device = context.get("device", "cpu")
+        if device != "cpu" and "device" not in inspect.signature(self.kind(name)).parameters:
+            raise ConfigurationError(f"{name} computes on the CPU, not on device {device!r}")
         if name == Auto.name and settings.keys() & {"timing", "exact"}:
             raise ConfigurationError(
                 "auto chooses its timing itself, and is exact; name the generator that is to have "

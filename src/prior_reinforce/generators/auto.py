@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from contextlib import suppress
+from pathlib import Path
 from typing import Any, ClassVar
 
 from typing_extensions import Self
@@ -40,7 +41,12 @@ class Auto(Wrapper):
     name: ClassVar[str] = "auto"
 
     def __init__(
-        self, generator: Generator | None = None, *, device: str = "cpu", threads: int = 1
+        self,
+        generator: Generator | None = None,
+        *,
+        device: str = "cpu",
+        threads: int = 1,
+        states: Path | None = None,
     ) -> None:
         """Choose where a network would be trained, if one is needed.
 
@@ -48,9 +54,10 @@ class Auto(Wrapper):
             generator: What was chosen, of a saved model; `fit` chooses anew.
             device: See `NetworkGenerator`.
             threads: See `NetworkGenerator`.
+            states: See `NetworkGenerator`.
         """
         super().__init__(generator or Timed(SmoothInterpolation()))
-        self._device, self._threads = device, threads
+        self._network: dict[str, Any] = {"device": device, "threads": threads, "states": states}
 
     def _fit(self, demonstrations: Demonstrations, seed: int, progress: Report) -> None:
         groups = patterns(demonstrations)
@@ -72,9 +79,7 @@ class Auto(Wrapper):
                 "and are left out: demonstrate those outcomes again, or learn all with diffusion"
             )
         else:
-            self.generator = Timed(
-                Corrected(DiffusionGenerator(device=self._device, threads=self._threads))
-            )
+            self.generator = Timed(Corrected(DiffusionGenerator(**self._network)))
             remarks.append(
                 f"generator: diffusion, since the demonstrations show {len(groups)} patterns that "
                 "do not mix: " + "; ".join(_listed([i + 1 for i in group]) for group in groups)

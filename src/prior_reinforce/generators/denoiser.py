@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
 from jaxtyping import Float, Int
 
@@ -40,6 +41,8 @@ def train(
     config: DiffusionConfig,
     seed: int,
     progress: Report,
+    *,
+    state: Path | None = None,
 ) -> Network:
     """Fit a network to all codes.
 
@@ -50,6 +53,7 @@ def train(
         config: Optimiser and so on.
         seed: Of noise and noise levels.
         progress: Called some 200 times.
+        state: See `optimise`.
 
     Returns:
         The network with exponentially averaged weights, in evaluation mode.
@@ -73,6 +77,8 @@ def train(
         progress,
         betas=_BETAS,
         decay=lambda n: min(1 - (1 + n) ** -config.ema_power, config.ema_limit),
+        rng=rng,
+        state=state,
     )
 
 

@@ -6,6 +6,7 @@ What it generates is a function of the condition, which the adapter needs: see `
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import msgspec
@@ -127,6 +128,7 @@ class DiffusionGenerator(NetworkGenerator):
         representation: Representation | None = None,
         device: str = "cpu",
         threads: int = 1,
+        states: Path | None = None,
     ) -> None:
         """Choose settings.
 
@@ -136,6 +138,7 @@ class DiffusionGenerator(NetworkGenerator):
             representation: Replaces the one of the settings.
             device: See `NetworkGenerator`.
             threads: See `NetworkGenerator`.
+            states: See `NetworkGenerator`.
 
         Raises:
             ConfigurationError: Both `config` and `preset`, or a device that is not there.
@@ -145,7 +148,7 @@ class DiffusionGenerator(NetworkGenerator):
         config = config or DiffusionConfig.preset(preset or "laptop")
         if representation is not None:
             config = replace(config, representation=representation)
-        super().__init__(config, device=device, threads=threads)
+        super().__init__(config, device=device, threads=threads, states=states)
 
     def _build(self, channels: int, length: int, outcome_dim: int) -> ConditionalUNet:
         from prior_reinforce.generators.unet import ConditionalUNet
@@ -153,11 +156,17 @@ class DiffusionGenerator(NetworkGenerator):
         return ConditionalUNet(channels, outcome_dim, self.config.network)
 
     def _train(
-        self, network: nn.Module, codes: Tensor, conditions: Tensor, seed: int, progress: Report
+        self,
+        network: nn.Module,
+        codes: Tensor,
+        conditions: Tensor,
+        seed: int,
+        progress: Report,
+        state: Path | None,
     ) -> nn.Module:
         from prior_reinforce.generators.denoiser import train
 
-        return train(network, codes, conditions, self.config, seed, progress)
+        return train(network, codes, conditions, self.config, seed, progress, state=state)
 
     def _codes(self, learned: Learned, conditions: Tensor) -> Tensor:
         from prior_reinforce.generators.denoiser import sample

@@ -7,9 +7,11 @@ network is used: most commands use none, and importing torch takes longer than a
 
 from __future__ import annotations
 
+import json
 from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -17,6 +19,7 @@ from typing_extensions import Self
 
 from prior_reinforce.arrays import Plans, Points
 from prior_reinforce.errors import ConfigurationError
+from prior_reinforce.files import sha256
 from prior_reinforce.generators.base import ConditionScale, Generator, Report
 from prior_reinforce.generators.config import UNetConfig
 from prior_reinforce.generators.saving import Tensors
@@ -53,7 +56,12 @@ class NetworkGenerator(Generator):
     config: UNetConfig
 
     def __init__(
-        self, config: UNetConfig | None = None, *, device: str = "cpu", threads: int = 1
+        self,
+        config: UNetConfig | None = None,
+        *,
+        device: str = "cpu",
+        threads: int = 1,
+        states: Path | None = None,
     ) -> None:
         """Choose settings.
 
@@ -63,6 +71,8 @@ class NetworkGenerator(Generator):
             threads: Threads to train on. The last digits depend on it, and two are slower than one
                 beside other work. Plans are always generated on one, so that a model means the
                 same ones everywhere.
+            states: Folder in which a training keeps its state, so that it goes on where it was
+                killed; None: it begins anew.
 
         Raises:
             ConfigurationError: A device that is not there, or no thread.
@@ -71,7 +81,7 @@ class NetworkGenerator(Generator):
             raise ConfigurationError(f"threads must be at least 1, got {threads}")
         self.config = config or self.config_type()
         self._device = _available(device)
-        self._threads = threads
+        self._threads, self._states = threads, states
         self._learned: Learned | None = None
 
     @abstractmethod
@@ -80,7 +90,13 @@ class NetworkGenerator(Generator):
 
     @abstractmethod
     def _train(
-        self, network: nn.Module, codes: Tensor, conditions: Tensor, seed: int, progress: Report
+        self,
+        network: nn.Module,
+        codes: Tensor,
+        conditions: Tensor,
+        seed: int,
+        progress: Report,
+        state: Path | None,
     ) -> nn.Module:
         """Fit the network to what the trend leaves of codes (N, C, T), and conditions (N, k)."""
 
@@ -109,14 +125,24 @@ class NetworkGenerator(Generator):
             trend = AffineTrend.fit(scaled, codes)
         else:
             trend = AffineTrend.zero(outcomes.shape[1], codec.channels, codec.length)
+        residuals = trend.remove(scaled, codes)
+        state = None
+        if self._states is not None:
+            told = json.dumps([self.name, asdict(self.config), seed]).encode()
+            known = sha256(told + residuals.tobytes() + scaled.tobytes())
+            self._states.mkdir(parents=True, exist_ok=True)
+            state = self._states / f"{known[:16]}.safetensors"
         with torch_threads(self._threads):
             network = self._train(
                 build(lambda: self._build(*shape), seed).to(self._device),
-                self._tensor(trend.remove(scaled, codes)),
+                self._tensor(residuals),
                 self._tensor(scaled),
                 seed,
                 progress,
+                state,
             )
+        if state is not None:
+            state.unlink(missing_ok=True)
         self._learned = Learned(codec, scale, trend, network, seed)
 
     def _generate(self, conditions: Points) -> Plans:

@@ -15,6 +15,7 @@ Notation:
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
 from prior_reinforce.generators.base import Report
@@ -58,7 +59,13 @@ class UNetRegression(NetworkGenerator):
         return RegressionNetwork(channels, length, outcome_dim, self.config.network)
 
     def _train(
-        self, network: nn.Module, codes: Tensor, conditions: Tensor, seed: int, progress: Report
+        self,
+        network: nn.Module,
+        codes: Tensor,
+        conditions: Tensor,
+        seed: int,
+        progress: Report,
+        state: Path | None,
     ) -> nn.Module:
         """Fit to all demonstrations at every step; the seed has drawn the initial weights."""
         from torch.nn.functional import mse_loss
@@ -66,7 +73,11 @@ class UNetRegression(NetworkGenerator):
         from prior_reinforce.generators.training import optimise
 
         return optimise(
-            network, lambda: mse_loss(network(conditions), codes), self.config, progress
+            network,
+            lambda: mse_loss(network(conditions), codes),
+            self.config,
+            progress,
+            state=state,
         )
 
     def _codes(self, learned: Learned, conditions: Tensor) -> Tensor:

@@ -1,18 +1,22 @@
 """The one optimiser loop: AdamW, a learning rate that rises and falls, averaged weights, progress.
 
-Diffusion and regression hand in what a step's loss is.
+Diffusion and regression hand in what a step's loss is. A long training keeps its state in a file,
+and goes on from there to the last digit.
 """
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, TypeVar, cast
 
-from torch.optim.lr_scheduler import LambdaLR
 from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
 
+from prior_reinforce.errors import FileFormatError
+from prior_reinforce.files import write
 from prior_reinforce.generators.base import FitProgress, Report
 from prior_reinforce.generators.config import UNetConfig
 from prior_reinforce.generators.threads import torch
@@ -21,6 +25,9 @@ _REPORTS = 200
 """Progress is told about so often in a fit."""
 _MEMORY = 100
 """Steps over which the reported loss is averaged."""
+
+_SAVED_EVERY = 60.0
+"""Time between two saved states, in [s]. Ours: what a killed training loses at most."""
 
 Network = TypeVar("Network", bound=torch.nn.Module)
 
@@ -43,6 +50,8 @@ def optimise(
     *,
     betas: tuple[float, float] = (0.9, 0.999),
     decay: Callable[[int], float] | None = None,
+    rng: torch.Generator | None = None,
+    state: Path | None = None,
 ) -> Network:
     """Fit a network, on the threads torch has.
 
@@ -54,9 +63,15 @@ def optimise(
         betas: Of AdamW.
         decay: How much of their average the averaged weights keep after n steps; no averaging if
             None.
+        rng: What `loss_of_step` draws from, if it draws.
+        state: File of this training's state, and of no other's: training goes on from there if it
+            exists, and keeps it up to date. None: nothing is kept.
 
     Returns:
         The network, with averaged weights if so, in evaluation mode.
+
+    Raises:
+        FileFormatError: The file is not the state of such a training.
     """
     optimiser = torch.optim.AdamW(
         network.parameters(),
@@ -65,25 +80,96 @@ def optimise(
         weight_decay=config.weight_decay,
         fused=True,
     )
-    schedule = LambdaLR(optimiser, lambda step: learning_rate_factor(step, config))
     average = None
     if decay is not None:
         average = AveragedModel(network, multi_avg_fn=_averaging(decay))
-    started, mean_loss, n_steps = time.monotonic(), 0.0, config.training_steps
-    for done in range(1, n_steps + 1):
+    run = _Run(network, optimiser, average, rng)
+    before, mean_loss = (0, 0.0) if state is None else run.restored(state)
+    started = saved = time.monotonic()
+    n_steps = config.training_steps
+    for done in range(before + 1, n_steps + 1):
+        for group in optimiser.param_groups:
+            group["lr"] = config.learning_rate * learning_rate_factor(done - 1, config)
         loss = loss_of_step()
         optimiser.zero_grad()
         torch.autograd.backward(loss)
         optimiser.step()
-        schedule.step()
         if average is not None:
             average.update_parameters(network)
         mean_loss += (loss.item() - mean_loss) / min(done, _MEMORY)
         if done == n_steps or done % max(1, n_steps // _REPORTS) == 0:
-            left = (time.monotonic() - started) / done * (n_steps - done)
+            left = (time.monotonic() - started) / (done - before) * (n_steps - done)
             progress(FitProgress(done, n_steps, mean_loss, left))
+        if state is not None and time.monotonic() - saved > _SAVED_EVERY:
+            run.save(state, done, mean_loss)
+            saved = time.monotonic()
     fitted = network if average is None else cast(Network, average.module)
     return fitted.eval().requires_grad_(False)
+
+
+@dataclass(frozen=True)
+class _Run:
+    """All that changes while a network is fitted."""
+
+    network: torch.nn.Module
+    optimiser: torch.optim.Optimizer
+    average: AveragedModel | None
+    rng: torch.Generator | None
+
+    def save(self, path: Path, done: int, mean_loss: float) -> None:
+        """Write it, whole or not at all."""
+        from safetensors.torch import save
+
+        moments = self.optimiser.state_dict()["state"]
+        tensors = {
+            **{f"network.{name}": value for name, value in self.network.state_dict().items()},
+            **{f"moment.{i}.{key}": v for i, of in moments.items() for key, v in of.items()},
+            "progress": torch.tensor([done, mean_loss], dtype=torch.float64),
+        }
+        if self.average is not None:
+            averaged = self.average.state_dict()
+            tensors |= {f"average.{name}": value for name, value in averaged.items()}
+        if self.rng is not None:
+            tensors["rng"] = self.rng.get_state()
+        write(path, save({name: value.contiguous() for name, value in tensors.items()}))
+
+    def restored(self, path: Path) -> tuple[int, float]:
+        """Take up what was written: steps done and the mean loss; 0 if nothing was.
+
+        Raises:
+            FileFormatError: It is damaged, or of another training.
+        """
+        from safetensors import SafetensorError
+        from safetensors.torch import load
+
+        if not path.is_file():
+            return 0, 0.0
+        try:
+            tensors = load(path.read_bytes())
+            done, mean_loss = tensors["progress"].tolist()
+            self.network.load_state_dict(_of("network.", tensors))
+            moments: dict[int, dict[str, torch.Tensor]] = {}
+            for name, value in _of("moment.", tensors).items():
+                number, key = name.split(".")
+                moments.setdefault(int(number), {})[key] = value
+            self.optimiser.load_state_dict({**self.optimiser.state_dict(), "state": moments})
+            if self.average is not None:
+                self.average.load_state_dict(_of("average.", tensors))
+            if self.rng is not None:
+                self.rng.set_state(tensors["rng"])
+        except (SafetensorError, KeyError, ValueError, RuntimeError) as error:
+            raise FileFormatError(
+                f"{path} is not the state of this training: {error}; remove it to begin anew"
+            ) from error
+        return int(done), float(mean_loss)
+
+
+def _of(prefix: str, tensors: Mapping[str, torch.Tensor]) -> dict[str, torch.Tensor]:
+    return {
+        name.removeprefix(prefix): value
+        for name, value in tensors.items()
+        if name.startswith(prefix)
+    }
 
 
 def _averaging(decay: Callable[[int], float]) -> Callable[..., None]:

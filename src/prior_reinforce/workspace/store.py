@@ -3,6 +3,7 @@
     demonstrations/<hash>.npz   one file an import
     models/<hash>/              one folder a training
     plans/trial-NNN-<hash>.npz  one file a trial
+    .training/                  the state of a training that was interrupted; no event names it
 
 An event that names a file is appended only once the file is on the disk, so that a power cut
 leaves at worst a file that nothing names.
@@ -42,6 +43,11 @@ class Store:
     def __init__(self, folder: Path) -> None:
         """Remember the workspace's folder."""
         self._folder = folder
+
+    @property
+    def training(self) -> Path:
+        """Folder of what a training goes on from."""
+        return self._folder / ".training"
 
     def save_demonstrations(self, demonstrations: Demonstrations) -> None:
         """Keep demonstrations under their hash.

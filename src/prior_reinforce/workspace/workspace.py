@@ -272,6 +272,7 @@ class Workspace:
         generator: str = "auto",
         *,
         seed: int = 0,
+        device: str = "cpu",
         progress: Callable[[FitProgress], None] | None = None,
     ) -> Training:
         """Fit a generator to the demonstrations and put it in use.
@@ -280,6 +281,7 @@ class Workspace:
             generator: Choice of the generator, for instance `auto`, `diffusion`,
                 `interpolation,timing=align` or `module:Class`.
             seed: Of the fit.
+            device: Where torch computes while it learns, `cpu` or `cuda`.
             progress: Called now and then while fitting.
 
         Raises:
@@ -292,7 +294,7 @@ class Workspace:
 
         self.session().refuse_open_trial("learning")
         demonstrations, known_as = self.demonstrations, self.log.demonstrations
-        made = make_generator(generator)
+        made = make_generator(generator, device=device, states=self.store.training)
         made.check_savable()
         fitted = made.fit(demonstrations, seed=seed, progress=progress)
         data = {
