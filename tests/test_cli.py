@@ -55,6 +55,8 @@ def test_a_reader_may_leave_before_the_end(folder, monkeypatch, capsys, args, bu
         ("status", "a/" * 2000),
         ("status", "planar\x1b[2J\nprior-reinforce: forged"),
         ("import", "planar", "no\nwhere"),
+        ("new", "other\x1b[2J", "--name", "other"),
+        ("ask", "planar", "--out", "plan\x1b[2J.npz"),
         ("new", "planar"),
         ("new", "other", "--name", "a\x1b]0;b"),
         ("new", "other", "--outcome-names", "x", "x"),

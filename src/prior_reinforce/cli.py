@@ -10,10 +10,12 @@ import io
 import os
 import pkgutil
 import sys
+import unicodedata
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, redirect_stderr
 from dataclasses import fields, is_dataclass
+from pathlib import Path
 from typing import Protocol
 
 import tyro
@@ -108,7 +110,7 @@ def _parse(args: list[str]) -> Command:
                 description="Hit a goal a robot arm has never hit, in about ten real trials.",
                 args=args,
             )
-    _check_numbers(command)
+    _check_values(command)
     return command
 
 
@@ -149,18 +151,21 @@ def _without_box(text: str) -> str:
     return "; ".join(" ".join(part.split()) for part in said) or "wrong; see --help"
 
 
-def _check_numbers(given: object, name: str = "") -> None:
-    """Refuse whole numbers that no seed, number of trials or size of an array can be.
+def _check_values(given: object, name: str = "") -> None:
+    """Refuse numbers that no seed, number of trials or size can be, and paths that move the cursor.
 
     Raises:
         ConfigurationError: One is given.
     """
     if is_dataclass(given):
         for each in fields(given):
-            _check_numbers(getattr(given, each.name), each.name)
+            _check_values(getattr(given, each.name), each.name)
     elif isinstance(given, tuple):
         for each in given:
-            _check_numbers(each, name)
+            _check_values(each, name)
+    elif isinstance(given, Path):
+        if any(unicodedata.category(char) == "Cc" for char in str(given)):
+            raise ConfigurationError(f"the path {given} holds control characters; rename it")
     elif isinstance(given, int):
         low = 0 if name == "seed" else -_LARGEST_WHOLE
         if not low <= given <= _LARGEST_WHOLE:

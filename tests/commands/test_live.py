@@ -8,7 +8,7 @@ import pytest
 from rich.console import Console
 from rich.progress import Progress
 
-from prior_reinforce.commands.live import LiveView, fit_progress
+from prior_reinforce.commands.live import LiveView, fit_progress, say
 from prior_reinforce.experiments.protocol import GoalTrials
 from prior_reinforce.generators.base import FitProgress
 
@@ -83,3 +83,11 @@ def test_a_fit_shows_its_loss_and_the_time_left(monkeypatch):
         progress(FitProgress(step=5, n_steps=10, loss=0.25, seconds_left=12.0))
     assert shown[0] == {"total": 10, "completed": 5, "detail": "loss 0.2500, 12 s left"}
     assert shown[-1]["detail"] == "done"
+
+
+def test_names_and_reasons_are_printed_as_they_are(capsys):
+    odd = (
+        "no [red]x[/red] [/] :ball: \x1b[2J in a line that is longer than any terminal is wide " * 2
+    )
+    say(Console(), odd, ("HIT", "bold"))
+    assert capsys.readouterr().out == odd.replace("\x1b", "\\x1b") + "HIT\n"

@@ -9,7 +9,7 @@ from typing import Annotated
 import tyro
 from rich.console import Console
 
-from prior_reinforce.commands.live import fit_progress
+from prior_reinforce.commands.live import fit_progress, say
 from prior_reinforce.commands.simulated import GeneratorChoice, TaskChoice, learn, open_task
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.files import claim_folder
@@ -86,6 +86,4 @@ class Learn:
             seed=self.seed,
             console=console,
         )
-        console.print(
-            f"model of {demonstrations.n} demonstrations saved in {source.out}", soft_wrap=True
-        )
+        say(console, f"model of {demonstrations.n} demonstrations saved in {source.out}")

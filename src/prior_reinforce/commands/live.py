@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn
+from rich.text import Text
 
 from prior_reinforce.arrays import Point
 from prior_reinforce.errors import InvalidFeedbackError, PerceptionFailedError
 from prior_reinforce.readings import Reading
-from prior_reinforce.wording import from_words, say_place, to_words
+from prior_reinforce.wording import from_words, plain, say_place, to_words
 
 if TYPE_CHECKING:
     from prior_reinforce.experiments.protocol import GoalTrials
@@ -22,6 +23,18 @@ if TYPE_CHECKING:
     from prior_reinforce.perception.base import Perception
     from prior_reinforce.rollouts import Rollout
     from prior_reinforce.tasks.base import Task
+
+
+def say(console: Console, *parts: str | tuple[str, str]) -> None:
+    """Print a line as it is: names and reasons hold no markup, emoji or control characters.
+
+    Args:
+        console: Where to.
+        parts: Texts, or texts with a style of rich.
+    """
+    styled = [(part, "") if isinstance(part, str) else part for part in parts]
+    shown = [(plain(text, keep="\n"), style) for text, style in styled]
+    console.print(Text.assemble(*shown), soft_wrap=True)
 
 
 class LiveView:
@@ -36,9 +49,7 @@ class LiveView:
     def goal(self, number: int, n_goals: int, goal: Point) -> None:
         """Announce a goal."""
         of_all = f" {number} of {n_goals}" if n_goals > 1 else ""
-        self._console.print(
-            f"\n[bold]goal{of_all}[/bold]: {place(self._task, goal)}", highlight=False
-        )
+        say(self._console, (f"\ngoal{of_all}", "bold"), f": {place(self._task, goal)}")
 
     def trial(self, result: GoalTrials) -> None:
         """Print the latest trial: how the condition moved, what was seen, solved or not."""
@@ -48,27 +59,25 @@ class LiveView:
         aim = "aim at the goal" if moved == "on the goal" else f"aim {moved}"
         if not first and moved != "on the goal":
             aim = f"aim moved {moved}"
-        seen = to_words(trial.error_seen)
+        words = to_words(trial.error_seen)
+        seen = ("a near miss" if words == "on the goal" else words, "")
         if trial.hit:
-            seen = "[bold green]HIT[/bold green]"
-        elif seen == "on the goal":
-            seen = "a near miss"
+            seen = ("HIT", "bold green")
         chance = "" if trial.p_hit is None else f"chance {trial.p_hit:4.0%}  "
-        self._console.print(
-            f"  trial {len(result.trials)}  {aim:<36} {chance}seen: {seen}", highlight=False
-        )
+        say(self._console, f"  trial {len(result.trials)}  {aim:<36} {chance}seen: ", seen)
 
     def end(self, result: GoalTrials) -> None:
         """Print the paper's count for this goal."""
         solved_at = result.solved_at
         if solved_at is None:
-            told = f"[bold red]not reached[/bold red] in {len(result.trials)} trials"
-        else:
-            told = (
-                f"reached: N = {self._n} demonstrations + {solved_at} "
-                f"trial{'s' if solved_at > 1 else ''} = {self._n + solved_at}"
-            )
-        self._console.print(f"  {told}", highlight=False)
+            trials = f" in {len(result.trials)} trials"
+            say(self._console, "  ", ("not reached", "bold red"), trials)
+            return
+        say(
+            self._console,
+            f"  reached: N = {self._n} demonstrations + {solved_at} "
+            f"trial{'s' if solved_at > 1 else ''} = {self._n + solved_at}",
+        )
 
     def summary(self, results: Sequence[GoalTrials]) -> None:
         """Print the count over all goals."""
@@ -76,12 +85,12 @@ class LiveView:
         if len(results) < 2 or not solved:
             return
         mean = np.mean(solved)
-        self._console.print(
-            f"\n[bold]{len(solved)} of {len(results)} goals reached[/bold], on average "
-            f"N = {self._n} + {mean:.1f} = {self._n + mean:.1f} trials",
-            highlight=False,
+        say(
+            self._console,
+            (f"\n{len(solved)} of {len(results)} goals reached", "bold"),
+            f", on average N = {self._n} + {mean:.1f} = {self._n + mean:.1f} trials",
         )
-        self._console.print(f"trials by goal: {trials_by_goal(results)}", highlight=False)
+        say(self._console, f"trials by goal: {trials_by_goal(results)}")
 
 
 def trials_by_goal(results: Sequence[GoalTrials]) -> str:
@@ -125,10 +134,10 @@ class Operator:
                 f"{failure}; there is no terminal to ask at: run in one, or choose another "
                 "--perception"
             ) from failure
-        self._print(f"not seen: {failure}")
+        say(self._console, f"  not seen: {failure}")
         latest = getattr(self._perception, "latest", None)
         if latest is not None:
-            self._print(f"picture: {latest}")
+            say(self._console, f"  picture: {latest}")
         while True:
             try:
                 text = input(
@@ -139,10 +148,7 @@ class Operator:
             except EOFError as error:
                 raise PerceptionFailedError(f"{failure}; no answer came") from error
             except InvalidFeedbackError as error:
-                self._print(str(error))
-
-    def _print(self, line: str) -> None:
-        self._console.print(f"  {line}", highlight=False, markup=False)
+                say(self._console, f"  {error}")
 
 
 @contextmanager

@@ -18,6 +18,7 @@ from rich.table import Column
 from rich.table import Table as TerminalTable
 from rich.text import Text
 
+from prior_reinforce.commands.live import say
 from prior_reinforce.errors import ConfigurationError, UnitFailedError
 from prior_reinforce.experiments.evidence import claims_table, write_evidence
 from prior_reinforce.experiments.recipes import QUICK, RECIPES, Recipe, Run, Scale, Table
@@ -76,12 +77,12 @@ class Reproduce:
                     figures = recipe.measurement.run(run)
             except UnitFailedError as error:
                 failures.append(error)  # the other recipes do not need it
-                console.print(f"{recipe.name}: {error}", markup=False, soft_wrap=True)
+                say(console, f"{recipe.name}: {error}")
             else:
                 self._keep(recipe, run, figures, console)
         if len(failures) < len(recipes):
             page, _ = write_evidence(self.out)
-            console.print(f"evidence: {page}", soft_wrap=True)
+            say(console, f"evidence: {page}")
         if failures:
             raise failures[0]
 
@@ -119,11 +120,8 @@ class Reproduce:
         if claims := recipe.claims(figures):
             console.print(_terminal(claims_table(claims), f"{recipe.title}: claims"))
         if len(run.commits) > 1:
-            console.print(
-                f"made by different code: {', '.join(sorted(run.commits))}; in a fresh --out "
-                "all of it runs anew",
-                markup=False,
-            )
+            commits = ", ".join(sorted(run.commits))
+            say(console, f"made by different code: {commits}; in a fresh --out all of it runs anew")
 
     def _check(self) -> None:
         """Refuse settings out of range, and those that would be passed over in silence."""
@@ -195,7 +193,7 @@ def _progress(console: Console, name: str) -> Iterator[OnProgress]:
         TimeElapsedColumn(),
         TextColumn("left"),
         TimeRemainingColumn(),
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
     )
     with Progress(*columns, console=console) as progress:
         line = progress.add_task(name, total=None, visible=False)
@@ -211,7 +209,7 @@ def _progress(console: Console, name: str) -> Iterator[OnProgress]:
 
 def _terminal(table: Table, title: str) -> TerminalTable:
     # As Text: rich would take [cm] for a style.
-    shown = TerminalTable(*map(_column, table.header), title=title, box=box.SIMPLE)
+    shown = TerminalTable(*map(_column, table.header), title=Text(title), box=box.SIMPLE)
     for row in table.rows:
         shown.add_row(*map(Text, row))
     return shown

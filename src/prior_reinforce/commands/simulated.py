@@ -12,7 +12,7 @@ from rich.console import Console
 
 from prior_reinforce.adapters import ADAPTERS, DEFAULT_ADAPTER, make_adapter
 from prior_reinforce.arrays import Frames, Point, Points
-from prior_reinforce.commands.live import LiveView, Operator, fit_progress, trials_by_goal
+from prior_reinforce.commands.live import LiveView, Operator, fit_progress, say, trials_by_goal
 from prior_reinforce.errors import ConfigurationError, FileFormatError, InvalidGoalError
 from prior_reinforce.files import claim_folder
 from prior_reinforce.generators import GENERATORS, make_generator
@@ -78,7 +78,7 @@ def learn(
     with fit_progress(console) as progress:
         generator = generator.fit(demonstrations, seed=seed, progress=progress)
     for remark in generator.remarks:
-        console.print(remark, markup=False)
+        say(console, remark)
     save_learned(folder, generator, demonstrations, seed)
     return generator
 
@@ -202,7 +202,7 @@ class Adapt(Simulated):
             if self.film:
                 film = film_last_trial(task, result, seed, self.out, f"goal{i}")
                 if film[0] is None:
-                    console.print(film[1])
+                    say(console, film[1])
             films.append(film)
         view.summary(results)
         facts = {
@@ -215,9 +215,9 @@ class Adapt(Simulated):
             "Earlier goals' trials used": "yes" if session.goals[-1].carry_over else "no",
         }
         page = report_adaptation(self.out, task, demonstrations, results, films, facts)
-        console.print(f"report: {page}", soft_wrap=True)
+        say(console, f"report: {page}")
         if (self.out / SEEN).is_dir() and recorded is not perception:
-            console.print(f"what was seen, with boxes and all answers: {self.out / SEEN}")
+            say(console, f"what was seen, with boxes and all answers: {self.out / SEEN}")
         return 0 if all(result.solved_at for result in results) else 1
 
     def _seen_by(self) -> str:
@@ -297,7 +297,7 @@ class Demo:
         from prior_reinforce.experiments.adaptation import recording
         from prior_reinforce.experiments.protocol import perceive_demonstrations
 
-        console.print(f"executing {recorded.n} demonstrations once, seen by {self.perception}")
+        say(console, f"executing {recorded.n} demonstrations once, seen by {self.perception}")
         eyes = recording(perception, self.out / SEEN, "demonstration")
         ask = Operator(console, task, eyes).look
         demonstrations = perceive_demonstrations(
@@ -306,7 +306,7 @@ class Demo:
         path = self.out / "demonstrations.npz"
         path.parent.mkdir(parents=True, exist_ok=True)
         demonstrations.save(path)
-        console.print(f"their outcomes, as seen: {path}", soft_wrap=True)
+        say(console, f"their outcomes, as seen: {path}")
         return demonstrations
 
 
@@ -350,20 +350,20 @@ class Rollout(Simulated):
             )
             hit = "  within the tolerance" if is_hit(rollout, aim, task.tolerance) else ""
             lost = "" if rollout.valid else "  (lost: it has no place on the table)"
-            console.print(f"rollout {number}: {place}{lost}{hit}")
+            say(console, f"rollout {number}: {place}{lost}{hit}")
         if self.repeats > 1:
             outcomes = np.array([rollout.outcome for rollout in rollouts])
             spread = [
                 f"{100 * value:.2f} cm" if unit == "m" else f"{value:.4f} {unit}"
                 for value, unit in zip(outcomes.std(axis=0, ddof=1), units, strict=True)
             ]
-            console.print("spread (sd): " + ", ".join(spread))
+            say(console, "spread (sd): " + ", ".join(spread))
         if self.film is not None:
             from prior_reinforce.report import record_film
 
             frames = task.film(plan, aim, np.random.default_rng(self.seed))
             film = record_film(frames, self.film.parent, self.film.stem)
-            console.print(f"film: {film.video}, its key moments: {film.strip}")
+            say(console, f"film: {film.video}, its key moments: {film.strip}")
 
     def _plan(self, demonstrations: Demonstrations) -> tuple[Frames, Point]:
         """The plan to execute, and the outcome that it is for."""
