@@ -1,6 +1,6 @@
-"""Three hundred damaged or odd recordings: taken in, or refused in one line and nothing changed.
+"""320 damaged or odd recordings: taken in, or refused in one line with nothing changed.
 
-Seeded: the same three hundred each time.
+Seeded: the same each time.
 """
 
 import contextlib
@@ -18,9 +18,10 @@ import zarr
 
 from prior_reinforce.cli import main
 from prior_reinforce.workspace.workspace import Workspace
+from tests.importing import recorded
 from tests.workspace.planar import demonstrations, manifest
 
-EACH = 25
+EACH = 20
 REMEDY = re.compile(
     r"give|say|write|mend|name|drop|add|export|copy|expected|record|choose|correct|measure|leave "
     r"out|rename|need|want|demonstrate",
@@ -117,9 +118,29 @@ def blanks(folder):
     return folder
 
 
+def lerobot(folder):
+    return recorded.write_lerobot(folder / "set", 20)
+
+
+def bags(folder, kind):
+    return recorded.write_bags(folder, kind=kind, count=4, rate=20, names=("joint1", "joint2"))
+
+
+def ros1(folder):
+    return bags(folder, "ros1")
+
+
+def sqlite(folder):
+    return bags(folder, "sqlite")
+
+
+def mcap(folder):
+    return bags(folder, "mcap")
+
+
 KINDS = (
     csv, semicolons, headless, together, degrees, workbook, npz, npy, robomimic, droid,
-    replay_buffer, blanks,
+    replay_buffer, blanks, lerobot, ros1, sqlite, mcap,
 )  # fmt: skip
 ODD = (
     b"", b"nan", b"1e400", b"-inf", b"\xff\xfe", b"\0", b'"', b";", b",", b"\t", b"\n", b"abc",
@@ -168,8 +189,8 @@ def test_odd_recordings_are_refused_in_one_line_and_change_nothing(tmp_path, wri
     original = tmp_path / "original"
     original.mkdir()
     inside = write(original).relative_to(original)
-    rows = [f"{i},{x},{y}" for i, (x, y) in enumerate(demonstrations().outcomes_seen)]
-    (original / "outcomes.csv").write_text("\n".join(["episode,x,y", *rows]))
+    outcomes = list(recorded.OUTCOMES.items())[: 6 if write is lerobot else 4]
+    recorded.write_outcomes(original, dict(outcomes))
     with Workspace.create(tmp_path / "hoop", manifest()):
         pass
     rng = np.random.default_rng(KINDS.index(write))

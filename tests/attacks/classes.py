@@ -6,10 +6,13 @@ import json
 import random
 import shutil
 from collections.abc import Callable
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import Stores, get_typestore
 
 from prior_reinforce.files import sha256, sha256_of_folder
 from prior_reinforce.generators import load_generator
@@ -94,19 +97,10 @@ def manifests(rng: random.Random, here: Path, asked: Path) -> str:
 def recordings(rng: random.Random, here: Path, asked: Path) -> str:
     """Recordings of any format that were damaged or crafted."""
     shutil.copytree(asked.parent / "learned", here / "planar")
+    written, inside = _written(rng.choice(list(_WRITERS)), asked.parent)
     source = here / "source"
-    source.mkdir()
-    write = rng.choice(
-        [
-            recorded.write_npz,
-            recorded.write_csv,
-            recorded.write_robomimic,
-            recorded.write_zarr,
-            recorded.write_lerobot,
-        ]
-    )
-    path = write(source)
-    recorded.write_outcomes(source)
+    shutil.copytree(written, source)
+    path = source / inside
     files = sorted(file for file in source.rglob("*") if file.is_file())
     for _ in range(rng.randrange(1, 3)):
         file = rng.choice(files)
@@ -114,10 +108,71 @@ def recordings(rng: random.Random, here: Path, asked: Path) -> str:
             np.savez(file, **_crafted(rng))
         elif file.suffix in (".json", "") and rng.random() < 0.5:
             _edit_json(rng, file)
-        else:
+        elif file.suffix == ".yaml" and rng.random() < 0.5:
+            lines = file.read_text(errors="replace").splitlines() or [""]
+            lines[rng.randrange(len(lines))] = rng.choice(_YAML)
+            file.write_text("\n".join(lines))
+        elif rng.random() < 0.1:  # a link to what is none of its business
+            file.unlink()
+            file.symlink_to(asked / "workspace.toml")
+        elif file.is_file():
             file.write_bytes(damage(rng, file.read_bytes()))
+    if inside == Path() and rng.random() < 0.3:
+        _write_odd_bag(rng, source / "odd")
     more = ["--joints", "joint1", "joint2", "--rate", "100"] if rng.random() < 0.8 else []
     return command(here, "import", "planar", str(path), *more)
+
+
+_WRITERS: dict[str, Callable[[Path], Path]] = {
+    "npz": recorded.write_npz,
+    "csv": recorded.write_csv,
+    "hdf5": recorded.write_robomimic,
+    "zarr": recorded.write_zarr,
+    "lerobot": recorded.write_lerobot,
+    "ros1": partial(recorded.write_bags, kind="ros1", rate=20),
+    "sqlite": partial(recorded.write_bags, kind="sqlite", rate=20),
+    "mcap": partial(recorded.write_bags, kind="mcap", rate=20),
+}
+_YAML = (
+    *("", "- x", "a: &a [*a]", "  message_count: 99999999999999", "  storage_identifier: sh"),
+    *("  - ../../../../etc/passwd", 'x: !!python/object/apply:os.system ["touch ran"]'),
+    *("  compression_mode: file", "  compression_mode: message", "  compression_format: zstd"),
+)
+
+
+@cache
+def _written(kind: str, place: Path) -> tuple[Path, Path]:
+    """A folder of recordings, and what in it is imported."""
+    folder = place / f"recorded-{kind}"
+    folder.mkdir()
+    path = _WRITERS[kind](folder)
+    recorded.write_outcomes(folder)
+    return folder, path.relative_to(folder)
+
+
+def _write_odd_bag(rng: random.Random, path: Path) -> None:
+    """A bag as its library writes it, of messages that are damaged or of another type."""
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    types, state = store.types, "sensor_msgs/msg/JointState"
+    stamp = types["builtin_interfaces/msg/Time"](sec=rng.choice([0, 1, -1]), nanosec=0)
+    names = rng.choice([["joint1", "joint2"], ["joint1", "joint1"], [], ["a\x1b[2J", "joint2"]])
+    numbers = np.array([rng.choice([0.1, np.nan, 1e308])] * rng.choice([2, 3, 0]))
+    message = types[state](
+        header=types["std_msgs/msg/Header"](stamp=stamp, frame_id=""),
+        name=names,
+        position=numbers,
+        velocity=numbers,
+        effort=numbers,
+    )
+    raw = bytes(store.serialize_cdr(message, state))
+    trajectory = "trajectory_msgs/msg/JointTrajectory"
+    kind = rng.choice([state, state, trajectory, "std_msgs/msg/String", "sensor_msgs/msg/Image"])
+    plugin = rng.choice([StoragePlugin.MCAP, StoragePlugin.SQLITE3])
+    with Writer(path, version=8, storage_plugin=plugin) as writer:
+        topic = writer.add_connection(rng.choice(["/q", "a\x1b[2J\nb"]), kind, typestore=store)
+        for k in range(rng.choice([0, 1, 30])):
+            sent = raw if rng.random() < 0.5 else damage(rng, raw)
+            writer.write(topic, rng.choice([k * 10**7, 0, 2**62]), sent)
 
 
 def _crafted(rng: random.Random) -> dict[str, Any]:

@@ -78,6 +78,9 @@ sys.exit(3 if kind == "crashes" else 0)
 KINDS = ("quick", "slow", "detaches", "double fork", "hangs", "will not stop", "stopped", "many")
 KINDS += ("crashes", "lies")
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGKILL)
+_EXITING = 4
+"""PF_EXITING (linux/sched.h): the kernel closes its files, and with them the lock, before it is a
+zombie."""
 NARROW = """model = "given"
 joint_names = ["joint1", "joint2"]
 lower = [-3, -3]
@@ -175,11 +178,13 @@ def _peak_velocity(folder: Path) -> float:
 
 
 def _alive(pid: int) -> bool:
+    """Whether a process still runs code of its own."""
     try:
         stat = Path(f"/proc/{pid}/stat").read_text()
     except OSError:
         return False
-    return stat.rsplit(")", 1)[1].split()[0] != "Z"
+    fields = stat.rsplit(")", 1)[1].split()
+    return fields[0] != "Z" and not int(fields[6]) & _EXITING
 
 
 def _judge(

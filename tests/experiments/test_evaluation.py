@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
+import shutil
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from prior_reinforce.errors import EndpointError, PerceptionFailedError
+from prior_reinforce.errors import EndpointError, FileFormatError, PerceptionFailedError
 from prior_reinforce.experiments.evaluation import (
     GOAL_SEED,
     PerceivedDemonstrations,
@@ -16,7 +18,7 @@ from prior_reinforce.experiments.evaluation import (
     ZeroShot,
 )
 from prior_reinforce.experiments.protocol import perceive_demonstrations
-from prior_reinforce.experiments.units import result_of
+from prior_reinforce.experiments.units import result_of, result_path
 from prior_reinforce.perception.base import Perception
 from prior_reinforce.perception.eye import Eye
 from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
@@ -110,3 +112,15 @@ def test_an_endpoint_that_does_not_answer_is_no_eye(tmp_path):
     unit = Trials(TRAINING, "basketball-v1", "gp", "vlm", 1, rounds=1, model=nobody)
     with pytest.raises(EndpointError, match="is the server running"):
         unit.run(tmp_path)
+
+
+def test_what_an_earlier_version_perceived_is_refused_in_one_line(tmp_path):
+    training = Training("basketball-v1", "A", "nearest", 0, perception="eye")
+    training.learned(tmp_path)
+    path = result_path(tmp_path, training.perceived)
+    kept = json.loads(path.read_text())
+    del kept["result"]["outcome_noise"]
+    path.write_text(json.dumps(kept))
+    shutil.rmtree(tmp_path / "models")
+    with pytest.raises(FileFormatError, match=r"is of an earlier version.*fresh --out"):
+        training.learned(tmp_path)

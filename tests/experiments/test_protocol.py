@@ -28,6 +28,7 @@ from prior_reinforce.readings import Reading
 from prior_reinforce.rollouts import Rollout
 from prior_reinforce.tasks import make_task
 from prior_reinforce.tasks.base import Task
+from prior_reinforce.wording import from_words
 
 TASK = make_task("basketball-v1")
 RECORDED = TASK.demonstrations("A")
@@ -183,3 +184,13 @@ def test_a_goal_counts_as_reached_from_the_round_that_reached_it():
     expected = [np.mean(solved_at <= number) for number in range(1, 5)]
     np.testing.assert_array_equal(success_by_round(results, 4), expected)
     np.testing.assert_allclose(results[0].errors[0], OFF, atol=1e-3)  # the goal is aimed at first
+
+
+def test_a_demonstration_of_which_only_the_direction_is_said_is_refused_in_one_line():
+    def point(failure, rollout, goal, rng):
+        return replace(from_words("long, left", 2), error_seen=rng.normal(size=2))
+
+    with pytest.raises(
+        InvalidDemonstrationsError, match="nobody said how far demonstration 0 went"
+    ):
+        seen(Blind(), on_failed_reading=point)

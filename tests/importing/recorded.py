@@ -223,6 +223,7 @@ def write_bag(
     header_type = store.types["std_msgs/msg/Header"]
     rng = np.random.default_rng(i)
     t, q = sampled(i, rate)
+    q = q[:, : len(names)]
     base = 1_700_000_000
 
     def header(seconds: float) -> object:

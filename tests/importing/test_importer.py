@@ -1,22 +1,19 @@
-"""Formats are told apart, episodes chosen, and damage of any kind is a named error."""
+"""Formats are told apart and episodes chosen; damage is `tests/test_odd_recordings.py`."""
 
 import builtins
 import importlib
 import shutil
-import warnings
+from dataclasses import replace
 
 import h5py
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
 
 from prior_reinforce.errors import (
     ConfigurationError,
     FileFormatError,
     InvalidDemonstrationsError,
     MissingExtraError,
-    PriorReinforceError,
     UnclearUnitsError,
 )
 from prior_reinforce.importing import (
@@ -165,7 +162,7 @@ def test_the_originals_are_good(originals, name):
 
 @pytest.mark.parametrize("rate", [0.0, -5.0, float("nan")])
 def test_the_rate_is_checked(originals, rate):
-    with pytest.raises(PriorReinforceError, match="positive number of frames a second"):
+    with pytest.raises(ConfigurationError, match="positive number of frames a second"):
         read_recordings(originals["npz"], rate=rate)
 
 
@@ -226,68 +223,6 @@ def test_episodes_are_left_out_by_name(originals):
         read_recordings(originals["csv"], episodes=["1"], leave_out=["1"])
 
 
-damage = given(
-    cut=st.booleans(),
-    file=st.floats(0, 1, exclude_max=True),
-    where=st.floats(0, 1, exclude_max=True),
-    bit=st.integers(0, 7),
-)
-
-
-def tries(n):
-    """So many examples; each damages a fresh copy, so sharing the folder between them is safe."""
-    unsafe = [HealthCheck.function_scoped_fixture]
-    return settings(max_examples=n, deadline=None, suppress_health_check=unsafe)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["npz", "csv", "robomimic"])
-@tries(100)
-@damage
-def test_damaged_bytes(originals, tmp_path, name, cut, file, where, bit):
-    import_damaged(originals[name], tmp_path, name, cut, file, where, bit)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["lerobot", "droid", "zarr", "ros1", "sqlite", "mcap"])
-@tries(25)
-@damage
-def test_damaged_bytes_of_slower_formats(originals, tmp_path, name, cut, file, where, bit):
-    import_damaged(originals[name], tmp_path, name, cut, file, where, bit)
-
-
-def import_damaged(original, tmp_path, name, cut, file, where, bit):
-    """Import a copy with one file cut short or one bit flipped; only named errors may come."""
-    folder = tmp_path / "damaged"
-    shutil.rmtree(folder, ignore_errors=True)
-    shutil.copytree(original, folder)
-    files = sorted(path for path in folder.rglob("*") if path.is_file())
-    path = files[int(file * len(files))]
-    content = bytearray(path.read_bytes())
-    position = int(where * len(content))
-    if cut:
-        content = content[:position]
-    else:
-        content[position] ^= 1 << bit
-    path.write_bytes(bytes(content))
-    before = {p: p.read_bytes() for p in folder.rglob("*") if p.is_file()}
-    with warnings.catch_warnings():
-        # A flipped bit may make an angle that looks like degrees; that is a warning's business.
-        warnings.simplefilter("ignore", UserWarning)
-        try:
-            result = import_demonstrations(
-                source_of(folder, name), joints=JOINTS, **OPTIONS.get(name, {})
-            )
-        except PriorReinforceError as error:
-            message = str(error)
-        else:
-            message = "a flipped bit that no format protects"
-            assert np.all(np.isfinite(result.demonstrations.plans))
-    assert message
-    assert "\n" not in message
-    assert {p: p.read_bytes() for p in folder.rglob("*") if p.is_file()} == before
-
-
 @pytest.mark.parametrize("name", ["npz", "csv", "robomimic"])
 @pytest.mark.parametrize("value", [np.nan, np.inf])
 def test_a_value_that_is_not_finite_is_named_with_its_episode_and_frame(
@@ -341,3 +276,18 @@ def test_only_demonstrations_of_one_kind_are_joined(originals):
         InvalidDemonstrationsError, match=r"plans of .*dt=0.02.*import all together"
     ):
         appended(fifty, twenty)
+
+
+def test_a_motion_that_comes_twice_is_refused(originals, tmp_path):
+    folder = tmp_path / "recordings"
+    shutil.copytree(originals["npz"], folder)
+    shutil.copy(folder / "throw_1.npz", folder / "throw_6.npz")
+    write_outcomes(folder, OUTCOMES | {"6": (1.2, 0.3)})
+    said = "throw_1 and throw_6 are one motion to the last number"
+    with pytest.raises(InvalidDemonstrationsError, match=said):
+        import_demonstrations(folder)
+    kept = import_demonstrations(folder, leave_out=["throw_6"]).demonstrations
+    other = replace(kept, outcomes_seen=kept.outcomes_seen + 0.01)
+    said = "demonstration 0 so far and new one 0 are one motion"
+    with pytest.raises(InvalidDemonstrationsError, match=said):
+        appended(kept, other)

@@ -86,3 +86,22 @@ def test_a_damaged_bag_that_was_not_asked_for_does_not_matter(tmp_path):
         read_recordings(tmp_path)
     found = read_recordings(tmp_path, episodes=["throw2", "throw0"])
     assert [recording.episode for recording in found] == ["throw2", "throw0"]
+
+
+def test_a_link_out_of_a_bag_is_not_read(tmp_path):
+    bag = write_bag(tmp_path / "throw0", 0, kind="mcap", rate=20)
+    (file,) = bag.glob("*.mcap")
+    file.rename(tmp_path / "secret.mcap")
+    file.symlink_to(tmp_path / "secret.mcap")
+    with pytest.raises(FileFormatError, match="is a link out of"):
+        read_recordings(bag)
+
+
+def test_a_bag_that_claims_more_messages_than_a_day_has_is_not_read(tmp_path):
+    bag = write_bag(tmp_path / "throw0", 0, kind="sqlite", rate=20)
+    claims = (
+        (bag / "metadata.yaml").read_text().replace("message_count: 35", f"message_count: {10**12}")
+    )
+    (bag / "metadata.yaml").write_text(claims)
+    with pytest.raises(FileFormatError, match="1e\\+12 numbers; that is no recording"):
+        read_recordings(bag)

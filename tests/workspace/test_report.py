@@ -1,6 +1,10 @@
 """The report of a workspace."""
 
+import subprocess
+import sys
+
 import numpy as np
+import pytest
 
 from prior_reinforce.trials import Stage, Trial
 from prior_reinforce.workspace.report import _checks
@@ -50,3 +54,16 @@ def test_the_plan_that_came_nearest_to_a_limit_is_shown():
     ]
     rows = [(row.check, row.status, row.trial) for row in _checks(trials)]
     assert rows == [("velocity", "pass", 2), ("jerk", "warn", 1), ("box", "pass", 2)]
+
+
+@pytest.mark.slow
+def test_two_reports_at_once_are_both_whole(run, folder, tmp_path):
+    run("goal", folder, "0.9", "0.05")
+    run("ask", folder)
+    program = [sys.executable, "-m", "prior_reinforce.cli", "report", folder]
+    both = [subprocess.Popen(program, stderr=subprocess.PIPE, text=True) for _ in range(2)]
+    said = [program.communicate()[1] for program in both]
+    assert [program.returncode for program in both] == [0, 0], said
+    report = tmp_path / "planar" / "report"
+    assert "</html>" in (report / "report.html").read_text()
+    assert not list(report.glob(".unfinished*"))

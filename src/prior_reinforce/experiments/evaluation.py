@@ -13,6 +13,7 @@ from jaxtyping import Float
 
 from prior_reinforce.adapters import make_adapter
 from prior_reinforce.arrays import Points
+from prior_reinforce.errors import FileFormatError
 from prior_reinforce.experiments.learned import own_class
 from prior_reinforce.experiments.protocol import (
     GoalTrials,
@@ -21,7 +22,7 @@ from prior_reinforce.experiments.protocol import (
     run_goals,
     unseen_goals,
 )
-from prior_reinforce.experiments.units import Unit, digest_of, result_of
+from prior_reinforce.experiments.units import Unit, digest_of, result_of, result_path
 from prior_reinforce.files import in_place
 from prior_reinforce.generators import Generator, load_generator, make_generator
 from prior_reinforce.perception import make_perception
@@ -173,6 +174,11 @@ class Training(Unit):
         demonstrations = self.recorded()
         if self.perceived is not None:
             seen = result_of(folder, self.perceived)
+            if "outcome_noise" not in seen:
+                raise FileFormatError(
+                    f"{result_path(folder, self.perceived)} is of an earlier version, which did "
+                    "not keep how uncertain outcomes are; delete it, or choose a fresh --out"
+                )
             demonstrations = replace(
                 demonstrations,
                 outcomes_seen=np.array(seen["outcomes_seen"]),

@@ -31,6 +31,7 @@ from prior_reinforce.importing.preprocessing import (
     Preprocessing,
     Selection,
     preprocess,
+    refuse_copies,
     select,
 )
 from prior_reinforce.importing.preview import Preview
@@ -168,6 +169,7 @@ def import_demonstrations(
     partial = how.get("episodes") is not None or how.get("leave_out") is not None
     outcomes_seen = outcomes_of(recordings, known, partial=partial)
     done = preprocess(kept.recordings, kept.units, preprocessing or Preprocessing())
+    refuse_copies(done.plans, [recording.episode for recording in recordings])
     demonstrations = Demonstrations(
         done.plans,
         outcomes_seen,
@@ -229,7 +231,7 @@ def appended(before: Demonstrations, more: Demonstrations) -> Demonstrations:
     """Return demonstrations with more of them; the shorter motions hold their last pose.
 
     Raises:
-        InvalidDemonstrationsError: They mean other numbers, or have an outcome twice.
+        InvalidDemonstrationsError: They mean other numbers, or have an outcome or a motion twice.
     """
     for what, one, other in (
         ("plans of", before.format, more.format),
@@ -246,6 +248,8 @@ def appended(before: Demonstrations, more: Demonstrations) -> Demonstrations:
         np.pad(d.plans, ((0, 0), (0, horizon - d.horizon), (0, 0)), mode="edge")
         for d in (before, more)
     ]
+    said = [f"demonstration {i} so far" for i in range(before.n)]
+    refuse_copies(np.concatenate(plans), [*said, *(f"new one {i}" for i in range(more.n))])
     outcomes = np.concatenate([before.outcomes_seen, more.outcomes_seen])
     noise = np.concatenate([before.outcome_noise, more.outcome_noise])
     return replace(more, plans=np.concatenate(plans), outcomes_seen=outcomes, outcome_noise=noise)

@@ -301,6 +301,28 @@ def preprocess(
     )
 
 
+def refuse_copies(plans: Plans, names: Sequence[str]) -> None:
+    """Do nothing where no two motions are one to the last number, as no two recordings are.
+
+    Args:
+        plans: N of them.
+        names: What to call each.
+
+    Raises:
+        InvalidDemonstrationsError: A file was copied, or one plan was executed twice: what lies
+            between its outcomes would be asked of the same motion.
+    """
+    first: dict[bytes, str] = {}
+    for plan, name in zip(plans, names, strict=True):
+        other = first.setdefault(plan.tobytes(), name)
+        if other != name:
+            raise InvalidDemonstrationsError(
+                f"{other} and {name} are one motion to the last number; if a file was copied, drop "
+                "it, and if one plan was executed twice, give it once, with the middle of where it "
+                "landed (--leave-out)"
+            )
+
+
 _ENDS, _GAPS, _READING, _STEPS, _LONG = range(5)
 """Kinds of remarks, the most important first: what the gate will refuse, what is not known, what
 was left out or chosen."""

@@ -13,11 +13,13 @@ from typing import Any
 import numpy as np
 
 from prior_reinforce.errors import FileFormatError
+from prior_reinforce.files import inside
 from prior_reinforce.importing.clock import Times
 from prior_reinforce.importing.naming import find_channels
 from prior_reinforce.importing.recording import (
     ReadOptions,
     Recording,
+    check_size,
     has_suffix,
     named_damage,
     natural_order,
@@ -48,11 +50,15 @@ def read(source: Path, options: ReadOptions) -> list[Recording]:
         name = bag.name if bag.is_dir() else bag.stem
         if not any(e == name or e.startswith(f"{name}-") for e in options.episodes or (name,)):
             continue
+        # A link inside could name any file of this machine.
+        for path in bag.iterdir() if bag.is_dir() else ():
+            inside(path, bag)
         with named_damage(bag, "a ROS bag"):
             # Bags from before ROS 2 Iron carry no definitions; these two messages never changed.
             definitions = get_typestore(Stores.LATEST)
             with AnyReader([bag], default_typestore=definitions) as reader:
                 connections, kind = _topic(bag, reader, options.key)
+                check_size(bag, connections[0].topic, (reader.message_count,))
                 messages = [
                     (stamp, reader.deserialize(raw, connection.msgtype))
                     for connection, stamp, raw in reader.messages(connections=connections)
@@ -72,8 +78,8 @@ def _bags_at(source: Path) -> list[Path]:
     """The bags a path stands for: itself, or those of its folder; empty if there are none."""
     if _is_bag(source):
         return [source]
-    inside = source.iterdir() if source.is_dir() else ()
-    return sorted(filter(_is_bag, inside), key=natural_order)
+    found = source.iterdir() if source.is_dir() else ()
+    return sorted(filter(_is_bag, found), key=natural_order)
 
 
 def _is_bag(path: Path) -> bool:

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from prior_reinforce.errors import FileFormatError
+from prior_reinforce.files import inside
 from prior_reinforce.importing.clock import Stamps
 from prior_reinforce.importing.recording import (
     NO_COLUMN,
@@ -150,12 +151,8 @@ def _metadata(source: Path) -> Iterator[tuple[str, bytes]]:
                 if member.endswith(names):
                     yield member, packed.read(member)
         return
-    inside = source.resolve()
     for path in sorted(source.rglob("*")):
-        if path.is_symlink() and not path.resolve().is_relative_to(inside):
-            raise FileFormatError(
-                f"{path} is a link that leads out of the store, which is not read; copy the store "
-                "with its files"
-            )
+        if path.is_symlink():
+            inside(path, source)
         if path.name in names:
             yield path.relative_to(source).as_posix(), path.read_bytes()

@@ -159,6 +159,12 @@ class Demonstrations:
             )
         noise = np.array(self.outcome_noise, dtype=np.float64)
         noise = noise if noise.any() else np.zeros_like(outcomes)
+        if noise.shape == outcomes.shape and np.any(np.isposinf(noise)):
+            row = int(np.argmax(np.isposinf(noise).any(axis=1)))
+            raise InvalidDemonstrationsError(
+                f"nobody said how far demonstration {row} went, only where to; a demonstration "
+                "needs a place: measure or estimate it, or leave it out"
+            )
         if noise.shape != outcomes.shape or not np.all(np.isfinite(noise) & (noise >= 0)):
             raise InvalidDemonstrationsError(
                 f"outcome_noise must be one finite number of at least 0 for each of the outcomes "
