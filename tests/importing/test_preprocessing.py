@@ -190,6 +190,15 @@ def test_smoothing_takes_noise_out_and_says_what_it_changed():
         preprocess(noisy, UNITS, Preprocessing(dt=0.002, smooth=250.0))
 
 
+def test_smoothing_slower_than_the_motion_is_refused():
+    still = Preprocessing(dt=1e-5, trim=False, smooth=20.0)
+    t = np.arange(2000) * 1e-5  # 20 ms
+    with pytest.raises(
+        ConfigurationError, match=r"faster than 0\.05 s, and episode 0 is 0\.02 s long"
+    ):
+        preprocess([Recording("0", t, np.column_stack([t, t]))], UNITS[:2], still)
+
+
 def test_smoothing_leaves_a_gripper_alone():
     t = np.arange(100) / 100
     q = np.column_stack([np.sin(t), (t >= 0.5) * 0.08])

@@ -245,3 +245,15 @@ def test_reading_one_loads_nothing_heavy():
     code = "import sys, prior_reinforce.workspace.manifest; print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert not set(heavy) & set(done.stdout.split())
+
+
+def test_frames_closer_than_an_arms_cycle_are_refused_before_anything_is_recorded(tmp_path):
+    with pytest.raises(
+        ConfigurationError, match=r"dt = 0\.0005: is less than an arm's cycle of 0\.001 s"
+    ):
+        load_manifest(write(tmp_path, manifest(robot="panda", dt=0.0005, **SEVEN)))
+    assert (
+        load_manifest(write(tmp_path, manifest(robot="panda", dt=0.001, **SEVEN))).format.dt
+        == 0.001
+    )
+    assert load_manifest(write(tmp_path, manifest(dt=0.0005))).robot is None

@@ -384,6 +384,11 @@ def _smoothed(
             f"--smooth {frequency:g} Hz is no less than half the plans' {1 / dt:g} Hz, where "
             "nothing is faster; give less, or leave it out"
         )
+    if frequency * len(frames) * dt < 1:
+        raise ConfigurationError(
+            f"--smooth {frequency:g} Hz takes out all that is faster than {1 / frequency:.3g} s, "
+            f"and episode {recording.episode} is {len(frames) * dt:.3g} s long; give more Hz"
+        )
     sections = butter(2, frequency, fs=1 / dt, output="sos")
     pad = min(len(frames) - 1, math.ceil(1 / (frequency * dt)))
     # Mirrored at an end, a channel keeps its rest there; turned about it, its speed.

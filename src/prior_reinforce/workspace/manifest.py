@@ -17,6 +17,7 @@ import msgspec
 import numpy as np
 
 from prior_reinforce.errors import ConfigurationError, FileFormatError, PriorReinforceError
+from prior_reinforce.plans.interpolation import RATE
 from prior_reinforce.plans.motions import PlanFormat
 from prior_reinforce.robots import (
     GateSettings,
@@ -215,6 +216,11 @@ class _Reader:
             raise self.error("task", "name", "must not be empty")
         if plan["dt"] > _IMPLAUSIBLE_SECONDS:
             raise self.error("plan", "dt", "looks like milliseconds or a rate; give seconds")
+        if robot["model"] != "none" and plan["dt"] < (1 - 1e-9) / RATE:
+            cycle = (
+                f"is less than an arm's cycle of {1 / RATE:g} s, within which nothing is checked"
+            )
+            raise self.error("plan", "dt", f"{cycle}; give more")
         names, units, tolerance = outcome["names"], outcome["units"], outcome["tolerance"]
         if len(names) != len(units):
             raise self.error("outcome", "units", f"must name one unit for each of {list(names)}")
