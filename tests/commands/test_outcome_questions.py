@@ -41,16 +41,20 @@ def typing(monkeypatch, answers):
 
 def test_what_was_typed_is_kept_answer_by_answer(run, folder, tmp_path, monkeypatch):
     recordings(tmp_path / "none", outcomes=[])
-    typing(monkeypatch, ["0.8 -0.2", "80 20 cm"])
+    typing(monkeypatch, ["0.8 -0.2", "80 20 cm +- 5 cm"])
     assert run("import", folder, "none")[0] == 130
-    typing(monkeypatch, ["1.0 -0.2", "1.0 0.2"])
+    typing(monkeypatch, ["1.0 -0.2 +- x", "100cm ahead, 20cm right ± 2cm", "1.0 0.2"])
     status, out, _ = run("import", folder, "none")
     assert status == 0
+    assert "cannot read 'x'" in out
+    assert "100 cm ahead, 20 cm right, give or take 2 cm" in out
     assert "typed before, in planar/outcomes.csv: throw_0, throw_1" in out
     with Workspace(folder) as workspace:
         np.testing.assert_allclose(
             workspace.demonstrations.outcomes_seen, demonstrations().outcomes_seen
         )
+        noise = workspace.demonstrations.outcome_noise
+    np.testing.assert_allclose(noise, np.transpose([[0, 0.05, 0.02, 0]] * 2))
     recordings(tmp_path / "others", outcomes=[])
     typed = (tmp_path / "planar" / "outcomes.csv").read_text()
     typing(monkeypatch, ["0.7 0"])

@@ -165,3 +165,44 @@ def test_a_table_to_fill_in_has_the_episodes_names_and_the_units(tmp_path):
     path.write_text(path.read_text().replace("[m]", "[cm]").replace("1,,", "1,92,3"))
     assert read_outcomes(path).values == {"throw_1": (0.92, 3.0)}
     assert missing_outcomes(["throw_1", "a,b"], read_outcomes(path)) == ["a,b"]
+
+
+@pytest.mark.parametrize(
+    ("head", "unit", "noise"),
+    [
+        ("episode,x,y,sd", None, 0.02),
+        ("episode,x [m],y [m],sd_cm", None, 0.0002),
+        ("episode,x,y,sd [m]", "cm", 0.02),
+        ("episode,x,y,SD", "cm", 0.0002),
+    ],
+)
+def test_a_table_may_say_how_uncertain_outcomes_are(recording, tmp_path, head, unit, noise):
+    scale = 100 if unit else 1
+    rows = [f"{name},{scale * x},{scale * y},0.02" for name, (x, y) in OUTCOMES.items()]
+    rows[1:3] = [rows[1].removesuffix("0.02"), rows[2].removesuffix("0.02") + "0"]
+    path = table(tmp_path, "\n".join([head, *rows]))
+    result = import_demonstrations(recording, outcomes=path, outcome_unit=unit)
+    expected = np.full((len(OUTCOMES), 2), noise)
+    expected[1:3] = 0.0
+    np.testing.assert_allclose(result.demonstrations.outcome_noise, expected)
+    np.testing.assert_allclose(result.demonstrations.outcomes_seen, list(OUTCOMES.values()))
+    assert f"uncertain by up to {1000 * noise:.2g} mm" in result.preview.text
+
+
+def test_one_uncertainty_is_of_one_unit(recording, tmp_path):
+    path = table(
+        tmp_path, "episode,x,turn,sd\n" + "".join(f"{i},{i},{int(i) % 2},1\n" for i in OUTCOMES)
+    )
+    with pytest.raises(
+        ConfigurationError, match=r"sd in .* is one number for components in m, rad"
+    ):
+        import_demonstrations(recording, outcomes=path, outcome_units=("m", "rad"))
+
+
+@pytest.mark.parametrize(("head", "unit"), [("episode,x [m],y [m]", None), ("episode,x,y", "m")])
+def test_centimetres_that_are_said_to_be_metres_are_refused(recording, tmp_path, head, unit):
+    rows = [f"{name},{100 * x},{100 * y}" for name, (x, y) in OUTCOMES.items()]
+    path = table(tmp_path, "\n".join([head, *rows]))
+    said = r"x is said to be in m and would reach 105 m.*call its column x \[cm\]"
+    with pytest.raises(InvalidDemonstrationsError, match=said):
+        import_demonstrations(recording, outcomes=path, outcome_unit=unit, take_guesses=True)

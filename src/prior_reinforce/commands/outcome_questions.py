@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import count
@@ -24,8 +25,9 @@ from prior_reinforce.importing.outcomes import (
     Outcomes,
     headed,
     outcomes_of,
+    uncertainty_of,
 )
-from prior_reinforce.wording import in_words, read_place, say_place
+from prior_reinforce.wording import in_words, read_place, say_length, say_place
 from prior_reinforce.workspace.manifest import Manifest
 
 _SKIP, _BACK = ("skip", "s"), ("back", "b")
@@ -61,13 +63,14 @@ def ask_for_outcomes(
         InvalidDemonstrationsError: The person stopped typing; the answers so far are kept.
         WorkspaceError: The disk is full, or the folder read-only.
     """
-    outcomes: dict[str, tuple[float, ...]] = {}
+    outcomes: dict[str, tuple[float, ...]] = {}  # the components, and how uncertain they are
     for recording in recordings:
         try:
             found = outcomes_of([recording], known, partial=True)[0]
         except InvalidDemonstrationsError:
             continue
-        outcomes[recording.episode] = tuple(found.tolist())
+        sd = uncertainty_of([recording], known)[0, 0]
+        outcomes[recording.episode] = (*found.tolist(), float(sd))
     missing = [r.episode for r in recordings if r.episode not in outcomes]
     if not missing:
         return None
@@ -95,7 +98,10 @@ def ask_for_outcomes(
         else:
             skipped.discard(episode)
             outcomes[episode] = answer
-            print(f"  {say_place(answer, manifest.outcome_names, manifest.outcome_units)}")
+            *place, sd = answer
+            said = say_place(place, manifest.outcome_names, manifest.outcome_units)
+            give = f", give or take {say_length(sd, manifest.outcome_units)}" if sd else ""
+            print(f"  {said}{give}")
         _keep(table, source, outcomes, manifest)
         number += 1
     _keep(table, source, outcomes, manifest)
@@ -121,7 +127,7 @@ def _keep(
     """Write all that is known of a source to the table in the workspace."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["episode", *headed(manifest.outcome_names, manifest.outcome_units), _SOURCE])
+    writer.writerow(["episode", *_heads(manifest), _SOURCE])
     for episode, values in outcomes.items():
         writer.writerow([episode, *map(repr, values), source.resolve()])
     with named_disk_errors(table.parent):
@@ -132,18 +138,28 @@ def _typed_before(table: Path, source: Path, manifest: Manifest) -> dict[str, tu
     """Outcomes that were typed for the same source."""
     if not table.is_file():
         return {}
-    names = headed(manifest.outcome_names, manifest.outcome_units)
+    *names, sd = _heads(manifest)  # the first tables had no such column
     with table.open(newline="", encoding="utf-8") as file:
         rows = [row for row in csv.DictReader(file) if row.get(_SOURCE) == str(source.resolve())]
     try:
-        return {row["episode"]: tuple(float(row[name]) for name in names) for row in rows}
+        return {
+            row["episode"]: (*(float(row[name]) for name in names), float(row.get(sd) or 0.0))
+            for row in rows
+        }
     except (KeyError, TypeError, ValueError):
         return {}  # changed by hand, or of another task: asked for again
+
+
+def _heads(manifest: Manifest) -> list[str]:
+    """What the columns of numbers are called."""
+    units = manifest.outcome_units
+    return headed((*manifest.outcome_names, "sd"), (*units, units[0]))
 
 
 def _explanation(manifest: Manifest, missing: Sequence[str]) -> str:
     names = " ".join(manifest.outcome_names)
     units = ", ".join(dict.fromkeys(manifest.outcome_units))
+    unit = "cm" if units == "m" else ""
     words = ""
     if in_words(manifest.outcome_units):
         k = len(manifest.outcome_names)
@@ -152,12 +168,13 @@ def _explanation(manifest: Manifest, missing: Sequence[str]) -> str:
         words += f'"{", ".join(example)}"'
     return (
         f"{len(missing)} episodes have no outcome: where did the object land, in the table frame?\n"
-        f"type {names} [{units}]{words}; skip leaves an episode out, back goes back one"
+        f"type {names} [{units}]{words}; +- 2{unit} behind it says how "
+        "uncertain it is; skip leaves an episode out, back goes back one"
     )
 
 
 def _ask(question: str, episode: str, table: Path, manifest: Manifest) -> tuple[float, ...] | str:
-    """A place, `skip` or `back`."""
+    """A place and how uncertain it is, `skip` or `back`."""
     while True:
         try:
             text = input(question).strip()
@@ -170,7 +187,12 @@ def _ask(question: str, episode: str, table: Path, manifest: Manifest) -> tuple[
             if text.lower() in words:
                 return words[0]
         try:
-            place = read_place(text, manifest.outcome_names, manifest.outcome_units)
-            return tuple(place.tolist())
+            said, *give = re.split(r"\+-|\+/-|±", text, maxsplit=1)
+            place = read_place(said, manifest.outcome_names, manifest.outcome_units)
+            unit = manifest.outcome_units[:1]
+            sd = abs(read_place(give[0], ("+-",), unit)[0]) if give else 0.0
+            if sd and len(set(manifest.outcome_units)) > 1:
+                raise InvalidFeedbackError("+- is for components of one unit; leave it out")
+            return (*place.tolist(), float(sd))
         except InvalidFeedbackError as error:
             print(error)

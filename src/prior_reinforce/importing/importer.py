@@ -25,7 +25,13 @@ from prior_reinforce.errors import (
 from prior_reinforce.importing import csv, hdf5, lerobot, npz, ros, zarr
 from prior_reinforce.importing.clock import TIME_UNITS
 from prior_reinforce.importing.inspection import Inspection, hold_against
-from prior_reinforce.importing.outcomes import find_outcomes, in_order, in_units, outcomes_of
+from prior_reinforce.importing.outcomes import (
+    find_outcomes,
+    in_order,
+    in_units,
+    outcomes_of,
+    uncertainty_of,
+)
 from prior_reinforce.importing.preprocessing import (
     Preprocessed,
     Preprocessing,
@@ -124,8 +130,8 @@ def import_demonstrations(
 
     Args:
         source: As in `read_recordings`.
-        outcomes: Where each demonstration's object landed: a CSV `episode,x,y[,z]`, or numbers by
-            episode name. None takes `outcomes.csv` beside or inside the source.
+        outcomes: Where each demonstration's object landed: a CSV `episode,x,y[,z][,sd]`, or numbers
+            by episode name. None takes `outcomes.csv` beside or inside the source.
         outcome_names: Names of the k components, in order, matched to the CSV's columns; None
             takes those as they stand.
         outcome_units: Unit of each component; None is metres.
@@ -176,6 +182,7 @@ def import_demonstrations(
         PlanFormat(kept.names, kept.units, done.dt),
         tuple(outcome_names) if outcome_names is not None else known.names,
         tuple(outcome_units) if outcome_units is not None else (),
+        uncertainty_of(recordings, known),
     )
     found = _inspection(kept, done, robot, gate)
     preview = Preview(f"{source.name} ({kind})", found, demonstrations, known.where)

@@ -1,8 +1,9 @@
 """Where each demonstration's object landed: no recording format says, so a table beside it does.
 
 `outcomes.csv` has a line of column names, `episode` among them; every other column is a component
-of the outcome, except `source`, `note` and `comment`. A column `x_cm` or `x [mm]` is converted to
-`x` in metres, and an angle likewise to radians.
+of the outcome, except `source`, `note` and `comment`, and `sd`, by which the row's components are
+uncertain. A column `x_cm` or `x [mm]` is converted to `x` in metres, and an angle likewise to
+radians.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import math
 import os
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -38,7 +39,8 @@ from prior_reinforce.importing.units import (
 )
 
 OUTCOMES_FILE = "outcomes.csv"
-_NOT_COMPONENTS = ("episode", "source", "note", "notes", "comment", "comments")
+_SD = "sd"
+_NOT_COMPONENTS = (_SD, "episode", "source", "note", "notes", "comment", "comments")
 
 
 @dataclass(frozen=True)
@@ -53,6 +55,10 @@ class Outcomes:
     """k numbers by episode; metres and radians where their unit is said."""
     units: tuple[str | None, ...] = ()
     """Unit of each component; None where the source says none."""
+    sd: Mapping[str, float] = field(default_factory=dict)
+    """How uncertain each component is, by episode; nothing where it was measured."""
+    sd_unit: str | None = None
+    """Unit of that; None is the first component's."""
 
 
 def find_outcomes(
@@ -140,9 +146,10 @@ def read_outcomes(path: Path, names: Sequence[str] | None = None) -> Outcomes:
         raise FileFormatError(f"no outcomes at {path}; give the path of a table episode,x,y")
     table = read_tables(path)[0]
     split = [split_unit(name, CHANNEL_UNITS) for name in table.names]
-    lower = [name.lower() for name in table.names]
+    lower = [name.lower() for name, _ in split]
     episode = next((i for i, name in enumerate(lower) if name in EPISODE_COLUMNS), None)
     columns = [i for i, name in enumerate(lower) if i != episode and name not in _NOT_COMPONENTS]
+    uncertain = lower.index(_SD) if _SD in lower else None
     if names is not None and set(names) <= {split[i][0] for i in columns}:
         columns = [i for i in columns if split[i][0] in names]
     kept = [split[i][0] for i in columns]
@@ -154,6 +161,7 @@ def read_outcomes(path: Path, names: Sequence[str] | None = None) -> Outcomes:
     units = [table.units[i] or split[i][1] for i in columns]
     bases = [base_of(unit) if unit else (None, 1.0) for unit in units]
     values: dict[str, tuple[float, ...]] = {}
+    sd: dict[str, float] = {}
     for row, name in enumerate(table.texts(episode)):
         line = table.lines[row]
         if name in values:
@@ -162,7 +170,11 @@ def read_outcomes(path: Path, names: Sequence[str] | None = None) -> Outcomes:
         if any(one.texts(i)[0] for i in columns):
             numbers = [_number(path, line, one, i) for i in columns]
             values[name] = tuple(n * u[1] for n, u in zip(numbers, bases, strict=True))
-    return Outcomes(str(path), tuple(kept), values, tuple(unit for unit, _ in bases))
+            if uncertain is not None and one.texts(uncertain)[0] not in ("", "0", "0.0"):
+                sd[name] = _number(path, line, one, uncertain)
+    sd_unit = None if uncertain is None else table.units[uncertain] or split[uncertain][1]
+    bare = tuple(unit for unit, _ in bases)
+    return Outcomes(str(path), tuple(kept), values, bare, sd, sd_unit)
 
 
 def in_order(outcomes: Outcomes, names: Sequence[str] | None) -> Outcomes:
@@ -186,7 +198,7 @@ def in_order(outcomes: Outcomes, names: Sequence[str] | None) -> Outcomes:
     order = [outcomes.names.index(name) for name in names]
     values = {name: tuple(v[i] for i in order) for name, v in outcomes.values.items()}
     units = tuple(outcomes.units[i] for i in order)
-    return Outcomes(outcomes.where, tuple(names), values, units)
+    return replace(outcomes, names=tuple(names), values=values, units=units)
 
 
 def in_units(
@@ -201,8 +213,9 @@ def in_units(
             nothing could land there, the one it looks like.
 
     Raises:
-        ConfigurationError: A component is in a unit that cannot be converted, or `given` has no
-            use.
+        ConfigurationError: A component is in a unit that cannot be converted, `given` has no use,
+            or one `sd` stands for components of several units.
+        InvalidDemonstrationsError: What is said of a unit cannot be.
     """
     k = max((len(value) for value in outcomes.values.values()), default=0)
     said = outcomes.units or (None,) * k
@@ -216,6 +229,11 @@ def in_units(
             f"--outcome-unit {given} has no use, since {outcomes.where} says its units; drop it"
         )
     names = outcomes.names or tuple(map(str, range(1, k + 1)))
+    if outcomes.sd and len(set(wanted)) > 1:
+        raise ConfigurationError(
+            f"{_SD} in {outcomes.where} is one number for components in {', '.join(wanted)}; leave "
+            "that column out"
+        )
     scale, looks = [], dict[str, list[str]]()
     for i, (name, own, unit) in enumerate(zip(names, said, wanted, strict=True)):
         reach = max((abs(value[i]) for value in outcomes.values.values()), default=0.0)
@@ -223,6 +241,13 @@ def in_units(
         if own is None and given is None and recorded != unit:
             looks.setdefault(recorded, []).append(f"{name} reaches {reach:.4g}")
         scale.append(conversion(recorded, unit, f"{name} in {outcomes.where}"))
+        looks_like = guess_unit(unit, reach * scale[-1])
+        if looks_like != unit:
+            raise InvalidDemonstrationsError(
+                f"in {outcomes.where}, {name} is said to be in {recorded} and would reach "
+                f"{reach * scale[-1]:.4g} {unit}, too far for an arm; if it is in {looks_like}, "
+                f"call its column {name} [{looks_like}]"
+            )
     doubts = tuple(
         Doubt(
             f"in {outcomes.where}, {' and '.join(reached)}, too far for an arm: it looks like "
@@ -235,7 +260,9 @@ def in_units(
         episode: tuple(v * s for v, s in zip(value, scale, strict=False))
         for episode, value in outcomes.values.items()
     }
-    return Outcomes(outcomes.where, outcomes.names, values, wanted), doubts
+    own_scale = conversion(outcomes.sd_unit, wanted[0], _SD) if outcomes.sd_unit else scale[0]
+    sd = {episode: own_scale * value for episode, value in outcomes.sd.items()}
+    return Outcomes(outcomes.where, outcomes.names, values, wanted, sd, wanted[0]), doubts
 
 
 def missing_outcomes(episodes: Sequence[str], outcomes: Outcomes) -> list[str]:
@@ -286,6 +313,20 @@ def outcomes_of(recordings: Sequence[Recording], outcomes: Outcomes, *, partial:
                 "measure it, or leave that episode out"
             )
     return np.array(rows, dtype=np.float64)
+
+
+def uncertainty_of(recordings: Sequence[Recording], outcomes: Outcomes) -> Points:
+    """Return how uncertain each recording's outcome is, shape (N, k), in order; 0 where measured.
+
+    Args:
+        recordings: N of them, all with an outcome.
+        outcomes: By episode, in the wanted units.
+    """
+    episodes = [recording.episode for recording in recordings]
+    picked = _matched(episodes, list(outcomes.values))
+    k = len(next(iter(outcomes.values.values())))
+    rows = [outcomes.sd.get(picked[episode], 0.0) for episode in episodes]
+    return np.tile(np.array(rows, dtype=np.float64)[:, None], k)
 
 
 def _matched(episodes: list[str], names: list[str]) -> dict[str, str]:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from jaxtyping import Float, Int
 
-from prior_reinforce.importing.inspection import Inspection, in_rows
+from prior_reinforce.importing.inspection import Inspection, in_rows, say_small
 from prior_reinforce.importing.preprocessing import Preprocessed
 from prior_reinforce.importing.recording import Recording
 from prior_reinforce.plans.motions import Demonstrations
@@ -64,6 +64,9 @@ class Preview:
         demos = self.demonstrations
         outcomes = zip(demos.outcome_names, demos.outcome_units, demos.outcomes_seen.T, strict=True)
         ranges = ", ".join(f"{n} {v.min():.3g} to {v.max():.3g} {u}" for n, u, v in outcomes)
+        if np.any(demos.outcome_noise):
+            most = say_small(float(demos.outcome_noise.max()), demos.outcome_units[0])
+            ranges += f", uncertain by up to {most}"
         rows = {
             "episodes": f"{demos.n} from {self.source}: {', '.join(self.episodes)}",
             **self.found.rows,
