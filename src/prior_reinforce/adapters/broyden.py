@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from jaxtyping import Float
 
 from prior_reinforce.adapters.base import Adapter
 from prior_reinforce.arrays import Point
@@ -57,6 +58,11 @@ class BroydenAdapter(Adapter):
             square = float(step @ step)
             if square > _LEAST_STEP**2:
                 slope = self._slope + np.outer(moved - self._slope @ step, step) / square
-                left, singular, right = np.linalg.svd(slope)
-                self._slope = left @ np.diag(np.clip(singular, *_SINGULAR)) @ right
+                self._slope = bounded(slope)
         self._last = now
+
+
+def bounded(slope: Float[np.ndarray, "k k"]) -> Float[np.ndarray, "k k"]:
+    """The same slope of outcomes, no direction's beyond a factor of two of 1."""
+    left, singular, right = np.linalg.svd(slope)
+    return np.asarray(left @ np.diag(np.clip(singular, *_SINGULAR)) @ right)
