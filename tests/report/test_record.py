@@ -52,3 +52,13 @@ def test_a_record_checks_what_it_is_given():
         replace(record, goal=np.array([0.9]))
     with pytest.raises(ConfigurationError, match="2 trials need as many"):
         replace(record, outcomes=(GOAL,))
+
+
+def test_seconds_count_as_metres_by_the_spread_of_the_demonstrations():
+    """One metric for tolerance, distances and pictures: that of sessions."""
+    mixed = adaptation(seed=1, units=("m", "s"), most=1)
+    spread = mixed.demonstrations.outcomes_seen.std(axis=0)
+    seconds = 0.3 * spread[1]  # 0.3 spreads of seconds are 0.3 spreads of metres
+    assert mixed.distance(np.array([0.0, seconds])) == pytest.approx(0.3 * spread[0])
+    np.testing.assert_allclose(mixed.radius, 0.015 * np.array([1.0, spread[1] / spread[0]]))
+    assert told([0.03, 0.04]).distance(np.array([0.03, 0.04])) == pytest.approx(0.05)

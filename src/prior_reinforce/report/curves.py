@@ -45,11 +45,11 @@ def draw_errors(record: AdaptationRecord) -> Figure:
     true: dict[int, float] = {}
     for x, (trial, truth) in enumerate(zip(record.trials, record.true_outcomes, strict=True), 1):
         if truth is not None:
-            true[x] = float(np.linalg.norm(truth - record.goal)) * record.scale
+            true[x] = record.distance(truth - record.goal) * record.scale
         if trial.error_seen is None:
             _write(axes, trial.stage.value, (x, tolerance), (0, 12), rotation=90, ha="center")
             continue
-        off = float(np.linalg.norm(trial.error_seen))
+        off = record.distance(trial.error_seen)
         seen[x] = off * record.scale
         colour = trial_colour(x - 1, n, hit=trial.hit)
         axes.plot(x, seen[x], "o", color=colour, markersize=10, clip_on=False, zorder=5)

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from jaxtyping import Float
 from matplotlib.axes import Axes
-from matplotlib.patches import Circle, FancyArrowPatch, Rectangle
+from matplotlib.patches import Ellipse, FancyArrowPatch, Rectangle
 from matplotlib.ticker import MaxNLocator
 
 from prior_reinforce.arrays import Point
@@ -115,14 +115,16 @@ class Panel:
     def draw_goal(self, record: AdaptationRecord) -> None:
         """Draw a goal and all that counts as reached."""
         x, y = self._place(record.goal)
-        radius = record.tolerance * record.scale
+        radius = record.radius * record.scale
+        across = radius[self._view.across]
         if self._view.up is None:
-            self._axes.axvspan(x - radius, x + radius, color=GOAL, alpha=0.13, linewidth=0)
+            self._axes.axvspan(x - across, x + across, color=GOAL, alpha=0.13, linewidth=0)
             self._axes.axvline(x, color=GOAL, linewidth=1.6, zorder=2)
             return
         edge: Any = {"facecolor": "none", "edgecolor": GOAL, "linewidth": 1.6, "zorder": 4}
-        self._axes.add_patch(Circle((x, y), radius, facecolor=GOAL, alpha=0.13, zorder=1))
-        self._axes.add_patch(Circle((x, y), radius, **edge))
+        size = 2 * across, 2 * radius[self._view.up]
+        self._axes.add_patch(Ellipse((x, y), *size, facecolor=GOAL, alpha=0.13, zorder=1))
+        self._axes.add_patch(Ellipse((x, y), *size, **edge))
         self._axes.plot(x, y, "+", color=GOAL, markersize=7, markeredgewidth=1.6, zorder=4)
 
     def draw_trials(

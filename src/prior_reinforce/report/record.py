@@ -9,6 +9,7 @@ Notation (docs/notation.md):
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,8 @@ from jaxtyping import Float
 from prior_reinforce.arrays import Point, as_goal
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.plans.motions import Demonstrations
-from prior_reinforce.trials import Stage, Trial
+from prior_reinforce.plans.normalisation import Normalisation
+from prior_reinforce.trials import Goal, Stage, Trial
 
 Box = Float[np.ndarray, "2 k"]
 """Lower and upper corner of a region of outcomes."""
@@ -56,7 +58,7 @@ class AdaptationRecord:
     goal: Point
     """g tilde, in the outcomes' units."""
     tolerance: float
-    """epsilon, in the same units."""
+    """epsilon, in the first component's unit (`Normalisation.metric`)."""
     trials: tuple[Trial, ...]
     """All trials in order, voided and open ones too; one without a plan is not drawn over time."""
     title: str = ""
@@ -94,6 +96,21 @@ class AdaptationRecord:
         """Stage-2 trials up to and with the first hit; None while the goal is not reached."""
         return next((n for n, trial in enumerate(self.told, start=1) if trial.hit), None)
 
+    @cached_property
+    def _aimed(self) -> Goal:
+        """The goal as sessions know it, with the metric of these demonstrations."""
+        metric = Normalisation.of(self.demonstrations).metric
+        return Goal(1, self.goal, self.tolerance, metric)
+
+    def distance(self, error: Point) -> float:
+        """How far an error is from the goal, in the first component's unit; see `Goal.distance`."""
+        return self._aimed.distance(error)
+
+    @property
+    def radius(self) -> Point:
+        """The tolerance along each component alone, in its own unit."""
+        return self._aimed.radius
+
     @property
     def landings(self) -> tuple[Point | None, ...]:
         """Perceived outcome r tilde of each trial; None unless told.
@@ -126,6 +143,6 @@ class AdaptationRecord:
     def _landing(self, trial: Trial) -> Point | None:
         if trial.error_seen is None:
             return None
-        distance = float(np.linalg.norm(trial.error_seen))
+        distance = self.distance(trial.error_seen)
         share = self.tolerance / distance if trial.hit and distance > self.tolerance else 1.0
         return self.goal + share * trial.error_seen

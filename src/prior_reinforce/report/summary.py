@@ -122,7 +122,7 @@ def _row(record: AdaptationRecord, i: int, trial: Trial) -> TrialRow:
             seen, state, result = _OPEN[trial.stage], "open", "open"
         return TrialRow(trial.number, state, aim, seen, "–", "", result)
     truth = record.true_outcomes[i]
-    truly_off = None if truth is None else float(np.linalg.norm(truth - record.goal))
+    truly_off = None if truth is None else record.distance(truth - record.goal)
     result = "hit" if trial.hit else "miss"
     # The truth, once known, is admitted where it disagrees.
     disagrees = truly_off is not None and (truly_off <= record.tolerance) != trial.hit
@@ -131,7 +131,7 @@ def _row(record: AdaptationRecord, i: int, trial: Trial) -> TrialRow:
         state=result,
         aim=aim,
         seen=say_error(trial.error_seen, names, units),
-        off=say_length(float(np.linalg.norm(trial.error_seen)), units),
+        off=say_length(record.distance(trial.error_seen), units),
         truly_off="" if truly_off is None else say_length(truly_off, units),
         result=f"taken for a {result}" if disagrees else result,
     )
