@@ -17,6 +17,7 @@ it: labels of seeds 0 to 2, goals and draws of the reported seed.
 from __future__ import annotations
 
 import argparse
+import itertools
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -334,7 +335,7 @@ def show_expectations(results: Results) -> None:
     )
     print("| P(hit) said | hit | trials to go said | took | trials |\n|---|---|---|---|---|")
     edges = [0, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 1.0]
-    for low, high in zip(edges[:-1], edges[1:], strict=True):
+    for low, high in itertools.pairwise(edges):
         here = (p >= low) & (p < high if high < 1 else p <= 1)
         if here.any():
             print(f"| {p[here].mean():.2f} | {hit[here].mean():.2f} | {expected[here].mean():.2f} "

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from prior_reinforce.report.curves import draw_errors, draw_plans
+from prior_reinforce.report.curves import draw_errors, draw_plans, draw_trials_by_goal
+from prior_reinforce.report.style import HIT
 from tests.report.swing_world import told
 
 GOAL = np.array([0.92, -0.10])
@@ -73,3 +74,13 @@ def test_a_joint_at_rest_is_not_blown_up_to_its_noise():
     figure = draw_plans(held)
     assert np.ptp(figure.axes[3].get_ylim()) > 0.02
     assert sum(figure.axes[3].get_ylim()) / 2 == pytest.approx(0.5, abs=1e-4)
+
+
+def test_trials_by_goal_are_those_up_to_the_hit_and_say_where_none_did():
+    reached, missed = told([0.05, 0.0], None, [0.0, 0.01]), told([0.05, 0.0], [0.03, 0.0])
+    (axes,) = draw_trials_by_goal([reached, missed, told([0.0, 0.0])]).axes
+    (way,) = [line for line in axes.lines if line.get_linestyle() == "-"]
+    np.testing.assert_array_equal(way.get_xydata(), [[1, 2], [2, 2], [3, 1]])
+    assert [text.get_text() for text in axes.texts] == ["2", "2, not reached", "1"]
+    fills = [line.get_markerfacecolor() for line in axes.lines if line.get_marker() == "o"]
+    assert fills == [HIT, "white", HIT]

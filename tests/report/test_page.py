@@ -119,7 +119,7 @@ def test_what_users_write_is_escaped(report):
 
 
 def test_every_picture_says_what_it_shows(report):
-    assert len(report[1].alts) == 1 + 2 * 5 + 1
+    assert len(report[1].alts) == 2 + 2 * 5 + 1
     assert all(len(alt) > 20 for alt in report[1].alts)
     assert any("voided: ball slipped" in alt for alt in report[1].alts)
 

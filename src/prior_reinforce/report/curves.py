@@ -1,12 +1,14 @@
-"""Pictures over trials and over time: the error by trial, and the plans joint by joint."""
+"""Pictures over goals, trials and time: trials by goal, the error by trial, plans by joint."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from prior_reinforce.arrays import Frames
 from prior_reinforce.plans.motions import Demonstrations
@@ -14,6 +16,7 @@ from prior_reinforce.report.record import AdaptationRecord
 from prior_reinforce.report.style import (
     DEMONSTRATION,
     GOAL,
+    HIT,
     INK,
     INK_SOFT,
     calm_axes,
@@ -29,6 +32,31 @@ _COLUMNS = 4
 _LEAST_TRIALS = 3  # that the error's axis has room for
 _LEAST_SHARE = 0.02
 """Ours: a joint that moves less than this share of what moves most is drawn as nearly at rest."""
+
+
+@drawing()
+def draw_trials_by_goal(records: Sequence[AdaptationRecord]) -> Figure:
+    """Draw how many trials each goal took, one goal after another; hollow where none hit."""
+    figure = new_figure(5.4, 2.2)
+    axes = figure.subplots()
+    calm_axes(axes)
+    axes.grid(visible=False, axis="x")
+    places = range(1, len(records) + 1)
+    counts = [record.trials_to_hit or len(record.told) for record in records]
+    axes.plot(places, counts, "-", color=DEMONSTRATION, linewidth=1.5, zorder=3)
+    for place, count, record in zip(places, counts, records, strict=True):
+        hit = record.trials_to_hit is not None
+        fill: Any = {"markerfacecolor": HIT if hit else "white", "markeredgecolor": HIT}
+        axes.plot(place, count, "o", markersize=9, clip_on=False, zorder=5, **fill)
+        said = str(count) if hit else f"{count}, not reached"
+        _write(axes, said, (place, count), (0, 8), color=INK, ha="center")
+    axes.set_ylim(0, 1.35 * max([2, *counts]))
+    axes.set_xlim(0.5, len(records) + 0.5)
+    axes.set_xticks(places, [str(place) for place in places])
+    axes.yaxis.set_major_locator(MaxNLocator(5, integer=True))
+    axes.set_xlabel("goal, in order")
+    axes.set_ylabel("trials")
+    return figure
 
 
 @drawing()

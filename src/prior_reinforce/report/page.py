@@ -56,6 +56,7 @@ def write_report(
     Raises:
         ConfigurationError: No adaptations, or a region of wrong shape.
     """
+    from prior_reinforce.report.curves import draw_trials_by_goal
     from prior_reinforce.report.pictures import draw_table
 
     if not adaptations:
@@ -76,6 +77,9 @@ def write_report(
         headline=headline(adaptations),
         overview=_picture(draw_table(adaptations, box), folder / "overview.png")
         if one_table
+        else None,
+        by_goal=_picture(draw_trials_by_goal(adaptations), folder / "trials-by-goal.png")
+        if len(adaptations) > 1
         else None,
         sections=[
             _section(folder, record, f"goal-{number}", called, box)
