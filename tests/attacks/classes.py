@@ -26,6 +26,10 @@ Attack = Callable[[random.Random, Path, Path], str]
 """Of a source of chance, an empty folder, and a workspace with one open trial to copy from."""
 
 
+_READERS = ["status", "ask", "log"] * 3 + ["report"]
+"""Commands that only look; a report draws pictures, which takes as long as ten others."""
+
+
 def flags(rng: random.Random, here: Path, asked: Path) -> str:
     """Any command of a workspace with any words behind it."""
     shutil.copytree(asked, here / "planar")
@@ -91,7 +95,7 @@ def manifests(rng: random.Random, here: Path, asked: Path) -> str:
         (here / "planar" / "workspace.toml").write_bytes(damage(rng, content.encode()))
     else:
         (here / "planar" / "workspace.toml").write_text(content, encoding="utf-8")
-    return command(here, rng.choice(["status", "ask", "log", "report"]), "planar")
+    return command(here, rng.choice(_READERS), "planar")
 
 
 def recordings(rng: random.Random, here: Path, asked: Path) -> str:
@@ -304,7 +308,7 @@ def journals(rng: random.Random, here: Path, asked: Path) -> str:
             _edit(rng, data)
             with workspace.log.exclusive():
                 workspace.log.append(rng.choice([kind, rng.choice(kinds)]), data)
-    name = rng.choice(["status", "ask", "log", "report", "tell", "void", "export"])
+    name = rng.choice([*_READERS, *["tell", "void", "export"] * 3])
     more = {"tell": ["1", "--hit"], "void": ["1"], "export": ["1", "plan.csv"]}.get(name, [])
     return command(here, name, "planar", *more)
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-KILLS = 40
+KILLS = 25
 
 
 @pytest.mark.slow
