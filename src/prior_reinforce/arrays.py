@@ -32,6 +32,11 @@ Points = Float[np.ndarray, "n k"]
 Point = Float[np.ndarray, " k"]
 """One outcome, condition, goal or error."""
 
+FARTHEST = 5.0
+"""In [m]; ours: no arm on a table reaches, throws or is seen farther, so more is another unit."""
+LARGEST_TURN = 7.0
+"""In [rad]; ours: joints of arms turn one turn (6.28 rad) either way, so more is degrees."""
+
 
 def as_plans(
     values: ArrayLike, action_dim: int, *, name: str = "plans", single: bool = False

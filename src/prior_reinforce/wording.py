@@ -24,6 +24,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
+from prior_reinforce.arrays import FARTHEST
 from prior_reinforce.errors import InvalidFeedbackError
 from prior_reinforce.readings import EYE_BETWEEN, OPEN_ERROR, Reading
 
@@ -54,8 +55,6 @@ _TO_UNIT = {
     ("deg", "rad"): math.pi / 180,
     ("rad", "deg"): 180 / math.pi,
 }
-_FARTHEST_PLACE = 5.0
-"""Ours, in [m]: no arm on a table throws farther; such a number is centimetres."""
 _SOMEWHERE = "somewhere"
 _ON_THE_GOAL = ("on the goal", "0")
 _HITS = {"hit": True, "miss": False}
@@ -201,7 +200,7 @@ def read_place(text: str, names: Sequence[str], units: Sequence[str]) -> _Point:
     if len(numbers) != len(names) or not all(map(math.isfinite, numbers)):
         raise InvalidFeedbackError(f"{text!r} is not {expected}; give those")
     for number, unit in zip(numbers, units, strict=True):
-        if unit == "m" and abs(number) > _FARTHEST_PLACE:
+        if unit == "m" and abs(number) > FARTHEST:
             raise InvalidFeedbackError(
                 f"{number:g} m is farther than any arm throws; say the unit, for instance "
                 f"{number:g}cm, or give metres"

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import tyro
 
@@ -129,17 +129,8 @@ class Import:
             print_next(workspace)
 
     def _inspection(self, workspace: Workspace) -> Inspection:
-        manifest = workspace.manifest
-        return inspect_recordings(
-            self.source,
-            names=manifest.format.names,
-            units=self.units,
-            plan_units=manifest.format.units,
-            preprocessing=self._preprocessing(manifest),
-            robot=manifest.robot,
-            gate=manifest.gate,
-            **self._how(workspace),
-        )
+        wanted = self._wanted(workspace.manifest)
+        return inspect_recordings(self.source, **wanted, **self._how(workspace))
 
     def _inspect(self, workspace: Workspace) -> None:
         manifest, found = workspace.manifest, self._inspection(workspace)
@@ -180,10 +171,17 @@ class Import:
                 given.append(" ".join([f"--{option}", *(shlex.quote(str(v)) for v in values)]))
         return given
 
-    def _preprocessing(self, manifest: Manifest) -> Preprocessing:
-        return Preprocessing(
-            dt=manifest.format.dt, horizon=self.horizon, trim=self.trim, smooth=self.smooth
-        )
+    def _wanted(self, manifest: Manifest) -> dict[str, Any]:
+        """What the plans shall be, and what they are held against."""
+        form = manifest.format
+        return {
+            "names": form.names,
+            "units": self.units,
+            "plan_units": form.units,
+            "preprocessing": Preprocessing(form.dt, self.horizon, self.trim, self.smooth),
+            "robot": manifest.robot,
+            "gate": manifest.gate,
+        }
 
     def _agreed(self, workspace: Workspace) -> bool:
         """Whether something was unclear, and the person at the terminal says it is as it looks.
@@ -234,13 +232,8 @@ class Import:
             outcome_names=manifest.outcome_names,
             outcome_units=manifest.outcome_units,
             outcome_unit=self.outcome_unit if answers is None else None,
-            names=manifest.format.names,
-            units=self.units,
-            plan_units=manifest.format.units,
-            preprocessing=self._preprocessing(manifest),
-            robot=manifest.robot,
-            gate=manifest.gate,
             take_guesses=take_guesses,
+            **self._wanted(manifest),
             **how,
         )
 

@@ -13,15 +13,13 @@ import numpy as np
 import tyro
 from jaxtyping import Float, UInt8
 
-from prior_reinforce.arrays import Point
+from prior_reinforce.arrays import FARTHEST, Point
 from prior_reinforce.errors import ConfigurationError, FileFormatError, PerceptionFailedError
 from prior_reinforce.files import named_disk_errors, refuse_foreign
 from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
 from prior_reinforce.scene import SeenObject, TableScene
 from prior_reinforce.wording import to_words
 
-_LARGEST_PLAUSIBLE_METRES = 5.0
-"""Ours: no camera over a table sees farther."""
 _COLUMNS = ("x", "y", "u", "v")
 _SAME_GOAL = 0.02
 """By how far what stands at the goal may be seen from it, in [m]; ours: twice a camera's error."""
@@ -49,10 +47,10 @@ class Calibrate:
 
         refuse_foreign(self.out, "prior-reinforce table calibration")
         for name, height in (("height", self.height), ("outcome-height", self.outcome_height)):
-            if height is not None and not abs(height) <= _LARGEST_PLAUSIBLE_METRES:
+            if height is not None and not abs(height) <= FARTHEST:
                 raise ConfigurationError(f"--{name} must be metres above the table, got {height}")
         table_points, pixels = np.hsplit(_read_points(self.points), 2)
-        if np.abs(table_points).max(initial=0.0) > _LARGEST_PLAUSIBLE_METRES:
+        if np.abs(table_points).max(initial=0.0) > FARTHEST:
             raise ConfigurationError(
                 f"a point {np.abs(table_points).max():g} m away looks like centimetres; x and y "
                 "must be metres"

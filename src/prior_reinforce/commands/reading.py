@@ -9,7 +9,7 @@ from typing import Annotated
 import numpy as np
 import tyro
 
-from prior_reinforce.arrays import Point, as_error
+from prior_reinforce.arrays import FARTHEST, Point, as_error
 from prior_reinforce.commands.workspace import Folder
 from prior_reinforce.errors import ConfigurationError, InvalidFeedbackError
 from prior_reinforce.readings import Reading
@@ -22,8 +22,6 @@ Number = Annotated[int, tyro.conf.Positional, tyro.conf.arg(metavar="TRIAL")]
 
 _LARGEST_PLAUSIBLE_METRES = 1.0
 """Ours: a bare number beyond it is centimetres far more often than a throw a metre off."""
-_LARGEST_SAYABLE_METRES = 5.0
-"""Ours: words carry their unit, but nobody measures a throw that far off a table of a metre."""
 
 
 @dataclass(frozen=True)
@@ -130,7 +128,7 @@ def _numbers(text: str) -> list[tuple[float, float | None]] | None:
 def _sayable(text: str, reading: Reading) -> Reading:
     """The reading, unless no throw is that far off."""
     largest = np.abs(reading.error_seen).max(initial=0.0)
-    if largest > _LARGEST_SAYABLE_METRES:
+    if largest > FARTHEST:
         raise InvalidFeedbackError(
             f"{text!r} is {largest:g} m; say it again, in cm, or void the trial if that is true"
         )

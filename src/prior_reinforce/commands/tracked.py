@@ -13,7 +13,6 @@ from prior_reinforce.errors import FileFormatError, InvalidFeedbackError
 from prior_reinforce.importing.tables import Table, read_tables
 from prior_reinforce.importing.units import (
     CHANNEL_UNITS,
-    base_of,
     conversion,
     guess_unit,
     split_unit,
@@ -131,9 +130,7 @@ def _seen(
                 f"{row.where}, line {row.lines[0]}: {names[j]} at {value:g} {units[j]} looks like "
                 f"{looks}; write the unit into the column's name, such as {names[j]} [{looks}]"
             )
-        said_unit = said_unit or units[j]
-        base, factor = base_of(said_unit)
-        place[j] = value * factor * conversion(base, units[j], names[j])
+        place[j] = value * conversion(said_unit or units[j], units[j], names[j])
     return plausible(workspace, place - goal), hit
 
 

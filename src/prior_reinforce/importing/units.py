@@ -11,6 +11,7 @@ import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
+from prior_reinforce.arrays import FARTHEST, LARGEST_TURN
 from prior_reinforce.errors import ConfigurationError, UnclearUnitsError
 
 _SPELLINGS = {
@@ -34,12 +35,8 @@ _BASE: Mapping[str, tuple[str, float]] = {
 }
 SECONDS: Mapping[str, float] = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 """Units of time, in [s]."""
-_LARGEST_RADIANS = 7.0
-"""Ours: joints of arms turn one turn either way (6.28 rad) at most."""
 _LARGEST_DEGREES = 720.0
 """Ours: beyond two turns it is no angle of a joint in degrees either."""
-_LARGEST_METRES = 5.0
-"""Ours: no arm on a table reaches that far, nor does what it throws land beyond."""
 _LARGEST_CENTIMETRES = 300.0
 """Ours: above it millimetres are likelier than an arm that reaches three metres."""
 _BRACKETS = re.compile(r"(?P<name>.+?)\s*[\[(]\s*(?P<unit>[^\[\]()]+?)\s*[\])]")
@@ -133,9 +130,9 @@ def guess_unit(wanted: str, reach: float) -> str | None:
     Returns:
         `deg`, `cm` or `mm`; the unit itself where they can be in it; None where no unit fits.
     """
-    if wanted == "rad" and reach > _LARGEST_RADIANS:
+    if wanted == "rad" and reach > LARGEST_TURN:
         return "deg" if reach <= _LARGEST_DEGREES else None
-    if wanted == "m" and reach > _LARGEST_METRES:
+    if wanted == "m" and reach > FARTHEST:
         return "cm" if reach <= _LARGEST_CENTIMETRES else "mm"
     return wanted
 

@@ -27,16 +27,22 @@ from jaxtyping import Float
 from numpy.typing import ArrayLike
 from typing_extensions import Self
 
-from prior_reinforce.arrays import Frames, Plans, Point, Points, as_goal, as_outcomes, as_plans
+from prior_reinforce.arrays import (
+    FARTHEST,
+    LARGEST_TURN,
+    Frames,
+    Plans,
+    Point,
+    Points,
+    as_goal,
+    as_outcomes,
+    as_plans,
+)
 from prior_reinforce.errors import FileFormatError, InvalidDemonstrationsError, InvalidPlanError
 from prior_reinforce.files import open_npz
 
 _FILE_FORMAT = "prior-reinforce demonstrations"
 _FILE_VERSION = 1
-# Ours: a table is a metre or so; 5 m of outcome, or 7 rad of joint angle, is a wrong unit far more
-# often than a real motion. Only ever a warning.
-_LARGEST_PLAUSIBLE_METRES = 5.0
-_LARGEST_PLAUSIBLE_RADIANS = 7.0
 
 
 @dataclass(frozen=True)
@@ -297,7 +303,7 @@ class Demonstrations:
     def _warn_about_units(self) -> None:
         metres = np.array([unit == "m" for unit in self.outcome_units])
         largest = np.abs(self.outcomes_seen[:, metres]).max(initial=0.0)
-        if largest > _LARGEST_PLAUSIBLE_METRES:
+        if largest > FARTHEST:
             warnings.warn(
                 f"an outcome of {largest:g} m looks like centimetres; outcomes are in metres: "
                 "divide by 100",
@@ -305,7 +311,7 @@ class Demonstrations:
             )
         radians = np.array([unit == "rad" for unit in self.format.units])
         largest = np.abs(self.plans[:, :, radians]).max(initial=0.0)
-        if largest > _LARGEST_PLAUSIBLE_RADIANS:
+        if largest > LARGEST_TURN:
             warnings.warn(
                 f"an angle of {largest:g} rad looks like degrees; plans are in radians: "
                 "convert with numpy.deg2rad",
