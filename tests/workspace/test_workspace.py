@@ -511,6 +511,13 @@ def test_links_further_down_are_refused_too(workspace, tmp_path, part):
     again.close()
 
 
+def test_no_training_goes_on_in_another_folder(workspace, tmp_path):
+    (tmp_path / "elsewhere").mkdir()
+    (workspace.folder / ".training").symlink_to(tmp_path / "elsewhere")
+    with pytest.raises(FileFormatError, match=r"\.training is a link out of"):
+        workspace.learn("nearest")
+
+
 class Unsavable(Generator):
     """Knows how to learn, and not how to be kept."""
 

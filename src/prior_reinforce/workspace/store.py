@@ -47,7 +47,7 @@ class Store:
     @property
     def training(self) -> Path:
         """Folder of what a training goes on from."""
-        return self._folder / ".training"
+        return inside(self._folder / ".training", self._folder)
 
     def save_demonstrations(self, demonstrations: Demonstrations) -> None:
         """Keep demonstrations under their hash.
