@@ -5,7 +5,7 @@ import pytest
 
 from prior_reinforce.tasks import make_task
 from prior_reinforce.tasks.zoo import DEVELOPED_ON, MEMBERS, REPORTED
-from prior_reinforce.tasks.zoo.human import KINDS
+from prior_reinforce.tasks.zoo.human import COUNTS, KINDS
 
 
 def test_each_task_is_either_developed_on_or_reported():
@@ -29,10 +29,10 @@ def test_both_halves_have_every_number_of_outcomes_and_poses_increments_and_cloc
 def test_every_task_can_be_demonstrated_in_every_kind(name, kind):
     task = make_task(name)
     low, high = task.region
-    for count, seed in ((3, 0), (12, 1)):
-        made = task.demonstrations(f"{kind}-{count}-{seed}")
-        assert made.n == count
-        assert np.all(np.ptp(made.outcomes_seen, axis=0) >= 0.85 * (high - low))
-        np.testing.assert_array_equal(
-            made.outcomes_seen, [rollout.outcome for rollout in task.rollout(made.plans, None)]
-        )
+    count = COUNTS[1] if kind == "mixed" else COUNTS[0]
+    made = task.demonstrations(f"{kind}-{count}-0")
+    assert made.n == count
+    assert np.all(np.ptp(made.outcomes_seen, axis=0) >= 0.85 * (high - low))
+    np.testing.assert_array_equal(
+        made.outcomes_seen, [rollout.outcome for rollout in task.rollout(made.plans, None)]
+    )
