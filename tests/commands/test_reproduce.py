@@ -72,7 +72,9 @@ def test_figures_name_the_command_that_makes_them_again(tmp_path):
     reproduce = Reproduce("all", goals=7, seeds=(0, 3), reader="vlm", vlm=model)
     commands = {
         recipe.name: reproduce._command(recipe, Run(tmp_path, Scale(), include=included))
-        for recipe, included in zip(reproduce._recipes(), [(GENERATOR,)] + [()] * 7, strict=True)
+        for recipe, included in zip(
+            reproduce._recipes(), [(GENERATOR,), *[()] * (len(RECIPES) - 1)], strict=True
+        )
     }
     assert commands["zero-shot"] == (
         f"prior-reinforce reproduce zero-shot --goals 7 --seeds 0 3 --include {GENERATOR}"
