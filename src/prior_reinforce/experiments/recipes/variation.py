@@ -1,8 +1,8 @@
 """When is diffusion needed? Generators over people's variation and numbers of demonstrations.
 
-Ours; the paper compares generators on one task. No setting was chosen on the tasks. Each has one set of
-demonstrations of each kind. Outcomes are exact, so that what is compared is what a generator makes
-of the demonstrations.
+Ours; the paper compares generators on one task. No setting was chosen on these tasks. Each has one
+set of demonstrations of each kind. Outcomes are exact, so that what is compared is what a generator
+makes of the demonstrations.
 """
 
 from __future__ import annotations
@@ -33,7 +33,8 @@ GENERATORS = (
 )
 """What is compared is called, and its choice."""
 TASKS = ("zoo-hoop", "zoo-arrival", "zoo-drag", "zoo-curl")
-"""Of the zoo's reported half, without a clock and of at most 100 frames: a network takes a minute."""
+"""Of the zoo's reported half, without a clock and of at most 100 frames: a network learns them in a
+minute."""
 SETS = ("clean-8", "mixed-4", "mixed-12", "styles-9")
 """Kind and number of the demonstrations (docs/tasks/zoo.md)."""
 _QUICK_SETS, _QUICK_TASKS, _GOALS = 1, 2, 30
