@@ -5,6 +5,7 @@ import numpy as np
 from prior_reinforce.workspace.workspace import Workspace
 from tests.workspace.planar import demonstrations, recordings
 
+T = np.arange(24) * 0.02
 NEW = (
     "--action-names", "joint1", "joint2", "--dt", "0.02", "--robot", "none",
 )  # fmt: skip
@@ -109,3 +110,24 @@ def test_more_recordings_are_appended(run, folder, tmp_path):
     status, _, err = run("import", folder, "more", "--append", "--no-trim")
     assert status == 2  # the same once more
     assert "demonstration 4 so far and new one 0 are one motion" in err
+
+
+def test_episodes_with_odd_names_are_printed_as_text(run, folder, tmp_path, monkeypatch):
+    rows = [
+        f"{t},{q},{q},a\x1b[2J{i}" for i in range(4) for t, q in zip(T, T * (i + 1), strict=True)
+    ]
+    (tmp_path / "all.csv").write_text("\n".join(["t,joint1,joint2,episode", *rows]))
+    (tmp_path / "outcomes.csv").write_text("episode,x,y\n")
+    said = run("import", folder, "all.csv", "--inspect")[1]
+    assert "a\\x1b[2J0, a\\x1b[2J1, a\\x1b[2J2, a\\x1b[2J3 missing" in said
+    asked = []
+
+    def answer(question):
+        asked.append(question)
+        return f"0.{len(asked)} 0.{len(asked) ** 2}"
+
+    monkeypatch.setattr("sys.stdin.isatty", lambda: True)
+    monkeypatch.setattr("builtins.input", answer)
+    status, out, err = run("import", folder, "all.csv")
+    assert status == 0, err
+    assert "\x1b" not in said + out + "".join(asked)

@@ -143,7 +143,7 @@ class Import:
         if table is not None:
             known = read_outcomes(table, manifest.outcome_names)
             missing = missing_outcomes(episodes, known)
-            print(f"outcomes: {table}, {', '.join(missing) or 'none'} missing")
+            print(plain(f"outcomes: {table}, {', '.join(missing) or 'none'} missing"))
         elif any(recording.outcome is not None for recording in found.recordings):
             print("outcomes: in the recordings")
         else:

@@ -27,7 +27,7 @@ from prior_reinforce.importing.outcomes import (
     outcomes_of,
     uncertainty_of,
 )
-from prior_reinforce.wording import in_words, read_place, say_length, say_place
+from prior_reinforce.wording import in_words, plain, read_place, say_length, say_place
 from prior_reinforce.workspace.manifest import Manifest
 
 _SKIP, _BACK = ("skip", "s"), ("back", "b")
@@ -79,7 +79,7 @@ def ask_for_outcomes(
     again = [episode for episode in missing if episode in before]
     outcomes |= {episode: before[episode] for episode in again}
     if again:
-        print(f"typed before, in {table}: {', '.join(again)}")
+        print(plain(f"typed before, in {table}: {', '.join(again)}"))
     missing = [episode for episode in missing if episode not in before]
     if missing:
         print(_explanation(manifest, missing))
@@ -87,7 +87,7 @@ def ask_for_outcomes(
     number = 0
     while number < len(missing):
         episode = missing[number]
-        question = f"{episode} ({number + 1} of {len(missing)}): "
+        question = plain(f"{episode} ({number + 1} of {len(missing)}): ")
         answer = _ask(question, episode, table, manifest)
         if answer == _BACK[0]:
             number = max(0, number - 1)

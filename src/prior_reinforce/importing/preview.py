@@ -14,6 +14,7 @@ from prior_reinforce.importing.inspection import Inspection, in_rows, say_small
 from prior_reinforce.importing.preprocessing import Preprocessed
 from prior_reinforce.importing.recording import Recording
 from prior_reinforce.plans.motions import Demonstrations
+from prior_reinforce.wording import plain
 
 if TYPE_CHECKING:
     from prior_reinforce.report.panels import View
@@ -161,7 +162,9 @@ class Preview:
                 axes.set_aspect("equal", adjustable="datalim")
         axes.scatter(*points.T, c=colours, s=30, zorder=2)
         for point, episode in zip(points, self.episodes, strict=True):
-            axes.annotate(episode, point, textcoords="offset points", xytext=(5, 4), fontsize=7)
+            axes.annotate(
+                plain(episode), point, textcoords="offset points", xytext=(5, 4), fontsize=7
+            )
         axes.margins(0.25)
         if view.mirrored:
             axes.invert_xaxis()
