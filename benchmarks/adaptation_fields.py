@@ -163,9 +163,9 @@ def own_sets(tuning: bool) -> Rows:
 
 
 def drawn(count: int) -> Callable[[bool], Rows]:
+    """Of basketball; in the draw E of three, two outcomes look the same."""
     return lambda tuning: [
-        [Source(task, name, 10 if tuning else 0, count) for name in "EFGH"]
-        for task in ("basketball-v1", "basketball-v3")
+        [Source("basketball-v1", name, 10 if tuning else 0, count) for name in "FGHI"]
     ]
 
 

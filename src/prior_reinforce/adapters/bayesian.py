@@ -26,10 +26,10 @@ from prior_reinforce.readings import Reading
 _STEPS = 12
 """Steps to the fixed point of the proposal, each 0.7 of the way (ours)."""
 _RELAXATION = 0.7
-_TRIALS_AFTER_A_MISS = 1.6
-"""Fitted to 1411 trials of tuning material (ours; docs/decisions-adapter.md)."""
-_POINTS = 64
-"""Where the probability of a hit is evaluated (ours): right to half a percent."""
+_TRIALS_AFTER_A_MISS = 1.3
+"""Fitted to 1429 trials of tuning material (ours; docs/decisions-adapter.md)."""
+_POINTS = 192
+"""Where the probability of a hit is evaluated (ours): right to 0.002, for k up to 3."""
 _TRIALS_KEPT = 24
 """Trials in memory before old ones are merged (ours): a proposal stays below 20 ms."""
 _MERGED_TO = 16
@@ -56,7 +56,7 @@ class BayesianConfig:
     """a, what the generator gets wrong: mostly the rounding of labels that were seen by eye."""
     field_reach: tuple[float, ...] = (0.7, 1.0)
     """l, how far that reaches."""
-    rough_sd: float = 0.045
+    rough_sd: float = 0.025
     """What lies between demonstrations."""
     rough_reach: float = 0.32
     """How far that reaches."""
@@ -64,9 +64,9 @@ class BayesianConfig:
     """b, what changed since the demonstrations: shift and stretch."""
     hardware_reach: float = 2.5
     """How far that reaches."""
-    execution_sd: float = 0.03
-    """How far apart outcomes of one plan lie: half a centimetre where 0.25 m x 0.5 m can be
-    reached."""
+    execution_sd: float = 0.02
+    """How far apart outcomes of one plan lie: 3 to 4 mm where the spread is 12 to 18 cm, as for
+    repeated executions on our tasks."""
     demonstration_sd: float = 0.15
     """By how much the demonstrations' outcomes are misread."""
     outlier: float = 0.01
@@ -131,10 +131,10 @@ class BayesianAdapter(Adapter):
     with independent Gaussian processes of prior mean 0 and squared-exponential kernels:
 
         f   sd a, reach l            what the generator got wrong, mostly labels that were rounded
-        u   sd 0.045, reach 0.32     what lies between the demonstrations
+        u   sd 0.025, reach 0.32     what lies between the demonstrations
         h   sd b, reach 2.5          what has changed since: shift and stretch, anew for every
                                      change of hardware
-        noise  sd 0.03               execution
+        noise  sd 0.02               execution
 
     Trials and questions see f + u + h of their hardware; demonstrations were executed on the
     hardware of their day and see f + u. A reading (`readings.Reading`) says that the blurred error
