@@ -19,7 +19,7 @@ def observe(adapter, condition, outcome):
     adapter.observe(condition, np.zeros(len(outcome)), outcome)
 
 
-DATA_SETS = int(os.environ.get("DATA_SETS", "50"))  # docs/decisions-adapter.md: 200
+DATA_SETS = int(os.environ.get("DATA_SETS", "30"))  # docs/decisions-adapter.md: 200
 REGION = np.array([[0.80, -0.25], [1.05, 0.25]])
 
 
@@ -94,7 +94,7 @@ def test_never_less_likely_than_scikit_learn_with_its_restarts():
 
 @pytest.mark.slow
 def test_never_less_likely_than_scikit_learn_on_many_data_sets():
-    assert assert_no_worse_than_scikit_learn(range(6, DATA_SETS), restarts=50) >= 0.75 * DATA_SETS
+    assert assert_no_worse_than_scikit_learn(range(6, DATA_SETS), restarts=50) >= 0.75 * (DATA_SETS - 6)
 
 
 @pytest.mark.parametrize("seed", range(10))

@@ -17,6 +17,6 @@ def asked(tmp_path_factory):
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-@pytest.mark.parametrize("case", range(3))
+@pytest.mark.parametrize("case", range(2))
 def test_a_kill_loses_doubles_and_replays_nothing(asked, tmp_path, name, case):
     kill(name, random.Random(f"{name} {case}"), tmp_path, asked)

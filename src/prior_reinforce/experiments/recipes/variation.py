@@ -37,7 +37,7 @@ TASKS = ("zoo-hoop", "zoo-arrival", "zoo-drag", "zoo-curl")
 minute."""
 SETS = ("clean-8", "mixed-4", "mixed-12", "styles-9")
 """Kind and number of the demonstrations (docs/tasks/zoo.md)."""
-_QUICK_SETS, _QUICK_TASKS, _GOALS = 1, 2, 30
+_QUICK_SETS, _QUICK_TASKS, _GOALS = 1, 1, 30
 
 
 @dataclass(frozen=True)
