@@ -8,6 +8,7 @@ import pytest
 from prior_reinforce.errors import InvalidDemonstrationsError
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 from prior_reinforce.plans.warping import Timeline, take_apart
+from prior_reinforce.tasks import make_task
 
 STARTS = np.array([5.3, 31.0, 12.7, 24.1])
 TEMPOS = np.array([1.0, 1.15, 0.85, 1.05])
@@ -178,3 +179,26 @@ def test_a_switch_that_changes_in_some_demonstrations_only_does_not_overshoot():
     plans = apart.timeline.play(apart.shapes, apart.numbers + 0.4)
     assert plans[:, :, 2].min() >= 0
     assert plans[:, :, 2].max() <= 1
+
+
+@pytest.mark.parametrize("by", [-12.0, 12.0])
+def test_a_motion_that_would_be_cut_off_where_all_rest_is_eased(by):
+    """Tele-operated plans: a hand drifts to the last frame, so what is moved is cut."""
+    demos = make_task("curling").demonstrations("A")
+    apart = take_apart(demos, "start")
+    timeline, edge = apart.timeline, 0 if by < 0 else -1
+    assert timeline.rests == (True, True)
+    beyond = np.clip(apart.numbers + by, timeline.lowest, timeline.highest)
+
+    def left(which):
+        steps = np.abs(np.diff(which.play(apart.shapes, beyond), axis=1)).max(axis=2)
+        return (steps[:, edge] / steps.max(axis=1)).max()
+
+    assert left(replace(timeline, rests=(False, False))) > 0.02
+    assert left(timeline) < 0.002
+    np.testing.assert_allclose(timeline.play(apart.shapes, apart.numbers), demos.plans, atol=1e-5)
+
+
+def test_what_demonstrations_do_not_rest_in_is_played_on():
+    demos = make_task("zoo-scoop").demonstrations("cut-6-0")
+    assert not take_apart(demos, "start").timeline.rests[1]

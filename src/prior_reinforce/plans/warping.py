@@ -36,18 +36,19 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal, get_args
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from prior_reinforce.arrays import Plans
 from prior_reinforce.errors import InvalidDemonstrationsError
 from prior_reinforce.plans.alignment import correlation_lags
-from prior_reinforce.plans.channels import kinds, transitions
+from prior_reinforce.plans.channels import kinds, noise, transitions
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 from prior_reinforce.plans.timing import (
     SMOOTHING,
     Continued,
     middle,
     motion_span,
+    moving_rows,
     velocity_profiles,
 )
 
@@ -76,6 +77,14 @@ _EXACT = 2e-5
 """Demonstrations come back from shape and warp to this part of the largest range of their unit,
 rms, or the shapes are sampled more finely. Ours: a tenth of a milliradian of 5 rad."""
 _OVERSAMPLING = (1, 2, 4)
+_STILL = 1e-4
+"""A pose is left where a channel is off by this part of the largest range of its unit, or by
+`_STILL_NOISE` standard deviations of its noise. Ours: a minimum-jerk motion has 0.7 % of its
+largest speed there, and can stop."""
+_STILL_NOISE = 6.0
+_EASED = 0.1
+"""Part of the frames over which a motion that is cut off comes to rest. Ours: the ends of our
+tele-operated plans are cut at 1 to 4 % of their largest speed, which stops well within limits."""
 _FEW_FRAMES = 20
 """In fewer frames nothing can be moved by parts of one without a loss; they are kept as recorded.
 Ours."""
@@ -114,6 +123,11 @@ class Timeline:
     beyond the demonstrations timing is extrapolated like shapes, but no further."""
     highest: tuple[float, ...]
     """Greatest, likewise."""
+    still: tuple[float, ...]
+    """How far each channel that shares the warp may be from a pose and still count as there."""
+    rests: tuple[bool, bool]
+    """Whether all demonstrations rest at their first frame, and at their last. Where they do, plans
+    do: what would be cut off there is eased instead."""
 
     @property
     def n_numbers(self) -> int:
@@ -142,6 +156,10 @@ class Timeline:
             plans[i][:, smooth] = _sample(shapes[i][:, : len(smooth)], at)
             for d in self.linear:
                 plans[i, :, d] = _linear(shapes[i, :, smooth.index(d)], at)
+        begins, ends = np.logical_and(self.cut_off(shapes, warp), self.rests).T
+        for at_end, cut in ((False, begins), (True, ends)):
+            for which in np.flatnonzero(cut):
+                plans[which][:, smooth] = _eased(plans[which][:, smooth], at_end=at_end)
         parts, event = shapes[:, :, len(smooth) :], 0
         for step in self.steps:
             for phase in step.phases:
@@ -154,6 +172,20 @@ class Timeline:
                 nearest = np.abs(values[:, :, None] - levels).argmin(axis=-1)
                 plans[:, :, step.channel] = levels[nearest]
         return plans
+
+    def cut_off(self, shapes: Float[np.ndarray, "n L C"], warp: Numbers) -> Bool[np.ndarray, "n 2"]:
+        """Whether some of each motion comes before the first frame, and after the last."""
+        lost = np.zeros((len(shapes), 2), dtype=bool)
+        if not warp.shape[1]:
+            return lost
+        still = np.array(self.still)
+        for i, theta in enumerate(warp):
+            rows = moving_rows(shapes[i][:, : len(still)], still)
+            if rows is not None:
+                phases = self.first + np.array(rows) / self.per_frame
+                begins, ends = _times(theta, self.span, phases)
+                lost[i] = begins < 0.0, ends > self.horizon - 1
+        return lost
 
     def n_channels(self, shapes: Float[np.ndarray, "n L C"]) -> int:
         """D, channels of the plans that shapes make."""
@@ -182,7 +214,8 @@ class Timeline:
             for channel, phases, levels in known["steps"]
         )
         known["linear"] = tuple(map(int, known["linear"]))
-        for name in ("lowest", "highest"):
+        known["rests"] = bool(known["rests"][0]), bool(known["rests"][1])
+        for name in ("lowest", "highest", "still"):
             known[name] = tuple(map(float, known[name]))
         return cls(**known)
 
@@ -277,17 +310,29 @@ def take_apart(demonstrations: Demonstrations, kind: WarpKind) -> Apart:
         steps=steps,
         lowest=tuple((numbers.min(axis=0) - np.ptp(numbers, axis=0)).tolist()),
         highest=tuple((numbers.max(axis=0) + np.ptp(numbers, axis=0)).tolist()),
+        still=tuple(_still(plans, plan_format.units)[_others(len(found), steps)].tolist()),
+        rests=(False, False),
     )
     continued = Continued(plans, plan_format.units, np.linalg.norm(profiles, axis=2))
     for per_frame in _OVERSAMPLING:
         timeline = replace(timeline, per_frame=per_frame)
         tau = first + np.arange((last - first) * per_frame + 1) / per_frame
         shapes = _shapes(timeline, continued, warp, times, tau)
+        cut = timeline.cut_off(shapes, warp)
+        timeline = replace(timeline, rests=(not cut[:, 0].any(), not cut[:, 1].any()))
         if _comes_back(timeline.play(shapes, numbers), demonstrations):
             return Apart(timeline, shapes, numbers)
     if kind == "none" or timeline.horizon >= _FEW_FRAMES:
         return Apart(timeline, shapes, numbers)
     return take_apart(demonstrations, "none")
+
+
+def _still(plans: Plans, units: tuple[str, ...]) -> Float[np.ndarray, " D"]:
+    """How far each channel may be from a pose and still count as there."""
+    ranges = np.ptp(plans, axis=(0, 1))
+    largest = [max(r for r, u in zip(ranges, units, strict=True) if u == unit) for unit in units]
+    noises = noise(plans)
+    return np.maximum(_STILL * np.array(largest), _STILL_NOISE * noises)
 
 
 def _shapes(
@@ -435,6 +480,17 @@ def _sample(values: Float[np.ndarray, "L C"], at: Float[np.ndarray, " H"]) -> np
         np.arange(len(values), dtype=float), values, k=min(3, len(values) - 1)
     )
     return np.asarray(spline(at))
+
+
+def _eased(plan: Float[np.ndarray, "H C"], *, at_end: bool) -> Float[np.ndarray, "H C"]:
+    """The same plan, brought to rest over its last frames, or from rest over its first."""
+    if not at_end:
+        return _eased(plan[::-1], at_end=True)[::-1]
+    frames = max(round(_EASED * len(plan)), 1)
+    part = (np.arange(frames) + 1.0) / frames
+    steps = np.diff(plan, axis=0)
+    steps[-frames:] *= 1.0 - (part**2 * (3.0 - 2.0 * part))[:, None]
+    return np.concatenate([plan[:1], plan[:1] + np.cumsum(steps, axis=0)])
 
 
 def _linear(values: Float[np.ndarray, " L"], at: Float[np.ndarray, " H"]) -> np.ndarray:
