@@ -2,6 +2,7 @@
 
 import itertools
 from dataclasses import replace
+from math import nan
 
 import pytest
 import safetensors.torch
@@ -97,7 +98,8 @@ def test_an_interrupted_training_goes_on_to_the_same_last_digit(tmp_path, monkey
 
 def test_the_state_of_another_training_is_refused_by_its_path(tmp_path):
     path = tmp_path / "state"
-    for content in (b"", b"x" * 64, safetensors.torch.save({"progress": torch.zeros(2)})):
+    told = [safetensors.torch.save({"progress": torch.tensor([n, 0.0])}) for n in (1.0, 3.0, nan)]
+    for content in (b"", b"x" * 64, *told):
         path.write_bytes(content)
         with pytest.raises(FileFormatError, match=str(path)):
             interrupted(path, CONFIG, None)

@@ -84,9 +84,9 @@ def optimise(
     if decay is not None:
         average = AveragedModel(network, multi_avg_fn=_averaging(decay))
     run = _Run(network, optimiser, average, rng)
-    before, mean_loss = (0, 0.0) if state is None else run.restored(state)
-    started = saved = time.monotonic()
     n_steps = config.training_steps
+    before, mean_loss = (0, 0.0) if state is None else run.restored(state, n_steps)
+    started = saved = time.monotonic()
     for done in range(before + 1, n_steps + 1):
         for group in optimiser.param_groups:
             group["lr"] = config.learning_rate * learning_rate_factor(done - 1, config)
@@ -133,7 +133,7 @@ class _Run:
             tensors["rng"] = self.rng.get_state()
         write(path, save({name: value.contiguous() for name, value in tensors.items()}))
 
-    def restored(self, path: Path) -> tuple[int, float]:
+    def restored(self, path: Path, n_steps: int) -> tuple[int, float]:
         """Take up what was written: steps done and the mean loss; 0 if nothing was.
 
         Raises:
@@ -147,6 +147,8 @@ class _Run:
         try:
             tensors = load(path.read_bytes())
             done, mean_loss = tensors["progress"].tolist()
+            if not 0 < done < n_steps:
+                raise ValueError(f"{done:g} of {n_steps} steps are done")
             self.network.load_state_dict(_of("network.", tensors))
             moments: dict[int, dict[str, torch.Tensor]] = {}
             for name, value in _of("moment.", tensors).items():
