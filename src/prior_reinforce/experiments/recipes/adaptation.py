@@ -54,8 +54,10 @@ RULES = (
 """The adapters compared, whether earlier goals' trials serve them, and what each is called."""
 _OURS = "Bayesian, earlier goals too"
 _GOALS = 8
-_DASHES = ("-", "--", ":", "-.", (0, (6, 1, 1, 1, 1, 1)))
-"""Of the rivals' lines, all in one grey."""
+_CARRIED = "earlier goals too"
+_ALONE = "each goal alone, all rules"
+_DASHES = ("--", ":", "-.")
+"""Of the lines of rivals that remember, all in one grey."""
 _BINS = (0.0, 0.1, 0.3, 0.45, 0.6, 0.75, 0.9, 1.0)
 """Of the reliability table."""
 
@@ -194,9 +196,14 @@ def draw(figures: Figures, folder: Path) -> list[Picture]:
             left.plot([mean.low, mean.high], [place, place], color=colour, linewidth=2)
             left.plot([mean.value], [place], "o", color=colour)
             curve = figures["by_place"][name]
-            if name == _OURS or min(curve) < 2 * min(figures["by_place"][_OURS]):
-                style = {"linewidth": 2.5} if name == _OURS else {"linestyle": _DASHES[place % 5]}
-                right.plot(range(1, _GOALS + 1), curve, color=colour, label=name, **style)
+            places = range(1, _GOALS + 1)
+            if name.endswith(_CARRIED):
+                style = {"linewidth": 2.5} if name == _OURS else {"linestyle": _DASHES[place % 3]}
+                right.plot(places, curve, color=colour, label=name, **style)
+            elif min(curve) < 2 * min(figures["by_place"][_OURS]):
+                first = not any(line.get_label() == _ALONE for line in right.lines)
+                label = _ALONE if first else None
+                right.plot(places, curve, color=INK_SOFT, alpha=0.35, linewidth=1, label=label)
         left.set_yticks(range(len(shown)), list(shown))
         left.invert_yaxis()
         left.set_xscale("log")
@@ -204,13 +211,16 @@ def draw(figures: Figures, folder: Path) -> list[Picture]:
         left.minorticks_off()
         left.set_xlabel("trials a goal, goals 2 to 8, mean of the tasks")
         right.set_xticks(range(1, _GOALS + 1))
-        right.legend(frameon=False, fontsize=7.5, labelcolor=INK_SOFT)
+        right.legend(
+            frameon=False, fontsize=8.5, labelcolor=INK_SOFT, loc="lower left",
+            bbox_to_anchor=(0.0, 1.0),
+        )  # fmt: skip
         right.set_xlabel("goal of the afternoon")
         right.set_ylabel("trials")
     caption = (
         "Left: mean trials a goal on goals 2 to 8 of an afternoon, by eye, in the mean of the "
         "tasks, with 95 % intervals over trainings and goals. Right: the mean by place of the "
-        "goal, for the rules that come within twice our best."
+        "goal, for rules whose best is within twice ours."
     )
     return [Picture(save(figure, folder / "adaptation.png"), caption)]
 
