@@ -94,7 +94,9 @@ def test_never_less_likely_than_scikit_learn_with_its_restarts():
 
 @pytest.mark.slow
 def test_never_less_likely_than_scikit_learn_on_many_data_sets():
-    assert assert_no_worse_than_scikit_learn(range(6, DATA_SETS), restarts=50) >= 0.75 * (DATA_SETS - 6)
+    assert assert_no_worse_than_scikit_learn(range(6, DATA_SETS), restarts=50) >= 0.75 * (
+        DATA_SETS - 6
+    )
 
 
 @pytest.mark.parametrize("seed", range(10))
