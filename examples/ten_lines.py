@@ -23,10 +23,10 @@ def main() -> int:
 
     task = pr.make_task("basketball-v1")
     demos = task.demonstrations("A")
-    config = pr.DiffusionConfig(training_steps=options.training_steps)
-    generator = pr.Timed(pr.DiffusionGenerator(config)).fit(demos, seed=0)
+    diffusion = pr.make_generator(f"diffusion,training_steps={options.training_steps}")
+    generator = diffusion.fit(demos, seed=0)
     session = pr.Session(
-        generator, pr.GaussianProcessAdapter(), demos, goal=options.goal, tolerance=task.tolerance
+        generator, pr.BayesianAdapter(), demos, goal=options.goal, tolerance=task.tolerance
     )
     eye, rng = pr.Eye(), np.random.default_rng(0)
     while not session.solved and session.n_trials < options.rounds:

@@ -20,8 +20,8 @@ many = settings(
     max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 REMEDY = re.compile(
-    r"give|say|write|mend|make|must|restore|tell|ask|void|see|run:|choose|add|put|needs|known|copy"
-    r"|unknown; |missing|expected|valid|looks like|wait|drop|correct|measure|help",
+    r"give|say|write|mend|make|must|restore|tell|ask|call|void|see|run:|choose|add|put|needs|known"
+    r"|copy|unknown; |missing|expected|valid|looks like|wait|drop|correct|measure|help",
     re.IGNORECASE,
 )
 numbers = st.floats(width=32).map(str)
