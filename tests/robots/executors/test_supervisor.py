@@ -56,6 +56,12 @@ def plan_file(tmp_path):
     return write_plan(plan, tmp_path / "plan.npz")
 
 
+def _hear_signals():
+    """Tests that run in the background of a shell, or under nohup, inherit signals as ignored."""
+    for number in (signal.SIGINT, signal.SIGHUP):
+        signal.signal(number, signal.SIG_DFL)
+
+
 @pytest.fixture
 def start(tmp_path, plan_file):
     """Start a program that executes a script under the lock; ends whatever is left of it."""
@@ -69,6 +75,7 @@ def start(tmp_path, plan_file):
             [sys.executable, "-c", PROGRAM, *map(str, arguments)],
             start_new_session=True,
             stderr=subprocess.PIPE,
+            preexec_fn=_hear_signals,
         )
         started.append(program)
         wait_for((tmp_path / "pid").exists)
