@@ -181,6 +181,21 @@ def test_a_switch_that_changes_in_some_demonstrations_only_does_not_overshoot():
     assert plans[:, :, 2].max() <= 1
 
 
+def test_a_channel_that_jumps_keeps_its_values_where_the_motion_is_eased():
+    switch = np.zeros((4, 90))
+    for row, start in zip(switch, STARTS.astype(int), strict=True):
+        row[start + 30 :] = 1.0
+    switch[0, 2:4] = 1.0  # once more: it cannot be timed by itself
+    demos = demonstrations(np.dstack([swings(), switch]), ("rad", "rad", "1"))
+    apart = take_apart(demos, "start")
+    assert apart.timeline.linear == (2,)
+    late = apart.numbers + 85 - 30 - STARTS[:, None]  # all jump at frame 85, and go on beyond 89
+    assert apart.timeline.rests == (True, True)
+    assert apart.timeline.cut_off(apart.shapes, late)[:, 1].all()
+    timeline = replace(apart.timeline, highest=(100.0,))
+    np.testing.assert_allclose(timeline.play(apart.shapes, late)[:, -1, 2], 1, atol=1e-9)
+
+
 @pytest.mark.parametrize("by", [-12.0, 12.0])
 def test_a_motion_that_would_be_cut_off_where_all_rest_is_eased(by):
     """Tele-operated plans: a hand drifts to the last frame, so what is moved is cut."""

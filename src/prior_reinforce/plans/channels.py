@@ -15,6 +15,7 @@ Notation:
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
@@ -62,6 +63,19 @@ def noise(plans: Plans) -> Float[np.ndarray, " D"]:
     return np.asarray(np.quantile(third, _QUANTILE, axis=0) / (_NORMAL * np.sqrt(20.0)))
 
 
+def largest_of_unit(
+    ranges: Float[np.ndarray, " D"], units: Sequence[str]
+) -> Float[np.ndarray, " D"]:
+    """Return for each channel the largest range of all that share its unit.
+
+    Args:
+        ranges: Of the D channels, each in its unit.
+        units: Of the D channels.
+    """
+    of = np.array(units)
+    return np.array([ranges[of == unit].max() for unit in of])
+
+
 def kinds(plans: Plans, units: tuple[str, ...]) -> tuple[ChannelKind, ...]:
     """Tell what kind of signal each channel is, from all demonstrations together.
 
@@ -70,8 +84,8 @@ def kinds(plans: Plans, units: tuple[str, ...]) -> tuple[ChannelKind, ...]:
         units: Of the D channels.
     """
     ranges = np.ptp(plans, axis=(0, 1))
-    largest = {u: max(r for r, v in zip(ranges, units, strict=True) if v == u) for u in set(units)}
-    floors = [HELD if unit in ("rad", "m") else HELD * largest[unit] for unit in units]
+    absolute = np.array([unit in ("rad", "m") for unit in units])
+    floors = HELD * np.where(absolute, 1.0, largest_of_unit(ranges, units))
     held = np.all(np.std(plans, axis=1) <= floors, axis=0)
     runs = [[] if held[d] else _all_runs(plans[:, :, d]) for d in range(len(units))]
     longest = max((b - a for each in runs for a, b in each), default=0)

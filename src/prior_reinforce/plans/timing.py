@@ -25,7 +25,7 @@ import numpy as np
 from jaxtyping import Float
 
 from prior_reinforce.arrays import Plans
-from prior_reinforce.plans.channels import kinds
+from prior_reinforce.plans.channels import kinds, largest_of_unit
 from prior_reinforce.plans.motions import Demonstrations
 
 SMOOTHING = 0.03
@@ -178,10 +178,8 @@ def still_bands(
         units: Of the D channels.
     """
     ranges = np.max([np.ptp(positions, axis=0) for positions in recordings], axis=0)
-    largest = {
-        unit: max(r for r, u in zip(ranges, units, strict=True) if u == unit) for unit in set(units)
-    }
-    return np.array([max(STILL_SHARE * largest[u], STILL_FLOOR.get(u, 0.0)) for u in units])
+    floors = np.array([STILL_FLOOR.get(unit, 0.0) for unit in units])
+    return np.maximum(STILL_SHARE * largest_of_unit(ranges, units), floors)
 
 
 def moving_rows(

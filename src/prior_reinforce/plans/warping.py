@@ -41,7 +41,7 @@ from jaxtyping import Bool, Float
 from prior_reinforce.arrays import Plans
 from prior_reinforce.errors import InvalidDemonstrationsError
 from prior_reinforce.plans.alignment import correlation_lags
-from prior_reinforce.plans.channels import kinds, noise, transitions
+from prior_reinforce.plans.channels import kinds, largest_of_unit, noise, transitions
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 from prior_reinforce.plans.timing import (
     SMOOTHING,
@@ -151,6 +151,7 @@ class Timeline:
         n_channels = self.n_channels(shapes)
         plans = np.zeros((len(shapes), self.horizon, n_channels))
         smooth = _others(n_channels, self.steps)
+        eased = [d for d in smooth if d not in self.linear]  # what jumps is at one level or another
         for i, theta in enumerate(warp):
             at = (_inverse(theta, self.span, t) - self.first) * self.per_frame
             plans[i][:, smooth] = _sample(shapes[i][:, : len(smooth)], at)
@@ -159,7 +160,7 @@ class Timeline:
         begins, ends = np.logical_and(self.cut_off(shapes, warp), self.rests).T
         for at_end, cut in ((False, begins), (True, ends)):
             for which in np.flatnonzero(cut):
-                plans[which][:, smooth] = _eased(plans[which][:, smooth], at_end=at_end)
+                plans[which][:, eased] = _eased(plans[which][:, eased], at_end=at_end)
         parts, event = shapes[:, :, len(smooth) :], 0
         for step in self.steps:
             for phase in step.phases:
@@ -178,9 +179,11 @@ class Timeline:
         lost = np.zeros((len(shapes), 2), dtype=bool)
         if not warp.shape[1]:
             return lost
-        still = np.array(self.still)
+        smooth = _others(self.n_channels(shapes), self.steps)
+        moved = [k for k, d in enumerate(smooth) if d not in self.linear]
+        still = np.array(self.still)[moved]
         for i, theta in enumerate(warp):
-            rows = moving_rows(shapes[i][:, : len(still)], still)
+            rows = moving_rows(shapes[i][:, moved], still)
             if rows is not None:
                 phases = self.first + np.array(rows) / self.per_frame
                 begins, ends = _times(theta, self.span, phases)
@@ -329,10 +332,8 @@ def take_apart(demonstrations: Demonstrations, kind: WarpKind) -> Apart:
 
 def _still(plans: Plans, units: tuple[str, ...]) -> Float[np.ndarray, " D"]:
     """How far each channel may be from a pose and still count as there."""
-    ranges = np.ptp(plans, axis=(0, 1))
-    largest = [max(r for r, u in zip(ranges, units, strict=True) if u == unit) for unit in units]
-    noises = noise(plans)
-    return np.maximum(_STILL * np.array(largest), _STILL_NOISE * noises)
+    largest = largest_of_unit(np.ptp(plans, axis=(0, 1)), units)
+    return np.maximum(_STILL * largest, _STILL_NOISE * noise(plans))
 
 
 def _shapes(
@@ -499,9 +500,8 @@ def _linear(values: Float[np.ndarray, " L"], at: Float[np.ndarray, " H"]) -> np.
 
 
 def _comes_back(plans: Plans, demonstrations: Demonstrations) -> bool:
-    units = np.array(demonstrations.format.units)
     ranges = np.ptp(demonstrations.plans, axis=(0, 1))
-    largest = np.array([ranges[units == unit].max() for unit in units])
+    largest = largest_of_unit(ranges, demonstrations.format.units)
     off = np.sqrt(np.mean((plans - demonstrations.plans) ** 2, axis=1))
     return bool(np.all(off <= _EXACT * np.where(largest > 0, largest, 1.0)))
 
