@@ -150,7 +150,7 @@ class _Denoiser:
     def clean(
         self, noisy: Float[torch.Tensor, "B C T"], level: int
     ) -> Float[torch.Tensor, "B C T"]:
-        """The network's estimate of x_0, clipped to the demonstrated range and its margin.
+        """The network's estimate of x_0, clipped to the range of what was learned and its margin.
 
         Args:
             noisy: Codes, a condition's copies one after another.

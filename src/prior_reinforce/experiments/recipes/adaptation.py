@@ -54,7 +54,6 @@ RULES = (
 """The adapters compared, whether earlier goals' trials serve them, and what each is called."""
 _OURS = "Bayesian, earlier goals too"
 _GOALS = 8
-_CARRIED = "earlier goals too"
 _ALONE = "each goal alone, all rules"
 _DASHES = ("--", ":", "-.")
 """Of the lines of rivals that remember, all in one grey."""
@@ -188,6 +187,7 @@ def draw(figures: Figures, folder: Path) -> list[Picture]:
     with drawing():
         figure = new_figure(10.5, 4.4)
         left, right = figure.subplots(1, 2, width_ratios=(1.4, 1.0))
+        carried = {label: remembers for _, remembers, label in RULES}
         shown = {n: interval_of(of["mean"]) for n, of in figures["trials"].items()}
         for axes in (left, right):
             calm_axes(axes)
@@ -197,7 +197,7 @@ def draw(figures: Figures, folder: Path) -> list[Picture]:
             left.plot([mean.value], [place], "o", color=colour)
             curve = figures["by_place"][name]
             places = range(1, _GOALS + 1)
-            if name.endswith(_CARRIED):
+            if carried.get(name, True):  # what was included is
                 style = {"linewidth": 2.5} if name == _OURS else {"linestyle": _DASHES[place % 3]}
                 right.plot(places, curve, color=colour, label=name, **style)
             elif min(curve) < 2 * min(figures["by_place"][_OURS]):
