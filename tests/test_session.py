@@ -214,7 +214,9 @@ def test_amend_leaves_a_pending_plan_as_it_is(session):
     session.tell(1, [0.05, 0.0])
     pending = session.ask()
     session.amend(1, [0.0, 0.04])
-    assert session.ask() is pending
+    again = session.ask()
+    assert (again.number, again.outdated, pending.outdated) == (2, True, False)
+    np.testing.assert_array_equal(again.plan, pending.plan)
 
 
 def test_voiding_a_told_trial_forgets_it(session):

@@ -131,3 +131,33 @@ def test_only_what_is_new_is_taken_in():
 
 def test_every_event_of_a_session_is_known():
     assert {"goal_set", "asked", "told", "amended", "voided", "executing", "executed"} <= KINDS
+
+
+@pytest.mark.parametrize(
+    ("memory", "then", "outdated"),
+    [
+        ("goal", ("amended", TOLD | {"trial": 2, "error_seen": [0.2, 0.0]}), True),
+        ("goal", ("amended", TOLD | {"trial": 2}), False),  # the same in other words
+        ("goal", ("amended", TOLD | {"trial": 2, "hit": True}), True),
+        ("goal", ("voided", {"trial": 2, "reason": "typed nonsense"}), True),
+        ("goal", ("voided", {"trial": 1, "reason": "of another goal"}), False),
+        ("workspace", ("voided", {"trial": 1, "reason": "of another goal"}), True),
+    ],
+)
+def test_a_plan_is_outdated_once_what_it_was_planned_from_is_corrected(memory, then, outdated):
+    events = [
+        *[("goal_set", GOAL), ("asked", ASKED), ("told", TOLD)],
+        *[("goal_set", GOAL | {"memory": memory}), ("asked", ASKED | {"trial": 2, "goal": 2})],
+        *[("told", TOLD | {"trial": 2}), ("asked", ASKED | {"trial": 3, "goal": 2})],
+    ]
+    assert not history(*events).open_trial.outdated
+    assert history(*events, then).open_trial.outdated is outdated
+    void = ("voided", {"trial": 3, "reason": "outdated"})
+    again = ("asked", ASKED | {"trial": 4, "goal": 2})
+    assert not history(*events, then, void, again).open_trial.outdated
+
+
+def test_readings_of_another_model_count_for_nothing():
+    told = history(("goal_set", GOAL), ("asked", ASKED), ("told", TOLD))
+    assert [trial.number for trial in told.readings_for(told.goal, "m")] == [1]
+    assert told.readings_for(told.goal, "another") == []

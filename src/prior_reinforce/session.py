@@ -294,7 +294,9 @@ class Session:
     def amend(
         self, number: int, seen: Reading | ArrayLike | None = None, *, hit: bool | None = None
     ) -> Trial:
-        """Correct what was told of a trial, of any goal. An open trial keeps the plan it has.
+        """Correct what was told of a trial, of any goal.
+
+        An open trial keeps the plan it has, and says so (`Trial.outdated`).
 
         Arguments as in `tell`.
 
@@ -478,7 +480,7 @@ class Session:
 
     def _inform(self) -> None:
         """Let the adapter see every reading that counts."""
-        readings = self._readings()
+        readings = self._history.readings_for(self._current_goal(), self._loaded_for[0])
         seen, self._observed = self._observed, None  # until it has seen them all
         # Another session's readings are in it, where two share it by mistake.
         if vars(self.adapter).get("_used_by") is not self._mark:
@@ -501,17 +503,6 @@ class Session:
             if goal.new_hardware is not None:
                 self.adapter.change_hardware()
         self._on_hardware_of = max(self._on_hardware_of, goal_number)
-
-    def _readings(self) -> list[Trial]:
-        """Told trials of this goal, and of earlier ones if they are carried over, oldest first."""
-        goal = self._current_goal()
-        return [
-            trial
-            for trial in self._history.trials
-            if trial.stage is Stage.TOLD
-            and trial.model == self._loaded_for[0]
-            and (goal.carry_over or trial.goal_number == goal.number)
-        ]
 
     def _open(self, condition: Point, plan: Frames) -> None:
         """Write a new trial down, if its plan may be executed."""

@@ -100,6 +100,8 @@ class Trial:
     """Whether the goal was reached: as seen, or judged from `error_seen`."""
     note: str = ""
     """Why it was voided."""
+    outdated: bool = False
+    """Whether a reading that it was planned from was amended or voided since."""
     p_hit: float | None = None
     """Probability that it hits, as its adapter saw it; None from one that expects nothing."""
     expected_trials: float | None = None
@@ -214,6 +216,21 @@ class History:
         """Trials of one goal, in order."""
         return tuple(trial for trial in self.trials if trial.goal_number == goal_number)
 
+    def readings_for(self, goal: Goal, model: str) -> list[Trial]:
+        """Told trials that an adapter learns from for a goal, oldest first.
+
+        Those of the goal, and of earlier ones where they are carried over, as far as this model
+        planned them.
+        """
+        return [
+            trial
+            for trial in self.trials
+            if trial.stage is Stage.TOLD
+            and trial.model == model
+            and (goal.carry_over or trial.goal_number == goal.number)
+            and trial.goal_number <= goal.number
+        ]
+
     def update(self, events: Sequence[Event]) -> None:
         """Take in the events of the log that came since the last time.
 
@@ -269,7 +286,19 @@ class History:
             if kind == "voided":
                 changes |= {"reading": None, "hit": False, "note": data["reason"]}
             index = range(1, len(self.trials) + 1).index(data["trial"])
-            self.trials[index] = replace(self.trials[index], **changes)
+            before, after = self.trials[index], replace(self.trials[index], **changes)
+            if kind in {"amended", "voided"} and _meaning(before) != _meaning(after):
+                self._outdate(before)
+            self.trials[index] = after
+
+    def _outdate(self, corrected: Trial) -> None:
+        """Mark the open trial if it was planned from a reading that is corrected now."""
+        trial = self.open_trial
+        if trial is None or corrected.open:
+            return
+        used = self.readings_for(self.goals[trial.goal_number - 1], trial.model)
+        if corrected.number in {reading.number for reading in used}:
+            self.trials[trial.number - 1] = replace(trial, outdated=True)
 
     def _reading(self, data: Mapping[str, Any]) -> Reading:
         """What was told; the first journals kept a number a component, and nothing of its origin.
@@ -294,6 +323,14 @@ _CHANGES = {
 }
 KINDS = frozenset({"goal_set", "asked", *_CHANGES})
 """Events that a session writes."""
+
+
+def _meaning(trial: Trial) -> object:
+    """What was seen of a trial, in whatever words; None unless told."""
+    reading = trial.reading
+    if reading is None:
+        return None
+    return reading.error_seen.tolist(), trial.hit, {**reading.as_json(), "said": ""}
 
 
 def _read_only(values: Any) -> np.ndarray:

@@ -210,3 +210,16 @@ def test_export_writes_what_was_handed_out(run, folder):
     status, out, _ = run("export", folder, 1, "plan.npz")
     assert status == 0
     assert trials_in(folder)[0].kept["plan_sha256"] in out
+
+
+def test_a_plan_of_before_a_correction_is_named_until_it_is_voided(run, folder):
+    run("goal", folder, "0.9", "-0.05")
+    run("ask", folder)
+    assert "before a correction" not in run("tell", folder, 1, "30 cm long")[1]
+    run("ask", folder)
+    said = "trial 2 was planned before a correction: unless it was thrown, void it and ask again"
+    assert said in run("amend", folder, 1, "3 cm long")[1]
+    assert said in run("ask", folder)[1]
+    assert said in run("void", folder, 1)[1]
+    assert "before a correction" not in run("void", folder, 2)[1]
+    assert "before a correction" not in run("ask", folder)[1]

@@ -143,6 +143,12 @@ def test_goal_far_outside_warns_and_says_how_far_and_a_near_one_is_silent():
         demos.check_goal([1.5, 0.0])
 
 
+def test_half_the_extent_beyond_the_outcomes_is_far_outside_and_less_is_not():
+    made = make(n=2, outcomes_seen=[[0.8, -0.2], [1.0, 0.2]])
+    np.testing.assert_allclose(made.far_outside(np.array([0.9, 0.75])), [0.0, 0.55])
+    np.testing.assert_array_equal(made.far_outside(np.array([0.9, 0.39])), [0.0, 0.0])
+
+
 def test_how_far_outside_a_goal_is_can_be_said_however_far():
     with pytest.warns(UserWarning, match=re.escape("goal [9e+05")) as warned:
         make().check_goal([9e5, 0.7])

@@ -17,7 +17,12 @@ from prior_reinforce.plans.motions import Plan
 from prior_reinforce.session import Session
 from prior_reinforce.trials import Stage, Trial
 from prior_reinforce.wording import say_place
-from prior_reinforce.workspace.status import execution_warning, say_expectation, say_trial
+from prior_reinforce.workspace.status import (
+    OUTDATED,
+    execution_warning,
+    say_expectation,
+    say_trial,
+)
 from prior_reinforce.workspace.workspace import Workspace
 
 
@@ -137,6 +142,7 @@ class Ask:
         print(f"trial {trial.number}: aimed at {place}")
         for line in say_expectation(session, trial):
             print(line)
+        _print_outdated(session)
         if reached_before:
             print("the goal is reached already: this trial repeats it")
         assert trial.plan is not None
@@ -253,6 +259,7 @@ class Amend(Seen):
             seen, hit = self.read(workspace, session)
             trial = session.amend(self.trial, seen, hit=hit)
             print(f"trial {trial.number}, corrected: {say_trial(workspace, trial)}")
+            _print_outdated(session)
             print_next(workspace)
 
 
@@ -270,10 +277,12 @@ class Void:
     def run(self) -> None:
         """Write it down."""
         with Workspace(self.folder) as workspace:
-            trial = workspace.session().void(self.number, self.reason)
+            session = workspace.session()
+            trial = session.void(self.number, self.reason)
             print(
                 f"trial {trial.number}: {say_trial(workspace, trial)}; nothing is learned from it"
             )
+            _print_outdated(session)
             print_next(workspace)
 
 
@@ -317,6 +326,13 @@ def _warn_of_its_execution(workspace: Workspace, session: Session, number: int) 
             "it, void it: a told trial can be voided too",
             file=sys.stderr,
         )
+
+
+def _print_outdated(session: Session) -> None:
+    """Say so where the trial that waits was planned before a correction."""
+    trial = session.open_trial
+    if trial is not None and trial.stage is Stage.ASKED and trial.outdated:
+        print(f"trial {trial.number} was {OUTDATED}")
 
 
 def _may_move() -> bool:

@@ -245,12 +245,9 @@ class Demonstrations:
             InvalidGoalError: Wrong shape, or not finite.
         """
         goal = as_goal(goal, self.outcome_names)
-        low, high = self.outcomes_seen.min(axis=0), self.outcomes_seen.max(axis=0)
-        spread = np.maximum(high - low, 1e-12)
-        beyond = np.maximum(np.maximum(low - goal, goal - high), 0.0)
-        # Ours: half the demonstrated extent beyond it is extrapolation that no figure of the paper
-        # supports (its displacement field degrades towards the boundary already).
-        if np.any(beyond > 0.5 * spread):
+        beyond = self.far_outside(goal)
+        if np.any(beyond):
+            low, high = self.outcomes_seen.min(axis=0), self.outcomes_seen.max(axis=0)
             warnings.warn(
                 f"goal {_say(goal)} lies {_say(beyond)} {self.outcome_units} outside the "
                 f"demonstrated outcomes {_say(low)} to {_say(high)}; check its unit, or "
@@ -258,6 +255,17 @@ class Demonstrations:
                 stacklevel=2,
             )
         return goal
+
+    def far_outside(self, goal: Point) -> Point:
+        """How far a goal lies outside the outcomes, in their units; zeros where it is near enough.
+
+        Ours: half the demonstrated extent beyond it is extrapolation that no figure of the paper
+        supports (its displacement field degrades towards the boundary already).
+        """
+        low, high = self.outcomes_seen.min(axis=0), self.outcomes_seen.max(axis=0)
+        spread = np.maximum(high - low, 1e-12)
+        beyond = np.maximum(np.maximum(low - goal, goal - high), 0.0)
+        return beyond if np.any(beyond > 0.5 * spread) else np.zeros_like(beyond)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write an `.npz`: two arrays and a JSON text; nothing in it can run code."""

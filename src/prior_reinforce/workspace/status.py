@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import shlex
 
+import numpy as np
+
 from prior_reinforce.registry import parse_choice
 from prior_reinforce.session import Session
 from prior_reinforce.trials import Goal, Stage, Trial
@@ -15,6 +17,8 @@ _POOR_TRIALS = 3
 _POOR_CHANCE = 0.35
 """Probability of a hit below which another trial like the last ones is no good plan (ours): words
 by eye leave a chance of a half where all else is known."""
+OUTDATED = "planned before a correction: unless it was thrown, void it and ask again"
+"""What to do about a trial whose plan knows nothing of what was amended or voided since."""
 _EXAMPLE = ("5cm long", "2cm left", "1cm high")
 
 
@@ -38,11 +42,11 @@ def describe(workspace: Workspace) -> str:
     if session.goals:
         goal = session.goals[-1]
         rows.append((f"goal {goal.number}", _say_goal(workspace, session, goal, n)))
-        rows += [
-            (f"  trial {trial.number}", say_trial(workspace, trial))
-            for trial in session.trials[-_TRIALS_SHOWN:]
-        ]
-    rows.append(("next", next_step(workspace, session)))
+        shown = session.trials[-_TRIALS_SHOWN:]
+        if earlier := len(session.trials) - len(shown):
+            rows.append((f"  {earlier} more", "before these; all are in the report"))
+        rows += [(f"  trial {trial.number}", say_trial(workspace, trial)) for trial in shown]
+    rows.append(("next", next_step(workspace, session) + _say_nearer(workspace, session)))
     return "\n".join(plain(f"{name:<15} {text}") for name, text in rows)
 
 
@@ -65,7 +69,8 @@ def _say_trial(workspace: Workspace, trial: Trial) -> str:
     if trial.stage is Stage.EXECUTED:
         warning = execution_warning(workspace, trial)
         return f"executed, {warning}" if warning else "executed, waits to be told"
-    return "asked for, waits to be executed and told"
+    waits = "asked for, waits to be executed and told"
+    return f"{waits}; {OUTDATED}" if trial.outdated else waits
 
 
 def say_expectation(session: Session, trial: Trial) -> list[str]:
@@ -125,6 +130,16 @@ def next_step(workspace: Workspace, session: Session) -> str:
         + (f" --generator {shlex.quote(own)}" if own else "")
         + (f" --adapter {shlex.quote(adapter)}" if ":" in adapter else "")
     )
+
+
+def _say_nearer(workspace: Workspace, session: Session) -> str:
+    """What else comes next where the gate may refuse a first plan: the goal is far out."""
+    if workspace.log.stale or not session.goals or session.trials:
+        return ""
+    if not np.any(workspace.demonstrations.far_outside(session.goal)):
+        return ""
+    nearer = f"prior-reinforce goal {shlex.quote(str(workspace.folder))} {_goal_example(workspace)}"
+    return f"; if it refuses, a goal nearer to the demonstrations: {nearer}"
 
 
 def tell_example(workspace: Workspace) -> str:
