@@ -33,15 +33,17 @@ class ConfigurationError(PriorReinforceError, ValueError):
 
 
 class UnclearUnitsError(ConfigurationError):
-    """Recorded units or times are not said and cannot be what they would be taken for.
+    """Recorded units, times or names are not said, or cannot be what they would be taken for.
 
-    `options` are the command-line options that say they are what they look like.
+    `what` says so in words, `options` are the command-line options that say they are what they
+    look like, and `also` is what else is wrong.
     """
 
-    def __init__(self, message: str, options: str = "") -> None:
-        """Keep the options beside the message."""
-        self.options = options
-        super().__init__(message)
+    def __init__(self, what: str, options: str, also: str = "") -> None:
+        """Keep the parts beside the message."""
+        self.what, self.options, self.also = what, options, also
+        more = f"; and {also}" if also else ""
+        super().__init__(f"{what}; if so, add: {options}{more}")
 
 
 class FileFormatError(PriorReinforceError, ValueError):

@@ -41,11 +41,61 @@ def test_what_is_unclear_is_taken_only_when_said(run, folder, tmp_path):
     status, _, err = run("import", folder, "odd")
     assert status == 2
     options = "--time-unit ms --units deg"
-    assert err.rstrip().endswith(f"if so, add: {options}")
+    assert err.rstrip().endswith(f"if so: prior-reinforce import planar odd {options}")
     assert sorted((tmp_path / "planar").rglob("*")) == before
     assert run("import", folder, "odd", "--no-trim", *options.split())[0] == 0
     with Workspace(folder) as workspace:
         np.testing.assert_allclose(workspace.demonstrations.plans, demonstrations().plans)
+
+
+def test_a_unit_that_cannot_be_is_put_right_in_the_command(run, folder, tmp_path):
+    in_milliseconds_and_degrees(tmp_path / "odd")
+    (tmp_path / "odd" / "outcomes.csv").unlink()
+    said = ("import", folder, "odd", "--time-unit", "s", "--units", "rad", "--no-trim")
+    status, out, err = run(*said)
+    assert (status, out) == (2, "")
+    assert err.startswith("prior-reinforce: no outcomes for episodes throw_0, throw_1")
+    command = "prior-reinforce import planar odd --no-trim --time-unit ms --units deg"
+    assert err.endswith(f"if so: {command}\n")
+    assert run(*said, "--inspect")[1].endswith(f"next: {command}\n")
+
+
+def test_numbered_columns_are_looked_at_and_named_in_the_next_command(run, folder, tmp_path):
+    (tmp_path / "odd").mkdir()
+    for i, plan in enumerate(demonstrations().plans):
+        rows = np.column_stack([np.arange(len(plan)) * 20, np.rad2deg(plan)])
+        path = tmp_path / "odd" / f"take{i}.csv"
+        np.savetxt(path, rows, delimiter=";", header="t;q0;q1", comments="")
+    status, out, _ = run("import", folder, "odd", "--inspect", "--no-trim")
+    assert status == 0
+    assert "- no column is called joint1 to joint2: it looks as if q0 to q1 were these" in out
+    assert ["joint1", "q0"] in [line.split()[:2] for line in out.splitlines()]
+    following = out.splitlines()[-1].split("next: ")[1]
+    assert following.endswith("--no-trim --time-unit ms --joints q0 q1 --units deg")
+    table = tmp_path / "odd" / "outcomes.csv"
+    rows = [f"take{i},{x},{y}," for i, (x, y) in enumerate(demonstrations().outcomes_seen)]
+    table.write_text("\n".join(["episode,x [m],y [m],note", *rows]))
+    status, _, err = run("import", folder, "odd", "--no-trim")
+    assert status == 2
+    assert err.endswith(f"if so: {following}\n")
+    assert run(*following.split()[1:])[0] == 0
+    with Workspace(folder) as workspace:
+        np.testing.assert_allclose(workspace.demonstrations.plans, demonstrations().plans)
+        assert workspace.demonstrations.format.names == ("joint1", "joint2")
+
+
+def test_what_breaks_every_limit_is_not_learned_from_next(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    recordings(tmp_path / "recordings")
+    assert run("new", "arm", "--robot", "panda", "--dt", "0.02")[0] == 0
+    for i, plan in enumerate(demonstrations().plans):
+        t = np.arange(len(plan)) * 0.02
+        q = 10 * plan[:, [0, 1, 0, 1, 0, 1, 0]]
+        np.savez(tmp_path / "recordings" / f"throw_{i}.npz", t=t, q=q)
+    status, out, err = run("import", "arm", "recordings", "--units", "rad", "--no-trim")
+    assert (status, err) == (0, "")
+    assert "panda: 4 of 4 demonstrations break a limit" in out
+    assert out.endswith("next: prior-reinforce import arm recordings --no-trim --units deg\n")
 
 
 def test_or_agreed_to_at_a_terminal(run, folder, tmp_path, monkeypatch):

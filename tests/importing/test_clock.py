@@ -63,6 +63,19 @@ def test_times_that_fit_no_unit_say_so():
     assert "no other unit fits better" in doubt.what
 
 
+@pytest.mark.parametrize(
+    ("unit", "said", "looks"), [(1e-3, "s", "ms"), (1.0, "ms", "s"), (1e-6, "ms", "us")]
+)
+def test_a_unit_that_makes_no_throw_is_a_doubt_although_it_was_said(unit, said, looks):
+    stamps = np.arange(140) * 0.0125 / unit
+    clock = clock_of("a", 140, stamps=stamps, name="t", time_unit=said)
+    (doubt,) = clock.doubts
+    assert doubt.option == f"--time-unit {looks}"
+    assert f"in {said}, as --time-unit says, would be" in doubt.what
+    assert f"in {looks} 80 Hz and 1.74 s long: it looks like {looks}" in doubt.what
+    assert clock.period == pytest.approx(0.0125)
+
+
 def test_slow_seconds_are_taken_when_said():
     clock = clock_of("a", 9, stamps=np.arange(9.0), name="t", time_unit="s")
     assert clock.doubts == ()

@@ -113,6 +113,17 @@ def test_libfrankas_log_is_known_by_its_columns(tmp_path):
         read_recordings(tmp_path, rate=100)
 
 
+def test_a_numbered_group_keeps_what_its_columns_are_called(tmp_path):
+    for i in range(N):
+        t, q = sampled(i, 100)
+        rows = np.column_stack([t, q, q + 1])
+        header = ",".join(["t", *(f"q{k}" for k in range(7)), *(f"tau{k}" for k in range(7))])
+        np.savetxt(tmp_path / f"{i}.csv", rows, delimiter=",", header=header, comments="")
+    recording = read_recordings(tmp_path, key="q")[0]
+    assert recording.names == JOINTS
+    assert recording.columns == tuple(f"q{k}" for k in range(7))
+
+
 def test_an_rtde_log_is_known_by_its_columns(tmp_path):
     """As UR's own recorder writes it: blanks between cells, seconds since the start."""
     t, q = sampled(0, 500)

@@ -55,6 +55,15 @@ def test_guesses_are_named_with_the_options_that_settle_them(tmp_path):
     assert found.recordings[0].duration == pytest.approx(1.7)
 
 
+def test_a_channel_is_listed_by_its_recorded_name(tmp_path):
+    for i in range(2):
+        t, q = sampled(i, 100)
+        names = [f"panda_joint{k}" for k in range(1, 8)]
+        np.savez(tmp_path / f"{i}.npz", t=t, q=q, joint_names=names)
+    found = inspect_recordings(tmp_path, joints=["joint4", "joint2"])
+    assert table(found.text, "channel ")["joint4"][0] == "panda_joint4"
+
+
 def test_every_demonstration_is_held_against_the_robots_limits(folder):
     panda = robot_limits("panda")
     write_outcomes(folder)
@@ -81,8 +90,20 @@ def test_noise_that_breaks_a_limit_is_offered_smoothing(tmp_path):
         r.startswith("the gate refuses acceleration") and r.endswith("try --smooth 20")
         for r in found.remarks
     )
+    assert inspect_recordings(tmp_path, robot=panda).remedy == "--smooth 20"
     smooth = inspect_recordings(tmp_path, robot=panda, preprocessing=Preprocessing(smooth=20.0))
     assert not any(r.refused for r in smooth.reports)
+    assert smooth.remedy == ""
+
+
+def test_degrees_said_to_be_radians_break_every_limit_and_have_a_remedy(tmp_path):
+    for i in range(2):
+        t, q = sampled(i, 100)
+        np.savez(tmp_path / f"{i}.npz", t=t, q=np.rad2deg(q) / 4, joint_names=JOINTS)
+    said = inspect_recordings(tmp_path, robot=robot_limits("panda"), units=["rad"])
+    assert said.remedy == "--units deg"
+    right = inspect_recordings(tmp_path, robot=robot_limits("panda"), units=["deg"])
+    assert right.remedy == ""
 
 
 def test_small_numbers_are_said_in_thousandths():

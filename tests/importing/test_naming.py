@@ -3,7 +3,12 @@
 import pytest
 
 from prior_reinforce.errors import InvalidDemonstrationsError
-from prior_reinforce.importing.naming import find_channels, missing_channels, vectors
+from prior_reinforce.importing.naming import (
+    find_channels,
+    missing_channels,
+    numbered_like,
+    vectors,
+)
 
 
 @pytest.mark.parametrize(
@@ -36,3 +41,18 @@ def test_the_exact_name_wins_and_two_others_are_ambiguous():
 def test_numbered_columns_are_vectors():
     names = ["t", "q[1]", "q[0]", "actual_q_0", "actual_q_1", "x", "lone3"]
     assert vectors(names) == {"q": [2, 1], "actual_q": [3, 4]}
+
+
+@pytest.mark.parametrize(
+    ("there", "found"),
+    [
+        (["t", "q1", "q0", "x"], ("q0", "q1")),
+        (["q[0]", "q[1]", "dq[0]", "dq[1]"], ("q[0]", "q[1]")),
+        (["actual_q_0", "actual_q_1", "target_q_0", "target_q_1"], None),
+        (["a0", "a1", "b0", "b1"], None),
+        (["q0", "q1", "q2"], None),
+        (["left", "right"], None),
+    ],
+)
+def test_numbered_channels_that_are_as_many_look_like_the_joints(there, found):
+    assert numbered_like(["joint1", "joint2"], there) == found

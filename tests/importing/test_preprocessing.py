@@ -1,5 +1,7 @@
 """Trimming, resampling and one horizon: nothing is cut, stretched or invented."""
 
+import warnings
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -306,6 +308,53 @@ def test_degrees_that_nobody_names_are_refused_until_said(tmp_path):
     for said in ({"units": ["deg"]}, {"take_guesses": True}):
         plans = import_demonstrations(folder, preprocessing=AS_IS, **said).demonstrations.plans
         np.testing.assert_allclose(plans[0, :171], sampled(0, 100)[1], atol=1e-12)
+
+
+def test_a_unit_that_cannot_be_is_refused_whoever_says_it(tmp_path):
+    with pytest.raises(UnclearUnitsError) as caught:
+        import_demonstrations(degrees(tmp_path), units=["rad"])
+    assert "in rad, as --units says, would reach 167.6 (joint6 of throw_5)" in str(caught.value)
+    assert caught.value.options == "--units deg"
+
+
+def test_what_no_arm_does_but_some_joint_could_is_the_first_remark(tmp_path):
+    """Twelve radians: two turns of a joint without stops, or a few degrees."""
+    for i in range(2):
+        t, q = sampled(i, 100)
+        np.savez(tmp_path / f"{i}.npz", t=t, q=q * 4)
+    outcomes = {name: OUTCOMES[name] for name in ("0", "1")}
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        preview = import_demonstrations(tmp_path, outcomes=outcomes, units=["rad"]).preview
+    assert preview.remarks[0] == (
+        "joint6 of 1 reaches 10.98 rad, and arms do not: if it was recorded in deg, say --units deg"
+    )
+
+
+def numbered(folder, names):
+    for i in range(N):
+        t, q = sampled(i, 100)
+        np.savez(folder / f"{i}.npz", t=t, q=q, joint_names=names)
+    write_outcomes(folder)
+    return folder
+
+
+def test_numbered_columns_are_taken_for_the_plans_joints_only_when_said(tmp_path):
+    recorded = [f"q{i}" for i in range(7)]
+    folder, plan = numbered(tmp_path, recorded), tuple(f"joint{i}" for i in range(1, 8))
+    with pytest.raises(UnclearUnitsError) as caught:
+        import_demonstrations(folder, joints=plan, names=plan)
+    assert str(caught.value) == (
+        "no column is called joint1 to joint7: it looks as if q0 to q6 were these; if so, add: "
+        "--joints q0 q1 q2 q3 q4 q5 q6"
+    )
+    said = import_demonstrations(folder, joints=recorded, names=plan).demonstrations
+    guessed = import_demonstrations(folder, joints=plan, names=plan, take_guesses=True)
+    np.testing.assert_array_equal(guessed.demonstrations.plans, said.plans)
+    assert guessed.demonstrations.format.names == plan
+    # What was said is not guessed about.
+    with pytest.raises(InvalidDemonstrationsError, match="has no joint a1 to a7; it has q0 to q6"):
+        import_demonstrations(folder, joints=[f"a{i}" for i in range(1, 8)], names=plan)
 
 
 def test_plans_may_be_in_degrees(tmp_path):

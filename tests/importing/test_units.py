@@ -10,6 +10,7 @@ from prior_reinforce.importing.units import (
     SECONDS,
     Doubt,
     base_of,
+    cannot_be,
     conversion,
     guess_unit,
     known_unit,
@@ -81,10 +82,19 @@ def test_doubts_are_one_line_with_the_options_that_settle_them():
     assert caught.value.options == "--time-unit ms --units deg"
     with pytest.raises(UnclearUnitsError, match="; and no outcomes") as caught:
         refuse_doubts(doubts, also="no outcomes")
-    assert caught.value.options == ""  # a yes would not be enough
+    assert caught.value.also == "no outcomes"
 
 
 def test_many_names_are_few_words():
     ninety = ["time", *(f"q[{i}]" for i in range(7)), *(f"cmd.q_{i}" for i in range(1, 7)), "x"]
     assert say_names(ninety) == "time, q[0] to q[6], cmd.q_1 to cmd.q_6, x"
     assert say_names([f"{c}{c}" for c in "abcdefghijklmno"]).endswith("ll and 3 more")
+
+
+@pytest.mark.parametrize(
+    ("unit", "reach", "cannot"),
+    [("rad", 12.0, False), ("rad", 151.0, True), ("m", 9.0, False), ("m", 92.0, True)],
+)
+def test_what_no_arm_can_do_whoever_says_it(unit, reach, cannot):
+    assert cannot_be(unit, reach) == cannot
+    assert not cannot_be("counts", 1e9)

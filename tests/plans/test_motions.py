@@ -134,6 +134,15 @@ def test_units_that_look_wrong_are_only_warned_about():
         make(plans=np.random.default_rng(0).normal(size=(4, 5, 2)) * 90)
 
 
+def test_odd_units_are_warned_about_once(tmp_path):
+    with pytest.warns(UserWarning, match="degrees"):
+        odd = make(plans=np.random.default_rng(0).normal(size=(4, 5, 2)) * 90)
+    odd.save(tmp_path / "odd.npz")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        Demonstrations.load(tmp_path / "odd.npz").only([0, 1, 2]).with_plans(odd.plans[:3])
+
+
 def test_goal_far_outside_warns_and_says_how_far_and_a_near_one_is_silent():
     demos = make(outcomes_seen=[[0.8, -0.2], [1.0, -0.2], [0.8, 0.2], [1.0, 0.2]])
     with warnings.catch_warnings():

@@ -13,7 +13,11 @@ import tyro
 
 from prior_reinforce.commands.outcome_questions import Answers, ask_for_outcomes
 from prior_reinforce.commands.workspace import Folder, print_next
-from prior_reinforce.errors import InvalidDemonstrationsError, UnclearUnitsError
+from prior_reinforce.errors import (
+    ConfigurationError,
+    InvalidDemonstrationsError,
+    UnclearUnitsError,
+)
 from prior_reinforce.files import named_disk_errors
 from prior_reinforce.importing import (
     FORMATS,
@@ -106,6 +110,14 @@ class Import:
 
     def run(self) -> None:
         """Read, show, take in."""
+        try:
+            self._run()
+        except UnclearUnitsError as unclear:
+            also = f"{unclear.also}; and " if unclear.also else ""
+            command = self._command(unclear.options)
+            raise ConfigurationError(f"{also}{unclear.what}; if so: {command}") from unclear
+
+    def _run(self) -> None:
         with Workspace(self.folder) as workspace:
             if self.inspect:
                 self._inspect(workspace)
@@ -126,7 +138,11 @@ class Import:
             with named_disk_errors(self.folder):
                 result.preview.draw(self.folder / _PICTURE)
             print(f"picture: {self.folder / _PICTURE}  (look at it before you learn)")
-            print_next(workspace)
+            remedy = result.preview.found.remedy
+            if remedy:
+                print(f"next: {self._command(remedy)}")
+            else:
+                print_next(workspace)
 
     def _inspection(self, workspace: Workspace) -> Inspection:
         wanted = self._wanted(workspace.manifest)
@@ -151,25 +167,25 @@ class Import:
             with named_disk_errors(places[0]):
                 write_outcome_table(table, episodes, manifest.outcome_names, manifest.outcome_units)
             print(f"outcomes: none yet; fill in {table} (units are in its first line)")
-        options = list(dict.fromkeys(doubt.option for doubt in found.doubts))
-        said = " ".join(["prior-reinforce import", shlex.quote(str(self.folder))])
-        said = " ".join([said, shlex.quote(str(self.source)), *self._as_given(), *options])
-        print(f"nothing was taken in; next: {said}")
+        doubts = [*found.doubts, *self._known(workspace, found.recordings)[1]]
+        options = " ".join(dict.fromkeys(doubt.option for doubt in doubts))
+        print(f"nothing was taken in; next: {self._command(options, found.remedy)}")
 
-    def _as_given(self) -> list[str]:
-        """The options that were given, for the command that comes next."""
-        given = []
+    def _command(self, *options: str) -> str:
+        """The whole command with what was given, and options instead of or beside that."""
+        more = " ".join(filter(None, options))
+        said = ["prior-reinforce import", shlex.quote(str(self.folder))]
+        said.append(shlex.quote(str(self.source)))
         for field in fields(self):
-            value = getattr(self, field.name)
+            value, option = getattr(self, field.name), f"--{field.name.replace('_', '-')}"
             if field.name in ("folder", "source", "inspect") or value == field.default:
                 continue
-            option = field.name.replace("_", "-")
             if isinstance(value, bool):
-                given.append(f"--{option}" if value else f"--no-{option}")
-            else:
+                said.append(option if value else option.replace("--", "--no-"))
+            elif option not in more.split():
                 values = value if isinstance(value, tuple) else (value,)
-                given.append(" ".join([f"--{option}", *(shlex.quote(str(v)) for v in values)]))
-        return given
+                said.append(" ".join([option, *(shlex.quote(str(v)) for v in values)]))
+        return " ".join([*said, more]).rstrip()
 
     def _wanted(self, manifest: Manifest) -> dict[str, Any]:
         """What the plans shall be, and what they are held against."""
@@ -255,9 +271,9 @@ class Import:
 
 def _agrees(unclear: UnclearUnitsError) -> bool:
     """Whether a person at the terminal says that it is as it looks."""
-    if not (sys.stdin.isatty() and unclear.options):
+    if not sys.stdin.isatty() or unclear.also:
         return False
-    print(plain(str(unclear)))
+    print(plain(unclear.what))
     try:
         return input("is it so? (yes/no) ").strip().lower() in {"y", "yes"}
     except EOFError:

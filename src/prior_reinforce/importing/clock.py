@@ -21,6 +21,8 @@ TIME_UNITS = (*SECONDS, FRAME)
 _SLOWEST, _FASTEST = 5.0, 5000.0
 """Frames a second at which arms are recorded. Ours: teleoperation at 10 Hz is the slowest in use,
 libfranka's and RTDE's logs have 1000 and 500."""
+_SHORTEST, LONGEST = 0.1, 60.0
+"""Seconds that a throw, slide or swing is recorded for. Ours, and wide on purpose."""
 _AGREE = 0.05
 """Two rates that differ by less are one."""
 
@@ -104,6 +106,17 @@ def clock_of(
     if chosen is None:
         chosen = _guess(period)
         doubts = _doubts(name, period, numbers, chosen)
+    elif time_unit is not None and _is_slip(chosen, period, numbers):
+        looks = _guess(period)
+        doubts = (
+            Doubt(
+                f"{name} in {chosen}, as --time-unit says, would be "
+                f"{_say_clock(period, numbers, chosen)}, in {looks} "
+                f"{_say_clock(period, numbers, looks)}: it looks like {looks}",
+                f"--time-unit {looks}",
+            ),
+        )
+        chosen = looks
     _check_rate(rate, period * SECONDS[chosen], name, chosen)
     # From the first on, since nanoseconds since 1970 are 0.2 us coarse as floats.
     first = numbers[0] if numbers.size else 0.0
@@ -127,25 +140,39 @@ def _even(episode: str, count: int, name: str, own_rate: float | None, rate: flo
 
 def _guess(period: float) -> str:
     """The first unit in which the frames come as fast as arms are recorded; seconds if none is."""
-    for unit, seconds in SECONDS.items():
-        if period > 0 and _SLOWEST <= 1 / (period * seconds) <= _FASTEST:
-            return unit
-    return "s"
+    return next((unit for unit in SECONDS if _is_fit(unit, period)), "s")
+
+
+def _is_slip(unit: str, period: float, stamps: Times) -> bool:
+    """Whether no arm is recorded like that, and another unit makes it a throw."""
+    looks = _guess(period)
+    if _is_fit(unit, period) or not _is_fit(looks, period):
+        return False
+    return _SHORTEST <= float(stamps[-1] - stamps[0]) * SECONDS[looks] <= LONGEST
+
+
+def _say_clock(period: float, stamps: Times, unit: str) -> str:
+    scale = SECONDS[unit]
+    rate, length = 1 / (period * scale), float(stamps[-1] - stamps[0]) * scale
+    return f"{rate:.4g} Hz and {length:.3g} s long"
+
+
+def _is_fit(unit: str, period: float) -> bool:
+    """Whether arms are recorded so fast."""
+    return period > 0 and _SLOWEST <= 1 / (period * SECONDS[unit]) <= _FASTEST
 
 
 def _doubts(name: str, period: float, stamps: Times, unit: str) -> tuple[Doubt, ...]:
-    if period <= 0 or (unit == "s" and 1 / period <= _FASTEST and 1 / period >= _SLOWEST):
+    if period <= 0 or (unit == "s" and _is_fit("s", period)):
         return ()
-    length = float(stamps[-1] - stamps[0])
-    as_seconds = f"{name} in s would be {1 / period:.3g} Hz and {length:.3g} s long"
+    as_seconds = f"{name} in s would be {_say_clock(period, stamps, 's')}"
     if unit == "s":
         return (Doubt(f"{as_seconds}, and no other unit fits better", "--time-unit s"),)
-    scale = SECONDS[unit]
     counts = " (or it counts frames: --time-unit frame --rate HZ)" if period == 1 else ""
     return (
         Doubt(
-            f"{as_seconds}, in {unit} {1 / (period * scale):.4g} Hz and {length * scale:.3g} s: it "
-            f"looks like {unit}{counts}",
+            f"{as_seconds}, in {unit} {_say_clock(period, stamps, unit)}: it looks like "
+            f"{unit}{counts}",
             f"--time-unit {unit}",
         ),
     )

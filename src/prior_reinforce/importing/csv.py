@@ -148,6 +148,7 @@ def _episode(
         units=units,
         clock=clock.source,
         doubts=(*guessed, *clock.doubts),
+        columns=names if table.named else (),
     )
 
 

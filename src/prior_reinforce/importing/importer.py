@@ -8,6 +8,7 @@ from __future__ import annotations
 import importlib
 import math
 import os
+import warnings
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -145,15 +146,15 @@ def import_demonstrations(
         preprocessing: Time step, horizon and trimming; None takes the defaults.
         robot: Limits that the preview holds every demonstration against; None checks none.
         gate: The gate's settings for that.
-        take_guesses: Take units and times as they look, where that would be an error.
+        take_guesses: Take units, times and names as they look, where that would be an error.
         how: As in `read_recordings`.
 
     Raises:
         FileFormatError: As in `read_recordings`, or a damaged `outcomes.csv`.
         InvalidDemonstrationsError: Missing outcomes or joints (named), or demonstrations that
             cannot be learned from.
-        UnclearUnitsError: Units or times that nobody said and that cannot be what they would be
-            taken for; the message has the options that say what they look like.
+        UnclearUnitsError: Units, times or names that nobody said, or that cannot be what somebody
+            said; the message has the options that say what they look like.
         ConfigurationError: Settings that contradict each other.
         MissingExtraError: The format's optional library is not installed.
     """
@@ -176,14 +177,16 @@ def import_demonstrations(
     outcomes_seen = outcomes_of(recordings, known, partial=partial)
     done = preprocess(kept.recordings, kept.units, preprocessing or Preprocessing())
     refuse_copies(done.plans, [recording.episode for recording in recordings])
-    demonstrations = Demonstrations(
-        done.plans,
-        outcomes_seen,
-        PlanFormat(kept.names, kept.units, done.dt),
-        tuple(outcome_names) if outcome_names is not None else known.names,
-        tuple(outcome_units) if outcome_units is not None else (),
-        uncertainty_of(recordings, known),
-    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # the preview's remarks say it, with the option to give
+        demonstrations = Demonstrations(
+            done.plans,
+            outcomes_seen,
+            PlanFormat(kept.names, kept.units, done.dt),
+            tuple(outcome_names) if outcome_names is not None else known.names,
+            tuple(outcome_units) if outcome_units is not None else (),
+            uncertainty_of(recordings, known),
+        )
     found = _inspection(kept, done, robot, gate)
     preview = Preview(f"{source.name} ({kind})", found, demonstrations, known.where)
     return ImportResult(demonstrations, preview.episodes, preview)
@@ -202,7 +205,8 @@ def inspect_recordings(
 ) -> Inspection:
     """Say what recordings hold and what an import would make of them; nothing is needed but them.
 
-    Units and times that nobody said are taken as they look, and named as guesses.
+    What nobody said of units, times and names, and what was said and cannot be, is taken as it
+    looks, and named as a guess.
 
     Args:
         source: As in `read_recordings`.

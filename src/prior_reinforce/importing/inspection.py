@@ -10,10 +10,16 @@ import numpy as np
 from prior_reinforce.errors import InvalidPlanError
 from prior_reinforce.importing.preprocessing import Preprocessed, Selection
 from prior_reinforce.importing.recording import Recording
-from prior_reinforce.importing.units import Doubt, say_names
+from prior_reinforce.importing.units import Doubt, guess_unit, say_names
 from prior_reinforce.plans.motions import Plan, PlanFormat
 from prior_reinforce.robots import GateSettings, RobotLimits, check_plan
 from prior_reinforce.robots.report import LimitReport
+
+_SMOOTH = "--smooth 20"
+"""What takes out an encoder's noise: 20 Hz is above what a throw holds. Ours."""
+
+_SHAKEN = frozenset({"acceleration", "jerk"})
+"""What noise breaks first."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +35,7 @@ class Inspection:
     reports: tuple[LimitReport, ...] = ()
     """What the gate says of each; empty where no robot is named."""
     doubts: tuple[Doubt, ...] = ()
-    """Units and times that are only guessed."""
+    """Units, times and names of channels that are only guessed."""
 
     @property
     def recordings(self) -> tuple[Recording, ...]:
@@ -39,7 +45,24 @@ class Inspection:
     @property
     def remarks(self) -> tuple[str, ...]:
         """What a person should know, the most important first: limits, ends, gaps, ..."""
-        return (*self._broken(), *self.done.remarks)
+        return (*self.kept.remarks, *self._broken(), *self.done.remarks)
+
+    @property
+    def remedy(self) -> str:
+        """An option that may help where no demonstration passes the gate; else nothing."""
+        if not self.reports or not all(report.refused for report in self.reports):
+            return ""
+        broken = {line.check for r in self.reports for line in r.lines if line.status == "refuse"}
+        if "position" in broken:
+            return "--units deg" if self._is_degrees() else ""
+        return _SMOOTH if broken & _SHAKEN and not self._is_smooth() else ""
+
+    def _is_degrees(self) -> bool:
+        """Whether angles that are farther than a joint turns are not where they are degrees."""
+        kept = self.kept
+        angles = [i for i, unit in enumerate(kept.recorded_units) if unit == "rad"]
+        reach = [np.abs(r.positions[:, angles]).max(initial=0.0) for r in self.recordings]
+        return guess_unit("rad", float(max(reach))) == "deg"
 
     @property
     def rows(self) -> dict[str, str]:
@@ -80,7 +103,7 @@ class Inspection:
             ranges = (f"{every[:, i].min():.4g}", f"{every[:, i].max():.4g}")
             noise = say_small(float(self.done.noise[i]), kept.units[i])
             held = "held" if i in self.done.held_channels else ""
-            recorded = self.recordings[0].names[i]
+            recorded = self.recordings[0].columns[i]
             unit = kept.units[i]
             if kept.recorded_units[i] != unit:
                 unit = f"{unit}, from {kept.recorded_units[i]}"
@@ -116,10 +139,10 @@ class Inspection:
             for line in report.lines:
                 if line.status == "refuse":
                     said.setdefault(line.check, []).append(f"{recording.episode} ({line.text})")
-        shaky = "; if that is noise, try --smooth 20"
+        shaky = f"; if that is noise, try {_SMOOTH}"
         return [
             f"the gate refuses {check}: {', '.join(episodes)}"
-            f"{shaky if check in ('acceleration', 'jerk') and not self._is_smooth() else ''}"
+            f"{shaky if check in _SHAKEN and not self._is_smooth() else ''}"
             for check, episodes in said.items()
         ]
 

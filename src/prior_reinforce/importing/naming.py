@@ -9,6 +9,8 @@ from prior_reinforce.errors import InvalidDemonstrationsError
 from prior_reinforce.importing.units import CHANNEL_UNITS, say_names, split_unit
 from prior_reinforce.robots.limits import is_joint
 
+_POSITIONS = re.compile(r"(^|[^a-z])(q|j|joints?|pos|positions?|angles?)$", re.IGNORECASE)
+"""How the positions of joints are called, beside `dq` and `tau`."""
 _NUMBERED = re.compile(r"(?P<stem>.*?)[_.\[ ]*(?P<number>\d+)\]?")
 
 
@@ -48,6 +50,18 @@ def vectors(names: Sequence[str]) -> dict[str, list[int]]:
         if match is not None and match["stem"]:
             groups.setdefault(match["stem"], []).append((int(match["number"]), index))
     return {stem: [i for _, i in sorted(g)] for stem, g in groups.items() if len(g) > 1}
+
+
+def numbered_like(joints: Sequence[str], there: Sequence[str]) -> tuple[str, ...] | None:
+    """Return numbered channels of which there are as many as joints; None where nothing is clear.
+
+    Where several groups are as many, one that is called like positions is taken: `q` beside `dq`
+    and `tau`.
+    """
+    fitting = {stem: group for stem, group in vectors(there).items() if len(group) == len(joints)}
+    called = [stem for stem in fitting if _POSITIONS.search(stem) is not None]
+    clear = list(fitting) if len(fitting) == 1 else called
+    return tuple(there[i] for i in fitting[clear[0]]) if len(clear) == 1 else None
 
 
 def _find(name: str, there: Sequence[str]) -> int | None:

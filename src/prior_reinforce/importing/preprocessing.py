@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -11,7 +12,13 @@ from jaxtyping import Float
 
 from prior_reinforce.arrays import Frames, Plans, Point
 from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
-from prior_reinforce.importing.naming import find_channels, missing_channels, vectors
+from prior_reinforce.importing.clock import LONGEST
+from prior_reinforce.importing.naming import (
+    find_channels,
+    missing_channels,
+    numbered_like,
+    vectors,
+)
 from prior_reinforce.importing.noise import (
     Channels,
     held_channels,
@@ -23,6 +30,7 @@ from prior_reinforce.importing.recording import Recording
 from prior_reinforce.importing.units import (
     Doubt,
     base_of,
+    cannot_be,
     conversion,
     guess_unit,
     known_unit,
@@ -51,6 +59,8 @@ class Selection:
     """In which they were recorded."""
     doubts: tuple[Doubt, ...] = ()
     """Which of those are only guessed."""
+    remarks: tuple[str, ...] = ()
+    """What a person should know of them."""
 
 
 @dataclass(frozen=True)
@@ -126,7 +136,8 @@ def select(
         recordings: At least one.
         joints: Recorded names to keep, in order; None keeps those of the first recording. They
             name the columns, in order, of recordings that name nothing.
-        names: What to call them; None keeps the recorded names.
+        names: What to call them; None keeps the recorded names. Where they are the joints, and no
+            column is called like them, numbered columns of which there are as many are a guess.
         units: Recorded units; a single one holds for all. None takes those that the recordings
             say, and for others the plan's; where an arm could not be in that unit, it is guessed.
         plan_units: Units of the plan; None takes radians for angles and metres for lengths, and
@@ -138,6 +149,7 @@ def select(
             contradict each other.
     """
     joints = tuple(joints) if joints is not None else recordings[0].names
+    nobody_said = names is not None and tuple(names) == joints
     names = tuple(names) if names is not None else joints
     if not joints or len(set(joints)) != len(joints):
         raise ConfigurationError(f"joints must be names that differ, got {list(joints)}")
@@ -149,6 +161,7 @@ def select(
             f"{len(joints)} joints need as many names and units, got {len(names)} names and "
             f"{n_units} units: {list(joints)}"
         )
+    joints, guessed = _guess_names(recordings[0], joints) if nobody_said else (joints, ())
     columns = [_columns(recording, joints) for recording in recordings]
     said = [
         _said_unit(recordings, columns, i, None if units is None else units[i])
@@ -160,12 +173,35 @@ def select(
     ]
     picked = [r.positions[:, c] for r, c in zip(recordings, columns, strict=True)]
     recorded, doubts = _guess_units(recordings, picked, names, said, wanted)
+    slip = () if units is None else _doubt_units(recordings, picked, names, recorded)
+    recorded = [slip[0].option.split()[-1]] * len(joints) if slip else recorded
     scale = [conversion(r, w, n) for r, w, n in zip(recorded, wanted, names, strict=True)]
     kept = tuple(
-        replace(r, positions=q * np.array(scale), names=joints, units=tuple(wanted))
-        for r, q in zip(recordings, picked, strict=True)
+        replace(
+            r,
+            positions=q * np.array(scale),
+            names=joints,
+            units=tuple(wanted),
+            columns=tuple(r.columns[i] for i in c),
+        )
+        for r, q, c in zip(recordings, picked, columns, strict=True)
     )
-    return Selection(kept, names, tuple(wanted), tuple(recorded), doubts)
+    remarks = _far(kept, names, wanted)
+    doubts = (*guessed, *doubts, *slip)
+    return Selection(kept, names, tuple(wanted), tuple(recorded), doubts, remarks)
+
+
+def _guess_names(
+    recording: Recording, joints: tuple[str, ...]
+) -> tuple[tuple[str, ...], tuple[Doubt, ...]]:
+    """The joints by their recorded names, where these can only be guessed: `q0`, `q1`, ..."""
+    if not recording.named or find_channels(joints, recording.names) is not None:
+        return joints, ()
+    found = numbered_like(joints, recording.names)
+    if found is None:
+        return joints, ()
+    what = f"no column is called {say_names(joints)}: it looks as if {say_names(found)} were these"
+    return found, (Doubt(what, f"--joints {shlex.join(found)}"),)
 
 
 def _said_unit(
@@ -195,21 +231,67 @@ def _guess_units(
     recorded, whats = [unit or "" for unit in said], []
     for base in dict.fromkeys(w for w, unit in zip(wanted, said, strict=True) if unit is None):
         open_ = [i for i, unit in enumerate(said) if unit is None and wanted[i] == base]
-        reach = np.array([np.abs(q[:, open_]).max(axis=0) for q in picked])
-        episode, channel = divmod(int(np.argmax(reach)), len(open_))
-        most = float(reach[episode, channel])
+        most, where = _farthest(recordings, picked, names, open_)
         looks = guess_unit(base, most)
         if looks != base:
             seen = f"it looks like {looks}" if looks else "and as degrees neither"
             whats.append(
                 f"{say_names([names[i] for i in open_])} in {base} would reach {most:.4g} "
-                f"({names[open_[channel]]} of {recordings[episode].episode}), which no arm does: "
-                f"{seen}"
+                f"({where}), which no arm does: {seen}"
             )
         for i in open_:
             recorded[i] = looks or base
     shown = recorded[:1] if len(set(recorded)) == 1 else recorded
     return recorded, tuple(Doubt(what, f"--units {' '.join(shown)}") for what in whats)
+
+
+def _farthest(
+    recordings: Sequence[Recording],
+    picked: Sequence[Float[np.ndarray, "_ D"]],
+    names: Sequence[str],
+    among: Sequence[int],
+) -> tuple[float, str]:
+    """How far some channels reach without their sign, and where that is."""
+    reach = np.array([np.abs(q[:, among]).max(axis=0) for q in picked])
+    episode, channel = divmod(int(np.argmax(reach)), len(among))
+    most = float(reach[episode, channel])
+    return most, f"{names[among[channel]]} of {recordings[episode].episode}"
+
+
+def _doubt_units(
+    recordings: Sequence[Recording],
+    picked: Sequence[Float[np.ndarray, "_ D"]],
+    names: Sequence[str],
+    recorded: Sequence[str],
+) -> tuple[Doubt, ...]:
+    """What was said of the units of all channels, and cannot be."""
+    unit = recorded[0]
+    if len(set(recorded)) > 1 or any(u is not None for r in recordings for u in r.units):
+        return ()
+    most, where = _farthest(recordings, picked, names, range(len(names)))
+    looks = guess_unit(unit, most)
+    if not cannot_be(unit, most) or looks is None:
+        return ()
+    what = (
+        f"{say_names(names)} in {unit}, as --units says, would reach {most:.4g} ({where}), which "
+        f"no arm does: it looks like {looks}"
+    )
+    return (Doubt(what, f"--units {looks}"),)
+
+
+def _far(kept: Sequence[Recording], names: Sequence[str], units: Sequence[str]) -> tuple[str, ...]:
+    """What reaches farther than arms mostly do, in the unit that was said."""
+    said = []
+    for unit in dict.fromkeys(units):
+        among = [i for i, own in enumerate(units) if own == unit]
+        most, where = _farthest(kept, [r.positions for r in kept], names, among)
+        looks = guess_unit(unit, most)
+        if looks not in (unit, None):
+            said.append(
+                f"{where} reaches {most:.4g} {unit}, and arms do not: if it was recorded in "
+                f"{looks}, say --units {looks}"
+            )
+    return tuple(said)
 
 
 def _columns(recording: Recording, joints: tuple[str, ...]) -> list[int]:
@@ -285,7 +367,15 @@ def preprocess(
                 f"{horizon}; give a horizon of {longest}, or a larger dt (motions are never cut)"
             )
         said.ends(recording, span, units, held=len(piece) < horizon)
-    if horizon > 400:
+    longest_motion = max(end - start for start, end in spans)
+    if longest_motion > LONGEST:
+        said.add(
+            _SLOW,
+            None,
+            f"motions take up to {longest_motion:.3g} s, and throws take seconds: cut the "
+            "recordings, or say in which unit their times are (--time-unit)",
+        )
+    elif horizon > 400:
         said.add(_LONG, None, f"{horizon} frames are many; dt {dt * horizon / 140:.2g} s makes 140")
     held = np.all([held_channels(q, units) for q in every], axis=0)
     return Preprocessed(
@@ -323,7 +413,7 @@ def refuse_copies(plans: Plans, names: Sequence[str]) -> None:
             )
 
 
-_ENDS, _GAPS, _READING, _STEPS, _LONG = range(5)
+_SLOW, _ENDS, _GAPS, _READING, _STEPS, _LONG = range(6)
 """Kinds of remarks, the most important first: what the gate will refuse, what is not known, what
 was left out or chosen."""
 

@@ -133,6 +133,9 @@ class Recording:
     """Where the times are from, for a person: `t in ms`."""
     doubts: tuple[Doubt, ...] = ()
     """What is only guessed of the times."""
+    columns: tuple[str, ...] = ()
+    """What the file calls the D channels, where that is not their `names`: numbered columns that
+    are taken as the joints in order."""
     named: bool = field(init=False)
     """Whether the file names the channels."""
 
@@ -196,6 +199,7 @@ class Recording:
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "positions", positions)
         object.__setattr__(self, "names", names)
+        object.__setattr__(self, "columns", tuple(self.columns) or names)
 
     @property
     def duration(self) -> float:

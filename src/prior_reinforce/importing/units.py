@@ -39,6 +39,9 @@ _LARGEST_DEGREES = 720.0
 """Ours: beyond two turns it is no angle of a joint in degrees either."""
 _LARGEST_CENTIMETRES = 300.0
 """Ours: above it millimetres are likelier than an arm that reaches three metres."""
+_BEYOND_DOUBT = 7.0
+"""Ours: numbers so many times beyond what an arm does (eight turns of a joint, 35 m) are not in the
+unit that they are said to be in, whoever says it."""
 _BRACKETS = re.compile(r"(?P<name>.+?)\s*[\[(]\s*(?P<unit>[^\[\]()]+?)\s*[\])]")
 _ENDING = re.compile(r"(?P<name>.+?)[_ ](?P<unit>[a-zµμ°]+)")
 
@@ -67,8 +70,7 @@ def refuse_doubts(doubts: Iterable[Doubt], also: str = "") -> None:
     if found:
         options = " ".join(dict.fromkeys(doubt.option for doubt in found))
         what = "; ".join(doubt.what for doubt in found)
-        more = f"; and {also}" if also else ""
-        raise UnclearUnitsError(f"{what}; if so, add: {options}{more}", "" if also else options)
+        raise UnclearUnitsError(what, options, also)
 
 
 def known_unit(text: str) -> str | None:
@@ -135,6 +137,16 @@ def guess_unit(wanted: str, reach: float) -> str | None:
     if wanted == "m" and reach > FARTHEST:
         return "cm" if reach <= _LARGEST_CENTIMETRES else "mm"
     return wanted
+
+
+def cannot_be(unit: str, reach: float) -> bool:
+    """Whether numbers reach farther than could be in a unit, even where somebody says it is theirs.
+
+    Args:
+        unit: `rad` or `m`; others may hold any number.
+        reach: Largest of them, without its sign.
+    """
+    return guess_unit(unit, reach / _BEYOND_DOUBT) != unit
 
 
 def say_names(names: Sequence[str]) -> str:

@@ -17,7 +17,8 @@ import json
 import math
 import os
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -217,8 +218,7 @@ class Demonstrations:
 
     def with_plans(self, plans: Plans, format: PlanFormat | None = None) -> Self:
         """Return the same outcomes with other plans; odd units were warned about already."""
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
+        with _warned_before():
             return replace(self, plans=plans, format=format or self.format)
 
     def only(self, chosen: Sequence[int]) -> Self:
@@ -228,12 +228,13 @@ class Demonstrations:
             chosen: Their numbers, from 0.
         """
         members = list(chosen)
-        return replace(
-            self,
-            plans=self.plans[members],
-            outcomes_seen=self.outcomes_seen[members],
-            outcome_noise=self.outcome_noise[members],
-        )
+        with _warned_before():
+            return replace(
+                self,
+                plans=self.plans[members],
+                outcomes_seen=self.outcomes_seen[members],
+                outcome_noise=self.outcome_noise[members],
+            )
 
     def check_goal(self, goal: ArrayLike) -> Point:
         """Return the goal as a fresh float array, warning when it lies far outside the outcomes.
@@ -287,7 +288,7 @@ class Demonstrations:
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Self:
-        """Read what `save` wrote.
+        """Read what `save` wrote; odd units were warned about then.
 
         Raises:
             FileFormatError: The file is missing, truncated, or not such an `.npz`.
@@ -306,7 +307,8 @@ class Demonstrations:
             format_ = PlanFormat(**metadata["format"])
             names = tuple(metadata["outcome_names"])
             units = tuple(metadata["outcome_units"])
-        return cls(plans, outcomes, format_, names, units, noise)
+        with _warned_before():
+            return cls(plans, outcomes, format_, names, units, noise)
 
     def _warn_about_units(self) -> None:
         metres = np.array([unit == "m" for unit in self.outcome_units])
@@ -325,6 +327,14 @@ class Demonstrations:
                 "convert with numpy.deg2rad",
                 stacklevel=4,
             )
+
+
+@contextmanager
+def _warned_before() -> Iterator[None]:
+    """Demonstrations made of others say nothing of their units again."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        yield
 
 
 def _say(values: Point) -> str:
