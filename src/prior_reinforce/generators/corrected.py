@@ -20,11 +20,11 @@ from typing_extensions import Self
 
 from prior_reinforce.arrays import Plans, Points
 from prior_reinforce.generators.base import Generator, Report
-from prior_reinforce.generators.outcome_weights import smooth_weights
 from prior_reinforce.generators.saving import Tensors
 from prior_reinforce.generators.wrapping import Wrapper
 from prior_reinforce.plans.channels import kinds
 from prior_reinforce.plans.motions import Demonstrations
+from prior_reinforce.plans.outcome_weights import smooth_weights
 
 
 class Corrected(Wrapper):
@@ -49,7 +49,7 @@ class Corrected(Wrapper):
         self._residuals[:, :, [kind == "switch" for kind in found]] = 0.0
 
     def _generate(self, conditions: Points) -> Plans:
-        weights = smooth_weights(conditions, self._outcomes, noise=self._noise)
+        weights = smooth_weights(self._outcomes, noise=self._noise)(conditions)
         return self.generator.generate(conditions) + np.tensordot(weights, self._residuals, axes=1)
 
     def state(self) -> tuple[dict[str, Any], Tensors]:

@@ -38,9 +38,9 @@ from typing_extensions import Self
 from prior_reinforce.arrays import Frames, Plans, Points
 from prior_reinforce.errors import MissingExtraError
 from prior_reinforce.generators.base import Generator, Report, at_once
-from prior_reinforce.generators.outcome_weights import smooth_weights
 from prior_reinforce.generators.saving import Tensors
 from prior_reinforce.plans.motions import Demonstrations
+from prior_reinforce.plans.outcome_weights import smooth_weights
 from prior_reinforce.plans.timing import motion_span, speeds
 from prior_reinforce.registry import build
 from prior_reinforce.settings import Checked, Positive
@@ -103,7 +103,7 @@ class DynamicMovementPrimitives(Generator):
     def _generate(self, conditions: Points) -> Plans:
         """Interpolate the primitives and roll each out."""
         known = self._primitives
-        weights = smooth_weights(conditions, known.outcomes, kernel="thin-plate")
+        weights = smooth_weights(known.outcomes, kernel="thin-plate")(conditions)
         parameters = np.tensordot(weights, known.parameters, axes=1)
         # Far outside the demonstrations an extrapolated motion could end before it begins.
         least = known.spans[:, 1] - known.spans[:, 0]

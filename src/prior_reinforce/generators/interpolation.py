@@ -30,13 +30,13 @@ from typing_extensions import Self
 
 from prior_reinforce.arrays import Plans, Points
 from prior_reinforce.generators.base import Generator, Report, at_once
-from prior_reinforce.generators.outcome_weights import (
+from prior_reinforce.generators.saving import Tensors
+from prior_reinforce.plans.motions import Demonstrations
+from prior_reinforce.plans.outcome_weights import (
     Kernel,
     inverse_distance_weights,
     smooth_weights,
 )
-from prior_reinforce.generators.saving import Tensors
-from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.registry import build
 from prior_reinforce.settings import Checked, Count, Positive
 
@@ -133,6 +133,6 @@ class SmoothInterpolation(_Mixture):
 
     def _weights(self, conditions: Points) -> Float[np.ndarray, "n N"]:
         """Weigh all plans; at an outcome that was measured its own alone, to rounding."""
-        return smooth_weights(
-            conditions, self._outcomes, kernel=self.config.kernel, noise=self._noise
+        return smooth_weights(self._outcomes, kernel=self.config.kernel, noise=self._noise)(
+            conditions
         )

@@ -1,6 +1,7 @@
 """How much each demonstration counts for a wished-for outcome: weights that sum to one.
 
-Two schemes, shared by the interpolating generators. Distances are taken after dividing every
+Two schemes, shared by the interpolating generators; the Bayesian adapter knows by them how labels
+that are off are mixed. Distances are taken after dividing every
 outcome component by its demonstrated range, so that components may differ in unit.
 
 Notation (docs/notation.md):
@@ -11,6 +12,7 @@ Notation (docs/notation.md):
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Literal
 
 import numpy as np
@@ -70,23 +72,25 @@ def inverse_distance_weights(
     return weights
 
 
+Weights = Callable[[Float[np.ndarray, "n k"]], Float[np.ndarray, "n N"]]
+"""Conditions c to weights w, a row a condition, a column a demonstration."""
+
+
 def smooth_weights(
-    conditions: Float[np.ndarray, "n k"],
     outcomes: Float[np.ndarray, "N k"],
     *,
     kernel: Kernel = "cubic",
     noise: Float[np.ndarray, "N k"] | None = None,
-) -> Float[np.ndarray, "n N"]:
+) -> Weights:
     r"""Return the cardinal weights of a polyharmonic spline with an affine tail.
 
     The interpolant of values :math:`f_i` at :math:`r_i`,
     :math:`f(c) = \sum_i a_i \varphi(\|c - r_i\|) + b_0 + b^\top c` with
-    :math:`\sum_i a_i = 0, \sum_i a_i r_i = 0`, is linear in the values; this returns
+    :math:`\sum_i a_i = 0, \sum_i a_i r_i = 0`, is linear in the values; these are the
     :math:`w_i(c)` of :math:`f(c) = \sum_i w_i(c) f_i`. Weights may be negative: it extrapolates,
     and reproduces every affine dependence of plan on outcome exactly.
 
     Args:
-        conditions: c.
         outcomes: r. With N <= k the tail is constant, and the kernel linear, because the others
             need an affine tail to be solvable.
         kernel: Which :math:`\varphi`.
@@ -111,7 +115,7 @@ def smooth_weights(
         degree=1 if affine else 0,
         smoothing=spread,
     )
-    return np.asarray(spline(conditions / scale)).reshape(len(conditions), n)
+    return lambda conditions: np.asarray(spline(conditions / scale)).reshape(len(conditions), n)
 
 
 _SCIPY = {"cubic": "cubic", "thin-plate": "thin_plate_spline", "linear": "linear"}

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import RBFInterpolator
 
-from prior_reinforce.generators.outcome_weights import inverse_distance_weights, smooth_weights
+from prior_reinforce.plans.outcome_weights import inverse_distance_weights, smooth_weights
 
 OUTCOMES = np.random.default_rng(0).uniform(size=(6, 2))
 CONDITIONS = np.random.default_rng(1).uniform(-0.3, 1.3, size=(20, 2))
@@ -42,14 +42,14 @@ def test_smooth_weights_interpolate_as_scipy_does(kernel: str):
         kernel={"thin-plate": "thin_plate_spline"}.get(kernel, kernel),
         degree=1,
     )
-    ours = smooth_weights(CONDITIONS, OUTCOMES, kernel=kernel) @ values
+    ours = smooth_weights(OUTCOMES, kernel=kernel)(CONDITIONS) @ values
     np.testing.assert_allclose(ours, theirs(CONDITIONS / scale), atol=1e-9)
 
 
 @pytest.mark.parametrize("kernel", ["linear", "thin-plate", "cubic"])
 def test_smooth_weights_reproduce_an_affine_dependence_everywhere(kernel: str):
     slope = np.array([[0.4, -1.0], [2.0, 0.3]])
-    weights = smooth_weights(CONDITIONS, OUTCOMES, kernel=kernel)
+    weights = smooth_weights(OUTCOMES, kernel=kernel)(CONDITIONS)
     np.testing.assert_allclose(weights @ (OUTCOMES @ slope + 3), CONDITIONS @ slope + 3, atol=1e-10)
     np.testing.assert_allclose(weights.sum(axis=1), 1, atol=1e-12)
 
@@ -57,7 +57,7 @@ def test_smooth_weights_reproduce_an_affine_dependence_everywhere(kernel: str):
 def test_an_uncertain_outcome_counts_for_less_at_its_place_and_what_is_affine_stays():
     noise = np.zeros_like(OUTCOMES)
     noise[2] = 0.2 * np.ptp(OUTCOMES, axis=0)
-    weights = smooth_weights(OUTCOMES, OUTCOMES, noise=noise)
+    weights = smooth_weights(OUTCOMES, noise=noise)(OUTCOMES)
     assert weights[2, 2] < 0.9
     np.testing.assert_allclose(np.delete(weights, 2, 0), np.delete(np.eye(6), 2, 0), atol=1e-9)
     np.testing.assert_allclose(weights @ OUTCOMES, OUTCOMES, atol=1e-9)
@@ -65,9 +65,9 @@ def test_an_uncertain_outcome_counts_for_less_at_its_place_and_what_is_affine_st
 
 def test_two_demonstrations_of_two_components_are_joined_without_an_affine_tail():
     outcomes = np.array([[0.0, 0.0], [1.0, 2.0]])
-    middle = smooth_weights(outcomes.mean(axis=0)[None], outcomes, kernel="linear")
+    middle = smooth_weights(outcomes, kernel="linear")(outcomes.mean(axis=0)[None])
     np.testing.assert_allclose(middle, [[0.5, 0.5]])
-    at_ends = smooth_weights(outcomes, outcomes, kernel="linear")
+    at_ends = smooth_weights(outcomes, kernel="linear")(outcomes)
     np.testing.assert_allclose(at_ends, np.eye(2), atol=1e-12)
 
 
@@ -79,7 +79,7 @@ def test_the_unit_of_a_component_does_not_matter(scheme: str):
     def weights(conditions: np.ndarray, outcomes: np.ndarray) -> np.ndarray:
         if scheme == "nearest":
             return inverse_distance_weights(conditions, outcomes, neighbours=3, power=2.0)
-        return smooth_weights(conditions, outcomes, kernel="thin-plate")
+        return smooth_weights(outcomes, kernel="thin-plate")(conditions)
 
     np.testing.assert_allclose(
         weights(CONDITIONS * factor, OUTCOMES * factor), weights(CONDITIONS, OUTCOMES), atol=1e-9
