@@ -91,3 +91,10 @@ def test_one_rule_says_which_column_is_which_joint():
         assert is_joint(name, "joint4")
     for name in ("Joint4", "j4", "joint14", "joint41", "joint4_vel", "xjoint4"):
         assert not is_joint(name, "joint4")
+
+
+def test_a_grippers_joints_are_none_of_the_arms():
+    for name in ("fr3_finger_joint4", "left/gripper.joint4", "arm_finger2_joint4.pos"):
+        assert not is_joint(name, "joint4")
+    assert is_joint("gripper_joint4", "gripper_joint4")
+    assert matched("panda_joint1", "panda_finger_joint1", "panda_finger_joint2") == {0: 0}

@@ -15,6 +15,7 @@ from prior_reinforce.robots.kinematics import Chain, JointPositions
 
 PerJoint = Float[np.ndarray, " D"]
 """One number for each of an arm's D joints."""
+_OF_A_GRIPPER = re.compile(r"(^|[_/.])(finger|gripper)s?\d*[_/.]")
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,9 +113,11 @@ class RobotLimits:
 def is_joint(column: str, joint: str) -> bool:
     """Whether a column moves a joint: `joint4`, `panda_joint4` (ROS) and `joint4.pos` (LeRobot) do.
 
-    Nothing else does, so that no column is held against another joint's limits.
+    Nothing else does, so that no column is held against another joint's limits. A gripper numbers
+    its own: `fr3_finger_joint1` (franka_description) is no joint of the arm.
     """
-    return bool(re.search(rf"(^|[_/.]){re.escape(joint)}(\.pos)?$", column))
+    found = re.search(rf"(?P<before>^|.*[_/.]){re.escape(joint)}(\.pos)?$", column)
+    return found is not None and not _OF_A_GRIPPER.search(found["before"])
 
 
 def match_joints(format: PlanFormat, limits: RobotLimits) -> dict[int, int]:
