@@ -140,6 +140,58 @@ def test_an_rtde_log_is_known_by_its_columns(tmp_path):
     assert not recording.named  # six columns are any six joints, in order
 
 
+def test_rows_of_an_rtde_log_that_mix_two_cycles_are_left_out(tmp_path):
+    """ur_rtde's recorder writes cycles twice, leaves some out, and reads a row's parts in turn."""
+    t, q = sampled(0, 500)
+    q = q[:, :6]
+    k = np.arange(len(t))
+    late = np.flatnonzero((t > 0.6) & (t < 0.9))[::10]  # while it moves
+    rows = [np.r_[t[i], q[min(i + 1, len(q) - 1)] if i in late[1::2] else q[i]] for i in k]
+    for i in late[::2]:
+        rows[i] = [rows[i], np.r_[t[i], q[i + 1]]]  # once more, with what came meanwhile
+    rows = np.vstack(rows)
+    rows = np.repeat(rows, 1 + (np.arange(len(rows)) % 7 == 0), axis=0)  # wholly equal ones
+    names = ["timestamp", *(f"actual_q_{i}" for i in range(6))]
+    pd.DataFrame(rows + np.r_[512.0, np.zeros(6)], columns=names).to_csv(
+        tmp_path / "0.csv", index=False, float_format="%.6f"
+    )
+    (recording,) = read_recordings(tmp_path)
+    there = np.rint(recording.times * 500).astype(int)
+    np.testing.assert_allclose(recording.positions, q[there], atol=1e-6)
+    assert len(there) == len(t) - len(late[1::2])
+    assert recording.remarks[1].endswith(f"of another cycle than their time: {len(late)}")
+    assert recording.remarks[2].endswith("frames were recorded twice; once is kept")
+
+
+def test_an_rtde_log_of_an_arm_at_rest_keeps_its_rows(tmp_path):
+    t, names = np.arange(50) / 500, ["timestamp", "actual_q_0", "actual_q_1"]
+    q = np.column_stack([np.round(np.linspace(0, 1e-4, 50), 5), np.ones(50)])  # whole 10 urad
+    pd.DataFrame(np.column_stack([t, q]), columns=names).to_csv(tmp_path / "0.csv", index=False)
+    (recording,) = read_recordings(tmp_path)
+    np.testing.assert_allclose(recording.positions, q)
+    assert len(recording.remarks) == 1
+
+
+def test_an_index_without_a_name_is_the_time(tmp_path):
+    """As `DataFrame.to_csv` writes one: of dates it is taken, of numbers only when it is said."""
+    t, q = sampled(0, 100)
+    start = pd.Timestamp("2026-11-21T10:00", tz="Europe/Berlin")
+    frame = pd.DataFrame(q, columns=JOINTS, index=start + pd.to_timedelta(t, unit="s"))
+    frame.to_csv(tmp_path / "0.csv")
+    (recording,) = read_recordings(tmp_path)
+    np.testing.assert_allclose(recording.times, t, atol=1e-9)
+    assert recording.names == JOINTS
+    frame.set_axis(1000 * t).to_csv(tmp_path / "0.csv")
+    with pytest.raises(UnclearUnitsError) as caught:
+        read_recordings(tmp_path)
+    assert caught.value.options == "--time-column 1 --time-unit ms"
+    (recording,) = read_recordings(tmp_path, time_column="1", time_unit="ms")
+    np.testing.assert_allclose(recording.times, t, atol=1e-9)
+    frame.set_axis(np.arange(len(t)) + 40).to_csv(tmp_path / "0.csv")  # rows that were cut out
+    (recording,) = read_recordings(tmp_path, rate=100, joints=JOINTS)
+    np.testing.assert_allclose(recording.positions, q)
+
+
 def test_columns_without_names_are_in_order_and_their_time_is_a_doubt(tmp_path):
     for i in range(N):
         t, q = sampled(i, 100)

@@ -11,12 +11,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from jaxtyping import Bool
 
 from prior_reinforce.errors import ConfigurationError, FileFormatError
-from prior_reinforce.importing.clock import Clock
+from prior_reinforce.importing.clock import Clock, Times
 from prior_reinforce.importing.naming import find_channels, vectors
 from prior_reinforce.importing.recording import (
     NO_COLUMN,
+    Positions,
     ReadOptions,
     Recording,
     files_at,
@@ -50,15 +52,20 @@ class _Log:
     key: str
     """Which of its vectors is the measured motion."""
     time_unit: str
+    mixed: bool = False
+    """Whether a row may have its time from one cycle, and its positions from the next."""
 
 
 _LOGS = (
     # libfranka, src/log.cpp: logToCSV writes time.toMSec().
     _Log("libfranka's log", ("time", "success_rate", "state.q[0]"), "state.q", "ms"),
     _Log("libfranka's log", ("duration", "success_rate", "q[0]"), "q", "ms"),
-    # UR's rtde/csv_writer.py and ur_rtde's recorder: seconds since the controller started.
-    _Log("an RTDE log", ("timestamp", "actual_q_0"), "actual_q", "s"),
+    # UR's rtde/csv_writer.py and ur_rtde's recorder: seconds since the controller started. The
+    # latter (1.6.5) runs beside the controller, and reads the variables of a row one by one.
+    _Log("an RTDE log", ("timestamp", "actual_q_0"), "actual_q", "s", mixed=True),
 )
+_STILL = 1e-4
+"""Ours, in [rad]: what a joint moves in 2 ms, a cycle, at 0.05 rad/s, which the gate calls rest."""
 
 
 def read(source: Path, options: ReadOptions) -> list[Recording]:
@@ -123,12 +130,18 @@ def _episode(
 ) -> Recording:
     log = next((g for g in _LOGS if set(g.columns) <= set(table.names)), None)
     time, guessed = _time_column(table, options)
-    clock = _clock(table, episode, time, options, None if log is None else log.time_unit)
     others = [i for i in range(len(table.names)) if i not in (time, episode_column)]
     channels, named = _channels(table, others, options, log)
     remarks: tuple[str, ...] = ()
     if log is not None:
         remarks = (f"{log.name}: time in {log.time_unit}, motion is {log.key} (measured)",)
+    if log is not None and log.mixed and time is not None:
+        mixed = _mixed(table.numbers(time), np.column_stack([table.numbers(i) for i in channels]))
+        if np.any(mixed):
+            table = table.rows(np.flatnonzero(~mixed).tolist())
+            why = "rows left out whose positions are of another cycle than their time"
+            remarks = (*remarks, f"{why}: {mixed.sum()}")
+    clock = _clock(table, episode, time, options, None if log is None else log.time_unit)
     texts = [i for i in channels if table.is_text(i)] if channels == others else []
     if texts:
         channels = [i for i in channels if i not in texts]
@@ -152,6 +165,22 @@ def _episode(
     )
 
 
+def _mixed(stamps: Times, positions: Positions) -> Bool[np.ndarray, " T"]:
+    """Which rows have their positions from another cycle than their time.
+
+    Such a row has other positions than the one before at the same time, or a moving arm's that the
+    next row repeats at the time they are of.
+    """
+    again = (np.diff(stamps) == 0) & np.all(np.diff(positions, axis=0) == 0, axis=1)
+    first = np.flatnonzero(np.concatenate([[True], ~again]))  # of rows that are wholly equal
+    steps, moved = np.diff(stamps[first]), np.diff(positions[first], axis=0)
+    mixed = np.zeros(len(first), dtype=bool)
+    mixed[1:] = steps == 0
+    came, repeated = np.abs(moved[:-1]).max(axis=1) > _STILL, np.all(moved[1:] == 0, axis=1)
+    mixed[1:-1] |= came & repeated
+    return np.repeat(mixed, np.diff(np.append(first, len(stamps))))
+
+
 def _time_column(table: Table, options: ReadOptions) -> tuple[int | None, tuple[Doubt, ...]]:
     """The column of times, None where there is none, and what is only guessed of it."""
     if options.time_column == NO_COLUMN:
@@ -160,19 +189,28 @@ def _time_column(table: Table, options: ReadOptions) -> tuple[int | None, tuple[
         return _named_column(table, options.time_column, "--time-column"), ()
     if table.named:
         bare = [split_unit(name, SECONDS)[0].lower() for name in table.names]
-        return next((i for i, name in enumerate(bare) if name in _TIMES), None), ()
-    if len(table.names) < 2:
-        return None, ()
-    stamps = table.nanoseconds(0)
-    steps = np.diff(table.numbers(0) if stamps is None else stamps)
-    if np.all(steps > 0) and steps.max() < 10 * np.median(steps):
-        return 0, (
-            Doubt(
-                f"{table.where} does not name its columns, and column 1 looks like the time",
-                "--time-column 1",
-            ),
-        )
+        found = next((i for i, name in enumerate(bare) if name in _TIMES), None)
+        # pandas writes an index without a name.
+        unnamed = not table.names[0] or table.names[0].startswith("Unnamed:")
+        if found is not None or not unnamed:
+            return found, ()
+        if table.nanoseconds(0) is not None:
+            return 0, ()
+        if options.rate is not None:
+            return None, ()
+    if len(table.names) > 1 and _could_be_time(table):
+        what = f"{table.where} names no column of times, and column 1 looks like the time"
+        return 0, (Doubt(what, "--time-column 1"),)
     return None, ()
+
+
+def _could_be_time(table: Table) -> bool:
+    """Whether the first column increases steadily."""
+    stamps = table.nanoseconds(0)
+    if stamps is None and table.is_text(0):
+        return False
+    steps = np.diff(table.numbers(0) if stamps is None else stamps)
+    return bool(np.all(steps > 0) and steps.max() < 10 * np.median(steps))
 
 
 def _clock(
