@@ -48,6 +48,7 @@ def test_errors_are_said_in_centimetres(error, words):
         ("5 long", [0.05, 0.0]),
         ("20 mm left", [0.0, 0.02]),
         ("0.1m short", [-0.1, 0.0]),
+        ("5cm long 2 cm left", [0.05, 0.02]),
         ("Hit", [0.0, 0.0]),
     ],
 )
@@ -99,6 +100,11 @@ def test_a_mere_direction_stands_for_five_centimetres():
     np.testing.assert_allclose(from_words("long, right", 2).error_seen, [0.05, -0.05])
 
 
+def test_what_cannot_be_read_is_named_once():
+    with pytest.raises(InvalidFeedbackError, match="^cannot read 'a bit long'; write"):
+        from_words("A bit long", 2)
+
+
 def test_hit_and_miss_exclude_each_other():
     with pytest.raises(InvalidFeedbackError, match="hit and miss"):
         from_words("hit, miss", 2)
@@ -114,6 +120,9 @@ def test_a_place_has_no_spread_and_no_mere_direction():
     ("reading", "said"),
     [
         (from_words("long, somewhere", 2), "long, somewhere"),
+        (from_words("30 long, 2 to the left", 2), "30 cm long, 2 cm left"),
+        (from_words("5 +- 0.5 long, miss", 2), "5 +- 0.5 cm long, miss"),
+        (from_words("5 +- 0.5 cm long, 2mm left", 2), "5 +- 0.5 cm long, 2mm left"),
         (Reading.by_eye([0.05, -0.02]), "5 cm long, 2 cm right"),
         (Reading.only(True, 2), "hit"),
         (Reading.only(False, 2), "missed"),
@@ -205,6 +214,9 @@ def test_a_place_that_was_said_is_read_again_to_a_millimetre(millimetres):
         ("92cm ahead, 10cm to the left", [0.92, 0.10]),
         ("10 cm right and 1 m behind", [-1.0, -0.1]),
         ("92cm ahead", [0.92, 0.0]),
+        ("92 cm 27 cm right", [0.92, -0.27]),
+        ("92 cm, 27 cm to the left", [0.92, 0.27]),
+        ("1.1m ahead .06 m left", [1.1, 0.06]),
     ],
 )
 def test_places_are_read_from_numbers_or_words(text, place):
@@ -220,6 +232,14 @@ def test_places_are_read_from_numbers_or_words(text, place):
         ("far away", METRES, "one of ahead, behind, left, right"),
         ("hit", METRES, "one of ahead"),
         ("5cm up", METRES, "one of ahead"),
+        ("27 cm right, 92 cm", METRES, "names left and right twice"),
+        ("92 cm 5 mm ahead", METRES, "names ahead and behind twice"),
+        ("92 cm ahead, 5 cm left, 3 cm", METRES, "cannot read '3 cm' in"),
+        (
+            "111 cm from the base of the arm, 6 cm left",
+            METRES,
+            "straight to the place or along x only; measure along x and say 111 cm ahead",
+        ),
         ("5cm ahead", MIXED, "give 2 finite numbers"),
         (f"{'9' * 400}cm ahead", METRES, "cannot read"),
     ],

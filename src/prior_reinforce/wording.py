@@ -46,6 +46,8 @@ _TERM = re.compile(
     rf"(?:(?:\+-|\+/-|±)\s*(?P<sd>{_NUMBER})\s*(?P<sd_unit>{_UNIT})\s*)?)?"
     r"(?:to the )?(?P<word>[a-z]+)"
 )
+_BARE_TERM = re.compile(rf"(?P<value>{_NUMBER})\s*(?P<unit>cm|mm|m)")
+_FROM_BASE = re.compile(r"(?P<length>.*?)\s*(?:away )?from (?:the )?(?:base|robot|arm|foot)\b.*")
 _PLACE_TERM = re.compile(
     rf"(?P<number>[+-]?(?:{_NUMBER}))\s*(?P<unit>cm|mm|m|deg|rad|)(?:\s*[,;]\s*|\s+|$)"
 )
@@ -101,9 +103,9 @@ def say_error(error: ArrayLike, names: Sequence[str], units: Sequence[str]) -> s
 
 
 def say_reading(reading: Reading, names: Sequence[str], units: Sequence[str]) -> str:
-    """Say what was seen: in its own words where it has some, else as its number."""
+    """Say what was seen: in its own words where it has some, with all units, else as its number."""
     if reading.said:
-        return reading.said
+        return _with_units(reading.said)
     if not np.any(np.isfinite(reading.low) | np.isfinite(reading.high)):
         return "hit" if reading.hit else "missed"
     return say_error(reading.error_seen, names, units)
@@ -182,7 +184,8 @@ def read_place(text: str, names: Sequence[str], units: Sequence[str]) -> _Point:
     """Read a place from numbers in the outcome's units, numbers with a unit, or words.
 
     Args:
-        text: For instance `0.92 0.10`, `92cm 10cm`, `92 10 cm`, or `92cm ahead, 10cm left`.
+        text: For instance `0.92 0.10`, `92cm 10cm`, `92 10 cm`, or `92cm ahead, 10cm left`; with
+            words, a length without one is the component whose turn it is: `92cm, 10cm left`.
         names: Of the components.
         units: Of the components.
 
@@ -249,7 +252,20 @@ class _Term:
 
 
 def _parts(text: str) -> list[str]:
-    return re.split(r"\s*(?:,|;|\band\b)\s*", text.strip().lower())
+    return re.split(r"\s*(?:,|;|\band\b)\s*|(?<=[a-z])\s+(?=\.?\d)", text.strip().lower())
+
+
+def _with_units(text: str) -> str:
+    """Words with the unit that was understood where none was said: `5 cm long` for `5 long`."""
+    said = []
+    for part in _parts(text):
+        term = _TERM.fullmatch(part)
+        if term is None or not term["value"] or term["unit"] or term["sd_unit"]:
+            said.append(part)
+            continue
+        spread = f" +- {term['sd']}" if term["sd"] else ""
+        said.append(f"{term['value']}{spread} cm {term['word']}")
+    return text if said == _parts(text) else ", ".join(said)
 
 
 def _read(
@@ -263,27 +279,41 @@ def _read(
     """Read the terms of a text by component; `sizes` wants a number for each, and no `+-`."""
     known = [word for pair in words for word in pair]
     read: dict[int, _Term] = {}
-    for part in parts:
-        match = _TERM.fullmatch(part)
+    for turn, part in enumerate(parts):
+        match, bare = _TERM.fullmatch(part), _BARE_TERM.fullmatch(part)
         understood = match is not None and match["word"] in known
-        if match is None or not understood or (sizes and (not match["value"] or match["sd"])):
-            raise InvalidFeedbackError(
-                f"cannot read {part!r} in {text!r}; write a length and one of {', '.join(known)}, "
-                f"{example}"
-            )
-        component, negative = divmod(known.index(match["word"]), 2)
+        if bare is not None and sizes and len(parts) > 1 and turn < len(words):
+            match, component, negative = bare, turn, 0
+        elif match is None or not understood or (sizes and (not match["value"] or match["sd"])):
+            raise InvalidFeedbackError(_unread(part, text, known, example, sizes=sizes))
+        else:
+            component, negative = divmod(known.index(match["word"]), 2)
         if component in read:
             raise InvalidFeedbackError(
                 f"{text!r} names {' and '.join(words[component])} twice; give each direction once"
             )
         size = sd = None
-        if match["value"]:
-            unit = match["unit"] or match["sd_unit"] or ""
-            size = _metres(match["value"], unit, part)
-            if match["sd"]:
-                sd = _metres(match["sd"], match["sd_unit"] or unit, part)
+        told = match.groupdict()
+        if told["value"]:
+            unit = told["unit"] or told.get("sd_unit") or ""
+            size = _metres(told["value"], unit, part)
+            if told.get("sd"):
+                sd = _metres(told["sd"], told["sd_unit"] or unit, part)
         read[component] = _Term(-1.0 if negative else 1.0, size, sd)
     return read
+
+
+def _unread(part: str, text: str, known: Sequence[str], example: str, *, sizes: bool) -> str:
+    from_base = _FROM_BASE.fullmatch(part) if sizes else None
+    if from_base is not None:
+        return (
+            f"{part!r} may be straight to the place or along x only; measure along x and say "
+            f"{from_base['length']} {known[0]}"
+        )
+    where = "" if part == text.strip().lower() else f" in {text!r}"
+    return (
+        f"cannot read {part!r}{where}; write a length and one of {', '.join(known)}, {example}"
+    )
 
 
 def _metres(number: str, unit: str, part: str) -> float:

@@ -44,6 +44,18 @@ def test_ask_says_what_the_trial_may_expect(run, folder):
     assert "probability" not in run("ask", folder)[1]
 
 
+def test_what_was_told_is_repeated_as_it_was_understood(run, folder):
+    run("goal", folder, "0.9", "0.05")
+    run("ask", folder)
+    out = run("tell", folder, 1, "--error", "30 long, 2 left")[1]
+    assert out.startswith(
+        "trial 1: 30 cm long, 2 cm left; numbers without a unit are centimetres\n"
+    )
+    assert "30 cm long, 2 cm left" in run("status", folder)[1]
+    out = run("amend", folder, 1, "--error", "3 cm long, 2 cm left")[1]
+    assert out.startswith("trial 1, corrected: 3 cm long, 2 cm left\n")
+
+
 def test_after_three_poor_trials_it_is_said_what_would_help(run, folder):
     run("goal", folder, "0.9", "0.05")
     for number in range(1, 4):

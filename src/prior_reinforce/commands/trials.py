@@ -230,7 +230,7 @@ class Tell(Seen):
                 seen, hit = self.read(workspace, session)
                 _warn_of_its_execution(workspace, session, self.trial)
                 trial = session.tell(self.trial, seen, hit=hit)
-                print(f"trial {trial.number}: {say_trial(workspace, trial)}")
+                print(f"trial {trial.number}: {_say_told(workspace, trial)}")
             print_next(workspace)
 
     def _tell_table(self, workspace: Workspace, session: Session, path: Path) -> None:
@@ -258,7 +258,7 @@ class Amend(Seen):
             session = workspace.session()
             seen, hit = self.read(workspace, session)
             trial = session.amend(self.trial, seen, hit=hit)
-            print(f"trial {trial.number}, corrected: {say_trial(workspace, trial)}")
+            print(f"trial {trial.number}, corrected: {_say_told(workspace, trial)}")
             _print_outdated(session)
             print_next(workspace)
 
@@ -314,6 +314,14 @@ def _was_cut_off(workspace: Workspace, session: Session) -> bool:
     trial = session.open_trial
     executing = trial is not None and trial.stage is Stage.EXECUTING
     return executing and not workspace.log.is_executing()
+
+
+def _say_told(workspace: Workspace, trial: Trial) -> str:
+    """What was told as it was understood, and that numbers had no unit, if so."""
+    said = say_trial(workspace, trial)
+    typed = trial.reading.said if trial.reading is not None else ""
+    no_unit = bool(typed) and typed not in said
+    return f"{said}; numbers without a unit are centimetres" if no_unit else said
 
 
 def _warn_of_its_execution(workspace: Workspace, session: Session, number: int) -> None:
