@@ -311,9 +311,7 @@ def _unread(part: str, text: str, known: Sequence[str], example: str, *, sizes: 
             f"{from_base['length']} {known[0]}"
         )
     where = "" if part == text.strip().lower() else f" in {text!r}"
-    return (
-        f"cannot read {part!r}{where}; write a length and one of {', '.join(known)}, {example}"
-    )
+    return f"cannot read {part!r}{where}; write a length and one of {', '.join(known)}, {example}"
 
 
 def _metres(number: str, unit: str, part: str) -> float:
