@@ -101,7 +101,7 @@ def test_a_mere_direction_stands_for_five_centimetres():
 
 
 def test_what_cannot_be_read_is_named_once():
-    with pytest.raises(InvalidFeedbackError, match="^cannot read 'a bit long'; write"):
+    with pytest.raises(InvalidFeedbackError, match=r"^cannot read 'a bit long'; write"):
         from_words("A bit long", 2)
 
 
