@@ -6,6 +6,7 @@ from prior_reinforce.adapters import bayesian
 from prior_reinforce.adapters.bayesian import BayesianAdapter, BayesianConfig
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
+from prior_reinforce.plans.outcome_weights import smooth_weights
 from prior_reinforce.readings import Reading
 
 CORNERS = np.array([[0.8, -0.2], [0.8, 0.0], [0.8, 0.2], [1.0, -0.2], [1.0, 0.0], [1.0, 0.2]])
@@ -13,11 +14,20 @@ GOAL = np.array([0.9, 0.05])
 TOLERANCE = 0.015
 
 
-def started(outcomes=CORNERS, units=(), **settings) -> BayesianAdapter:
+def started(outcomes=CORNERS, units=(), noise=(), **settings) -> BayesianAdapter:
     plans = np.random.default_rng(0).normal(size=(len(outcomes), 4, 1))
     format_ = PlanFormat(("j1",), ("rad",), 0.02)
     adapter = BayesianAdapter(BayesianConfig(**settings))
-    adapter.start(Demonstrations(plans, outcomes, format_, (), units))
+    adapter.start(
+        Demonstrations(
+            plans,
+            outcomes,
+            format_,
+            (),
+            units,
+            outcome_noise=np.reshape(noise, (-1, outcomes.shape[1])),
+        )
+    )
     return adapter
 
 
@@ -84,7 +94,37 @@ def test_new_hardware_keeps_what_the_generator_gets_wrong_and_forgets_the_shift(
     assert np.linalg.norm(forgotten) < np.linalg.norm(known)
     unsure, sure = (adapter.expect(GOAL + m, GOAL, TOLERANCE) for m in (forgotten, known))
     assert unsure.p_hit < 0.5
-    assert sure.trials == pytest.approx(1 + 1.3 * (1 - sure.p_hit))
+    assert sure.trials == pytest.approx(1 + 1.24 * (1 - sure.p_hit))
+
+
+def test_labels_that_are_off_are_found_as_the_mixture_that_they_make():
+    """Where labels are off the field is their spline: four readings tell of all of it."""
+    noise = np.full_like(CORNERS, 0.03)
+    weights = smooth_weights(CORNERS, noise=noise)
+    places = np.random.default_rng(0).uniform([0.8, -0.2], [1.0, 0.2], size=(40, 2))
+    for seed in range(4):
+        off = np.random.default_rng(seed).normal(0.0, 0.03, size=CORNERS.shape)
+        adapter = started(noise=noise)
+        for condition in np.array([[0.82, -0.18], [0.98, -0.1], [0.82, 0.02], [0.9, 0.1]]):
+            moved = (weights(condition[None]) @ off)[0]
+            adapter.observe(condition, condition, Reading.measured(moved, 0.001))
+        conditions = np.array([adapter.propose(goal) for goal in places])
+        left = conditions + weights(conditions) @ off - places
+        assert np.linalg.norm(left) < 0.3 * np.linalg.norm(weights(places) @ off)
+
+
+def test_a_generator_that_is_wrong_in_its_own_ways_is_not_taken_for_labels():
+    """A wave that no mixture of six labels makes: trials next to the goal count."""
+    adapter = started()
+    rng = np.random.default_rng(4)
+
+    def moved(c):
+        return 0.05 * np.array([np.sin(40 * c[1]), np.cos(40 * c[0])])
+
+    for condition in rng.uniform(CORNERS.min(axis=0), CORNERS.max(axis=0), size=(20, 2)):
+        adapter.observe(condition, condition, Reading.measured(moved(condition), 0.002))
+    own = np.flatnonzero(adapter._own)
+    assert adapter._known().model_weights[own].sum() > 0.99
 
 
 def test_what_the_demonstrations_hardware_did_is_no_shift():
@@ -99,14 +139,14 @@ def test_what_the_demonstrations_hardware_did_is_no_shift():
 
 
 def test_p_hit_of_one_component_by_hand():
-    adapter = started(np.array([[0.0], [2.0], [1.0], [3.0]]), field_sd=(0.2,), hardware_sd=(0.1,),
-                      field_reach=(1.0,))  # fmt: skip
+    adapter = started(np.array([[0.0], [2.0], [1.0], [3.0]]))
     condition, goal = np.array([1.4]), np.array([1.5])
     mean, variance = adapter._predict(adapter._normalisation.apply(condition[None]))
     scale = adapter._normalisation.scale[0]
-    sd = scale * np.sqrt(variance[0, 0, 0] + 0.02**2)
-    middle = condition[0] + scale * mean[0, 0, 0]
-    expected = norm.cdf(1.6, middle, sd) - norm.cdf(1.4, middle, sd)
+    sd = scale * np.sqrt(variance[:, 0, 0] + 0.02**2)
+    middle = condition[0] + scale * mean[:, 0, 0]
+    inside = norm.cdf(1.6, middle, sd) - norm.cdf(1.4, middle, sd)
+    expected = inside @ np.tile(np.kron([0.9, 0.1], [0.8, 0.2]), 2) / 2  # two sd of the labels
     assert adapter.expect(condition, goal, 0.1).p_hit == pytest.approx(expected, abs=1e-3)
 
 
@@ -134,7 +174,7 @@ def test_p_hit_grows_with_the_tolerance_and_with_what_is_known():
     for _ in range(4):
         throw(adapter, GOAL, np.array([0.02, 0.0]), Reading.measured, words=False)
     condition = adapter.propose(GOAL)
-    assert adapter.expect(condition, GOAL, 0.015).p_hit > 2 * p[1]
+    assert adapter.expect(condition, GOAL, 0.015).p_hit > 0.9 > p[1]
     assert adapter.expect(condition + 0.1, GOAL, 0.015).p_hit < 0.05
 
 
@@ -162,7 +202,7 @@ def many(adapter, n):
 
 def test_two_hundred_trials_are_merged_and_hardly_missed(monkeypatch):
     merged = many(started(), 200)
-    assert np.count_nonzero(merged._memory.hardware) <= 24
+    assert len(merged._memory.hardware) <= 24
     monkeypatch.setattr(bayesian, "_TRIALS_KEPT", 10**6)
     whole = many(started(), 60)
     goals = np.random.default_rng(0).uniform([0.83, -0.17], [0.97, 0.17], size=(20, 2))
@@ -180,12 +220,12 @@ def test_trials_of_different_hardware_are_never_merged():
     adapter.change_hardware()
     many(adapter, 40)
     counts = np.bincount(adapter._memory.hardware)
-    assert counts[0] == len(CORNERS)
-    assert np.all(counts[1:] > 0)
+    assert np.all(counts > 0)
+    assert len(counts) == 2
 
 
 def test_what_a_reading_would_teach_is_what_it_takes_off_the_variance():
-    adapter = started(field_sd=(0.25,), field_reach=(1.0,), hardware_sd=(0.3,))
+    adapter = started(label_sd=(0.2,), own_sd=1e-6, hardware_sd=(0.3, 0.3))
     throw(adapter, GOAL, np.array([0.03, 0.0]))
     region = np.random.default_rng(0).uniform([0.8, -0.2], [1.0, 0.2], size=(40, 2))
     at = np.array([0.85, -0.12])
@@ -199,7 +239,7 @@ def test_what_a_reading_would_teach_is_what_it_takes_off_the_variance():
 
 
 def test_a_throw_teaches_more_than_a_demonstration_where_hardware_changed():
-    adapter = started(hardware_sd=(0.5,))
+    adapter = started(hardware_sd=(0.5, 0.5))
     region = np.random.default_rng(0).uniform([0.8, -0.2], [1.0, 0.2], size=(40, 2))
     throws, shown = (adapter.gain(region, region, demonstrations=d) for d in (False, True))
     assert throws.max() > 3 * shown.max()
@@ -231,11 +271,12 @@ def test_metres_and_milliseconds_are_as_good_as_metres_and_seconds():
 @pytest.mark.parametrize(
     ("settings", "word"),
     [
-        ({"field_sd": ()}, "field_sd"),
-        ({"field_sd": (0.1, -0.1)}, "field_sd"),
+        ({"label_sd": ()}, "label_sd"),
+        ({"label_sd": (0.1, -0.1)}, "label_sd"),
         ({"rough_reach": 0.0}, "rough_reach"),
         ({"execution_sd": float("nan")}, "execution_sd"),
         ({"outlier": 0.7}, "outlier"),
+        ({"p_changed": 0.7}, "p_changed"),
     ],
 )
 def test_settings_out_of_range_are_refused(settings, word):

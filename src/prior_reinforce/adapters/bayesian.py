@@ -21,13 +21,14 @@ from prior_reinforce.arrays import Point, Points
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.plans.normalisation import Normalisation
+from prior_reinforce.plans.outcome_weights import smooth_weights
 from prior_reinforce.readings import Reading
 
 _STEPS = 12
 """Steps to the fixed point of the proposal, each 0.7 of the way (ours)."""
 _RELAXATION = 0.7
-_TRIALS_AFTER_A_MISS = 1.3
-"""Fitted to 1429 trials of tuning material (ours; docs/decisions-adapter.md)."""
+_TRIALS_AFTER_A_MISS = 1.24
+"""Fitted to 1623 trials of tuning material (ours; docs/decisions-adapter.md)."""
 _POINTS = 192
 """Where the probability of a hit is evaluated (ours): right to 0.002, for k up to 3."""
 _TRIALS_KEPT = 24
@@ -49,26 +50,30 @@ class BayesianConfig:
     """Settings of `BayesianAdapter`, in units of S, the demonstrations' spread (`Normalisation`).
 
     Where there are several values, all combinations are models, and their evidence weighs them.
-    The defaults cover what maximum likelihood finds on the fields of all our tasks.
     """
 
-    field_sd: tuple[float, ...] = (0.12, 0.25, 0.45)
-    """a, what the generator gets wrong: mostly the rounding of labels that were seen by eye."""
-    field_reach: tuple[float, ...] = (0.7, 1.0)
-    """l, how far that reaches."""
+    label_sd: tuple[float, ...] = (0.03, 0.1)
+    """How far demonstrated outcomes are off, beside the noise that they state."""
+    own_sd: float = 0.3
+    """a, what a generator gets wrong in ways of its own."""
+    own_reach: float = 0.5
+    """How far that reaches."""
+    p_own: float = 0.1
+    """Beforehand, the probability that it does."""
     rough_sd: float = 0.025
     """What lies between demonstrations."""
     rough_reach: float = 0.32
     """How far that reaches."""
-    hardware_sd: tuple[float, ...] = (0.03, 0.3)
-    """b, what changed since the demonstrations: shift and stretch."""
+    hardware_sd: tuple[float, float] = (0.03, 0.3)
+    """b, what is different from the demonstrations' day: where nothing was changed, and where
+    something was."""
     hardware_reach: float = 2.5
-    """How far that reaches."""
+    """How far that reaches: shift and stretch."""
+    p_changed: float = 0.2
+    """Beforehand, the probability that something was changed."""
     execution_sd: float = 0.02
     """How far apart outcomes of one plan lie: 3 to 4 mm where the spread is 12 to 18 cm, as for
     repeated executions on our tasks."""
-    demonstration_sd: float = 0.15
-    """By how much the demonstrations' outcomes are misread."""
     outlier: float = 0.01
     """Probability that a reading says nothing: a lost ball, a wrong word."""
 
@@ -82,8 +87,9 @@ class BayesianConfig:
             values = value if isinstance(value, tuple) else (value,)
             if not (values and all(math.isfinite(v) and v > 0 for v in values)):
                 raise ConfigurationError(f"{name} must be positive, got {value}")
-        if self.outlier >= 0.5:
-            raise ConfigurationError(f"outlier must be below 0.5, got {self.outlier}; try 0.01")
+        for name in ("outlier", "p_own", "p_changed"):
+            if (value := getattr(self, name)) >= 0.5:
+                raise ConfigurationError(f"{name} must be below 0.5, got {value}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,10 +98,16 @@ class _Memory:
 
     conditions: Points
     hardware: Int[np.ndarray, " n"]
-    """0 for demonstrations, then counting changes of hardware from 1."""
+    """How often something had been changed."""
     low: Points
     high: Points
     variance: Points
+
+    @classmethod
+    def empty(cls, k: int) -> _Memory:
+        """Nothing yet."""
+        none = np.empty((0, k))
+        return cls(none, np.empty(0, int), none, none, none)
 
     def with_one(
         self, condition: Point, hardware: int, low: Point, high: Point, variance: Point
@@ -126,21 +138,28 @@ class BayesianAdapter(Adapter):
     In normalised units, where S, the root mean square deviation of the demonstrated outcomes, is 1
     (one S for each unit), a plan generated for c comes down at
 
-        r = c + d(c) + noise,        d_j(c) = f_j(c) + u_j(c) + h_j(c)        j = 1..k
+        r = c + d(c) + noise,    d_j(c) = sum_i w_i(c) e_ij + f_j(c) + u_j(c) + h_j(c)    j = 1..k
 
-    with independent Gaussian processes of prior mean 0 and squared-exponential kernels:
+    with independent Gaussian terms of prior mean 0:
 
-        f   sd a, reach l            what the generator got wrong, mostly labels that were rounded
-        u   sd 0.025, reach 0.32     what lies between the demonstrations
-        h   sd b, reach 2.5          what has changed since: shift and stretch, anew for every
-                                     change of hardware
-        noise  sd 0.02               execution
+        e   sd s_i              by how much the outcome of demonstration i is off: the noise that it
+                                states, and 0.03 or 0.1 more
+        f   sd a, reach 0.5     what the generator gets wrong in ways of its own: 0, or with
+                                probability 0.1 0.3
+        u   sd 0.025, reach 0.32    what lies between the demonstrations
+        h   sd b, reach 2.5     what is different from their day: 0.03, or with probability 0.2 0.3;
+                                anew for every change of hardware
+        noise  sd 0.02          execution
 
-    Trials and questions see f + u + h of their hardware; demonstrations were executed on the
-    hardware of their day and see f + u. A reading (`readings.Reading`) says that the blurred error
-    r - g lies in an interval, or, with probability 0.01, nothing at all; a demonstration says that
-    d(c_i) = 0 give or take 0.15. The posterior is found by expectation propagation for each (a, l,
-    b) of a grid of 12; its evidence weighs them.
+    f, u and h are Gaussian processes with squared-exponential kernels. w are the weights of a
+    spline over the demonstrated outcomes (`plans.outcome_weights`): as far as landing is linear in
+    the plan, a mixture of plans comes down where the same mixture of the demonstrations' outcomes
+    is, so labels that are off move it by their mixture. Of six labels by eye that is little more
+    than its affine part, which few trials tell.
+
+    A reading (`readings.Reading`) says that the blurred error r - g lies in an interval, or, with
+    probability 0.01, nothing at all. The posterior is found by expectation propagation for each of
+    eight models; their evidence weighs them.
 
     The next condition is the fixed point c = g - E d(c): the posterior mean, which is as good as
     the greatest probability of a hit on our tasks, and knows no tolerance
@@ -151,8 +170,7 @@ class BayesianAdapter(Adapter):
     before.
 
     Source: ours, because words are intervals, and taken as numbers an adapter stands still.
-    Constants: maximum likelihood of such kernels on fields of all our tasks, and the figures of
-    docs/decisions-adapter.md.
+    Constants: measured fields of all our tasks, and the figures of docs/decisions-adapter.md.
     """
 
     config_type: ClassVar[type[BayesianConfig]] = BayesianConfig
@@ -160,21 +178,21 @@ class BayesianAdapter(Adapter):
 
     def __init__(self, config: BayesianConfig | None = None) -> None:
         """Take the settings, or the defaults."""
-        self.config = config or BayesianConfig()
-        grid = itertools.product(
-            self.config.field_sd, self.config.field_reach, self.config.hardware_sd
-        )
-        a, reach, b = np.array(list(grid)).T
-        self._field, self._reach, self._hardware_variance = a**2, reach, b**2
-        self._prior_variance = a**2 + b**2 + self.config.rough_sd**2
+        self.config = config = config or BayesianConfig()
+        own = ((0.0, 1.0 - config.p_own), (config.own_sd, config.p_own))
+        same, changed = config.hardware_sd
+        hardware = ((same, 1.0 - config.p_changed), (changed, config.p_changed))
+        grid = itertools.product(config.label_sd, own, hardware)
+        models = [(e, a, b, p * q) for e, (a, p), (b, q) in grid]
+        e, a, b, share = np.array(models).T
+        self._label, self._own, self._hardware, self._log_prior = e**2, a**2, b**2, np.log(share)
 
     def _start(self, demonstrations: Demonstrations) -> None:
         self._normalisation = Normalisation.of(demonstrations)
-        conditions = self._normalisation.apply(demonstrations.outcomes_seen)
-        zero = np.zeros_like(conditions)
-        variance = np.full_like(zero, self.config.demonstration_sd**2 + self.config.execution_sd**2)
-        self._memory = _Memory(conditions, np.zeros(len(zero), int), zero, zero, variance)
-        self._now = 1
+        outcomes, noise = demonstrations.outcomes_seen, demonstrations.outcome_noise
+        self._weights = smooth_weights(outcomes, noise=noise)
+        self._stated = np.mean((noise / self._normalisation.scale) ** 2, axis=1)
+        self._memory, self._now = _Memory.empty(outcomes.shape[1]), 0
         self._posterior: Posterior | None = None
 
     def change_hardware(self) -> None:
@@ -194,7 +212,7 @@ class BayesianAdapter(Adapter):
             (reading.sd / scale) ** 2 + self.config.execution_sd**2,
         )
         self._posterior = None
-        if np.count_nonzero(self._memory.hardware) > _TRIALS_KEPT:
+        if len(self._memory.hardware) > _TRIALS_KEPT:
             self._merge()
 
     def _propose(self, goal_seen: Point) -> Point:
@@ -246,15 +264,15 @@ class BayesianAdapter(Adapter):
         cross = self._covariance(at, self._memory.conditions, here & (not demonstrations))
         to = self._covariance(places, self._memory.conditions, here)
         now = np.full((1, len(places)), not demonstrations)
-        own = self._prior_variance - (self._hardware_variance if demonstrations else 0.0)
+        own = self._variance(at) - (self._hardware[:, None] if demonstrations else 0.0)
         gone, left = np.zeros(len(at)), 0.0
         for precision in np.moveaxis(known.precision, 1, 0):  # for each component
             explained = cross @ precision
             covariance = self._covariance(at, places, now) - explained @ np.swapaxes(to, 1, 2)
-            variance = own[:, None] - np.sum(explained * cross, axis=-1)
+            variance = own - np.sum(explained * cross, axis=-1)
             noise = self.config.execution_sd**2 + _TEACHING_SD**2
             gone += share @ (np.square(covariance).mean(axis=-1) / (variance + noise))
-            unknown = self._prior_variance[:, None] - np.sum((to @ precision) * to, axis=-1)
+            unknown = self._variance(places) - np.sum((to @ precision) * to, axis=-1)
             left += float(share @ unknown.mean(axis=-1))
         return np.asarray(gone / left)
 
@@ -263,11 +281,9 @@ class BayesianAdapter(Adapter):
         if self._posterior is None:
             memory, config = self._memory, self.config
             same = memory.hardware[:, None] == memory.hardware
-            covariance = self._covariance(
-                memory.conditions, memory.conditions, same & (memory.hardware > 0)
-            )
+            covariance = self._covariance(memory.conditions, memory.conditions, same)
             readings = Readings(memory.low.T, memory.high.T, memory.variance.T, config.outlier)
-            self._posterior = infer(covariance, readings)
+            self._posterior = infer(covariance, readings, self._log_prior)
         return self._posterior
 
     def _merge(self) -> None:
@@ -279,50 +295,67 @@ class BayesianAdapter(Adapter):
         known, memory = self._known(), self._memory
         share = known.model_weights
         tau, nu = (np.einsum("m,mkn->nk", share, of) for of in (known.tau, known.nu))
-        trials = np.flatnonzero(memory.hardware)
-        old = trials[:-_LATEST]
+        old = np.arange(len(memory.hardware) - _LATEST)
         sites = memory.only(old)
         number = nu[old] / tau[old]
         sites = replace(sites, low=number, high=number, variance=1.0 / tau[old])
         told = np.any(tau[old] > _TELLS_NOTHING, axis=1)
         sites = sites.only(told)
-        a2, reach = share @ self._field, share @ self._reach
         while len(sites.hardware) > _MERGED_TO - _LATEST:
             i, j = _closest(sites)
             weight = np.sum(1.0 / sites.variance[[i, j]], axis=1)
-            middle = np.average(sites.conditions[[i, j]], axis=0, weights=weight)
-            square = np.square(sites.conditions[[i, j]] - middle).sum(axis=1)[:, None]
-            lost = 2 * a2 * -np.expm1(-0.5 * square / reach**2)
-            lost = lost + 2 * self.config.rough_sd**2 * -np.expm1(
-                -0.5 * square / self.config.rough_reach**2
-            )
-            precision = 1.0 / (sites.variance[[i, j]] + lost)
+            both = sites.conditions[[i, j]]
+            middle = np.average(both, axis=0, weights=weight)
+            precision = 1.0 / (sites.variance[[i, j]] + self._apart(both, middle)[:, None])
             number = np.sum(precision * sites.low[[i, j]], axis=0) / precision.sum(axis=0)
             hardware, variance = sites.hardware[i], 1.0 / precision.sum(axis=0)
             rest = sites.only(np.setdiff1d(np.arange(len(sites.hardware)), [i, j]))
             sites = rest.with_one(middle, hardware, number, number, variance)
-        own, latest = memory.only(memory.hardware == 0), memory.only(trials[-_LATEST:])
+        latest = memory.only(np.arange(len(memory.hardware) - _LATEST, len(memory.hardware)))
         self._memory = _Memory(
             *(
-                np.concatenate([getattr(part, name) for part in (own, sites, latest)])
+                np.concatenate([getattr(part, name) for part in (sites, latest)])
                 for name in ("conditions", "hardware", "low", "high", "variance")
             )
         )
         self._posterior = None
 
+    def _apart(self, conditions: Points, other: Point) -> Float[np.ndarray, " n"]:
+        """Prior variance of the difference between displacements here and there."""
+        there = other[None]
+        cross = self._covariance(conditions, there, np.ones((1, 1), bool))[..., 0]
+        variance = self._variance(conditions) + self._variance(there) - 2.0 * cross
+        return np.asarray(self._known().model_weights @ variance)
+
     def _covariance(
         self, a: Float[np.ndarray, "p k"], b: Points, share_hardware: Bool[np.ndarray, "_ n"]
     ) -> Float[np.ndarray, "m p n"]:
         """Prior covariance of displacements, the hardware's part where both share it."""
+        config = self.config
         square = np.square(a[:, None] - b[None]).sum(axis=-1)
-        rough = self.config.rough_sd**2 * np.exp(-0.5 * square / self.config.rough_reach**2)
-        hardware = np.exp(-0.5 * square / self.config.hardware_reach**2) * share_hardware
-        by_reach = np.exp(-0.5 * square / self._reach[:, None, None] ** 2)
+        w_a, w_b = self._mixed_by(a), self._mixed_by(b)
+        stated = (w_a * self._stated) @ w_b.T
+        rough = config.rough_sd**2 * np.exp(-0.5 * square / config.rough_reach**2)
+        own = np.exp(-0.5 * square / config.own_reach**2)
+        hardware = np.exp(-0.5 * square / config.hardware_reach**2) * share_hardware
         return np.asarray(
-            self._field[:, None, None] * by_reach
-            + self._hardware_variance[:, None, None] * hardware
+            stated
             + rough
+            + self._label[:, None, None] * (w_a @ w_b.T)
+            + self._own[:, None, None] * own
+            + self._hardware[:, None, None] * hardware
         )
+
+    def _variance(self, at: Float[np.ndarray, "p k"]) -> Float[np.ndarray, "m p"]:
+        """Prior variance of the displacement of a trial."""
+        squares = np.square(self._mixed_by(at))
+        of_all = self.config.rough_sd**2 + squares @ self._stated
+        of_each = self._label[:, None] * squares.sum(axis=1)
+        return np.asarray(of_all + of_each + (self._own + self._hardware)[:, None])
+
+    def _mixed_by(self, at: Float[np.ndarray, "p k"]) -> Float[np.ndarray, "p N"]:
+        """w, how much each demonstration counts."""
+        return self._weights(self._normalisation.undo(at))
 
     def _predict(
         self, at: Float[np.ndarray, "p k"]
@@ -333,7 +366,7 @@ class BayesianAdapter(Adapter):
         cross = self._covariance(at, self._memory.conditions, same)[:, None]
         mean = (cross @ posterior.weights[..., None])[..., 0]
         explained = np.sum((cross @ posterior.precision) * cross, axis=-1)
-        variance = self._prior_variance[:, None, None] - explained
+        variance = self._variance(at)[:, None] - explained
         return mean, np.maximum(variance, 1e-10)
 
     def _mixed(self, means: Float[np.ndarray, "m k p"]) -> Float[np.ndarray, "p k"]:

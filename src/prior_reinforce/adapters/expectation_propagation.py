@@ -66,19 +66,28 @@ class Posterior:
     precision: Float[np.ndarray, "m k n n"]
     """(K + diag(1 / tau))^-1: Var d(x) = k(x, x) - k(x)' precision k(x)."""
     log_evidence: Float[np.ndarray, " m"]
-    """log p(readings), summed over outputs, up to a constant that all models share."""
+    """log p(readings, model), summed over outputs, up to a constant that all models share."""
 
     @property
     def model_weights(self) -> Float[np.ndarray, " m"]:
-        """Posterior probability of each model, all equal beforehand."""
+        """Posterior probability of each model."""
         share = np.exp(self.log_evidence - self.log_evidence.max())
         return np.asarray(share / share.sum())
 
 
-def infer(covariance: Float[np.ndarray, "m n n"], readings: Readings) -> Posterior:
+def infer(
+    covariance: Float[np.ndarray, "m n n"],
+    readings: Readings,
+    log_prior: Float[np.ndarray, " m"] | float = 0.0,
+) -> Posterior:
     """Return the latent's posterior under each of m prior covariances.
 
     Deterministic; k outputs are independent and share each covariance.
+
+    Args:
+        covariance: K of each model.
+        readings: Of k outputs, n each; n may be 0.
+        log_prior: Of each model, beforehand; all equal where it is not said.
     """
     m, n, _ = covariance.shape
     k = len(readings.low)
@@ -110,7 +119,7 @@ def infer(covariance: Float[np.ndarray, "m n n"], readings: Readings) -> Posteri
         + rest_mean * rest_tau / both * (tau * rest_mean - 2.0 * nu)
     )
     log_determinant = np.linalg.slogdet(_whitened(prior, tau))[1]
-    evidence = of_sites.sum(axis=(-2, -1)) - 0.5 * log_determinant.sum(axis=-1)
+    evidence = of_sites.sum(axis=(-2, -1)) - 0.5 * log_determinant.sum(axis=-1) + log_prior
     weights = nu - (precision @ (prior @ nu[..., None]))[..., 0]
     return Posterior(tau, nu, weights, precision, evidence)
 
