@@ -7,13 +7,12 @@ import shutil
 from collections.abc import Iterator
 
 import pytest
-from jaxtyping import install_import_hook
 from threadpoolctl import threadpool_limits
 
-import tests.shapes  # noqa: F401  (the hook finds it by name)
+from tests.shapes import check_shapes
 
 # Before anything imports the package, or it stays unchecked.
-install_import_hook("prior_reinforce", "tests.shapes.arrays_only")
+check_shapes("prior_reinforce")
 
 # Threads that wait for each other by spinning crawl on a busy machine; two test processes are one.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
