@@ -110,6 +110,7 @@ def test_what_was_learned_on_a_gpu_is_loaded_on_either(make, throws, tmp_path):
 @each
 def test_a_killed_fit_goes_on_where_it_was(make, throws, tmp_path, monkeypatch):
     monkeypatch.setattr(training, "_SAVED_EVERY", 0.0)
+    monkeypatch.setattr(training, "_SAVING", np.inf)
     demos, states = throws(3, 20), tmp_path / "states"
     whole = make().fit(demos, seed=0).generate(demos.outcomes_seen)
     steps = []

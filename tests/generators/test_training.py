@@ -4,6 +4,7 @@ import itertools
 from dataclasses import replace
 from math import nan
 
+import numpy as np
 import pytest
 import safetensors.torch
 import torch
@@ -86,6 +87,7 @@ def interrupted(path, config, at):
 
 def test_an_interrupted_training_goes_on_to_the_same_last_digit(tmp_path, monkeypatch):
     monkeypatch.setattr(training, "_SAVED_EVERY", 0.0)
+    monkeypatch.setattr(training, "_SAVING", np.inf)
     config = replace(CONFIG, training_steps=20)
     whole, _ = interrupted(None, config, None)
     for at in (8, 3, 6):
@@ -94,6 +96,24 @@ def test_an_interrupted_training_goes_on_to_the_same_last_digit(tmp_path, monkey
     weight, last = interrupted(tmp_path / "state", config, None)
     assert weight == whole
     assert last.step == 20
+
+
+def test_a_state_that_takes_long_to_save_is_saved_seldom(tmp_path, monkeypatch):
+    clock, saves = [0.0], []
+
+    def save(*_):
+        saves.append(clock[0])
+        clock[0] += 20.0
+
+    def now():
+        clock[0] += 1.0
+        return clock[0]
+
+    monkeypatch.setattr(training.time, "monotonic", now)
+    monkeypatch.setattr(training._Run, "save", save)
+    interrupted(tmp_path / "state", replace(CONFIG, training_steps=900), None)
+    assert saves[0] == pytest.approx(60, abs=5)
+    assert saves[1] - saves[0] == pytest.approx(20 / 0.02, rel=0.1)
 
 
 def test_the_state_of_another_training_is_refused_by_its_path(tmp_path):

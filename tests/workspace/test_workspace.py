@@ -566,6 +566,7 @@ def test_a_session_that_was_open_sees_what_another_window_executes(workspace):
 
 def test_a_training_that_was_interrupted_goes_on_where_it_was(tmp_path, monkeypatch):
     monkeypatch.setattr(training, "_SAVED_EVERY", 0.0)
+    monkeypatch.setattr(training, "_SAVING", np.inf)
     choice = "regression,training_steps=4,network.widths=8,network.groups=2,timing=none"
     steps = []
 
