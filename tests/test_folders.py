@@ -1,23 +1,22 @@
 """Fifteen folders as labs have them, each from recordings to a plan that passes the gate.
 
-Their files are written by the libraries that write them in labs, or in the layout that a
-controller's own logger documents. All have an encoder's noise and joints that are held. At most one
-correction is needed, and the message before names it. The generator is what `learn` chooses.
+Their files are written by the libraries that write them in labs, or as those were seen to write
+them (lerobot, robomimic, ur_rtde). All have an encoder's noise and joints that are held. At most
+one correction is needed, and the message before names it. The generator is what `learn` chooses.
 """
+
+import csv
 
 import h5py
 import numpy as np
 import pandas as pd
-import pyarrow as pa
-import pyarrow.parquet as pq
 import pytest
 import zarr
+from mcap_ros2.writer import Writer as McapWriter
 from rosbags.rosbag1 import Writer as Writer1
-from rosbags.rosbag2 import StoragePlugin
-from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_typestore
 
-from tests.importing.recorded import JOINTS
+from tests.importing.recorded import JOINTS, lerobot_set
 from tests.robots.arms import UR, ur5e, write_urdf
 
 N = 6
@@ -67,25 +66,35 @@ def libfranka(folder):
 
 
 def rtde(folder):
-    """UR's RTDE recorder: blanks between the cells, seconds since the controller started."""
+    """UR's RTDE client: blanks between the cells, seconds since the controller started."""
     for i in range(N):
         t, q = throw(i, 500, 6)
         names = ["timestamp", *(f"{kind}_q_{j}" for kind in ("target", "actual") for j in range(6))]
-        rows = np.column_stack([t + 8123.4, q, q])
-        np.savetxt(folder / f"{i}.csv", rows, header=" ".join(names), comments="", fmt="%.9f")
+        with (folder / f"{i}.csv").open("w") as file:
+            writer = csv.writer(file, delimiter=" ")
+            writer.writerow(names)
+            writer.writerows(np.column_stack([t + 8123.4, q, q]).tolist())
     outcomes(folder)
 
 
 def ur_rtde(folder):
-    """ur_rtde's recorder: commas, the chosen variables in its own order."""
+    """ur_rtde's recorder: it runs beside the controller, so some cycles come twice, some never.
+
+    Seen with 1.6.5 on a busy machine; one row in a hundred had the positions of the next cycle.
+    """
     for i in range(N):
         t, q = throw(i, 500, 6)
         names = [
             f"{kind}_q{d}_{j}" for kind in ("target", "actual") for d in ("", "d") for j in range(6)
         ]
-        frame = pd.DataFrame(np.column_stack([q, 0 * q, q, 0 * q]), columns=names)
-        frame.insert(0, "timestamp", t + 512.2)
-        frame.to_csv(folder / f"throw {i}.csv", index=False)
+        rng = np.random.default_rng(i)
+        rows = np.sort(rng.choice(len(t) - 1, size=len(t)))
+        later = rows + (np.arange(len(rows)) % 100 == 50)
+        frame = pd.DataFrame(
+            np.column_stack([q[rows], 0 * q[rows], q[later], 0 * q[rows]]), columns=names
+        )
+        frame.insert(0, "timestamp", t[rows] + 512.2)
+        frame.to_csv(folder / f"throw {i}.csv", index=False, float_format="%.6f")
     outcomes(folder)
 
 
@@ -153,30 +162,28 @@ def one_file(folder):
 
 
 def lerobot(folder):
-    """LeRobot v3 in degrees, as its drivers record them."""
-    names = [f"{name}.pos" for name in JOINTS]
-    state = {"dtype": "float32", "shape": [7], "names": names}
-    info = {"codebase_version": "v3.0", "fps": 50, "features": {"observation.state": state}}
-    (folder / "meta").mkdir()
-    (folder / "meta" / "info.json").write_text(str(info).replace("'", '"'))
-    (folder / "data" / "chunk-000").mkdir(parents=True)
-    frames = [(i, k, q) for i in range(N) for k, q in enumerate(np.rad2deg(throw(i, 50)[1]))]
-    episode, index, rows = zip(*frames, strict=True)
-    flat = pa.array(np.concatenate(rows).astype(np.float32))
-    columns = {"episode_index": episode, "frame_index": index}
-    table = pa.table({**columns, "observation.state": pa.FixedSizeListArray.from_arrays(flat, 7)})
-    pq.write_table(table, folder / "data" / "chunk-000" / "file-000.parquet")
+    """LeRobot v3 in degrees, with a gripper, as its drivers record them."""
+    names = [f"{name}.pos" for name in (*JOINTS, "gripper")]
+    motions = [np.rad2deg(throw(i, 50)[1]) for i in range(N)]
+    motions = [np.column_stack([q, np.full(len(q), 30.0)]) for q in motions]
+    lerobot_set(folder / "hoop", 50, motions, names)
     outcomes(folder)
 
 
 def robomimic(folder):
+    """robomimic's `dataset_states_to_obs`, where robosuite's collection kept the control rate."""
     with h5py.File(folder / "demos.hdf5", "w") as file:
         file.create_group("data").attrs["env_args"] = '{"env_kwargs": {"control_freq": 50}}'
         for i in range(N):
             q = throw(i, 50)[1]
-            file[f"data/demo_{i}/obs/robot0_joint_pos"] = q
-            file[f"data/demo_{i}/actions"] = np.zeros((len(q), 7))
-    outcomes(folder, 1000, "episode,x (mm),y (mm)", "demo_{}")
+            demo = file.create_group(f"data/demo_{i + 1}")
+            demo.attrs["num_samples"] = len(q)
+            demo["actions"] = np.zeros((len(q), 8))
+            demo["obs/robot0_joint_pos"] = q
+            demo["obs/robot0_eef_pos"] = np.zeros((len(q), 3))
+        file["mask/train"] = np.array([f"demo_{i + 1}" for i in range(N)], dtype="S")
+    rows = [f"demo_{i + 1},{1000 * x},{1000 * y}" for i in range(N) for x, y in [landed(i)]]
+    (folder / "outcomes.csv").write_text("\n".join(["episode,x (mm),y (mm)", *rows]))
 
 
 def droid(folder):
@@ -190,46 +197,79 @@ def droid(folder):
     outcomes(folder)
 
 
-def states(path, i, names, joints, ros1):
-    """A bag of joint states in another order, with a gripper's messages on the same topic."""
-    store = get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.ROS2_HUMBLE)
-    kind, none = "sensor_msgs/msg/JointState", np.zeros(0)
-    extra = {"seq": 0} if ros1 else {}
-    plugin = {} if ros1 else {"version": 8, "storage_plugin": StoragePlugin.MCAP}
-    with (Writer1 if ros1 else Writer2)(path, **plugin) as writer:
-        topic = writer.add_connection("/joint_states", kind, typestore=store)
-        for t, q in zip(*throw(i, 125, joints), strict=True):
-            now = round((1.7e9 + t) * 1e9)
-            stamp = store.types["builtin_interfaces/msg/Time"](
-                sec=now // 10**9, nanosec=now % 10**9
-            )
-            header = store.types["std_msgs/msg/Header"](stamp=stamp, frame_id="", **extra)
-            for said, positions in ((names[::-1], q[::-1].copy()), (["finger"], np.array([0.04]))):
-                message = store.types[kind](
-                    header=header, name=list(said), position=positions, velocity=none, effort=none
-                )
-                raw = (store.serialize_ros1 if ros1 else store.serialize_cdr)(message, kind)
-                writer.write(topic, now, raw)
-
-
 def ros1(folder):
+    """rosbags: joint states in another order, with a gripper's messages on the same topic."""
+    store = get_typestore(Stores.ROS1_NOETIC)
+    kind, none = "sensor_msgs/msg/JointState", np.zeros(0)
     for i in range(N):
-        states(folder / f"throw_{i}.bag", i, UR, 6, ros1=True)
+        with Writer1(folder / f"throw_{i}.bag") as writer:
+            topic = writer.add_connection("/joint_states", kind, typestore=store)
+            for t, q in zip(*throw(i, 125, 6), strict=True):
+                now = round((1.7e9 + t) * 1e9)
+                stamp = store.types["builtin_interfaces/msg/Time"](
+                    sec=now // 10**9, nanosec=now % 10**9
+                )
+                header = store.types["std_msgs/msg/Header"](seq=0, stamp=stamp, frame_id="")
+                for said, positions in ((UR[::-1], q[::-1].copy()), (["finger"], np.ones(1))):
+                    message = store.types[kind](
+                        header=header,
+                        name=list(said),
+                        position=positions,
+                        velocity=none,
+                        effort=none,
+                    )
+                    writer.write(topic, now, store.serialize_ros1(message, kind))
     outcomes(folder)
 
 
 def mcap(folder):
+    """mcap-ros2-support: joint states as franka_ros2 names them, the fingers among them."""
+    names = [f"fr3_{name}" for name in (*JOINTS, "finger_joint1", "finger_joint2")]
     for i in range(N):
-        states(folder / f"throw_{i}", i, [f"fr3_{name}" for name in JOINTS], 7, ros1=False)
+        with (folder / f"throw_{i}.mcap").open("wb") as file, McapWriter(file) as writer:
+            schema = writer.register_msgdef("sensor_msgs/msg/JointState", JOINT_STATE)
+            for t, q in zip(*throw(i, 125), strict=True):
+                now = round((1.7e9 + t) * 1e9)
+                stamp = {"sec": now // 10**9, "nanosec": now % 10**9}
+                message = {
+                    "header": {"stamp": stamp, "frame_id": "base"},
+                    "name": names,
+                    "position": [*q, 0.04, 0.04],
+                    "velocity": [],
+                    "effort": [],
+                }
+                writer.write_message("/franka/joint_states", schema, message, now + 10**6, now)
     outcomes(folder)
 
 
+JOINT_STATE = "\n".join(
+    [
+        "std_msgs/Header header",
+        "string[] name",
+        *(f"float64[] {name}" for name in ("position", "velocity", "effort")),
+        80 * "=",
+        "MSG: std_msgs/Header",
+        "builtin_interfaces/Time stamp",
+        "string frame_id",
+        80 * "=",
+        "MSG: builtin_interfaces/Time",
+        "int32 sec",
+        "uint32 nanosec",
+    ]
+)
+"""`sensor_msgs/msg/JointState`, with the definitions that it names, as rosbag2 stores them."""
+
+
 def replay_buffer(folder):
-    """UMI's replay buffer, whose times are milliseconds here."""
+    """Diffusion Policy's buffer of a real arm (`RealEnv`), whose times are milliseconds here."""
     root = zarr.open_group(str(folder / "all.zarr"), mode="w", zarr_format=2)
     parts = [throw(i, 60) for i in range(N)]
+    q = np.concatenate([q for _, q in parts])
     data = root.create_group("data")
-    data.create_array("joint_pos", data=np.concatenate([q for _, q in parts]))
+    data.create_array("robot_joint", data=q)
+    data.create_array("robot_eef_pose", data=q[:, :6])
+    data.create_array("action", data=q[:, :6])
+    data.create_array("stage", data=np.zeros(len(q), dtype=np.int64))
     data.create_array("timestamp", data=np.concatenate([1000 * t for t, _ in parts]))
     ends = np.cumsum([len(t) for t, _ in parts])
     root.create_group("meta").create_array("episode_ends", data=ends)
@@ -246,14 +286,14 @@ FOLDERS = {
     unlabelled: ("panda", "", "--time-column 1 --time-unit ms --units deg"),
     workbook: ("panda", "all.xlsx", ""),
     one_file: ("panda", "", ""),
-    lerobot: ("panda", "", "--units deg"),
+    lerobot: ("panda", "hoop", "--units deg"),
     robomimic: ("panda", "demos.hdf5", ""),
     droid: ("panda", "", ""),
     ros1: ("arm.urdf", "", ""),
     mcap: ("fr3", "", ""),
-    replay_buffer: ("panda", "all.zarr", "--time-unit ms --outcome-unit cm"),
+    replay_buffer: ("panda", "all.zarr --key robot_joint", "--time-unit ms --outcome-unit cm"),
 }
-"""Robot, what is imported of the folder, and the correction that the first message names."""
+"""Robot, what of the folder is imported and how, and the correction that the message names."""
 MANY = {libfranka: 40, ros1: 40}
 """Of which so many plans are asked for: a Panda, and a UR5e known by its URDF alone."""
 
@@ -267,7 +307,7 @@ def test_a_folder_becomes_a_plan_that_passes(run, tmp_path, monkeypatch, write):
     write(tmp_path / "lab")
     write_urdf(tmp_path / "arm.urdf", ur5e())
     assert run("new", "hoop", "--robot", robot)[0] == 0
-    command = ["import", "hoop", f"lab/{inside}"]
+    command = ["import", "hoop", *f"lab/{inside}".split()]
     status, out, err = run(*command)
     if correction:
         assert status == 2

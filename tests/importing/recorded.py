@@ -97,61 +97,112 @@ def write_lerobot(
     skip: Sequence[int] = (),
     names: object = None,
 ) -> Path:
-    """The documented layout: several episodes a file, the last episode split over two files."""
-    features = {
-        "observation.state": {
-            "dtype": "float32",
-            "shape": [8],
-            "names": names or [*JOINTS, "gripper"],
-        },
-        "action": {"dtype": "float32", "shape": [8], "names": names or [*JOINTS, "gripper"]},
-        "timestamp": {"dtype": "float32", "shape": [1], "names": None},
-        "episode_index": {"dtype": "int64", "shape": [1], "names": None},
-    }
-    meta = folder / "meta"
-    meta.mkdir(parents=True)
+    """Six throws and a gripper's opening; of v3.0, the last episode is split over two files."""
+    motions = [
+        np.column_stack([q, np.full(len(q), 0.04)]) for _, q in map(sampled, range(N), [rate] * N)
+    ]
+    names = names or [*JOINTS, "gripper"]
+    return lerobot_set(folder, rate, motions, names, version, stale=stale, skip=skip, apart=50)
+
+
+def lerobot_set(
+    folder: Path,
+    rate: int,
+    motions: Sequence[np.ndarray],
+    names: object,
+    version: str = "v3.0",
+    *,
+    stale: bool = False,
+    skip: Sequence[int] = (),
+    apart: int = 0,
+) -> Path:
+    """A data set as `LeRobotDataset.create`, `add_frame` and `save_episode` make it of vectors.
+
+    Held against what lerobot 0.4.4 (v3.0) and 0.3.3 (v2.1) wrote of the same numbers: columns,
+    types and values of data and episodes were equal, and info but for what nothing reads;
+    statistics and tasks are left out. The action is the state plus one.
+
+    Args:
+        folder: New.
+        rate: Frames a second.
+        motions: State of each episode, (T, D).
+        names: Of the D channels; a list, or nested as some writers do.
+        version: `v3.0` or `v2.1`.
+        stale: Whether the list of episodes points to a file that is not there.
+        skip: Episodes that are listed and have no frames.
+        apart: How many of the last frames are in a second file, in v3.0.
+    """
+    vector = {"dtype": "float32", "shape": [motions[0].shape[1]], "names": names}
+    kinds = {"timestamp": "float32"} | dict.fromkeys(
+        ("frame_index", "episode_index", "index", "task_index"), "int64"
+    )
+    single = {name: {"dtype": kind, "shape": [1], "names": None} for name, kind in kinds.items()}
+    lengths = [len(motion) for motion in motions]
+    ends = np.cumsum(lengths).tolist()
+    newer = version == "v3.0"
+    pattern = (
+        "chunk_index:03d}/file-{file_index:03d"
+        if newer
+        else "episode_chunk:03d}/episode_{episode_index:06d"
+    )
     info = {
         "codebase_version": version,
+        "robot_type": "arm",
+        "total_episodes": len(motions),
+        "total_frames": ends[-1],
+        "total_tasks": 1,
+        "chunks_size": 1000,
         "fps": rate,
-        "total_episodes": N,
-        "features": features,
-        "data_path": "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet",
+        "splits": {"train": f"0:{len(motions)}"},
+        "data_path": f"data/chunk-{{{pattern}}}.parquet",
+        "video_path": None,
+        "features": {"observation.state": vector, "action": vector, **single},
     }
-    (meta / "info.json").write_text(json.dumps(info))
-    tables, lengths = {}, {}
-    for i in range(N):
-        t, q = sampled(i, rate)
-        lengths[i] = len(t)
-        state = np.column_stack([q, np.full(len(t), 0.04)]).astype(np.float32)
+    (folder / "meta").mkdir(parents=True)
+    (folder / "meta" / "info.json").write_text(json.dumps(info, indent=4))
+    tables = {}
+    for i, motion in enumerate(motions):
+        count = len(motion)
+        flat = motion.astype(np.float32).ravel()
         columns = {
-            "observation.state": pa.FixedSizeListArray.from_arrays(pa.array(state.ravel()), 8),
-            "action": pa.FixedSizeListArray.from_arrays(pa.array(state.ravel() + 1), 8),
-            "timestamp": pa.array(t.astype(np.float32)),
-            "frame_index": pa.array(np.arange(len(t))),
-            "episode_index": pa.array(np.full(len(t), i)),
+            "observation.state": pa.FixedSizeListArray.from_arrays(flat, motion.shape[1]),
+            "action": pa.FixedSizeListArray.from_arrays(flat + 1, motion.shape[1]),
+            "timestamp": (np.arange(count) / rate).astype(np.float32),
+            "frame_index": np.arange(count),
+            "episode_index": np.full(count, i),
+            "index": np.arange(ends[i] - count, ends[i]),
+            "task_index": np.zeros(count, dtype=np.int64),
         }
         if i not in skip:
             tables[i] = pa.table(columns)
     data = folder / "data" / "chunk-000"
     data.mkdir(parents=True)
-    if version == "v2.1":
+    tasks = ["throw"]
+    if not newer:
         for i, table in tables.items():
             pq.write_table(table, data / f"episode_{i:06d}.parquet")
-        lines = [json.dumps({"episode_index": i, "length": n}) for i, n in lengths.items()]
-        (meta / "episodes.jsonl").write_text("\n".join(lines) + "\n")
+        rows = [{"episode_index": i, "tasks": tasks, "length": n} for i, n in enumerate(lengths)]
+        text = "".join(f"{json.dumps(row)}\n" for row in rows)
+        (folder / "meta" / "episodes.jsonl").write_text(text)
         return folder
     whole = pa.concat_tables(list(tables.values()))
-    cut = whole.num_rows - 50
+    cut = whole.num_rows - apart
     pq.write_table(whole.slice(0, cut), data / "file-000.parquet")
-    pq.write_table(whole.slice(cut), data / "file-001.parquet")
-    listed = meta / "episodes" / "chunk-000"
+    if apart:
+        pq.write_table(whole.slice(cut), data / "file-001.parquet")
+    listed = folder / "meta" / "episodes" / "chunk-000"
     listed.mkdir(parents=True)
-    pointers = [7 if stale else 0] * N
+    nothing = [0] * len(motions)
     episodes = {
-        "episode_index": list(range(N)),
-        "length": [lengths[i] for i in range(N)],
-        "data/chunk_index": [0] * N,
-        "data/file_index": pointers,
+        "episode_index": list(range(len(motions))),
+        "tasks": [tasks] * len(motions),
+        "length": lengths,
+        "data/chunk_index": nothing,
+        "data/file_index": [7] * len(motions) if stale else nothing,
+        "dataset_from_index": [0, *ends[:-1]],
+        "dataset_to_index": ends,
+        "meta/episodes/chunk_index": nothing,
+        "meta/episodes/file_index": nothing,
     }
     pq.write_table(pa.table(episodes), listed / "file-000.parquet")
     return folder
