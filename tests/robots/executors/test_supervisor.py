@@ -1,5 +1,6 @@
 """The supervisor: whatever is signalled to whom, nothing that it started outlives the lock."""
 
+import json
 import os
 import signal
 import subprocess
@@ -213,3 +214,28 @@ def test_endless_output_fills_no_disk(tmp_path, plan_file):
     )
     assert result.output_tail.endswith("end\n")
     assert (folder / "output.txt").stat().st_size < 17_000_000
+
+
+def test_a_command_that_fails_before_anybody_looks_has_failed(tmp_path):
+    program = (
+        "import json, subprocess, sys, time\n"
+        "from prior_reinforce.robots.executors import supervisor\n"
+        "start = subprocess.Popen.__init__\n"
+        "def slow(self, *args, **more):\n"
+        "    start(self, *args, **more)\n"
+        "    time.sleep(0.3)\n"
+        "subprocess.Popen.__init__ = slow\n"
+        "supervisor.main(json.loads(sys.argv[1]))\n"
+    )
+    ended = tmp_path / "ended.json"
+    with (tmp_path / "output").open("wb") as output:
+        request = {
+            "arguments": ["false"], "output": output.fileno(), "ended": str(ended),
+            "keep_open": [], "time_limit": 5.0, "grace": 1.0,
+        }  # fmt: skip
+        subprocess.run(
+            [sys.executable, "-c", program, json.dumps(request)],
+            check=True,
+            pass_fds=[output.fileno()],
+        )
+    assert json.loads(ended.read_text())["exit_status"] == 1

@@ -69,13 +69,14 @@ def main(request: dict[str, Any]) -> None:
     ended = Path(request["ended"])
     start = time.monotonic()
     try:
-        command = subprocess.Popen(
+        # Kept: where nothing holds it, Python itself takes the status of what has ended already.
+        process = subprocess.Popen(
             request["arguments"],
             stdout=slave,
             stderr=slave,
             pass_fds=request["keep_open"],
             preexec_fn=in_the_child,
-        ).pid
+        )
     except (OSError, ValueError, subprocess.SubprocessError) as error:
         _write(ended, {"started": False, "error": str(error)})
         return
@@ -87,7 +88,7 @@ def main(request: dict[str, Any]) -> None:
         output.take(_LOOK)
         try:
             while (ended_now := os.waitpid(-1, os.WNOHANG))[0] != 0:
-                if ended_now[0] == command:
+                if ended_now[0] == process.pid:
                     status, since = os.waitstatus_to_exitcode(ended_now[1]), time.monotonic()
         except ChildProcessError:
             break  # whatever loses its parent becomes our child: nothing is left
