@@ -65,6 +65,14 @@ def test_speed_is_found_with_its_joint_time_and_margin():
         report.require()
 
 
+def test_what_is_worst_while_a_pose_is_held_is_said_to_be_at_the_end_of_the_motion():
+    towards = swing(4, -0.9, 1.0)  # nearest to its end in the last frame
+    for plan, time in ((towards, 1.0), (towards[::-1], 0.0)):
+        line = lines(check_plan(Plan(plan, FORMAT), PANDA))["position"]
+        assert line.time == pytest.approx(time)
+        assert line.text.endswith(f"at {time:.3f} s")
+
+
 def test_acceleration_is_found():
     # Peak 10/sqrt(3) * 0.4 / 0.5^2 = 9.24 rad/s^2 on joint 2, whose limit is 7.5.
     line = lines(check_plan(Plan(swing(2, 0.4, 0.5), FORMAT), PANDA))["acceleration"]

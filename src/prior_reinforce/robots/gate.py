@@ -160,6 +160,8 @@ class _Checks:
         self._rows, self._picked = list(self._columns), list(self._columns.values())
         self._names = [limits.joint_names[row] for row in self._rows]
         self._fine = interpolate(plan.actions, plan.format.dt, hold_before=_HOLD, hold_after=_HOLD)
+        # A held pose is that of the first or the last frame, and is said to be there.
+        self._t = np.clip(self._fine.t, 0.0, plan.times[-1])
         self._at_frames = join_frames(plan.actions, plan.format.dt)(plan.times, 2)
 
     def joints(self) -> LimitLine:
@@ -202,16 +204,16 @@ class _Checks:
         everywhere[:, rows] = q
         low, high = limits.velocity_bounds(everywhere)
         # Linear from frame to frame, it is largest at a frame, which may lie between two cycles.
-        t_ddq = np.concatenate([fine.t, self._plan.times])
+        t_ddq = np.concatenate([self._t, self._plan.times])
         ddq = np.concatenate([ddq, self._at_frames[:, self._picked]])
         bounds = np.where(dq < 0, -low[:, rows], high[:, rows])
         return [
             self._range("position", "rad", q, limits.lower[rows], limits.upper[rows], self._names),
-            self._rate("velocity", "rad/s", fine.t, dq, bounds),
+            self._rate("velocity", "rad/s", self._t, dq, bounds),
             self._derivative(
                 "acceleration", "rad/s^2", t_ddq, ddq, _picked(limits.acceleration, rows), 0
             ),
-            self._derivative("jerk", "rad/s^3", fine.t, dddq, _picked(limits.jerk, rows), 1),
+            self._derivative("jerk", "rad/s^3", self._t, dddq, _picked(limits.jerk, rows), 1),
             self._rest("rest at start", 0, 0.0),
             self._rest("rest at end", -2, float(self._plan.times[-1])),
         ]
@@ -243,7 +245,7 @@ class _Checks:
         value, margin = float(values[sample, column]), float(distance[sample, column])
         near_low = value - low[column] < high[column] - value
         limit = float(low[column] if near_low else high[column])
-        name, time, beyond = names[column], float(self._fine.t[sample]), not margin > 0
+        name, time, beyond = names[column], float(self._t[sample]), not margin > 0
         place, where, end = f"{name} at", "beyond" if beyond else "from", "its end"
         if check == "box":
             place, where, end = (
