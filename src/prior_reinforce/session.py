@@ -158,6 +158,10 @@ class Session:
         """All trials for one goal, in order."""
         return self._history.trials_of(goal_number)
 
+    def readings_for(self, goal: Goal, model: str) -> list[Trial]:
+        """Told trials that count for a goal and that a model planned, oldest first."""
+        return self._history.readings_for(goal, model)
+
     @property
     def open_trial(self) -> Trial | None:
         """The trial that waits to be told, if any."""

@@ -8,7 +8,7 @@ import pytest
 from rich.console import Console
 from rich.progress import Progress
 
-from prior_reinforce.commands.live import LiveView, fit_progress, say
+from prior_reinforce.commands.live import LiveView, drawing_progress, fit_progress, say
 from prior_reinforce.experiments.protocol import GoalTrials
 from prior_reinforce.generators.base import FitProgress
 
@@ -91,3 +91,14 @@ def test_names_and_reasons_are_printed_as_they_are(capsys):
     )
     say(Console(), odd, ("HIT", "bold"))
     assert capsys.readouterr().out == odd.replace("\x1b", "\\x1b") + "HIT\n"
+
+
+@pytest.mark.parametrize("watched", [True, False])
+def test_the_goals_of_a_report_are_counted_where_somebody_watches(watched):
+    console = Console(file=io.StringIO(), width=200, force_terminal=watched)
+    with drawing_progress(console) as progress:
+        progress(1, 5)
+        console.file.flush()
+    assert ("1 of 5 goals" in console.file.getvalue()) is watched
+    if not watched:
+        assert console.file.getvalue() == ""

@@ -3,6 +3,7 @@
 import imageio.v3 as imageio
 import numpy as np
 
+from prior_reinforce.report import advice
 from prior_reinforce.report.advice import draw_advice
 
 
@@ -16,3 +17,22 @@ def test_where_a_first_throw_hits_is_dark(tmp_path):
         )  # fmt: skip
         pictures.append(imageio.imread(path)[..., :3].mean())
     assert pictures[0] > pictures[1] + 20
+
+
+def test_what_the_shades_and_the_axes_mean_is_said(tmp_path, monkeypatch):
+    figures = []
+    monkeypatch.setattr(advice, "save_png", lambda figure, path: figures.append(figure) or path)
+    grid = np.stack(np.meshgrid([0.8, 0.9, 1.0], [-0.2, 0.2], indexing="ij"), -1).reshape(-1, 2)
+    draw_advice(
+        tmp_path / "a.png", grid, np.full(6, 0.5), grid[:2], grid[3], grid[3],
+        (("x", "y"), ("m", "m")),
+    )  # fmt: skip
+    (axes,) = figures[0].axes
+    assert axes.get_xlabel() == "← left      y [cm]      right →"
+    assert axes.get_xbound() == (-20.0, 20.0)
+    (bar,) = axes.child_axes
+    assert bar.get_ylabel() == "probability that\na first throw hits"
+    assert bar.get_yticklabels()[-1].get_text() == "100%"
+    sizes = {scatter.get_label(): scatter.get_sizes()[0] for scatter in axes.collections[1:]}
+    # Both are seen where they are at one place.
+    assert sizes["throw that teaches most"] > 4 * sizes["demonstration that teaches most"]

@@ -1,12 +1,14 @@
 """Curves: errors as long as they are, plans as they were, noise no larger than it is."""
 
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 import pytest
 
 from prior_reinforce.report.curves import draw_errors, draw_plans, draw_trials_by_goal
 from prior_reinforce.report.style import HIT
+from prior_reinforce.trials import Stage
 from tests.report.swing_world import told
 
 GOAL = np.array([0.92, -0.10])
@@ -19,7 +21,8 @@ def test_errors_are_drawn_in_centimetres_over_the_trials_own_numbers():
     np.testing.assert_allclose(way.get_xydata(), [[1, 5.0], [3, 1.0]])
     assert [label.get_text() for label in axes.get_xticklabels()] == ["4", "5", "6"]
     said = [text.get_text() for text in axes.texts]
-    assert said == ["5 cm", "voided", "1 cm", "reached: within 1.5 cm"]
+    assert said == ["5 cm", "voided", "1 cm"]
+    assert axes.get_title(loc="right") == "shaded: reached, within 1.5 cm"
     assert axes.get_ylim()[1] > 5.0
 
 
@@ -35,24 +38,54 @@ def test_a_goal_not_tried_yet_has_axes_all_the_same():
     assert axes.get_ylim()[1] > 1.5
 
 
-def test_every_joint_shows_the_demonstrations_and_each_trial():
+def test_what_is_said_of_a_waiting_trial_covers_no_other_words():
+    record = told([0.30, 0.0], [0.0, 0.02], [0.0, 0.02])
+    waiting = replace(record.trials[2], stage=Stage.ASKED, reading=None)
+    figure = draw_errors(replace(record, trials=(*record.trials[:2], waiting)))
+    figure.draw_without_rendering()
+    (axes,) = figure.axes
+    boxes = [text.get_window_extent() for text in (*axes.texts, axes._right_title)]
+    assert not any(a.overlaps(b) for a, b in combinations(boxes, 2))
+
+
+def test_every_joint_shows_the_demonstrations_and_each_trial_and_their_differences():
     record = told([0.03, 0.04], None)
+    first, second = record.trials
+    record = replace(record, trials=(first, replace(second, plan=second.plan + 0.002)))
     figure = draw_plans(record)
     panels = [axes for axes in figure.axes if axes.axison]
-    assert [axes.get_title(loc="left") for axes in panels] == [
+    whole = [axes for axes in panels if axes.get_title(loc="left").startswith("joint")]
+    differences = [axes for axes in panels if axes not in whole]
+    assert [axes.get_title(loc="left") for axes in whole] == [
         f"joint{i} [rad]" for i in range(1, 8)
     ]
-    for j, axes in enumerate(panels):
+    for j, axes in enumerate(whole):
         drawn = [line.get_ydata() for line in axes.lines]
         plans = [*record.demonstrations.plans, *(trial.plan for trial in record.trials)]
         np.testing.assert_array_equal(drawn, [plan[:, j] for plan in plans])
+    for axes in differences:
+        assert axes.get_title(loc="left") == "minus trial 1 [mrad]"
+        drawn = [line.get_ydata() for line in axes.lines]
+        np.testing.assert_allclose(drawn, [np.zeros(60), np.full(60, 2.0)], atol=1e-9)
+    assert len(differences) == 7
     (legend,) = figure.legends
     assert [text.get_text() for text in legend.get_texts()] == [
         "demonstrations",
         "trial 1",
         "trial 2",
     ]
-    assert panels[0].lines[-1].get_linestyle() == "--"  # voided
+    assert whole[0].lines[-1].get_linestyle() == "--"  # voided
+
+
+def test_only_plans_of_one_horizon_are_compared():
+    record = told([0.03, 0.04], None, [0.0, 0.0])
+    first, second, third = record.trials
+    shorter = replace(second, plan=second.plan[:-5])
+    for trials, n in (((first,), 0), ((first, shorter), 0), ((first, shorter, third), 2)):
+        panels = draw_plans(replace(record, trials=trials)).axes
+        below = [axes for axes in panels if "minus" in axes.get_title(loc="left")]
+        drawn = [sum(len(line.get_xdata()) > 0 for line in axes.lines) for axes in below]
+        assert drawn == ([n] * 7 if n else [])
 
 
 @pytest.mark.parametrize("plan", [None, np.empty((0, 7))])
@@ -76,11 +109,21 @@ def test_a_joint_at_rest_is_not_blown_up_to_its_noise():
     assert sum(figure.axes[3].get_ylim()) / 2 == pytest.approx(0.5, abs=1e-4)
 
 
-def test_trials_by_goal_are_those_up_to_the_hit_and_say_where_none_did():
-    reached, missed = told([0.05, 0.0], None, [0.0, 0.01]), told([0.05, 0.0], [0.03, 0.0])
-    (axes,) = draw_trials_by_goal([reached, missed, told([0.0, 0.0])]).axes
+def test_trials_by_goal_are_those_up_to_the_hit_and_only_goals_that_were_reached_are_joined():
+    records = [
+        told([0.05, 0.0], None, [0.0, 0.01]),
+        replace(told([0.05, 0.0], [0.03, 0.0]), number=4),
+        told(None),
+        replace(told([0.0, 0.0]), number=7),
+    ]
+    figure = draw_trials_by_goal(records)
+    (axes,) = figure.axes
     (way,) = [line for line in axes.lines if line.get_linestyle() == "-"]
-    np.testing.assert_array_equal(way.get_xydata(), [[1, 2], [2, 2], [3, 1]])
-    assert [text.get_text() for text in axes.texts] == ["2", "2, not reached", "1"]
-    fills = [line.get_markerfacecolor() for line in axes.lines if line.get_marker() == "o"]
-    assert fills == [HIT, "white", HIT]
+    np.testing.assert_array_equal(way.get_xydata(), [[1, 2], [4, 1]])
+    assert [text.get_text() for text in axes.texts] == ["2", "2", "–", "1"]
+    assert [label.get_text() for label in axes.get_xticklabels()] == ["1", "4", "3", "7"]
+    marks = [line for line in axes.lines if line.get_marker() == "o"]
+    assert [line.get_markerfacecolor() for line in marks] == [HIT, "white", HIT]
+    (legend,) = figure.legends
+    assert "not reached yet" in [text.get_text() for text in legend.get_texts()]
+    assert draw_trials_by_goal([records[0], records[3]]).legends == []

@@ -14,7 +14,7 @@ from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.report import page, record_film, write_report
 from prior_reinforce.report.record import CheckRow
 from prior_reinforce.report.style import PICTURE_DPI
-from tests.report.swing_world import FullStep, adaptation, demonstrations, pictures
+from tests.report.swing_world import FullStep, adaptation, demonstrations, pictures, told
 
 FACTS = {
     "Seeds": "training 0, goals 1",
@@ -184,6 +184,28 @@ def test_a_goal_not_tried_yet_has_a_report(tmp_path):
     assert "N =" not in reader.words
 
 
+def test_goals_keep_their_numbers_and_only_what_shows_something_is_drawn(tmp_path):
+    records = [replace(told([0.05, 0.0]), number=3), replace(told(None), number=7)]
+    (tmp_path / "goal-2-errors.png").write_bytes(b"of an earlier report")
+    (tmp_path / "goal-2-photo.png").write_bytes(b"mine")
+    drawn = []
+    path = write_report(
+        tmp_path, records, title="x", note="No plan was given for goal 5.",
+        progress=lambda done, n: drawn.append((done, n)),
+    )  # fmt: skip
+    assert drawn == [(1, 2), (2, 2)]
+    words = read(path).words
+    assert "Goal 3" in words
+    assert "Goal 7 no trial that counts" in words
+    assert "No plan was given for goal 5." in words
+    names = {picture.name for picture in tmp_path.glob("goal-*.png")}
+    assert names == {
+        *(f"goal-3-{name}.png" for name in ("table", "landings", "aims", "errors", "plans")),
+        *(f"goal-7-{name}.png" for name in ("table", "aims", "plans")),
+        "goal-2-photo.png",
+    }
+
+
 def test_a_large_film_lies_beside_the_page(records, tmp_path, monkeypatch):
     monkeypatch.setattr(page, "LARGEST_INLINE_VIDEO", 10)
     reader = read(write_report(tmp_path, records[:1], title="large"))
@@ -197,6 +219,8 @@ def test_bad_input_is_named_and_writes_nothing(tmp_path):
         write_report(folder, [], title="none")
     with pytest.raises(ConfigurationError, match=r"region must have shape \(2, 2\)"):
         write_report(folder, [adaptation(adapter=FullStep(), most=1)], title="x", region=[1, 2])
+    with pytest.raises(ConfigurationError, match=r"two goals go by one number in \[2, 2\]"):
+        write_report(folder, [replace(told(), number=2), told()], title="x")
     assert not folder.exists()
 
 

@@ -110,3 +110,33 @@ def test_a_true_landing_beyond_what_was_seen_is_shown_and_a_lost_ball_moves_noth
     (plain,) = draw_close_up(told([-0.05, 0.0])).axes
     (far,) = draw_close_up(told([-0.05, 0.0], outcomes=(lost,))).axes
     assert far.get_ybound() == plain.get_ybound()
+
+
+def test_a_wild_landing_leaves_the_aims_as_large_as_they_were():
+    (calm,) = draw_close_up(told([0.02, 0.0]), aims=True).axes
+    (wild,) = draw_close_up(told([0.30, 0.0]), aims=True).axes
+    assert wild.get_ybound() == calm.get_ybound()
+    assert wild.get_ybound()[1] < 110
+    (landings,) = draw_close_up(told([0.30, 0.0])).axes
+    assert landings.get_ybound()[1] > 122
+
+
+def test_aims_have_a_legend_and_voided_ones_are_hollow():
+    figure = draw_close_up(told([0.05, 0.0], None, [0.0, 0.0]), aims=True)
+    marks = [line for line in figure.axes[0].lines if line.get_marker() == "s"]
+    assert [line.get_color() == "white" for line in marks] == [False, True, False]
+    (legend,) = figure.legends
+    assert [text.get_text() for text in legend.get_texts()] == [
+        "goal ± 1.5 cm",
+        "demonstrations",
+        "aims, first to last",
+        "aim that hit",
+        "voided",
+    ]
+
+
+@pytest.mark.parametrize("across", [0.0, 0.003, 0.006, 0.009, 0.012])
+def test_no_tick_is_cut_off_after_both_directions_have_one_scale(across):
+    figure = draw_close_up(told(None, goal=(1.4, across)), aims=True)
+    figure.draw_without_rendering()
+    assert figure.get_tightbbox().x1 <= figure.get_figwidth()

@@ -26,6 +26,26 @@ MISSED = record([0.05, 0.0], [0.03, 0.04])
 def test_voided_trials_are_not_counted():
     assert outcome_line(REACHED_IN_2) == "reached in 2 trials"
     assert outcome_line(MISSED) == "not reached in 2 trials"
+    assert outcome_line(record(None)) == "no trial that counts"
+    assert outcome_line(record()) == "not tried yet"
+
+
+@pytest.mark.parametrize(
+    ("stage", "said"),
+    [(Stage.ASKED, "executed"), (Stage.EXECUTING, "told"), (Stage.EXECUTED, "told")],
+)
+def test_a_goal_whose_only_trial_is_open_waits_for_it(stage, said):
+    trial = replace(MISSED.trials[0], number=8, stage=stage, reading=None)
+    assert outcome_line(replace(MISSED, trials=(trial,))) == f"trial 8 waits to be {said}"
+
+
+def test_what_went_wrong_with_an_execution_is_said_beside_what_was_seen():
+    why = {1: "but aborted: the command ended with status 1"}
+    (row,) = trial_rows(replace(record([0.05, 0.0]), warnings=why))
+    assert row.seen == "5 cm long; but aborted: the command ended with status 1"
+    trial = replace(MISSED.trials[0], stage=Stage.EXECUTED, reading=None)
+    (row,) = trial_rows(replace(MISSED, trials=(trial,), warnings=why))
+    assert row.seen == "executed, but aborted: the command ended with status 1"
 
 
 def test_the_headline_counts_as_the_paper_does():
@@ -38,6 +58,16 @@ def test_the_headline_admits_goals_that_were_not_reached():
     said = headline([REACHED_IN_2, MISSED])
     assert (said.text, said.count) == ("1 of 2 goals reached", "N = 6 + 2.0 trials")
     assert "leaves out the 1 goal that was not reached" in said.explanation
+
+
+def test_goals_with_no_trial_that_counts_are_named_and_not_counted():
+    said = headline([REACHED_IN_2, MISSED, record(None), replace(record(), number=9)])
+    assert (said.text, said.complete) == ("1 of 2 goals reached", False)
+    assert "then 2 trials to reach one goal" in said.explanation
+    assert "with no trial that counts: Goal 3, Goal 9." in said.explanation
+    assert headline([REACHED_IN_1, record(None)]).text == "1 of 1 goal reached"
+    assert headline([REACHED_IN_1, REACHED_IN_2]).complete
+    assert headline([record(None), record()]).text == "No goal tried yet"
 
 
 def test_one_goal_has_a_headline_of_its_own():
@@ -93,4 +123,5 @@ def test_goals_say_where_they_are_and_how_near_is_near_enough():
     mixed = adaptation(seed=1, units=("m", "s"), most=1)
     assert (say_goal(mixed), say_tolerance(mixed)) == ("distance 0.9 m, duration 0.1 s", "0.015")
     assert trial_rows(mixed)[0].aim == "distance 0.9 m, duration 0.1 s"
-    assert titles([MISSED, replace(MISSED, title="the far hoop")]) == ["Goal 1", "the far hoop"]
+    named = [MISSED, replace(MISSED, title="the far hoop"), replace(MISSED, number=7)]
+    assert titles(named) == ["Goal 1", "the far hoop", "Goal 7"]

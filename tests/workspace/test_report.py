@@ -37,6 +37,40 @@ def test_the_report_shows_every_goal_and_the_voided_trials(run, folder, tmp_path
     assert run("report", folder)[0] == 0
 
 
+def test_goals_are_called_what_status_calls_them_and_none_is_left_out_without_a_word(
+    run, folder, tmp_path
+):
+    run("goal", folder, "0.9", "0.05")
+    run("ask", folder)
+    run("tell", folder, 1, "--error", "3cm long")
+    run("goal", folder, "0.85", "0.05")
+    run("goal", folder, "0.95", "-0.05")
+    run("ask", folder)
+    assert run("report", folder)[0] == 0
+    page = (tmp_path / "planar" / "report" / "report.html").read_text()
+    for text in (
+        "0 of 1 goal reached",
+        "Left out, with no trial that counts: Goal 3.",
+        "No plan was given for goal 2.",
+        "trial 2 waits to be executed",
+        "<dd>by goal 3</dd>",  # goal 1 had no earlier trials
+    ):
+        assert text in page
+    names = {path.name for path in (tmp_path / "planar" / "report").glob("*-table.png")}
+    assert names == {"goal-1-table.png", "goal-3-table.png"}
+
+
+def test_an_aborted_execution_is_said_as_status_says_it(run, folder, tmp_path):
+    run("goal", folder, "0.9", "0.05")
+    said = run("ask", folder, "--yes", "--run", "false {plan}")
+    assert said[0] == 1
+    assert "executed, but aborted: the command ended" in run("status", folder)[1]
+    run("report", folder)
+    page = (tmp_path / "planar" / "report" / "report.html").read_text()
+    assert "executed, but aborted: the command ended" in page
+    assert "trial 1 waits to be told" in page
+
+
 def trial(number, **lines):
     """A trial whose gate said this of each check: its status and margin."""
     said = [

@@ -168,3 +168,14 @@ def fit_progress(console: Console) -> Iterator[Callable[[FitProgress], None]]:
 
         yield show
         progress.update(line, detail="done")
+
+
+@contextmanager
+def drawing_progress(console: Console) -> Iterator[Callable[[int, int], None]]:
+    """Show which goal of a report is being drawn; nothing where nobody watches."""
+    with console.status("drawing") as status:
+
+        def show(done: int, n: int) -> None:
+            status.update(f"drawing: {done} of {n} goals done")
+
+        yield show

@@ -8,8 +8,10 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import tyro
+from rich.console import Console
 
 from prior_reinforce.adapters import ADAPTERS, DEFAULT_ADAPTER
+from prior_reinforce.commands.live import drawing_progress
 from prior_reinforce.errors import (
     ConfigurationError,
     InvalidFeedbackError,
@@ -187,8 +189,8 @@ class Report:
         """Write it."""
         from prior_reinforce.workspace.report import report_workspace
 
-        with Workspace(self.folder) as workspace:
-            page = report_workspace(workspace, self.out or self.folder / "report")
+        with Workspace(self.folder) as workspace, drawing_progress(Console()) as progress:
+            page = report_workspace(workspace, self.out or self.folder / "report", progress)
         print(f"report: {page}")
 
 

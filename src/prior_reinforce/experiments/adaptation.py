@@ -113,7 +113,7 @@ def report_adaptation(
         tolerance = f"{task.tolerance * 100:g} cm"  # to the last digit, unlike an estimate
     records = [
         AdaptationRecord(
-            title=f"Goal {i}",
+            number=i,
             demonstrations=demonstrations,
             goal=result.goal,
             tolerance=task.tolerance,

@@ -7,8 +7,11 @@ from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
+from matplotlib.ticker import PercentFormatter
 
 from prior_reinforce.arrays import Point, Points
+from prior_reinforce.report.panels import axis_label
+from prior_reinforce.report.record import drawn_scale
 from prior_reinforce.report.style import (
     DEMONSTRATION,
     GOAL,
@@ -46,8 +49,12 @@ def draw_advice(
     Returns:
         The path.
     """
-    x, y = (np.unique(goals[:, j]) for j in range(2))
     names, units = outcome
+    scale = drawn_scale(units)
+    goals, demonstrated, throw, demonstration = (
+        scale * points for points in (goals, demonstrated, throw, demonstration)
+    )
+    x, y = (np.unique(goals[:, j]) for j in range(2))
     # As high as the region at this width, and what stands below it.
     height = 4.8 * np.ptp(x) / np.ptp(y) if units[0] == units[1] else 3.0
     figure = new_figure(6.4, 1.1 + float(np.clip(height, 1.5, 6.0)))
@@ -57,22 +64,23 @@ def draw_advice(
     shade = axes.pcolormesh(
         y, x, p_hit.reshape(len(x), len(y)), cmap="Greys", vmin=0.0, vmax=1.0, shading="gouraud"
     )
-    bar = figure.colorbar(shade, ax=axes)
-    bar.set_label("first throw hits", color=INK_SOFT)
+    bar = figure.colorbar(shade, cax=axes.inset_axes((1.04, 0, 0.035, 1)))  # as high as the panel
+    bar.set_label("probability that\na first throw hits", color=INK_SOFT)
+    bar.ax.yaxis.set_major_formatter(PercentFormatter(1.0))
     bar.ax.tick_params(labelsize=9, colors=INK_SOFT)
-    marks = (
-        (demonstrated, "o", DEMONSTRATION, "demonstrated"),
-        (throw[None], "*", GOAL, "throw that teaches most"),
-        (demonstration[None], "D", HIT, "demonstration that teaches most"),
+    marks = (  # the diamond fits into the star, for both are often at one place
+        (demonstrated, "o", 42, DEMONSTRATION, "demonstrated"),
+        (throw[None], "*", 260, GOAL, "throw that teaches most"),
+        (demonstration[None], "D", 26, HIT, "demonstration that teaches most"),
     )
-    for points, mark, colour, label in marks:
+    for points, mark, size, colour, label in marks:
         axes.scatter(
-            points[:, 1], points[:, 0], marker=mark, s=90 if mark == "*" else 42, color=colour,
-            edgecolors=INK, linewidths=0.8, label=label, zorder=3,
+            points[:, 1], points[:, 0], marker=mark, s=size, color=colour,
+            edgecolors=INK, linewidths=0.8, label=label, zorder=3, clip_on=False,
         )  # fmt: skip
     axes.invert_xaxis()
-    axes.set_xlabel(f"{names[1]} [{units[1]}]")
-    axes.set_ylabel(f"{names[0]} [{units[0]}]")
+    axes.set_xlabel(axis_label(names, units, 1, mirrored=True))
+    axes.set_ylabel(axis_label(names, units, 0))
     if units[0] == units[1]:
         axes.set_aspect("equal")
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=3, frameon=False, fontsize=8)

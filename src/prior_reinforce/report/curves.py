@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 
-from prior_reinforce.arrays import Frames
-from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.report.record import AdaptationRecord
 from prior_reinforce.report.style import (
     DEMONSTRATION,
@@ -24,38 +25,58 @@ from prior_reinforce.report.style import (
     new_figure,
     trial_colour,
 )
-from prior_reinforce.report.summary import say_tolerance
-from prior_reinforce.trials import Stage
+from prior_reinforce.report.summary import numbers, say_tolerance
+from prior_reinforce.trials import Stage, Trial
 from prior_reinforce.wording import say_length
 
 _COLUMNS = 4
 _LEAST_TRIALS = 3  # that the error's axis has room for
 _LEAST_SHARE = 0.02
 """Ours: a joint that moves less than this share of what moves most is drawn as nearly at rest."""
+_SHOWN: Any = {"label": "demonstrations", "color": DEMONSTRATION, "alpha": 0.45, "linewidth": 1}
+
+_Plan = Float[np.ndarray, "_ D"]
+"""A plan of any horizon, or no frames of one."""
 
 
 @drawing()
 def draw_trials_by_goal(records: Sequence[AdaptationRecord]) -> Figure:
-    """Draw how many trials each goal took, one goal after another; hollow where none hit."""
+    """Draw how many trials each goal took, one goal after another.
+
+    A line joins the goals that were reached; what one took that was not is no number to compare.
+    """
     figure = new_figure(5.4, 2.2)
     axes = figure.subplots()
     calm_axes(axes)
     axes.grid(visible=False, axis="x")
-    places = range(1, len(records) + 1)
+    marks: Any = {"linestyle": "", "marker": "o", "markersize": 9, "markeredgecolor": HIT}
+    legend: dict[str, Line2D] = {}
+    reached: dict[int, int] = {}
     counts = [record.trials_to_hit or len(record.told) for record in records]
-    axes.plot(places, counts, "-", color=DEMONSTRATION, linewidth=1.5, zorder=3)
-    for place, count, record in zip(places, counts, records, strict=True):
+    for place, (record, count) in enumerate(zip(records, counts, strict=True), start=1):
+        if not count:
+            _write(axes, "–", (place, 0), (0, 4), ha="center")
+            legend["no trial that counts"] = Line2D([], [], ls="", marker="_", color=INK_SOFT)
+            continue
         hit = record.trials_to_hit is not None
-        fill: Any = {"markerfacecolor": HIT if hit else "white", "markeredgecolor": HIT}
-        axes.plot(place, count, "o", markersize=9, clip_on=False, zorder=5, **fill)
-        said = str(count) if hit else f"{count}, not reached"
-        _write(axes, said, (place, count), (0, 8), color=INK, ha="center")
+        if hit:
+            reached[place] = count
+        (mark,) = axes.plot(
+            place, count, markerfacecolor=HIT if hit else "white", clip_on=False, zorder=5, **marks
+        )
+        legend["reached" if hit else "not reached yet"] = mark
+        _write(axes, str(count), (place, count), (0, 8), color=INK, ha="center", zorder=6)
+    axes.plot(
+        list(reached), list(reached.values()), "-", color=DEMONSTRATION, linewidth=1.5, zorder=3
+    )
     axes.set_ylim(0, 1.35 * max([2, *counts]))
     axes.set_xlim(0.5, len(records) + 0.5)
-    axes.set_xticks(places, [str(place) for place in places])
+    axes.set_xticks(range(1, len(records) + 1), [str(number) for number in numbers(records)])
     axes.yaxis.set_major_locator(MaxNLocator(5, integer=True))
     axes.set_xlabel("goal, in order")
     axes.set_ylabel("trials")
+    if len(reached) < len(records):
+        _legend_above(figure, legend)
     return figure
 
 
@@ -75,22 +96,22 @@ def draw_errors(record: AdaptationRecord) -> Figure:
         if truth is not None:
             true[x] = record.distance(truth - record.goal) * record.scale
         if trial.error_seen is None:
-            _write(axes, trial.stage.value, (x, tolerance), (0, 12), rotation=90, ha="center")
+            _write(axes, trial.stage.value, (x, tolerance), (0, 8), rotation=90, ha="center")
             continue
         off = record.distance(trial.error_seen)
         seen[x] = off * record.scale
         colour = trial_colour(x - 1, n, hit=trial.hit)
         axes.plot(x, seen[x], "o", color=colour, markersize=10, clip_on=False, zorder=5)
         said = say_length(off, record.demonstrations.outcome_units)
-        _write(axes, said, (x, seen[x]), (9, 7), color=INK)
+        _write(axes, said, (x, seen[x]), (9, 7), color=INK, zorder=6)
     axes.plot(list(seen), list(seen.values()), "-", color=DEMONSTRATION, linewidth=1.5, zorder=3)
     if true:
         hollow: Any = {"markersize": 6, "markerfacecolor": "white", "markeredgecolor": INK_SOFT}
         axes.plot(list(true), list(true.values()), "o", **hollow, zorder=4, label="true error")
         axes.legend(frameon=False, fontsize=9, labelcolor=INK_SOFT, loc="upper right")
     room = max(n, _LEAST_TRIALS)
-    reached = f"reached: within {say_tolerance(record)}"
-    _write(axes, reached, (room + 0.68, tolerance), (0, 2), color=GOAL, ha="right")
+    reached = f"shaded: reached, within {say_tolerance(record)}"
+    axes.set_title(reached, loc="right", fontsize=9.5, color=GOAL)
     axes.set_ylim(0, 1.18 * max([2.5 * tolerance, *seen.values(), *true.values()]))
     axes.set_xlim(0.5, room + 0.7)
     axes.set_xticks(range(1, n + 1), [str(trial.number) for trial in record.trials])
@@ -101,59 +122,96 @@ def draw_errors(record: AdaptationRecord) -> Figure:
 
 @drawing()
 def draw_plans(record: AdaptationRecord) -> Figure:
-    """Draw the plans of all trials, one panel an action dimension, demonstrations behind."""
-    plan_format, d = record.demonstrations.format, record.demonstrations.action_dim
+    """Draw the plans of all trials, one panel an action dimension, demonstrations behind.
+
+    Trials move a plan by less than a line's width, so a second panel below each shows by how much
+    it differs from the first plan.
+    """
+    form, d = record.demonstrations.format, record.demonstrations.action_dim
+    shown = record.demonstrations.plans
+    plans = [np.empty((0, d)) if t.plan is None else t.plan for t in record.trials]
+    styles = [_trial_style(record, i) for i in range(len(plans))]
+    first, differences = _differences(record.trials, plans)
     columns = min(_COLUMNS, d)
     rows = -(-d // columns)
-    figure = new_figure(max(2.75 * columns, 5.4), 1.9 * rows + 0.45)
-    panels = figure.subplots(rows, columns, squeeze=False, sharex=True).ravel()
-    lines: list[tuple[str, Frames, dict[str, Any]]] = [
-        ("demonstrations", plan, {"color": DEMONSTRATION, "alpha": 0.45, "linewidth": 1})
-        for plan in record.demonstrations.plans
-    ]
-    for i, trial in enumerate(record.trials):
-        style = {
-            "color": trial_colour(i, len(record.trials), hit=trial.hit),
-            "linewidth": 1.7,
-            "linestyle": "--" if trial.stage is Stage.VOIDED else "-",
-        }
-        plan = np.empty((0, d)) if trial.plan is None else trial.plan
-        lines.append((f"trial {trial.number}" + (" (hit)" if trial.hit else ""), plan, style))
-    for j, axes in enumerate(panels):
+    heights = [1.9, 1.3] if differences else [1.9]
+    figure = new_figure(max(2.75 * columns, 5.4), sum(heights) * rows + 0.45)
+    panels = figure.subplots(
+        rows * len(heights), columns, squeeze=False, sharex=True, height_ratios=heights * rows
+    )
+    for j in range(columns * rows):
+        row, column = len(heights) * (j // columns), j % columns
+        panel, *below = panels[row : row + len(heights), column]
+        for axes in (panel, *below):
+            calm_axes(axes)
+            axes.tick_params(labelsize=8.5)
+            if j >= d:
+                axes.set_axis_off()
         if j >= d:
-            axes.set_axis_off()
             continue
-        calm_axes(axes)
-        axes.tick_params(labelsize=8.5)
-        for label, plan, style in lines:
-            axes.plot(np.arange(len(plan)) * plan_format.dt, plan[:, j], label=label, **style)
-        _widen(axes, record.demonstrations, j)
-        title = f"{plan_format.names[j]} [{plan_format.units[j]}]"
-        axes.set_title(title, loc="left", fontsize=9.5, color=INK)
+        for plan, style in zip((*shown, *plans), (*[_SHOWN] * len(shown), *styles), strict=True):
+            panel.plot(np.arange(len(plan)) * form.dt, plan[:, j], **style)
+        _widen(panel, shown, form.units, j)
+        panel.set_title(f"{form.names[j]} [{form.units[j]}]", loc="left", fontsize=9.5, color=INK)
+        for axes in below:
+            scale, unit = (1000, "mrad") if form.units[j] == "rad" else (1, form.units[j])
+            for off, style in zip(differences, styles, strict=True):
+                axes.plot(np.arange(len(off)) * form.dt, scale * off[:, j], **style)
+            compared = np.stack([off for off in differences if len(off)])
+            _widen(axes, scale * compared, form.units, j)
+            title = f"minus trial {first} [{unit}]"
+            axes.set_title(title, loc="left", fontsize=8.5, color=INK_SOFT)
         if j + columns >= d:
-            axes.tick_params(labelbottom=True)
-            axes.set_xlabel("time [s]", fontsize=9)
-    handles, labels = panels[0].get_legend_handles_labels()
-    keys = dict(zip(labels, handles, strict=True))
+            lowest = below[-1] if below else panel
+            lowest.tick_params(labelbottom=True)
+            lowest.set_xlabel("time [s]", fontsize=9)
+    handles, labels = panels[0, 0].get_legend_handles_labels()
+    _legend_above(figure, dict(zip(labels, handles, strict=True)), ncols=max(3, 2 * columns))
+    return figure
+
+
+def _differences(trials: Sequence[Trial], plans: Sequence[_Plan]) -> tuple[int, list[_Plan]]:
+    """The first trial with a plan, and by how much each plan differs from its plan.
+
+    No frames where a plan cannot be compared; an empty list where nothing can.
+    """
+    first = next((i for i, plan in enumerate(plans) if len(plan)), 0)
+    alike = [len(plan) > 0 and plan.shape == plans[first].shape for plan in plans]
+    if sum(alike) < 2:
+        return 0, []
+    return trials[first].number, [
+        plan - plans[first] if same else plan[:0] for plan, same in zip(plans, alike, strict=True)
+    ]
+
+
+def _trial_style(record: AdaptationRecord, i: int) -> dict[str, Any]:
+    trial = record.trials[i]
+    return {
+        "label": f"trial {trial.number}" + (" (hit)" if trial.hit else ""),
+        "color": trial_colour(i, len(record.trials), hit=trial.hit),
+        "linewidth": 1.7,
+        "linestyle": "--" if trial.stage is Stage.VOIDED else "-",
+    }
+
+
+def _legend_above(figure: Figure, legend: Mapping[str, Any], ncols: int = 3) -> None:
     figure.legend(
-        list(keys.values()),
-        list(keys),
+        list(legend.values()),
+        list(legend),
         loc="outside upper left",
-        ncols=max(3, 2 * columns),
+        ncols=ncols,
         frameon=False,
         fontsize=9,
         labelcolor=INK_SOFT,
         handlelength=1.6,
         columnspacing=1.4,
     )
-    return figure
 
 
-def _widen(axes: Axes, demonstrations: Demonstrations, j: int) -> None:
+def _widen(axes: Axes, drawn: Float[np.ndarray, "n H D"], units: Sequence[str], j: int) -> None:
     """Leave room around a joint that hardly moves, so that a sensor's noise does not look wild."""
-    units = np.array(demonstrations.format.units)
-    spans = np.ptp(demonstrations.plans, axis=(0, 1))
-    least = _LEAST_SHARE * spans[units == units[j]].max()
+    spans = np.ptp(drawn, axis=(0, 1))
+    least = _LEAST_SHARE * spans[np.array(units) == units[j]].max()
     low, high = axes.get_ylim()
     if high - low < least:
         axes.set_ylim((low + high - least) / 2, (low + high + least) / 2)
@@ -168,4 +226,5 @@ def _write(
     **more: Any,
 ) -> None:
     points: Any = {"textcoords": "offset points", "fontsize": 9.5, "va": "bottom"}
-    axes.annotate(text, place, offset, color=color, **points, **more)
+    over_lines = [withStroke(linewidth=2.5, foreground="white")]
+    axes.annotate(text, place, offset, color=color, path_effects=over_lines, **points, **more)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +17,7 @@ from prior_reinforce.report.html import data_uri, render
 from prior_reinforce.report.record import AdaptationRecord, Box
 from prior_reinforce.report.summary import (
     headline,
+    numbers,
     outcome_line,
     say_goal,
     say_tolerance,
@@ -31,6 +32,9 @@ if TYPE_CHECKING:
 LARGEST_INLINE_VIDEO = 3_000_000
 """[bytes]; a larger film lies beside the page instead of inside it, so that the page opens fast."""
 
+_PICTURES = ("table", "landings", "aims", "errors", "plans")
+"""Of a goal, `goal-3-table.png`; those that show something are drawn."""
+
 
 def write_report(
     folder: str | os.PathLike[str],
@@ -39,8 +43,12 @@ def write_report(
     title: str,
     facts: Mapping[str, str] | None = None,
     region: ArrayLike | None = None,
+    note: str = "",
+    progress: Callable[[int, int], None] | None = None,
 ) -> Path:
     """Write `report.html`, whole in one file, and its pictures as PNGs beside it.
+
+    Pictures of goals that an earlier report left there and this one has not are removed.
 
     Args:
         folder: Where to write; made if need be. A film elsewhere is copied here when it is too
@@ -49,12 +57,14 @@ def write_report(
         title: Of the page.
         facts: What made these results: generator with its remarks, adapter, perception, seeds.
         region: Region of goals, lower and upper corner, shape (2, k).
+        note: What else is to be said under the headline.
+        progress: Called with the number of goals drawn, and of all, after each.
 
     Returns:
         Path of the page.
 
     Raises:
-        ConfigurationError: No adaptations, or a region of wrong shape.
+        ConfigurationError: No adaptations, two of one number, or a region of wrong shape.
     """
     from prior_reinforce.report.curves import draw_trials_by_goal
     from prior_reinforce.report.pictures import draw_table
@@ -68,9 +78,20 @@ def write_report(
                 f"region must have shape (2, {record.goal.size}), lower and upper corner, got "
                 f"{box.shape}"
             )
+    if len(set(numbers(adaptations))) < len(adaptations):
+        raise ConfigurationError(
+            f"two goals go by one number in {numbers(adaptations)}; number all or none"
+        )
     folder = Path(folder)
     first = adaptations[0].demonstrations
     one_table = len(adaptations) > 1 and all(r.demonstrations is first for r in adaptations)
+    sections = []
+    for number, called, record in zip(
+        numbers(adaptations), titles(adaptations), adaptations, strict=True
+    ):
+        sections.append(_section(folder, record, f"goal-{number}", called, box))
+        if progress is not None:
+            progress(len(sections), len(adaptations))
     page = render(
         "page.html",
         title=title,
@@ -81,16 +102,17 @@ def write_report(
         by_goal=_picture(draw_trials_by_goal(adaptations), folder / "trials-by-goal.png")
         if len(adaptations) > 1
         else None,
-        sections=[
-            _section(folder, record, f"goal-{number}", called, box)
-            for number, (record, called) in enumerate(
-                zip(adaptations, titles(adaptations), strict=True), start=1
-            )
-        ],
+        sections=sections,
+        note=note,
         from_behind=first.outcome_dim > 1 and in_words(first.outcome_units),
         any_truth=any(_knows_truth(record) for record in adaptations),
         facts=dict(facts or {}),
     )
+    drawn = {f"{s['anchor']}-{name}.png" for s in sections for name in s["pictures"]}
+    for name in _PICTURES:
+        for old in folder.glob(f"goal-*-{name}.png"):
+            if old.name not in drawn:
+                old.unlink(missing_ok=True)
     return write(folder / "report.html", page)
 
 
@@ -103,13 +125,11 @@ def _section(
     from prior_reinforce.report.style import trial_colour
 
     n = len(record.trials)
-    figures = {
-        "table": draw_table([record], region),
-        "landings": draw_close_up(record),
-        "aims": draw_close_up(record, aims=True),
-        "errors": draw_errors(record),
-        "plans": draw_plans(record),
-    }
+    figures = {"table": draw_table([record], region)}
+    if record.told:
+        figures |= {"landings": draw_close_up(record), "errors": draw_errors(record)}
+    if record.trials:
+        figures |= {"aims": draw_close_up(record, aims=True), "plans": draw_plans(record)}
     return {
         "anchor": stem,
         "title": title,
@@ -125,7 +145,7 @@ def _section(
         "strip": record.film and data_uri(record.film.strip),
         "video": record.film and _video(folder, record.film.video),
         "film_caption": record.film_caption,
-        **{
+        "pictures": {
             name: _picture(figure, folder / f"{stem}-{name}.png")
             for name, figure in figures.items()
         },

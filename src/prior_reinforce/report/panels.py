@@ -16,7 +16,7 @@ from matplotlib.ticker import MaxNLocator
 
 from prior_reinforce.arrays import Point
 from prior_reinforce.report.badges import draw_badges
-from prior_reinforce.report.record import AdaptationRecord, Box
+from prior_reinforce.report.record import AdaptationRecord, Box, drawn_scale
 from prior_reinforce.report.style import (
     DEMONSTRATION,
     GOAL,
@@ -27,6 +27,7 @@ from prior_reinforce.report.style import (
     trial_colour,
 )
 from prior_reinforce.report.summary import titles
+from prior_reinforce.trials import Stage
 from prior_reinforce.wording import WORDS, in_words
 
 _Place = Float[np.ndarray, "2"]
@@ -52,6 +53,17 @@ def views_of(units: Sequence[str]) -> list[View]:
         return [View(i, i + 1) for i in range(len(units) - 1)]
     above = View(1, 0, mirrored=True, title="from above")
     return [above] if len(units) == 2 else [above, View(0, 2, title="from the side")]
+
+
+def axis_label(
+    names: Sequence[str], units: Sequence[str], component: int, *, mirrored: bool = False
+) -> str:
+    """Say what an axis shows, and in words what lies at its ends."""
+    label = f"{names[component]} [{'cm' if drawn_scale(units) == 100 else units[component]}]"
+    if not in_words(units):
+        return label
+    low, high = WORDS[component][:: 1 if mirrored else -1]
+    return f"← {low}      {label}      {high} →"
 
 
 class Panel:
@@ -97,6 +109,19 @@ class Panel:
         across, up = (left + right) / 2, (low + high) / 2
         axes.set_xbound(across - half * box.width, across + half * box.width)
         axes.set_ybound(up - half * box.height, up + half * box.height)
+        self._drop_ticks_beyond_the_paper()
+
+    def _drop_ticks_beyond_the_paper(self) -> None:
+        """Leave out the ticks whose labels other limits put over the figure's edge."""
+        axes, (low, high) = self._axes, self._axes.get_xbound()
+        edge = axes.figure.bbox.x1
+        axes.set_xticks(
+            [
+                tick
+                for tick, label in zip(axes.get_xticks(), axes.get_xticklabels(), strict=True)
+                if low <= tick <= high and label.get_window_extent().x1 <= edge
+            ]
+        )
 
     def draw_region(self, region: Box) -> None:
         """Shade the region of goals."""
@@ -139,7 +164,8 @@ class Panel:
 
         Args:
             record: The goal and its trials.
-            aims: Draw where they were aimed instead, each with an arrow from the aim before.
+            aims: Draw where they were aimed instead, each with an arrow from the aim before;
+                hollow where a trial was voided.
             numbered: Number the trials; on a line, give each a row.
             with_truth: Draw where they truly landed, too, as far as that is known.
         """
@@ -159,7 +185,10 @@ class Panel:
                 start = places[-1] if places else place
             if start is not place:
                 self._draw_arrow(start, place, colour, dashed=aims)
-            self._mark(place, "s" if aims else "o", colour, zorder=6)
+            if aims and trial.stage is Stage.VOIDED:
+                self._mark(place, "s", "white", edge=colour, zorder=6)
+            else:
+                self._mark(place, "s" if aims else "o", colour, zorder=6)
             truth = record.true_outcomes[i]
             if with_truth and truth is not None:
                 true_places.append(self._place(truth, row))
@@ -195,13 +224,9 @@ class Panel:
         return np.array([drawn[view.across], -row if view.up is None else drawn[view.up]])
 
     def _axis_label(self, component: int) -> str:
-        demonstrations = self._record.demonstrations
-        label = f"{demonstrations.outcome_names[component]} [{self._record.unit(component)}]"
-        if not in_words(demonstrations.outcome_units):
-            return label
+        shown = self._record.demonstrations
         mirrored = self._view.mirrored and component == self._view.across
-        low, high = WORDS[component][:: 1 if mirrored else -1]
-        return f"← {low}      {label}      {high} →"
+        return axis_label(shown.outcome_names, shown.outcome_units, component, mirrored=mirrored)
 
     def _mark(
         self, place: _Place, marker: str, colour: str, *, edge: str = "white", zorder: int

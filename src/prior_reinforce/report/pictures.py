@@ -26,6 +26,7 @@ from prior_reinforce.report.style import (
     trial_colour,
 )
 from prior_reinforce.report.summary import say_tolerance
+from prior_reinforce.trials import Stage
 
 _WIDTH, _HEIGHT = 5.4, 4.5  # [inch], one of two beside each other on a page
 _LABELS = (0.7, 0.72)  # [inch], what labels take of a panel's width and height
@@ -52,7 +53,9 @@ def draw_table(records: Sequence[AdaptationRecord], region: Box | None = None) -
     for record in records:
         seen += [record.goal, *(point for point in record.landings if point is not None)]
     n_rows = 1 + len(first.trials) if single else 2
-    figure, panels = _panels(first, seen, margin=0.06, least=4, n_rows=n_rows, legend=legend)
+    figure, panels = _panels(
+        first, seen, margin=0.06, least=4, n_rows=n_rows, legend=legend, flat=True
+    )
     for panel in panels:
         if region is not None:
             panel.draw_region(region)
@@ -67,12 +70,14 @@ def draw_table(records: Sequence[AdaptationRecord], region: Box | None = None) -
 
 @drawing()
 def draw_close_up(record: AdaptationRecord, *, aims: bool = False) -> Figure:
-    """Draw where each trial was seen to land, or, on the same scale, where it was aimed."""
-    seen = [record.goal, *(point for point in record.landings if point is not None)]
-    seen += [trial.condition for trial in record.trials]
-    seen += _near(np.stack(seen), record.true_outcomes)
+    """Draw where each trial was seen to land, or where it was aimed."""
+    seen = [record.goal, *(trial.condition for trial in record.trials)]
+    if not aims:  # one wild landing would squeeze all aims together
+        seen += [point for point in record.landings if point is not None]
+        seen += _near(np.stack(seen), record.true_outcomes)
     n_rows = 1 + len(record.trials)
-    figure, panels = _panels(record, seen, margin=0.14, least=3, n_rows=n_rows)
+    legend = _legend_of_aims(record) if aims else None
+    figure, panels = _panels(record, seen, margin=0.14, least=3, n_rows=n_rows, legend=legend)
     for panel in panels:
         panel.draw_demonstrations()
         panel.draw_goal(record)
@@ -94,6 +99,7 @@ def _panels(
     least: float,
     n_rows: int,
     legend: Mapping[str, Any] | None = None,
+    flat: bool = False,
 ) -> tuple[Figure, list[Panel]]:
     """Make a figure with one panel a view, laid out and ready to be drawn in.
 
@@ -103,7 +109,8 @@ def _panels(
         margin: Share of its size that is left free on each side.
         least: Least half size, in tolerances.
         n_rows: Rows of a line.
-        legend: Marks by what they mean; with them, the figure is only as high as what is seen.
+        legend: Marks by what they mean.
+        flat: Make the figure only as high as what is seen.
     """
     views = views_of(record.demonstrations.outcome_units)
     points = np.stack(seen) * record.scale
@@ -114,7 +121,7 @@ def _panels(
     wanted = _HEIGHT
     if views[0].up is None:
         wanted = _ROW * (n_rows + 1)
-    elif legend and record.unit():
+    elif flat and record.unit():
         wanted = (_WIDTH - _LABELS[0]) * max(half[view.up] / half[view.across] for view in views)
     height = np.clip(wanted, _LEAST_HEIGHT, _HEIGHT - around) + around
     figure = new_figure(_WIDTH * len(views), height)
@@ -141,15 +148,29 @@ def _panels(
     return figure, panels
 
 
+def _mark(colour: str, marker: str = "o", **more: Any) -> Line2D:
+    return Line2D([], [], linestyle="", marker=marker, markersize=5, color=colour, **more)
+
+
 def _legend(record: AdaptationRecord) -> dict[str, Any]:
     """Marks by what they mean; a tuple of marks stands side by side."""
-
-    def mark(colour: str, marker: str = "o", **more: Any) -> Line2D:
-        return Line2D([], [], linestyle="", marker=marker, markersize=5, color=colour, **more)
-
     return {
-        f"goal ± {say_tolerance(record)}": mark(GOAL, markerfacecolor="none"),
-        "demonstrations": mark(DEMONSTRATION, "D"),
-        "misses, first to last": tuple(mark(trial_colour(i, 3)) for i in range(3)),
-        "hits": mark(HIT),
+        f"goal ± {say_tolerance(record)}": _mark(GOAL, markerfacecolor="none"),
+        "demonstrations": _mark(DEMONSTRATION, "D"),
+        "misses, first to last": tuple(_mark(trial_colour(i, 3)) for i in range(3)),
+        "hits": _mark(HIT),
     }
+
+
+def _legend_of_aims(record: AdaptationRecord) -> dict[str, Any]:
+    """The same for aims, hits and voided ones where there are any."""
+    legend = {
+        f"goal ± {say_tolerance(record)}": _mark(GOAL, markerfacecolor="none"),
+        "demonstrations": _mark(DEMONSTRATION, "D"),
+        "aims, first to last": tuple(_mark(trial_colour(i, 3), "s") for i in range(3)),
+    }
+    if record.trials_to_hit is not None:
+        legend["aim that hit"] = _mark(HIT, "s")
+    if any(trial.stage is Stage.VOIDED for trial in record.trials):
+        legend["voided"] = _mark(trial_colour(2, 3), "s", markerfacecolor="white")
+    return legend

@@ -8,7 +8,8 @@ Notation (docs/notation.md):
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
@@ -23,6 +24,11 @@ from prior_reinforce.trials import Goal, Stage, Trial
 
 Box = Float[np.ndarray, "2 k"]
 """Lower and upper corner of a region of outcomes."""
+
+
+def drawn_scale(units: Sequence[str]) -> float:
+    """Number that turns outcomes of these units into what is drawn: metres become centimetres."""
+    return 100.0 if set(units) == {"m"} else 1.0
 
 
 @dataclass(frozen=True)
@@ -62,7 +68,11 @@ class AdaptationRecord:
     trials: tuple[Trial, ...]
     """All trials in order, voided and open ones too; one without a plan is not drawn over time."""
     title: str = ""
-    """What to call this goal; `Goal 1`, `Goal 2`, ... where empty."""
+    """What to call this goal; `Goal` and its number where empty."""
+    number: int | None = None
+    """What number it goes by; its place in the report where None."""
+    warnings: Mapping[int, str] = field(default_factory=dict)
+    """Why what was seen of a trial might mislead, by the trial's number: `but aborted: ...`."""
     outcomes: tuple[Point | None, ...] | None = None
     """True outcome of each trial where known; None as a whole on a real arm."""
     checks: tuple[CheckRow, ...] = ()
@@ -132,7 +142,7 @@ class AdaptationRecord:
     @property
     def scale(self) -> float:
         """Number that turns the outcomes' unit into the one drawn: metres become centimetres."""
-        return 100.0 if set(self.demonstrations.outcome_units) == {"m"} else 1.0
+        return drawn_scale(self.demonstrations.outcome_units)
 
     def unit(self, *components: int) -> str:
         """Unit drawn for some components, or for distances over all; empty where they differ."""

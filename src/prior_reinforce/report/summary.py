@@ -43,54 +43,78 @@ class Headline:
     count: str
     """For instance `N = 6 + 2.2 trials`; empty while no goal is reached."""
     explanation: str
+    complete: bool = True
+    """Whether the count is of every goal that was tried."""
 
 
 def headline(records: Sequence[AdaptationRecord]) -> Headline:
-    """Say how many goals were reached, and at what cost.
+    """Say how many goals were reached, of those with a trial that counts, and at what cost.
 
     N counts demonstrations plus the mean of the Stage-2 trials until each goal was first reached
     (paper, Evaluation Protocol), over the goals that were reached.
     """
     several = len(records) > 1
-    counts = [c for c in (record.trials_to_hit for record in records) if c is not None]
+    tried = [record for record in records if record.told]
+    counts = [c for c in (record.trials_to_hit for record in tried) if c is not None]
     text = "Goal reached" if counts else "Goal not reached yet"
-    if several:
-        text = f"{len(counts)} of {len(records)} goals reached"
+    if several and not tried:
+        text = "No goal tried yet"
+    elif several:
+        text = f"{len(counts)} of {_count(len(tried), 'goal')} reached"
     tolerances = dict.fromkeys(say_tolerance(record) for record in records)
     within = f"A goal counts as reached within {' or '.join(tolerances)}."
+    named = zip(titles(records), records, strict=True)
+    untried = [title for title, record in named if not record.told]
+    if several and untried:
+        within += f" Left out, with no trial that counts: {', '.join(untried)}."
     if not counts:
-        tried = sum(len(record.told) for record in records)
-        return Headline(text, "", f"{_trials(tried)} so far. {within}")
+        so_far = _count(sum(len(record.told) for record in records), "trial")
+        return Headline(text, "", f"{so_far} so far. {within}")
     demonstrated = {record.demonstrations.n for record in records}
     if len(demonstrated) > 1:
         return Headline(text, "", within)
     n, mean = demonstrated.pop(), float(np.mean(counts))
     count = f"N = {n} + {mean:.1f} trials" if several else f"N = {n} + {counts[0]} trials"
     if not several:
-        spent = f"{_trials(counts[0])} on the arm to reach the goal"
+        spent = f"{_count(counts[0], 'trial')} on the arm to reach the goal"
+    elif len(counts) == 1:
+        spent = f"{_count(counts[0], 'trial')} to reach one goal"
     elif min(counts) == max(counts):
-        spent = f"{_trials(counts[0])} to reach each goal"
+        spent = f"{_count(counts[0], 'trial')} to reach each goal"
     else:
         spent = f"{mean:.1f} trials on average to reach a goal, from {min(counts)} to {max(counts)}"
-    missing = len(records) - len(counts)
+    missing = len(tried) - len(counts)
     left_out = ""
     if missing:
         goals = "goal that was" if missing == 1 else "goals that were"
-        left_out = f" This mean leaves out the {missing} {goals} not reached."
-    return Headline(text, count, f"{n} demonstrations, then {spent}.{left_out} {within}")
+        left_out = f" This leaves out the {missing} {goals} not reached."
+    explanation = f"{n} demonstrations, then {spent}.{left_out} {within}"
+    return Headline(text, count, explanation, complete=not missing)
+
+
+def numbers(records: Sequence[AdaptationRecord]) -> list[int]:
+    """The numbers that the goals go by."""
+    return [record.number or place for place, record in enumerate(records, start=1)]
 
 
 def titles(records: Sequence[AdaptationRecord]) -> list[str]:
     """What the goals are called."""
-    return [record.title or f"Goal {number}" for number, record in enumerate(records, start=1)]
+    named = zip(numbers(records), records, strict=True)
+    return [record.title or f"Goal {number}" for number, record in named]
 
 
 def outcome_line(record: AdaptationRecord) -> str:
     """Say in one line how it went for one goal."""
     count = record.trials_to_hit
     if count is not None:
-        return f"reached in {_trials(count)}"
-    return f"not reached in {_trials(len(record.told))}" if record.told else "not tried yet"
+        return f"reached in {_count(count, 'trial')}"
+    if record.told:
+        return f"not reached in {_count(len(record.told), 'trial')}"
+    waiting = [trial for trial in record.trials if trial.open]
+    if waiting:
+        asked = waiting[-1].stage is Stage.ASKED
+        return f"trial {waiting[-1].number} waits to be {'executed' if asked else 'told'}"
+    return "no trial that counts" if record.trials else "not tried yet"
 
 
 def trial_rows(record: AdaptationRecord) -> list[TrialRow]:
@@ -120,6 +144,8 @@ def _row(record: AdaptationRecord, i: int, trial: Trial) -> TrialRow:
             seen += f": {trial.note}" if trial.note else ""
         else:
             seen, state, result = _OPEN[trial.stage], "open", "open"
+            if trial.number in record.warnings:
+                seen = f"{trial.stage.value}, {record.warnings[trial.number]}"
         return TrialRow(trial.number, state, aim, seen, "–", "", result)
     truth = record.true_outcomes[i]
     truly_off = None if truth is None else record.distance(truth - record.goal)
@@ -130,12 +156,19 @@ def _row(record: AdaptationRecord, i: int, trial: Trial) -> TrialRow:
         trial.number,
         state=result,
         aim=aim,
-        seen=say_error(trial.error_seen, names, units),
+        seen="; ".join(
+            part
+            for part in (
+                say_error(trial.error_seen, names, units),
+                record.warnings.get(trial.number),
+            )
+            if part
+        ),
         off=say_length(record.distance(trial.error_seen), units),
         truly_off="" if truly_off is None else say_length(truly_off, units),
         result=f"taken for a {result}" if disagrees else result,
     )
 
 
-def _trials(n: int) -> str:
-    return "1 trial" if n == 1 else f"{n} trials"
+def _count(n: int, what: str) -> str:
+    return f"{n} {what}" if n == 1 else f"{n} {what}s"

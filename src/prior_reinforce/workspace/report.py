@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
@@ -16,15 +16,19 @@ from prior_reinforce.report import AdaptationRecord, write_report
 from prior_reinforce.report.record import CheckRow
 from prior_reinforce.session import Session
 from prior_reinforce.trials import Goal, Trial
+from prior_reinforce.workspace.status import execution_warning
 from prior_reinforce.workspace.workspace import Workspace
 
 
-def report_workspace(workspace: Workspace, folder: Path) -> Path:
+def report_workspace(
+    workspace: Workspace, folder: Path, progress: Callable[[int, int], None] | None = None
+) -> Path:
     """Write the page and its pictures.
 
     Args:
         workspace: With a goal that a trial was asked for.
         folder: Where to write; made if need be.
+        progress: See `write_report`.
 
     Returns:
         Path of the page.
@@ -49,10 +53,8 @@ def report_workspace(workspace: Workspace, folder: Path) -> Path:
         "Model": ", ".join(dict.fromkeys(models)),
         "Adapter": ", ".join(dict.fromkeys(goal.adapter for goal in goals)),
         "Robot": "none, no limits checked" if robot is None else robot.robot,
-        "Earlier goals' trials used": ", ".join(
-            f"goal {goal.number}" for goal in goals if goal.carry_over
-        )
-        or "by no goal",
+        "Earlier goals' trials used": "by "
+        + _name_goals(goal.number for goal in goals if _used_earlier(session, goal)),
         "Version": version("prior-reinforce"),
     }
     if training is not None and training.remarks:
@@ -60,7 +62,30 @@ def report_workspace(workspace: Workspace, folder: Path) -> Path:
     claim_folder(folder)
     title = f"{workspace.manifest.name}: {len(goals)} goal" + "s" * (len(goals) > 1)
     with named_disk_errors(folder):
-        return write_report(folder, records, title=title, facts=facts)
+        return write_report(
+            folder, records, title=title, facts=facts, note=_say_without_plan(session),
+            progress=progress,
+        )  # fmt: skip
+
+
+def _say_without_plan(session: Session) -> str:
+    """Name the goals that were set and that no plan was given for."""
+    without = [goal.number for goal in session.goals if not session.trials_of(goal.number)]
+    return f"No plan was given for {_name_goals(without)}." if without else ""
+
+
+def _name_goals(numbers: Iterable[int]) -> str:
+    *most, last = [str(number) for number in numbers] or [""]
+    if not last:
+        return "no goal"
+    return f"goals {', '.join(most)} and {last}" if most else f"goal {last}"
+
+
+def _used_earlier(session: Session, goal: Goal) -> bool:
+    """Whether trials of earlier goals counted for a goal."""
+    models = {trial.model for trial in session.trials_of(goal.number)}
+    readings = [reading for model in models for reading in session.readings_for(goal, model)]
+    return any(reading.goal_number < goal.number for reading in readings)
 
 
 def _record(workspace: Workspace, session: Session, goal: Goal) -> AdaptationRecord:
@@ -77,7 +102,8 @@ def _record(workspace: Workspace, session: Session, goal: Goal) -> AdaptationRec
         goal=goal.goal,
         tolerance=goal.tolerance,
         trials=tuple(trials),
-        title=f"Goal {goal.number}",
+        number=goal.number,
+        warnings={t.number: said for t in trials if (said := execution_warning(workspace, t))},
         checks=_checks(trials),
         film_caption="; ".join(remarks),
     )
