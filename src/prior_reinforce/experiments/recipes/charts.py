@@ -54,6 +54,8 @@ class Line:
     place: int
     """Which colour and marker; the same method has the same in every panel."""
     dashed: bool = False
+    each: Sequence[Sequence[float]] = ()
+    """What each point of the curve is the mean of, where that is drawn instead of intervals."""
 
 
 @dataclass(frozen=True)
@@ -127,7 +129,7 @@ def _draw_line(axes: Axes, at: Float[np.ndarray, " n"], line: Line, **style: Any
 
 @drawing()
 def draw_kinds(kinds: Sequence[str], panels: Mapping[str, Sequence[Line]], path: Path) -> Path:
-    """Draw a value by kind, panels side by side: a mark a method with its interval.
+    """Draw a value by kind, panels side by side: a mark a method, and what it is the mean of.
 
     Args:
         kinds: What stands below each group of marks.
@@ -139,7 +141,15 @@ def draw_kinds(kinds: Sequence[str], panels: Mapping[str, Sequence[Line]], path:
     for axes, (label, lines) in zip(subplots, panels.items(), strict=True):
         calm_axes(axes)
         for line, offset in zip(lines, np.linspace(-0.3, 0.3, len(lines)), strict=True):
-            _draw_line(axes, np.arange(len(kinds)) + offset, line, linestyle="none")
+            colour, marker = (
+                _COLOURS[line.place % len(_COLOURS)],
+                _MARKERS[line.place % len(_MARKERS)],
+            )
+            at = np.arange(len(kinds)) + offset
+            means = [point["value"] for point in line.curve]
+            axes.plot(at, means, marker, color=colour, markersize=9, label=line.label)
+            for x, cells in zip(at, line.each, strict=True):
+                axes.plot([x] * len(cells), cells, marker, color=colour, markersize=4, alpha=0.45)
         axes.set_xticks(range(len(kinds)), kinds)
         axes.set_ylim(bottom=0)
         axes.set_ylabel(label)

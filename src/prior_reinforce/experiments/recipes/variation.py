@@ -86,8 +86,8 @@ class Variation(Measurement):
                         asdict(bootstrap_mean(of_set, within=(1, scale.rounds + 1)))
                         for of_set in took[i]
                     ],
-                    "first_by_task": (solved[i] == 1).mean(axis=(0, 2)).tolist(),
-                    "trials_by_task": took[i].mean(axis=(0, 2)).tolist(),
+                    "first_of_each": (solved[i] == 1).mean(axis=2).tolist(),
+                    "trials_of_each": took[i].mean(axis=2).tolist(),
                 }
                 for i, label in enumerate(labels)
             ],
@@ -118,7 +118,10 @@ def table(figures: Figures) -> Table:
     by_task = [
         (
             name,
-            *(f"{r['first_by_task'][i]:.2f}; {r['trials_by_task'][i]:.2f}" for r in rows),
+            *(
+                f"{_of_task(r['first_of_each'], i)}; {_of_task(r['trials_of_each'], i)}"
+                for r in rows
+            ),
         )
         for i, name in enumerate(figures["tasks"])
     ]
@@ -130,7 +133,10 @@ def draw(figures: Figures, folder: Path) -> list[Picture]:
     from prior_reinforce.experiments.recipes.charts import Line, draw_kinds
 
     lines = {
-        key: [Line(row["label"], row[key], place) for place, row in enumerate(figures["rows"])]
+        key: [
+            Line(row["label"], row[key], place, each=row[f"{key}_of_each"])
+            for place, row in enumerate(figures["rows"])
+        ]
         for key in ("first", "trials")
     }
     path = draw_kinds(
@@ -139,11 +145,16 @@ def draw(figures: Figures, folder: Path) -> list[Picture]:
         folder / "variation.png",
     )
     caption = (
-        f"Means over {len(figures['tasks'])} tasks on which nothing was chosen, by what differs "
-        "between the demonstrations and how many there are. Bars: 95 % intervals over tasks and "
-        f"goals, {figures['goals']} a task. The Bayesian adapter sees trials exactly."
+        f"Large: means over {len(figures['tasks'])} tasks on which nothing was chosen, by what "
+        "differs between the demonstrations and how many there are. Small: each task, "
+        f"{figures['goals']} goals. The Bayesian adapter sees trials exactly."
     )
     return [Picture(path, caption)]
+
+
+def _of_task(cells: Sequence[Sequence[float]], i: int) -> str:
+    """Mean over the sets of a task."""
+    return f"{sum(of_set[i] for of_set in cells) / len(cells):.2f}"
 
 
 def _in_words(name: str) -> str:
