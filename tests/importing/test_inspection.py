@@ -110,3 +110,49 @@ def test_small_numbers_are_said_in_thousandths():
     assert say_small(2.13e-5, "rad") == "0.021 mrad"
     assert say_small(0.0012, "m") == "1.2 mm"
     assert say_small(3.0, "counts") == "3 counts"
+
+
+def noisy(folder, sigma, rate=80):
+    """Two throws whose every joint has white noise."""
+    rng = np.random.default_rng(0)
+    for i in range(2):
+        t, q = sampled(i, rate)
+        q = q + rng.normal(0, sigma, q.shape)
+        np.savez(folder / f"{i}.npz", t=t, q=q, joint_names=JOINTS)
+    return folder
+
+
+def test_noise_that_takes_up_much_of_a_limit_is_said_with_what_takes_it_out(tmp_path):
+    """2.5 standard deviations of 6 sigma / dt^2 in a cycle of 1 ms are 49 % of 3750 rad/s^3."""
+    folder, panda = noisy(tmp_path, 1.9e-5), robot_limits("panda")
+    found = inspect_recordings(folder, robot=panda)
+    (remark,) = found.remarks
+    share = 2.5 * 6 * found.done.noise[1] * 80**2 * 1000 / 3750
+    assert remark == (
+        f"noise alone takes up about {share:.0%} of the jerk limit of joint2: --smooth 20 takes "
+        "it out"
+    )
+    assert share == pytest.approx(0.49, abs=0.15)
+    seen = [line.value for r in found.reports for line in r.lines if line.check == "jerk"]
+    assert max(seen) > 0.25 * 3750
+    smooth = inspect_recordings(folder, robot=panda, preprocessing=Preprocessing(smooth=20.0))
+    assert smooth.remarks == ()
+    assert inspect_recordings(folder).remarks == ()
+
+
+@pytest.mark.parametrize(("sigma", "rate"), [(2e-6, 80), (0.0, 15), (2e-5, 20)])
+def test_little_noise_and_what_may_be_motion_are_not_remarked_on(tmp_path, sigma, rate):
+    folder = noisy(tmp_path, sigma, rate)
+    found = inspect_recordings(
+        folder, robot=robot_limits("panda"), preprocessing=Preprocessing(dt=0.0125)
+    )
+    assert not any("noise" in remark for remark in found.remarks)
+
+
+def test_noise_of_joints_that_are_held_is_not_remarked_on(tmp_path):
+    rng = np.random.default_rng(0)
+    for i in range(2):
+        t, q = sampled(i, 80)
+        q[:, 2] += rng.normal(0, 4e-5, len(q))
+        np.savez(tmp_path / f"{i}.npz", t=t, q=q, joint_names=JOINTS)
+    assert inspect_recordings(tmp_path, robot=robot_limits("panda")).remarks == ()

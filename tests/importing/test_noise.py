@@ -3,7 +3,14 @@
 import numpy as np
 import pytest
 
-from prior_reinforce.importing.noise import held_channels, is_step, moving_ends, noise_of
+from prior_reinforce.importing.noise import (
+    acceleration_of,
+    held_channels,
+    is_step,
+    moving_ends,
+    noise_of,
+)
+from prior_reinforce.plans.interpolation import join_frames
 from tests.importing.recorded import sampled
 
 RAD = ("rad",)
@@ -67,3 +74,11 @@ def test_coarse_noise_at_rest_is_no_speed():
     starts, ends = moving_ends(t, (swing + noise).T, RAD * 30)
     assert not starts.any()
     assert not ends.any()
+
+
+def test_noise_alone_accelerates_by_as_much_as_the_spline_through_it():
+    sigma, dt = 2e-5, 0.0125
+    noise = np.random.default_rng(0).normal(0, sigma, (20_000, 1))
+    knots = join_frames(noise, dt)(np.arange(100, 19_900) * dt, 2)
+    assert knots.std() == pytest.approx(6 * sigma / dt**2, rel=0.03)
+    assert acceleration_of(np.array([sigma]), dt) == pytest.approx(2.5 * knots.std(), rel=0.03)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from prior_reinforce.plans.channels import kinds, noise, transitions
+from prior_reinforce.plans.channels import kinds, noise, transitions, without_noise_where_held
 
 FRAMES = np.arange(90)
 RAMP = (0.0, 0.05, 0.24, 0.54, 0.83, 0.98, 1.0)
@@ -72,3 +72,16 @@ def test_noise_is_estimated_to_a_quarter_beside_a_motion():
     noisy = plans()[:, :, :1] + 1e-3 * rng.normal(size=(4, 90, 1))
     assert noise(noisy)[0] == pytest.approx(1e-3, rel=0.25)
     assert noise(np.random.default_rng(0).normal(size=(3, 12, 2))).tolist() == [0.0, 0.0]
+
+
+def test_a_held_channel_is_its_mean_and_all_else_stays():
+    given = plans()
+    still = without_noise_where_held(given, ("rad", "rad", "m", "bool"))
+    np.testing.assert_array_equal(np.ptp(still[:, :, 1], axis=1), 0)
+    np.testing.assert_allclose(still[:, 0, 1], given[:, :, 1].mean(axis=1))
+    np.testing.assert_array_equal(still[:, :, [0, 2, 3]], given[:, :, [0, 2, 3]])
+
+
+def test_a_constant_channel_keeps_its_last_digit():
+    given = np.full((2, 90, 1), 0.1)
+    np.testing.assert_array_equal(without_noise_where_held(given, ("rad",)), given)

@@ -49,6 +49,17 @@ def test_demonstrations_come_back_to_a_tenth_of_a_milliradian(kind, horizon):
     assert np.sqrt(np.mean((plans - demos.plans) ** 2, axis=1)).max() < 1e-4
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_joint_that_is_held_but_for_noise_is_one_number_a_plan(kind):
+    rng = np.random.default_rng(0)
+    base = np.linspace(-0.3, 0.3, 4)[:, None] + rng.normal(0, 2e-5, (4, 90))
+    demos = demonstrations(np.dstack([swings(TEMPOS), base]), ("rad",) * 3)
+    apart, plans = played(demos, kind)
+    assert np.ptp(plans[:, :, 2], axis=1).max() < 1e-12
+    assert np.sqrt(np.mean((plans - demos.plans) ** 2, axis=1)).max() < 1e-4
+    assert apart.timeline.per_frame == played(demonstrations(swings(TEMPOS)), kind)[0].timeline.per_frame
+
+
 def test_starts_come_back():
     apart = take_apart(demonstrations(swings()), "start")
     off = apart.numbers[:, 0] - STARTS

@@ -25,7 +25,7 @@ from prior_reinforce.errors import (
 )
 from prior_reinforce.importing import csv, hdf5, lerobot, npz, ros, zarr
 from prior_reinforce.importing.clock import TIME_UNITS
-from prior_reinforce.importing.inspection import Inspection, hold_against
+from prior_reinforce.importing.inspection import Inspection, hold_against, say_shaking
 from prior_reinforce.importing.outcomes import (
     find_outcomes,
     in_order,
@@ -235,7 +235,9 @@ def _inspection(
     kept: Selection, done: Preprocessed, robot: RobotLimits | None, gate: GateSettings | None
 ) -> Inspection:
     reports = hold_against(kept, done, robot, gate)
-    return Inspection(kept, done, None if robot is None else robot.robot, reports)
+    name = None if robot is None else robot.robot
+    shaking = say_shaking(kept, done, robot) if reports else ""
+    return Inspection(kept, done, name, reports, shaking)
 
 
 def appended(before: Demonstrations, more: Demonstrations) -> Demonstrations:

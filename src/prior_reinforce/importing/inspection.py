@@ -8,16 +8,22 @@ from dataclasses import dataclass
 import numpy as np
 
 from prior_reinforce.errors import InvalidPlanError
+from prior_reinforce.importing.noise import acceleration_of
 from prior_reinforce.importing.preprocessing import Preprocessed, Selection
 from prior_reinforce.importing.recording import Recording
 from prior_reinforce.importing.units import Doubt, guess_unit, say_names
+from prior_reinforce.plans.interpolation import RATE
 from prior_reinforce.plans.motions import Plan, PlanFormat
 from prior_reinforce.robots import GateSettings, RobotLimits, check_plan
+from prior_reinforce.robots.limits import match_joints
 from prior_reinforce.robots.report import LimitReport
 
-_SMOOTH = "--smooth 20"
+_SMOOTH_HZ = 20
+_SMOOTH = f"--smooth {_SMOOTH_HZ}"
 """What takes out an encoder's noise: 20 Hz is above what a throw holds. Ours."""
 
+_MUCH_NOISE = 0.25
+"""Part of a limit that noise alone takes up, from which on it is said. Ours."""
 _SHAKEN = frozenset({"acceleration", "jerk"})
 """What noise breaks first."""
 
@@ -34,6 +40,8 @@ class Inspection:
     """Whose limits the demonstrations were held against."""
     reports: tuple[LimitReport, ...] = ()
     """What the gate says of each; empty where no robot is named."""
+    shaking: str = ""
+    """What noise alone makes of limits, where that is much; empty where it is little."""
     doubts: tuple[Doubt, ...] = ()
     """Units, times and names of channels that are only guessed."""
 
@@ -45,7 +53,10 @@ class Inspection:
     @property
     def remarks(self) -> tuple[str, ...]:
         """What a person should know, the most important first: limits, ends, gaps, ..."""
-        return (*self.kept.remarks, *self._broken(), *self.done.remarks)
+        broken = self._broken()
+        told = any(_SMOOTH in remark for remark in broken)
+        shaking = (self.shaking,) if self.shaking and not told else ()
+        return (*self.kept.remarks, *broken, *shaking, *self.done.remarks)
 
     @property
     def remedy(self) -> str:
@@ -221,6 +232,32 @@ def hold_against(
         return tuple(check_plan(Plan(p, form), robot, None, gate) for p in done.plans)
     except InvalidPlanError:
         return ()
+
+
+def say_shaking(kept: Selection, done: Preprocessed, robot: RobotLimits | None) -> str:
+    """Say what part of the robot's limits noise alone takes up; nothing where that is little.
+
+    Channels that are held do not count: noise on them is not learned.
+    """
+    if robot is None or done.smoothed is not None:
+        return ""
+    period = max(done.dt, max(recording.period for recording in kept.recordings))
+    if 2 * _SMOOTH_HZ * period >= 1:  # so few frames hardly tell noise from motion
+        return ""
+    accelerations = acceleration_of(done.noise, period)
+    said: list[tuple[float, str]] = []
+    for joint, channel in match_joints(PlanFormat(kept.names, kept.units, done.dt), robot).items():
+        for what, limits, scale in (
+            ("acceleration", robot.acceleration, 1.0),
+            ("jerk", robot.jerk, RATE),  # an end leaps to its acceleration in one cycle
+        ):
+            if limits is not None and channel not in done.held_channels:
+                share = float(accelerations[channel] * scale / limits[joint])
+                said.append((share, f"the {what} limit of {kept.names[channel]}"))
+    share, where = max(said, default=(0.0, ""))
+    if share < _MUCH_NOISE:
+        return ""
+    return f"noise alone takes up about {share:.0%} of {where}: {_SMOOTH} takes it out"
 
 
 def in_rows(rows: Mapping[str, str], remarks: Sequence[str]) -> str:

@@ -102,6 +102,20 @@ def kinds(plans: Plans, units: tuple[str, ...]) -> tuple[ChannelKind, ...]:
     return tuple(found)
 
 
+def without_noise_where_held(plans: Plans, units: tuple[str, ...]) -> Plans:
+    """Return the plans with each channel that is `held` at its mean, one number a plan.
+
+    Args:
+        plans: A.
+        units: Of the D channels.
+    """
+    plans = plans.copy()
+    for d, kind in enumerate(kinds(plans, units)):
+        if kind == "held" and np.any(np.ptp(plans[:, :, d], axis=1)):
+            plans[:, :, d] = plans[:, :, d].mean(axis=1, keepdims=True)
+    return plans
+
+
 def transitions(
     values: Float[np.ndarray, "N H"],
 ) -> Float[np.ndarray, "N M"] | None:

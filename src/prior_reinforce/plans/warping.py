@@ -15,11 +15,12 @@ both can be learned; it plays any shape through any warp. The inverse map is wha
 
 Phase 0 is the middle of the motion, so that start and tempo hardly depend on each other. Outside
 its recording a plan holds where it rests, and goes on with its last velocity where it does not, so
-no rest is needed at either end, and nothing is cut off. A channel that rests but for short
-transitions (`channels`) is timed by itself: its shape is split at its transitions, and when each of
-them comes is one number more. If it goes with the motion, its last transition is phase 0 of
-`start`, and where `tempo` and `warp` begin their search: a hand that opens decides where the object
-goes, and what the arm does just then is what has to be mixed.
+no rest is needed at either end, and nothing is cut off. A channel that is held but for noise
+(`channels`) is held without it. One that rests but for short transitions is timed by itself: its
+shape is split at its transitions, and when each of them comes is one number more. If it goes with
+the motion, its last transition is phase 0 of `start`, and where `tempo` and `warp` begin their
+search: a hand that opens decides where the object goes, and what the arm does just then is what has
+to be mixed.
 
 Notation:
     t      time of a plan               [frames]
@@ -41,7 +42,13 @@ from jaxtyping import Bool, Float
 from prior_reinforce.arrays import Plans
 from prior_reinforce.errors import InvalidDemonstrationsError
 from prior_reinforce.plans.alignment import correlation_lags
-from prior_reinforce.plans.channels import kinds, largest_of_unit, noise, transitions
+from prior_reinforce.plans.channels import (
+    kinds,
+    largest_of_unit,
+    noise,
+    transitions,
+    without_noise_where_held,
+)
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 from prior_reinforce.plans.timing import (
     SMOOTHING,
@@ -265,7 +272,8 @@ def take_apart(demonstrations: Demonstrations, kind: WarpKind) -> Apart:
     Raises:
         InvalidDemonstrationsError: Nothing moves, so nothing can be timed.
     """
-    plan_format, plans = demonstrations.format, demonstrations.plans
+    plan_format = demonstrations.format
+    plans = without_noise_where_held(demonstrations.plans, plan_format.units)
     found = kinds(plans, plan_format.units)
     events = {
         d: found_times
@@ -323,7 +331,7 @@ def take_apart(demonstrations: Demonstrations, kind: WarpKind) -> Apart:
         shapes = _shapes(timeline, continued, warp, times, tau)
         cut = timeline.cut_off(shapes, warp)
         timeline = replace(timeline, rests=(not cut[:, 0].any(), not cut[:, 1].any()))
-        if _comes_back(timeline.play(shapes, numbers), demonstrations):
+        if _comes_back(timeline.play(shapes, numbers), plans, plan_format.units):
             return Apart(timeline, shapes, numbers)
     if kind == "none" or timeline.horizon >= _FEW_FRAMES:
         return Apart(timeline, shapes, numbers)
@@ -499,10 +507,9 @@ def _linear(values: Float[np.ndarray, " L"], at: Float[np.ndarray, " H"]) -> np.
     return np.interp(at, np.arange(len(values)), values)
 
 
-def _comes_back(plans: Plans, demonstrations: Demonstrations) -> bool:
-    ranges = np.ptp(demonstrations.plans, axis=(0, 1))
-    largest = largest_of_unit(ranges, demonstrations.format.units)
-    off = np.sqrt(np.mean((plans - demonstrations.plans) ** 2, axis=1))
+def _comes_back(plans: Plans, expected: Plans, units: tuple[str, ...]) -> bool:
+    largest = largest_of_unit(np.ptp(expected, axis=(0, 1)), units)
+    off = np.sqrt(np.mean((plans - expected) ** 2, axis=1))
     return bool(np.all(off <= _EXACT * np.where(largest > 0, largest, 1.0)))
 
 
