@@ -33,7 +33,7 @@ def learn(tmp_path, capsys):
 @pytest.mark.parametrize("frames", [140, 80], ids=["rest to rest", "cut off in mid-swing"])
 def test_the_timing_that_was_chosen_is_told_in_a_line_and_kept(learn, generator, frames):
     told, model = learn("--generator", generator, frames=frames)
-    assert "timing: starts learned apart from the motion" in " ".join(told.split())
+    assert "timing: when to start is learned apart from how to move" in " ".join(told.split())
     assert len(model.remarks) == 1
 
 

@@ -69,7 +69,9 @@ def test_plans_come_back_as_recorded(timing, horizon):
 
 def test_what_was_chosen_is_said_and_kept_on_disk(tmp_path):
     timed = Timed(NearestNeighbours()).fit(demonstrations(), seed=0)
-    assert timed.remarks[0].startswith("timing: starts learned apart from the motion, as a rule")
+    assert timed.remarks[0].startswith(
+        "timing: when to start is learned apart from how to move, as a rule"
+    )
     timed.save(tmp_path)
     assert load_generator(tmp_path).remarks == timed.remarks
 

@@ -26,14 +26,20 @@ def demonstrations(release: int | None, n: int = 8) -> Demonstrations:
 def test_a_release_that_the_motion_brings_about_asks_for_starts_apart():
     choice = choose_timing(demonstrations(None))
     assert choice.apart.timeline.kind == "start"
-    assert "starts learned apart from the motion (start)" in choice.reason
+    assert "when to start is learned apart from how to move (start)" in choice.reason
+    assert choice.errors["start"] == outcome_error(demonstrations(None), choice.apart)
 
 
 def test_a_clocked_release_asks_for_plans_as_recorded():
     demos = demonstrations(42)
     errors = {kind: outcome_error(demos, take_apart(demos, kind)) for kind in ("none", "start")}
     assert errors["none"] < 0.5 * errors["start"]
-    assert choose_timing(demos).apart.timeline.kind == "none"
+    choice = choose_timing(demos)
+    assert choice.apart.timeline.kind == "none"
+    assert choice.reason == (
+        "timing: plans start when the demonstrations did (none), as these demonstrations ask for"
+    )
+    assert choice.errors == errors | {"tempo": choice.errors["tempo"]}
 
 
 def test_people_who_start_when_they_like_keep_to_no_clock():
@@ -48,7 +54,24 @@ def test_people_who_start_when_they_like_keep_to_no_clock():
 def test_few_demonstrations_tell_nothing():
     choice = choose_timing(demonstrations(42, n=4))
     assert choice.apart.timeline.kind == "start"
-    assert "as a rule; 4 demonstrations tell no better" in choice.reason
+    assert "as a rule; 4 demonstrations cannot tell what is better" in choice.reason
+    assert not choice.errors
+
+
+def test_it_is_said_where_the_timing_does_not_matter():
+    demos = demonstrations(None)
+    together = take_apart(demos, "start").shapes[:, :100]
+    same = Demonstrations(together, demos.outcomes_seen, demos.format)
+    assert choose_timing(same).reason.endswith("; another timing would do as well here")
+
+
+def test_it_is_said_where_the_demonstrations_do_not_tell():
+    demos = demonstrations(None)
+    elsewhere = np.random.default_rng(1).uniform(-1, 1, size=(8, 2))
+    chance = Demonstrations(demos.plans, elsewhere, demos.format)
+    assert choose_timing(chance).reason.endswith(
+        "(start), as a rule; these demonstrations do not tell what is better"
+    )
 
 
 def test_what_does_not_move_keeps_its_timing():

@@ -57,7 +57,10 @@ def test_a_joint_that_is_held_but_for_noise_is_one_number_a_plan(kind):
     apart, plans = played(demos, kind)
     assert np.ptp(plans[:, :, 2], axis=1).max() < 1e-12
     assert np.sqrt(np.mean((plans - demos.plans) ** 2, axis=1)).max() < 1e-4
-    assert apart.timeline.per_frame == played(demonstrations(swings(TEMPOS)), kind)[0].timeline.per_frame
+    assert (
+        apart.timeline.per_frame
+        == played(demonstrations(swings(TEMPOS)), kind)[0].timeline.per_frame
+    )
 
 
 def test_starts_come_back():

@@ -16,7 +16,8 @@ Notation:
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 from jaxtyping import Float
@@ -47,11 +48,14 @@ _BEST = 3
 """Of all phases the best so many are averaged, against luck. Ours."""
 _RIDGE = 1e-3
 """Ridge of the affine function, relative to the states' mean square. Ours."""
+_MATTERS = 0.1
+"""Errors that differ by less than this part of the outcomes' spread are as good as each other.
+Ours: with six demonstrations they are not known better."""
 _WORDS: dict[WarpKind, str] = {
-    "none": "as recorded",
-    "start": "starts learned apart from the motion",
-    "tempo": "starts and tempos learned apart from the motion",
-    "warp": "warps of time learned apart from the motion",
+    "none": "plans start when the demonstrations did",
+    "start": "when to start is learned apart from how to move",
+    "tempo": "when to start and how fast to go are learned apart from how to move",
+    "warp": "when to be where is learned apart from how to move",
 }
 
 
@@ -61,7 +65,9 @@ class TimingChoice:
 
     apart: Apart
     reason: str
-    """In one line, for people."""
+    """In one sentence, for people."""
+    errors: Mapping[WarpKind, float] = field(default_factory=dict)
+    """`outcome_error` of each timing that was compared; empty where none could be."""
 
 
 def choose_timing(demonstrations: Demonstrations) -> TimingChoice:
@@ -78,7 +84,8 @@ def choose_timing(demonstrations: Demonstrations) -> TimingChoice:
     if n < max(_FEWEST, demonstrations.outcome_dim + 3):
         return TimingChoice(
             usual,
-            f"timing: {_WORDS[usual.timeline.kind]}, as a rule; {n} demonstrations tell no better",
+            f"timing: {_WORDS[usual.timeline.kind]}, as a rule; {n} demonstrations cannot tell "
+            "what is better",
         )
     apart: dict[WarpKind, Apart] = {
         kind: usual if kind == "start" else take_apart(demonstrations, kind) for kind in _WORTH
@@ -88,12 +95,14 @@ def choose_timing(demonstrations: Demonstrations) -> TimingChoice:
     if float(np.std(usual.numbers[:, 0])) > _ON_TIME * _length(demonstrations):
         able = [kind for kind in able if kind != "none"]
     best = min(able, key=lambda kind: errors[kind] / _WORTH[kind])
-    others = ", ".join(f"{errors[kind]:.0%} {kind}" for kind in errors if kind != best)
-    words = _WORDS[apart[best].timeline.kind]
+    if errors[best] >= _TELLS:
+        why = ", as a rule; these demonstrations do not tell what is better"
+    elif max(errors.values()) - min(errors.values()) < _MATTERS:
+        why = "; another timing would do as well here"
+    else:
+        why = ", as these demonstrations ask for"
     return TimingChoice(
-        apart[best],
-        f"timing: {words} ({best}); outcomes of left-out demonstrations are then told from "
-        f"the motion to {errors[best]:.0%} of their spread ({others})",
+        apart[best], f"timing: {_WORDS[apart[best].timeline.kind]} ({best}){why}", errors
     )
 
 
