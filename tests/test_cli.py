@@ -25,6 +25,21 @@ def test_a_reader_may_leave_before_the_end(folder, monkeypatch, capsys, args, bu
     assert capsys.readouterr().err == ""
 
 
+@pytest.mark.skipif(os.name != "posix", reason="pipes as POSIX has them")
+def test_output_that_is_not_buffered_leaves_as_quietly(folder):
+    program = [sys.executable, "-m", "prior_reinforce.cli", "log", folder]
+    reading, writing = os.pipe()
+    os.close(reading)
+    with open(writing, "wb") as nobody_reads:
+        run = subprocess.run(
+            program,
+            stdout=nobody_reads,
+            stderr=subprocess.PIPE,
+            env={**os.environ, "PYTHONUNBUFFERED": "1"},
+        )
+    assert (run.returncode, run.stderr) == (141, b"")
+
+
 @pytest.mark.parametrize(
     "args",
     [

@@ -9,6 +9,7 @@ from __future__ import annotations
 import io
 import os
 import pkgutil
+import select
 import sys
 import unicodedata
 import warnings
@@ -79,7 +80,7 @@ def main(args: Sequence[str] | None = None) -> int:
         status = command.run() or 0
         return status if _flushed() else _NOBODY_READS
     except BrokenPipeError:
-        if _flushed():  # not our output's pipe
+        if _flushed() and not _reader_left():  # not our output's pipe
             raise
         return _NOBODY_READS
     except PriorReinforceError as error:
@@ -213,6 +214,13 @@ def _flushed() -> bool:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return False
     return True
+
+
+def _reader_left() -> bool:
+    """Whether the other end of our output's pipe is closed; unbuffered, flushing says nothing."""
+    poll = select.poll()
+    poll.register(sys.stdout.fileno(), 0)
+    return any(event & (select.POLLERR | select.POLLHUP) for _, event in poll.poll(0))
 
 
 def _print_warning(message: Warning | str, *_: object, **__: object) -> None:
