@@ -1,8 +1,9 @@
 """Fifteen folders as labs have them, each from recordings to a plan that passes the gate.
 
 Their files are written by the libraries that write them in labs, or as those were seen to write
-them (lerobot, robomimic, ur_rtde). All have an encoder's noise and joints that are held. At most
-one correction is needed, and the message before names it. The generator is what `learn` chooses.
+them (lerobot, libfranka, robomimic, ur_rtde). All have an encoder's noise and joints that are held.
+At most one correction is needed, and the message before names it. The generator is what `learn`
+chooses.
 """
 
 import csv
@@ -51,17 +52,18 @@ def outcomes(folder, scale=1.0, head="episode,x,y", name="{}"):
 
 
 def libfranka(folder):
-    """`franka::logToCSV`: milliseconds, blanks in the header, six vectors of seven."""
+    """`franka::logToCSV` of 0.9.2: milliseconds since the robot started, six digits, 87 columns."""
+    state = ("q", "q_d", "dq", "dq_d", "tau_J", "tau_ext_hat_filtered")
+    command = {"q_d": 7, "dq_d": 7, "O_T_EE_d": 16, "O_dP_EE_d": 6, "tau_J_d": 7}
+    names = [f"state.{vector}[{j}]" for vector in state for j in range(7)]
+    names += [f"cmd.{vector}[{j}]" for vector, size in command.items() for j in range(size)]
     for i in range(N):
         _, q = throw(i, 1000)
-        names = ["time", " success_rate"]
-        for vector in ("state.q", "state.q_d", "state.dq", "state.tau_J", "cmd.q_d"):
-            names += [f" {vector}[{j}]" for j in range(7)]
-        rows = np.column_stack([np.arange(len(q)), np.ones(len(q)), q, q, 0 * q, 0 * q, q])
-        header = ",".join(names)
-        np.savetxt(
-            folder / f"log_{i}.csv", rows, delimiter=",", header=header, comments="", fmt="%.9g"
-        )
+        rows = np.column_stack([q, q, np.zeros((len(q), 28)), q, np.zeros((len(q), 36))])
+        frame = pd.DataFrame(rows, columns=names)
+        frame.insert(0, "success_rate", 1)
+        frame.insert(0, "time", 123456789 + np.arange(len(q)))
+        frame.to_csv(folder / f"log_{i}.csv", index=False, float_format="%.6g")
     outcomes(folder)
 
 

@@ -57,7 +57,7 @@ def test_csv_with_a_column_of_episodes_and_text_beside(tmp_path):
         ("t,a\n0,1\n0.1,x\n", "line 3: a is 'x'"),
         ("a,b\n0,1\n1,2\n", "give the rate"),
         ("t,a\n0.1,1\n0.0,2\n", "time does not increase"),
-        ("t,a,a\n0,1,1\n0.1,2,2\n", "repeats a channel name"),
+        ("t,a,b,a\n0,1,1,1\n0.1,2,2,2\n", "repeats a channel name: a; rename"),
         ('t,a\n0,"1\n0.1,2\n', "as a table .*EOF inside string"),
         ("t\n0\n1\n", "for 0 channels"),
     ],
@@ -88,14 +88,15 @@ def test_a_workbook_with_a_sheet_an_episode(tmp_path):
     assert [r.episode for r in recordings] == ["throw 0", "throw 1"]
 
 
-def libfranka_log(path, q, *, prefix="state."):
-    """As `logToCSV` of libfranka 0.9 and later writes it: `time` in ms, blanks in the header."""
-    vectors = {f"{prefix}q": q, f"{prefix}q_d": q, f"{prefix}dq": 0 * q, "cmd.q_d": q + 1}
+def libfranka_log(path, q):
+    """As libfranka 0.9.2 was seen to write it: `time` in ms since the robot started, six digits."""
+    vectors = {"state.q": q, "state.q_d": q, "state.dq": 0 * q, "cmd.q_d": q + 1}
     names = ["time", "success_rate"]
     names += [f"{name}[{i}]" for name in vectors for i in range(7)]
-    rows = np.column_stack([np.arange(len(q)), np.ones(len(q)), *vectors.values()])
-    lines = [", ".join(names), *(",".join(f"{v:.10g}" for v in row) for row in rows)]
-    path.write_text("\n".join(lines))
+    lines = [",".join(names)]
+    for k, row in enumerate(np.column_stack(list(vectors.values()))):
+        lines.append(f"{123456789 + k},1,{','.join(f'{v:.6g}' for v in row)}")
+    path.write_text("\n".join(lines) + "\n")
 
 
 def test_libfrankas_log_is_known_by_its_columns(tmp_path):
@@ -103,10 +104,10 @@ def test_libfrankas_log_is_known_by_its_columns(tmp_path):
     (recording,) = read_recordings(tmp_path, joints=JOINTS)
     assert recording.period == pytest.approx(0.001)
     assert recording.duration == pytest.approx(1.7)
-    np.testing.assert_allclose(recording.positions, sampled(0, 1000)[1], atol=1e-9)
+    np.testing.assert_allclose(recording.positions, sampled(0, 1000)[1], atol=1e-5)
     assert recording.remarks == ("libfranka's log: time in ms, motion is state.q (measured)",)
     commanded = read_recordings(tmp_path, key="cmd.q_d")[0]
-    np.testing.assert_allclose(commanded.positions, recording.positions + 1)
+    np.testing.assert_allclose(commanded.positions, recording.positions + 1, atol=2e-5)
     with pytest.raises(ConfigurationError, match="time is in ms, but --time-unit says s"):
         read_recordings(tmp_path, time_unit="s")
     with pytest.raises(ConfigurationError, match="time in ms says 1000 Hz"):
@@ -122,6 +123,20 @@ def test_a_numbered_group_keeps_what_its_columns_are_called(tmp_path):
     recording = read_recordings(tmp_path, key="q")[0]
     assert recording.names == JOINTS
     assert recording.columns == tuple(f"q{k}" for k in range(7))
+
+
+def test_the_log_of_the_first_libfranka_is_known_by_its_columns(tmp_path):
+    """Its `logToCSV` gives commands the names of the state's vectors, after an empty column."""
+    q = sampled(0, 1000)[1]
+    vectors = [", ".join(f"{name}[{i}]" for i in range(7)) for name in ("q", "q_d", "tau_J")]
+    lines = [f"duration, success rate, {','.join(vectors)},sent commands,{vectors[1]}"]
+    for k, row in enumerate(q):
+        cells = ",".join(f"{v:.6g}" for v in row)
+        lines.append(f"{5000 + k},1,{cells},{cells},{cells},,{cells}")
+    (tmp_path / "0.csv").write_text("\n".join(lines) + "\n")
+    (recording,) = read_recordings(tmp_path, joints=JOINTS)
+    np.testing.assert_allclose(recording.positions, q, atol=1e-5)
+    np.testing.assert_allclose(recording.times, np.arange(len(q)) / 1000)
 
 
 def test_an_rtde_log_is_known_by_its_columns(tmp_path):

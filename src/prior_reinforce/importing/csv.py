@@ -57,9 +57,9 @@ class _Log:
 
 
 _LOGS = (
-    # libfranka, src/log.cpp: logToCSV writes time.toMSec().
+    # libfranka, src/log.cpp: logToCSV writes time.toMSec(). First 0.9.2 and later, then of 2017.
     _Log("libfranka's log", ("time", "success_rate", "state.q[0]"), "state.q", "ms"),
-    _Log("libfranka's log", ("duration", "success_rate", "q[0]"), "q", "ms"),
+    _Log("libfranka's log", ("duration", "success rate", "q[0]"), "q", "ms"),
     # UR's rtde/csv_writer.py and ur_rtde's recorder: seconds since the controller started. The
     # latter (1.6.5) runs beside the controller, and reads the variables of a row one by one.
     _Log("an RTDE log", ("timestamp", "actual_q_0"), "actual_q", "s", mixed=True),

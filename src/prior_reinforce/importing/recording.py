@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -21,7 +22,7 @@ from prior_reinforce.errors import (
 )
 from prior_reinforce.files import without_advice
 from prior_reinforce.importing.clock import Clock, Stamps, Times, clock_of
-from prior_reinforce.importing.units import CHANNEL_UNITS, Doubt, split_unit
+from prior_reinforce.importing.units import CHANNEL_UNITS, Doubt, say_names, split_unit
 
 Positions = Float[np.ndarray, "T D"]
 """D channels at T times, in their units."""
@@ -164,9 +165,10 @@ class Recording:
                 f"{len(names)} channels; expected (T,) and (T, {len(names)}) with T >= 2: mend or "
                 "drop it"
             )
-        if len(set(names)) != len(names):
+        repeated = [name for name, count in Counter(names).items() if count > 1]
+        if repeated:
             raise InvalidDemonstrationsError(
-                f"{episode} repeats a channel name: {names}; rename the channels"
+                f"{episode} repeats a channel name: {say_names(repeated)}; rename the channels"
             )
         numbers = np.column_stack([positions, times])
         bad = np.argwhere(~np.isfinite(numbers))
