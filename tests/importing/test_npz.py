@@ -99,6 +99,14 @@ def test_the_array_of_times_may_be_named(tmp_path):
         read_recordings(tmp_path, time_column="t")
 
 
+def test_times_may_be_a_column(tmp_path):
+    """As a log of panda_py is, whose `get_log` has an array for each time too."""
+    t = np.arange(171) / 100
+    np.savez(tmp_path / "0.npz", q=list(throw(0, t)), tau_J=throw(1, t), time=t[:, None])
+    (recording,) = read_recordings(tmp_path)
+    np.testing.assert_allclose(recording.times, t)
+
+
 @pytest.mark.parametrize("suffix", ["npz", "npy"])
 def test_python_objects_are_named_without_advice_to_load_them_all_the_same(tmp_path, suffix):
     path = tmp_path / f"throw.{suffix}"

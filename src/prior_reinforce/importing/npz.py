@@ -116,7 +116,10 @@ def _clock(
             return options.clock(episode, count)
         if name is not None:
             stamps = arrays[name]
-            stamps = stamps[index] if stamps.ndim == 2 else stamps
+            if stamps.size == count:
+                stamps = stamps.ravel()  # a column, as panda_py's `get_log` has it
+            elif stamps.ndim == 2:
+                stamps = stamps[index]
             return options.clock(episode, count, stamps=stamps, name=name)
         if "dt" in arrays:
             return options.clock(episode, count, name="dt", own_rate=1 / float(arrays["dt"]))
