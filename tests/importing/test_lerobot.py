@@ -47,3 +47,11 @@ def test_lerobot_with_a_missing_episode(tmp_path):
     result = import_demonstrations(folder, joints=JOINTS, episodes=rest)
     assert result.episodes == tuple(rest)
     np.testing.assert_allclose(result.demonstrations.outcomes_seen[3], OUTCOMES["4"])
+
+
+def test_lerobot_whose_recorder_was_not_finalized(tmp_path):
+    folder = write_lerobot(tmp_path / "set")
+    path = folder / "data" / "chunk-000" / "file-000.parquet"
+    path.write_bytes(path.read_bytes()[:-5000])  # its footer was never written
+    with pytest.raises(FileFormatError, match=r"file-000\.parquet .* called finalize\(\)"):
+        import_demonstrations(folder, joints=JOINTS)

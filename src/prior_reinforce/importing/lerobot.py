@@ -3,7 +3,8 @@
 Layout (lerobot 0.6.1, datasets/utils.py): `meta/info.json`, episodes listed in
 `meta/episodes/**.parquet` (2.1: `meta/episodes.jsonl`), frames in `data/**.parquet`. Frames are
 collected by their own `episode_index`: the listed file pointers can be stale in converted data
-(huggingface/lerobot issue 2401), a file may hold several episodes, an episode several files.
+(huggingface/lerobot issue 2401), a file may hold several episodes, an episode several files. A file
+of a recorder (0.4.4) that ended without `finalize()` has no footer, and cannot be read.
 """
 
 from __future__ import annotations
@@ -111,7 +112,7 @@ def _frames(source: Path, key: str) -> dict[int, tuple[FrameNumbers, Positions]]
         )
     parts = []
     for path in paths:
-        with named_damage(path, "LeRobot frames"):
+        with named_damage(path, "LeRobot frames, complete once its recorder called finalize()"):
             table = parquet.read_table(path, columns=["episode_index", "frame_index", key])
             episode = np.asarray(table["episode_index"].to_pylist(), dtype=np.int64)
             index = np.asarray(table["frame_index"].to_pylist(), dtype=np.int64)
