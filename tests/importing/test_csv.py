@@ -195,7 +195,7 @@ def test_an_index_without_a_name_is_the_time(tmp_path):
     frame.to_csv(tmp_path / "0.csv")
     (recording,) = read_recordings(tmp_path)
     np.testing.assert_allclose(recording.times, t, atol=1e-9)
-    assert recording.names == JOINTS
+    assert (recording.names, recording.clock) == (JOINTS, "column 1 in ns")
     frame.set_axis(1000 * t).to_csv(tmp_path / "0.csv")
     with pytest.raises(UnclearUnitsError) as caught:
         read_recordings(tmp_path)

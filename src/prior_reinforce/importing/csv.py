@@ -219,7 +219,7 @@ def _clock(
     if time is None:
         return options.clock(episode, len(table))
     dates = table.nanoseconds(time)
-    name = table.names[time]
+    name = table.names[time] or f"column {time + 1}"
     if dates is not None:
         return options.clock(episode, len(table), stamps=dates, name=name, unit="ns")
     stamps, unit = table.numbers(time), unit or table.units[time]
