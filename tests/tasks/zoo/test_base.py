@@ -19,6 +19,17 @@ def test_disturbances_of_zero_are_the_undisturbed_execution():
     np.testing.assert_array_equal(task.execute(plan), task.execute(plan, np.zeros(7 + 1)))
 
 
+@pytest.mark.parametrize("task", ["zoo-swing", "zoo-lob", "zoo-drag", "zoo-slide", "zoo-strike"])
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_what_a_wild_plan_throws_out_of_the_world_is_lost(task):
+    made = make_task(task)
+    plans = made.demonstrations("clean-6-0").plans
+    wild = plans.mean(axis=0) + 1e4 * (plans - plans.mean(axis=0))
+    for rollout in made.rollout(wild, None):
+        assert np.all(np.abs(rollout.outcome) <= 100)
+        assert rollout.valid or not rollout.outcome.any()
+
+
 def test_servos_follow_the_plan_and_then_come_to_rest_in_its_last_frame():
     seen = []
 

@@ -16,6 +16,10 @@ from prior_reinforce.tasks.base import Task
 from prior_reinforce.tasks.demonstrations.teleoperation import follow
 from prior_reinforce.tasks.zoo.human import Strategy, demonstrate
 
+_GONE = 100.0
+"""An outcome farther off than this, in its unit, is of an object that is lost. Ours: goals are
+within a few metres and seconds."""
+
 
 class ZooTask(Task):
     """A small task that is computed, not drawn; a rollout takes milliseconds.
@@ -88,8 +92,13 @@ class ZooTask(Task):
         if self.bandwidth is not None:
             still = np.tile(self.held(plan), (round(self.lead_out / self.format.dt), 1))
             plan = follow(np.vstack([plan, still]), self.format.dt, self.bandwidth)
-        outcome = self._execute(plan, draws[len(joints) :] * self.spread)
-        return None if outcome is None else np.array(outcome, dtype=np.float64)
+        try:
+            outcome = self._execute(plan, draws[len(joints) :] * self.spread)
+        except OverflowError:  # a wild plan throws it out of all numbers
+            return None
+        if outcome is None or not np.all(np.abs(outcome) <= _GONE):
+            return None
+        return np.array(outcome, dtype=np.float64)
 
     def rollout(self, plans: ArrayLike, rng: np.random.Generator | None) -> list[Rollout]:
         """See `Task.rollout`, and the task for its outcome."""
