@@ -1,6 +1,7 @@
 """Algorithm 1 as a state machine, on a closed-form world."""
 
 import threading
+import warnings
 
 import numpy as np
 import pytest
@@ -375,7 +376,7 @@ def test_a_refused_plan_never_leaves_whenever_it_is_asked_for():
         RepeatingGenerator().fit(DEMOS, seed=0), FullStepAdapter(), DEMOS, GOAL, 0.015, gate=gate
     )
     gate.limit = 0.5
-    with pytest.raises(RobotLimitError, match="no plan for the condition"):
+    with pytest.raises(RobotLimitError, match=r"no plan for the goal \[0\.9, 0\.1\]: 0\.9 is"):
         session.ask()
     assert session.trials == ()
     gate.limit = 10.0
@@ -384,6 +385,34 @@ def test_a_refused_plan_never_leaves_whenever_it_is_asked_for():
     with pytest.raises(RobotLimitError, match="void it and ask again"):
         session.ask()
     session.void(1, "refused")
+
+
+class Beside(FullStepAdapter):
+    def _propose(self, goal_seen):
+        return goal_seen + np.array([0.01, 0.0])
+
+
+def test_a_refusal_names_the_goal_what_was_asked_for_and_that_it_is_too_far():
+    gate = Gate()
+    gate.limit = 0.5
+    with pytest.warns(UserWarning, match="outside"):
+        session = Session(
+            RepeatingGenerator().fit(DEMOS, seed=0), Beside(), DEMOS, [2.0, 0.1], 0.015, gate=gate
+        )
+    with pytest.raises(RobotLimitError) as refused:
+        session.ask()
+    assert str(refused.value).startswith(
+        "no plan for the goal [2.0, 0.1], asked of the generator as [2.01, 0.1], which lies far "
+        "outside the demonstrations (choose one nearer to them): "
+    )
+
+
+def test_a_goal_is_not_spoken_of_while_a_trial_waits(session):
+    session.ask()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        with pytest.raises(TrialStateError, match="trial 1 waits to be told"):
+            session.set_goal([2.0, 0.1])
 
 
 def test_a_plan_is_executed_once_and_what_was_cut_off_is_for_a_person_to_say(session):

@@ -223,6 +223,8 @@ class Session:
             ConfigurationError: The tolerance is not a positive number.
             TrialStateError: A trial for the goal before waits to be told.
         """
+        self._refresh()
+        self.refuse_open_trial("setting a goal")  # before anything is said of the goal
         checked = self.demonstrations.check_goal(goal)
         tolerance = _as_tolerance(self._tolerance if tolerance is None else tolerance)
         carried = self._carry_over if carry_over is None else carry_over
@@ -510,10 +512,9 @@ class Session:
 
     def _open(self, condition: Point, plan: Frames) -> None:
         """Write a new trial down, if its plan may be executed."""
-        at = (np.round(condition, 4) + 0.0).tolist()  # -0 is 0
-        verdict = self._check(plan, f"no plan for the condition {at}")
-        number = len(self._history.trials) + 1
         goal = self._current_goal()
+        verdict = self._check(plan, self._say_no_plan(goal.goal, condition))
+        number = len(self._history.trials) + 1
         expected = self.adapter.expect(condition, goal.goal, goal.tolerance)
         data = {
             "trial": number,
@@ -526,6 +527,16 @@ class Session:
             **self.log.keep_plan(number, plan),
         }
         self.log.append("asked", data)
+
+    def _say_no_plan(self, goal: Point, condition: Point) -> str:
+        """For which goal there is no plan, and why that is, where it is simply too far."""
+        place, at = ((np.round(point, 4) + 0.0).tolist() for point in (goal, condition))
+        said = f"no plan for the goal {place}"
+        if at != place:
+            said += f", asked of the generator as {at}"
+        if np.any(self.demonstrations.far_outside(goal)):
+            said += ", which lies far outside the demonstrations (choose one nearer to them)"
+        return said
 
     def _with_plan(self, number: int, *, is_new: bool) -> Trial:
         """A trial with its plan, unless the gate refuses it now."""

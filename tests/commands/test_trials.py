@@ -163,7 +163,7 @@ def test_a_check_moves_nothing(run, folder, driver, tmp_path):
     run("goal", folder, "0.9", "0.05")
     status, out, _ = run("ask", folder, "--check", "--yes", "--run", driver)
     assert status == 0
-    assert "it begins at joint1 0 rad, joint2 0 rad" in out
+    assert "it begins at joint1 0 rad, joint2 0 rad: move the arm there slowly first" in out
     assert "checked; nothing moved" in out
     assert not (tmp_path / "motions").exists()
     assert trials_in(folder)[0].stage is Stage.ASKED

@@ -47,6 +47,13 @@ def test_those_of_no_episode_are_named(recording, tmp_path):
         import_demonstrations(recording, outcomes=path)
 
 
+def test_where_there_is_no_table_it_is_said_what_writes_one(recording):
+    with pytest.raises(
+        InvalidDemonstrationsError, match=r"outcomes.csv with .* \(import --inspect writes one"
+    ):
+        import_demonstrations(recording)
+
+
 def test_given_numbers(recording):
     result = import_demonstrations(recording, outcomes=OUTCOMES)
     np.testing.assert_array_equal(result.demonstrations.outcomes_seen, list(OUTCOMES.values()))

@@ -148,7 +148,9 @@ def test_goal_far_outside_warns_and_says_how_far_and_a_near_one_is_silent():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         np.testing.assert_array_equal(demos.check_goal([1.05, 0.0]), [1.05, 0.0])
-    with pytest.warns(UserWarning, match=r"0\.5.*outside"):
+    with pytest.warns(
+        UserWarning, match=r"lies 0\.5 m outside the demonstrated x \(0\.8 to 1\); check"
+    ):
         demos.check_goal([1.5, 0.0])
 
 

@@ -213,6 +213,12 @@ def test_a_box_that_cannot_be_checked_refuses():
             report.require()
 
 
+def test_without_a_box_it_is_said_what_is_not_looked_at():
+    line = lines(check_plan(Plan(np.tile(HOME, (5, 1)), FORMAT), PANDA))["box"]
+    assert line.status == "unchecked"
+    assert "the table is not looked at: set tool_tip, workspace_low" in line.text
+
+
 def test_the_box_for_the_tool_tip():
     plan = Plan(swing(4, 0.5, 1.0), FORMAT)
     free = GateSettings(box_low=(-1, -1, 0), box_high=(1, 1, 1.5))

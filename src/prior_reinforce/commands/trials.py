@@ -155,7 +155,7 @@ class Ask:
                 manifest.format.names, trial.plan[0].round(4), manifest.format.units, strict=True
             )
         )
-        print(f"it begins at {begins}")
+        print(f"it begins at {begins}: move the arm there slowly first")
         out = self._out_of(trial.number)
         if out is not None:
             plan = Plan(trial.plan, manifest.format)

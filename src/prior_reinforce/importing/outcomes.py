@@ -101,7 +101,8 @@ def find_outcomes(
     raise InvalidDemonstrationsError(
         f"no outcomes for episodes {_listed([r.episode for r in recordings])}, and no recording "
         f"format says where the object landed; write {places[0] / OUTCOMES_FILE} with the columns "
-        f"episode,x,y, or name a table with --outcomes{hint}"
+        "episode,x,y (import --inspect writes one to fill in), or name a table with "
+        f"--outcomes{hint}"
     )
 
 

@@ -249,10 +249,14 @@ class Demonstrations:
         beyond = self.far_outside(goal)
         if np.any(beyond):
             low, high = self.outcomes_seen.min(axis=0), self.outcomes_seen.max(axis=0)
+            said = ", ".join(
+                f"{beyond[j]:.4g} {self.outcome_units[j]} outside the demonstrated {name} "
+                f"({low[j]:.4g} to {high[j]:.4g})"
+                for j, name in enumerate(self.outcome_names)
+                if beyond[j] > 0
+            )
             warnings.warn(
-                f"goal {_say(goal)} lies {_say(beyond)} {self.outcome_units} outside the "
-                f"demonstrated outcomes {_say(low)} to {_say(high)}; check its unit, or "
-                "demonstrate nearer to it",
+                f"goal {_say(goal)} lies {said}; check its unit, or demonstrate nearer to it",
                 stacklevel=2,
             )
         return goal

@@ -25,6 +25,10 @@ _BEYOND_SHOWN = 1.5
 maker publishes no limit. Ours: between demonstrations, a plan exceeds each of them by less."""
 _HOLD = 0.01
 """Held before and after the motion, in [s], so that the steps where they meet are seen."""
+_NO_BOX = (
+    "no box given, so the table is not looked at: set tool_tip, workspace_low and workspace_high "
+    "in [gate]"
+)
 
 Samples = Float[np.ndarray, "T d"]
 """Of d joints or axes at T times, 1 ms apart."""
@@ -222,7 +226,7 @@ class _Checks:
         """Whether the tool tip stays in the box, through forward kinematics at 1 kHz."""
         settings, limits, d = self._settings, self._limits, len(self._limits.joint_names)
         if settings.box_low is None or settings.box_high is None:
-            return _unchecked("box", "no box given")
+            return _unchecked("box", _NO_BOX)
         if limits.chain is None or len(self._columns) < d:
             why = f"it needs all {d} joints in the plan"
             if limits.chain is None:

@@ -99,6 +99,6 @@ class LimitReport:
         if refusals:
             raise RobotLimitError(
                 f"plan refused for {self.robot}: " + "; ".join(refusals) + ". It is never clamped "
-                "or retimed: choose another goal, learn another way (learn --align, or another "
-                "--generator or --seed), or demonstrate gentler motions"
+                "or retimed: choose another goal, learn another way (another --generator or "
+                "--seed), or demonstrate gentler motions"
             )
