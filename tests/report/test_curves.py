@@ -44,7 +44,9 @@ def test_what_is_said_of_a_waiting_trial_covers_no_other_words():
     figure = draw_errors(replace(record, trials=(*record.trials[:2], waiting)))
     figure.draw_without_rendering()
     (axes,) = figure.axes
-    boxes = [text.get_window_extent() for text in (*axes.texts, axes._right_title)]
+    # Three points apart.
+    texts = (*axes.texts, axes._right_title)
+    boxes = [text.get_window_extent().padded(1.5 * figure.dpi / 72) for text in texts]
     assert not any(a.overlaps(b) for a, b in combinations(boxes, 2))
 
 

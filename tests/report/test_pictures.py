@@ -135,8 +135,8 @@ def test_aims_have_a_legend_and_voided_ones_are_hollow():
     ]
 
 
-@pytest.mark.parametrize("across", [0.0, 0.003, 0.006, 0.009, 0.012])
+@pytest.mark.parametrize("across", [0.004, 0.005, 0.006])  # a tick comes to the very edge
 def test_no_tick_is_cut_off_after_both_directions_have_one_scale(across):
-    figure = draw_close_up(told(None, goal=(1.4, across)), aims=True)
+    figure = draw_close_up(told([0.0, 0.0], goal=(1.4, across), tolerance=0.02), aims=True)
     figure.draw_without_rendering()
     assert figure.get_tightbbox().x1 <= figure.get_figwidth()
