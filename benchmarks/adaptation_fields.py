@@ -28,6 +28,7 @@ import numpy as np
 from scipy import stats
 
 from prior_reinforce.adapters import make_adapter
+from prior_reinforce.errors import InvalidDemonstrationsError
 from prior_reinforce.experiments.evaluation import GOAL_SEED
 from prior_reinforce.experiments.fields import Change, Conditions, Field, FieldTask, measure
 from prior_reinforce.experiments.protocol import perceive_demonstrations, run_sequences
@@ -119,19 +120,33 @@ class Source:
         name = f"{self.task}-{self.demonstrations}{self.count or ''}-{self.labels}-{self.seen}"
         path = folder / f"{name}.npz"
         if not path.exists():
-            learned_on, seed = make_task(TASKS[self.task]), GOAL_SEED + self.labels
-            perception: Perception = (
-                HumanEye() if self.seen == "human" else make_perception(self.seen, seed=seed)
-            )
-            prior = perceive_demonstrations(
-                learned_on, self._prior(learned_on, tuning), perception, seed=seed
-            )
+            prior = self._seen(make_task(TASKS[self.task]), tuning)
+            seed = GOAL_SEED + self.labels
             generator = make_generator(GENERATOR).fit(prior, seed=self.labels)
             measure(make_task(self.task), generator, prior, name, seed=seed).save(path)
             print(f"measured {name}", flush=True)
         return Field.load(path)
 
-    def _prior(self, task: Task, tuning: bool) -> Demonstrations:
+    def _seen(self, task: Task, tuning: bool) -> Demonstrations:
+        """The demonstrations with their outcomes as they were seen.
+
+        In a draw of which two look the same, another is taken, and the eye's words begin elsewhere.
+        """
+        attempt = 0
+        while True:
+            seed = GOAL_SEED + self.labels + 1000 * attempt
+            perception: Perception = (
+                HumanEye() if self.seen == "human" else make_perception(self.seen, seed=seed)
+            )
+            prior = self._prior(task, tuning, attempt)
+            try:
+                return perceive_demonstrations(task, prior, perception, seed=seed)
+            except InvalidDemonstrationsError:
+                if not self.count:
+                    raise
+            attempt += 1
+
+    def _prior(self, task: Task, tuning: bool, attempt: int) -> Demonstrations:
         """The demonstrations as they were recorded."""
         if self.demonstrations in task.demonstration_sets:
             return task.demonstrations(self.demonstrations)
@@ -143,7 +158,7 @@ class Source:
             outcome_noise=np.concatenate([d.outcome_noise for d in both]),
         )
         seed = TUNING_SEED if tuning else GOAL_SEED
-        rng = np.random.default_rng([seed, ord(self.demonstrations)])
+        rng = np.random.default_rng([seed, ord(self.demonstrations), *[attempt] * (attempt > 0)])
         return pool.only(tuple(sorted(rng.permutation(pool.n)[: self.count or both[0].n])))
 
 
@@ -163,9 +178,10 @@ def own_sets(tuning: bool) -> Rows:
 
 
 def drawn(count: int) -> Callable[[bool], Rows]:
-    """Of basketball; in the draw E of three, two outcomes look the same."""
+    """Of basketball and curling."""
     return lambda tuning: [
-        [Source("basketball-v1", name, 10 if tuning else 0, count) for name in "FGHI"]
+        [Source(task, name, 10 if tuning else 0, count) for name in "FGHIJK"]
+        for task in ("basketball-v1", "curling")
     ]
 
 
