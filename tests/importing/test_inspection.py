@@ -86,14 +86,39 @@ def test_noise_that_breaks_a_limit_is_offered_smoothing(tmp_path):
         np.savez(tmp_path / f"{i}.npz", t=t, q=noisy, joint_names=JOINTS)
     panda = robot_limits("panda")
     found = inspect_recordings(tmp_path, robot=panda)
-    assert any(
-        r.startswith("the gate refuses acceleration") and r.endswith("try --smooth 20")
-        for r in found.remarks
-    )
-    assert inspect_recordings(tmp_path, robot=panda).remedy == "--smooth 20"
+    assert any(r.startswith("the gate refuses acceleration") for r in found.remarks)
+    assert any(r.endswith("--smooth 20 takes it out") for r in found.remarks)
+    assert found.remedy == "--smooth 20"
     smooth = inspect_recordings(tmp_path, robot=panda, preprocessing=Preprocessing(smooth=20.0))
     assert not any(r.refused for r in smooth.reports)
     assert smooth.remedy == ""
+
+
+@pytest.mark.parametrize(
+    ("rate", "sigma", "skipped", "faster", "dt"),
+    [
+        (100, 0.0, 0.0, 3.0, None),  # nothing but too fast
+        (30, 0.0, 0.0, 2.0, 0.04),  # too fast, at plans that --smooth 20 refuses
+        (30, 1e-3, 0.0, 1.0, 0.04),
+        (100, 1e-4, 0.8, 1.0, None),  # starts in motion
+        (100, 1e-4, 0.0, 3.0, None),  # noise, and too fast without it
+    ],
+)
+def test_smoothing_is_no_remedy_where_all_break_a_limit_after_it(
+    tmp_path, rate, sigma, skipped, faster, dt
+):
+    rng = np.random.default_rng(0)
+    for i in range(2):
+        t, q = sampled(i, rate)
+        t, q = t[t >= skipped] / faster, q[t >= skipped]
+        noisy = q + rng.normal(0, sigma, q.shape)
+        np.savez(tmp_path / f"{i}.npz", t=t, q=noisy, joint_names=JOINTS)
+    panda = robot_limits("panda")
+    found = inspect_recordings(tmp_path, robot=panda, preprocessing=Preprocessing(dt=dt))
+    assert all(report.refused for report in found.reports)
+    assert found.remedy == ""
+    if not sigma or dt is not None:
+        assert not any("--smooth" in remark for remark in found.remarks)
 
 
 def test_degrees_said_to_be_radians_break_every_limit_and_have_a_remedy(tmp_path):

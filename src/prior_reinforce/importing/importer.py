@@ -25,7 +25,12 @@ from prior_reinforce.errors import (
 )
 from prior_reinforce.importing import csv, hdf5, lerobot, npz, ros, zarr
 from prior_reinforce.importing.clock import TIME_UNITS
-from prior_reinforce.importing.inspection import Inspection, hold_against, say_shaking
+from prior_reinforce.importing.inspection import (
+    Inspection,
+    hold_against,
+    say_shaking,
+    would_smoothing_help,
+)
 from prior_reinforce.importing.outcomes import (
     find_outcomes,
     in_order,
@@ -175,7 +180,8 @@ def import_demonstrations(
     refuse_doubts(doubts)
     partial = how.get("episodes") is not None or how.get("leave_out") is not None
     outcomes_seen = outcomes_of(recordings, known, partial=partial)
-    done = preprocess(kept.recordings, kept.units, preprocessing or Preprocessing())
+    settings = preprocessing or Preprocessing()
+    done = preprocess(kept.recordings, kept.units, settings)
     refuse_copies(done.plans, [recording.episode for recording in recordings])
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the preview's remarks say it, with the option to give
@@ -187,7 +193,7 @@ def import_demonstrations(
             tuple(outcome_units) if outcome_units is not None else (),
             uncertainty_of(recordings, known),
         )
-    found = _inspection(kept, done, robot, gate)
+    found = _inspection(kept, done, settings, robot, gate)
     preview = Preview(f"{source.name} ({kind})", found, demonstrations, known.where)
     return ImportResult(demonstrations, preview.episodes, preview)
 
@@ -226,18 +232,24 @@ def inspect_recordings(
     """
     recordings, _ = _read(Path(source), how)
     kept = select(recordings, how.get("joints"), names, units, plan_units)
-    done = preprocess(kept.recordings, kept.units, preprocessing or Preprocessing())
-    found = _inspection(kept, done, robot, gate)
+    settings = preprocessing or Preprocessing()
+    done = preprocess(kept.recordings, kept.units, settings)
+    found = _inspection(kept, done, settings, robot, gate)
     return replace(found, doubts=(*_doubts_of(recordings), *kept.doubts))
 
 
 def _inspection(
-    kept: Selection, done: Preprocessed, robot: RobotLimits | None, gate: GateSettings | None
+    kept: Selection,
+    done: Preprocessed,
+    settings: Preprocessing,
+    robot: RobotLimits | None,
+    gate: GateSettings | None,
 ) -> Inspection:
     reports = hold_against(kept, done, robot, gate)
     name = None if robot is None else robot.robot
     shaking = say_shaking(kept, done, robot) if reports else ""
-    return Inspection(kept, done, name, reports, shaking)
+    helps = bool(shaking) and would_smoothing_help(kept, reports, settings, robot, gate)
+    return Inspection(kept, done, name, reports, shaking, helps)
 
 
 def appended(before: Demonstrations, more: Demonstrations) -> Demonstrations:

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from prior_reinforce.errors import InvalidPlanError
+from prior_reinforce.errors import ConfigurationError, InvalidPlanError
 from prior_reinforce.importing.noise import acceleration_of
-from prior_reinforce.importing.preprocessing import Preprocessed, Selection
+from prior_reinforce.importing.preprocessing import (
+    Preprocessed,
+    Preprocessing,
+    Selection,
+    preprocess,
+)
 from prior_reinforce.importing.recording import Recording
 from prior_reinforce.importing.units import Doubt, guess_unit, say_names
 from prior_reinforce.plans.interpolation import RATE
@@ -24,8 +29,6 @@ _SMOOTH = f"--smooth {_SMOOTH_HZ}"
 
 _MUCH_NOISE = 0.25
 """Part of a limit that noise alone takes up, from which on it is said. Ours."""
-_SHAKEN = frozenset({"acceleration", "jerk"})
-"""What noise breaks first."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +45,8 @@ class Inspection:
     """What the gate says of each; empty where no robot is named."""
     shaking: str = ""
     """What noise alone makes of limits, where that is much; empty where it is little."""
+    smoothing_helps: bool = False
+    """Whether all demonstrations break a limit, and smoothing brings one or more within them."""
     doubts: tuple[Doubt, ...] = ()
     """Units, times and names of channels that are only guessed."""
 
@@ -53,10 +58,8 @@ class Inspection:
     @property
     def remarks(self) -> tuple[str, ...]:
         """What a person should know, the most important first: limits, ends, gaps, ..."""
-        broken = self._broken()
-        told = any(_SMOOTH in remark for remark in broken)
-        shaking = (self.shaking,) if self.shaking and not told else ()
-        return (*self.kept.remarks, *broken, *shaking, *self.done.remarks)
+        shaking = (self.shaking,) if self.shaking else ()
+        return (*self.kept.remarks, *self._broken(), *shaking, *self.done.remarks)
 
     @property
     def remedy(self) -> str:
@@ -66,7 +69,7 @@ class Inspection:
         broken = {line.check for r in self.reports for line in r.lines if line.status == "refuse"}
         if "position" in broken:
             return "--units deg" if self._is_degrees() else ""
-        return _SMOOTH if broken & _SHAKEN and not self._is_smooth() else ""
+        return _SMOOTH if self.smoothing_helps else ""
 
     def _is_degrees(self) -> bool:
         """Whether angles that are farther than a joint turns are not where they are degrees."""
@@ -150,15 +153,9 @@ class Inspection:
             for line in report.lines:
                 if line.status == "refuse":
                     said.setdefault(line.check, []).append(f"{recording.episode} ({line.text})")
-        shaky = f"; if that is noise, try {_SMOOTH}"
         return [
-            f"the gate refuses {check}: {', '.join(episodes)}"
-            f"{shaky if check in _SHAKEN and not self._is_smooth() else ''}"
-            for check, episodes in said.items()
+            f"the gate refuses {check}: {', '.join(episodes)}" for check, episodes in said.items()
         ]
-
-    def _is_smooth(self) -> bool:
-        return self.done.smoothed is not None
 
     def _rate(self) -> str:
         recorded = _span((1 / recording.period for recording in self.recordings), ".4g")
@@ -258,6 +255,26 @@ def say_shaking(kept: Selection, done: Preprocessed, robot: RobotLimits | None) 
     if share < _MUCH_NOISE:
         return ""
     return f"noise alone takes up about {share:.0%} of {where}: {_SMOOTH} takes it out"
+
+
+def would_smoothing_help(
+    kept: Selection,
+    reports: Sequence[LimitReport],
+    settings: Preprocessing,
+    robot: RobotLimits | None,
+    gate: GateSettings | None,
+) -> bool:
+    """Whether the gate refuses all demonstrations, but not all of them once they are smoothed.
+
+    It is tried: what noise breaks, a motion that is too fast or starts at speed breaks as well.
+    """
+    if not reports or not all(report.refused for report in reports):
+        return False
+    try:
+        done = preprocess(kept.recordings, kept.units, replace(settings, smooth=_SMOOTH_HZ))
+    except ConfigurationError:  # recordings too short to be smoothed
+        return False
+    return not all(report.refused for report in hold_against(kept, done, robot, gate))
 
 
 def in_rows(rows: Mapping[str, str], remarks: Sequence[str]) -> str:
