@@ -97,6 +97,31 @@ def test_new_hardware_keeps_what_the_generator_gets_wrong_and_forgets_the_shift(
     assert sure.trials == pytest.approx(1 + 1.24 * (1 - sure.p_hit))
 
 
+@pytest.mark.parametrize("before", [0, 20])
+def test_a_change_that_is_said_is_expected_however_long_nothing_had_changed(before):
+    adapter, shift = started(), np.array([0.06, -0.04])
+    rng = np.random.default_rng(1)
+    for condition in rng.uniform(CORNERS.min(axis=0), CORNERS.max(axis=0), size=(before, 2)):
+        adapter.observe(condition, condition, Reading.measured([0.0, 0.0], 0.005))
+    adapter.change_hardware()
+    assert adapter.expect(GOAL, GOAL, TOLERANCE).p_hit < 0.3
+    throw(adapter, GOAL, shift)
+    assert np.linalg.norm(adapter.propose(GOAL) + shift - GOAL) < 0.025
+
+
+def test_what_a_demonstration_would_teach_is_what_adding_it_takes_off():
+    places = np.random.default_rng(0).uniform([0.8, -0.2], [1.0, 0.2], size=(40, 2))
+    new = np.array([[0.9, 0.1], [1.05, 0.25], CORNERS[2]])
+    adapter, more = started(), started(np.vstack([CORNERS, new[0]]))
+    more._normalisation = adapter._normalisation  # a seventh outcome changes the spread a little
+    more._demonstrated = adapter._normalisation.apply(np.vstack([CORNERS, new[0]]))
+    more._mix()
+    before, after = (a._unknown(adapter._normalisation.apply(places)) for a in (adapter, more))
+    gains = adapter.gain(new, places, demonstrations=True)
+    assert gains[0] == pytest.approx(1 - after / before, abs=1e-9)
+    assert gains[2] == 0  # there is one already
+
+
 def test_labels_that_are_off_are_found_as_the_mixture_that_they_make():
     """Where labels are off the field is their spline: four readings tell of all of it."""
     noise = np.full_like(CORNERS, 0.03)
@@ -202,7 +227,7 @@ def many(adapter, n):
 
 def test_two_hundred_trials_are_merged_and_hardly_missed(monkeypatch):
     merged = many(started(), 200)
-    assert len(merged._memory.hardware) <= 24
+    assert len(merged._memory.changes) <= 24
     monkeypatch.setattr(bayesian, "_TRIALS_KEPT", 10**6)
     whole = many(started(), 60)
     goals = np.random.default_rng(0).uniform([0.83, -0.17], [0.97, 0.17], size=(20, 2))
@@ -219,7 +244,7 @@ def test_trials_of_different_hardware_are_never_merged():
     adapter = many(started(), 20)
     adapter.change_hardware()
     many(adapter, 40)
-    counts = np.bincount(adapter._memory.hardware)
+    counts = np.bincount(adapter._memory.changes)
     assert np.all(counts > 0)
     assert len(counts) == 2
 
@@ -243,7 +268,15 @@ def test_a_throw_teaches_more_than_a_demonstration_where_hardware_changed():
     region = np.random.default_rng(0).uniform([0.8, -0.2], [1.0, 0.2], size=(40, 2))
     throws, shown = (adapter.gain(region, region, demonstrations=d) for d in (False, True))
     assert throws.max() > 3 * shown.max()
-    assert np.all(shown > 0)
+    assert np.all(throws > 0)
+
+
+def test_a_demonstration_teaches_where_there_is_none_and_not_beside_another():
+    adapter = started()
+    region = np.random.default_rng(0).uniform([0.8, -0.2], [1.2, 0.2], size=(40, 2))
+    shown = adapter.gain(np.array([[1.2, 0.0], [0.9, 0.01]]), region, demonstrations=True)
+    assert shown[0] > 0.05
+    assert shown[0] > shown[1]
 
 
 def test_proposals_depend_on_what_was_observed_alone():
@@ -275,8 +308,10 @@ def test_metres_and_milliseconds_are_as_good_as_metres_and_seconds():
         ({"label_sd": (0.1, -0.1)}, "label_sd"),
         ({"rough_reach": 0.0}, "rough_reach"),
         ({"execution_sd": float("nan")}, "execution_sd"),
-        ({"outlier": 0.7}, "outlier"),
-        ({"p_changed": 0.7}, "p_changed"),
+        ({"outlier": 1.7}, "outlier"),
+        ({"p_changed": 1.0}, "p_changed"),
+        ({"hardware_sd": (0.1,)}, "hardware_sd"),
+        ({"hardware_sd": 0.1}, "hardware_sd"),
     ],
 )
 def test_settings_out_of_range_are_refused(settings, word):

@@ -5,6 +5,7 @@ Ours; the paper's adapter is in `gaussian_process`. See `BayesianAdapter` for th
 
 from __future__ import annotations
 
+import copy
 import functools
 import itertools
 import math
@@ -81,15 +82,23 @@ class BayesianConfig:
         """Check the settings.
 
         Raises:
-            ConfigurationError: A setting is not positive, or a probability of 1 or more.
+            ConfigurationError: A setting is not positive, a probability is 1 or more, or the
+                hardware has not two.
         """
+        for name in ("label_sd", "hardware_sd"):
+            if not isinstance(getattr(self, name), tuple):
+                raise ConfigurationError(f"{name} must be several, got {getattr(self, name)}")
         for name, value in vars(self).items():
             values = value if isinstance(value, tuple) else (value,)
             if not (values and all(math.isfinite(v) and v > 0 for v in values)):
                 raise ConfigurationError(f"{name} must be positive, got {value}")
         for name in ("outlier", "p_own", "p_changed"):
-            if (value := getattr(self, name)) >= 0.5:
-                raise ConfigurationError(f"{name} must be below 0.5, got {value}")
+            if (value := getattr(self, name)) >= 1.0:
+                raise ConfigurationError(f"{name} must be below 1, got {value}")
+        if len(self.hardware_sd) != 2:
+            raise ConfigurationError(
+                f"hardware_sd must be two, unchanged and changed, got {self.hardware_sd}"
+            )
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,8 +106,8 @@ class _Memory:
     """What was read of the displacement at n conditions, in normalised units."""
 
     conditions: Points
-    hardware: Int[np.ndarray, " n"]
-    """How often something had been changed."""
+    changes: Int[np.ndarray, " n"]
+    """How often a change of hardware had been said."""
     low: Points
     high: Points
     variance: Points
@@ -110,12 +119,12 @@ class _Memory:
         return cls(none, np.empty(0, int), none, none, none)
 
     def with_one(
-        self, condition: Point, hardware: int, low: Point, high: Point, variance: Point
+        self, condition: Point, changes: int, low: Point, high: Point, variance: Point
     ) -> _Memory:
         """The same and one more."""
         return _Memory(
             np.vstack([self.conditions, condition]),
-            np.append(self.hardware, hardware),
+            np.append(self.changes, changes),
             np.vstack([self.low, low]),
             np.vstack([self.high, high]),
             np.vstack([self.variance, variance]),
@@ -125,7 +134,7 @@ class _Memory:
         """Some of them."""
         return _Memory(
             self.conditions[which],
-            self.hardware[which],
+            self.changes[which],
             self.low[which],
             self.high[which],
             self.variance[which],
@@ -143,12 +152,12 @@ class BayesianAdapter(Adapter):
     with independent Gaussian terms of prior mean 0:
 
         e   sd s_i              by how much the outcome of demonstration i is off: the noise that it
-                                states, and 0.03 or 0.1 more
+                                states (mean over components), and 0.03 or 0.1 more
         f   sd a, reach 0.5     what the generator gets wrong in ways of its own: 0, or with
                                 probability 0.1 0.3
         u   sd 0.025, reach 0.32    what lies between the demonstrations
         h   sd b, reach 2.5     what is different from their day: 0.03, or with probability 0.2 0.3;
-                                anew for every change of hardware
+                                0.3, anew, whenever a change of hardware is said
         noise  sd 0.02          execution
 
     f, u and h are Gaussian processes with squared-exponential kernels. w are the weights of a
@@ -189,11 +198,11 @@ class BayesianAdapter(Adapter):
 
     def _start(self, demonstrations: Demonstrations) -> None:
         self._normalisation = Normalisation.of(demonstrations)
-        outcomes, noise = demonstrations.outcomes_seen, demonstrations.outcome_noise
-        self._weights = smooth_weights(outcomes, noise=noise)
-        self._stated = np.mean((noise / self._normalisation.scale) ** 2, axis=1)
-        self._memory, self._now = _Memory.empty(outcomes.shape[1]), 0
+        self._demonstrated = self._normalisation.apply(demonstrations.outcomes_seen)
+        self._noise = demonstrations.outcome_noise / self._normalisation.scale
+        self._memory, self._now = _Memory.empty(demonstrations.outcome_dim), 0
         self._posterior: Posterior | None = None
+        self._mix()
 
     def change_hardware(self) -> None:
         """What has changed since the demonstrations is unknown anew; the rest stays known."""
@@ -212,7 +221,7 @@ class BayesianAdapter(Adapter):
             (reading.sd / scale) ** 2 + self.config.execution_sd**2,
         )
         self._posterior = None
-        if len(self._memory.hardware) > _TRIALS_KEPT:
+        if len(self._memory.changes) > _TRIALS_KEPT:
             self._merge()
 
     def _propose(self, goal_seen: Point) -> Point:
@@ -251,37 +260,59 @@ class BayesianAdapter(Adapter):
             candidates: Conditions that a trial might be made with, shape (n, k), in the outcomes'
                 units.
             over: Conditions whose displacements are to be known, shape (m, k).
-            demonstrations: The readings are of new demonstrations, which say nothing of what has
-                changed, instead of trials.
+            demonstrations: Demonstrations with these outcomes would be added instead of trials; the
+                generator then mixes anew, which can also make less known.
 
         Returns:
-            Share of the mean variance over those places that is gone afterwards; exact for a
-            number read to 0.1 spreads, which is about a word by eye.
+            Share of the mean variance over those places that is gone afterwards; of a trial exact
+            for a number read to 0.1 spreads, which is about a word by eye.
         """
-        known, share = self._known(), self._known().model_weights
         at, places = self._normalisation.apply(candidates), self._normalisation.apply(over)
-        here = (self._memory.hardware == self._now)[None]
-        cross = self._covariance(at, self._memory.conditions, here & (not demonstrations))
-        to = self._covariance(places, self._memory.conditions, here)
-        now = np.full((1, len(places)), not demonstrations)
-        own = self._variance(at) - (self._hardware[:, None] if demonstrations else 0.0)
-        gone, left = np.zeros(len(at)), 0.0
+        left = self._unknown(places)
+        if demonstrations:
+            told = [self._with_demonstration(at[[i]])._unknown(places) for i in range(len(at))]
+            return 1.0 - np.array(told) / left
+        known, share = self._known(), self._known().model_weights
+        memory, noise = self._memory, self.config.execution_sd**2 + _TEACHING_SD**2
+        cross = self._covariance(at, self._now, memory.conditions, memory.changes)
+        to = self._covariance(places, self._now, memory.conditions, memory.changes)
+        between = self._covariance(at, self._now, places, self._now)
+        gone = np.zeros(len(at))
         for precision in np.moveaxis(known.precision, 1, 0):  # for each component
             explained = cross @ precision
-            covariance = self._covariance(at, places, now) - explained @ np.swapaxes(to, 1, 2)
-            variance = own - np.sum(explained * cross, axis=-1)
-            noise = self.config.execution_sd**2 + _TEACHING_SD**2
+            covariance = between - explained @ np.swapaxes(to, 1, 2)
+            variance = self._variance(at, self._now) - np.sum(explained * cross, axis=-1)
             gone += share @ (np.square(covariance).mean(axis=-1) / (variance + noise))
-            unknown = self._variance(places) - np.sum((to @ precision) * to, axis=-1)
-            left += float(share @ unknown.mean(axis=-1))
         return np.asarray(gone / left)
+
+    def _unknown(self, places: Float[np.ndarray, "p k"]) -> float:
+        """Mean variance of a trial's displacement there, summed over components."""
+        _, variance = self._predict(places)
+        return float(self._known().model_weights @ variance.sum(axis=1).mean(axis=1))
+
+    def _with_demonstration(self, outcome: Float[np.ndarray, "1 k"]) -> BayesianAdapter:
+        """The same with one demonstration more, seen as the others are on average."""
+        if np.any(np.all(np.isclose(outcome, self._demonstrated), axis=1)):
+            return self  # a second one there would be refused
+        other = copy.copy(self)
+        other._demonstrated = np.vstack([self._demonstrated, outcome])
+        other._noise = np.vstack([self._noise, self._noise.mean(axis=0)])
+        other._mix()
+        return other
+
+    def _mix(self) -> None:
+        """Know by which weights demonstrations are mixed, and how far they are off."""
+        outcomes, scale = self._normalisation.undo(self._demonstrated), self._normalisation.scale
+        self._weights = smooth_weights(outcomes, noise=self._noise * scale)
+        self._stated = np.mean(self._noise**2, axis=1)
+        self._posterior = None
 
     def _known(self) -> Posterior:
         """The posterior of now."""
         if self._posterior is None:
             memory, config = self._memory, self.config
-            same = memory.hardware[:, None] == memory.hardware
-            covariance = self._covariance(memory.conditions, memory.conditions, same)
+            at = memory.conditions, memory.changes
+            covariance = self._covariance(*at, *at)
             readings = Readings(memory.low.T, memory.high.T, memory.variance.T, config.outlier)
             self._posterior = infer(covariance, readings, self._log_prior)
         return self._posterior
@@ -295,63 +326,75 @@ class BayesianAdapter(Adapter):
         known, memory = self._known(), self._memory
         share = known.model_weights
         tau, nu = (np.einsum("m,mkn->nk", share, of) for of in (known.tau, known.nu))
-        old = np.arange(len(memory.hardware) - _LATEST)
+        old = np.arange(len(memory.changes) - _LATEST)
         sites = memory.only(old)
         number = nu[old] / tau[old]
         sites = replace(sites, low=number, high=number, variance=1.0 / tau[old])
         told = np.any(tau[old] > _TELLS_NOTHING, axis=1)
         sites = sites.only(told)
-        while len(sites.hardware) > _MERGED_TO - _LATEST:
+        while len(sites.changes) > _MERGED_TO - _LATEST:
             i, j = _closest(sites)
             weight = np.sum(1.0 / sites.variance[[i, j]], axis=1)
             both = sites.conditions[[i, j]]
             middle = np.average(both, axis=0, weights=weight)
-            precision = 1.0 / (sites.variance[[i, j]] + self._apart(both, middle)[:, None])
+            precision = 1.0 / (
+                sites.variance[[i, j]] + self._apart(both, middle, int(sites.changes[i]))[:, None]
+            )
             number = np.sum(precision * sites.low[[i, j]], axis=0) / precision.sum(axis=0)
-            hardware, variance = sites.hardware[i], 1.0 / precision.sum(axis=0)
-            rest = sites.only(np.setdiff1d(np.arange(len(sites.hardware)), [i, j]))
-            sites = rest.with_one(middle, hardware, number, number, variance)
-        latest = memory.only(np.arange(len(memory.hardware) - _LATEST, len(memory.hardware)))
+            changes, variance = sites.changes[i], 1.0 / precision.sum(axis=0)
+            rest = sites.only(np.setdiff1d(np.arange(len(sites.changes)), [i, j]))
+            sites = rest.with_one(middle, changes, number, number, variance)
+        latest = memory.only(np.arange(len(memory.changes) - _LATEST, len(memory.changes)))
         self._memory = _Memory(
             *(
                 np.concatenate([getattr(part, name) for part in (sites, latest)])
-                for name in ("conditions", "hardware", "low", "high", "variance")
+                for name in ("conditions", "changes", "low", "high", "variance")
             )
         )
         self._posterior = None
 
-    def _apart(self, conditions: Points, other: Point) -> Float[np.ndarray, " n"]:
+    def _apart(self, conditions: Points, other: Point, change: int) -> Float[np.ndarray, " n"]:
         """Prior variance of the difference between displacements here and there."""
         there = other[None]
-        cross = self._covariance(conditions, there, np.ones((1, 1), bool))[..., 0]
-        variance = self._variance(conditions) + self._variance(there) - 2.0 * cross
-        return np.asarray(self._known().model_weights @ variance)
+        cross = self._covariance(conditions, change, there, change)[..., 0]
+        variance = self._variance(conditions, change) + self._variance(there, change)
+        return np.asarray(self._known().model_weights @ (variance - 2.0 * cross))
 
     def _covariance(
-        self, a: Float[np.ndarray, "p k"], b: Points, share_hardware: Bool[np.ndarray, "_ n"]
+        self,
+        a: Float[np.ndarray, "p k"],
+        after_a: Int[np.ndarray, " p"] | int,
+        b: Points,
+        after_b: Int[np.ndarray, " n"] | int,
     ) -> Float[np.ndarray, "m p n"]:
-        """Prior covariance of displacements, the hardware's part where both share it."""
+        """Prior covariance of displacements at a and b, each after so many changes of hardware."""
         config = self.config
         square = np.square(a[:, None] - b[None]).sum(axis=-1)
         w_a, w_b = self._mixed_by(a), self._mixed_by(b)
         stated = (w_a * self._stated) @ w_b.T
         rough = config.rough_sd**2 * np.exp(-0.5 * square / config.rough_reach**2)
         own = np.exp(-0.5 * square / config.own_reach**2)
-        hardware = np.exp(-0.5 * square / config.hardware_reach**2) * share_hardware
+        of_a, of_b = np.broadcast_to(after_a, len(a)), np.broadcast_to(after_b, len(b))
+        shared = np.where(of_a[:, None] == of_b, self._hardware_of(of_b)[:, None], 0.0)
         return np.asarray(
             stated
             + rough
             + self._label[:, None, None] * (w_a @ w_b.T)
             + self._own[:, None, None] * own
-            + self._hardware[:, None, None] * hardware
+            + shared * np.exp(-0.5 * square / config.hardware_reach**2)
         )
 
-    def _variance(self, at: Float[np.ndarray, "p k"]) -> Float[np.ndarray, "m p"]:
+    def _hardware_of(self, changes: Int[np.ndarray, " n"]) -> Float[np.ndarray, "m n"]:
+        """b^2: before anything is said to be changed it is one of two, afterwards the greater."""
+        return np.where(changes == 0, self._hardware[:, None], self.config.hardware_sd[1] ** 2)
+
+    def _variance(self, at: Float[np.ndarray, "p k"], changes: int) -> Float[np.ndarray, "m p"]:
         """Prior variance of the displacement of a trial."""
         squares = np.square(self._mixed_by(at))
         of_all = self.config.rough_sd**2 + squares @ self._stated
         of_each = self._label[:, None] * squares.sum(axis=1)
-        return np.asarray(of_all + of_each + (self._own + self._hardware)[:, None])
+        hardware = self._hardware_of(np.full(len(at), changes))
+        return np.asarray(of_all + of_each + self._own[:, None] + hardware)
 
     def _mixed_by(self, at: Float[np.ndarray, "p k"]) -> Float[np.ndarray, "p N"]:
         """w, how much each demonstration counts."""
@@ -362,11 +405,11 @@ class BayesianAdapter(Adapter):
     ) -> tuple[Float[np.ndarray, "m k p"], Float[np.ndarray, "m k p"]]:
         """Mean and variance of the displacement of a trial now, under each model."""
         posterior = self._known()
-        same = (self._memory.hardware == self._now)[None]
-        cross = self._covariance(at, self._memory.conditions, same)[:, None]
+        memory = self._memory
+        cross = self._covariance(at, self._now, memory.conditions, memory.changes)[:, None]
         mean = (cross @ posterior.weights[..., None])[..., 0]
         explained = np.sum((cross @ posterior.precision) * cross, axis=-1)
-        variance = self._variance(at)[:, None] - explained
+        variance = self._variance(at, self._now)[:, None] - explained
         return mean, np.maximum(variance, 1e-10)
 
     def _mixed(self, means: Float[np.ndarray, "m k p"]) -> Float[np.ndarray, "p k"]:
@@ -377,7 +420,7 @@ class BayesianAdapter(Adapter):
 def _closest(memory: _Memory) -> tuple[int, int]:
     """The two that are closest together, of one hardware."""
     square = np.square(memory.conditions[:, None] - memory.conditions[None]).sum(axis=-1)
-    square[memory.hardware[:, None] != memory.hardware] = np.inf
+    square[memory.changes[:, None] != memory.changes] = np.inf
     square[np.tril_indices(len(square))] = np.inf
     i, j = np.unravel_index(np.argmin(square), square.shape)
     return int(i), int(j)

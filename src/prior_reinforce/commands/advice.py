@@ -71,15 +71,24 @@ class Advise:
                 f"({throws[throw]:.0%} of what is unknown; half of all places teach less than "
                 f"{np.median(throws):.0%})"
             )
+            shows = bool(shown[demonstration] > 0)
             print(
                 f"the demonstration that teaches most: one that ends at {at(demonstration)} "
                 f"({shown[demonstration]:.0%} of what is unknown)"
+                if shows
+                else "one more demonstration here would teach nothing that trials do not"
             )
             if goals.shape[1] == 2:
                 from prior_reinforce.report.advice import draw_advice
 
                 picture = draw_advice(
-                    out, goals, p, outcomes, goals[throw], goals[demonstration], (names, units)
+                    out,
+                    goals,
+                    p,
+                    outcomes,
+                    goals[throw],
+                    goals[demonstration] if shows else None,
+                    (names, units),
                 )
                 print(f"picture: {picture}")
 

@@ -32,7 +32,7 @@ def draw_advice(
     p_hit: Float[np.ndarray, " n"],
     demonstrated: Float[np.ndarray, "N k"],
     throw: Point,
-    demonstration: Point,
+    demonstration: Point | None,
     outcome: tuple[Sequence[str], Sequence[str]],
 ) -> Path:
     """Draw it.
@@ -43,7 +43,7 @@ def draw_advice(
         p_hit: Probability that a first throw hits each.
         demonstrated: Outcomes of the demonstrations.
         throw: Goal of the throw that teaches most.
-        demonstration: Where the demonstration that teaches most ends.
+        demonstration: Where the demonstration that teaches most ends; None if none would teach.
         outcome: Names and units of the two components.
 
     Returns:
@@ -51,9 +51,7 @@ def draw_advice(
     """
     names, units = outcome
     scale = drawn_scale(units)
-    goals, demonstrated, throw, demonstration = (
-        scale * points for points in (goals, demonstrated, throw, demonstration)
-    )
+    goals, demonstrated, throw = (scale * points for points in (goals, demonstrated, throw))
     x, y = (np.unique(goals[:, j]) for j in range(2))
     # As high as the region at this width, and what stands below it.
     height = 4.8 * np.ptp(x) / np.ptp(y) if units[0] == units[1] else 3.0
@@ -68,11 +66,13 @@ def draw_advice(
     bar.set_label("probability that\na first throw hits", color=INK_SOFT)
     bar.ax.yaxis.set_major_formatter(PercentFormatter(1.0))
     bar.ax.tick_params(labelsize=9, colors=INK_SOFT)
-    marks = (  # the diamond fits into the star, for both are often at one place
+    marks = [
         (demonstrated, "o", 42, DEMONSTRATION, "demonstrated"),
         (throw[None], "*", 260, GOAL, "throw that teaches most"),
-        (demonstration[None], "D", 26, HIT, "demonstration that teaches most"),
-    )
+    ]
+    if demonstration is not None:  # the diamond fits into the star, for both are often at one place
+        shown = scale * demonstration[None]
+        marks.append((shown, "D", 26, HIT, "demonstration that teaches most"))
     for points, mark, size, colour, label in marks:
         axes.scatter(
             points[:, 1], points[:, 0], marker=mark, s=size, color=colour,
