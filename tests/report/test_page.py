@@ -186,8 +186,9 @@ def test_a_goal_not_tried_yet_has_a_report(tmp_path):
 
 def test_goals_keep_their_numbers_and_only_what_shows_something_is_drawn(tmp_path):
     records = [replace(told([0.05, 0.0]), number=3), replace(told(None), number=7)]
-    (tmp_path / "goal-2-errors.png").write_bytes(b"of an earlier report")
-    (tmp_path / "goal-2-photo.png").write_bytes(b"mine")
+    mine = ("goal-2-photo.png", "goal-of-my-thesis-plans.png")
+    for name in ("report.html", "goal-2-errors.png", *mine):
+        (tmp_path / name).write_bytes(b"there before")
     drawn = []
     path = write_report(
         tmp_path, records, title="x", note="No plan was given for goal 5.",
@@ -202,8 +203,14 @@ def test_goals_keep_their_numbers_and_only_what_shows_something_is_drawn(tmp_pat
     assert names == {
         *(f"goal-3-{name}.png" for name in ("table", "landings", "aims", "errors", "plans")),
         *(f"goal-7-{name}.png" for name in ("table", "aims", "plans")),
-        "goal-2-photo.png",
+        *mine,
     }
+
+
+def test_where_there_was_no_report_nothing_is_removed(tmp_path):
+    (tmp_path / "goal-12-plans.png").write_bytes(b"mine")
+    write_report(tmp_path, [told([0.05, 0.0])], title="x")
+    assert (tmp_path / "goal-12-plans.png").read_bytes() == b"mine"
 
 
 def test_a_large_film_lies_beside_the_page(records, tmp_path, monkeypatch):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -33,6 +34,7 @@ LARGEST_INLINE_VIDEO = 3_000_000
 """[bytes]; a larger film lies beside the page instead of inside it, so that the page opens fast."""
 
 _PICTURES = ("table", "landings", "aims", "errors", "plans")
+_OF_A_GOAL = re.compile(rf"goal-\d+-(?:{'|'.join(_PICTURES)})\.png")
 """Of a goal, `goal-3-table.png`; those that show something are drawn."""
 
 
@@ -109,9 +111,9 @@ def write_report(
         facts=dict(facts or {}),
     )
     drawn = {f"{s['anchor']}-{name}.png" for s in sections for name in s["pictures"]}
-    for name in _PICTURES:
-        for old in folder.glob(f"goal-*-{name}.png"):
-            if old.name not in drawn:
+    if (folder / "report.html").exists():  # an earlier one, whose pictures are not to be mixed in
+        for old in folder.glob("goal-*.png"):
+            if _OF_A_GOAL.fullmatch(old.name) and old.name not in drawn:
                 old.unlink(missing_ok=True)
     return write(folder / "report.html", page)
 
