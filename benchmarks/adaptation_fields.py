@@ -74,6 +74,8 @@ ADAPTERS = {
     "Bayesian optimisation": (f"{RIVALS}:BayesianOptimisationAdapter", False),
 }
 """By label: choice, and whether the trials of earlier goals serve it."""
+_DRAWS = 50
+"""Of demonstrations, until no two of them look the same."""
 SEARCHES = ("CMA-ES", "Bayesian optimisation")
 """Far behind, and slow: tried where nothing is changed, and on changed hardware, alone."""
 
@@ -132,8 +134,7 @@ class Source:
 
         In a draw of which two look the same, another is taken, and the eye's words begin elsewhere.
         """
-        attempt = 0
-        while True:
+        for attempt in range(_DRAWS):
             seed = GOAL_SEED + self.labels + 1000 * attempt
             perception: Perception = (
                 HumanEye() if self.seen == "human" else make_perception(self.seen, seed=seed)
@@ -142,9 +143,9 @@ class Source:
             try:
                 return perceive_demonstrations(task, prior, perception, seed=seed)
             except InvalidDemonstrationsError:
-                if not self.count:
+                if not self.count or attempt == _DRAWS - 1:
                     raise
-            attempt += 1
+        raise AssertionError("range is empty")
 
     def _prior(self, task: Task, tuning: bool, attempt: int) -> Demonstrations:
         """The demonstrations as they were recorded."""
@@ -178,8 +179,10 @@ def own_sets(tuning: bool) -> Rows:
 
 
 def drawn(count: int) -> Callable[[bool], Rows]:
-    """Of basketball: three of curling lose stones where they have to extrapolate. At most ten: of
-    all twelve, two always look the same by eye."""
+    """Of basketball: three of curling lose stones where they have to extrapolate.
+
+    At most ten: of all twelve, two always look the same by eye.
+    """
     return lambda tuning: [
         [Source("basketball-v1", name, 10 if tuning else 0, count) for name in "FGHIJKLMNO"]
     ]

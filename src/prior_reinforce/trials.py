@@ -101,7 +101,7 @@ class Trial:
     note: str = ""
     """Why it was voided."""
     outdated: bool = False
-    """Whether a reading that it was planned from was amended or voided since."""
+    """Whether a reading that it was planned from was amended or voided while it waited."""
     p_hit: float | None = None
     """Probability that it hits, as its adapter saw it; None from one that expects nothing."""
     expected_trials: float | None = None

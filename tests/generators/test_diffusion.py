@@ -41,7 +41,7 @@ def misses(generator: Timed, demos: Demonstrations) -> np.ndarray:
     return np.sqrt(np.mean((generator.generate(demos.outcomes_seen) - demos.plans) ** 2, 1)) / span
 
 
-def test_two_demonstrations_come_back_at_their_own_outcomes(throws):
+def test_two_demonstrations_come_back_with_the_correction(throws):
     demos = throws(2, 62)
     assert misses(fitted(demos), demos).max() < 0.01
 
@@ -57,7 +57,7 @@ def test_demonstrations_come_back_and_between_them_the_direction_follows_the_con
     assert plan[70, 2] == pytest.approx(middle[0, 1], abs=0.1 * np.ptp(demos.outcomes_seen[:, 1]))
 
 
-def test_a_horizon_of_five_comes_back(plan_format):
+def test_a_horizon_of_five_comes_back_with_the_correction(plan_format):
     rng = np.random.default_rng(0)
     demos = Demonstrations(
         rng.uniform(-1, 1, (3, 5, 2)), np.array([[0.1], [0.2], [0.3]]), plan_format(2)

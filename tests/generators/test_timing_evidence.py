@@ -87,3 +87,14 @@ def test_what_does_not_move_keeps_its_timing():
 @pytest.mark.parametrize("name", ["A", "B"])
 def test_our_own_demonstrations_differ_in_their_starts(task, name):
     assert choose_timing(make_task(task).demonstrations(name)).apart.timeline.kind == "start"
+
+
+@pytest.mark.parametrize(
+    ("task", "name", "why"),
+    [
+        ("zoo-curl", "mixed-12-0", "(start), as a rule"),  # tempo tells better, not by half
+        ("zoo-drag", "clean-8-0", "(tempo); another timing would do as well here"),
+    ],
+)
+def test_the_reason_is_no_better_than_the_evidence(task, name, why):
+    assert choose_timing(make_task(task).demonstrations(name)).reason.endswith(why)

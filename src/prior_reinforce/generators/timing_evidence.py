@@ -97,8 +97,9 @@ def choose_timing(demonstrations: Demonstrations) -> TimingChoice:
     best = min(able, key=lambda kind: errors[kind] / _WORTH[kind])
     if errors[best] >= _TELLS:
         why = ", as a rule; these demonstrations do not tell what is better"
-    elif max(errors.values()) - min(errors.values()) < _MATTERS:
-        why = "; another timing would do as well here"
+    elif min(e for kind, e in errors.items() if kind != best) - errors[best] < _MATTERS:
+        better = min(errors.values()) < errors[best] - _MATTERS
+        why = ", as a rule" if better else "; another timing would do as well here"
     else:
         why = ", as these demonstrations ask for"
     return TimingChoice(
