@@ -28,7 +28,13 @@ def one_blas_thread() -> Iterator[None]:
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Start the longest tests first, or one process waits for them in the end."""
-    items.sort(key=lambda item: item.path.suffix != ".ipynb" and item.path.stem != "test_tutorial")
+
+    def place(item: pytest.Item) -> int:
+        if item.path.suffix == ".ipynb" or item.path.stem in ("test_tutorial", "test_cluster"):
+            return 0
+        return 1 if item.get_closest_marker("slow") else 2
+
+    items.sort(key=place)
 
 
 @pytest.fixture(scope="session")
