@@ -15,6 +15,7 @@ from prior_reinforce.errors import (
 from prior_reinforce.importing import import_demonstrations
 from prior_reinforce.importing.preprocessing import Preprocessing, preprocess
 from prior_reinforce.importing.recording import Recording
+from prior_reinforce.robots import robot_limits
 from tests.importing.recorded import (
     AS_IS,
     BEFORE,
@@ -329,6 +330,44 @@ def test_what_no_arm_does_but_some_joint_could_is_the_first_remark(tmp_path):
     assert preview.remarks[0] == (
         "joint6 of 1 reaches 10.98 rad, and arms do not: if it was recorded in deg, say --units deg"
     )
+
+
+def far(folder, names, scale):
+    """The last joint of six throws reaches twice as far as any joint turns."""
+    for i in range(N):
+        t, q = sampled(i, 100)
+        q[:, 6] *= 11
+        np.savez(folder / f"{i}.npz", t=t, q=q * scale, joint_names=names)
+    write_outcomes(folder)
+    return folder
+
+
+@pytest.mark.parametrize("said", ["in the names", "with --units"])
+def test_degrees_that_were_said_are_not_advised_again(tmp_path, said):
+    ending, units = ("_deg", None) if said == "in the names" else ("", ["deg"])
+    folder = far(tmp_path, [f"j{i}{ending}" for i in range(7)], 180 / np.pi)
+    result = import_demonstrations(folder, units=units, robot=robot_limits("panda"))
+    assert np.abs(result.demonstrations.plans).max() == pytest.approx(8.8)
+    assert not any("--units" in remark for remark in result.preview.remarks)
+    assert result.preview.found.remedy == ""
+
+
+def test_a_unit_that_the_file_says_is_to_be_checked_and_not_said_otherwise(tmp_path):
+    names = [*(f"joint{i}_rad" for i in range(1, 7)), "rail_m"]
+    folder = far(tmp_path, names, 1.0)
+    preview = import_demonstrations(folder, robot=robot_limits("panda")).preview
+    assert preview.remarks[0] == "rail of 0 reaches 8.8 m, and arms do not: check its unit"
+    names = [f"joint{i}_rad" for i in range(1, 8)]
+    preview = import_demonstrations(far(folder, names, 1.0), robot=robot_limits("panda")).preview
+    assert preview.remarks[0] == "joint7 of 0 reaches 8.8 rad, and arms do not: check its unit"
+    assert all(report.refused for report in preview.found.reports)
+    assert preview.found.remedy == ""
+
+
+def test_one_unit_is_not_advised_for_channels_of_several(tmp_path):
+    names, units = [f"c{i}" for i in range(7)], [*["rad"] * 6, "m"]
+    preview = import_demonstrations(far(tmp_path, names, 1.0), units=units).preview
+    assert preview.remarks[0] == "c6 of 0 reaches 8.8 m, and arms do not: check its unit"
 
 
 def numbered(folder, names):

@@ -16,7 +16,7 @@ from prior_reinforce.importing.preprocessing import (
     preprocess,
 )
 from prior_reinforce.importing.recording import Recording
-from prior_reinforce.importing.units import Doubt, guess_unit, say_names
+from prior_reinforce.importing.units import Doubt, say_names
 from prior_reinforce.plans.interpolation import RATE
 from prior_reinforce.plans.motions import Plan, PlanFormat
 from prior_reinforce.robots import GateSettings, RobotLimits, check_plan
@@ -68,15 +68,8 @@ class Inspection:
             return ""
         broken = {line.check for r in self.reports for line in r.lines if line.status == "refuse"}
         if "position" in broken:
-            return "--units deg" if self._is_degrees() else ""
+            return self.kept.other_unit
         return _SMOOTH if self.smoothing_helps else ""
-
-    def _is_degrees(self) -> bool:
-        """Whether angles that are farther than a joint turns are not where they are degrees."""
-        kept = self.kept
-        angles = [i for i, unit in enumerate(kept.recorded_units) if unit == "rad"]
-        reach = [np.abs(r.positions[:, angles]).max(initial=0.0) for r in self.recordings]
-        return guess_unit("rad", float(max(reach))) == "deg"
 
     @property
     def rows(self) -> dict[str, str]:

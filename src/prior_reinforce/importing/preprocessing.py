@@ -61,6 +61,9 @@ class Selection:
     """Which of those are only guessed."""
     remarks: tuple[str, ...] = ()
     """What a person should know of them."""
+    other_unit: str = ""
+    """The option that says the unit they look like instead; empty where that is the one taken, or
+    one option cannot say it."""
 
 
 @dataclass(frozen=True)
@@ -173,7 +176,10 @@ def select(
     ]
     picked = [r.positions[:, c] for r, c in zip(recordings, columns, strict=True)]
     recorded, doubts = _guess_units(recordings, picked, names, said, wanted)
-    slip = () if units is None else _doubt_units(recordings, picked, names, recorded)
+    # No option may contradict a unit that the file says.
+    open_ = all(r.units[i] is None for r, c in zip(recordings, columns, strict=True) for i in c)
+    doubted = units is not None and open_
+    slip = _doubt_units(recordings, picked, names, recorded) if doubted else ()
     recorded = [slip[0].option.split()[-1]] * len(joints) if slip else recorded
     scale = [conversion(r, w, n) for r, w, n in zip(recorded, wanted, names, strict=True)]
     kept = tuple(
@@ -186,9 +192,10 @@ def select(
         )
         for r, q, c in zip(recordings, picked, columns, strict=True)
     )
-    remarks = _far(kept, names, wanted)
+    other = _other_unit(recordings, picked, names, recorded) if open_ else ""
+    remarks = _far(recordings, picked, names, recorded, other)
     doubts = (*guessed, *doubts, *slip)
-    return Selection(kept, names, tuple(wanted), tuple(recorded), doubts, remarks)
+    return Selection(kept, names, tuple(wanted), tuple(recorded), doubts, remarks, other)
 
 
 def _guess_names(
@@ -266,7 +273,7 @@ def _doubt_units(
 ) -> tuple[Doubt, ...]:
     """What was said of the units of all channels, and cannot be."""
     unit = recorded[0]
-    if len(set(recorded)) > 1 or any(u is not None for r in recordings for u in r.units):
+    if len(set(recorded)) > 1:
         return ()
     most, where = _farthest(recordings, picked, names, range(len(names)))
     looks = guess_unit(unit, most)
@@ -279,18 +286,35 @@ def _doubt_units(
     return (Doubt(what, f"--units {looks}"),)
 
 
-def _far(kept: Sequence[Recording], names: Sequence[str], units: Sequence[str]) -> tuple[str, ...]:
-    """What reaches farther than arms mostly do, in the unit that was said."""
+def _other_unit(
+    recordings: Sequence[Recording],
+    picked: Sequence[Float[np.ndarray, "_ D"]],
+    names: Sequence[str],
+    recorded: Sequence[str],
+) -> str:
+    """The option that says what unit all channels look like; empty where it is theirs."""
+    if len(set(recorded)) > 1:
+        return ""
+    looks = guess_unit(recorded[0], _farthest(recordings, picked, names, range(len(names)))[0])
+    return "" if looks in (recorded[0], None) else f"--units {looks}"
+
+
+def _far(
+    recordings: Sequence[Recording],
+    picked: Sequence[Float[np.ndarray, "_ D"]],
+    names: Sequence[str],
+    recorded: Sequence[str],
+    other: str,
+) -> tuple[str, ...]:
+    """What reaches farther than arms mostly do, in the unit that it was recorded in."""
     said = []
-    for unit in dict.fromkeys(units):
-        among = [i for i, own in enumerate(units) if own == unit]
-        most, where = _farthest(kept, [r.positions for r in kept], names, among)
+    for unit in dict.fromkeys(recorded):
+        among = [i for i, own in enumerate(recorded) if own == unit]
+        most, where = _farthest(recordings, picked, names, among)
         looks = guess_unit(unit, most)
         if looks not in (unit, None):
-            said.append(
-                f"{where} reaches {most:.4g} {unit}, and arms do not: if it was recorded in "
-                f"{looks}, say --units {looks}"
-            )
+            advice = f"if it was recorded in {looks}, say {other}" if other else "check its unit"
+            said.append(f"{where} reaches {most:.4g} {unit}, and arms do not: {advice}")
     return tuple(said)
 
 
