@@ -5,6 +5,7 @@ import pytest
 from prior_reinforce.errors import InvalidDemonstrationsError
 from prior_reinforce.importing.naming import (
     find_channels,
+    joint_vectors,
     missing_channels,
     numbered_like,
     vectors,
@@ -52,7 +53,42 @@ def test_numbered_columns_are_vectors():
         (["a0", "a1", "b0", "b1"], None),
         (["q0", "q1", "q2"], None),
         (["left", "right"], None),
+        (["tau0", "tau1", "vel_q0", "vel_q1"], None),
+        (["tau0", "tau1", "tcp_angle_0", "tcp_angle_1"], None),
+        (["jointVelocity0", "jointVelocity1", "a0", "a1"], ("a0", "a1")),
+        (["q_d[0]", "q_d[1]", "dq_d[0]", "dq_d[1]"], ("q_d[0]", "q_d[1]")),
+        (["tool_q0", "tool_q1", "theta0", "theta1"], ("theta0", "theta1")),
     ],
 )
 def test_numbered_channels_that_are_as_many_look_like_the_joints(there, found):
     assert numbered_like(["joint1", "joint2"], there) == found
+
+
+@pytest.mark.parametrize(
+    "stem",
+    [
+        *("tau", "tauJ", "tau_ext", "dq", "dQ", "state.dq", "ddq", "qd", "actual_qd", "q_dot"),
+        *(
+            "current_",
+            "joint_torque_",
+            "jointtorque",
+            "JointVelocities",
+            "vel_q",
+            "jointvel",
+            "speed",
+        ),
+        *("effort", "joint_force", "accelerations", "acc", "motor_temp_", "TCP_pose_", "O_T_EE"),
+    ],
+)
+def test_what_says_it_is_something_else_is_never_taken_for_positions(stem):
+    there = [f"{stem}{i}" for i in range(6)]
+    assert numbered_like([f"joint{i}" for i in range(1, 7)], there) is None
+    assert joint_vectors(there, 6) == {}
+
+
+@pytest.mark.parametrize("stem", ["a", "q", "actual_q_", "ch", "theta", "jointPos"])
+def test_what_says_nothing_else_may_be_positions(stem):
+    there = [f"{stem}{i}" for i in range(6)]
+    assert numbered_like([f"joint{i}" for i in range(1, 7)], there) == tuple(there)
+    assert list(joint_vectors(there, 6).values()) == [list(range(6))]
+    assert joint_vectors(there, 7) == {}

@@ -371,6 +371,7 @@ def test_one_unit_is_not_advised_for_channels_of_several(tmp_path):
 
 
 def numbered(folder, names):
+    folder.mkdir(exist_ok=True)
     for i in range(N):
         t, q = sampled(i, 100)
         np.savez(folder / f"{i}.npz", t=t, q=q, joint_names=names)
@@ -391,6 +392,9 @@ def test_numbered_columns_are_taken_for_the_plans_joints_only_when_said(tmp_path
     guessed = import_demonstrations(folder, joints=plan, names=plan, take_guesses=True)
     np.testing.assert_array_equal(guessed.demonstrations.plans, said.plans)
     assert guessed.demonstrations.format.names == plan
+    torques = numbered(tmp_path / "torques", [f"tau{i}" for i in range(7)])
+    with pytest.raises(InvalidDemonstrationsError, match=r"it has tau0 to tau6: .* --joints$"):
+        import_demonstrations(torques, joints=plan, names=plan)
     # What was said is not guessed about.
     with pytest.raises(InvalidDemonstrationsError, match="has no joint a1 to a7; it has q0 to q6"):
         import_demonstrations(folder, joints=[f"a{i}" for i in range(1, 8)], names=plan)

@@ -10,7 +10,14 @@ from prior_reinforce.importing.units import CHANNEL_UNITS, say_names, split_unit
 from prior_reinforce.robots.limits import is_joint
 
 _POSITIONS = re.compile(r"(^|[^a-z])(q|j|joints?|pos|positions?|angles?)$", re.IGNORECASE)
-"""How the positions of joints are called, beside `dq` and `tau`."""
+"""How the positions of joints are called."""
+_ELSE = re.compile(
+    r"vel|speed|accel|jerk|torque|tau|effort|force|wrench|current|temperature|cartesian|tcp|pose"
+    r"|(^|[^a-z])(acc|d+q|qd+|q_?dot|temp|tool|ee|eef)($|[^a-z])",
+    re.IGNORECASE,
+)
+"""How what is no position of a joint is called. Ours, and rather too much than too little: what is
+not offered can still be said."""
 _NUMBERED = re.compile(r"(?P<stem>.*?)[_.\[ ]*(?P<number>\d+)\]?")
 
 
@@ -52,13 +59,25 @@ def vectors(names: Sequence[str]) -> dict[str, list[int]]:
     return {stem: [i for _, i in sorted(g)] for stem, g in groups.items() if len(g) > 1}
 
 
+def joint_vectors(names: Sequence[str], count: int) -> dict[str, list[int]]:
+    """Return the groups of `vectors` that have a size and could be positions of joints.
+
+    Groups whose name says something else, such as velocities, torques or a pose, could not.
+    """
+    return {
+        stem: group
+        for stem, group in vectors(names).items()
+        if len(group) == count and _ELSE.search(stem) is None
+    }
+
+
 def numbered_like(joints: Sequence[str], there: Sequence[str]) -> tuple[str, ...] | None:
     """Return numbered channels of which there are as many as joints; None where nothing is clear.
 
-    Where several groups are as many, one that is called like positions is taken: `q` beside `dq`
-    and `tau`.
+    Where several groups are as many, one that is called like positions is taken: `q` beside `a`.
+    Groups that say they are something else never are: `dq`, `tau`.
     """
-    fitting = {stem: group for stem, group in vectors(there).items() if len(group) == len(joints)}
+    fitting = joint_vectors(there, len(joints))
     called = [stem for stem in fitting if _POSITIONS.search(stem) is not None]
     clear = list(fitting) if len(fitting) == 1 else called
     return tuple(there[i] for i in fitting[clear[0]]) if len(clear) == 1 else None

@@ -15,9 +15,9 @@ from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsErro
 from prior_reinforce.importing.clock import LONGEST
 from prior_reinforce.importing.naming import (
     find_channels,
+    joint_vectors,
     missing_channels,
     numbered_like,
-    vectors,
 )
 from prior_reinforce.importing.noise import (
     Channels,
@@ -340,7 +340,7 @@ def _columns(recording: Recording, joints: tuple[str, ...]) -> list[int]:
 
 def _by_key(recording: Recording, count: int) -> str:
     """A hint at numbered columns of which there are as many as joints."""
-    fitting = [stem for stem, group in vectors(recording.names).items() if len(group) == count]
+    fitting = list(joint_vectors(recording.names, count))
     return f", or numbered columns at once: --key {fitting[0]}" if fitting else ""
 
 
