@@ -187,6 +187,41 @@ def test_an_rtde_log_of_an_arm_at_rest_keeps_its_rows(tmp_path):
     assert len(recording.remarks) == 1
 
 
+def rtde_log(path, t, q):
+    names = ["timestamp", *(f"actual_q_{i}" for i in range(q.shape[1]))]
+    pd.DataFrame(np.column_stack([t + 512.0, q]), columns=names).to_csv(path, index=False)
+
+
+def repeated(t, q):
+    """Every seventh row twice, as ur_rtde's recorder writes them."""
+    twice = np.repeat(np.arange(len(t)), 1 + (np.arange(len(t)) % 7 == 0))
+    return t[twice], q[twice]
+
+
+@pytest.mark.parametrize("recorder", [lambda t, q: (t, q), repeated], ids=["ur", "ur_rtde"])
+@pytest.mark.parametrize(
+    ("rate", "digits"),
+    [(500, 3), (20, 5), (10, 5)],  # coarse at the arm's cycle; slow, so that a rest comes at once
+)
+def test_right_rows_of_an_rtde_log_are_kept(tmp_path, recorder, rate, digits):
+    t, q = sampled(0, rate)
+    q = np.round(q[:, :6], digits)
+    rtde_log(tmp_path / "0.csv", *recorder(t, q))
+    (recording,) = read_recordings(tmp_path)
+    np.testing.assert_allclose(recording.times, t, atol=1e-9)
+    np.testing.assert_array_equal(recording.positions, q)
+    assert not any("another cycle" in remark for remark in recording.remarks)
+
+
+def test_an_rtde_log_without_a_repeated_row_is_of_another_recorder(tmp_path):
+    """Positions of an arm at 125 Hz with times at 500 Hz."""
+    t, q = sampled(0, 500)
+    q = np.round(q[:, :6], 6)[np.arange(len(t)) // 4 * 4]
+    rtde_log(tmp_path / "0.csv", t, q)
+    (recording,) = read_recordings(tmp_path)
+    np.testing.assert_array_equal(recording.positions, q)
+
+
 def test_an_index_without_a_name_is_the_time(tmp_path):
     """As `DataFrame.to_csv` writes one: of dates it is taken, of numbers only when it is said."""
     t, q = sampled(0, 100)

@@ -16,6 +16,7 @@ from jaxtyping import Bool
 from prior_reinforce.errors import ConfigurationError, FileFormatError
 from prior_reinforce.importing.clock import Clock, Times
 from prior_reinforce.importing.naming import find_channels, vectors
+from prior_reinforce.importing.noise import REST_SPEED
 from prior_reinforce.importing.recording import (
     NO_COLUMN,
     Positions,
@@ -61,11 +62,12 @@ _LOGS = (
     _Log("libfranka's log", ("time", "success_rate", "state.q[0]"), "state.q", "ms"),
     _Log("libfranka's log", ("duration", "success rate", "q[0]"), "q", "ms"),
     # UR's rtde/csv_writer.py and ur_rtde's recorder: seconds since the controller started. The
-    # latter (1.6.5) runs beside the controller, and reads the variables of a row one by one.
+    # latter (1.6.5) runs beside the controller, reads the variables of a row one by one, and
+    # writes rows again where no new cycle came; the former writes each once.
     _Log("an RTDE log", ("timestamp", "actual_q_0"), "actual_q", "s", mixed=True),
 )
-_STILL = 1e-4
-"""Ours, in [rad]: what a joint moves in 2 ms, a cycle, at 0.05 rad/s, which the gate calls rest."""
+_CYCLE = 0.002
+"""Of UR's controller, in [s]."""
 
 
 def read(source: Path, options: ReadOptions) -> list[Recording]:
@@ -166,18 +168,25 @@ def _episode(
 
 
 def _mixed(stamps: Times, positions: Positions) -> Bool[np.ndarray, " T"]:
-    """Which rows have their positions from another cycle than their time.
+    """Which rows of ur_rtde's recorder have their positions from another cycle than their time.
 
     Such a row has other positions than the one before at the same time, or a moving arm's that the
-    next row repeats at the time they are of.
+    next row repeats at the time they are of. The latter is told only at the controller's own cycle,
+    in which no arm comes to rest, and where the arm moves by more than one count of the numbers.
+    Where no row is repeated as a whole, another recorder wrote the log, and none is.
     """
     again = (np.diff(stamps) == 0) & np.all(np.diff(positions, axis=0) == 0, axis=1)
+    if not np.any(again):
+        return np.zeros(len(stamps), dtype=bool)
     first = np.flatnonzero(np.concatenate([[True], ~again]))  # of rows that are wholly equal
     steps, moved = np.diff(stamps[first]), np.diff(positions[first], axis=0)
     mixed = np.zeros(len(first), dtype=bool)
     mixed[1:] = steps == 0
-    came, repeated = np.abs(moved[:-1]).max(axis=1) > _STILL, np.all(moved[1:] == 0, axis=1)
-    mixed[1:-1] |= came & repeated
+    if np.any(steps > 0) and abs(np.median(steps[steps > 0]) - _CYCLE) < 0.1 * _CYCLE:
+        count = np.abs(moved)[moved != 0].min(initial=np.inf)
+        still = np.maximum(REST_SPEED["rad"] * steps, 1.5 * count)
+        came, repeated = np.abs(moved).max(axis=1) > still, np.all(moved == 0, axis=1)
+        mixed[1:-1] |= came[:-1] & repeated[1:]
     return np.repeat(mixed, np.diff(np.append(first, len(stamps))))
 
 
