@@ -240,6 +240,18 @@ def test_an_index_without_a_name_is_the_time(tmp_path):
     frame.set_axis(np.arange(len(t)) + 40).to_csv(tmp_path / "0.csv")  # rows that were cut out
     (recording,) = read_recordings(tmp_path, rate=100, joints=JOINTS)
     np.testing.assert_allclose(recording.positions, q)
+    assert recording.remarks == ()
+    for how in ({}, {"time_column": "none"}):
+        (recording,) = read_recordings(tmp_path, rate=100, **how)
+        assert recording.names == JOINTS
+        np.testing.assert_allclose(recording.positions, q)
+        assert recording.remarks == ("column 1 left out, an index without a name",)
+
+
+def test_a_channel_without_a_name_is_called_by_its_number(tmp_path):
+    (tmp_path / "a.csv").write_text(",b\n0,1\n5,2\n3,4\n")
+    (recording,) = read_recordings(tmp_path, rate=100)
+    assert recording.names == ("column 1", "b")
 
 
 def test_columns_without_names_are_in_order_and_their_time_is_a_doubt(tmp_path):

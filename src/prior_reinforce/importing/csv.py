@@ -132,7 +132,8 @@ def _episode(
 ) -> Recording:
     log = next((g for g in _LOGS if set(g.columns) <= set(table.names)), None)
     time, guessed = _time_column(table, options)
-    others = [i for i in range(len(table.names)) if i not in (time, episode_column)]
+    index = 0 if time is None and _no_name_first(table) and _could_be_time(table) else None
+    others = [i for i in range(len(table.names)) if i not in (time, episode_column, index)]
     channels, named = _channels(table, others, options, log)
     remarks: tuple[str, ...] = ()
     if log is not None:
@@ -144,6 +145,8 @@ def _episode(
             why = "rows left out whose positions are of another cycle than their time"
             remarks = (*remarks, f"{why}: {mixed.sum()}")
     clock = _clock(table, episode, time, options, None if log is None else log.time_unit)
+    if index is not None and channels == others and not options.joints:
+        remarks = (*remarks, f"column {index + 1} left out, an index without a name")
     texts = [i for i in channels if table.is_text(i)] if channels == others else []
     if texts:
         channels = [i for i in channels if i not in texts]
@@ -151,7 +154,9 @@ def _episode(
         remarks = (*remarks, f"{left_out} left out, which holds no number")
     positions = np.column_stack([table.numbers(i) for i in channels] or [np.zeros((0, 0))])
     units = tuple(table.units[i] or split_unit(table.names[i], CHANNEL_UNITS)[1] for i in channels)
-    names = tuple(split_unit(table.names[i], CHANNEL_UNITS)[0] for i in channels)
+    names = tuple(
+        split_unit(table.names[i], CHANNEL_UNITS)[0] or f"column {i + 1}" for i in channels
+    )
     if len(set(names)) < len(names):
         names = tuple(table.names[i] for i in channels)
     return Recording(
@@ -199,9 +204,7 @@ def _time_column(table: Table, options: ReadOptions) -> tuple[int | None, tuple[
     if table.named:
         bare = [split_unit(name, SECONDS)[0].lower() for name in table.names]
         found = next((i for i, name in enumerate(bare) if name in _TIMES), None)
-        # pandas writes an index without a name.
-        unnamed = not table.names[0] or table.names[0].startswith("Unnamed:")
-        if found is not None or not unnamed:
+        if found is not None or not _no_name_first(table):
             return found, ()
         if table.nanoseconds(0) is not None:
             return 0, ()
@@ -211,6 +214,11 @@ def _time_column(table: Table, options: ReadOptions) -> tuple[int | None, tuple[
         what = f"{table.where} names no column of times, and column 1 looks like the time"
         return 0, (Doubt(what, "--time-column 1"),)
     return None, ()
+
+
+def _no_name_first(table: Table) -> bool:
+    """Whether the first column has no name, as pandas writes an index."""
+    return table.named and (not table.names[0] or table.names[0].startswith("Unnamed:"))
 
 
 def _could_be_time(table: Table) -> bool:
