@@ -20,6 +20,8 @@ _ACROSS = 25
 """Goals along each side of the region (ours)."""
 _MOST_GOALS = 1000
 """Goals in all: more than two components have fewer along a side."""
+_DEMONSTRATED_EVERY = 4
+"""Every fourth of these goals is tried as a demonstration, at 10 ms each."""
 _MARGIN = 0.1
 """How far beyond the demonstrated outcomes is looked, as a share of their range (ours)."""
 
@@ -54,13 +56,15 @@ class Advise:
             conditions = np.array([adapter.propose(goal) for goal in goals])
             p = p_hit(conditions, goals, session.tolerance)
             throws = gain(conditions, conditions)
-            shown = gain(goals, conditions, demonstrations=True)
+            coarse = np.arange(0, len(goals), _DEMONSTRATED_EVERY)
+            shown = gain(goals[coarse], conditions, demonstrations=True)
             names, units = workspace.manifest.outcome_names, workspace.manifest.outcome_units
 
             def at(place: int) -> str:
                 return say_place(goals[place], names, units)
 
-            best, throw, demonstration = (int(np.argmax(of)) for of in (p, throws, shown))
+            best, throw, most = (int(np.argmax(of)) for of in (p, throws, shown))
+            demonstration = int(coarse[most])
             worst = int(np.argmin(p))
             print(
                 f"first throws hit with probability {p.mean():.2f} on average over the "
@@ -71,10 +75,10 @@ class Advise:
                 f"({throws[throw]:.0%} of what is unknown; half of all places teach less than "
                 f"{np.median(throws):.0%})"
             )
-            shows = bool(shown[demonstration] > 0)
+            shows = bool(shown[most] > 0)
             print(
                 f"the demonstration that teaches most: one that ends at {at(demonstration)} "
-                f"({shown[demonstration]:.0%} of what is unknown)"
+                f"({shown[most]:.0%} of what is unknown)"
                 if shows
                 else "one more demonstration here would teach nothing that trials do not"
             )

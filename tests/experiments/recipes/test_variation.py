@@ -9,7 +9,7 @@ from prior_reinforce.experiments.recipes.variation import RECIPE, Variation
 
 SMALL = Scale(goals=6, seeds=(0,), sets=("A",), rounds=3)
 MEASUREMENT = Variation(
-    tasks=("zoo-drag", "zoo-catapult"),
+    tasks=("zoo-hoop", "zoo-catapult"),
     sets=("clean-6", "mixed-4", "styles-9"),
     generators=(("auto", "auto"), ("nearest neighbours", "nearest")),
 )
