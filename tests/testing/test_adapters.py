@@ -2,9 +2,13 @@
 
 from functools import partial
 
+import numpy as np
 import pytest
 
 from prior_reinforce.adapters import ADAPTERS, make_adapter
+from prior_reinforce.adapters.base import Adapter
+from prior_reinforce.plans.motions import Demonstrations, PlanFormat
+from prior_reinforce.readings import Reading
 from prior_reinforce.testing import AdapterContract
 
 
@@ -12,3 +16,38 @@ class TestAdapters(AdapterContract):
     @pytest.fixture(autouse=True, params=ADAPTERS.members)
     def choose(self, request):
         self.make = partial(make_adapter, request.param)
+
+
+class OfReadings(Adapter):
+    """One that takes readings and no numbers, as docs/extending.md says."""
+
+    def _start(self, demonstrations):
+        self._moved = np.zeros(demonstrations.outcome_dim)
+
+    def _propose(self, goal_seen):
+        return goal_seen - self._moved
+
+    def _observe_reading(self, condition, goal, reading):
+        if reading.has_number:
+            self._moved = goal + reading.error_seen - condition
+
+
+class TestOfReadings(AdapterContract):
+    make = OfReadings
+
+
+class OfNothing(Adapter):
+    def _start(self, demonstrations):
+        pass
+
+    def _propose(self, goal_seen):
+        return goal_seen
+
+
+def test_one_that_takes_in_nothing_is_told_what_to_write():
+    adapter = OfNothing()
+    outcomes = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+    plans = np.random.default_rng(0).normal(size=(3, 4, 1))
+    adapter.start(Demonstrations(plans, outcomes, PlanFormat(("j1",), ("rad",), 0.02)))
+    with pytest.raises(NotImplementedError, match="OfNothing takes in no trials: write _observe"):
+        adapter.observe([0.5, 0.5], [0.5, 0.5], Reading.measured([0.0, 0.0]))

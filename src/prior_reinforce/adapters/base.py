@@ -112,9 +112,11 @@ class Adapter(ABC):
     def _propose(self, goal_seen: Point) -> Point:
         """See `propose`; the goal may be returned itself."""
 
-    @abstractmethod
     def _observe(self, condition: Point, outcome_seen: Point) -> None:
         """Take in one trial as a number: the perceived outcome r = g + e; both may be kept."""
+        raise NotImplementedError(
+            f"{type(self).__name__} takes in no trials: write _observe, or _observe_reading"
+        )
 
     def _observe_reading(self, condition: Point, goal: Point, reading: Reading) -> None:
         """See `observe`; for adapters that know what to do with more than a number.

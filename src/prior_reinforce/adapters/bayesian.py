@@ -208,9 +208,6 @@ class BayesianAdapter(Adapter):
         """What has changed since the demonstrations is unknown anew; the rest stays known."""
         self._now += 1
 
-    def _observe(self, condition: Point, outcome_seen: Point) -> None:
-        self._observe_reading(condition, condition, Reading.estimated(outcome_seen - condition))
-
     def _observe_reading(self, condition: Point, goal: Point, reading: Reading) -> None:
         scale, moved = self._normalisation.scale, goal - condition
         self._memory = self._memory.with_one(
