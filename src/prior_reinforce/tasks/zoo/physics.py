@@ -51,7 +51,8 @@ class Arm:
         return vector
 
 
-def _turn(vectors: Places, axis: str, angles: Float[np.ndarray, "*t"]) -> Places:
+def _turn(vectors: np.ndarray, axis: str, angles: np.ndarray) -> np.ndarray:
+    # Shapes (*t, 3) and (*t,): its callers', which are checked; it is called for every joint.
     i, j = _PLANES[axis]
     cos, sin = np.cos(angles), np.sin(angles)
     turned = vectors.copy()
@@ -120,7 +121,7 @@ def flight_in_air(start: Place, velocity: Place, drag: float, step: float = 0.01
     if start[2] <= 0.0:
         return None
 
-    def slope(state: Float[np.ndarray, "6"]) -> Float[np.ndarray, "6"]:
+    def slope(state: np.ndarray) -> np.ndarray:  # shape (6,); not checked, as it is called so often
         v = state[3:]
         slower = -drag * math.sqrt(float(v @ v)) * v
         slower[2] -= GRAVITY
