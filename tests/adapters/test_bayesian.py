@@ -148,7 +148,7 @@ def test_a_generator_that_is_wrong_in_its_own_ways_is_not_taken_for_labels():
 
     for condition in rng.uniform(CORNERS.min(axis=0), CORNERS.max(axis=0), size=(20, 2)):
         adapter.observe(condition, condition, Reading.measured(moved(condition), 0.002))
-    own = np.flatnonzero(adapter._own)
+    own = np.flatnonzero(adapter._generator)
     assert adapter._known().model_weights[own].sum() > 0.99
 
 
@@ -240,6 +240,14 @@ def test_two_hundred_trials_are_merged_and_hardly_missed(monkeypatch):
     assert np.median(off) < 2 * np.median(off_whole) + 0.001
 
 
+def test_trials_that_cannot_be_merged_are_kept_apart():
+    adapter = started()
+    for _ in range(30):
+        adapter.observe(GOAL, GOAL, Reading.measured([0.01, 0.0]))
+        adapter.change_hardware()
+    assert len(adapter._memory.changes) == 30
+
+
 def test_trials_of_different_hardware_are_never_merged():
     adapter = many(started(), 20)
     adapter.change_hardware()
@@ -250,7 +258,7 @@ def test_trials_of_different_hardware_are_never_merged():
 
 
 def test_what_a_reading_would_teach_is_what_it_takes_off_the_variance():
-    adapter = started(label_sd=(0.2,), own_sd=1e-6, hardware_sd=(0.3, 0.3))
+    adapter = started(label_sd=(0.2,), generator_sd=1e-6, hardware_sd=(0.3, 0.3))
     throw(adapter, GOAL, np.array([0.03, 0.0]))
     region = np.random.default_rng(0).uniform([0.8, -0.2], [1.0, 0.2], size=(40, 2))
     at = np.array([0.85, -0.12])

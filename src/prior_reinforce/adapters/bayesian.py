@@ -55,11 +55,11 @@ class BayesianConfig:
 
     label_sd: tuple[float, ...] = (0.03, 0.1)
     """How far demonstrated outcomes are off, beside the noise that they state."""
-    own_sd: float = 0.3
-    """a, what a generator gets wrong in ways of its own."""
-    own_reach: float = 0.5
+    generator_sd: float = 0.3
+    """a, what the generator itself gets wrong, whatever the labels."""
+    generator_reach: float = 0.5
     """How far that reaches."""
-    p_own: float = 0.1
+    p_generator: float = 0.1
     """Beforehand, the probability that it does."""
     rough_sd: float = 0.025
     """What lies between demonstrations."""
@@ -82,22 +82,22 @@ class BayesianConfig:
         """Check the settings.
 
         Raises:
-            ConfigurationError: A setting is not positive, a probability is 1 or more, or the
-                hardware has not two.
+            ConfigurationError: A setting is not positive, a probability is 1 or more, or
+                `hardware_sd` has not two values.
         """
         for name in ("label_sd", "hardware_sd"):
             if not isinstance(getattr(self, name), tuple):
-                raise ConfigurationError(f"{name} must be several, got {getattr(self, name)}")
+                raise ConfigurationError(f"{name} must be a tuple, got {getattr(self, name)}")
         for name, value in vars(self).items():
             values = value if isinstance(value, tuple) else (value,)
             if not (values and all(math.isfinite(v) and v > 0 for v in values)):
                 raise ConfigurationError(f"{name} must be positive, got {value}")
-        for name in ("outlier", "p_own", "p_changed"):
+        for name in ("outlier", "p_generator", "p_changed"):
             if (value := getattr(self, name)) >= 1.0:
                 raise ConfigurationError(f"{name} must be below 1, got {value}")
         if len(self.hardware_sd) != 2:
             raise ConfigurationError(
-                f"hardware_sd must be two, unchanged and changed, got {self.hardware_sd}"
+                f"hardware_sd must have two values, unchanged and changed, got {self.hardware_sd}"
             )
 
 
@@ -153,8 +153,7 @@ class BayesianAdapter(Adapter):
 
         e   sd s_i              by how much the outcome of demonstration i is off: the noise that it
                                 states (mean over components), and 0.03 or 0.1 more
-        f   sd a, reach 0.5     what the generator gets wrong in ways of its own: 0, or with
-                                probability 0.1 0.3
+        f   sd a, reach 0.5     what the generator itself gets wrong: 0, or with probability 0.1 0.3
         u   sd 0.025, reach 0.32    what lies between the demonstrations
         h   sd b, reach 2.5     what is different from their day: 0.03, or with probability 0.2 0.3;
                                 0.3, anew, whenever a change of hardware is said
@@ -188,13 +187,18 @@ class BayesianAdapter(Adapter):
     def __init__(self, config: BayesianConfig | None = None) -> None:
         """Take the settings, or the defaults."""
         self.config = config = config or BayesianConfig()
-        own = ((0.0, 1.0 - config.p_own), (config.own_sd, config.p_own))
+        generator = ((0.0, 1.0 - config.p_generator), (config.generator_sd, config.p_generator))
         same, changed = config.hardware_sd
         hardware = ((same, 1.0 - config.p_changed), (changed, config.p_changed))
-        grid = itertools.product(config.label_sd, own, hardware)
+        grid = itertools.product(config.label_sd, generator, hardware)
         models = [(e, a, b, p * q) for e, (a, p), (b, q) in grid]
         e, a, b, share = np.array(models).T
-        self._label, self._own, self._hardware, self._log_prior = e**2, a**2, b**2, np.log(share)
+        self._label, self._generator, self._hardware, self._log_prior = (
+            e**2,
+            a**2,
+            b**2,
+            np.log(share),
+        )
 
     def _start(self, demonstrations: Demonstrations) -> None:
         self._normalisation = Normalisation.of(demonstrations)
@@ -329,7 +333,8 @@ class BayesianAdapter(Adapter):
         sites = replace(sites, low=number, high=number, variance=1.0 / tau[old])
         told = np.any(tau[old] > _TELLS_NOTHING, axis=1)
         sites = sites.only(told)
-        while len(sites.changes) > _MERGED_TO - _LATEST:
+        # Trials of different hardware are never merged, so there may be none left that can be.
+        while len(sites.changes) > max(_MERGED_TO - _LATEST, len(np.unique(sites.changes))):
             i, j = _closest(sites)
             weight = np.sum(1.0 / sites.variance[[i, j]], axis=1)
             both = sites.conditions[[i, j]]
@@ -370,14 +375,14 @@ class BayesianAdapter(Adapter):
         w_a, w_b = self._mixed_by(a), self._mixed_by(b)
         stated = (w_a * self._stated) @ w_b.T
         rough = config.rough_sd**2 * np.exp(-0.5 * square / config.rough_reach**2)
-        own = np.exp(-0.5 * square / config.own_reach**2)
+        generator = np.exp(-0.5 * square / config.generator_reach**2)
         of_a, of_b = np.broadcast_to(after_a, len(a)), np.broadcast_to(after_b, len(b))
         shared = np.where(of_a[:, None] == of_b, self._hardware_of(of_b)[:, None], 0.0)
         return np.asarray(
             stated
             + rough
             + self._label[:, None, None] * (w_a @ w_b.T)
-            + self._own[:, None, None] * own
+            + self._generator[:, None, None] * generator
             + shared * np.exp(-0.5 * square / config.hardware_reach**2)
         )
 
@@ -391,7 +396,7 @@ class BayesianAdapter(Adapter):
         of_all = self.config.rough_sd**2 + squares @ self._stated
         of_each = self._label[:, None] * squares.sum(axis=1)
         hardware = self._hardware_of(np.full(len(at), changes))
-        return np.asarray(of_all + of_each + self._own[:, None] + hardware)
+        return np.asarray(of_all + of_each + self._generator[:, None] + hardware)
 
     def _mixed_by(self, at: Float[np.ndarray, "p k"]) -> Float[np.ndarray, "p N"]:
         """w, how much each demonstration counts."""

@@ -89,13 +89,21 @@ def _draw_panel(axes: Axes, panel: Panel) -> None:
     n_rounds = len(lines[0].curve)
     offsets = np.linspace(-_SPREAD / 2, _SPREAD / 2, len(lines)) if len(lines) > 1 else [0.0]
     for i, (line, offset) in enumerate(zip(lines, offsets, strict=True)):
-        _draw_line(
-            axes,
+        value, low, high = (
+            np.array([point[key] for point in line.curve]) for key in ("value", "low", "high")
+        )
+        axes.errorbar(
             np.arange(1, n_rounds + 1) + offset,
-            line,
+            value,
+            yerr=[value - low, high - value],
+            color=_COLOURS[line.place % len(_COLOURS)],
+            marker=_MARKERS[line.place % len(_MARKERS)],
+            markersize=5.5,
             linewidth=2.6 if shares and i == 0 else 1.5,
             linestyle="--" if line.dashed else "-",
+            elinewidth=1.1,
             zorder=10 - i,
+            label=line.label,
             clip_on=False,
         )
     axes.set_xlim(0.5, n_rounds + 0.5)
@@ -107,24 +115,6 @@ def _draw_panel(axes: Axes, panel: Panel) -> None:
     axes.set_xticks(range(1, n_rounds + 1))
     axes.set_xlabel("round")
     axes.tick_params(labelcolor=INK_SOFT)
-
-
-def _draw_line(axes: Axes, at: Float[np.ndarray, " n"], line: Line, **style: Any) -> None:
-    """A method's values with their intervals, in its colour and with its marker."""
-    value, low, high = (
-        np.array([point[key] for point in line.curve]) for key in ("value", "low", "high")
-    )
-    axes.errorbar(
-        at,
-        value,
-        yerr=[value - low, high - value],
-        color=_COLOURS[line.place % len(_COLOURS)],
-        marker=_MARKERS[line.place % len(_MARKERS)],
-        markersize=5.5,
-        elinewidth=1.1,
-        label=line.label,
-        **style,
-    )
 
 
 @drawing()
@@ -141,10 +131,8 @@ def draw_kinds(kinds: Sequence[str], panels: Mapping[str, Sequence[Line]], path:
     for axes, (label, lines) in zip(subplots, panels.items(), strict=True):
         calm_axes(axes)
         for line, offset in zip(lines, np.linspace(-0.3, 0.3, len(lines)), strict=True):
-            colour, marker = (
-                _COLOURS[line.place % len(_COLOURS)],
-                _MARKERS[line.place % len(_MARKERS)],
-            )
+            colour = _COLOURS[line.place % len(_COLOURS)]
+            marker = _MARKERS[line.place % len(_MARKERS)]
             at = np.arange(len(kinds)) + offset
             means = [point["value"] for point in line.curve]
             axes.plot(at, means, marker, color=colour, markersize=9, label=line.label)
