@@ -13,6 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 
+from prior_reinforce.plans.channels import largest_of_unit
 from prior_reinforce.report.record import AdaptationRecord
 from prior_reinforce.report.style import (
     DEMONSTRATION,
@@ -211,7 +212,7 @@ def _legend_above(figure: Figure, legend: Mapping[str, Any], ncols: int = 3) -> 
 def _widen(axes: Axes, drawn: Float[np.ndarray, "n H D"], units: Sequence[str], j: int) -> None:
     """Leave room around a joint that hardly moves, so that a sensor's noise does not look wild."""
     spans = np.ptp(drawn, axis=(0, 1))
-    least = _LEAST_SHARE * spans[np.array(units) == units[j]].max()
+    least = _LEAST_SHARE * largest_of_unit(spans, units)[j]
     low, high = axes.get_ylim()
     if high - low < least:
         axes.set_ylim((low + high - least) / 2, (low + high + least) / 2)
