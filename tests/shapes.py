@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 import inspect
+import itertools
 from collections.abc import Callable
 from typing import Any, get_args
 
@@ -11,12 +13,15 @@ from beartype import beartype
 from beartype.door import die_if_unbearable
 from jaxtyping import AbstractArray, install_import_hook, jaxtyped
 
+ALWAYS, SELDOM = 200, 50
+"""Calls of a function in a process that are all checked, and which of the others."""
+
 
 def check_shapes(package: str) -> None:
     """Hold the package, which nothing may have imported yet, to its annotated arrays.
 
     The import hook wraps every function, at 20 us a call; here only those are wrapped that have an
-    array. Half of the suite's time on small functions was that.
+    array, and not at each of a hundred thousand calls. Half of the time on small functions was that.
     """
     jaxtyping.jaxtyped = _wrapped_where_needed
     install_import_hook(package, "tests.shapes.arrays_only")
@@ -24,11 +29,25 @@ def check_shapes(package: str) -> None:
 
 def _wrapped_where_needed(*, typechecker: Callable[..., Any]) -> Callable[..., Any]:
     def wrapped(made: Any) -> Any:
-        if inspect.isfunction(made) and not _takes_or_gives_arrays(made):
+        if not inspect.isfunction(made):
+            return jaxtyped(made, typechecker=typechecker)
+        if not _takes_or_gives_arrays(made):
             return made
-        return jaxtyped(made, typechecker=typechecker)
+        return _often(made, jaxtyped(made, typechecker=typechecker))
 
     return wrapped
+
+
+def _often(made: Callable[..., Any], checked: Callable[..., Any]) -> Callable[..., Any]:
+    """Check a function's first calls and some of those that follow."""
+    calls = itertools.count()
+
+    @functools.wraps(made)
+    def call(*args: Any, **kwargs: Any) -> Any:
+        n = next(calls)
+        return (checked if n < ALWAYS or n % SELDOM == 0 else made)(*args, **kwargs)
+
+    return call
 
 
 def _takes_or_gives_arrays(function: Callable[..., Any]) -> bool:

@@ -8,7 +8,7 @@ from prior_reinforce.arrays import Plans, Points
 from prior_reinforce.perception.exact import Exact
 from prior_reinforce.plans.normalisation import Normalisation
 from prior_reinforce.rollouts import Rollout
-from tests.shapes import arrays_only
+from tests.shapes import SELDOM, arrays_only
 
 
 @jaxtyped(typechecker=arrays_only)
@@ -42,8 +42,10 @@ def test_a_shape_or_kind_that_does_not_fit_is_caught(plans, weights, note):
 
 def test_the_package_is_checked():
     goal, seen = np.zeros(2), np.zeros(3)
+    rollout, rng = Rollout(outcome=goal, valid=True), np.random.default_rng(0)
     with pytest.raises(TypeCheckError):
-        Exact().perceive(Rollout(outcome=goal, valid=True), goal[None], np.random.default_rng(0))
+        for _ in range(SELDOM):
+            Exact().perceive(rollout, goal[None], rng)
     with pytest.raises(TypeCheckError):
         Normalisation(goal, seen)
 

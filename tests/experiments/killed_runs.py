@@ -67,6 +67,7 @@ def wait_for_a_write(folder: Path, pid: int) -> None:
     while os.waitid(os.P_PID, pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is None:
         if set(folder.glob("*/.unfinished-*")) - known:
             return
+        time.sleep(WRITING / 10)  # not a core of its own
 
 
 def main(folder: Path, n_kills: int) -> None:
