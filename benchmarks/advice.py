@@ -2,7 +2,7 @@
 
     python benchmarks/advice.py FOLDER [TASK ...] [--afternoons 4] [--goals 25] [--seed 3001]
 
-By eye, on the measured fields of sets A and B that `adaptation_fields.py FOLDER --tuning` keeps.
+By eye, on displacement fields of sets A and B with tuning seeds, which are kept in FOLDER.
 Each afternoon makes throws that are chosen where `BayesianAdapter.gain` is greatest, or aimed at
 goals drawn at random; then one throw at each of the goals. Printed is the share that hits, with its
 standard error over afternoons. Basketball V3 is other hardware than demonstrations were made on.
@@ -14,11 +14,11 @@ import argparse
 from pathlib import Path
 
 import numpy as np
-from adaptation_fields import Source
 
 from prior_reinforce.adapters.bayesian import BayesianAdapter
-from prior_reinforce.experiments.fields import Conditions, FieldTask
+from prior_reinforce.experiments.fields import Conditions, FieldTask, MeasuredField
 from prior_reinforce.experiments.protocol import is_hit
+from prior_reinforce.experiments.recipes.adaptation import TASKS
 from prior_reinforce.generators.base import Generator
 from prior_reinforce.perception.eye import Eye
 from prior_reinforce.tasks.base import Task
@@ -91,8 +91,10 @@ def main() -> None:
     print(f"| task | throws | {' | '.join(map(str, THROWS))} |")
     print("|---" * (2 + len(THROWS)) + "|")
     for name in arguments.tasks:
-        sources = [Source(name, key, LABELS) for key in "AB"]
-        tasks = [FieldTask(source.field(arguments.folder, tuning=True)) for source in sources]
+        measured = [
+            MeasuredField(name, TASKS[name], key, LABELS, seed=arguments.seed) for key in "AB"
+        ]
+        tasks = [FieldTask(one.field(arguments.folder)) for one in measured]
         for chosen in (True, False):
             shares = np.array([
                 afternoon(task, chosen, arguments.goals, arguments.seed + i)

@@ -2,8 +2,8 @@
 
     python benchmarks/relabel.py FOLDER [--goals 8 20] [--afternoons 2] [--seed 3001]
 
-Basketball V1, sets A and B, by eye, on the measured fields that `adaptation_fields.py FOLDER
---tuning` keeps. After an afternoon of goals the Bayesian adapter's mean displacement at each
+Basketball V1, sets A and B, by eye, on displacement fields of tuning seeds, which are measured once
+and kept in FOLDER. After an afternoon of goals the Bayesian adapter's mean displacement at each
 demonstration, without what hardware changed, is added to the outcome that was seen of it, and the
 generator is fitted again. Printed: how far labels are off (rms), and for 40 new goals the median
 miss in contact physics without noise and the share within the tolerance, of first throws of the
@@ -18,10 +18,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from adaptation_fields import GENERATOR, Source
 
 from prior_reinforce.adapters.bayesian import BayesianAdapter
-from prior_reinforce.experiments.fields import Conditions, FieldTask
+from prior_reinforce.experiments.fields import Conditions, FieldTask, MeasuredField
 from prior_reinforce.experiments.protocol import perceive_demonstrations, reach_goals
 from prior_reinforce.generators import make_generator
 from prior_reinforce.perception.eye import Eye
@@ -55,7 +54,8 @@ def main() -> None:
     print("| set, afternoon, goals | labels off | as it was | with memory | fitted again |")
     print("|---|---|---|---|---|")
     for key in "AB":
-        task = FieldTask(Source(TASK, key, LABELS).field(arguments.folder, tuning=True))
+        measured = MeasuredField(TASK, TASK, key, LABELS, seed=arguments.seed)
+        task = FieldTask(measured.field(arguments.folder))
         own = task.demonstrations("own")
         recorded = physics.demonstrations(key)
         prior = perceive_demonstrations(physics, recorded, Eye(), seed=100 + LABELS)
@@ -79,7 +79,7 @@ def main() -> None:
                     for d in (prior, corrected)
                 ]
                 proposed = np.array([adapter.propose(goal) for goal in new])
-                again = make_generator(GENERATOR).fit(corrected, seed=LABELS).generate(new)
+                again = make_generator(measured.generator).fit(corrected, seed=LABELS).generate(new)
                 landed = np.array([r.outcome for r in physics.rollout(again, None)])
                 misses = (
                     task.field.at(new), proposed + task.field.at(proposed) - new, landed - new,

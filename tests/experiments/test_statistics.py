@@ -9,6 +9,8 @@ from prior_reinforce.experiments.statistics import (
     bootstrap_difference,
     bootstrap_mean,
     difference_curve,
+    difference_of_tasks,
+    mean_of_tasks,
     mean_success_difference,
     reached_by,
     success_curve,
@@ -88,3 +90,28 @@ def test_a_difference_of_curves_is_paired():
     solved = np.tile([1, 0], (3, 20))
     (point,) = difference_curve(solved, solved, 1)
     assert point == {"value": 0.0, "low": 0.0, "high": 0.0}
+
+
+def test_tasks_weigh_alike_however_many_trainings_they_have():
+    few, many = np.full((2, 5), 1.0), np.full((8, 5), 3.0)
+    assert mean_of_tasks([few, many]).value == 2.0
+    assert mean_of_tasks([few, many], within=(1, 2.5)).high <= 2.5
+
+
+def test_the_interval_over_tasks_holds_the_truth():
+    rng = np.random.default_rng(0)
+    held = 0
+    for number in range(200):
+        rows = [rng.normal(0.0, 0.15, (m, 1)) + rng.normal(0.0, 0.4, (m, 20)) for m in (4, 3, 4)]
+        interval = mean_of_tasks(rows, seed=number)
+        held += interval.low <= 0.0 <= interval.high
+    assert held >= 0.92 * 200
+
+
+def test_a_difference_over_tasks_is_of_the_trainings_that_both_have():
+    rng = np.random.default_rng(0)
+    a = [rng.normal(size=(4, 6)) for _ in range(3)]
+    b = [of[:2] - 0.5 for of in a]
+    interval = difference_of_tasks(a, b)
+    assert interval.value == pytest.approx(0.5)
+    assert interval.high - interval.low < 1e-9

@@ -12,8 +12,11 @@ Ours, because adapters differ by a tenth of a trial: that asks for more goals th
 from __future__ import annotations
 
 import os
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -22,11 +25,17 @@ from scipy.interpolate import RectBivariateSpline
 from typing_extensions import Self
 
 from prior_reinforce.arrays import Plans, Points, as_plans
-from prior_reinforce.errors import ConfigurationError
-from prior_reinforce.generators import Generator
+from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
+from prior_reinforce.experiments.evaluation import GOAL_SEED
+from prior_reinforce.experiments.protocol import perceive_demonstrations
+from prior_reinforce.experiments.units import Unit, digest_of, result_of
+from prior_reinforce.generators import Generator, make_generator
 from prior_reinforce.generators.base import Report
+from prior_reinforce.perception import make_perception
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
+from prior_reinforce.registry import source_digest
 from prior_reinforce.rollouts import Rollout
+from prior_reinforce.tasks import make_task
 from prior_reinforce.tasks.base import Task
 
 SPACING = 0.04
@@ -37,6 +46,8 @@ _MARGIN = 0.05
 the edge."""
 _REPEATED = (4, 5)
 """Conditions whose plans are executed again, and how often, for the noise: right to 15 %."""
+_DRAWS = 50
+"""Of demonstrations, until no two of them look the same."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,6 +148,90 @@ def measure(
         name, low, (high - low) / (counts - 1), landed - grid, np.sqrt(apart), task.region,
         task.tolerance, demonstrations.outcomes_seen, demonstrations.outcome_noise,
     )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class MeasuredField(Unit):
+    """Learn from a task's demonstrations, and measure where plans for a grid come down."""
+
+    task: str
+    """Where plans are executed."""
+    learned_on: str
+    """The task that was demonstrated."""
+    demonstrations: str
+    """Prior set, A or B; another letter: a draw from both."""
+    labels: int
+    """Seed of how their outcomes are seen."""
+    count: int = 0
+    """How many of a draw; 0 for as many as A has."""
+    perception: str = "eye"
+    """Through which they are seen."""
+    generator: str = "interpolation,timing=align"
+    """What is learned."""
+    seed: int = GOAL_SEED
+    """Of the draws; what is decided is decided on others than the reported ones."""
+
+    @property
+    def label(self) -> str:
+        """What it is, for a progress line."""
+        return f"measure {self.task} {self.demonstrations}{self.count or ''} by {self.perception}"
+
+    @property
+    def own_sources(self) -> tuple[str, ...]:
+        """Hashes of your own files behind it; see `Unit`."""
+        own = (self.task, self.learned_on, self.perception, self.generator)
+        return tuple(source_digest(choice) for choice in own)
+
+    def run(self, folder: Path) -> Mapping[str, Any]:
+        """Measure, and keep the field in the folder's models."""
+        prior = self._seen(make_task(self.learned_on))
+        generator = make_generator(self.generator).fit(prior, seed=self.labels)
+        seed = GOAL_SEED + self.labels
+        measured = measure(make_task(self.task), generator, prior, self.label, seed=seed)
+        path = self._path(folder)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        measured.save(path)
+        return {"noise_sd": measured.noise_sd.tolist()}
+
+    def field(self, folder: Path) -> Field:
+        """What was measured: from the folder, or now, and put there."""
+        if not self._path(folder).is_file():
+            result_of(folder, self)
+        return Field.load(self._path(folder))
+
+    def _path(self, folder: Path) -> Path:
+        return folder / "fields" / f"{digest_of(self)}.npz"
+
+    def _seen(self, task: Task) -> Demonstrations:
+        """The demonstrations with their outcomes as they were seen.
+
+        In a draw of which two look the same, another is taken, and the eye's words begin elsewhere.
+        """
+        for attempt in range(_DRAWS):
+            seed = GOAL_SEED + self.labels + 1000 * attempt
+            prior = self._recorded(task, attempt)
+            try:
+                with make_perception(self.perception, seed=seed) as perception:
+                    return perceive_demonstrations(task, prior, perception, seed=seed)
+            except InvalidDemonstrationsError:
+                if self.demonstrations in task.demonstration_sets or attempt == _DRAWS - 1:
+                    raise
+        raise AssertionError("range is empty")
+
+    def _recorded(self, task: Task, attempt: int) -> Demonstrations:
+        """The demonstrations as they were recorded."""
+        if self.demonstrations in task.demonstration_sets:
+            return task.demonstrations(self.demonstrations)
+        both = [task.demonstrations(name) for name in task.demonstration_sets]
+        pool = replace(
+            both[0],
+            plans=np.concatenate([d.plans for d in both]),
+            outcomes_seen=np.concatenate([d.outcomes_seen for d in both]),
+            outcome_noise=np.concatenate([d.outcome_noise for d in both]),
+        )
+        drawn = [self.seed, ord(self.demonstrations), *[attempt] * (attempt > 0)]
+        order = np.random.default_rng(drawn).permutation(pool.n)
+        return pool.only(tuple(sorted(order[: self.count or both[0].n])))
 
 
 @dataclass(frozen=True)

@@ -1,12 +1,14 @@
 """Afternoons: goals worked through one after another, with or without what came before.
 
+In physics, or by the thousand on a displacement field.
+
 Ours; the paper starts every goal from the demonstrations alone.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +16,8 @@ import numpy as np
 
 from prior_reinforce.adapters import make_adapter
 from prior_reinforce.experiments.evaluation import GOAL_SEED, Training
-from prior_reinforce.experiments.protocol import run_sequences
+from prior_reinforce.experiments.fields import Change, Conditions, FieldTask, MeasuredField
+from prior_reinforce.experiments.protocol import GoalTrials, run_sequences
 from prior_reinforce.experiments.units import Unit
 from prior_reinforce.perception import make_perception
 from prior_reinforce.registry import source_digest
@@ -73,8 +76,68 @@ class Afternoons(Unit):
                 rounds=self.rounds,
                 seed=seed,
             )
-        trials = [trial for of_one in results for goal in of_one for trial in goal.trials]
-        return {
-            "solved_at": [[goal.solved_at or 0 for goal in of_one] for of_one in results],
-            "expected": [[trial.p_hit, trial.hit] for trial in trials if trial.p_hit is not None],
-        }
+        return _kept(results)
+
+
+@dataclass(frozen=True)
+class FieldAfternoons(Unit):
+    """Work through sequences of goals on a field with one adapter."""
+
+    measured: MeasuredField
+    """Where."""
+    adapter: str
+    """Adapter, by its choice."""
+    carry_over: bool
+    """Whether earlier goals' trials serve later ones."""
+    change: Change = field(default_factory=Change)
+    """What is different since it was measured."""
+    perception: str = "eye"
+    """Through which trials are seen."""
+    goals: int = 8
+    """In the sequence."""
+    sequences: int = 1
+    """Number of afternoons."""
+    rounds: int = 10
+    """Trials a goal at most."""
+    seed: int = GOAL_SEED
+    """Of the goals."""
+
+    @property
+    def label(self) -> str:
+        """What it is, for a progress line."""
+        carried = ", carried" if self.carry_over else ""
+        return f"{self.adapter}{carried}, {self.measured.label.removeprefix('measure ')}"
+
+    @property
+    def own_sources(self) -> tuple[str, ...]:
+        """Hashes of your own files behind it; see `Unit`."""
+        own = (self.adapter, self.perception)
+        return super().own_sources + tuple(source_digest(choice) for choice in own)
+
+    def run(self, folder: Path) -> Mapping[str, Any]:
+        """Run them in lock step, and keep plain numbers, a row a sequence."""
+        task = FieldTask(self.measured.field(folder), self.change)
+        prior = task.demonstrations("own")
+        goals = task.sample_goals(self.sequences * self.goals, np.random.default_rng(self.seed))
+        with make_perception(self.perception, seed=self.seed) as perception:
+            results = run_sequences(
+                task,
+                Conditions().fit(prior, seed=0),
+                lambda: make_adapter(self.adapter),
+                perception,
+                prior,
+                goals.reshape(self.sequences, self.goals, -1),
+                carry_over=self.carry_over,
+                rounds=self.rounds,
+                seed=self.seed + self.measured.labels,
+            )
+        return _kept(results)
+
+
+def _kept(results: Sequence[Sequence[GoalTrials]]) -> dict[str, Any]:
+    """Which trial reached each goal, and what was said before each trial and came of it."""
+    trials = [trial for of_one in results for goal in of_one for trial in goal.trials]
+    return {
+        "solved_at": [[goal.solved_at or 0 for goal in of_one] for of_one in results],
+        "expected": [[trial.p_hit, trial.hit] for trial in trials if trial.p_hit is not None],
+    }

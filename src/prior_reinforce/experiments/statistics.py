@@ -11,7 +11,7 @@ are trainings (prior set and seed), its columns goals.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -26,6 +26,8 @@ SHARE = (0.0, 1.0)
 
 Values = Shaped[np.ndarray, "trainings goals"]
 """One number for each training and goal."""
+OfTasks = Sequence[Shaped[np.ndarray, "_ _"]]
+"""Such numbers of each task; tasks may have different numbers of trainings."""
 Curve = list[dict[str, float]]
 """An interval for each round, from round 1, as it goes into JSON."""
 
@@ -131,3 +133,40 @@ def mean_success_difference(solved_at: Values, other: Values, rounds: int) -> In
         for at in (solved_at, other)
     )
     return bootstrap_difference(a, b, within=SHARE)
+
+
+def mean_of_tasks(
+    rows: OfTasks, *, within: tuple[float, float] = _ANYWHERE, seed: int = 0
+) -> Interval:
+    """Mean of tasks that weigh alike: trainings and goals are drawn anew in each, tasks are not.
+
+    Args:
+        rows: Values of each task.
+        within: What such a mean can be at all.
+        seed: Of the resampling.
+
+    Returns:
+        As `bootstrap_mean`, each task's deviations widened as a variance of so few trainings, all
+        together to Student's tails.
+    """
+    from scipy import stats
+
+    rng, deviation = np.random.default_rng(seed), np.zeros(_RESAMPLES)
+    for row in rows:
+        m, n = row.shape
+        drawn = row[
+            rng.integers(m, size=(_RESAMPLES, m, 1)), rng.integers(n, size=(_RESAMPLES, 1, n))
+        ].mean(axis=(1, 2))
+        deviation += np.sqrt(m / max(m - 1, 1)) * (drawn - row.mean()) / len(rows)
+    tail = (1 + _CONFIDENCE) / 2
+    freedom = max(sum(len(row) - 1 for row in rows), 1)
+    widened = stats.t.ppf(tail, freedom) / stats.norm.ppf(tail) * deviation
+    value = float(np.mean([row.mean() for row in rows]))
+    low, high = np.clip(value + np.quantile(widened, [1 - tail, tail]), *within)
+    return Interval(value, float(low), float(high))
+
+
+def difference_of_tasks(a: OfTasks, b: OfTasks, *, seed: int = 0) -> Interval:
+    """Mean of a - b over tasks, paired; of the trainings of a, the first that b has as well."""
+    pairs = zip(a, b, strict=True)
+    return mean_of_tasks([of_a[: len(of_b)] - of_b for of_a, of_b in pairs], seed=seed)

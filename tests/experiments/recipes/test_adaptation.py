@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from prior_reinforce.experiments.recipes import Run, Scale
-from prior_reinforce.experiments.recipes.adaptation import RECIPE, Adaptation, _reliability
+from prior_reinforce.experiments.recipes.adaptation import RECIPE, Adaptation, reliability
 
 SMALL = Scale(goals=8, seeds=(0,), sets=("A",), rounds=2)
 
 
-def test_reliability_by_hand():
+def testreliability_by_hand():
     expected = np.array([[0.2, 0], [0.2, 0], [0.2, 1], [0.8, 1]], dtype=float)
-    found = _reliability(expected)
+    found = reliability(expected)
     assert found["brier"] == pytest.approx((0.04 + 0.04 + 0.64 + 0.04) / 4)
     assert found["base_rate"] == 0.25
     assert [b["n"] for b in found["bins"]] == [3, 1]

@@ -11,6 +11,7 @@ from prior_reinforce.experiments.recipes import (
     displacement,
     generators,
     process,
+    robustness,
     trials,
     variation,
     zero_shot,
@@ -36,6 +37,7 @@ RECIPES: Mapping[str, Recipe] = {
         trials,
         process,
         adaptation,
+        robustness,
         variation,
     )
 }

@@ -6,7 +6,7 @@ contact physics. Goals 2 to 8 count: before the first there is nothing to rememb
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -130,7 +130,7 @@ class Adaptation(Measurement):
                 if i != ours
             },
             "by_place": {name: by_place[i].tolist() for i, name in enumerate(names)},
-            "p_hit": _reliability(np.array(expected, dtype=float)),
+            "p_hit": reliability(np.array(expected, dtype=float)),
         }
 
     def _trainings(self, task: str, scale: Scale) -> list[Training]:
@@ -141,7 +141,7 @@ class Adaptation(Measurement):
         ]
 
 
-def _reliability(expected: Any) -> dict[str, Any]:
+def reliability(expected: Any) -> dict[str, Any]:
     """What was said of P(hit) and what came of it, over trials; Brier score beside the base rate's.
 
     Args:
@@ -227,13 +227,17 @@ def draw(figures: Figures, folder: Path) -> list[Picture]:
 
 def remarks(figures: Figures) -> list[str]:
     """How far the probabilities that were said before each trial can be trusted."""
-    p = figures["p_hit"]
+    return [said_of(figures["p_hit"])]
+
+
+def said_of(p: Mapping[str, Any]) -> str:
+    """A reliability table in a sentence."""
     bins = "; ".join(f"{b['said']:.2f}: {b['hit']:.2f} of {b['n']}" for b in p["bins"])
-    return [
+    return (
         f"P(hit), as the Bayesian adapter said it before each of {p['n']} trials: Brier score "
         f"{p['brier']:.3f}, that of the base rate {p['base_rate']:.3f}. Said, and the share that "
         f"hit: {bins}."
-    ]
+    )
 
 
 RECIPE = Recipe(

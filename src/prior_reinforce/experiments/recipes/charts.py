@@ -313,3 +313,30 @@ def draw_alignment(
     figure.axes[-1].set_xlabel("time [s]")
     figure.axes[-1].set_xlim(0, dt * (max(before.shape[1], after.shape[1]) - 1))
     return save_png(figure, path)
+
+
+@drawing()
+def draw_rows(
+    rows: Mapping[str, Mapping[str, Interval]], marks: Mapping[str, str], label: str, path: Path
+) -> Path:
+    """Draw intervals, a row a condition and a mark a method; the first method is ours."""
+    figure = new_figure(7.5, 0.55 * len(rows) + 1.3)
+    axes = figure.subplots()
+    calm_axes(axes)
+    axes.grid(visible=False, axis="y")
+    for place, of_method in enumerate(rows.values()):
+        for i, (method, mark) in enumerate(marks.items()):
+            if method not in of_method:
+                continue
+            y, of = place + 0.17 * (i - (len(marks) - 1) / 2), of_method[method]
+            colour = GOAL if i == 0 else _COLOURS[i - 1]
+            axes.plot([of.low, of.high], [y, y], color=colour, linewidth=1.5)
+            name = method if place == 0 else None
+            axes.plot(of.value, y, mark, color=colour, markersize=6, label=name)
+    axes.set_yticks(range(len(rows)), list(rows))
+    axes.invert_yaxis()
+    axes.set_xlabel(label)
+    figure.legend(
+        loc="outside upper center", ncols=2, frameon=False, fontsize=9, labelcolor=INK_SOFT
+    )
+    return save_png(figure, path)
