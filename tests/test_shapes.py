@@ -43,9 +43,13 @@ def test_a_shape_or_kind_that_does_not_fit_is_caught(plans, weights, note):
 def test_the_package_is_checked():
     goal, seen = np.zeros(2), np.zeros(3)
     rollout, rng = Rollout(outcome=goal, valid=True), np.random.default_rng(0)
-    with pytest.raises(TypeCheckError):
+
+    def look_often():
         for _ in range(SELDOM):
             Exact().perceive(rollout, goal[None], rng)
+
+    with pytest.raises(TypeCheckError):
+        look_often()
     with pytest.raises(TypeCheckError):
         Normalisation(goal, seen)
 
