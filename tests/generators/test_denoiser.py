@@ -62,14 +62,31 @@ def test_mean_shift_ends_in_a_mode_not_between_two():
     torch.testing.assert_close(codes, torch.full((5, 1, 1), 0.8), atol=0.02, rtol=0)
 
 
+@pytest.mark.parametrize("shared", [True, False])
 @pytest.mark.parametrize("sampler", ["mean_shift", "ddim", "ddpm"])
-def test_a_code_depends_on_its_condition_alone(sampler):
-    config = DiffusionConfig(prediction="sample", margin=1.0, sampler=sampler)
+def test_a_code_depends_on_its_condition_alone(sampler, shared):
+    config = DiffusionConfig(prediction="sample", margin=1.0, sampler=sampler, shared_noise=shared)
     conditions = torch.tensor([[0.1], [0.5], [-0.7]])
     together = sample(gaussian(0.01), conditions, (1, 4), config, seed=0)
     alone = sample(gaussian(0.01), conditions[1:2], (1, 4), config, seed=0)
     torch.testing.assert_close(together[1:2], alone, atol=1e-6, rtol=0)
     torch.testing.assert_close(together, conditions[:, :, None].expand(3, 1, 4), atol=0.03, rtol=0)
+
+
+def test_noise_is_shared_or_each_conditions_own():
+    """Where plans scatter widely, DDPM ends a draw away from the condition."""
+    conditions = torch.linspace(-0.5, 0.5, 400)[:, None]
+    scatter = {}
+    for shared in (True, False):
+        config = DiffusionConfig(
+            prediction="sample", margin=4.0, sampler="ddpm", shared_noise=shared
+        )
+        codes = sample(gaussian(0.2), conditions, (1, 1), config, seed=0)
+        scatter[shared] = (codes[:, 0, 0] - conditions[:, 0]).std().item()
+        other = sample(gaussian(0.2), conditions, (1, 1), config, seed=1)
+        assert not torch.allclose(codes, other)
+    assert scatter[True] < 0.01
+    assert scatter[False] == pytest.approx(0.2, rel=0.15)
 
 
 def test_levels_fall_and_reach_low_noise():

@@ -1,8 +1,8 @@
 """The denoising network, trained on a handful of codes, and three ways to run it.
 
 The adapter needs the same plan for the same condition, and near plans for near conditions. So
-nothing is drawn while sampling: what noise there is comes from the fit's seed and is shared by all
-conditions.
+noise comes from the fit's seed and is shared by all conditions. With `shared_noise=False` each has
+its own, as where plans are sampled at random; still the same condition has the same plan.
 
 Notation:
     B  batch    C  numbers of a code at one position    T  positions    n  conditions    k  outcome
@@ -10,8 +10,9 @@ Notation:
 
 from __future__ import annotations
 
+import hashlib
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -121,11 +122,22 @@ def sample(
         conditions: Scaled conditions, on the network's device.
         shape: (C, T) of a code.
         config: Sampler and its settings.
-        seed: Of the shared noise.
+        seed: Of the noise.
     """
     schedule = NoiseSchedule.squared_cosine(config.noise_levels)
-    denoiser = _Denoiser(network, conditions, shape, config, schedule)
-    return _SAMPLERS[config.sampler](denoiser, torch.Generator().manual_seed(seed))
+    rows = [b""] if config.shared_noise else [row.tobytes() for row in conditions.cpu().numpy()]
+    sources = [_source(seed, row) for row in rows]
+    return _SAMPLERS[config.sampler](
+        _Denoiser(network, conditions, shape, config, schedule, sources)
+    )
+
+
+def _source(seed: int, condition: bytes) -> torch.Generator:
+    """Noise of a seed; where a condition is given, that condition's own."""
+    if condition:
+        digest = hashlib.sha256(f"{seed} ".encode() + condition).digest()
+        seed = int.from_bytes(digest[:7], "big")
+    return torch.Generator().manual_seed(seed)
 
 
 @dataclass(frozen=True)
@@ -138,14 +150,18 @@ class _Denoiser:
     """(C, T) of a code."""
     config: DiffusionConfig
     schedule: NoiseSchedule
+    sources: Sequence[torch.Generator]
+    """Of noise: one for all conditions, or one each."""
 
     def mean(self) -> Float[torch.Tensor, "n C T"]:
         """The mean of all latents, which is zero, for each condition."""
         return torch.zeros((len(self.conditions), *self.shape), device=self.conditions.device)
 
-    def noise(self, count: int, rng: torch.Generator) -> Float[torch.Tensor, "{count} C T"]:
-        """Draws that all conditions share."""
-        return torch.randn((count, *self.shape), generator=rng).to(self.conditions.device)
+    def noise(self, count: int) -> Float[torch.Tensor, "n {count} C T"]:
+        """Draw so much for each condition."""
+        shape = count, *self.shape
+        drawn = torch.stack([torch.randn(shape, generator=source) for source in self.sources])
+        return drawn.to(self.conditions.device).expand(len(self.conditions), *shape)
 
     def clean(
         self, noisy: Float[torch.Tensor, "B C T"], level: int
@@ -164,7 +180,7 @@ class _Denoiser:
         return estimate.clamp(-bound, bound)
 
 
-def _mean_shift(denoiser: _Denoiser, rng: torch.Generator) -> torch.Tensor:
+def _mean_shift(denoiser: _Denoiser) -> torch.Tensor:
     """Climb to a mode of what was learned: annealed mean shift.
 
     An estimate x_0 is noised, at a few falling levels, with the same K draws for every condition,
@@ -176,10 +192,10 @@ def _mean_shift(denoiser: _Denoiser, rng: torch.Generator) -> torch.Tensor:
     """
     config, schedule = denoiser.config, denoiser.schedule
     draws = config.noise_draws
-    half = denoiser.noise(draws // 2, rng)
+    half = denoiser.noise(draws // 2)
     # Opposite draws cancel what is odd in the noise.
     x = denoiser.mean()
-    noise = torch.cat([half, -half]).repeat(len(x), 1, 1)
+    noise = torch.cat([half, -half], dim=1).flatten(0, 1)
     for level in mean_shift_levels(config.noise_levels, config.sampling_steps):
         levels = torch.full((len(noise),), level, device=x.device)
         noisy = schedule.add_noise(x.repeat_interleave(draws, dim=0), noise, levels)
@@ -187,9 +203,8 @@ def _mean_shift(denoiser: _Denoiser, rng: torch.Generator) -> torch.Tensor:
     return x
 
 
-def _ddim(denoiser: _Denoiser, rng: torch.Generator) -> torch.Tensor:
+def _ddim(denoiser: _Denoiser) -> torch.Tensor:
     """DDIM [Song2021] from x_T = 0, the mean of the latents."""
-    del rng
     config = denoiser.config
     steps = inference_steps(config.noise_levels, config.sampling_steps)
     x = denoiser.mean()
@@ -198,16 +213,16 @@ def _ddim(denoiser: _Denoiser, rng: torch.Generator) -> torch.Tensor:
     return x
 
 
-def _ddpm(denoiser: _Denoiser, rng: torch.Generator) -> torch.Tensor:
-    """DDPM [Ho2020] over all levels, as the paper samples; one noise path for all conditions."""
-    x = denoiser.mean() + denoiser.noise(1, rng)
+def _ddpm(denoiser: _Denoiser) -> torch.Tensor:
+    """DDPM [Ho2020] over all levels, as the paper samples."""
+    x = denoiser.noise(1)[:, 0]
     for step in range(denoiser.config.noise_levels - 1, -1, -1):
         clean = denoiser.clean(x, step)
-        x = denoiser.schedule.ddpm_step(x, clean, step, denoiser.noise(1, rng))
+        x = denoiser.schedule.ddpm_step(x, clean, step, denoiser.noise(1)[:, 0])
     return x
 
 
-_SAMPLERS: dict[str, Callable[[_Denoiser, torch.Generator], torch.Tensor]] = {
+_SAMPLERS: dict[str, Callable[[_Denoiser], torch.Tensor]] = {
     "mean_shift": _mean_shift,
     "ddim": _ddim,
     "ddpm": _ddpm,

@@ -74,6 +74,9 @@ class DiffusionConfig(UNetConfig):
     """Noise levels visited by mean shift or DDIM; DDPM visits all."""
     noise_draws: Annotated[int, msgspec.Meta(ge=2, multiple_of=2)] = 8
     """K, noise draws over which a step of mean shift averages; even: a draw and its opposite."""
+    shared_noise: bool = True
+    """All conditions share what noise a sampler draws, so that near conditions have near plans; if
+    not, each has its own, as where plans are sampled at random."""
     batch_size: Count = 24
     """Samples a step, at least one of each demonstration where there is room."""
     fill_batch: bool = True
@@ -149,6 +152,26 @@ class DiffusionGenerator(NetworkGenerator):
         if representation is not None:
             config = replace(config, representation=representation)
         super().__init__(config, device=device, threads=threads, states=states)
+
+    def sampled(
+        self, *, sampler: Sampler | None = None, shared_noise: bool | None = None
+    ) -> DiffusionGenerator:
+        """Return a generator with the same network, sampled otherwise; it needs no training.
+
+        Args:
+            sampler: Replaces the one of the settings.
+            shared_noise: Replaces that of the settings.
+
+        Raises:
+            NotFittedError: It is not fitted.
+        """
+        other = DiffusionGenerator.unpack(self.pack())
+        other.config = replace(
+            self.config,
+            sampler=self.config.sampler if sampler is None else sampler,
+            shared_noise=self.config.shared_noise if shared_noise is None else shared_noise,
+        )
+        return other.to(self._device)
 
     def _build(self, channels: int, length: int, outcome_dim: int) -> ConditionalUNet:
         from prior_reinforce.generators.unet import ConditionalUNet

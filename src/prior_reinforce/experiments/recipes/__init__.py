@@ -10,6 +10,7 @@ from prior_reinforce.experiments.recipes import (
     alignment,
     displacement,
     generators,
+    preset,
     process,
     robustness,
     trials,
@@ -39,6 +40,7 @@ RECIPES: Mapping[str, Recipe] = {
         adaptation,
         robustness,
         variation,
+        preset,
     )
 }
 """Every recipe by its name, in the order of the evidence page."""

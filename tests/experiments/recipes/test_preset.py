@@ -1,0 +1,43 @@
+"""The paper's preset beside ours; brief networks stand for it, since it learns for hours."""
+
+import json
+
+import numpy as np
+import pytest
+
+from prior_reinforce.commands.reproduce import Reproduce
+from prior_reinforce.experiments.evaluation import Training
+from prior_reinforce.experiments.recipes import Run, Scale
+from prior_reinforce.experiments.recipes.base import TASK
+from prior_reinforce.experiments.recipes.preset import RECIPE, OwnNoiseTraining, PaperPreset
+
+BRIEF = (
+    "diffusion,timing=none,exact=no,trend=zero,training_steps=20,sampler=ddpm,sampling_steps=5,"
+    "noise_levels=5"
+)
+SMALL = Scale(goals=4, seeds=(0,), sets=("A", "B"), rounds=2)
+
+
+@pytest.mark.slow
+def test_one_network_is_sampled_twice_and_stands_beside_ours(tmp_path):
+    methods = (("ours", "nearest", False), ("shared", BRIEF, False), ("own", BRIEF, True))
+    measurement = PaperPreset(methods)
+    figures = json.loads(json.dumps(measurement.run(Run(tmp_path, SMALL))))
+    assert len(list(tmp_path.glob("models/*"))) == 4  # not a network for each way of sampling
+    table = RECIPE.table(figures)
+    assert [row[0] for row in table.rows] == ["ours", "shared", "own"]
+    assert {len(row) for row in table.rows} == {len(table.header)}
+    shared, own = figures["rows"][1:]
+    assert shared["first_error_m"] != own["first_error_m"]
+
+    plans = [
+        kind(TASK, "A", BRIEF, 0).learned(tmp_path).generator.generate([[1.0, 0.0], [1.0, 1e-6]])
+        for kind in (Training, OwnNoiseTraining)
+    ]
+    apart = [np.abs(np.diff(of, axis=0)).max() for of in plans]
+    assert apart[0] < 1e-3 < apart[1]  # near conditions have near plans, or not
+
+
+def test_all_leaves_it_out_and_its_name_runs_it():
+    assert RECIPE not in Reproduce("all")._recipes()
+    assert Reproduce("preset")._recipes() == [RECIPE]
