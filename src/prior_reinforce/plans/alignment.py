@@ -116,9 +116,11 @@ def correlation_lags(profiles: Float[np.ndarray, "N H D"]) -> Float[np.ndarray, 
     # Correlation of i, moved later by s frames, with j: the real part of sum(cross[i, j] e^{jws}).
     cross = np.einsum("ifd,jfd->ijf", spectra.conj(), spectra)
     # Start from the demonstration that resembles all others most.
-    starts = [[_best_lag(cross[i, j], frequencies) for i in range(n)] for j in range(n)]
-    reference = max(range(n), key=lambda j: sum(value for _, value in starts[j]))
-    lags = np.array([lag for lag, _ in starts[reference]])
+    resembles = [
+        float(np.maximum(_correlations(cross[:, j]).max(axis=1), 0).sum()) for j in range(n)
+    ]
+    reference = int(np.argmax(resembles))
+    lags = np.array([_best_lag(cross[i, reference], frequencies) for i in range(n)])
     lags -= lags.mean()
     for _ in range(_MAX_ROUNDS):
         previous = lags.copy()
@@ -126,23 +128,29 @@ def correlation_lags(profiles: Float[np.ndarray, "N H D"]) -> Float[np.ndarray, 
             delays = np.exp(-1j * np.outer(lags, frequencies))  # e^{-jws}: moved later by s
             delays[i] = 0.0
             template = np.einsum("jf,jf->f", delays, cross[i])
-            lags[i] = _best_lag(template, frequencies)[0]
+            lags[i] = _best_lag(template, frequencies)
         lags -= lags.mean()
         if np.max(np.abs(lags - previous)) < _CONVERGED:
             break
     return lags
 
 
+def _correlations(cross_spectra: Complex[np.ndarray, "*n F"]) -> Float[np.ndarray, "*n lags"]:
+    """Correlation at every lag of a scan, `_LAGS_PER_FRAME` a frame."""
+    length = 2 * (cross_spectra.shape[-1] - 1)
+    scan = np.fft.irfft(cross_spectra, n=length * _LAGS_PER_FRAME, axis=-1)
+    return np.asarray(scan * _LAGS_PER_FRAME)
+
+
 def _best_lag(
     cross_spectrum: Complex[np.ndarray, " F"], frequencies: Float[np.ndarray, " F"]
-) -> tuple[float, float]:
-    """Lag [frames] of the highest correlation, and that correlation: a scan, then Newton steps."""
+) -> float:
+    """Lag [frames] of the highest correlation: a scan, then Newton steps."""
     length = 2 * (len(frequencies) - 1)
-    curve = np.fft.irfft(cross_spectrum, n=length * _LAGS_PER_FRAME) * _LAGS_PER_FRAME
+    curve = _correlations(cross_spectrum)
     best = int(np.argmax(curve))
-    value = float(curve[best])
-    if value <= 0:  # nothing moves
-        return 0.0, 0.0
+    if curve[best] <= 0:  # nothing moves
+        return 0.0
     lag = best / _LAGS_PER_FRAME
     lag -= length if lag > length / 2 else 0
     # The real signal's spectrum has two sides, but for its ends.
@@ -155,4 +163,4 @@ def _best_lag(
             break
         step = -slope / curvature
         lag += float(np.clip(step, -1 / _LAGS_PER_FRAME, 1 / _LAGS_PER_FRAME))
-    return lag, value
+    return lag
