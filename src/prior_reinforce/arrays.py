@@ -81,8 +81,8 @@ def as_outcomes(values: ArrayLike, n_plans: int) -> Points:
         n_plans: N that is expected.
 
     Raises:
-        InvalidDemonstrationsError: Wrong shape, fewer than two, repeated outcomes, outcomes in a
-            subspace (on one line when k = 2), or values that are not finite.
+        InvalidDemonstrationsError: Wrong shape, fewer than two, outcomes in a subspace (on one line
+            when k = 2), or values that are not finite.
     """
     outcomes = _as_numbers(
         values, InvalidDemonstrationsError, "outcomes must be an array (N, k) of numbers"
@@ -100,13 +100,6 @@ def as_outcomes(values: ArrayLike, n_plans: int) -> Points:
             f"outcomes must be finite, but demonstration {row} has {outcomes[row].tolist()}; "
             "measure it again, or drop that demonstration"
         )
-    for i in range(n):
-        for j in range(i):
-            if np.array_equal(outcomes[i], outcomes[j]):
-                raise InvalidDemonstrationsError(
-                    f"demonstrations {j} and {i} have the same outcome {outcomes[i].tolist()}; one "
-                    "condition cannot stand for two motions: drop one"
-                )
     spread = np.ptp(outcomes, axis=0)
     if np.any(spread == 0):
         raise InvalidDemonstrationsError(

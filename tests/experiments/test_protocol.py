@@ -91,7 +91,7 @@ def test_outcomes_that_look_the_same_are_told_with_what_to_do():
 
     with pytest.raises(InvalidDemonstrationsError) as raised:
         seen(Asleep(), seed=7)
-    for told in ("Asleep", "basketball-v1", "seed 7", "the same outcome", "choose another seed"):
+    for told in ("Asleep", "basketball-v1", "seed 7", "all outcomes agree", "choose another seed"):
         assert told in str(raised.value)
 
 

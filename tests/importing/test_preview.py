@@ -126,3 +126,11 @@ def test_three_components_are_seen_from_above_and_from_the_side(folder):
     axes = outcome_axes(folder, outcomes)
     assert list(axes) == ["outcomes from above", "outcomes from the side"]
     assert axes["outcomes from the side"].get_ylabel() == "z [m]"
+
+
+def test_measured_outcomes_that_come_twice_are_told(folder):
+    twice = {**OUTCOMES, "3": OUTCOMES["1"]}
+    preview = import_demonstrations(folder, outcomes=twice).preview
+    (remark,) = preview.remarks
+    assert remark.startswith("throw_1 and throw_3 have the same outcome: the mean of both")
+    assert remark in preview.text

@@ -95,7 +95,7 @@ def test_arrays_are_own_copies_and_read_only():
         ({"plans": [np.zeros((5, 2))] * 3 + [np.zeros((6, 2))]}, r"mixed horizons \[5, 6\]"),
         ({"outcomes_seen": np.zeros((3, 2))}, "4 plans need as many outcomes"),
         ({"outcomes_seen": np.full((4, 2), np.inf)}, "finite"),
-        ({"outcomes_seen": [[0.1, 0.2]] * 4}, "same outcome"),
+        ({"outcomes_seen": [[0.1, 0.2]] * 4}, "all outcomes agree"),
         ({"outcomes_seen": [[0.1 * i, 0.2 * i] for i in range(4)]}, "one line"),
         ({"outcomes_seen": [[0.1 * i, 0.2] for i in range(4)]}, "component 1"),
         ({"plans": np.zeros((1, 5, 2)), "outcomes_seen": [[0.1, 0.2]]}, "at least two"),
@@ -213,3 +213,17 @@ def test_missing_truncated_flipped_and_foreign_files_are_named(tmp_path):
     np.savez(bad, plans=np.array([{}], dtype=object), outcomes_seen=[1], metadata="{}")
     with pytest.raises(FileFormatError):
         Demonstrations.load(bad)
+
+
+REPEATED = [[0.1, 0.2], [0.3, 0.1], [0.1, 0.2], [0.4, 0.5]]
+
+
+def test_outcomes_that_were_measured_alike_are_warned_of_and_kept():
+    with pytest.warns(UserWarning, match=r"0 and 2 have the same outcome.*the mean of both"):
+        demos = make(outcomes_seen=REPEATED)
+    assert demos.n == 4
+    demos.with_plans(demos.plans)  # said once
+
+
+def test_outcomes_that_look_alike_by_eye_are_kept_without_a_word():
+    assert make(outcomes_seen=REPEATED, outcome_noise=np.full((4, 2), 0.03)).n == 4

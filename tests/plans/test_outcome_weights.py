@@ -84,3 +84,24 @@ def test_the_unit_of_a_component_does_not_matter(scheme: str):
     np.testing.assert_allclose(
         weights(CONDITIONS * factor, OUTCOMES * factor), weights(CONDITIONS, OUTCOMES), atol=1e-9
     )
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.05])
+@pytest.mark.parametrize("kernel", ["linear", "thin-plate", "cubic"])
+def test_demonstrations_of_one_outcome_are_averaged(kernel, noise):
+    repeated = np.vstack([OUTCOMES, OUTCOMES[2]])
+    weights = smooth_weights(repeated, kernel=kernel, noise=np.full((7, 2), noise))(CONDITIONS)
+    np.testing.assert_allclose(weights[:, 2], weights[:, 6], atol=1e-9)
+    np.testing.assert_allclose(weights.sum(axis=1), 1.0, atol=1e-9)
+    if not noise:
+        alone = smooth_weights(OUTCOMES, kernel=kernel)(CONDITIONS)
+        np.testing.assert_allclose(weights[:, 2] + weights[:, 6], alone[:, 2], atol=1e-3)
+
+
+def test_the_nearest_of_one_outcome_are_averaged_there_and_beside_it():
+    repeated = np.vstack([OUTCOMES, OUTCOMES[2]])
+    at, beside = inverse_distance_weights(
+        np.array([OUTCOMES[2], OUTCOMES[2] + 1e-9]), repeated, neighbours=4, power=2.0
+    )
+    np.testing.assert_array_equal(at[[2, 6]], [0.5, 0.5])
+    np.testing.assert_allclose(beside[[2, 6]], [0.5, 0.5])

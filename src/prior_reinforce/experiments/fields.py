@@ -206,17 +206,25 @@ class MeasuredField(Unit):
         """The demonstrations with their outcomes as they were seen.
 
         In a draw of which two look the same, another is taken, and the eye's words begin elsewhere.
+
+        Raises:
+            InvalidDemonstrationsError: Every draw has outcomes that cannot be learned from.
         """
+        problem = "every draw has two demonstrations that look the same"
         for attempt in range(_DRAWS):
             seed = GOAL_SEED + self.labels + 1000 * attempt
             prior = self._recorded(task, attempt)
             try:
                 with make_perception(self.perception, seed=seed) as perception:
-                    return perceive_demonstrations(task, prior, perception, seed=seed)
-            except InvalidDemonstrationsError:
-                if self.demonstrations in task.demonstration_sets or attempt == _DRAWS - 1:
+                    seen = perceive_demonstrations(task, prior, perception, seed=seed)
+            except InvalidDemonstrationsError as error:
+                if self.demonstrations in task.demonstration_sets:
                     raise
-        raise AssertionError("range is empty")
+                problem = str(error)
+            else:
+                if len(np.unique(seen.outcomes_seen, axis=0)) == seen.n:
+                    return seen
+        raise InvalidDemonstrationsError(problem)
 
     def _recorded(self, task: Task, attempt: int) -> Demonstrations:
         """The demonstrations as they were recorded."""

@@ -120,7 +120,7 @@ def perceive_demonstrations(
         The same plans with the outcomes seen, and how uncertain each is.
 
     Raises:
-        InvalidDemonstrationsError: An execution was lost, or outcomes looked the same.
+        InvalidDemonstrationsError: An execution was lost, or all outcomes look alike.
     """
     reference = task.region.mean(axis=0)
     rng = np.random.default_rng([seed, 5])

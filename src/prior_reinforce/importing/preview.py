@@ -56,8 +56,13 @@ class Preview:
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """What a person should look at: gaps, ends in mid-swing, messages skipped."""
-        return self.found.remarks
+        """What a person should look at: gaps, ends in mid-swing, outcomes that come twice."""
+        alike = tuple(
+            f"{self.episodes[i]} and {self.episodes[j]} have the same outcome: the mean of both "
+            "motions stands for it; if that is a slip of the pen, correct it"
+            for i, j in self.demonstrations.measured_alike()
+        )
+        return (*self.found.remarks, *alike)
 
     @property
     def text(self) -> str:

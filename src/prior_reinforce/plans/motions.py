@@ -134,11 +134,11 @@ class Demonstrations:
     given: measured. What is learned is exact at the demonstrations only where they are."""
 
     def __post_init__(self) -> None:
-        """Copy and check everything; warn about units that look wrong.
+        """Copy and check everything; warn of units that look wrong, and of repeated outcomes.
 
         Raises:
-            InvalidDemonstrationsError: Fewer than two, repeated outcomes, outcomes in a subspace
-                (on one line when k = 2), shapes that do not fit, values that are not finite.
+            InvalidDemonstrationsError: Fewer than two, outcomes in a subspace (on one line when
+                k = 2), shapes that do not fit, values that are not finite.
         """
         if isinstance(self.plans, (list, tuple)):
             horizons = sorted({np.asarray(plan).shape[0] for plan in self.plans if np.ndim(plan)})
@@ -184,6 +184,7 @@ class Demonstrations:
         object.__setattr__(self, "outcome_names", names)
         object.__setattr__(self, "outcome_units", units)
         self._warn_about_units()
+        self._warn_about_repeated_outcomes()
 
     @property
     def n(self) -> int:
@@ -235,6 +236,13 @@ class Demonstrations:
                 outcomes_seen=self.outcomes_seen[members],
                 outcome_noise=self.outcome_noise[members],
             )
+
+    def measured_alike(self) -> list[tuple[int, int]]:
+        """Return pairs whose measured outcomes are the same; by eye, two throws often look it."""
+        measured = np.all(self.outcome_noise == 0.0, axis=1)
+        same = np.all(self.outcomes_seen[:, None] == self.outcomes_seen[None], axis=2)
+        pairs = np.argwhere(np.triu(same & measured & measured[:, None], k=1))
+        return [(int(i), int(j)) for i, j in pairs]
 
     def check_goal(self, goal: ArrayLike) -> Point:
         """Return the goal as a fresh float array, warning when it lies far outside the outcomes.
@@ -313,6 +321,17 @@ class Demonstrations:
             units = tuple(metadata["outcome_units"])
         with _warned_before():
             return cls(plans, outcomes, format_, names, units, noise)
+
+    def _warn_about_repeated_outcomes(self) -> None:
+        pairs = self.measured_alike()
+        if pairs:
+            i, j = pairs[0]
+            warnings.warn(
+                f"demonstrations {i} and {j} have the same outcome "
+                f"{self.outcomes_seen[i].tolist()}: the mean of both motions stands for it; if "
+                "that is a slip of the pen, correct it, or drop one",
+                stacklevel=4,
+            )
 
     def _warn_about_units(self) -> None:
         metres = np.array([unit == "m" for unit in self.outcome_units])

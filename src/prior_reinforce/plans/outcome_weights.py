@@ -28,6 +28,11 @@ _SMOOTHING = 100.0
 docs/decisions-generator.md."""
 
 
+_REPEATED = 1e-6
+"""Least smoothing of outcomes that come more than once, so that their plans are averaged. Ours: far
+below what smooths anything else."""
+
+
 def inverse_distance_weights(
     conditions: Float[np.ndarray, "n k"],
     outcomes: Float[np.ndarray, "N k"],
@@ -45,12 +50,13 @@ def inverse_distance_weights(
 
     Args:
         conditions: c.
-        outcomes: r, no two rows equal.
+        outcomes: r.
         neighbours: m; all demonstrations where there are fewer.
         power: p > 0.
 
     Returns:
-        w; at an outcome of a demonstration, exactly that demonstration.
+        w; at an outcome of a demonstration, exactly that demonstration, or the mean of those that
+        have it.
 
     Source: Shepard, "A two-dimensional interpolation function for irregularly-spaced data",
     ACM National Conference 1968; the paper says only "computed based on distances".
@@ -65,8 +71,7 @@ def inverse_distance_weights(
     with np.errstate(invalid="ignore", divide="ignore"):
         kept = (near[:, :1] / near) ** power
     hit = near[:, 0] == 0
-    kept[hit] = 0.0
-    kept[hit, 0] = 1.0
+    kept[hit] = near[hit] == 0
     weights = np.zeros_like(distances)
     np.put_along_axis(weights, nearest, kept / kept.sum(axis=1, keepdims=True), axis=1)
     return weights
@@ -95,7 +100,7 @@ def smooth_weights(
             need an affine tail to be solvable.
         kernel: Which :math:`\varphi`.
         noise: Standard deviation of each outcome. What is uncertain is smoothed: its weight at its
-            own outcome is below one.
+            own outcome is below one. Demonstrations of one and the same outcome are averaged.
 
     Source: Wendland, "Scattered Data Approximation", 2005, chapter 8 (ours to use it here).
     """
@@ -108,6 +113,8 @@ def smooth_weights(
     if noise is not None:
         relative = np.where(noise > _MEASURED * scale, noise / scale, 0.0)
         spread = _SMOOTHING * np.mean(relative**2, axis=1)
+    times = (outcomes[:, None] == outcomes[None]).all(axis=2).sum(axis=1)
+    spread = np.where(times > 1, np.maximum(spread, _REPEATED), spread)
     spline = RBFInterpolator(
         outcomes / scale,
         np.eye(n),  # one value a demonstration: what is interpolated are the weights themselves

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -80,6 +81,18 @@ class AdapterContract:
         for goal in (outcomes.mean(axis=0), 0.75 * outcomes[0] + 0.25 * outcomes[1]):
             off = np.abs(adapter.propose(goal) - goal)
             assert np.all(off < 0.01 * np.ptp(outcomes, axis=0))
+
+    def test_demonstrations_that_look_the_same_by_eye_are_no_trouble(self) -> None:
+        demonstrations = synthetic_demonstrations(6)
+        outcomes = demonstrations.outcomes_seen.copy()
+        outcomes[1] = outcomes[4]
+        noise = np.full_like(outcomes, 0.02)
+        adapter = self.make()
+        adapter.start(replace(demonstrations, outcomes_seen=outcomes, outcome_noise=noise))
+        goal, spread = outcomes.mean(axis=0), np.ptp(outcomes, axis=0)
+        assert np.all(np.abs(adapter.propose(goal) - goal) < 0.01 * spread)
+        adapter.observe(goal, goal, 0.1 * spread)
+        assert np.all(np.abs(adapter.propose(goal) - goal) < spread)
 
     def test_before_start_it_says_what_to_call(self) -> None:
         with pytest.raises(NotFittedError, match=r"start\(demonstrations\)"):

@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -55,6 +56,15 @@ class GeneratorContract:
         demos = synthetic_demonstrations(2)
         plans = self.make().fit(demos, seed=0).generate(demos.outcomes_seen)
         assert plans.shape == demos.plans.shape
+
+    def test_two_that_look_the_same_by_eye_are_no_trouble(self) -> None:
+        demos = synthetic_demonstrations(5)
+        outcomes = demos.outcomes_seen.copy()
+        outcomes[1] = outcomes[4]
+        noise = np.full_like(outcomes, 0.02)
+        alike = replace(demos, outcomes_seen=outcomes, outcome_noise=noise)
+        plans = self.make().fit(alike, seed=0).generate(_inside(demos, 3))
+        assert np.all(np.isfinite(plans))
 
     def test_the_same_seed_gives_the_same_plans_and_leaves_everything_as_it_was(self) -> None:
         import torch
