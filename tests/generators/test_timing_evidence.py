@@ -42,6 +42,17 @@ def test_a_clocked_release_asks_for_plans_as_recorded():
     assert choice.errors == errors | {"tempo": choice.errors["tempo"]}
 
 
+def test_a_hand_that_opens_in_the_plan_needs_no_clock():
+    """However well the arm at one frame seems to tell outcomes."""
+    demos = demonstrations(42)
+    opens = (np.arange(100) > np.round(STARTS)[:, None] + 30).astype(float)
+    plans = np.concatenate([demos.plans, opens[:, :, None]], axis=2)
+    plan_format = PlanFormat(("a", "b", "gripper"), ("rad", "rad", "m"), 0.02)
+    choice = choose_timing(Demonstrations(plans, demos.outcomes_seen, plan_format))
+    assert choice.errors["none"] < 0.5 * choice.errors["start"]
+    assert choice.apart.timeline.kind == "start"
+
+
 def test_people_who_start_when_they_like_keep_to_no_clock():
     """However well plans as recorded seem to tell outcomes."""
     demos = demonstrations(42)

@@ -4,7 +4,11 @@ import numpy as np
 import pytest
 from scipy.interpolate import RBFInterpolator
 
-from prior_reinforce.plans.outcome_weights import inverse_distance_weights, smooth_weights
+from prior_reinforce.plans.outcome_weights import (
+    amplification,
+    inverse_distance_weights,
+    smooth_weights,
+)
 
 OUTCOMES = np.random.default_rng(0).uniform(size=(6, 2))
 CONDITIONS = np.random.default_rng(1).uniform(-0.3, 1.3, size=(20, 2))
@@ -105,3 +109,29 @@ def test_the_nearest_of_one_outcome_are_averaged_there_and_beside_it():
     )
     np.testing.assert_array_equal(at[[2, 6]], [0.5, 0.5])
     np.testing.assert_allclose(beside[[2, 6]], [0.5, 0.5])
+
+
+def test_amplification_half_way_between_two_is_a_half():
+    outcomes = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+    assert amplification(smooth_weights(outcomes), outcomes) == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(
+    ("outcomes", "kernel"),
+    [
+        (np.stack(np.meshgrid([0.0, 1.0, 2.0], [0.0, 1.0]), -1).reshape(-1, 2), "cubic"),
+        (
+            np.array([[0.0, 0], [0.9, 0.1], [1.0, 0.15], [1.0, 1], [0.1, 0.9], [2, 0.4]]),
+            "thin-plate",
+        ),
+        (np.array([[0.0], [0.45], [0.5], [0.52], [0.9], [1.0]]), "thin-plate"),
+    ],
+    ids=["a grid", "two close together", "on a line"],
+)
+def test_where_outcomes_lie_close_together_plans_bend_less(outcomes, kernel):
+    """Cubic weights of two close together are a slope: what differs by chance would grow."""
+    spread = amplification(smooth_weights(outcomes, kernel="cubic"), outcomes)
+    assert (spread > 0.9) == (kernel == "thin-plate")
+    at = outcomes[:1] + 0.3
+    expected = smooth_weights(outcomes, kernel=kernel)(at)
+    np.testing.assert_array_equal(smooth_weights(outcomes)(at), expected)

@@ -55,9 +55,9 @@ class NearestNeighboursConfig(Checked):
 class SmoothInterpolationConfig(Checked):
     """How plans are interpolated; docs/baselines.md tells what was tried."""
 
-    kernel: Kernel = "cubic"
+    kernel: Kernel = "auto"
     """Radial function: the cube of distance, of least bending (`thin-plate`), or distance itself
-    (`linear`)."""
+    (`linear`); `auto` is the first, or the second where outcomes lie too close together for it."""
 
 
 class _Mixture(Generator):

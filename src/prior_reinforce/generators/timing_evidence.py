@@ -92,7 +92,8 @@ def choose_timing(demonstrations: Demonstrations) -> TimingChoice:
     }
     errors = {kind: outcome_error(demonstrations, each) for kind, each in apart.items()}
     able = [kind for kind in errors if kind == "start" or errors[kind] < _TELLS]
-    if float(np.std(usual.numbers[:, 0])) > _ON_TIME * _length(demonstrations):
+    off_time = float(np.std(usual.numbers[:, 0])) > _ON_TIME * _length(demonstrations)
+    if off_time or usual.by_step:  # a hand that opens within the plan needs no clock
         able = [kind for kind in able if kind != "none"]
     best = min(able, key=lambda kind: errors[kind] / _WORTH[kind])
     if errors[best] >= _TELLS:

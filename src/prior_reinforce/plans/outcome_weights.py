@@ -18,8 +18,11 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
-Kernel = Literal["cubic", "thin-plate", "linear"]
-"""Of `smooth_weights`: the radial function is d^3, d^2 log d, or d."""
+Kernel = Literal["auto", "cubic", "thin-plate", "linear"]
+"""Of `smooth_weights`: the radial function is d^3, d^2 log d, or d. `auto` is the first, or the
+second where the first amplifies what differs between demonstrations by chance (`amplification`)."""
+_LARGEST_AMPLIFICATION = 0.9
+"""Ours: outcomes that are spread evenly stay below it; docs/decisions-generator.md."""
 _MEASURED = 0.01
 """Noise below this part of the demonstrated range is none: the outcome was measured. Ours: 3 mm of
 30 cm, several times what a camera or a tape is off by."""
@@ -84,7 +87,7 @@ Weights = Callable[[Float[np.ndarray, "n k"]], Float[np.ndarray, "n N"]]
 def smooth_weights(
     outcomes: Float[np.ndarray, "N k"],
     *,
-    kernel: Kernel = "cubic",
+    kernel: Kernel = "auto",
     noise: Float[np.ndarray, "N k"] | None = None,
 ) -> Weights:
     r"""Return the cardinal weights of a polyharmonic spline with an affine tail.
@@ -106,6 +109,11 @@ def smooth_weights(
     """
     from scipy.interpolate import RBFInterpolator
 
+    if kernel == "auto":
+        cubic = smooth_weights(outcomes, kernel="cubic", noise=noise)
+        if amplification(cubic, outcomes) <= _LARGEST_AMPLIFICATION:
+            return cubic
+        return smooth_weights(outcomes, kernel="thin-plate", noise=noise)
     n, k = outcomes.shape
     affine = n > k
     scale = np.ptp(outcomes, axis=0)
@@ -123,6 +131,18 @@ def smooth_weights(
         smoothing=spread,
     )
     return lambda conditions: np.asarray(spline(conditions / scale)).reshape(len(conditions), n)
+
+
+def amplification(weights: Weights, outcomes: Float[np.ndarray, "N k"]) -> float:
+    r"""Return the mean of :math:`\sum_i w_i(c)^2` half-way between any two outcomes.
+
+    It is the variance of what differs between demonstrations by chance (posture, tempo) in what is
+    mixed of them, relative to its variance between them. Where two outcomes lie close together,
+    their motions' difference is a slope, and weights grow far beyond one.
+    """
+    i, j = np.triu_indices(len(outcomes), k=1)
+    halfway = 0.5 * (outcomes[i] + outcomes[j])
+    return float(np.mean(np.sum(weights(halfway) ** 2, axis=1)))
 
 
 _SCIPY = {"cubic": "cubic", "thin-plate": "thin_plate_spline", "linear": "linear"}

@@ -239,6 +239,8 @@ class Apart:
     """Smooth channels first, then the parts of those that are timed by themselves."""
     numbers: Numbers
     """theta of each demonstration."""
+    by_step: bool = False
+    """Phase 0 is the transition of a channel: a hand that opens, say."""
 
     def names(self, plan_format: PlanFormat) -> tuple[tuple[str, ...], tuple[str, ...]]:
         """Name and unit of each of the C channels of a shape, then of the P numbers."""
@@ -288,7 +290,7 @@ def take_apart(demonstrations: Demonstrations, kind: WarpKind) -> Apart:
     )
     lasts = [each[:, -1] for each in events.values() if each.shape[1]]
     decisive = max(lasts, key=lambda last: float(last.mean()), default=None)
-    warp, span = _warps(profiles, kind, decisive)
+    warp, span, by_step = _warps(profiles, kind, decisive)
     # Whole frames, so that a transition comes back as recorded.
     times = {d: np.round(each).astype(int) for d, each in events.items()}
     steps = tuple(
@@ -332,9 +334,9 @@ def take_apart(demonstrations: Demonstrations, kind: WarpKind) -> Apart:
         cut = timeline.cut_off(shapes, warp)
         timeline = replace(timeline, rests=(not cut[:, 0].any(), not cut[:, 1].any()))
         if _comes_back(timeline.play(shapes, numbers), plans, plan_format.units):
-            return Apart(timeline, shapes, numbers)
+            return Apart(timeline, shapes, numbers, by_step)
     if kind == "none" or timeline.horizon >= _FEW_FRAMES:
-        return Apart(timeline, shapes, numbers)
+        return Apart(timeline, shapes, numbers, by_step)
     return take_apart(demonstrations, "none")
 
 
@@ -379,26 +381,27 @@ def _warps(
     profiles: Float[np.ndarray, "N H S"],
     kind: WarpKind,
     decisive: Float[np.ndarray, " N"] | None,
-) -> tuple[Numbers, float]:
-    """Return theta of each demonstration, and the span of the knots."""
+) -> tuple[Numbers, float, bool]:
+    """Return theta of each demonstration, the span of the knots, and whether a step is phase 0."""
     if kind == "none":
-        return np.zeros((len(profiles), 0)), 1.0
+        return np.zeros((len(profiles), 0)), 1.0, False
     speeds = np.linalg.norm(profiles, axis=2)
     if not np.all(speeds.max(axis=1) > 0):
         raise InvalidDemonstrationsError("a demonstration does not move, so it cannot be timed")
     # Phase 0 is the middle of the motion, in the mean, or a step that goes with the motion.
     starts = np.mean([middle(speed) for speed in speeds]) - correlation_lags(profiles)
     length = float(np.median([np.ptp(motion_span(speed)) for speed in speeds]))
-    if decisive is not None and np.std(decisive - starts) <= _GOES_WITH * length:
+    by_step = decisive is not None and bool(np.std(decisive - starts) <= _GOES_WITH * length)
+    if decisive is not None and by_step:
         starts = decisive
     if kind == "start":
-        return starts[:, None], 1.0
+        return starts[:, None], 1.0, by_step
     span = length
     warp = _refine(profiles, np.stack([starts, np.zeros_like(starts)], axis=1), span)
     if kind == "warp":
         warp = np.concatenate([warp[:, :1], np.repeat(warp[:, 1:], _KNOTS, axis=1)], axis=1)
         warp = _refine(profiles, warp, span)
-    return warp, span
+    return warp, span, by_step
 
 
 def _refine(profiles: Float[np.ndarray, "N H S"], warp: Numbers, span: float) -> Numbers:
