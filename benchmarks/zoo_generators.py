@@ -41,7 +41,8 @@ METHODS = (
     "nearest",
 )
 KINDS = ("clean-6", "delayed-6", "tempo-6", "warped-8", "paused-8", "cut-6", "short-rest-8",
-         "postures-6", "styles-9", "outlier-8", "jitter-6", "mixed-8", "mixed-12")  # fmt: skip
+         "postures-6", "styles-9", "outlier-8", "jitter-6", "mixed-8", "mixed-12", "scattered-6",
+         "scattered-8")  # fmt: skip
 ROUNDS = 8
 
 

@@ -57,7 +57,7 @@ class SmoothInterpolationConfig(Checked):
 
     kernel: Kernel = "auto"
     """Radial function: the cube of distance, of least bending (`thin-plate`), or distance itself
-    (`linear`); `auto` is the first, or the second where outcomes lie too close together for it."""
+    (`linear`); `auto` is the first, or the last where outcomes lie too close together for it."""
 
 
 class _Mixture(Generator):

@@ -20,7 +20,7 @@ from jaxtyping import Float
 
 Kernel = Literal["auto", "cubic", "thin-plate", "linear"]
 """Of `smooth_weights`: the radial function is d^3, d^2 log d, or d. `auto` is the first, or the
-second where the first amplifies what differs between demonstrations by chance (`amplification`)."""
+last where the first amplifies what differs between demonstrations by chance (`amplification`)."""
 _LARGEST_AMPLIFICATION = 0.9
 """Ours: outcomes that are spread evenly stay below it; docs/decisions-generator.md."""
 _MEASURED = 0.01
@@ -113,7 +113,7 @@ def smooth_weights(
         cubic = smooth_weights(outcomes, kernel="cubic", noise=noise)
         if amplification(cubic, outcomes) <= _LARGEST_AMPLIFICATION:
             return cubic
-        return smooth_weights(outcomes, kernel="thin-plate", noise=noise)
+        return smooth_weights(outcomes, kernel="linear", noise=noise)
     n, k = outcomes.shape
     affine = n > k
     scale = np.ptp(outcomes, axis=0)

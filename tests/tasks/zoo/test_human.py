@@ -131,3 +131,16 @@ def test_two_phases_are_minimum_jerk_strokes_one_after_the_other():
 def test_a_name_that_is_no_set_is_refused_with_all_kinds(name):
     with pytest.raises(ConfigurationError, match=f"no demonstration set '{name}'.*short-rest"):
         LOB.demonstrations(name)
+
+
+def test_scattered_outcomes_are_as_far_apart_as_chance_has_them():
+    def nearest(kind):
+        found = []
+        for seed in range(6):
+            shares = SCOOP.demonstrations(f"{kind}-8-{seed}").outcomes_seen - SCOOP.region[0]
+            shares = shares / np.ptp(SCOOP.region, axis=0)
+            gaps = np.linalg.norm(shares[:, None] - shares, axis=-1) + 9 * np.eye(8)
+            found.append(gaps.min())
+        return np.median(found)
+
+    assert nearest("scattered") < 0.5 * nearest("mixed")

@@ -127,6 +127,8 @@ class Variation:
     """Demonstrations in the other style, an odd posture and another tempo, whatever else holds."""
     jitter: float = 0.0
     """Standard deviation of the encoders' noise on angles, in [rad]."""
+    scattered: bool = False
+    """Outcomes are meant at random; else far from each other."""
 
 
 _ENCODER = 2e-5  # rad
@@ -144,9 +146,11 @@ KINDS = {
     "styles": Variation(second_style=1 / 3),
     "outlier": Variation(outliers=1),
     "jitter": Variation(jitter=_ENCODER),
-    "mixed": Variation((0.1, 0.9), (0.0, 0.0), 0.08, 0.12, 0.15, 0.5, 0.0, 0, _ENCODER),
+    "mixed": (_MIXED := Variation((0.1, 0.9), (0.0, 0.0), 0.08, 0.12, 0.15, 0.5, 0.0, 0, _ENCODER)),
+    "scattered": replace(_MIXED, scattered=True),
 }
-"""What each kind of set varies; `mixed` varies all that one person does, at about half the size."""
+"""What each kind of set varies; `mixed` varies all that one person does, at about half the size,
+and `scattered` also where it ends up."""
 
 COUNTS = (3, 12)
 """Fewest and most demonstrations of a set that is made by name."""
@@ -220,7 +224,7 @@ def demonstrate(task: ZooTask, name: str) -> Demonstrations:
     styles[odd[: round(variation.second_style * count)]] = 1
     outliers = {int(i) for i in odd[: variation.outliers]}
     plans, outcomes = [], []
-    for i, meant in enumerate(_spread(task, count, rng)):
+    for i, meant in enumerate(_meant(task, variation, count, rng)):
         plan, outcome = _attempt(task, variation, meant, int(styles[i]), i in outliers, rng)
         plans.append(plan)
         outcomes.append(outcome)
@@ -241,10 +245,10 @@ def _parse(task: str, name: str) -> tuple[str, int, int]:
     return kind, int(numbers[0]), int(numbers[1])
 
 
-def _spread(task: ZooTask, count: int, rng: np.random.Generator) -> Points:
-    """Outcomes to mean, spread over the region: each far from those before (ours)."""
+def _meant(task: ZooTask, variation: Variation, count: int, rng: np.random.Generator) -> Points:
+    """Outcomes to mean, up to the region's edges: at random, or each far from those before."""
     low, high = task.region
-    shares = rng.uniform(size=(1, len(low)))
+    shares = rng.uniform(size=(count if variation.scattered else 1, len(low)))
     while len(shares) < count:
         candidates = rng.uniform(size=(60, len(low)))
         apart = np.linalg.norm(candidates[:, None] - shares, axis=-1).min(axis=1)
