@@ -263,6 +263,10 @@ def test_a_place_in_numbers_with_or_without_units(text, place):
     np.testing.assert_allclose(read_place(text, ("x", "y"), ("m", "m")), place)
 
 
+def test_metres_that_are_said_may_be_as_far_as_a_bat_strikes():
+    np.testing.assert_allclose(read_place("9.7m -1m", ("x", "y"), ("m", "m")), [9.7, -1])
+
+
 def test_a_place_in_another_unit_is_converted():
     assert read_place("30 deg", ("angle",), ("rad",)) == pytest.approx([np.pi / 6])
     assert read_place("0.5rad", ("angle",), ("deg",)) == pytest.approx([90 / np.pi])
@@ -272,6 +276,8 @@ def test_a_place_in_another_unit_is_converted():
     ("text", "says"),
     [
         ("53, -13", "53 m is farther than any arm throws; say the unit, for instance 53cm"),
+        ("9.7, -1", "for instance 9.7cm, or 9.7m"),
+        ("53m, -13m", "53 m is farther than any arm throws"),
         ("92cm", "is not 2 finite numbers"),
         ("92cm 10deg", "cannot read"),
         ("92cm -10", "cannot read"),

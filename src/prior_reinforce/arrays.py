@@ -33,9 +33,13 @@ Point = Float[np.ndarray, " k"]
 """One outcome, condition, goal or error."""
 
 FARTHEST = 5.0
-"""In [m]; ours: no arm on a table reaches, throws or is seen farther, so more is another unit."""
+"""In [m]; ours: no arm on a table reaches, throws or is seen farther, so more is another unit,
+unless somebody says that it is metres."""
 LARGEST_TURN = 7.0
 """In [rad]; ours: joints of arms turn one turn (6.28 rad) either way, so more is degrees."""
+BEYOND_DOUBT = 7.0
+"""Ours: numbers so many times beyond that (eight turns of a joint, 35 m) are in another unit,
+whoever says what."""
 
 
 def as_plans(

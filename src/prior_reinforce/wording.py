@@ -24,7 +24,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
-from prior_reinforce.arrays import FARTHEST
+from prior_reinforce.arrays import BEYOND_DOUBT, FARTHEST
 from prior_reinforce.errors import InvalidFeedbackError
 from prior_reinforce.readings import EYE_BETWEEN, OPEN_ERROR, Reading
 
@@ -202,11 +202,13 @@ def read_place(text: str, names: Sequence[str], units: Sequence[str]) -> _Point:
         raise InvalidFeedbackError(f"cannot read {text!r}; give {expected}")
     if len(numbers) != len(names) or not all(map(math.isfinite, numbers)):
         raise InvalidFeedbackError(f"{text!r} is not {expected}; give those")
+    has_units = any(letter.isalpha() for letter in text)
     for number, unit in zip(numbers, units, strict=True):
-        if unit == "m" and abs(number) > FARTHEST:
+        possible = abs(number) <= FARTHEST * BEYOND_DOUBT
+        if unit == "m" and abs(number) > FARTHEST and not (has_units and possible):
             raise InvalidFeedbackError(
                 f"{number:g} m is farther than any arm throws; say the unit, for instance "
-                f"{number:g}cm, or give metres"
+                f"{number:g}cm" + (f", or {number:g}m" if possible else "")
             )
     return np.array(numbers)
 

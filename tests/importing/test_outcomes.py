@@ -167,7 +167,7 @@ def test_only_a_table_that_stands_beside_the_recordings_is_taken(tmp_path):
 def test_a_table_to_fill_in_has_the_episodes_names_and_the_units(tmp_path):
     path = tmp_path / "outcomes.csv"
     write_outcome_table(path, ["throw_1", "a,b"], ["x", "turns"], ["m", "counts"])
-    assert path.read_text() == 'episode,x [m],turns,note\nthrow_1,,,\n"a,b",,,\n'
+    assert path.read_text() == 'episode,x [m],turns [counts],note\nthrow_1,,,\n"a,b",,,\n'
     assert read_outcomes(path).values == {}
     path.write_text(path.read_text().replace("[m]", "[cm]").replace("1,,", "1,92,3"))
     assert read_outcomes(path).values == {"throw_1": (0.92, 3.0)}
@@ -213,3 +213,41 @@ def test_centimetres_that_are_said_to_be_metres_are_refused(recording, tmp_path,
     said = r"x is said to be in m and would reach 105 m.*call its column x \[cm\]"
     with pytest.raises(InvalidDemonstrationsError, match=said):
         import_demonstrations(recording, outcomes=path, outcome_unit=unit, take_guesses=True)
+
+
+@pytest.mark.parametrize(
+    ("head", "scale", "names", "units"),
+    [
+        ("angle [rad],apex [m]", (1, 1), ("angle", "apex"), ("rad", "m")),
+        ("angle [deg],apex [cm]", (180 / np.pi, 100), ("angle", "apex"), ("rad", "m")),
+        ("volume [ml],arrival [ms]", (1, 1000), ("volume", "arrival"), ("ml", "s")),
+        ("force [N],x (ahead)", (1, 1), ("force", "x (ahead)"), ("N", "m")),
+    ],
+)
+def test_a_unit_in_the_tables_head_is_the_outcomes(recording, tmp_path, head, scale, names, units):
+    rows = [f"{name},{scale[0] * x:.12g},{scale[1] * y:.12g}" for name, (x, y) in OUTCOMES.items()]
+    path = table(tmp_path, "\n".join([f"episode,{head}", *rows]))
+    result = import_demonstrations(recording, outcomes=path)
+    assert result.demonstrations.outcome_names == names
+    assert result.demonstrations.outcome_units == units
+    np.testing.assert_allclose(result.demonstrations.outcomes_seen, list(OUTCOMES.values()))
+    assert f"{names[0]} 0.8 to 1.05 {units[0]}" in result.preview.text
+
+
+def test_metres_that_are_said_may_be_as_far_as_a_bat_strikes(recording, tmp_path):
+    rows = [f"{name},{9 + x},{y}" for name, (x, y) in OUTCOMES.items()]
+    path = table(tmp_path, "\n".join(["episode,x [m],y [m]", *rows]))
+    assert import_demonstrations(recording, outcomes=path).demonstrations.outcomes_seen.max() > 9
+    bare = table(tmp_path, "\n".join(["episode,x,y", *rows]))
+    assert import_demonstrations(recording, outcomes=bare, outcome_unit="m").demonstrations.n == 6
+    with pytest.raises(UnclearUnitsError, match="it looks like cm"):
+        import_demonstrations(recording, outcomes=bare)
+
+
+def test_a_unit_that_the_task_does_not_have_says_where_it_stands(recording, tmp_path):
+    rows = [f"{name},{x},{y}" for name, (x, y) in OUTCOMES.items()]
+    path = table(tmp_path, "\n".join(["episode,x [ml],y [m]", *rows]))
+    with pytest.raises(
+        ConfigurationError, match=r"x in .* is in ml, but .* in m; .*workspace.toml"
+    ):
+        import_demonstrations(recording, outcomes=path, outcome_units=("m", "m"))

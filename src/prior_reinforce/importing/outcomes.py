@@ -2,8 +2,8 @@
 
 `outcomes.csv` has a line of column names, `episode` among them; every other column is a component
 of the outcome, except `source`, `note` and `comment`, and `sd`, by which the row's components are
-uncertain. A column `x_cm` or `x [mm]` is converted to `x` in metres, and an angle likewise to
-radians.
+uncertain. A column `x_cm` or `x [mm]` is converted to `x` in metres, an angle likewise to radians,
+and a time to seconds; any other unit in brackets is kept: `volume [ml]`.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ from prior_reinforce.importing.csv import EPISODE_COLUMNS
 from prior_reinforce.importing.recording import Recording
 from prior_reinforce.importing.tables import Table, read_tables
 from prior_reinforce.importing.units import (
-    CHANNEL_UNITS,
     Doubt,
     base_of,
+    cannot_be,
     conversion,
     guess_unit,
-    split_unit,
+    split_any_unit,
 )
 
 OUTCOMES_FILE = "outcomes.csv"
@@ -114,7 +114,7 @@ def table_beside(places: Sequence[Path]) -> Path | None:
 
 def headed(names: Sequence[str], units: Sequence[str]) -> list[str]:
     """Return what a table calls its components: with their units, where those are known here."""
-    return [f"{n} [{u}]" if u in CHANNEL_UNITS else n for n, u in zip(names, units, strict=True)]
+    return [f"{n} [{u}]" for n, u in zip(names, units, strict=True)]
 
 
 def write_outcome_table(
@@ -146,7 +146,7 @@ def read_outcomes(path: Path, names: Sequence[str] | None = None) -> Outcomes:
     if not path.is_file():
         raise FileFormatError(f"no outcomes at {path}; give the path of a table episode,x,y")
     table = read_tables(path)[0]
-    split = [split_unit(name, CHANNEL_UNITS) for name in table.names]
+    split = [split_any_unit(name) for name in table.names]
     lower = [name.lower() for name, _ in split]
     episode = next((i for i, name in enumerate(lower) if name in EPISODE_COLUMNS), None)
     columns = [i for i, name in enumerate(lower) if i != episode and name not in _NOT_COMPONENTS]
@@ -241,9 +241,14 @@ def in_units(
         recorded = own or given or guess_unit(unit, reach) or unit
         if own is None and given is None and recorded != unit:
             looks.setdefault(recorded, []).append(f"{name} reaches {reach:.4g}")
+        if base_of(recorded)[0] != base_of(unit)[0]:
+            raise ConfigurationError(
+                f"{name} in {outcomes.where} is in {recorded}, but outcomes of this task are in "
+                f"{unit}; correct either: a workspace has its units in workspace.toml, [outcome]"
+            )
         scale.append(conversion(recorded, unit, f"{name} in {outcomes.where}"))
         looks_like = guess_unit(unit, reach * scale[-1])
-        if looks_like != unit:
+        if cannot_be(unit, reach * scale[-1]):
             raise InvalidDemonstrationsError(
                 f"in {outcomes.where}, {name} is said to be in {recorded} and would reach "
                 f"{reach * scale[-1]:.4g} {unit}, too far for an arm; if it is in {looks_like}, "

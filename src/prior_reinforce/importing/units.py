@@ -11,7 +11,7 @@ import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from prior_reinforce.arrays import FARTHEST, LARGEST_TURN
+from prior_reinforce.arrays import BEYOND_DOUBT, FARTHEST, LARGEST_TURN
 from prior_reinforce.errors import ConfigurationError, UnclearUnitsError
 
 _SPELLINGS = {
@@ -39,9 +39,6 @@ _LARGEST_DEGREES = 720.0
 """Ours: beyond two turns it is no angle of a joint in degrees either."""
 _LARGEST_CENTIMETRES = 300.0
 """Ours: above it millimetres are likelier than an arm that reaches three metres."""
-_BEYOND_DOUBT = 7.0
-"""Ours: numbers so many times beyond what an arm does (eight turns of a joint, 35 m) are not in the
-unit that they are said to be in, whoever says it."""
 _BRACKETS = re.compile(r"(?P<name>.+?)\s*[\[(]\s*(?P<unit>[^\[\]()]+?)\s*[\])]")
 _ENDING = re.compile(r"(?P<name>.+?)[_ ](?P<unit>[a-zµμ°]+)")
 
@@ -95,15 +92,30 @@ def split_unit(column: str, among: Collection[str]) -> tuple[str, str | None]:
     return column, None
 
 
+def split_any_unit(column: str) -> tuple[str, str | None]:
+    """Split a column's name as `split_unit` does, with any unit at all in square brackets.
+
+    Args:
+        column: For instance `x_cm`, `arrival [ms]` or `volume [ml]`.
+    """
+    name, unit = split_unit(column, CHANNEL_UNITS)
+    match = _BRACKETS.fullmatch(column.strip())
+    if unit is not None or match is None or not column.strip().endswith("]"):
+        return name, unit
+    return match["name"].strip(), known_unit(match["unit"]) or match["unit"]
+
+
 CHANNEL_UNITS = tuple(_BASE)
 """Units that a channel's name may carry: angles and lengths."""
 
 
 def base_of(unit: str) -> tuple[str, float]:
-    """Return a recorded unit's own in plans, and what to multiply with: rad and pi/180 for deg.
+    """Return a recorded unit's own, and what to multiply with: rad and pi/180 for deg.
 
-    Units that are neither angles nor lengths stay as they are.
+    Units of neither angle, length nor time stay as they are.
     """
+    if unit in SECONDS:
+        return "s", SECONDS[unit]
     return _BASE.get(unit, (unit, 1.0))
 
 
@@ -146,7 +158,7 @@ def cannot_be(unit: str, reach: float) -> bool:
         unit: `rad` or `m`; others may hold any number.
         reach: Largest of them, without its sign.
     """
-    return guess_unit(unit, reach / _BEYOND_DOUBT) != unit
+    return guess_unit(unit, reach / BEYOND_DOUBT) != unit
 
 
 def say_names(names: Sequence[str]) -> str:

@@ -29,6 +29,7 @@ from numpy.typing import ArrayLike
 from typing_extensions import Self
 
 from prior_reinforce.arrays import (
+    BEYOND_DOUBT,
     FARTHEST,
     LARGEST_TURN,
     Frames,
@@ -336,7 +337,7 @@ class Demonstrations:
     def _warn_about_units(self) -> None:
         metres = np.array([unit == "m" for unit in self.outcome_units])
         largest = np.abs(self.outcomes_seen[:, metres]).max(initial=0.0)
-        if largest > FARTHEST:
+        if largest > BEYOND_DOUBT * FARTHEST:
             warnings.warn(
                 f"an outcome of {largest:g} m looks like centimetres; outcomes are in metres: "
                 "divide by 100",
