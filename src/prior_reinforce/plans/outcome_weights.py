@@ -21,8 +21,9 @@ from jaxtyping import Float
 Kernel = Literal["auto", "cubic", "thin-plate", "linear"]
 """Of `smooth_weights`: the radial function is d^3, d^2 log d, or d. `auto` is the first, or the
 last where the first amplifies what differs between demonstrations by chance (`amplification`)."""
-_LARGEST_AMPLIFICATION = 0.9
-"""Ours: outcomes that are spread evenly stay below it; docs/decisions-generator.md."""
+_LARGEST_AMPLIFICATION = 1.0
+"""Ours: what is mixed varies by chance no more than one demonstration does. Outcomes that are spread
+evenly stay below it; docs/decisions-generator.md."""
 _MEASURED = 0.01
 """Noise below this part of the demonstrated range is none: the outcome was measured. Ours: 3 mm of
 30 cm, several times what a camera or a tape is off by."""

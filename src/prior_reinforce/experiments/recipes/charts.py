@@ -324,12 +324,13 @@ def draw_rows(
     axes = figure.subplots()
     calm_axes(axes)
     axes.grid(visible=False, axis="y")
+    others = [colour for colour in _COLOURS if colour != GOAL]
     for place, of_method in enumerate(rows.values()):
         for i, (method, mark) in enumerate(marks.items()):
             if method not in of_method:
                 continue
             y, of = place + 0.17 * (i - (len(marks) - 1) / 2), of_method[method]
-            colour = GOAL if i == 0 else _COLOURS[i - 1]
+            colour = GOAL if i == 0 else others[i - 1]
             axes.plot([of.low, of.high], [y, y], color=colour, linewidth=1.5)
             name = method if place == 0 else None
             axes.plot(of.value, y, mark, color=colour, markersize=6, label=name)
