@@ -202,7 +202,7 @@ def read_place(text: str, names: Sequence[str], units: Sequence[str]) -> _Point:
         raise InvalidFeedbackError(f"cannot read {text!r}; give {expected}")
     if len(numbers) != len(names) or not all(map(math.isfinite, numbers)):
         raise InvalidFeedbackError(f"{text!r} is not {expected}; give those")
-    has_units = any(letter.isalpha() for letter in text)
+    has_units = _bare_numbers(text) is None
     for number, unit in zip(numbers, units, strict=True):
         possible = abs(number) <= FARTHEST * BEYOND_DOUBT
         if unit == "m" and abs(number) > FARTHEST and not (has_units and possible):
@@ -213,15 +213,23 @@ def read_place(text: str, names: Sequence[str], units: Sequence[str]) -> _Point:
     return np.array(numbers)
 
 
+def _bare_numbers(text: str) -> list[float] | None:
+    """Numbers without units, such as `0.92, 0.1`; None where it is anything else."""
+    try:
+        return [float(part) for part in text.replace(",", " ").split()]
+    except ValueError:
+        return None
+
+
 def _numbers_with_units(text: str, units: Sequence[str]) -> list[float] | None:
     """Numbers in the outcome's units, such as `0.92 0.1` or `92cm, 10 cm`; None where it is none.
 
     A unit after the last number only is that of all.
     """
-    try:
-        return [float(part) for part in text.replace(",", " ").split()]
-    except ValueError:
-        terms = list(_PLACE_TERM.finditer(text.strip()))
+    bare = _bare_numbers(text)
+    if bare is not None:
+        return bare
+    terms = list(_PLACE_TERM.finditer(text.strip()))
     if "".join(term[0] for term in terms) != text.strip():
         return None
     said = [term["unit"] for term in terms]

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from prior_reinforce.generators import timing_evidence
 from prior_reinforce.generators.timing_evidence import choose_timing, outcome_error
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 from prior_reinforce.plans.warping import take_apart
@@ -109,3 +110,12 @@ def test_our_own_demonstrations_differ_in_their_starts(task, name):
 )
 def test_the_reason_is_no_better_than_the_evidence(task, name, why):
     assert choose_timing(make_task(task).demonstrations(name)).reason.endswith(why)
+
+
+@pytest.mark.parametrize(("untold", "kind"), [(0.3, "start"), (0.5, "none")])
+def test_a_clock_is_looked_for_only_where_starts_apart_leave_much_untold(monkeypatch, untold, kind):
+    errors = {"none": 0.5 * untold, "start": untold, "tempo": 0.9}
+    monkeypatch.setattr(
+        timing_evidence, "outcome_error", lambda _, apart: errors[apart.timeline.kind]
+    )
+    assert choose_timing(demonstrations(42)).apart.timeline.kind == kind

@@ -167,7 +167,7 @@ def test_only_a_table_that_stands_beside_the_recordings_is_taken(tmp_path):
 def test_a_table_to_fill_in_has_the_episodes_names_and_the_units(tmp_path):
     path = tmp_path / "outcomes.csv"
     write_outcome_table(path, ["throw_1", "a,b"], ["x", "turns"], ["m", "counts"])
-    assert path.read_text() == 'episode,x [m],turns [counts],note\nthrow_1,,,\n"a,b",,,\n'
+    assert path.read_text() == 'episode,x [m],turns,note\nthrow_1,,,\n"a,b",,,\n'
     assert read_outcomes(path).values == {}
     path.write_text(path.read_text().replace("[m]", "[cm]").replace("1,,", "1,92,3"))
     assert read_outcomes(path).values == {"throw_1": (0.92, 3.0)}
@@ -221,6 +221,7 @@ def test_centimetres_that_are_said_to_be_metres_are_refused(recording, tmp_path,
         ("angle [rad],apex [m]", (1, 1), ("angle", "apex"), ("rad", "m")),
         ("angle [deg],apex [cm]", (180 / np.pi, 100), ("angle", "apex"), ("rad", "m")),
         ("volume [ml],arrival [ms]", (1, 1000), ("volume", "arrival"), ("ml", "s")),
+        ("arrival_ms,wait (s)", (1000, 1), ("arrival", "wait"), ("s", "s")),
         ("force [N],x (ahead)", (1, 1), ("force", "x (ahead)"), ("N", "m")),
     ],
 )
@@ -237,7 +238,10 @@ def test_a_unit_in_the_tables_head_is_the_outcomes(recording, tmp_path, head, sc
 def test_metres_that_are_said_may_be_as_far_as_a_bat_strikes(recording, tmp_path):
     rows = [f"{name},{9 + x},{y}" for name, (x, y) in OUTCOMES.items()]
     path = table(tmp_path, "\n".join(["episode,x [m],y [m]", *rows]))
-    assert import_demonstrations(recording, outcomes=path).demonstrations.outcomes_seen.max() > 9
+    said = import_demonstrations(recording, outcomes=path, outcome_unit="m")
+    assert said.demonstrations.outcomes_seen.max() > 9
+    with pytest.raises(UnclearUnitsError, match=r"10.05 m \(if that is in cm, .*--outcome-unit m"):
+        import_demonstrations(recording, outcomes=path)  # a table that we wrote is headed so
     bare = table(tmp_path, "\n".join(["episode,x,y", *rows]))
     assert import_demonstrations(recording, outcomes=bare, outcome_unit="m").demonstrations.n == 6
     with pytest.raises(UnclearUnitsError, match="it looks like cm"):
@@ -248,6 +252,30 @@ def test_a_unit_that_the_task_does_not_have_says_where_it_stands(recording, tmp_
     rows = [f"{name},{x},{y}" for name, (x, y) in OUTCOMES.items()]
     path = table(tmp_path, "\n".join(["episode,x [ml],y [m]", *rows]))
     with pytest.raises(
-        ConfigurationError, match=r"x in .* is in ml, but .* in m; .*workspace.toml"
+        ConfigurationError, match=r"x in .* is in ml, but .*workspace.toml.* in m; correct"
     ):
         import_demonstrations(recording, outcomes=path, outcome_units=("m", "m"))
+
+
+@pytest.mark.parametrize(
+    "unit", ["m", "meters", "degrees", "deg", "°", "s", "seconds", "counts", ""]
+)
+def test_a_table_that_is_written_to_be_filled_in_is_read_in_the_units_of_the_task(
+    recording, tmp_path, unit
+):
+    path = tmp_path / "outcomes.csv"
+    write_outcome_table(path, list(OUTCOMES), ["x", "y"], [unit, unit])
+    head, *_ = path.read_text().splitlines()
+    rows = [f"{name},{x},{y}," for name, (x, y) in OUTCOMES.items()]
+    path.write_text("\n".join([head, *rows]))
+    result = import_demonstrations(recording, outcomes=path, outcome_units=(unit, unit))
+    assert result.demonstrations.outcome_units == (unit, unit)
+    np.testing.assert_allclose(result.demonstrations.outcomes_seen, list(OUTCOMES.values()))
+
+
+@pytest.mark.parametrize(("head", "noise"), [("x [cm],y [cm]", 0.02), ("x [ms],y [ms]", 0.002)])
+def test_how_uncertain_outcomes_are_is_in_the_unit_of_the_first(recording, tmp_path, head, noise):
+    rows = [f"{name},{100 * x},{100 * y},2" for name, (x, y) in OUTCOMES.items()]
+    path = table(tmp_path, "\n".join([f"episode,{head},sd", *rows]))
+    demonstrations = import_demonstrations(recording, outcomes=path).demonstrations
+    np.testing.assert_allclose(demonstrations.outcome_noise, noise)

@@ -227,3 +227,17 @@ def test_outcomes_that_were_measured_alike_are_warned_of_and_kept():
 
 def test_outcomes_that_look_alike_by_eye_are_kept_without_a_word():
     assert make(outcomes_seen=REPEATED, outcome_noise=np.full((4, 2), 0.03)).n == 4
+
+
+def test_metres_are_doubted_sooner_where_nobody_said_them():
+    far = [[10.0, 0.2], [16.0, 0.1], [22.0, 0.3], [28.0, 0.5]]
+    with pytest.warns(UserWarning, match="28 m looks like centimetres"):
+        make(outcomes_seen=far)
+    assert make(outcomes_seen=far, outcome_units=("m", "m")).n == 4
+
+
+def test_outcomes_that_differ_by_rounding_are_the_same():
+    almost = np.array(REPEATED)
+    almost[2] += 1e-12
+    with pytest.warns(UserWarning, match="0 and 2 have the same outcome"):
+        make(outcomes_seen=almost)

@@ -233,10 +233,14 @@ class Trials(Unit):
             "failed_readings": [result.failed_readings for result in results],
         }
 
+    def learned(self, folder: Path) -> Learned:
+        """What is tried: from the folder's models, or learned now."""
+        return self.training.learned(folder)
+
     def trials(self, folder: Path) -> list[GoalTrials]:
         """Run the protocol."""
         task = make_task(self.task)
-        learned = self.training.learned(folder)
+        learned = self.learned(folder)
         rng = np.random.default_rng(GOAL_SEED)
         # Far from where demonstrations truly went, so that goals are the same for every perception.
         goals = (

@@ -28,7 +28,8 @@ from prior_reinforce.arrays import Plans, Points, as_plans
 from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
 from prior_reinforce.experiments.evaluation import GOAL_SEED
 from prior_reinforce.experiments.protocol import perceive_demonstrations
-from prior_reinforce.experiments.units import Unit, digest_of, result_of
+from prior_reinforce.experiments.units import Unit, digest_of
+from prior_reinforce.files import in_place
 from prior_reinforce.generators import Generator, make_generator
 from prior_reinforce.generators.base import Report
 from prior_reinforce.perception import make_perception
@@ -99,8 +100,9 @@ class Field:
         return np.stack([spline.ev(x, y) for spline in self._splines], axis=-1)
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write an .npz."""
-        np.savez(path, **asdict(self))
+        """Write an .npz, under that very name."""
+        with open(path, "wb") as file:
+            np.savez(file, **asdict(self))
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Self:
@@ -183,20 +185,21 @@ class MeasuredField(Unit):
         return tuple(source_digest(choice) for choice in own)
 
     def run(self, folder: Path) -> Mapping[str, Any]:
-        """Measure, and keep the field in the folder's models."""
+        """Measure, and keep the field in the folder's `fields`."""
         prior = self._seen(make_task(self.learned_on))
         generator = make_generator(self.generator).fit(prior, seed=self.labels)
         seed = GOAL_SEED + self.labels
         measured = measure(make_task(self.task), generator, prior, self.label, seed=seed)
         path = self._path(folder)
         path.parent.mkdir(parents=True, exist_ok=True)
-        measured.save(path)
+        with in_place(path) as unfinished:
+            measured.save(unfinished)
         return {"noise_sd": measured.noise_sd.tolist()}
 
     def field(self, folder: Path) -> Field:
         """What was measured: from the folder, or now, and put there."""
         if not self._path(folder).is_file():
-            result_of(folder, self)
+            self.run(folder)
         return Field.load(self._path(folder))
 
     def _path(self, folder: Path) -> Path:

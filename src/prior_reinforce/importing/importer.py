@@ -141,7 +141,7 @@ def import_demonstrations(
             by episode name. None takes `outcomes.csv` beside or inside the source.
         outcome_names: Names of the k components, in order, matched to the CSV's columns; None
             takes those as they stand.
-        outcome_units: Unit of each component; None is metres.
+        outcome_units: Unit of each component; None is what the table's head says, or metres.
         outcome_unit: Unit in which a table holds those whose columns name none (`x_cm` does); None
             is the component's own, and an error where nothing could land there.
         names: What to call the joints in the plan format; None keeps the recorded names.
@@ -264,7 +264,7 @@ def appended(before: Demonstrations, more: Demonstrations) -> Demonstrations:
     """Return demonstrations with more of them; the shorter motions hold their last pose.
 
     Raises:
-        InvalidDemonstrationsError: They mean other numbers, or have an outcome or a motion twice.
+        InvalidDemonstrationsError: They mean other numbers, or have a motion twice.
     """
     for what, one, other in (
         ("plans of", before.format, more.format),

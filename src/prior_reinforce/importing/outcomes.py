@@ -30,11 +30,13 @@ from prior_reinforce.importing.csv import EPISODE_COLUMNS
 from prior_reinforce.importing.recording import Recording
 from prior_reinforce.importing.tables import Table, read_tables
 from prior_reinforce.importing.units import (
+    CHANNEL_UNITS,
     Doubt,
     base_of,
     cannot_be,
     conversion,
     guess_unit,
+    known_unit,
     split_any_unit,
 )
 
@@ -114,7 +116,7 @@ def table_beside(places: Sequence[Path]) -> Path | None:
 
 def headed(names: Sequence[str], units: Sequence[str]) -> list[str]:
     """Return what a table calls its components: with their units, where those are known here."""
-    return [f"{n} [{u}]" for n, u in zip(names, units, strict=True)]
+    return [f"{n} [{u}]" if u in CHANNEL_UNITS else n for n, u in zip(names, units, strict=True)]
 
 
 def write_outcome_table(
@@ -173,7 +175,9 @@ def read_outcomes(path: Path, names: Sequence[str] | None = None) -> Outcomes:
             values[name] = tuple(n * u[1] for n, u in zip(numbers, bases, strict=True))
             if uncertain is not None and one.texts(uncertain)[0] not in ("", "0", "0.0"):
                 sd[name] = _number(path, line, one, uncertain)
-    sd_unit = None if uncertain is None else table.units[uncertain] or split[uncertain][1]
+    sd_unit = None
+    if uncertain is not None:
+        sd_unit = table.units[uncertain] or split[uncertain][1] or units[0]
     bare = tuple(unit for unit, _ in bases)
     return Outcomes(str(path), tuple(kept), values, bare, sd, sd_unit)
 
@@ -209,9 +213,10 @@ def in_units(
 
     Args:
         outcomes: Their components in order.
-        wanted: Unit of each; None is metres.
-        given: Unit of the components whose source says none; None takes the wanted one, or where
-            nothing could land there, the one it looks like.
+        wanted: Unit of each, as the task has it; None takes what is said, or metres.
+        given: Unit of the components whose source says none, or that of all, said again where
+            it is doubted; None takes the wanted one, or where nothing could land there, the one it
+            looks like.
 
     Raises:
         ConfigurationError: A component is in a unit that cannot be converted, `given` has no use,
@@ -220,12 +225,12 @@ def in_units(
     """
     k = max((len(value) for value in outcomes.values.values()), default=0)
     said = outcomes.units or (None,) * k
-    wanted = (
-        tuple(wanted) if wanted is not None else tuple(base_of(unit or "m")[0] for unit in said)
-    )
+    task = "" if wanted is None else "outcomes of this task (workspace.toml, [outcome])"
+    if wanted is None:
+        wanted = [base_of(unit or given or "m")[0] for unit in said]
     if len(wanted) != k or len(said) != k:
         return outcomes, ()  # another number of components: said when they are joined
-    if given is not None and None not in said:
+    if given is not None and None not in said and given not in said:
         raise ConfigurationError(
             f"--outcome-unit {given} has no use, since {outcomes.where} says its units; drop it"
         )
@@ -236,15 +241,16 @@ def in_units(
             "that column out"
         )
     scale, looks = [], dict[str, list[str]]()
-    for i, (name, own, unit) in enumerate(zip(names, said, wanted, strict=True)):
+    for i, (name, own, spelt) in enumerate(zip(names, said, wanted, strict=True)):
+        unit = known_unit(spelt) or spelt
         reach = max((abs(value[i]) for value in outcomes.values.values()), default=0.0)
         recorded = own or given or guess_unit(unit, reach) or unit
         if own is None and given is None and recorded != unit:
             looks.setdefault(recorded, []).append(f"{name} reaches {reach:.4g}")
-        if base_of(recorded)[0] != base_of(unit)[0]:
+        if task and base_of(recorded)[0] != base_of(unit)[0]:
             raise ConfigurationError(
-                f"{name} in {outcomes.where} is in {recorded}, but outcomes of this task are in "
-                f"{unit}; correct either: a workspace has its units in workspace.toml, [outcome]"
+                f"{name} in {outcomes.where} is in {recorded}, but {task} are in {spelt}; correct "
+                "either"
             )
         scale.append(conversion(recorded, unit, f"{name} in {outcomes.where}"))
         looks_like = guess_unit(unit, reach * scale[-1])
@@ -254,10 +260,15 @@ def in_units(
                 f"{reach * scale[-1]:.4g} {unit}, too far for an arm; if it is in {looks_like}, "
                 f"call its column {name} [{looks_like}]"
             )
+        if own is not None and given is None and looks_like != unit:
+            looks.setdefault(unit, []).append(
+                f"{name} reaches {reach * scale[-1]:.4g} {unit} (if that is in {looks_like}, call "
+                f"its column {name} [{looks_like}])"
+            )
     doubts = tuple(
         Doubt(
-            f"in {outcomes.where}, {' and '.join(reached)}, too far for an arm: it looks like "
-            f"{unit}",
+            f"in {outcomes.where}, {' and '.join(reached)}, too far for an arm"
+            + (f": it looks like {unit}" if unit not in said else ""),
             f"--outcome-unit {unit}",
         )
         for unit, reached in looks.items()
@@ -266,9 +277,10 @@ def in_units(
         episode: tuple(v * s for v, s in zip(value, scale, strict=False))
         for episode, value in outcomes.values.items()
     }
-    own_scale = conversion(outcomes.sd_unit, wanted[0], _SD) if outcomes.sd_unit else scale[0]
+    first = known_unit(wanted[0]) or wanted[0]
+    own_scale = conversion(outcomes.sd_unit, first, _SD) if outcomes.sd_unit else scale[0]
     sd = {episode: own_scale * value for episode, value in outcomes.sd.items()}
-    return Outcomes(outcomes.where, outcomes.names, values, wanted, sd, wanted[0]), doubts
+    return Outcomes(outcomes.where, outcomes.names, values, tuple(wanted), sd, wanted[0]), doubts
 
 
 def missing_outcomes(episodes: Sequence[str], outcomes: Outcomes) -> list[str]:

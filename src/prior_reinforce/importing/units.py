@@ -96,9 +96,9 @@ def split_any_unit(column: str) -> tuple[str, str | None]:
     """Split a column's name as `split_unit` does, with any unit at all in square brackets.
 
     Args:
-        column: For instance `x_cm`, `arrival [ms]` or `volume [ml]`.
+        column: For instance `x_cm`, `arrival_ms` or `volume [ml]`.
     """
-    name, unit = split_unit(column, CHANNEL_UNITS)
+    name, unit = split_unit(column, (*CHANNEL_UNITS, *SECONDS))
     match = _BRACKETS.fullmatch(column.strip())
     if unit is not None or match is None or not column.strip().endswith("]"):
         return name, unit

@@ -32,6 +32,7 @@ from prior_reinforce.arrays import (
     BEYOND_DOUBT,
     FARTHEST,
     LARGEST_TURN,
+    SAME,
     Frames,
     Plans,
     Point,
@@ -160,6 +161,7 @@ class Demonstrations:
         outcomes = as_outcomes(self.outcomes_seen, plans.shape[0])
         k = outcomes.shape[1]
         names = tuple(self.outcome_names) or tuple("xyz"[:k] if k <= 3 else map(str, range(k)))
+        said = bool(self.outcome_units)
         units = tuple(self.outcome_units) or ("m",) * k
         if len(names) != k or len(units) != k:
             raise InvalidDemonstrationsError(
@@ -184,7 +186,7 @@ class Demonstrations:
         object.__setattr__(self, "outcomes_seen", outcomes)
         object.__setattr__(self, "outcome_names", names)
         object.__setattr__(self, "outcome_units", units)
-        self._warn_about_units()
+        self._warn_about_units(said=said)
         self._warn_about_repeated_outcomes()
 
     @property
@@ -241,7 +243,8 @@ class Demonstrations:
     def measured_alike(self) -> list[tuple[int, int]]:
         """Return pairs whose measured outcomes are the same; by eye, two throws often look it."""
         measured = np.all(self.outcome_noise == 0.0, axis=1)
-        same = np.all(self.outcomes_seen[:, None] == self.outcomes_seen[None], axis=2)
+        scaled = self.outcomes_seen / np.ptp(self.outcomes_seen, axis=0)
+        same = np.all(np.abs(scaled[:, None] - scaled[None]) <= SAME, axis=2)
         pairs = np.argwhere(np.triu(same & measured & measured[:, None], k=1))
         return [(int(i), int(j)) for i, j in pairs]
 
@@ -334,10 +337,10 @@ class Demonstrations:
                 stacklevel=4,
             )
 
-    def _warn_about_units(self) -> None:
+    def _warn_about_units(self, *, said: bool) -> None:
         metres = np.array([unit == "m" for unit in self.outcome_units])
         largest = np.abs(self.outcomes_seen[:, metres]).max(initial=0.0)
-        if largest > BEYOND_DOUBT * FARTHEST:
+        if largest > FARTHEST * (BEYOND_DOUBT if said else 1.0):
             warnings.warn(
                 f"an outcome of {largest:g} m looks like centimetres; outcomes are in metres: "
                 "divide by 100",

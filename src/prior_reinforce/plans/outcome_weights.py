@@ -18,23 +18,23 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
+from prior_reinforce.arrays import SAME
+
 Kernel = Literal["auto", "cubic", "thin-plate", "linear"]
 """Of `smooth_weights`: the radial function is d^3, d^2 log d, or d. `auto` is the first, or the
 last where the first amplifies what differs between demonstrations by chance (`amplification`)."""
 _LARGEST_AMPLIFICATION = 1.0
-"""Ours: what is mixed varies by chance no more than one demonstration does. Outcomes that are spread
-evenly stay below it; docs/decisions-generator.md."""
+"""Ours: what is mixed varies by chance no more than one demonstration does. Outcomes on a grid stay
+below it, most that nobody spread do not; docs/decisions-generator.md."""
+_REPEATED = 1e-6
+"""Least smoothing of outcomes that come more than once, so that their plans are averaged. Ours: far
+below what smooths anything else."""
 _MEASURED = 0.01
 """Noise below this part of the demonstrated range is none: the outcome was measured. Ours: 3 mm of
 30 cm, several times what a camera or a tape is off by."""
 _SMOOTHING = 100.0
 """Smoothing of an outcome whose noise is the demonstrated range. Ours, see
 docs/decisions-generator.md."""
-
-
-_REPEATED = 1e-6
-"""Least smoothing of outcomes that come more than once, so that their plans are averaged. Ours: far
-below what smooths anything else."""
 
 
 def inverse_distance_weights(
@@ -75,7 +75,7 @@ def inverse_distance_weights(
     with np.errstate(invalid="ignore", divide="ignore"):
         kept = (near[:, :1] / near) ** power
     hit = near[:, 0] == 0
-    kept[hit] = near[hit] == 0
+    kept[hit] = near[hit] <= SAME
     weights = np.zeros_like(distances)
     np.put_along_axis(weights, nearest, kept / kept.sum(axis=1, keepdims=True), axis=1)
     return weights
@@ -122,7 +122,8 @@ def smooth_weights(
     if noise is not None:
         relative = np.where(noise > _MEASURED * scale, noise / scale, 0.0)
         spread = _SMOOTHING * np.mean(relative**2, axis=1)
-    times = (outcomes[:, None] == outcomes[None]).all(axis=2).sum(axis=1)
+    same = np.all(np.abs(outcomes[:, None] - outcomes[None]) <= SAME * scale, axis=2)
+    outcomes, times = outcomes[same.argmax(axis=1)], same.sum(axis=1)
     spread = np.where(times > 1, np.maximum(spread, _REPEATED), spread)
     spline = RBFInterpolator(
         outcomes / scale,

@@ -11,7 +11,7 @@ from prior_reinforce.experiments.recipes.adaptation import RECIPE, Adaptation, r
 SMALL = Scale(goals=8, seeds=(0,), sets=("A",), rounds=2)
 
 
-def testreliability_by_hand():
+def test_reliability_by_hand():
     expected = np.array([[0.2, 0], [0.2, 0], [0.2, 1], [0.8, 1]], dtype=float)
     found = reliability(expected)
     assert found["brier"] == pytest.approx((0.04 + 0.04 + 0.64 + 0.04) / 4)

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from prior_reinforce.commands.reproduce import Reproduce
-from prior_reinforce.experiments.evaluation import Training
+from prior_reinforce.experiments.evaluation import Training, Trials
 from prior_reinforce.experiments.recipes import Run, Scale
 from prior_reinforce.experiments.recipes.base import TASK
-from prior_reinforce.experiments.recipes.preset import RECIPE, OwnNoiseTraining, PaperPreset
+from prior_reinforce.experiments.recipes.preset import RECIPE, OwnNoiseTrials, PaperPreset
 
 BRIEF = (
     "diffusion,timing=none,exact=no,trend=zero,training_steps=20,sampler=ddpm,sampling_steps=5,"
@@ -30,9 +30,12 @@ def test_one_network_is_sampled_twice_and_stands_beside_ours(tmp_path):
     shared, own = figures["rows"][1:]
     assert shared["first_error_m"] != own["first_error_m"]
 
+    training = Training(TASK, "A", BRIEF, 0)
     plans = [
-        kind(TASK, "A", BRIEF, 0).learned(tmp_path).generator.generate([[1.0, 0.0], [1.0, 1e-6]])
-        for kind in (Training, OwnNoiseTraining)
+        kind(training, TASK, "gp", "exact", goals=1)
+        .learned(tmp_path)
+        .generator.generate([[1.0, 0.0], [1.0, 1e-6]])
+        for kind in (Trials, OwnNoiseTrials)
     ]
     apart = [np.abs(np.diff(of, axis=0)).max() for of in plans]
     assert apart[0] < 1e-3 < apart[1]  # near conditions have near plans, or not

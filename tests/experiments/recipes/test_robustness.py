@@ -63,7 +63,7 @@ def test_conditions_give_table_picture_and_remarks(fields, tmp_path):
 
 def test_who_is_ahead_of_ours_is_named(fields, tmp_path):
     figures = SMALL.run(Run(tmp_path, Scale(rounds=2)))
-    figures["conditions"][0]["rules"]["mean offset"]["mean"]["value"] = 0.5
+    figures["conditions"][0]["rules"]["mean offset"]["ours_minus"]["value"] = 0.5
     assert "mean offset in 'by eye'" in RECIPE.remarks(figures)[0]
 
 

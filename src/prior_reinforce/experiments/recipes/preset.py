@@ -40,19 +40,14 @@ _GOALS = 30
 
 
 @dataclass(frozen=True)
-class OwnNoiseTraining(Training):
-    """The network of a training, sampled with noise of each condition's own."""
+class OwnNoiseTrials(Trials):
+    """Trials with the network of a training, sampled with noise of each condition's own."""
 
     def learned(self, folder: Path) -> Learned:
         """What was learned, sampled otherwise."""
-        shared = Training(self.task, self.demonstrations, self.generator, self.seed).learned(folder)
+        shared = self.training.learned(folder)
         assert isinstance(shared.generator, DiffusionGenerator)
         return Learned(shared.generator.sampled(shared_noise=False), shared.prior)
-
-
-@dataclass(frozen=True)
-class OwnNoiseTrials(Trials):
-    """Trials with such a training: a kind of its own, so that results are told apart."""
 
 
 METHODS = (
@@ -85,7 +80,7 @@ class PaperPreset(Measurement):
         goals, rounds = min(scale.goals, _GOALS), scale.rounds
         units = [
             (OwnNoiseTrials if own else Trials)(
-                (OwnNoiseTraining if own else Training)(TASK, name, choice, self.seed),
+                Training(TASK, name, choice, self.seed),
                 TASK, "gp", "amplified", goals, rounds=rounds,
             )
             for _, choice, own in self.methods

@@ -4,8 +4,8 @@ A task has a base strategy: submovements (minimum-jerk strokes that may overlap)
 posture, with as many aims as an outcome has components. A demonstrator draws a manner (when to
 start, how fast, how evenly, in what posture), and then aims by trying in the mind: the aims are
 solved for, in that manner, until the task's own rollout without disturbances comes near to the
-outcome that was meant. So the outcomes spread over the region in every kind of set, and each is
-exactly what its plan does. A manner in which nothing hits is drawn again.
+outcome that was meant. So the outcomes spread over the region in every kind of set but `scattered`,
+and each is exactly what its plan does. A manner in which nothing hits is drawn again.
 
 A set is named `KIND-COUNT-SEED`, for instance `warped-8-2`; the same name gives the same set.
 """
@@ -134,6 +134,7 @@ class Variation:
 _ENCODER = 2e-5  # rad
 _ODD_POSTURE, _ODD_TEMPO = 3.0, 0.85
 
+_MIXED = Variation((0.1, 0.9), (0.0, 0.0), 0.08, 0.12, 0.15, 0.5, 0.0, 0, _ENCODER)
 KINDS = {
     "clean": Variation(),
     "delayed": Variation(rest=(0.3, 0.7)),
@@ -146,7 +147,7 @@ KINDS = {
     "styles": Variation(second_style=1 / 3),
     "outlier": Variation(outliers=1),
     "jitter": Variation(jitter=_ENCODER),
-    "mixed": (_MIXED := Variation((0.1, 0.9), (0.0, 0.0), 0.08, 0.12, 0.15, 0.5, 0.0, 0, _ENCODER)),
+    "mixed": _MIXED,
     "scattered": replace(_MIXED, scattered=True),
 }
 """What each kind of set varies; `mixed` varies all that one person does, at about half the size,
