@@ -1,10 +1,13 @@
 """Annotated shapes are checked while the tests run."""
 
+from contextlib import suppress
+
 import numpy as np
 import pytest
 from jaxtyping import Float, TypeCheckError, jaxtyped
 
 from prior_reinforce.arrays import Plans, Points
+from prior_reinforce.errors import PriorReinforceError
 from prior_reinforce.perception.exact import Exact
 from prior_reinforce.plans.normalisation import Normalisation
 from prior_reinforce.rollouts import Rollout
@@ -46,7 +49,8 @@ def test_the_package_is_checked():
 
     def look_often():
         for _ in range(SELDOM):
-            Exact().perceive(rollout, goal[None], rng)
+            with suppress(PriorReinforceError):  # of a call that was not checked
+                Exact().perceive(rollout, goal[None], rng)
 
     with pytest.raises(TypeCheckError):
         look_often()

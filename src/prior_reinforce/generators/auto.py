@@ -1,8 +1,8 @@
 """The generator that demonstrations ask for: closed form, or diffusion where patterns are mixed.
 
 One motion pattern is learned in closed form, in about a second: plans are mixed by a spline over
-outcomes (`plans.outcome_weights`), timing apart (`timing_evidence`). Because the weights reproduce affine
-functions, whatever else differs between demonstrations (posture, tempo, a second manner, an
+outcomes (`plans.outcome_weights`), timing apart (`timing_evidence`). Because the weights reproduce
+affine functions, whatever else differs between demonstrations (posture, tempo, a second manner, an
 outlier) cancels to first order, as long as outcomes were measured. Where demonstrations show
 patterns that do not mix (`patterns`), the largest is learned if it is large enough, and the others
 are named; else diffusion learns all of them, which keeps patterns apart. Ours; on which evidence,
