@@ -26,11 +26,9 @@ from prior_reinforce.plans.outcome_weights import smooth_weights
 from prior_reinforce.readings import Reading
 
 _STEPS = 12
-"""Steps to the fixed point of the proposal, each 0.7 of the way (ours)."""
+"""Steps to the fixed point of the proposal, each 0.7 of the way, or shorter where that would lead
+away from it (ours)."""
 _RELAXATION = 0.7
-_FARTHEST = 2.0
-"""A condition lies within this of its goal, in spreads. Ours: what labels, generator and hardware
-were off by was 0.24 at most, so that farther away the model, not the world, is off."""
 _TRIALS_AFTER_A_MISS = 1.24
 """Fitted to 1623 trials of tuning material (ours; docs/decisions-adapter.md)."""
 _POINTS = 192
@@ -230,14 +228,21 @@ class BayesianAdapter(Adapter):
 
     def _propose(self, goal_seen: Point) -> Point:
         goal = self._normalisation.apply(goal_seen)
-        condition = goal
+        condition, relaxation = goal, _RELAXATION
+        off = self._off(condition, goal)
         for _ in range(_STEPS):
-            mean, _ = self._predict(condition[None])
-            condition = condition + _RELAXATION * (goal - self._mixed(mean)[0] - condition)
-            away = float(np.linalg.norm(condition - goal))
-            if away > _FARTHEST:
-                condition = goal + (condition - goal) * (_FARTHEST / away)
+            tried = condition + relaxation * off
+            then = self._off(tried, goal)
+            if then @ then < off @ off:
+                condition, off = tried, then
+            else:  # too steep for so long a step
+                relaxation /= 2
         return self._normalisation.undo(condition)
+
+    def _off(self, condition: Point, goal: Point) -> Point:
+        """Return goal minus where a condition is expected to land, in normalised units."""
+        mean, _ = self._predict(condition[None])
+        return np.asarray(goal - self._mixed(mean)[0] - condition)
 
     def _expect(self, condition: Point, goal: Point, tolerance: float) -> Expectation:
         p_hit = float(self.p_hit(condition[None], goal[None], tolerance)[0])
