@@ -32,7 +32,7 @@ Points = Float[np.ndarray, "n k"]
 Point = Float[np.ndarray, " k"]
 """One outcome, condition, goal or error."""
 
-SAME = 1e-6
+SAME_OUTCOME = 1e-6
 """Outcomes this part of their range apart are the same; ours: what rounding and units leave."""
 FARTHEST = 5.0
 """In [m]; ours: no arm on a table reaches, throws or is seen farther, so more is another unit,

@@ -72,6 +72,22 @@ def test_nearest_refuses_senseless_settings(setting: str, value: float):
         NearestNeighboursConfig(**{setting: value})
 
 
+def test_a_kernel_that_is_not_the_usual_one_is_said():
+    rng = np.random.default_rng(0)
+    grid = np.stack(np.meshgrid([0.0, 1.0, 2.0], [0.0, 1.0]), axis=-1).reshape(6, 2)
+    close = np.vstack([grid, grid[0] + 0.001])  # a millimetre beside another
+    said = [
+        SmoothInterpolation()
+        .fit(Demonstrations(rng.normal(size=(len(of), 11, 2)), of, FORMAT), seed=0)
+        .remarks
+        for of in (grid, close)
+    ]
+    assert said == [
+        (),
+        ("kernel: linear, since outcomes lie too close together for a cubic spline",),
+    ]
+
+
 def test_interpolation_refuses_an_unknown_kernel():
     with pytest.raises(ConfigurationError, match=r"kernel.*gaussian"):
         SmoothInterpolationConfig(kernel="gaussian")  # type: ignore[arg-type]

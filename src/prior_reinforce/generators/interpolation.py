@@ -35,6 +35,7 @@ from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.plans.outcome_weights import (
     Kernel,
     inverse_distance_weights,
+    kernel_for,
     smooth_weights,
 )
 from prior_reinforce.registry import build
@@ -130,6 +131,13 @@ class SmoothInterpolation(_Mixture):
     name: ClassVar[str] = "interpolation"
     config_type: ClassVar[type[SmoothInterpolationConfig]] = SmoothInterpolationConfig
     config: SmoothInterpolationConfig
+
+    def _fit(self, demonstrations: Demonstrations, seed: int, progress: Report) -> None:
+        super()._fit(demonstrations, seed, progress)
+        if self.config.kernel == "auto" and kernel_for(self._outcomes, self._noise) == "linear":
+            self.remarks = (
+                "kernel: linear, since outcomes lie too close together for a cubic spline",
+            )
 
     def _weights(self, conditions: Points) -> Float[np.ndarray, "n N"]:
         """Weigh all plans; at an outcome that was measured its own alone, to rounding."""

@@ -60,7 +60,7 @@ class Preview:
         alike = tuple(
             f"{self.episodes[i]} and {self.episodes[j]} have the same outcome: the mean of both "
             "motions stands for it; if that is a slip of the pen, correct it"
-            for i, j in self.demonstrations.measured_alike()
+            for i, j in self.demonstrations.repeated_outcomes()
         )
         return (*self.found.remarks, *alike)
 

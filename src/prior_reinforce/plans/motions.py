@@ -32,7 +32,7 @@ from prior_reinforce.arrays import (
     BEYOND_DOUBT,
     FARTHEST,
     LARGEST_TURN,
-    SAME,
+    SAME_OUTCOME,
     Frames,
     Plans,
     Point,
@@ -240,11 +240,11 @@ class Demonstrations:
                 outcome_noise=self.outcome_noise[members],
             )
 
-    def measured_alike(self) -> list[tuple[int, int]]:
-        """Return pairs whose measured outcomes are the same; by eye, two throws often look it."""
+    def repeated_outcomes(self) -> list[tuple[int, int]]:
+        """Return pairs whose outcomes were measured and are the same; by eye they often look it."""
         measured = np.all(self.outcome_noise == 0.0, axis=1)
         scaled = self.outcomes_seen / np.ptp(self.outcomes_seen, axis=0)
-        same = np.all(np.abs(scaled[:, None] - scaled[None]) <= SAME, axis=2)
+        same = np.all(np.abs(scaled[:, None] - scaled[None]) <= SAME_OUTCOME, axis=2)
         pairs = np.argwhere(np.triu(same & measured & measured[:, None], k=1))
         return [(int(i), int(j)) for i, j in pairs]
 
@@ -327,7 +327,7 @@ class Demonstrations:
             return cls(plans, outcomes, format_, names, units, noise)
 
     def _warn_about_repeated_outcomes(self) -> None:
-        pairs = self.measured_alike()
+        pairs = self.repeated_outcomes()
         if pairs:
             i, j = pairs[0]
             warnings.warn(

@@ -18,7 +18,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
-from prior_reinforce.arrays import SAME
+from prior_reinforce.arrays import SAME_OUTCOME
 
 Kernel = Literal["auto", "cubic", "thin-plate", "linear"]
 """Of `smooth_weights`: the radial function is d^3, d^2 log d, or d. `auto` is the first, or the
@@ -75,7 +75,7 @@ def inverse_distance_weights(
     with np.errstate(invalid="ignore", divide="ignore"):
         kept = (near[:, :1] / near) ** power
     hit = near[:, 0] == 0
-    kept[hit] = near[hit] <= SAME
+    kept[hit] = near[hit] <= SAME_OUTCOME
     weights = np.zeros_like(distances)
     np.put_along_axis(weights, nearest, kept / kept.sum(axis=1, keepdims=True), axis=1)
     return weights
@@ -111,10 +111,7 @@ def smooth_weights(
     from scipy.interpolate import RBFInterpolator
 
     if kernel == "auto":
-        cubic = smooth_weights(outcomes, kernel="cubic", noise=noise)
-        if amplification(cubic, outcomes) <= _LARGEST_AMPLIFICATION:
-            return cubic
-        return smooth_weights(outcomes, kernel="linear", noise=noise)
+        kernel = kernel_for(outcomes, noise)
     n, k = outcomes.shape
     affine = n > k
     scale = np.ptp(outcomes, axis=0)
@@ -122,7 +119,7 @@ def smooth_weights(
     if noise is not None:
         relative = np.where(noise > _MEASURED * scale, noise / scale, 0.0)
         spread = _SMOOTHING * np.mean(relative**2, axis=1)
-    same = np.all(np.abs(outcomes[:, None] - outcomes[None]) <= SAME * scale, axis=2)
+    same = np.all(np.abs(outcomes[:, None] - outcomes[None]) <= SAME_OUTCOME * scale, axis=2)
     outcomes, times = outcomes[same.argmax(axis=1)], same.sum(axis=1)
     spread = np.where(times > 1, np.maximum(spread, _REPEATED), spread)
     spline = RBFInterpolator(
@@ -135,12 +132,27 @@ def smooth_weights(
     return lambda conditions: np.asarray(spline(conditions / scale)).reshape(len(conditions), n)
 
 
+def kernel_for(
+    outcomes: Float[np.ndarray, "N k"], noise: Float[np.ndarray, "N k"] | None = None
+) -> Kernel:
+    """Return the kernel that `auto` means: cubic, or linear where cubic weights amplify.
+
+    Args:
+        outcomes: r.
+        noise: See `smooth_weights`.
+
+    Source: ours, see docs/decisions-generator.md.
+    """
+    cubic = smooth_weights(outcomes, kernel="cubic", noise=noise)
+    return "cubic" if amplification(cubic, outcomes) <= _LARGEST_AMPLIFICATION else "linear"
+
+
 def amplification(weights: Weights, outcomes: Float[np.ndarray, "N k"]) -> float:
     r"""Return the mean of :math:`\sum_i w_i(c)^2` half-way between any two outcomes.
 
     It is the variance of what differs between demonstrations by chance (posture, tempo) in what is
-    mixed of them, relative to its variance between them. Where two outcomes lie close together,
-    their motions' difference is a slope, and weights grow far beyond one.
+    mixed of them, relative to its variance in one demonstration. Where two outcomes lie close
+    together, their motions' difference is a slope, and weights grow far beyond one.
     """
     i, j = np.triu_indices(len(outcomes), k=1)
     halfway = 0.5 * (outcomes[i] + outcomes[j])
