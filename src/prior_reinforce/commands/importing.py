@@ -68,7 +68,8 @@ class Import:
     """CSV `episode,x,y` with where each object landed; if not given, `outcomes.csv` beside the
     source, and what it lacks is asked for on a terminal."""
     outcome_unit: Literal["m", "cm", "mm", "rad", "deg"] | None = None
-    """Unit of the outcomes in that table, where its columns do not say it (`x_cm`)."""
+    """Unit of the outcomes in that table, where its columns do not say it (`x_cm`), or where what
+    they say is doubted."""
     key: str | None = None
     """Where the motion is within the source (HDF5 data set, topic, column)."""
     rate: float | None = None

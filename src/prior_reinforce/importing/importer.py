@@ -32,7 +32,6 @@ from prior_reinforce.importing.inspection import (
     would_smoothing_help,
 )
 from prior_reinforce.importing.outcomes import (
-    Outcomes,
     find_outcomes,
     in_order,
     in_units,
@@ -191,19 +190,12 @@ def import_demonstrations(
             outcomes_seen,
             PlanFormat(kept.names, kept.units, done.dt),
             tuple(outcome_names) if outcome_names is not None else known.names,
-            _units_of(known, outcome_units),
+            tuple(outcome_units or [unit or "m" for unit in known.units]),
             uncertainty_of(recordings, known),
         )
     found = _inspection(kept, done, settings, robot, gate)
     preview = Preview(f"{source.name} ({kind})", found, demonstrations, known.where)
     return ImportResult(demonstrations, preview.episodes, preview)
-
-
-def _units_of(known: Outcomes, wanted: Sequence[str] | None) -> tuple[str, ...]:
-    """Units of the outcomes' components: as wanted, as their source says, or metres."""
-    if wanted is not None:
-        return tuple(wanted)
-    return tuple(unit or "m" for unit in known.units)
 
 
 def inspect_recordings(

@@ -225,7 +225,7 @@ def in_units(
     """
     k = max((len(value) for value in outcomes.values.values()), default=0)
     said = outcomes.units or (None,) * k
-    task = "" if wanted is None else "outcomes of this task (workspace.toml, [outcome])"
+    chosen = wanted is not None
     if wanted is None:
         wanted = [base_of(unit or given or "m")[0] for unit in said]
     if len(wanted) != k or len(said) != k:
@@ -247,10 +247,10 @@ def in_units(
         recorded = own or given or guess_unit(unit, reach) or unit
         if own is None and given is None and recorded != unit:
             looks.setdefault(recorded, []).append(f"{name} reaches {reach:.4g}")
-        if task and base_of(recorded)[0] != base_of(unit)[0]:
+        if chosen and base_of(recorded)[0] != base_of(unit)[0]:
             raise ConfigurationError(
-                f"{name} in {outcomes.where} is in {recorded}, but {task} are in {spelt}; correct "
-                "either"
+                f"{name} in {outcomes.where} is in {recorded}, but its unit is to be {spelt}; "
+                "correct either (a workspace has it in workspace.toml, [outcome])"
             )
         scale.append(conversion(recorded, unit, f"{name} in {outcomes.where}"))
         looks_like = guess_unit(unit, reach * scale[-1])
@@ -260,7 +260,7 @@ def in_units(
                 f"{reach * scale[-1]:.4g} {unit}, too far for an arm; if it is in {looks_like}, "
                 f"call its column {name} [{looks_like}]"
             )
-        if own is not None and given is None and looks_like != unit:
+        if own is not None and given != unit and looks_like != unit:
             looks.setdefault(unit, []).append(
                 f"{name} reaches {reach * scale[-1]:.4g} {unit} (if that is in {looks_like}, call "
                 f"its column {name} [{looks_like}])"
