@@ -104,6 +104,20 @@ def test_two_seeds_differ_and_the_generator_can_be_fitted_again(throws):
     np.testing.assert_array_equal(first, again)
 
 
+@pytest.mark.parametrize("other", [{"sampler": "ddpm"}, {"shared_noise": False}])
+def test_a_network_sampled_otherwise_is_the_one_that_was_fitted_so(throws, other):
+    demos = throws(3)
+    network = DiffusionGenerator(FEW).fit(demos, seed=0)
+    before = network.generate(demos.outcomes_seen)
+    sampled = network.sampled(**other)
+    as_fitted = DiffusionGenerator(replace(FEW, **other)).fit(demos, seed=0)
+    plans = sampled.generate(demos.outcomes_seen)
+    np.testing.assert_array_equal(plans, as_fitted.generate(demos.outcomes_seen))
+    assert np.abs(plans - before).max() > 1e-6
+    assert sampled.config == as_fitted.config
+    np.testing.assert_array_equal(network.generate(demos.outcomes_seen), before)
+
+
 def test_presets_and_representation_are_one_word_each():
     paper = DiffusionGenerator(preset="paper").config
     assert paper.network.widths == (256, 512, 1024)
