@@ -190,9 +190,7 @@ class MeasuredField(Unit):
         generator = make_generator(self.generator).fit(prior, seed=self.labels)
         seed = GOAL_SEED + self.labels
         measured = measure(make_task(self.task), generator, prior, self.label, seed=seed)
-        path = self._path(folder)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with in_place(path) as unfinished:
+        with in_place(self._path(folder)) as unfinished:
             measured.save(unfinished)
         return {"noise_sd": measured.noise_sd.tolist()}
 

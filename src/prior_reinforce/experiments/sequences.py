@@ -81,7 +81,7 @@ class Afternoons(Unit):
 
 @dataclass(frozen=True)
 class FieldAfternoons(Unit):
-    """Work through sequences of goals on a field with one adapter."""
+    """Work through a sequence of goals on a field with one adapter."""
 
     measured: MeasuredField
     """Where."""
@@ -95,8 +95,6 @@ class FieldAfternoons(Unit):
     """Through which trials are seen."""
     goals: int = 8
     """In the sequence."""
-    sequences: int = 1
-    """Number of afternoons."""
     rounds: int = 10
     """Trials a goal at most."""
     seed: int = GOAL_SEED
@@ -115,10 +113,10 @@ class FieldAfternoons(Unit):
         return super().own_sources + tuple(source_digest(choice) for choice in own)
 
     def run(self, folder: Path) -> Mapping[str, Any]:
-        """Run them in lock step, and keep plain numbers, a row a sequence."""
+        """Work through them, and keep plain numbers; one row, of the one sequence."""
         task = FieldTask(self.measured.field(folder), self.change)
         prior = task.demonstrations("own")
-        goals = task.sample_goals(self.sequences * self.goals, np.random.default_rng(self.seed))
+        goals = task.sample_goals(self.goals, np.random.default_rng(self.seed))
         with make_perception(self.perception, seed=self.seed) as perception:
             results = run_sequences(
                 task,
@@ -126,7 +124,7 @@ class FieldAfternoons(Unit):
                 lambda: make_adapter(self.adapter),
                 perception,
                 prior,
-                goals.reshape(self.sequences, self.goals, -1),
+                goals[None],
                 carry_over=self.carry_over,
                 rounds=self.rounds,
                 seed=self.seed + self.measured.labels,

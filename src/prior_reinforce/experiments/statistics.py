@@ -26,7 +26,7 @@ SHARE = (0.0, 1.0)
 
 Values = Shaped[np.ndarray, "trainings goals"]
 """One number for each training and goal."""
-OfTasks = Sequence[Shaped[np.ndarray, "_ _"]]
+ValuesByTask = Sequence[Shaped[np.ndarray, "_ _"]]
 """Such numbers of each task; tasks may have different numbers of trainings."""
 Curve = list[dict[str, float]]
 """An interval for each round, from round 1, as it goes into JSON."""
@@ -136,7 +136,7 @@ def mean_success_difference(solved_at: Values, other: Values, rounds: int) -> In
 
 
 def mean_of_tasks(
-    rows: OfTasks, *, within: tuple[float, float] = _ANYWHERE, seed: int = 0
+    rows: ValuesByTask, *, within: tuple[float, float] = _ANYWHERE, seed: int = 0
 ) -> Interval:
     """Mean of tasks that weigh alike: trainings and goals are drawn anew in each, tasks are not.
 
@@ -166,7 +166,7 @@ def mean_of_tasks(
     return Interval(value, float(low), float(high))
 
 
-def difference_of_tasks(a: OfTasks, b: OfTasks, *, seed: int = 0) -> Interval:
+def difference_of_tasks(a: ValuesByTask, b: ValuesByTask, *, seed: int = 0) -> Interval:
     """Mean of a - b over tasks, paired; of the trainings of a, the first that b has as well."""
     pairs = zip(a, b, strict=True)
     return mean_of_tasks([of_a[: len(of_b)] - of_b for of_a, of_b in pairs], seed=seed)

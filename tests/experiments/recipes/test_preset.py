@@ -9,7 +9,7 @@ from prior_reinforce.commands.reproduce import Reproduce
 from prior_reinforce.experiments.evaluation import Training, Trials
 from prior_reinforce.experiments.recipes import Run, Scale
 from prior_reinforce.experiments.recipes.base import TASK
-from prior_reinforce.experiments.recipes.preset import RECIPE, OwnNoiseTrials, PaperPreset
+from prior_reinforce.experiments.recipes.preset import RECIPE, IndependentNoiseTrials, PaperPreset
 
 BRIEF = "quick_units:BriefDiffusion,sampler=ddpm"
 SMALL = Scale(goals=3, seeds=(0,), sets=("A",), rounds=1)
@@ -32,7 +32,7 @@ def test_one_network_is_sampled_twice_and_stands_beside_ours(tmp_path):
         kind(training, TASK, "gp", "exact", goals=1)
         .learned(tmp_path)
         .generator.generate([[1.0, 0.0], [1.0, 1e-6]])
-        for kind in (Trials, OwnNoiseTrials)
+        for kind in (Trials, IndependentNoiseTrials)
     ]
     apart = [np.abs(np.diff(of, axis=0)).max() for of in plans]
     assert apart[0] < 1e-3 < apart[1]  # near conditions have near plans, or not

@@ -227,10 +227,10 @@ def draw(figures: Figures, folder: Path) -> list[Picture]:
 
 def remarks(figures: Figures) -> list[str]:
     """How far the probabilities that were said before each trial can be trusted."""
-    return [said_of(figures["p_hit"])]
+    return [reliability_in_words(figures["p_hit"])]
 
 
-def said_of(p: Mapping[str, Any]) -> str:
+def reliability_in_words(p: Mapping[str, Any]) -> str:
     """A reliability table in a sentence."""
     bins = "; ".join(f"{b['said']:.2f}: {b['hit']:.2f} of {b['n']}" for b in p["bins"])
     return (

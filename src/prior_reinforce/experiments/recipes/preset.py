@@ -2,8 +2,8 @@
 
 Diffusion Policy's low-dimensional training: 69 million parameters, raw frames, 5,000 steps, DDPM.
 It is learned once a prior set (hours on a CPU) and sampled twice: with noise that all conditions
-share, as everywhere here, and with noise of each condition's own, as where plans are sampled at
-random. Adapter, noise and goals are those of the generators' comparison.
+share, as everywhere here, and with independent noise for each condition, as where plans are sampled
+at random. Adapter, noise and goals are those of the generators' comparison.
 """
 
 from __future__ import annotations
@@ -40,8 +40,8 @@ _GOALS = 30
 
 
 @dataclass(frozen=True)
-class OwnNoiseTrials(Trials):
-    """Trials with the network of a training, sampled with noise of each condition's own."""
+class IndependentNoiseTrials(Trials):
+    """Trials with the network of a training, sampled with independent noise for each condition."""
 
     def learned(self, folder: Path) -> Learned:
         """What was learned, sampled otherwise."""
@@ -54,9 +54,9 @@ METHODS = (
     ("diffusion", "diffusion", False),
     ("diffusion on whole plans", WHOLE_PLANS, False),
     ("the paper's preset, shared noise", "diffusion-paper", False),
-    ("the paper's preset, noise of each condition's own", "diffusion-paper", True),
+    ("the paper's preset, independent noise", "diffusion-paper", True),
 )
-"""What is compared is called, its choice, and whether each condition has its own noise."""
+"""What is compared is called, its choice, and whether noise is independent between conditions."""
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ class PaperPreset(Measurement):
         run.learn(self.trainings(scale))
         goals, rounds = min(scale.goals, _GOALS), scale.rounds
         units = [
-            (OwnNoiseTrials if own else Trials)(
+            (IndependentNoiseTrials if own else Trials)(
                 Training(TASK, name, choice, self.seed),
                 TASK, "gp", "amplified", goals, rounds=rounds,
             )

@@ -17,7 +17,7 @@ import numpy as np
 
 from prior_reinforce.experiments.evaluation import GOAL_SEED
 from prior_reinforce.experiments.fields import Change, MeasuredField
-from prior_reinforce.experiments.recipes.adaptation import TASKS, reliability, said_of
+from prior_reinforce.experiments.recipes.adaptation import TASKS, reliability, reliability_in_words
 from prior_reinforce.experiments.recipes.base import (
     Figures,
     Measurement,
@@ -75,7 +75,7 @@ _QUICK_RULES = 7
 """The first so many are tried in a quick run."""
 
 
-def own_sets(seed: int = GOAL_SEED) -> list[list[MeasuredField]]:
+def own_sets() -> list[list[MeasuredField]]:
     """A, B, and two draws of as many demonstrations, of every task.
 
     Without fishing's second draw, of which two outcomes look the same: these fields are older than
@@ -84,7 +84,7 @@ def own_sets(seed: int = GOAL_SEED) -> list[list[MeasuredField]]:
     sets = (("A", 0), ("B", 1), ("C", 2), ("D", 0))
     return [
         [
-            MeasuredField(task, learned_on, name, labels, seed=seed)
+            MeasuredField(task, learned_on, name, labels)
             for name, labels in sets
             if (task, name) != ("fishing", "D")
         ]
@@ -291,7 +291,7 @@ def remarks(figures: Figures) -> list[str]:
         if of["ours_minus"]["value"] > 0
     ]
     first = figures["conditions"][0]
-    said = f"On fields, {first['label']}: {said_of(first['p_hit'])}"
+    said = f"On fields, {first['label']}: {reliability_in_words(first['p_hit'])}"
     if not behind:
         return [said]
     return [f"With fewer trials than ours (ours minus it): {'; '.join(behind)}.", said]
