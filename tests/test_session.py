@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from prior_reinforce.adapters.base import Adapter, Expectation
+from prior_reinforce.adapters.bayesian import BayesianAdapter
 from prior_reinforce.errors import (
     ConfigurationError,
     InvalidFeedbackError,
@@ -158,6 +159,21 @@ def test_a_miss_alone_teaches_nobody_who_wants_numbers(session):
     session.tell(session.ask().number, hit=False)
     assert not session.solved
     np.testing.assert_array_equal(session.ask().condition, GOAL)
+
+
+def test_misses_alone_make_the_default_adapter_try_beside_them():
+    seen = Demonstrations(
+        DEMOS.plans, DEMOS.outcomes_seen, DEMOS.format, outcome_noise=[[0.02] * 2] * 2
+    )
+    session = Session(RepeatingGenerator().fit(seen, seed=0), BayesianAdapter(), seen, GOAL, 0.015)
+    for _ in range(4):
+        session.tell(session.ask().number, hit=False)
+    tried = np.array([trial.condition for trial in session.trials])
+    np.testing.assert_allclose(tried[0], GOAL, atol=1e-9)
+    apart = np.linalg.norm(tried[:, None] - tried, axis=2)[np.triu_indices(4, 1)]
+    assert np.all((apart > 0.003) & (apart < 0.1))
+    p_hit = [trial.p_hit for trial in session.trials]
+    assert 0.0 < p_hit[3] < p_hit[0]
 
 
 def test_a_hit_that_is_seen_overrules_what_the_reading_knows(session):

@@ -70,6 +70,9 @@ class Reading:
     """Whether the goal was reached, where that was seen directly; None where it was not."""
     said: str = ""
     """The words, where words were said."""
+    beyond: Point | None = None
+    """Half-axes of an ellipsoid that the true error is known to lie outside of, since the trial
+    missed; None where nothing is known of it. `within` finds them."""
 
     @property
     def spread(self) -> Point:
@@ -188,7 +191,7 @@ class Reading:
         the hit is believed. After a miss, what the other components cannot make up for must be
         this one's: "2 cm long" that missed by more than 1.5 cm, and at most 1 cm to the side, was
         1.1 cm long at least. The box around the ellipsoid stands for it: components stay
-        independent.
+        independent. What no box can say is kept in `beyond`.
 
         Args:
             radius: Tolerance in each component, shape (k,), in the outcomes' units.
@@ -208,7 +211,10 @@ class Reading:
         high = np.where(self.high < 0, np.minimum(self.high, -least), self.high)
         sound = low < high
         return replace(
-            self, low=np.where(sound, low, self.low), high=np.where(sound, high, self.high)
+            self,
+            low=np.where(sound, low, self.low),
+            high=np.where(sound, high, self.high),
+            beyond=np.asarray(radius),
         )
 
     def as_json(self) -> dict[str, Any]:

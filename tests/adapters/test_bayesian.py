@@ -117,7 +117,7 @@ def test_a_change_that_is_said_is_expected_however_long_nothing_had_changed(befo
 
 def test_what_a_demonstration_would_teach_is_what_adding_it_takes_off():
     places = np.random.default_rng(0).uniform([0.8, -0.2], [1.0, 0.2], size=(40, 2))
-    new = np.array([[0.9, 0.1], [1.05, 0.25], CORNERS[2]])  # the last where there is one already
+    new = np.array([[0.9, 0.1], [1.05, 0.25], [0.801, 0.2]])  # the last beside another
     adapter = started()
     gains = adapter.gain(new, places, demonstrations=True)
     before = adapter._unknown(adapter._normalisation.apply(places))
@@ -349,3 +349,57 @@ def test_no_condition_is_far_from_its_goal(monkeypatch):
     for result in results:
         away = [abs(float(trial.condition[0] - result.goal[0])) for trial in result.trials]
         assert max(away) <= 2.0 * spread * 1.01
+
+
+def only_told_whether_it_hit(adapter, goal, shift, rounds) -> list[np.ndarray]:
+    """Conditions until the goal is reached, where outcomes are condition plus shift."""
+    tried = []
+    for _ in range(rounds):
+        tried.append(adapter.propose(goal))
+        hit = bool(np.linalg.norm(tried[-1] + shift - goal) <= TOLERANCE)
+        adapter.observe(
+            tried[-1], goal, Reading.only(hit, len(goal)).within(np.full(len(goal), TOLERANCE))
+        )
+        if hit:
+            break
+    return tried
+
+
+@pytest.mark.parametrize("shift", [[0.02, 0.0], [0.0, -0.025], [-0.015, 0.02]])
+def test_of_hit_or_miss_alone_a_goal_is_searched_around(shift):
+    noise = np.full((6, 2), 0.02)
+    tried = only_told_whether_it_hit(started(noise=noise), GOAL, np.array(shift), rounds=20)
+    assert np.linalg.norm(tried[-1] + shift - GOAL) <= TOLERANCE
+    apart = np.linalg.norm(np.array(tried)[:, None] - np.array(tried), axis=2)
+    assert np.all(apart[np.triu_indices(len(tried), 1)] > 0.2 * TOLERANCE)
+
+
+def test_a_miss_makes_the_same_throw_less_probable():
+    adapter = started(noise=np.full((6, 2), 0.02))
+    at, goals, p = GOAL[None], GOAL[None], []
+    for _ in range(4):
+        p.append(float(adapter.p_hit(at, goals, TOLERANCE)[0]))
+        adapter.observe(GOAL, GOAL, Reading.only(False, 2).within(np.full(2, TOLERANCE)))
+    assert p[0] > 2 * p[1] > 2 * p[2]
+    assert p[3] < 0.1
+
+
+def test_a_miss_that_was_said_in_words_changes_nothing():
+    """ "5 cm long" is no hit anyway."""
+    told, untold = started(), started()
+    reading = Reading.by_eye([0.05, 0.0], hit=False)
+    told.observe(GOAL, GOAL, reading.within(np.full(2, TOLERANCE)))
+    untold.observe(GOAL, GOAL, reading)
+    np.testing.assert_array_equal(told.propose(GOAL), untold.propose(GOAL))
+
+
+def test_noisy_numbers_that_missed_are_not_repeated():
+    """Read as 0 with 2 cm of noise, but a miss of more than 1.5 cm."""
+    adapter, radius = started(noise=np.full((6, 2), 0.03)), np.full(2, TOLERANCE)
+    reading = Reading.measured([0.0, 0.0], 0.02, hit=False)
+    adapter.observe(GOAL, GOAL, reading.within(radius))
+    moved = np.linalg.norm(adapter.propose(GOAL) - GOAL)
+    assert 0.5 * TOLERANCE < moved < 3 * TOLERANCE
+    believed = started(noise=np.full((6, 2), 0.03))
+    believed.observe(GOAL, GOAL, Reading.measured([0.0, 0.0], 0.02))
+    assert np.linalg.norm(believed.propose(GOAL) - GOAL) < 0.1 * TOLERANCE

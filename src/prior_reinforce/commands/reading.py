@@ -64,7 +64,7 @@ class Seen:
         if sum(given) > 1 or not said or (self.hit and self.miss):
             raise ConfigurationError(
                 "say what was seen: words or numbers, or --error or --outcome, with --hit or "
-                "--miss if that was seen as well, or --hit alone"
+                "--miss if that was seen as well, or one of those alone"
             )
         hit = True if self.hit else False if self.miss else None
         goal = session.goals[session.trial(self.trial).goal_number - 1].goal
