@@ -206,6 +206,8 @@ class BayesianAdapter(Adapter):
 
     config_type: ClassVar[type[BayesianConfig]] = BayesianConfig
     carries_over: ClassVar[bool] = True
+    _posterior: Posterior | None
+    _missed: _Memory | None
 
     def __init__(self, config: BayesianConfig | None = None) -> None:
         """Take the settings, or the defaults."""
@@ -229,7 +231,6 @@ class BayesianAdapter(Adapter):
         self._demonstrated = self._normalisation.apply(demonstrations.outcomes_seen)
         self._noise = demonstrations.outcome_noise / self._normalisation.scale
         self._memory, self._now = _Memory.empty(demonstrations.outcome_dim), 0
-        self._posterior: Posterior | None = None
         self._mix()
 
     def change_hardware(self) -> None:
@@ -248,7 +249,7 @@ class BayesianAdapter(Adapter):
             moved / scale,
             beyond,
         )
-        self._posterior = None
+        self._posterior = self._missed = None
         if len(self._memory.changes) > _TRIALS_KEPT:
             self._merge()
 
@@ -324,12 +325,14 @@ class BayesianAdapter(Adapter):
 
     def _misses(self) -> _Memory:
         """The latest trials that missed and of which their readings do not say so."""
-        missed = self._memory.only(slice(-_LATEST, None))
-        missed = missed.only(missed.beyond > 0.0)
-        if len(missed.changes) == 0:
-            return missed
-        p_hit = self._p_hit(missed.conditions, missed.aims, missed.beyond)
-        return missed.only(p_hit > _NOT_EXCLUDED)
+        if self._missed is None:
+            missed = self._memory.only(slice(-_LATEST, None))
+            missed = missed.only(missed.beyond > 0.0)
+            if len(missed.changes) > 0:
+                p_hit = self._p_hit(missed.conditions, missed.aims, missed.beyond)
+                missed = missed.only(p_hit > _NOT_EXCLUDED)
+            self._missed = missed
+        return self._missed
 
     def _p_hit_after(
         self, missed: _Memory, at: Points, aims: Points, radius: float
@@ -406,7 +409,7 @@ class BayesianAdapter(Adapter):
         outcomes, scale = self._normalisation.undo(self._demonstrated), self._normalisation.scale
         self._weights = smooth_weights(outcomes, noise=self._noise * scale)
         self._stated = np.mean(self._noise**2, axis=1)
-        self._posterior = None
+        self._posterior = self._missed = None
 
     def _known(self) -> Posterior:
         """The posterior of now."""
@@ -448,7 +451,7 @@ class BayesianAdapter(Adapter):
             sites = rest.with_one(middle, changes, number, number, variance)
         latest = memory.only(slice(-_LATEST, None))
         self._memory = sites.and_then(latest)
-        self._posterior = None
+        self._posterior = self._missed = None
 
     def _apart(self, conditions: Points, other: Point, change: int) -> Float[np.ndarray, " n"]:
         """Prior variance of the difference between displacements here and there."""

@@ -17,6 +17,7 @@ importance weights are standard (Robert and Casella, Monte Carlo Statistical Met
 from __future__ import annotations
 
 import functools
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,7 +27,9 @@ from scipy.special import ndtr
 from prior_reinforce.arrays import Points
 
 _DRAWS = 512
-"""Of each model (ours): a probability then has a standard error of 0.02 at most."""
+"""Of all models together (ours): a probability then has a standard error of 0.02 at most."""
+_FEWEST = 16
+"""Draws of an improbable model, which may be the one that explains the misses (ours)."""
 _LEAST_SHARE = 1e-3
 """Models less probable than this are left out (ours)."""
 _JITTER = 1e-9
@@ -76,17 +79,19 @@ def p_hit_after(
     jitter = _JITTER * np.eye(len(missed))
     hits, total = np.zeros(n), 0.0
     for model in np.flatnonzero(belief.share > _LEAST_SHARE):
+        draws = max(_FEWEST, math.ceil(_DRAWS * belief.share[model]))
+        share, drawn = belief.share[model] / draws, normal[:, :draws]
         factor = np.linalg.cholesky(belief.among_missed[model] + jitter)
         onto = np.linalg.solve(factor, np.swapaxes(belief.cross[model], 1, 2))
         left = np.maximum(belief.variance[model] - np.square(onto).sum(axis=1), 0.0)
-        there = belief.at_missed[model][:, None] + normal[..., :-1] @ np.swapaxes(factor, 1, 2)
-        here = belief.mean[model][:, None] + normal[..., :-1] @ onto
-        here += np.sqrt(left)[:, None] * normal[..., -1:]
+        there = belief.at_missed[model][:, None] + drawn[..., :-1] @ np.swapaxes(factor, 1, 2)
+        here = belief.mean[model][:, None] + drawn[..., :-1] @ onto
+        here += np.sqrt(left)[:, None] * drawn[..., -1:]
         beside = (_distance(there, missed) - radii) / execution_sd
         weight = np.prod((1.0 - outlier) * ndtr(beside) + outlier, axis=1)
         inside = ndtr((radius - _distance(here, aims)) / execution_sd)
-        hits += belief.share[model] * (weight @ inside)
-        total += belief.share[model] * weight.sum()
+        hits += share * (weight @ inside)
+        total += share * weight.sum()
     return np.asarray(hits / total)
 
 
