@@ -405,3 +405,16 @@ def test_noisy_numbers_that_missed_are_not_repeated():
     believed = started(noise=np.full((6, 2), 0.03))
     believed.observe(GOAL, GOAL, Reading.measured([0.0, 0.0], 0.02))
     assert np.linalg.norm(believed.propose(GOAL) - GOAL) < 0.1 * TOLERANCE
+
+
+def test_where_the_tolerance_is_far_finer_than_the_eye_nothing_is_repeated():
+    """The word 0 is anything within 1 cm, and what missed was to come within 2 mm."""
+    outcomes = CORNERS * 2.5  # executions would be 6 mm apart, were they as far as on our tasks
+    adapter, goal, fine = started(outcomes), np.array([2.3, 0.1]), np.full(2, 0.002)
+    tried = []
+    for _ in range(5):
+        tried.append(adapter.propose(goal))
+        adapter.observe(tried[-1], goal, Reading.by_eye([0.0, 0.0], hit=False).within(fine))
+    apart = np.linalg.norm(np.array(tried)[:, None] - np.array(tried), axis=2)
+    assert np.all(apart[np.triu_indices(5, 1)] > 0.001)
+    assert adapter.expect(tried[0], goal, 0.002).p_hit < 0.05
