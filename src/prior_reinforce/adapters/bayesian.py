@@ -30,6 +30,9 @@ _STEPS = 12
 """Steps to the fixed point of the proposal, each 0.7 of the way, or shorter where that would lead
 away from it (ours)."""
 _RELAXATION = 0.7
+_FARTHEST = 6.5
+"""A correction is this many sd of changed hardware at most (ours): farther away the model, not the
+world, is off, as where weights are steep and an outcome lay a hundred spreads away."""
 _TRIALS_AFTER_A_MISS = 1.24
 """Fitted to 1623 trials of tuning material (ours; docs/decisions-adapter.md)."""
 _POINTS = 192
@@ -44,16 +47,16 @@ _TEACHING_SD = 0.1
 """How finely a trial that is made to learn from is read, in spreads (ours): "5 cm" by eye is an
 interval of 4 cm, whose standard deviation is 1.2 cm of 12 to 18."""
 _NOT_EXCLUDED = 0.05
-"""A miss counts where its reading leaves a hit at least this probable (ours): "2 cm long" and "a
-miss" often do, "10 cm long" never does. At 0.15 a goal of which only hit or miss is said takes 6.2
-trials instead of 4.8 (docs/decisions-adapter.md)."""
+"""A miss counts where its reading leaves a hit more than this share as probable as it would be on
+target (ours): "2 cm long" and "a miss" often do, "10 cm long" never does
+(docs/decisions-adapter.md)."""
 _REPEATABLE = 0.3
 """Executions of one plan are taken to lie no farther apart than this share of the tolerance, as a
 standard deviation (ours): nobody asks for what a good plan would miss. On our own tasks it is 0.13
 to 0.30 by `execution_sd` alone."""
-_BETTER = 0.02
-"""By how much more probable a hit must be for a condition that is not the expected one (ours): what
-so many draws are uncertain by."""
+_BETTER, _RELATIVE = 0.02, 0.1
+"""By how much more probable a hit must be for a condition that is not the expected one, or by which
+share where that is less (ours): what so many draws are uncertain by."""
 _TELLS_NOTHING = 1e-2
 """Precision below which a reading is dropped when trials are merged (ours): an sd of ten
 spreads."""
@@ -268,9 +271,10 @@ class BayesianAdapter(Adapter):
     def _expected_to_land_on(self, goal: Point) -> Point:
         """Return the fixed point c = g - E d(c), in normalised units."""
         condition, relaxation = goal, _RELAXATION
+        farthest = _FARTHEST * self.config.hardware_sd[1]
         off = self._off(condition, goal)
         for _ in range(_STEPS):
-            tried = condition + relaxation * off
+            tried = goal + _clipped(condition + relaxation * off - goal, farthest)
             then = self._off(tried, goal)
             if then @ then < off @ off:
                 condition, off = tried, then
@@ -281,14 +285,17 @@ class BayesianAdapter(Adapter):
     def _likeliest_beside(self, condition: Point, goal: Point, missed: _Memory) -> Point:
         """Return the condition around another that hits with the greatest probability."""
         _, variance = self._predict(condition[None])
-        reach = missed.beyond[-1] + 2.0 * math.sqrt(float(variance.max()))
+        # No farther than changed hardware takes it: where weights are steep, the sd means nothing.
+        sd = min(math.sqrt(float(variance.max())), self.config.hardware_sd[1])
+        reach = missed.beyond[-1] + 2.0 * sd
         cube = 2.0 * _evenly(len(goal)) - 1.0
         ball = cube[np.linalg.norm(cube, axis=1) <= 1.0]
         candidates = np.vstack([condition, condition + reach * ball])
         aims = goal - candidates
         p_hit = self._p_hit_after(missed, candidates, aims, float(missed.beyond[-1]))
         best = int(np.argmax(p_hit))
-        return candidates[best if p_hit[best] > p_hit[0] + _BETTER else 0]
+        more = min(_BETTER, _RELATIVE * float(p_hit[0]))
+        return candidates[best if p_hit[best] > p_hit[0] + more else 0]
 
     def _off(self, condition: Point, goal: Point) -> Point:
         """Return goal minus where a condition is expected to land, in normalised units."""
@@ -333,8 +340,10 @@ class BayesianAdapter(Adapter):
             missed = self._memory.only(slice(-_LATEST, None))
             missed = missed.only(missed.beyond > 0.0)
             if len(missed.changes) > 0:
-                p_hit = self._p_hit(missed.conditions, missed.aims, missed.beyond)
-                missed = missed.only(p_hit > _NOT_EXCLUDED)
+                at, radius = missed.conditions, missed.beyond
+                on_target = self._p_hit(at, self._mixed(self._predict(at)[0]), radius)
+                p_hit = self._p_hit(at, missed.aims, radius)
+                missed = missed.only(p_hit > _NOT_EXCLUDED * on_target)
             self._missed = missed
         return self._missed
 
@@ -521,6 +530,12 @@ class BayesianAdapter(Adapter):
     def _mixed(self, means: Float[np.ndarray, "m k p"]) -> Float[np.ndarray, "p k"]:
         """Mean over all models."""
         return np.asarray(np.einsum("m,mkp->pk", self._known().model_weights, means))
+
+
+def _clipped(vector: Point, longest: float) -> Point:
+    """The same direction, no longer than that."""
+    length = float(np.linalg.norm(vector))
+    return vector if length <= longest else vector * (longest / length)
 
 
 def _closest(memory: _Memory) -> tuple[int, int]:

@@ -32,8 +32,8 @@ _FEWEST = 16
 """Draws of an improbable model, which may be the one that explains the misses (ours)."""
 _LEAST_SHARE = 1e-3
 """Models less probable than this are left out (ours)."""
-_JITTER = 1e-9
-"""Added to variances, so that conditions that are the same have a Cholesky factor."""
+_SINGULAR = 1e-9
+"""Eigenvalues of a covariance are this share of the greatest at least."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,13 +76,15 @@ def p_hit_after(
     """
     _, k, n = belief.mean.shape
     normal = _normal(k, len(missed) + 1)
-    jitter = _JITTER * np.eye(len(missed))
     hits, total = np.zeros(n), 0.0
     for model in np.flatnonzero(belief.share > _LEAST_SHARE):
         draws = max(_FEWEST, math.ceil(_DRAWS * belief.share[model]))
         share, drawn = belief.share[model] / draws, normal[:, :draws]
-        factor = np.linalg.cholesky(belief.among_missed[model] + jitter)
-        onto = np.linalg.solve(factor, np.swapaxes(belief.cross[model], 1, 2))
+        # Conditions that are the same have a singular covariance: a root by eigenvectors.
+        values, vectors = np.linalg.eigh(belief.among_missed[model])
+        root = np.sqrt(np.maximum(values, _SINGULAR * values[:, -1:]))[:, None]
+        factor = vectors * root
+        onto = np.swapaxes(belief.cross[model] @ (vectors / root), 1, 2)
         left = np.maximum(belief.variance[model] - np.square(onto).sum(axis=1), 0.0)
         there = belief.at_missed[model][:, None] + drawn[..., :-1] @ np.swapaxes(factor, 1, 2)
         here = belief.mean[model][:, None] + drawn[..., :-1] @ onto
