@@ -43,7 +43,9 @@ def test_a_recipe_leaves_figures_and_a_page(tmp_path, capsys):
         (["all", "--goals", "0"], "at least 1"),
         (["all", "--seeds", "0", "0", "1"], "different"),
         (["all", "--seeds", "-1"], "not negative"),
+        (["all", "--sets", "A", "A"], "A, B, or both"),
         (["all", "--quick", "--goals", "50"], "leave out either"),
+        (["all", "--quick", "--sets", "A"], "leave out either"),
         (["all", "--quick", "--reader", "vlm"], "without --quick"),
         (["adapters", "--reader", "vlm"], "the pictures of `trials`"),
         (["trials", "--vlm.model", "mine"], "with --reader vlm"),
@@ -88,6 +90,11 @@ def test_figures_name_the_command_that_makes_them_again(tmp_path):
         assert again.goals == 7
         assert again.seeds == (0, 3)
     assert again.vlm == model
+    half = Reproduce("preset", sets=("A",))
+    assert half._scale().sets == ("A",)
+    assert half._command(RECIPES["preset"], Run(tmp_path, half._scale())) == (
+        "prior-reinforce reproduce preset --goals 100 --seeds 0 1 2 --sets A"
+    )
     quick = Reproduce("all", quick=True)._command(RECIPES["adapters"], Run(tmp_path, Scale()))
     assert quick == "prior-reinforce reproduce adapters --quick"
 

@@ -45,6 +45,9 @@ class Reproduce:
     """Goals a training."""
     seeds: tuple[int, ...] = (0, 1, 2)
     """Training seeds."""
+    sets: tuple[Literal["A", "B"], ...] = ("A", "B")
+    """Sets of demonstrations that generators learn from; one is half of the work, and decides
+    less."""
     quick: bool = False
     """Ten goals, one training a method, no variants, no rows of the VLM: decides no claim."""
     reader: Literal["camera", "vlm"] = "camera"
@@ -65,7 +68,7 @@ class Reproduce:
         recipes = self._recipes()
         included = {recipe.name: self._joining(recipe) for recipe in recipes}
         self._check()
-        scale = QUICK if self.quick else Scale(goals=self.goals, seeds=self.seeds)
+        scale = QUICK if self.quick else self._scale()
         workers = Workers(self.workers, self.ray)
         console = Console()
         self._learn(recipes, included, scale, workers, console)
@@ -129,13 +132,19 @@ class Reproduce:
             raise ConfigurationError("--goals and --workers must be at least 1, and --seeds given")
         if min(self.seeds) < 0 or len(set(self.seeds)) < len(self.seeds):
             raise ConfigurationError("--seeds must be different and not negative")
-        if self.quick and Scale(goals=self.goals, seeds=self.seeds) != Scale():
-            raise ConfigurationError("--quick has its own goals and seeds; leave out either")
+        if not self.sets or len(set(self.sets)) < len(self.sets):
+            raise ConfigurationError("--sets must be A, B, or both")
+        if self.quick and self._scale() != Scale():
+            raise ConfigurationError("--quick has its own goals, seeds and sets; leave out either")
         asked = self.reader == "vlm"
         if asked and (self.quick or self.recipe not in ("trials", "all")):
             raise ConfigurationError("--reader vlm reads the pictures of `trials`, without --quick")
         if self.vlm != VisionLanguageModelConfig() and not asked:
             raise ConfigurationError("--vlm.* say whom to ask with --reader vlm; give that as well")
+
+    def _scale(self) -> Scale:
+        """How much is asked for."""
+        return Scale(goals=self.goals, seeds=self.seeds, sets=self.sets)
 
     def _command(self, recipe: Recipe, run: Run) -> str:
         """What makes the figures of one recipe again."""
@@ -144,6 +153,7 @@ class Reproduce:
             words.append("--quick")
         else:
             words += ["--goals", str(self.goals), "--seeds", *map(str, self.seeds)]
+            words += ["--sets", *self.sets] if self.sets != Scale().sets else []
         for own in run.include:
             words += ["--include", own]
         measurement = recipe.measurement
