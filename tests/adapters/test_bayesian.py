@@ -179,7 +179,7 @@ def test_p_hit_of_one_component_by_hand():
     sd = scale * np.sqrt(variance[:, 0, 0] + 0.02**2)
     middle = condition[0] + scale * mean[:, 0, 0]
     inside = norm.cdf(1.6, middle, sd) - norm.cdf(1.4, middle, sd)
-    of_errors = [0.4, 0.4, *[0.05] * 4]  # two sd of the labels, or four of the generator's own
+    of_errors = [0.45, 0.45, *[0.025] * 4]  # two sd of the labels, or four of the generator's own
     expected = inside @ np.kron(of_errors, [0.8, 0.2])
     assert adapter.expect(condition, goal, 0.1).p_hit == pytest.approx(expected, abs=1e-3)
 

@@ -76,7 +76,7 @@ class BayesianConfig:
     """a, what the generator itself gets wrong, whatever the labels."""
     generator_reach: tuple[float, ...] = (0.2, 0.6)
     """How far that reaches: about as far as people's manners are alike."""
-    p_generator: float = 0.2
+    p_generator: float = 0.1
     """Beforehand, the probability that it does, for all sizes and reaches together."""
     rough_sd: float = 0.025
     """What lies between demonstrations."""
@@ -179,7 +179,7 @@ class BayesianAdapter(Adapter):
 
         e   sd s_i              by how much the outcome of demonstration i is off: the noise that it
                                 states (mean over components), and 0.03 or 0.1 more
-        f   sd a                what the generator itself gets wrong: 0, or with probability 0.2 0.1
+        f   sd a                what the generator itself gets wrong: 0, or with probability 0.1 0.1
                                 or 0.3, at a reach of 0.2 or 0.6
         u   sd 0.025, reach 0.32    what lies between the demonstrations
         h   sd b, reach 2.5     what is different from their day: 0.03, or with probability 0.2 0.3;
