@@ -27,8 +27,9 @@ from prior_reinforce.plans.outcome_weights import smooth_weights
 from prior_reinforce.readings import Reading
 
 _STEPS = 12
-"""Steps to the fixed point of the proposal, each 0.7 of the way, or shorter where that would lead
-away from it (ours)."""
+"""Steps to the fixed point of the proposal, each 0.7 of the way (ours). Where landing hardly
+depends on the condition, as with demonstrations in a line, the way goes on: steps that must come
+nearer stop there."""
 _RELAXATION = 0.7
 _FARTHEST = 6.5
 """A correction is this many sd of changed hardware at most (ours): farther away the model, not the
@@ -270,16 +271,11 @@ class BayesianAdapter(Adapter):
 
     def _expected_to_land_on(self, goal: Point) -> Point:
         """Return the fixed point c = g - E d(c), in normalised units."""
-        condition, relaxation = goal, _RELAXATION
-        farthest = _FARTHEST * self.config.hardware_sd[1]
-        off = self._off(condition, goal)
+        condition, farthest = goal, _FARTHEST * self.config.hardware_sd[1]
         for _ in range(_STEPS):
-            tried = goal + _clipped(condition + relaxation * off - goal, farthest)
-            then = self._off(tried, goal)
-            if then @ then < off @ off:
-                condition, off = tried, then
-            else:  # too steep for so long a step
-                relaxation /= 2
+            mean, _ = self._predict(condition[None])
+            step = _RELAXATION * (goal - self._mixed(mean)[0] - condition)
+            condition = goal + _clipped(condition + step - goal, farthest)
         return condition
 
     def _likeliest_beside(self, condition: Point, goal: Point, missed: _Memory) -> Point:
@@ -296,11 +292,6 @@ class BayesianAdapter(Adapter):
         best = int(np.argmax(p_hit))
         more = min(_BETTER, _RELATIVE * float(p_hit[0]))
         return candidates[best if p_hit[best] > p_hit[0] + more else 0]
-
-    def _off(self, condition: Point, goal: Point) -> Point:
-        """Return goal minus where a condition is expected to land, in normalised units."""
-        mean, _ = self._predict(condition[None])
-        return np.asarray(goal - self._mixed(mean)[0] - condition)
 
     def _expect(self, condition: Point, goal: Point, tolerance: float) -> Expectation:
         p_hit = float(self.p_hit(condition[None], goal[None], tolerance)[0])
