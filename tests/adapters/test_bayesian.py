@@ -179,8 +179,7 @@ def test_p_hit_of_one_component_by_hand():
     sd = scale * np.sqrt(variance[:, 0, 0] + 0.02**2)
     middle = condition[0] + scale * mean[:, 0, 0]
     inside = norm.cdf(1.6, middle, sd) - norm.cdf(1.4, middle, sd)
-    of_errors = [0.45, 0.45, *[0.025] * 4]  # two sd of the labels, or four of the generator's own
-    expected = inside @ np.kron(of_errors, [0.8, 0.2])
+    expected = inside @ np.tile(np.kron([0.9, 0.1], [0.8, 0.2]), 2) / 2  # two sd of the labels
     assert adapter.expect(condition, goal, 0.1).p_hit == pytest.approx(expected, abs=1e-3)
 
 
@@ -267,7 +266,7 @@ def test_trials_of_different_hardware_are_never_merged():
 
 
 def test_what_a_reading_would_teach_is_what_it_takes_off_the_variance():
-    adapter = started(label_sd=(0.2,), generator_sd=(1e-6,), hardware_sd=(0.3, 0.3))
+    adapter = started(label_sd=(0.2,), generator_sd=1e-6, hardware_sd=(0.3, 0.3))
     throw(adapter, GOAL, np.array([0.03, 0.0]))
     region = np.random.default_rng(0).uniform([0.8, -0.2], [1.0, 0.2], size=(40, 2))
     at = np.array([0.85, -0.12])
@@ -323,7 +322,6 @@ def test_metres_and_milliseconds_are_as_good_as_metres_and_seconds():
     [
         ({"label_sd": ()}, "label_sd"),
         ({"label_sd": (0.1, -0.1)}, "label_sd"),
-        ({"generator_reach": 0.5}, "generator_reach"),
         ({"rough_reach": 0.0}, "rough_reach"),
         ({"execution_sd": float("nan")}, "execution_sd"),
         ({"outlier": 1.7}, "outlier"),

@@ -67,18 +67,17 @@ spreads."""
 class BayesianConfig:
     """Settings of `BayesianAdapter`, in units of S, the demonstrations' spread (`Normalisation`).
 
-    Where there are several values, all combinations are models, and their evidence weighs them;
-    where the generator errs in ways of its own, labels are off by the first `label_sd`.
+    Where there are several values, all combinations are models, and their evidence weighs them.
     """
 
     label_sd: tuple[float, ...] = (0.03, 0.1)
     """How far demonstrated outcomes are off, beside the noise that they state."""
-    generator_sd: tuple[float, ...] = (0.1, 0.3)
+    generator_sd: float = 0.3
     """a, what the generator itself gets wrong, whatever the labels."""
-    generator_reach: tuple[float, ...] = (0.2, 0.6)
-    """How far that reaches: about as far as people's manners are alike."""
+    generator_reach: float = 0.5
+    """How far that reaches."""
     p_generator: float = 0.1
-    """Beforehand, the probability that it does, for all sizes and reaches together."""
+    """Beforehand, the probability that it does."""
     rough_sd: float = 0.025
     """What lies between demonstrations."""
     rough_reach: float = 0.32
@@ -103,7 +102,7 @@ class BayesianConfig:
             ConfigurationError: A setting is not positive, a probability is 1 or more, or
                 `hardware_sd` has not two values.
         """
-        for name in ("label_sd", "generator_sd", "generator_reach", "hardware_sd"):
+        for name in ("label_sd", "hardware_sd"):
             if not isinstance(getattr(self, name), tuple):
                 raise ConfigurationError(f"{name} must be a tuple, got {getattr(self, name)}")
         for name, value in vars(self).items():
@@ -180,8 +179,7 @@ class BayesianAdapter(Adapter):
 
         e   sd s_i              by how much the outcome of demonstration i is off: the noise that it
                                 states (mean over components), and 0.03 or 0.1 more
-        f   sd a                what the generator itself gets wrong: 0, or with probability 0.1 0.1
-                                or 0.3, at a reach of 0.2 or 0.6
+        f   sd a, reach 0.5     what the generator itself gets wrong: 0, or with probability 0.1 0.3
         u   sd 0.025, reach 0.32    what lies between the demonstrations
         h   sd b, reach 2.5     what is different from their day: 0.03, or with probability 0.2 0.3;
                                 0.3, anew, whenever a change of hardware is said
@@ -195,7 +193,7 @@ class BayesianAdapter(Adapter):
 
     A reading (`readings.Reading`) says that the blurred error r - g lies in an interval, or, with
     probability 0.01, nothing at all. The posterior is found by expectation propagation for each of
-    twelve models; their evidence weighs them.
+    eight models; their evidence weighs them.
 
     The next condition is the fixed point c = g - E d(c): the posterior mean, which is as good as
     the greatest probability of a hit on our tasks, and knows no tolerance
@@ -220,19 +218,18 @@ class BayesianAdapter(Adapter):
     def __init__(self, config: BayesianConfig | None = None) -> None:
         """Take the settings, or the defaults."""
         self.config = config = config or BayesianConfig()
-        labels = [(e, 0.0, 1.0) for e in config.label_sd]
-        own = [
-            (config.label_sd[0], *of)
-            for of in itertools.product(config.generator_sd, config.generator_reach)
-        ]
-        errors = [(of, (1.0 - config.p_generator) / len(labels)) for of in labels]
-        errors += [(of, config.p_generator / len(own)) for of in own]
+        generator = ((0.0, 1.0 - config.p_generator), (config.generator_sd, config.p_generator))
         same, changed = config.hardware_sd
         hardware = ((same, 1.0 - config.p_changed), (changed, config.p_changed))
-        models = [(*of, b, p * q) for (of, p), (b, q) in itertools.product(errors, hardware)]
-        e, a, self._reach, b, share = np.array(models).T
-        self._label, self._generator, self._hardware = e**2, a**2, b**2
-        self._log_prior = np.log(share)
+        grid = itertools.product(config.label_sd, generator, hardware)
+        models = [(e, a, b, p * q) for e, (a, p), (b, q) in grid]
+        e, a, b, share = np.array(models).T
+        self._label, self._generator, self._hardware, self._log_prior = (
+            e**2,
+            a**2,
+            b**2,
+            np.log(share),
+        )
 
     def _start(self, demonstrations: Demonstrations) -> None:
         self._normalisation = Normalisation.of(demonstrations)
@@ -479,7 +476,7 @@ class BayesianAdapter(Adapter):
         w_a, w_b = self._mixed_by(a), self._mixed_by(b)
         stated = (w_a * self._stated) @ w_b.T
         rough = config.rough_sd**2 * np.exp(-0.5 * square / config.rough_reach**2)
-        generator = np.exp(-0.5 * square / self._reach[:, None, None] ** 2)
+        generator = np.exp(-0.5 * square / config.generator_reach**2)
         of_a, of_b = np.broadcast_to(after_a, len(a)), np.broadcast_to(after_b, len(b))
         shared = np.where(of_a[:, None] == of_b, self._hardware_of(of_b)[:, None], 0.0)
         return np.asarray(
