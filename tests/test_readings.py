@@ -68,8 +68,10 @@ def test_a_miss_was_farther_off_than_the_other_components_can_make_up_for():
     np.testing.assert_array_equal(far.within(RADIUS).low, far.low)
     alone = Reading.only(False, 2).within(RADIUS)
     assert np.all(np.isinf(alone.low))
-    np.testing.assert_array_equal([cut.beyond, alone.beyond], [RADIUS, RADIUS])
-    assert Reading.only(True, 2).within(RADIUS).beyond is None
+    np.testing.assert_array_equal(
+        [cut.missed_by_at_least, alone.missed_by_at_least], [RADIUS, RADIUS]
+    )
+    assert Reading.only(True, 2).within(RADIUS).missed_by_at_least is None
 
 
 def test_nothing_changes_where_it_was_not_seen_whether_it_hit():

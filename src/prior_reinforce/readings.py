@@ -70,7 +70,7 @@ class Reading:
     """Whether the goal was reached, where that was seen directly; None where it was not."""
     said: str = ""
     """The words, where words were said."""
-    beyond: Point | None = None
+    missed_by_at_least: Point | None = None
     """Half-axes of an ellipsoid that the true error is known to lie outside of, since the trial
     missed; None where nothing is known of it. `within` finds them."""
 
@@ -191,7 +191,8 @@ class Reading:
         the hit is believed. After a miss, what the other components cannot make up for must be
         this one's: "2 cm long" that missed by more than 1.5 cm, and at most 1 cm to the side, was
         1.1 cm long at least. The box around the ellipsoid stands for it: components stay
-        independent. What no box can say is kept in `beyond`.
+        independent. What no box can say is kept in
+        `missed_by_at_least`.
 
         Args:
             radius: Tolerance in each component, shape (k,), in the outcomes' units.
@@ -214,7 +215,7 @@ class Reading:
             self,
             low=np.where(sound, low, self.low),
             high=np.where(sound, high, self.high),
-            beyond=np.asarray(radius),
+            missed_by_at_least=np.asarray(radius),
         )
 
     def as_json(self) -> dict[str, Any]:

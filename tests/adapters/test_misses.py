@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from prior_reinforce.adapters.misses import Belief, p_hit_after
+from prior_reinforce.adapters.misses import Balls, Belief, p_hit_after
 
 SD, OUTLIER = 0.02, 0.01
 
@@ -21,47 +21,72 @@ def belief(mean, variance, at_missed, among_missed, cross, share=(1.0,)) -> Beli
     )
 
 
+def balls(aims, radius, sd=SD) -> Balls:
+    """All of one size; aims of one component may be plain numbers."""
+    aims = np.reshape(aims, (len(aims), -1)).astype(float)
+    return Balls(aims, np.full(len(aims), radius), np.full(len(aims), sd))
+
+
 @pytest.mark.parametrize("aim", [0.0, 0.05, 0.12, -0.2])
 def test_beside_what_missed_is_what_the_integral_says(aim):
     """One displacement for all conditions, N(0.03, 0.1^2); 0 missed by 0.06 at least."""
     same = belief([0.03], [0.01], [0.03], [[0.01]], [[0.01]])
-    said = p_hit_after(
-        same, np.array([[0.0]]), np.array([0.06]), np.array([[aim]]), 0.06, SD, OUTLIER
-    )
+    said = p_hit_after(same, balls([0.0], 0.06), balls([aim], 0.06), OUTLIER)
     d = np.linspace(-0.7, 0.7, 20001)
     left = norm.pdf(d, 0.03, 0.1) * (0.99 * norm.cdf((abs(d) - 0.06) / SD) + OUTLIER)
     hit = norm.cdf((0.06 - abs(d - aim)) / SD)
-    assert said[0] == pytest.approx(np.sum(left * hit) / np.sum(left), abs=0.05)
+    assert said[0] == pytest.approx(np.sum(left * hit) / np.sum(left), abs=0.04)
+
+
+@pytest.mark.parametrize("k", [2, 3])
+def test_balls_are_missed_and_hit_as_often_as_in_a_million_throws(k):
+    """Displacements at a missed condition and at two others that go with it more and less."""
+    rng = np.random.default_rng(k)
+    together = 0.09**2 * np.array([[1.0, 0.95, 0.4], [0.95, 1.0, 0.3], [0.4, 0.3, 1.0]])
+    mean = np.array([[0.02, 0.0, -0.01]] * k)
+    aims = np.array([[0.0] * k, [0.02] + [0.0] * (k - 1), [0.0] * k])
+    throws = np.stack([rng.multivariate_normal(m, together, size=1_000_000) for m in mean])
+    noisy = throws + rng.normal(scale=SD, size=throws.shape)
+    hit = np.sqrt(np.sum((noisy - aims.T[:, None]) ** 2, axis=0)) < 0.07
+    believed = Belief(
+        np.ones(1),
+        mean[None, :, :1],
+        np.broadcast_to(together[:1, :1], (1, k, 1, 1)),
+        mean[None, :, 1:],
+        np.broadcast_to(np.diag(together)[1:], (1, k, 2)),
+        np.broadcast_to(together[1:, :1], (1, k, 2, 1)),
+    )
+    said = p_hit_after(believed, balls(aims[:1], 0.07), balls(aims[1:], 0.07), outlier=1e-9)
+    np.testing.assert_allclose(said, hit[~hit[:, 0], 1:].mean(axis=0), atol=0.02)
+    assert said[0] < 0.75 * hit[:, 1].mean()
 
 
 def test_a_miss_elsewhere_tells_nothing():
-    aims = np.array([[0.0], [0.1]])
     apart = belief([0.0, 0.0], [0.01, 0.01], [0.0], [[0.01]], [[0.0], [0.0]])
-    said = p_hit_after(apart, np.array([[0.0]]), np.array([0.06]), aims, 0.06, SD, OUTLIER)
+    said = p_hit_after(apart, balls([0.0], 0.06), balls([0.0, 0.1], 0.06), OUTLIER)
     d = np.linspace(-0.7, 0.7, 20001)
     density = norm.pdf(d, 0.0, 0.1)
     hits = [np.sum(density * norm.cdf((0.06 - abs(d - a)) / SD)) for a in (0.0, 0.1)]
-    np.testing.assert_allclose(said, hits / density.sum(), atol=0.05)
+    np.testing.assert_allclose(said, hits / density.sum(), atol=0.04)
 
 
-def test_models_count_by_how_well_they_told_the_miss():
+@pytest.mark.parametrize("share", [0.5, 0.9])
+def test_models_count_by_how_well_they_told_the_miss(share):
     """One model is sure that 0 hits, the other that it misses: after a miss the other is left."""
     both = Belief(
-        np.array([0.5, 0.5]),
+        np.array([share, 1 - share]),
         np.array([[[0.0]], [[0.3]]]),
         np.full((2, 1, 1, 1), 1e-6),
         np.array([[[0.0, 0.0]], [[0.3, 0.3]]]),
         np.full((2, 1, 2), 1e-6),
         np.full((2, 1, 2, 1), 1e-6),
     )
-    aims = np.array([[0.0], [0.3]])
-    said = p_hit_after(both, np.array([[0.0]]), np.array([0.1]), aims, 0.1, SD, OUTLIER)
-    np.testing.assert_allclose(said, [0.01, 0.99], atol=0.01)
+    said = p_hit_after(both, balls([0.0], 0.1), balls([0.0, 0.3], 0.1), OUTLIER)
+    first = share * OUTLIER / (share * OUTLIER + 1 - share)
+    np.testing.assert_allclose(said, [first, 1 - first], atol=0.005)
 
 
 def test_twenty_misses_at_one_condition_are_no_contradiction():
     sure = belief([0.0], [1e-6], np.zeros(20), np.full((20, 20), 1e-6), np.full((1, 20), 1e-6))
-    said = p_hit_after(
-        sure, np.zeros((20, 1)), np.full(20, 0.1), np.array([[0.0]]), 0.1, SD, OUTLIER
-    )
+    said = p_hit_after(sure, balls(np.zeros(20), 0.1), balls([0.0], 0.1), OUTLIER)
     assert said[0] == pytest.approx(1.0, abs=1e-3)

@@ -18,7 +18,7 @@ from scipy.special import ndtr, ndtri
 
 from prior_reinforce.adapters.base import Adapter, Expectation
 from prior_reinforce.adapters.expectation_propagation import Posterior, Readings, infer
-from prior_reinforce.adapters.misses import Belief, p_hit_after
+from prior_reinforce.adapters.misses import Balls, Belief, p_hit_after
 from prior_reinforce.arrays import Point, Points
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.plans.motions import Demonstrations
@@ -27,13 +27,13 @@ from prior_reinforce.plans.outcome_weights import smooth_weights
 from prior_reinforce.readings import Reading
 
 _STEPS = 12
-"""Steps to the fixed point of the proposal, each 0.7 of the way (ours). Where landing hardly
-depends on the condition, as with demonstrations in a line, the way goes on: steps that must come
-nearer stop there."""
+"""Steps to the fixed point of the proposal, each 0.7 of the way (ours). They need not end there:
+where landing hardly depends on the condition, as with demonstrations in a line, they go on."""
 _RELAXATION = 0.7
-_FARTHEST = 6.5
-"""A correction is this many sd of changed hardware at most (ours): farther away the model, not the
-world, is off, as where weights are steep and an outcome lay a hundred spreads away."""
+_FARTHEST = 20.0
+"""A correction is this many sd of changed hardware at most, 6 spreads (ours). Where weights are
+steep, an outcome may lie a hundred spreads away. Three demonstrations nearly in a line need 2 to 4:
+at 2 spreads goals took 2.3 instead of 2.2 trials (24 draws; docs/decisions-adapter.md)."""
 _TRIALS_AFTER_A_MISS = 1.24
 """Fitted to 1623 trials of tuning material (ours; docs/decisions-adapter.md)."""
 _POINTS = 192
@@ -49,15 +49,14 @@ _TEACHING_SD = 0.1
 interval of 4 cm, whose standard deviation is 1.2 cm of 12 to 18."""
 _NOT_EXCLUDED = 0.05
 """A miss counts where its reading leaves a hit more than this share as probable as it would be on
-target (ours): "2 cm long" and "a miss" often do, "10 cm long" never does
-(docs/decisions-adapter.md)."""
+target (ours): where words are coarse, or numbers noisy, or not believed."""
 _REPEATABLE = 0.3
 """Executions of one plan are taken to lie no farther apart than this share of the tolerance, as a
 standard deviation (ours): nobody asks for what a good plan would miss. On our own tasks it is 0.13
 to 0.30 by `execution_sd` alone."""
-_BETTER, _RELATIVE = 0.02, 0.1
-"""By how much more probable a hit must be for a condition that is not the expected one, or by which
-share where that is less (ours): what so many draws are uncertain by."""
+_AGAIN = 0.5
+"""A condition closer than this share of the tolerance to one that missed the same goal would be
+tried again (ours)."""
 _TELLS_NOTHING = 1e-2
 """Precision below which a reading is dropped when trials are merged (ours): an sd of ten
 spreads."""
@@ -130,7 +129,7 @@ class _Memory:
     variance: Points
     aims: Points
     """Displacements that would have hit: goal minus condition."""
-    beyond: Float[np.ndarray, " n"]
+    missed_by: Float[np.ndarray, " n"]
     """How far from those they missed at least; 0 where nothing is known of it."""
 
     @classmethod
@@ -147,12 +146,12 @@ class _Memory:
         high: Point,
         variance: Point,
         aim: Point | None = None,
-        beyond: float = 0.0,
+        missed_by: float = 0.0,
     ) -> _Memory:
         """The same and one more."""
         aim = np.zeros_like(condition) if aim is None else aim
         one = (condition[None], [changes], low[None], high[None], variance[None], aim[None])
-        return self._beside((*one, [beyond]))
+        return self._beside((*one, [missed_by]))
 
     def and_then(self, other: _Memory) -> _Memory:
         """The same and all of another."""
@@ -200,7 +199,7 @@ class BayesianAdapter(Adapter):
     (docs/decisions-adapter.md). With nothing but demonstrations it is the goal. Where trials missed
     and their readings do not say it (a coarse word, a noisy number, "a miss" and nothing else), it
     is the condition around that one with the greatest probability of a hit, given that they missed
-    (`adapters.misses`).
+    (`adapters.misses`), wherever that one has just missed itself.
 
     Old trials are merged where there are many: those closest together become one number with the
     precision of both. Proposals depend on what was observed alone, never on what was proposed
@@ -244,7 +243,8 @@ class BayesianAdapter(Adapter):
 
     def _observe_reading(self, condition: Point, goal: Point, reading: Reading) -> None:
         scale, moved = self._normalisation.scale, goal - condition
-        beyond = 0.0 if reading.beyond is None else float((reading.beyond / scale).min())
+        radius = reading.missed_by_at_least
+        missed_by = 0.0 if radius is None else float((radius / scale).min())
         self._memory = self._memory.with_one(
             self._normalisation.apply(condition),
             self._now,
@@ -252,7 +252,7 @@ class BayesianAdapter(Adapter):
             (reading.high + moved) / scale,
             (reading.sd / scale) ** 2 + self.config.execution_sd**2,
             moved / scale,
-            beyond,
+            missed_by,
         )
         self._posterior = self._missed = None
         if len(self._memory.changes) > _TRIALS_KEPT:
@@ -262,7 +262,9 @@ class BayesianAdapter(Adapter):
         goal = self._normalisation.apply(goal_seen)
         condition = self._expected_to_land_on(goal)
         missed = self._misses()
-        if len(missed.changes) > 0:
+        off = np.linalg.norm(missed.conditions - condition, axis=1)
+        off += np.linalg.norm(missed.aims - (goal - condition), axis=1)
+        if np.any((missed.changes == self._now) & (off < _AGAIN * missed.missed_by)):
             condition = self._likeliest_beside(condition, goal, missed)
         return self._normalisation.undo(condition)
 
@@ -276,19 +278,21 @@ class BayesianAdapter(Adapter):
         return condition
 
     def _likeliest_beside(self, condition: Point, goal: Point, missed: _Memory) -> Point:
-        """Return the condition around another that hits with the greatest probability."""
+        """Return the condition around another that most probably hits, within the last tolerance.
+
+        No farther away than changed hardware takes it: where weights are steep, the sd means
+        nothing.
+        """
         _, variance = self._predict(condition[None])
-        # No farther than changed hardware takes it: where weights are steep, the sd means nothing.
-        sd = min(math.sqrt(float(variance.max())), self.config.hardware_sd[1])
-        reach = missed.beyond[-1] + 2.0 * sd
+        share = self._known().model_weights
+        sd = math.sqrt(float(np.einsum("m,mkp->k", share, variance).max()))
+        radius = float(missed.missed_by[-1])
+        reach = radius + 2.0 * min(sd, self.config.hardware_sd[1])
         cube = 2.0 * _evenly(len(goal)) - 1.0
         ball = cube[np.linalg.norm(cube, axis=1) <= 1.0]
-        candidates = np.vstack([condition, condition + reach * ball])
-        aims = goal - candidates
-        p_hit = self._p_hit_after(missed, candidates, aims, float(missed.beyond[-1]))
-        best = int(np.argmax(p_hit))
-        more = min(_BETTER, _RELATIVE * float(p_hit[0]))
-        return candidates[best if p_hit[best] > p_hit[0] + more else 0]
+        candidates = condition + reach * ball
+        p_hit = self._p_hit_after(missed, candidates, goal - candidates, radius)
+        return np.asarray(candidates[np.argmax(p_hit)])
 
     def _expect(self, condition: Point, goal: Point, tolerance: float) -> Expectation:
         p_hit = float(self.p_hit(condition[None], goal[None], tolerance)[0])
@@ -310,14 +314,18 @@ class BayesianAdapter(Adapter):
         )
         missed = self._misses()
         if len(missed.changes) > 0:
-            return self._p_hit_after(missed, at, aims, radius)
-        return self._p_hit(at, aims, radius)
+            return self._p_hit_after(missed, at, aims, radius, seed=1)
+        return self._p_hit(at, self._now, aims, radius)
 
     def _p_hit(
-        self, at: Points, aims: Points, radius: float | Float[np.ndarray, " n"]
+        self,
+        at: Points,
+        changes: Int[np.ndarray, " n"] | int,
+        aims: Points,
+        radius: float | Float[np.ndarray, " n"],
     ) -> Float[np.ndarray, " n"]:
         """Probability that the displacement at each condition is within a radius of its aim."""
-        mean, variance = self._predict(at)
+        mean, variance = self._predict(at, changes)
         sd = np.sqrt(variance + self._execution_sd(radius) ** 2)
         inside = _share_within(radius, mean - aims.T, sd)
         return np.asarray(np.clip(self._known().model_weights @ inside, 0.0, 1.0))
@@ -326,19 +334,19 @@ class BayesianAdapter(Adapter):
         """The latest trials that missed and of which their readings do not say so."""
         if self._missed is None:
             missed = self._memory.only(slice(-_LATEST, None))
-            missed = missed.only(missed.beyond > 0.0)
+            missed = missed.only(missed.missed_by > 0.0)
             if len(missed.changes) > 0:
-                at, radius = missed.conditions, missed.beyond
-                on_target = self._p_hit(at, self._mixed(self._predict(at)[0]), radius)
-                p_hit = self._p_hit(at, missed.aims, radius)
+                at, radius = (missed.conditions, missed.changes), missed.missed_by
+                on_target = self._p_hit(*at, self._mixed(self._predict(*at)[0]), radius)
+                p_hit = self._p_hit(*at, missed.aims, radius)
                 missed = missed.only(p_hit > _NOT_EXCLUDED * on_target)
             self._missed = missed
         return self._missed
 
     def _p_hit_after(
-        self, missed: _Memory, at: Points, aims: Points, radius: float
+        self, missed: _Memory, at: Points, aims: Points, radius: float, *, seed: int = 0
     ) -> Float[np.ndarray, " n"]:
-        """`_p_hit`, given that those missed."""
+        """`_p_hit` of now, given that those missed; what was chosen is judged by other draws."""
         known, memory = self._known(), self._memory
         then, told = (missed.conditions, missed.changes), (memory.conditions, memory.changes)
         to_missed = self._covariance(*then, *told)[:, None]
@@ -353,10 +361,16 @@ class BayesianAdapter(Adapter):
             variance=variance,
             cross=self._covariance(at, self._now, *then)[:, None] - to_here @ from_missed,
         )
-        sd, outlier = float(self._execution_sd(radius)), self.config.outlier
-        return p_hit_after(belief, missed.aims, missed.beyond, aims, radius, sd, outlier)
+        size = np.full(len(at), radius)
+        return p_hit_after(
+            belief,
+            Balls(missed.aims, missed.missed_by, self._execution_sd(missed.missed_by)),
+            Balls(aims, size, self._execution_sd(size)),
+            self.config.outlier,
+            seed,
+        )
 
-    def _execution_sd(self, radius: float | Float[np.ndarray, " n"]) -> Float[np.ndarray, "..."]:
+    def _execution_sd(self, radius: float | Float[np.ndarray, " n"]) -> Float[np.ndarray, "*n"]:
         """How far apart outcomes of one plan lie, where so small a radius is asked for."""
         return np.asarray(np.minimum(self.config.execution_sd, _REPEATABLE * np.asarray(radius)))
 
@@ -491,12 +505,14 @@ class BayesianAdapter(Adapter):
         """b^2: before anything is said to be changed it is one of two, afterwards the greater."""
         return np.where(changes == 0, self._hardware[:, None], self.config.hardware_sd[1] ** 2)
 
-    def _variance(self, at: Float[np.ndarray, "p k"], changes: int) -> Float[np.ndarray, "m p"]:
+    def _variance(
+        self, at: Float[np.ndarray, "p k"], changes: Int[np.ndarray, " p"] | int
+    ) -> Float[np.ndarray, "m p"]:
         """Prior variance of the displacement of a trial."""
         squares = np.square(self._mixed_by(at))
         of_all = self.config.rough_sd**2 + squares @ self._stated
         of_each = self._label[:, None] * squares.sum(axis=1)
-        hardware = self._hardware_of(np.full(len(at), changes))
+        hardware = self._hardware_of(np.broadcast_to(changes, len(at)))
         return np.asarray(of_all + of_each + self._generator[:, None] + hardware)
 
     def _mixed_by(self, at: Float[np.ndarray, "p k"]) -> Float[np.ndarray, "p N"]:
@@ -504,15 +520,15 @@ class BayesianAdapter(Adapter):
         return self._weights(self._normalisation.undo(at))
 
     def _predict(
-        self, at: Float[np.ndarray, "p k"]
+        self, at: Float[np.ndarray, "p k"], changes: Int[np.ndarray, " p"] | int | None = None
     ) -> tuple[Float[np.ndarray, "m k p"], Float[np.ndarray, "m k p"]]:
-        """Mean and variance of the displacement of a trial now, under each model."""
-        posterior = self._known()
-        memory = self._memory
-        cross = self._covariance(at, self._now, memory.conditions, memory.changes)[:, None]
+        """Mean and variance of a trial's displacement under each model; now, if not said when."""
+        posterior, memory = self._known(), self._memory
+        after = self._now if changes is None else changes
+        cross = self._covariance(at, after, memory.conditions, memory.changes)[:, None]
         mean = (cross @ posterior.weights[..., None])[..., 0]
         explained = np.sum((cross @ posterior.precision) * cross, axis=-1)
-        variance = self._variance(at, self._now)[:, None] - explained
+        variance = self._variance(at, after)[:, None] - explained
         return mean, np.maximum(variance, 1e-10)
 
     def _mixed(self, means: Float[np.ndarray, "m k p"]) -> Float[np.ndarray, "p k"]:

@@ -47,7 +47,7 @@ class Reproduce:
     """Training seeds."""
     sets: tuple[Literal["A", "B"], ...] = ("A", "B")
     """Sets of demonstrations that generators learn from; one is half of the work, and decides
-    less."""
+    less. `robustness` and `variation` have their own."""
     quick: bool = False
     """Ten goals, one training a method, no variants, no rows of the VLM: decides no claim."""
     reader: Literal["camera", "vlm"] = "camera"
