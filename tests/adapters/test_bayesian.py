@@ -383,6 +383,10 @@ def test_a_miss_makes_the_same_throw_less_probable():
         adapter.observe(GOAL, GOAL, Reading.only(False, 2).within(np.full(2, TOLERANCE)))
     assert p[0] > 2 * p[1] > 2 * p[2]
     assert p[3] < 0.1
+    expected = adapter.expect(GOAL, GOAL, TOLERANCE)
+    assert expected.trials == pytest.approx(1 / expected.p_hit)  # such trials teach little
+    adapter.observe(GOAL, GOAL, Reading.by_eye([0.02, 0.0], hit=False))
+    assert adapter.expect(GOAL, GOAL, TOLERANCE).trials < 2.3
 
 
 def test_a_miss_that_was_said_in_words_changes_nothing():

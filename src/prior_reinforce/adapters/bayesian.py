@@ -36,6 +36,9 @@ steep, an outcome may lie a hundred spreads away. Three demonstrations nearly in
 at 2 spreads goals took 2.3 instead of 2.2 trials (24 draws; docs/decisions-adapter.md)."""
 _TRIALS_AFTER_A_MISS = 1.24
 """Fitted to 1623 trials of tuning material (ours; docs/decisions-adapter.md)."""
+_LEAST_P_HIT = 0.01
+"""Where "a miss" was all that was told, 1 / P(hit) trials are expected, a hundred at most (ours):
+such a trial teaches little. That is still too few: 8 to 13 where 14 were needed (tuning fields)."""
 _POINTS = 192
 """Where the probability of a hit is evaluated (ours): right to 0.002, for k up to 3."""
 _TRIALS_KEPT = 24
@@ -296,6 +299,9 @@ class BayesianAdapter(Adapter):
 
     def _expect(self, condition: Point, goal: Point, tolerance: float) -> Expectation:
         p_hit = float(self.p_hit(condition[None], goal[None], tolerance)[0])
+        last = self._memory.only(slice(-1, None))
+        if np.any(last.missed_by > 0.0) and np.all(np.isinf(last.high - last.low)):
+            return Expectation(p_hit, 1.0 / max(p_hit, _LEAST_P_HIT))
         return Expectation(p_hit, 1.0 + _TRIALS_AFTER_A_MISS * (1.0 - p_hit))
 
     def p_hit(self, conditions: Points, goals: Points, tolerance: float) -> Float[np.ndarray, " n"]:
