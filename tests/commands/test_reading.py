@@ -56,7 +56,7 @@ def test_an_error_can_be_told_in_many_ways(run, folder, said, seen):
         (("--error", "50m long"), "say it again, in cm"),
         (("--error", "0.05", "0", "--outcome", "0.9", "0"), "--error or --outcome"),
         (("--outcome", "0.9"), "needs 2 numbers"),
-        (("--hit", "--miss"), "--hit alone"),
+        (("--hit", "--miss"), "one of those alone"),
     ],
 )
 def test_what_cannot_be_told_is_one_line_and_changes_nothing(run, folder, said, remedy):

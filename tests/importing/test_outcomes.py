@@ -252,7 +252,7 @@ def test_a_unit_that_the_task_does_not_have_says_where_it_stands(recording, tmp_
     rows = [f"{name},{x},{y}" for name, (x, y) in OUTCOMES.items()]
     path = table(tmp_path, "\n".join(["episode,x [ml],y [m]", *rows]))
     with pytest.raises(
-        ConfigurationError, match=r"x in .* is in ml, but .*workspace.toml.* in m; correct"
+        ConfigurationError, match=r"x in .* is in ml, but its unit is to be m; .*workspace.toml"
     ):
         import_demonstrations(recording, outcomes=path, outcome_units=("m", "m"))
 
