@@ -33,12 +33,12 @@ SETS = ("mixed-8-0", "mixed-8-1", "scattered-6-0", "scattered-6-1")
 
 
 class HitOrMiss(Perception):
-    """Whoever runs the trial says whether it hit; this adds nothing."""
+    """Sees nothing; whether a trial hit is told by the protocol."""
 
     name = "hit"
 
     def perceive(self, rollout: Rollout, goal: Point, rng: np.random.Generator) -> Reading:
-        """Nothing."""
+        """Return a reading without numbers."""
         return Reading.only(False, len(goal))
 
 
@@ -59,6 +59,8 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=10)
     parser.add_argument("--seed", type=int, default=0)
     arguments = parser.parse_args()
+    if arguments.goals < 2:
+        parser.error("--goals must be at least 2: the first of a sequence does not count")
     warnings.simplefilter("ignore")
     named = {"developed": DEVELOPED_ON, "reported": REPORTED}
     tasks = [make_task(n) for given in arguments.tasks for n in named.get(given, (given,))]

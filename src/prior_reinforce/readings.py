@@ -191,8 +191,7 @@ class Reading:
         the hit is believed. After a miss, what the other components cannot make up for must be
         this one's: "2 cm long" that missed by more than 1.5 cm, and at most 1 cm to the side, was
         1.1 cm long at least. The box around the ellipsoid stands for it: components stay
-        independent. What no box can say is kept in
-        `missed_by_at_least`.
+        independent. What no box can say is kept in `missed_by_at_least`.
 
         Args:
             radius: Tolerance in each component, shape (k,), in the outcomes' units.

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from prior_reinforce.adapters.misses import Balls, Belief, p_hit_after
+from prior_reinforce.adapters.misses import Belief, Targets, p_hit_after
 
 SD, OUTLIER = 0.02, 0.01
 
@@ -21,17 +21,17 @@ def belief(mean, variance, at_missed, among_missed, cross, share=(1.0,)) -> Beli
     )
 
 
-def balls(aims, radius, sd=SD) -> Balls:
+def targets(aims, radius, sd=SD) -> Targets:
     """All of one size; aims of one component may be plain numbers."""
     aims = np.reshape(aims, (len(aims), -1)).astype(float)
-    return Balls(aims, np.full(len(aims), radius), np.full(len(aims), sd))
+    return Targets(aims, np.full(len(aims), radius), np.full(len(aims), sd))
 
 
 @pytest.mark.parametrize("aim", [0.0, 0.05, 0.12, -0.2])
 def test_beside_what_missed_is_what_the_integral_says(aim):
     """One displacement for all conditions, N(0.03, 0.1^2); 0 missed by 0.06 at least."""
     same = belief([0.03], [0.01], [0.03], [[0.01]], [[0.01]])
-    said = p_hit_after(same, balls([0.0], 0.06), balls([aim], 0.06), OUTLIER)
+    said = p_hit_after(same, targets([0.0], 0.06), targets([aim], 0.06), OUTLIER)
     d = np.linspace(-0.7, 0.7, 20001)
     left = norm.pdf(d, 0.03, 0.1) * (0.99 * norm.cdf((abs(d) - 0.06) / SD) + OUTLIER)
     hit = norm.cdf((0.06 - abs(d - aim)) / SD)
@@ -56,14 +56,14 @@ def test_balls_are_missed_and_hit_as_often_as_in_a_million_throws(k):
         np.broadcast_to(np.diag(together)[1:], (1, k, 2)),
         np.broadcast_to(together[1:, :1], (1, k, 2, 1)),
     )
-    said = p_hit_after(believed, balls(aims[:1], 0.07), balls(aims[1:], 0.07), outlier=1e-9)
+    said = p_hit_after(believed, targets(aims[:1], 0.07), targets(aims[1:], 0.07), outlier=1e-9)
     np.testing.assert_allclose(said, hit[~hit[:, 0], 1:].mean(axis=0), atol=0.02)
     assert said[0] < 0.75 * hit[:, 1].mean()
 
 
 def test_a_miss_elsewhere_tells_nothing():
     apart = belief([0.0, 0.0], [0.01, 0.01], [0.0], [[0.01]], [[0.0], [0.0]])
-    said = p_hit_after(apart, balls([0.0], 0.06), balls([0.0, 0.1], 0.06), OUTLIER)
+    said = p_hit_after(apart, targets([0.0], 0.06), targets([0.0, 0.1], 0.06), OUTLIER)
     d = np.linspace(-0.7, 0.7, 20001)
     density = norm.pdf(d, 0.0, 0.1)
     hits = [np.sum(density * norm.cdf((0.06 - abs(d - a)) / SD)) for a in (0.0, 0.1)]
@@ -81,12 +81,12 @@ def test_models_count_by_how_well_they_told_the_miss(share):
         np.full((2, 1, 2), 1e-6),
         np.full((2, 1, 2, 1), 1e-6),
     )
-    said = p_hit_after(both, balls([0.0], 0.1), balls([0.0, 0.3], 0.1), OUTLIER)
+    said = p_hit_after(both, targets([0.0], 0.1), targets([0.0, 0.3], 0.1), OUTLIER)
     first = share * OUTLIER / (share * OUTLIER + 1 - share)
     np.testing.assert_allclose(said, [first, 1 - first], atol=0.005)
 
 
 def test_twenty_misses_at_one_condition_are_no_contradiction():
     sure = belief([0.0], [1e-6], np.zeros(20), np.full((20, 20), 1e-6), np.full((1, 20), 1e-6))
-    said = p_hit_after(sure, balls(np.zeros(20), 0.1), balls([0.0], 0.1), OUTLIER)
+    said = p_hit_after(sure, targets(np.zeros(20), 0.1), targets([0.0], 0.1), OUTLIER)
     assert said[0] == pytest.approx(1.0, abs=1e-3)

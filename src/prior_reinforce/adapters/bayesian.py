@@ -18,7 +18,7 @@ from scipy.special import ndtr, ndtri
 
 from prior_reinforce.adapters.base import Adapter, Expectation
 from prior_reinforce.adapters.expectation_propagation import Posterior, Readings, infer
-from prior_reinforce.adapters.misses import Balls, Belief, p_hit_after
+from prior_reinforce.adapters.misses import Belief, Targets, p_hit_after
 from prior_reinforce.arrays import Point, Points
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.plans.motions import Demonstrations
@@ -33,7 +33,7 @@ _RELAXATION = 0.7
 _FARTHEST = 20.0
 """A correction is this many sd of changed hardware at most, 6 spreads (ours). Where weights are
 steep, an outcome may lie a hundred spreads away. Three demonstrations nearly in a line need 2 to 4:
-at 2 spreads goals took 2.3 instead of 2.2 trials (24 draws; docs/decisions-adapter.md)."""
+bounded at 2 spreads, goals took 2.3 instead of 2.2 trials (24 draws; docs/decisions-adapter.md)."""
 _TRIALS_AFTER_A_MISS = 1.24
 """Fitted to 1623 trials of tuning material (ours; docs/decisions-adapter.md)."""
 _LEAST_P_HIT = 0.01
@@ -185,7 +185,7 @@ class BayesianAdapter(Adapter):
         u   sd 0.025, reach 0.32    what lies between the demonstrations
         h   sd b, reach 2.5     what is different from their day: 0.03, or with probability 0.2 0.3;
                                 0.3, anew, whenever a change of hardware is said
-        noise  sd 0.02          execution
+        noise  sd 0.02          execution; for P(hit) 0.3 of the tolerance at most
 
     f, u and h are Gaussian processes with squared-exponential kernels. w are the weights of a
     spline over the demonstrated outcomes (`plans.outcome_weights`): as far as landing is linear in
@@ -199,10 +199,10 @@ class BayesianAdapter(Adapter):
 
     The next condition is the fixed point c = g - E d(c): the posterior mean, which is as good as
     the greatest probability of a hit on our tasks, and knows no tolerance
-    (docs/decisions-adapter.md). With nothing but demonstrations it is the goal. Where trials missed
-    and their readings do not say it (a coarse word, a noisy number, "a miss" and nothing else), it
-    is the condition around that one with the greatest probability of a hit, given that they missed
-    (`adapters.misses`), wherever that one has just missed itself.
+    (docs/decisions-adapter.md). With nothing but demonstrations it is the goal. Where the fixed
+    point has just missed the same goal, since its reading did not say what to change (a word
+    coarser than the tolerance, or "a miss" and nothing else), the condition beside it that most
+    probably hits is next, given all that missed (`adapters.misses`).
 
     Old trials are merged where there are many: those closest together become one number with the
     precision of both. Proposals depend on what was observed alone, never on what was proposed
@@ -370,8 +370,8 @@ class BayesianAdapter(Adapter):
         size = np.full(len(at), radius)
         return p_hit_after(
             belief,
-            Balls(missed.aims, missed.missed_by, self._execution_sd(missed.missed_by)),
-            Balls(aims, size, self._execution_sd(size)),
+            Targets(missed.aims, missed.missed_by, self._execution_sd(missed.missed_by)),
+            Targets(aims, size, self._execution_sd(size)),
             self.config.outlier,
             seed,
         )
