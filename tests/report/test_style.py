@@ -9,6 +9,7 @@ from prior_reinforce.report.style import (
     HIT,
     calm_axes,
     drawing,
+    lay_out,
     new_figure,
     save_png,
     text_on,
@@ -52,6 +53,7 @@ def test_pictures_are_the_same_bytes_whatever_matplotlib_is_set_to(tmp_path):
 
 def test_a_picture_that_cannot_be_drawn_leaves_the_one_before(tmp_path, monkeypatch):
     path, figure = tmp_path / "picture.png", new_figure(2, 1)
+    figure.subplots()
     path.write_bytes(b"before")
 
     def fail(to, **_):
@@ -63,3 +65,17 @@ def test_a_picture_that_cannot_be_drawn_leaves_the_one_before(tmp_path, monkeypa
         save_png(figure, path)
     assert path.read_bytes() == b"before"
     assert [p.name for p in tmp_path.iterdir()] == ["picture.png"]
+
+
+def test_a_figure_is_arranged_as_when_it_is_drawn_and_only_once():
+    once, drawn = new_figure(4, 3), new_figure(4, 3)
+    for figure in (once, drawn):
+        figure.subplots(1, 2)[0].set_ylabel("where it lands [cm]")
+    lay_out(once)
+    drawn.draw_without_rendering()
+    for a, b in zip(once.axes, drawn.axes, strict=True):
+        assert a.get_position().bounds == pytest.approx(b.get_position().bounds)
+    before = once.axes[0].get_position().bounds
+    once.axes[0].set_ylabel("two\nlines")
+    once.draw_without_rendering()
+    assert once.axes[0].get_position().bounds == before

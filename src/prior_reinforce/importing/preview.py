@@ -93,6 +93,7 @@ class Preview:
         from matplotlib.figure import Figure
 
         from prior_reinforce.report.panels import views_of
+        from prior_reinforce.report.style import lay_out
 
         demos = self.demonstrations
         views = views_of(demos.outcome_units)
@@ -110,6 +111,7 @@ class Preview:
             f"{demos.n} demonstrations as they will be learned (colour, dot where the motion ends) "
             "and as recorded (grey)"
         )
+        lay_out(figure)
         figure.savefig(path, format="png")
 
     def _coverage(self) -> str:

@@ -22,6 +22,7 @@ from prior_reinforce.report.style import (
     LINE,
     REGION,
     drawing,
+    lay_out,
     new_figure,
     trial_colour,
 )
@@ -140,9 +141,7 @@ def _panels(
             fontsize=9,
             labelcolor=INK_SOFT,
         )
-    # Laid out now and never again, so that data coordinates have their place on paper.
-    figure.draw_without_rendering()
-    figure.set_layout_engine("none")
+    lay_out(figure)  # so that data coordinates have their place on paper
     for panel in panels:
         panel.equalise()
     return figure, panels

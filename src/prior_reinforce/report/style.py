@@ -93,6 +93,14 @@ def calm_axes(axes: Axes, *, grid: bool = True) -> None:
         axes.grid(color="#edf0f2", linewidth=0.8)
 
 
+def lay_out(figure: Figure) -> None:
+    """Arrange panels and labels now and never again; `savefig` would draw everything twice."""
+    engine = figure.get_layout_engine()
+    if engine is not None:
+        engine.execute(figure)
+        figure.set_layout_engine(None)
+
+
 def save_png(figure: Figure, path: Path) -> Path:
     """Write a PNG, whole or not at all; the same figure gives the same bytes.
 
@@ -100,5 +108,6 @@ def save_png(figure: Figure, path: Path) -> Path:
         The path.
     """
     with drawing(), in_place(path) as unfinished:
+        lay_out(figure)
         figure.savefig(unfinished, format="png", dpi=PICTURE_DPI, metadata={"Software": None})
     return path
