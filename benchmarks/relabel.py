@@ -30,15 +30,6 @@ from prior_reinforce.tasks import make_task
 TASK, LABELS, ROUNDS, NEW_GOALS = "basketball-v1", 10, 10, 40
 
 
-def at_demonstrations(adapter: BayesianAdapter, outcomes: np.ndarray) -> np.ndarray:
-    """Mean displacement of demonstrations, shape (N, 2), in [m]."""
-    memory, scale = adapter._memory, adapter._normalisation.scale
-    nothing = np.zeros((1, len(memory.hardware)), dtype=bool)
-    cross = adapter._covariance(adapter._normalisation.apply(outcomes), memory.conditions, nothing)
-    means = (cross[:, None] @ adapter._known().weights[..., None])[..., 0]
-    return adapter._mixed(means) * scale
-
-
 def say(misses: np.ndarray, tolerance: float) -> str:
     return f"{100 * np.median(misses):.2f} cm, {np.mean(misses <= tolerance):.2f}"
 
@@ -73,7 +64,7 @@ def main() -> None:
                 adapter = session.informed_adapter()
                 assert isinstance(adapter, BayesianAdapter)
                 seen = prior.outcomes_seen
-                corrected = replace(prior, outcomes_seen=seen + at_demonstrations(adapter, seen))
+                corrected = replace(prior, outcomes_seen=seen + adapter.displacement(seen))
                 off = [
                     100 * np.sqrt(np.square(d.outcomes_seen - recorded.outcomes_seen).sum(1).mean())
                     for d in (prior, corrected)

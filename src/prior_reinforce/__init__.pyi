@@ -3,7 +3,7 @@ from .adapters import make_adapter as make_adapter
 from .adapters.base import Adapter as Adapter
 from .adapters.base import Expectation as Expectation
 from .adapters.bayesian import BayesianAdapter as BayesianAdapter
-from .adapters.bayesian import BayesianConfig as BayesianConfig
+from .adapters.displacement import BayesianConfig as BayesianConfig
 from .adapters.frozen import FrozenAdapter as FrozenAdapter
 from .adapters.gaussian_process import GaussianProcessAdapter as GaussianProcessAdapter
 from .adapters.gaussian_process import GaussianProcessConfig as GaussianProcessConfig

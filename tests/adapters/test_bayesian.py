@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from prior_reinforce.adapters import bayesian
-from prior_reinforce.adapters.bayesian import BayesianAdapter, BayesianConfig
-from prior_reinforce.errors import ConfigurationError
+from prior_reinforce.adapters import displacement
+from prior_reinforce.adapters.bayesian import BayesianAdapter
+from prior_reinforce.adapters.displacement import BayesianConfig
 from prior_reinforce.experiments.protocol import run_goals
 from prior_reinforce.generators import make_generator
 from prior_reinforce.perception.exact import Exact
@@ -123,10 +123,10 @@ def test_what_a_demonstration_would_teach_is_what_adding_it_takes_off():
     before = adapter._unknown(adapter._normalisation.apply(places))
     for one, gain in zip(new, gains, strict=True):
         more = started(np.vstack([CORNERS, one]))
-        more._normalisation = adapter._normalisation  # a seventh changes the spread a little
-        more._demonstrated = adapter._normalisation.apply(np.vstack([CORNERS, one]))
-        more._mix()
-        after = more._unknown(adapter._normalisation.apply(places))
+        same = adapter._normalisation  # a seventh changes the spread a little
+        more._prior.normalisation = more._normalisation = same
+        more._prior._mix(same.apply(np.vstack([CORNERS, one])), np.zeros((7, 2)))
+        after = more._unknown(same.apply(places))
         assert gain == pytest.approx(1 - after / before, abs=1e-9)
 
 
@@ -156,7 +156,7 @@ def test_a_generator_that_is_wrong_in_its_own_ways_is_not_taken_for_labels():
 
     for condition in rng.uniform(CORNERS.min(axis=0), CORNERS.max(axis=0), size=(20, 2)):
         adapter.observe(condition, condition, Reading.measured(moved(condition), 0.002))
-    own = np.flatnonzero(adapter._generator)
+    own = np.flatnonzero(adapter._prior._generator)
     assert adapter._known().model_weights[own].sum() > 0.99
 
 
@@ -211,60 +211,6 @@ def test_p_hit_grows_with_the_tolerance_and_with_what_is_known():
     assert adapter.expect(condition + 0.1, GOAL, 0.015).p_hit < 0.05
 
 
-@pytest.mark.parametrize("k", [1, 2, 3, 4])
-@pytest.mark.parametrize("sd", [0.01, 0.1, 1.0])
-def test_the_share_within_a_ball_is_that_of_samples_whatever_its_size(k, sd):
-    rng = np.random.default_rng(k)
-    mean = 0.05 * rng.normal(size=k)
-    sds = sd * rng.uniform(0.5, 1.5, size=k)
-    share = bayesian._share_within(0.1, mean[None, :, None], sds[None, :, None])[0, 0]
-    samples = mean + sds * rng.normal(size=(400_000, k))
-    assert share == pytest.approx(np.mean(np.linalg.norm(samples, axis=1) < 0.1), abs=0.006)
-
-
-def many(adapter, n):
-    """Trials at random places of a smooth field, seen to 1 cm."""
-    rng = np.random.default_rng(3)
-    for condition in rng.uniform(CORNERS.min(axis=0), CORNERS.max(axis=0), size=(n, 2)):
-        moved = 0.03 * np.array([np.sin(9 * condition[1]), np.cos(9 * condition[0])])
-        low = np.floor(100 * moved) / 100
-        reading = Reading(moved, low, low + 0.01, np.zeros(2))
-        adapter.observe(condition, condition, reading)
-    return adapter
-
-
-def test_two_hundred_trials_are_merged_and_hardly_missed(monkeypatch):
-    merged = many(started(), 200)
-    assert len(merged._memory.changes) <= 24
-    monkeypatch.setattr(bayesian, "_TRIALS_KEPT", 10**6)
-    whole = many(started(), 60)
-    goals = np.random.default_rng(0).uniform([0.83, -0.17], [0.97, 0.17], size=(20, 2))
-    off, off_whole = (
-        [np.linalg.norm(c + 0.03 * np.array([np.sin(9 * c[1]), np.cos(9 * c[0])]) - goal)
-         for goal in goals for c in [adapter.propose(goal)]]
-        for adapter in (merged, whole)
-    )  # fmt: skip
-    assert np.median(off) < 0.004
-    assert np.median(off) < 2 * np.median(off_whole) + 0.001
-
-
-def test_trials_that_cannot_be_merged_are_kept_apart():
-    adapter = started()
-    for _ in range(30):
-        adapter.observe(GOAL, GOAL, Reading.measured([0.01, 0.0]))
-        adapter.change_hardware()
-    assert len(adapter._memory.changes) == 30
-
-
-def test_trials_of_different_hardware_are_never_merged():
-    adapter = many(started(), 20)
-    adapter.change_hardware()
-    many(adapter, 40)
-    counts = np.bincount(adapter._memory.changes)
-    assert np.all(counts > 0)
-    assert len(counts) == 2
-
-
 def test_what_a_reading_would_teach_is_what_it_takes_off_the_variance():
     adapter = started(label_sd=(0.2,), generator_sd=1e-6, hardware_sd=(0.3, 0.3))
     throw(adapter, GOAL, np.array([0.03, 0.0]))
@@ -317,27 +263,9 @@ def test_metres_and_milliseconds_are_as_good_as_metres_and_seconds():
     assert hits[0] == pytest.approx(hits[1])
 
 
-@pytest.mark.parametrize(
-    ("settings", "word"),
-    [
-        ({"label_sd": ()}, "label_sd"),
-        ({"label_sd": (0.1, -0.1)}, "label_sd"),
-        ({"rough_reach": 0.0}, "rough_reach"),
-        ({"execution_sd": float("nan")}, "execution_sd"),
-        ({"outlier": 1.7}, "outlier"),
-        ({"p_changed": 1.0}, "p_changed"),
-        ({"hardware_sd": (0.1,)}, "hardware_sd"),
-        ({"hardware_sd": 0.1}, "hardware_sd"),
-    ],
-)
-def test_settings_out_of_range_are_refused(settings, word):
-    with pytest.raises(ConfigurationError, match=word):
-        BayesianConfig(**settings)
-
-
 def test_no_condition_is_far_from_its_goal(monkeypatch):
     """Two demonstrations lie a tenth of a millimetre apart; cubic weights of them are a cliff."""
-    monkeypatch.setattr(bayesian, "smooth_weights", partial(smooth_weights, kernel="cubic"))
+    monkeypatch.setattr(displacement, "smooth_weights", partial(smooth_weights, kernel="cubic"))
     task = make_task("zoo-slide")
     demonstrations = task.demonstrations("scattered-6-1")
     generator = make_generator("interpolation,kernel=cubic").fit(demonstrations, seed=0)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from prior_reinforce.adapters.misses import Belief, Targets, p_hit_after
+from prior_reinforce.adapters.p_hit import Belief, Targets, p_hit_after, share_within
 
 SD, OUTLIER = 0.02, 0.01
 
@@ -90,3 +90,14 @@ def test_twenty_misses_at_one_condition_are_no_contradiction():
     sure = belief([0.0], [1e-6], np.zeros(20), np.full((20, 20), 1e-6), np.full((1, 20), 1e-6))
     said = p_hit_after(sure, targets(np.zeros(20), 0.1), targets([0.0], 0.1), OUTLIER)
     assert said[0] == pytest.approx(1.0, abs=1e-3)
+
+
+@pytest.mark.parametrize("k", [1, 2, 3, 4])
+@pytest.mark.parametrize("sd", [0.01, 0.1, 1.0])
+def test_the_share_within_a_ball_is_that_of_samples_whatever_its_size(k, sd):
+    rng = np.random.default_rng(k)
+    mean = 0.05 * rng.normal(size=k)
+    sds = sd * rng.uniform(0.5, 1.5, size=k)
+    share = share_within(0.1, mean[None, :, None], sds[None, :, None])[0, 0]
+    samples = mean + sds * rng.normal(size=(400_000, k))
+    assert share == pytest.approx(np.mean(np.linalg.norm(samples, axis=1) < 0.1), abs=0.006)

@@ -1,4 +1,7 @@
-"""What trials that missed tell of the next: the probability of a hit, given that those missed.
+"""The probability of a hit, and what trials that missed tell of it.
+
+Displacements are Gaussian, so that the probability of a hit is the share of a normal distribution
+that lies in a ball (`share_within`).
 
 A miss says that an error lies outside of a ball, which no interval and no Gaussian says. So the
 displacements at the conditions that missed are drawn, each draw is weighed by the probability that
@@ -22,8 +25,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
-from scipy.special import ndtr
+from scipy.special import ndtr, ndtri
 
+_POINTS = 192
+"""Where the share within a ball is evaluated (ours): right to 0.002, for k up to 3."""
 _DRAWS = 1024
 """Of all models together (ours). After six misses the standard error of P(hit) is then 0.02 with
 two components, at most 0.03, and 0.07 with one, at most 0.09 (twelve sets, twenty seeds)."""
@@ -106,6 +111,46 @@ def p_hit_after(
         )
         total += share * weight.sum()
     return np.asarray(hits / total)
+
+
+def share_within(
+    radius: float | Float[np.ndarray, " n"],
+    mean: Float[np.ndarray, "m k n"],
+    sd: Float[np.ndarray, "m k n"],
+) -> Float[np.ndarray, "m n"]:
+    """Probability that independent normal numbers lie in the ball around 0, or in one each.
+
+    One component after another, each between what the ones before leave of the ball: exact for k =
+    1, and smooth in everything. Source: Genz, Numerical computation of multivariate normal
+    probabilities, 1992, for a box; the ball is ours.
+    """
+    k = mean.shape[1]
+    points = evenly_spread(k - 1)
+    square = np.square(radius)[..., None]
+    left = np.broadcast_to(square, (*mean[:, 0].shape, len(points)))
+    inside = np.ones_like(left)
+    for j in range(k):
+        reach, middle, spread = np.sqrt(left), mean[:, j, :, None], sd[:, j, :, None]
+        low, high = ndtr((-reach - middle) / spread), ndtr((reach - middle) / spread)
+        inside = inside * (high - low)
+        if j < k - 1:
+            at = middle + spread * ndtri(np.clip(low + (high - low) * points[:, j], 1e-300, 1.0))
+            left = np.maximum(left - np.square(np.clip(at, -reach, reach)), 0.0)
+    return np.asarray(inside.mean(axis=-1))
+
+
+@functools.lru_cache
+def evenly_spread(k: int) -> Float[np.ndarray, "q k"]:
+    """Points that fill the unit cube evenly: additive recurrence by the root of x^(k+1) = x + 1.
+
+    Source: Roberts, The unreasonable effectiveness of quasirandom sequences, 2018.
+    """
+    root = 2.0
+    for _ in range(50):
+        root = (1.0 + root) ** (1.0 / (k + 1))
+    return np.asarray(
+        (0.5 + np.arange(1, _POINTS + 1)[:, None] * root ** -np.arange(1.0, k + 1)) % 1
+    )
 
 
 @functools.lru_cache
