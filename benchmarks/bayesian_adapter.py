@@ -15,6 +15,7 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -77,7 +78,7 @@ def main() -> None:
                     proposed = adapter.propose(goals[-1])  # noqa: B023
                     adapter.expect(proposed, goals[-1], TOLERANCE)  # noqa: B023
 
-                replay = [seconds(lambda a=adapter: again(a)) for adapter in adapters]
+                replay = [seconds(partial(again, adapter)) for adapter in adapters]
                 missed = missing.propose(goals[-1])
                 works = [
                     lambda: one_more(ours, conditions[-1], seen[-1]),  # noqa: B023

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,7 @@ from prior_reinforce import make_task
 from prior_reinforce.generators import load_generator, make_generator
 from prior_reinforce.plans.motions import Plan
 from prior_reinforce.robots import check_plan, robot_limits
+from prior_reinforce.robots.report import LimitReport
 
 
 def main() -> None:
@@ -48,7 +50,7 @@ def main() -> None:
             print(f"{task.name} {name}: {say(reports)}", flush=True)
 
 
-def say(reports):
+def say(reports: Sequence[LimitReport]) -> str:
     """The share that passes, with the lines that refuse and those that warn."""
     passed = sum(not report.refused for report in reports)
     said = [f"{passed} of {len(reports)} pass"]

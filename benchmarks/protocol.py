@@ -19,6 +19,7 @@ from unittest.mock import patch
 
 import mujoco.rollout
 import numpy as np
+from numpy.typing import ArrayLike
 
 from prior_reinforce.adapters.gaussian_process import GaussianProcessAdapter
 from prior_reinforce.experiments.protocol import run_goals
@@ -49,11 +50,11 @@ class TimedAdapter(GaussianProcessAdapter):
 
     watch = Stopwatch(lambda work: work())
 
-    def propose(self, goal_seen: np.ndarray) -> np.ndarray:
+    def propose(self, goal_seen: ArrayLike) -> np.ndarray:
         """Return the next condition."""
         return self.watch(lambda: super(TimedAdapter, self).propose(goal_seen))
 
-    def observe(self, condition: np.ndarray, goal: np.ndarray, reading: Reading) -> None:
+    def observe(self, condition: ArrayLike, goal: ArrayLike, reading: Reading | ArrayLike) -> None:
         """Take in a trial."""
         self.watch(lambda: super(TimedAdapter, self).observe(condition, goal, reading))
 

@@ -43,7 +43,8 @@ def main() -> None:
     def ours() -> None:
         task.rollout(plans, np.random.default_rng(arguments.seed))
 
-    bare(), ours()
+    bare()
+    ours()
     times: dict[Callable[[], None], list[float]] = {bare: [], ours: []}
     for _ in range(arguments.rounds):
         for work in rng.permutation(np.array([bare, ours], dtype=object)):

@@ -21,6 +21,7 @@ from prior_reinforce.generators import make_generator
 from prior_reinforce.tasks import make_task
 from prior_reinforce.tasks.base import Task
 from prior_reinforce.tasks.zoo import DEVELOPED_ON, MEMBERS
+from prior_reinforce.tasks.zoo.base import ZooTask
 from prior_reinforce.tasks.zoo.human import KINDS
 
 SHOWN = "zoo-scoop"
@@ -39,12 +40,13 @@ def first_throws(task: Task, kind: str, sets: int, goals: int, seed: int) -> flo
         aims = task.sample_goals(goals, rng)
         for rollout, aim in zip(task.rollout(generator.generate(aims), rng), aims, strict=True):
             near = np.linalg.norm(rollout.outcome - aim) <= task.tolerance
-            hits.append(rollout.valid and near)
+            hits.append(bool(rollout.valid and near))
     return float(np.mean(hits))
 
 
 def row(task: Task, arguments: argparse.Namespace) -> str:
     """One line of the table."""
+    assert isinstance(task, ZooTask)
     prior = task.demonstrations("clean-6-0")
     plans = np.repeat(prior.plans, 20, axis=0)
     begun = time.perf_counter()

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import argparse
 import warnings
+from functools import partial
 
 import numpy as np
 
@@ -80,7 +81,7 @@ def main() -> None:
                 results = run_sequences(
                     task,
                     generator,
-                    lambda name=adapter: make_adapter(name.rstrip("+")),
+                    partial(make_adapter, adapter.rstrip("+")),
                     perception_of(perception),
                     prior,
                     goals,
@@ -90,17 +91,18 @@ def main() -> None:
                 )
                 trials = [[goal.solved_at or arguments.rounds + 1 for goal in of] for of in results]
                 took[row, column] = np.mean(np.array(trials)[:, 1:])
-        groups = {f"k = {k} ({np.sum(components == k)})": components == k for k in (1, 2, 3)}
+        each = {k: components == k for k in (1, 2, 3)}
+        groups = {f"k = {k} ({which.sum()})": which for k, which in each.items()}
         groups |= {f"all ({len(fitted)})": components > 0}
         groups = {head: which for head, which in groups.items() if which.any()}
         print(f"\nReadings: {perception}\n\n| adapter | {' | '.join(groups)} |")
         print(f"|---{'|---' * len(groups)}|")
-        for name, row in zip(arguments.adapters, took, strict=True):
+        for name, mean in zip(arguments.adapters, took, strict=True):
             cells = []
             for which in groups.values():
-                off = (took[0] - row)[which]
+                off = (took[0] - mean)[which]
                 error = np.std(off, ddof=1) / np.sqrt(len(off)) if len(off) > 1 else np.nan
-                cells.append(f"{row[which].mean():.2f} ({off.mean():+.2f} ± {error:.2f})")
+                cells.append(f"{mean[which].mean():.2f} ({off.mean():+.2f} ± {error:.2f})")
             print(f"| {name} | {' | '.join(cells)} |", flush=True)
 
 

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import argparse
 import warnings
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -103,7 +104,7 @@ def trials(
         results = run_goals(
             task,
             generator,
-            lambda name=adapter: make_adapter(name),
+            partial(make_adapter, adapter),
             make_perception("exact"),
             demonstrations,
             goals,
