@@ -1,16 +1,18 @@
 """The command `reproduce`, as a user types it."""
 
+import io
 import json
 import shlex
 from dataclasses import dataclass
 
 import pytest
 import tyro
+from rich.console import Console
 
 from prior_reinforce.cli import main
-from prior_reinforce.commands.reproduce import Reproduce
+from prior_reinforce.commands.reproduce import Reproduce, _terminal
 from prior_reinforce.experiments.evaluation import Training
-from prior_reinforce.experiments.recipes import RECIPES, Measurement, Recipe, Run, Scale
+from prior_reinforce.experiments.recipes import RECIPES, Measurement, Recipe, Run, Scale, Table
 from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
 
 GENERATOR = "prior_reinforce.generators.interpolation:SmoothInterpolation"
@@ -124,3 +126,18 @@ def test_a_recipe_that_fails_costs_no_other_its_figures(tmp_path, capsys, monkey
     assert main(["reproduce", "all", "--quick", "--out", str(tmp_path)]) == 2
     assert "no such luck" in capsys.readouterr().err
     assert "Timeline alignment" in (tmp_path / "evidence.html").read_text()
+
+
+def test_a_table_wider_than_the_terminal_is_folded_into_several_with_the_first_column():
+    row = ("by eye", *(f"{i}.00 [1.00, 2.00]" for i in range(12)))
+    table = Table(("condition", *(f"rule {i}" for i in range(12))), (row,))
+    console = Console(width=100, file=io.StringIO())
+    for part in _terminal(table, "Trials [m]", 100):
+        console.print(part)
+    lines = console.file.getvalue().splitlines()
+    heads = [line.split() for line in lines if "condition" in line]
+    assert len(heads) == 3
+    assert [int(n) for head in heads for n in head if n.isdecimal()] == list(range(12))
+    assert sum("by eye" in line for line in lines) == 3
+    assert max(map(len, lines)) <= 100
+    assert len([*_terminal(table, "", 1000)]) == 1

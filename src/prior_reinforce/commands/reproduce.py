@@ -31,6 +31,8 @@ from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
 
 _SLOWEST = "diffusion"
 """Takes twice as long to learn as the next."""
+_WIDEST = 28
+"""Characters of a cell before it is wrapped."""
 
 
 @dataclass(frozen=True)
@@ -119,9 +121,11 @@ class Reproduce:
         """Write a recipe's figures down and print them."""
         text = json.dumps({**run.made_by(self._command(recipe, run)), **figures}, indent=1)
         write(self.out / f"{recipe.name}.json", text + "\n")
-        console.print(_terminal(recipe.table(figures), recipe.title))
+        for part in _terminal(recipe.table(figures), recipe.title, console.width):
+            console.print(part)
         if claims := recipe.claims(figures):
-            console.print(_terminal(claims_table(claims), f"{recipe.title}: claims"))
+            for part in _terminal(claims_table(claims), f"{recipe.title}: claims", console.width):
+                console.print(part)
         if len(run.commits) > 1:
             commits = ", ".join(sorted(run.commits))
             say(console, f"made by different code: {commits}; in a fresh --out all of it runs anew")
@@ -221,12 +225,22 @@ def _progress(console: Console, name: str) -> Iterator[OnProgress]:
         yield show
 
 
-def _terminal(table: Table, title: str) -> TerminalTable:
-    # As Text: rich would take [cm] for a style.
-    shown = TerminalTable(*map(_column, table.header), title=Text(title), box=box.SIMPLE)
-    for row in table.rows:
-        shown.add_row(*map(Text, row))
-    return shown
+def _terminal(table: Table, title: str, width: int) -> Iterator[TerminalTable]:
+    """Tables of as many columns as a line has room for, each with the first column."""
+    columns = list(zip(table.header, *table.rows, strict=True))
+    sizes = [2 + min(_WIDEST, max(map(len, column))) for column in columns]
+    end = 1
+    while end < len(columns):
+        begin, end = end, end + 1
+        while end < len(columns) and sizes[0] + sum(sizes[begin : end + 1]) <= width:
+            end += 1
+        heads = (table.header[0], *table.header[begin:end])
+        # As Text: rich would take [cm] for a style.
+        name = Text(title) if begin == 1 else None
+        shown = TerminalTable(*map(_column, heads), title=name, box=box.SIMPLE)
+        for row in table.rows:
+            shown.add_row(*map(Text, (row[0], *row[begin:end])))
+        yield shown
 
 
 def _column(header: str) -> Column:
