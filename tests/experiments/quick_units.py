@@ -2,7 +2,6 @@
 
 import os
 import signal
-import time
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -51,8 +50,6 @@ class Roots(Unit):
     """Eigenvalues of a random matrix, slowly; numbers whose last digits threads would change."""
 
     seed: int
-    pause: float = 0.0
-    """How long it takes, in [s]."""
 
     @property
     def label(self):
@@ -60,7 +57,6 @@ class Roots(Unit):
 
     def run(self, folder: Path):
         matrix = np.random.default_rng(self.seed).normal(size=(200, 200))
-        time.sleep(self.pause)
         return {
             "product": float((matrix @ matrix.T).sum()),
             "roots": np.linalg.svd(matrix)[1][:9].tolist(),

@@ -22,6 +22,10 @@ from prior_reinforce.experiments.units import Workers, result_path, run_units
 MEMORY = 80 * 2**20
 
 
+LASTS = 2.0
+"""Seconds that a unit takes on the cluster: long enough to be killed in, on a busy machine too."""
+
+
 @dataclass(frozen=True)
 class Watched(Roots):
     """Tells on which node it runs."""
@@ -30,6 +34,7 @@ class Watched(Roots):
         if ray.is_initialized():
             node = ray.get_runtime_context().get_node_id()
             (folder.parent / f"{self.seed} on {node}").touch()
+            time.sleep(LASTS)
         return super().run(folder)
 
 
@@ -38,8 +43,7 @@ def nodes_of(folder, unit):
 
 
 def main(folder: Path) -> None:
-    # They last long enough to be killed in, on a busy machine too.
-    watched = [Watched(seed, pause=2.0) for seed in range(4)]
+    watched = [Watched(seed) for seed in range(4)]
     units = [*watched, *real_units()]
     reference = folder / "reference"
     run_units(units, reference, Workers(), lambda *_: None)
