@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from prior_reinforce.errors import InvalidDemonstrationsError
+from prior_reinforce.plans.alignment import correlation_lags
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
+from prior_reinforce.plans.timing import SMOOTHING, velocity_profiles
 from prior_reinforce.plans.warping import Timeline, take_apart
 from prior_reinforce.tasks import make_task
 
@@ -67,6 +69,31 @@ def test_starts_come_back():
     apart = take_apart(demonstrations(swings()), "start")
     off = apart.numbers[:, 0] - STARTS
     np.testing.assert_allclose(off, off.mean(), atol=0.02)
+
+
+def test_motions_of_uneven_pace_start_so_that_their_strikes_coincide():
+    """A wind-up as fast as people like, then the same strike: as wholes they agree elsewhere."""
+    frames = np.arange(140.0)
+
+    def stroke(begins, lasts):
+        s = np.clip((frames - begins) / lasts, 0, 1)
+        return 10 * s**3 - 15 * s**4 + 6 * s**5
+
+    wind_ups = np.array([20.0, 30.0, 40.0, 50.0])
+    strikes = STARTS + wind_ups + 2
+    each = zip(STARTS, wind_ups, strikes, SIZES, strict=True)
+    swing = [size * stroke(hit, 20) - 1.2 * stroke(back, lasts) for back, lasts, hit, size in each]
+    plans = np.stack(swing)[:, :, None] * [1.0, -0.7]
+    starts = take_apart(demonstrations(plans), "start").numbers[:, 0]
+    lags = correlation_lags(velocity_profiles(plans, ("rad", "rad"), SMOOTHING / 0.0125))
+    assert np.ptp(-lags - strikes) > 3.0
+    assert np.ptp(starts - strikes) < 1.1
+
+
+def test_motions_that_differ_in_when_they_start_stay_where_they_agree_as_wholes():
+    starts = take_apart(demonstrations(swings()), "start").numbers[:, 0]
+    lags = correlation_lags(velocity_profiles(swings(), ("rad", "rad"), SMOOTHING / 0.0125))
+    np.testing.assert_allclose(np.diff(starts), -np.diff(lags), rtol=0, atol=1e-12)
 
 
 def test_tempos_come_back():

@@ -13,7 +13,8 @@ both can be learned; it plays any shape through any warp. The inverse map is wha
 - `tempo`: rho constant; two numbers.
 - `warp`: rho piecewise linear over the motion, constant outside; `_KNOTS` numbers more.
 
-Phase 0 is the middle of the motion, so that start and tempo hardly depend on each other. Outside
+Phase 0 is the middle of the motion, so that start and tempo hardly depend on each other; `start` has
+motions agree around the moment at which they are fastest. Outside
 its recording a plan holds where it rests, and goes on with its last velocity where it does not, so
 no rest is needed at either end, and nothing is cut off. A channel that is held but for noise
 (`channels`) is held without it. One that rests but for short transitions is timed by itself: its
@@ -76,6 +77,17 @@ _GOES_WITH = 0.15
 """A step goes with the motion if it comes at the same time in it, to this part of the motion's
 length, standard deviation. Ours: 0.02 to 0.03 on five sets of zoo-gripper; a gripper that closes by
 the clock, whenever the arm starts, goes with nothing."""
+_AROUND = 0.2
+"""Part of a motion's length, as a standard deviation, around its fastest moment over which motions
+are compared there. Ours: with 0.1 two styles of a motion are taken for one (docs/decisions-
+generator.md)."""
+_SEARCHED = 0.3
+"""A motion is moved by this part of its length at most to agree there. Ours."""
+_SAME = 0.007
+"""Starts that would move by less than this part of the length stay where whole motions agree best.
+Ours: where nobody's pace differs, estimates do by up to that (curling, set A)."""
+_LEAST_ENERGY = 1e-6
+"""Of a motion with unit energy: nothing moves."""
 _COMPARED = 40.0
 """Phases over the motion at which velocities are compared. Ours: they are smooth."""
 _FINE = 8
@@ -395,6 +407,8 @@ def _warps(
     if decisive is not None and by_step:
         starts = decisive
     if kind == "start":
+        if not by_step:
+            starts = _together_when_fastest(profiles, starts, length)
         return starts[:, None], 1.0, by_step
     span = length
     warp = _refine(profiles, np.stack([starts, np.zeros_like(starts)], axis=1), span)
@@ -402,6 +416,45 @@ def _warps(
         warp = np.concatenate([warp[:, :1], np.repeat(warp[:, 1:], _KNOTS, axis=1)], axis=1)
         warp = _refine(profiles, warp, span)
     return warp, span, by_step
+
+
+def _together_when_fastest(
+    profiles: Float[np.ndarray, "N H S"], starts: Float[np.ndarray, " N"], length: float
+) -> Float[np.ndarray, " N"]:
+    """Move starts to where motions agree best around the moment at which they are fastest.
+
+    What is thrown leaves about then, so there positions and velocities have to be mixed; where
+    paces differ, motions that agree best as a whole do not agree there.
+    """
+    from scipy.signal import correlate
+
+    horizon = profiles.shape[1]
+    tau = np.arange(-horizon * _FINE, horizon * _FINE + 1) / _FINE
+    clock = np.arange(horizon, dtype=float)
+    unit = profiles / np.sqrt(np.sum(profiles**2, axis=(1, 2), keepdims=True))
+    near = np.abs(tau) <= _SEARCHED * length
+    moved = starts
+    for _ in range(_ROUNDS):
+        played = np.stack(
+            [
+                np.stack([np.interp(tau + s, clock, p, left=0.0, right=0.0) for p in each.T])
+                for s, each in zip(moved, unit, strict=True)
+            ]
+        )
+        mean = played.mean(axis=0)
+        fastest = tau[np.argmax(np.linalg.norm(mean, axis=0))]
+        window = np.exp(-0.5 * ((tau - fastest) / (_AROUND * length)) ** 2)
+        lags = []
+        for each in played:
+            alike = sum(correlate(p, window * m, "same") for p, m in zip(each, mean, strict=True))
+            energy = correlate(np.sum(each**2, axis=0), window, "same")
+            score = alike / np.sqrt(np.maximum(energy, _LEAST_ENERGY))
+            lags.append(tau[near][np.argmax(score[near])])
+        moved = moved + lags
+    change = moved - starts
+    if np.abs(change - change.mean()).max() < _SAME * length:
+        return starts
+    return moved
 
 
 def _refine(profiles: Float[np.ndarray, "N H S"], warp: Numbers, span: float) -> Numbers:
