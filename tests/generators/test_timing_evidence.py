@@ -104,7 +104,7 @@ def test_our_own_demonstrations_differ_in_their_starts(task, name):
 @pytest.mark.parametrize(
     ("task", "name", "why"),
     [
-        ("zoo-curl", "mixed-12-0", "(start), as a rule"),  # tempo tells better, not by half
+        ("zoo-push", "tempo-6-1", "(start), as a rule"),  # tempo tells better, not by half
         ("zoo-drag", "clean-8-0", "(tempo); another timing would do as well here"),
     ],
 )
