@@ -13,15 +13,14 @@ both can be learned; it plays any shape through any warp. The inverse map is wha
 - `tempo`: rho constant; two numbers.
 - `warp`: rho piecewise linear over the motion, constant outside; `_KNOTS` numbers more.
 
-Phase 0 is the middle of the motion, so that start and tempo hardly depend on each other; `start` has
-motions agree around the moment at which they are fastest. Outside
-its recording a plan holds where it rests, and goes on with its last velocity where it does not, so
-no rest is needed at either end, and nothing is cut off. A channel that is held but for noise
-(`channels`) is held without it. One that rests but for short transitions is timed by itself: its
-shape is split at its transitions, and when each of them comes is one number more. If it goes with
-the motion, its last transition is phase 0 of `start`, and where `tempo` and `warp` begin their
-search: a hand that opens decides where the object goes, and what the arm does just then is what has
-to be mixed.
+Phase 0 is the middle of the motion, so that start and tempo hardly depend on each other; by `start`
+alone, motions agree where they are fastest. Outside its recording a plan holds where it rests, and
+goes on with its last velocity where it does not, so no rest is needed at either end, and nothing is
+cut off. A channel that is held but for noise (`channels`) is held without it. One that rests but
+for short transitions is timed by itself: its shape is split at its transitions, and when each of
+them comes is one number more. If it goes with the motion, its last transition is phase 0 of
+`start`, and where `tempo` and `warp` begin their search: a hand that opens decides where the object
+goes, and what the arm does just then is what has to be mixed.
 
 Notation:
     t      time of a plan               [frames]
