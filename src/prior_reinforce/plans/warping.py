@@ -425,13 +425,13 @@ def _together_when_fastest(
     What is thrown leaves about then, so there positions and velocities have to be mixed; where
     paces differ, motions that agree best as a whole do not agree there.
     """
-    from scipy.signal import correlate
-
     horizon = profiles.shape[1]
     tau = np.arange(-horizon * _FINE, horizon * _FINE + 1) / _FINE
     clock = np.arange(horizon, dtype=float)
     unit = profiles / np.sqrt(np.sum(profiles**2, axis=(1, 2), keepdims=True))
-    near = np.abs(tau) <= _SEARCHED * length
+    reach = int(_SEARCHED * length * _FINE)
+    steps = np.arange(-reach, reach + 1)
+    size = 2 * len(tau)  # padded: what is moved never wraps around
     moved = starts
     for _ in range(_ROUNDS):
         played = np.stack(
@@ -443,13 +443,16 @@ def _together_when_fastest(
         mean = played.mean(axis=0)
         fastest = tau[np.argmax(np.linalg.norm(mean, axis=0))]
         window = np.exp(-0.5 * ((tau - fastest) / (_AROUND * length)) ** 2)
-        lags = []
-        for each in played:
-            alike = sum(correlate(p, window * m, "same") for p, m in zip(each, mean, strict=True))
-            energy = correlate(np.sum(each**2, axis=0), window, "same")
-            score = alike / np.sqrt(np.maximum(energy, _LEAST_ENERGY))
-            lags.append(tau[near][np.argmax(score[near])])
-        moved = moved + lags
+        template = np.fft.rfft(window * mean, size).conj()
+        alike = np.fft.irfft(np.sum(np.fft.rfft(played, size) * template, axis=1), size)
+        energy = np.fft.irfft(
+            np.fft.rfft(np.sum(played**2, axis=1), size) * np.fft.rfft(window, size).conj(), size
+        )
+        score = alike[:, steps] / np.sqrt(np.maximum(energy[:, steps], _LEAST_ENERGY))
+        best = steps[np.argmax(score, axis=1)]
+        if not best.any():
+            break
+        moved = moved + best / _FINE
     change = moved - starts
     if np.abs(change - change.mean()).max() < _SAME * length:
         return starts
