@@ -71,29 +71,78 @@ def test_starts_come_back():
     np.testing.assert_allclose(off, off.mean(), atol=0.02)
 
 
-def test_motions_of_uneven_pace_start_so_that_their_strikes_coincide():
-    """A wind-up as fast as people like, then the same strike: as wholes they agree elsewhere."""
+def wind_ups_and_strikes() -> tuple[np.ndarray, np.ndarray]:
+    """A wind-up as fast as people like, then the same strike; and when it comes."""
     frames = np.arange(140.0)
-
-    def stroke(begins, lasts):
-        s = np.clip((frames - begins) / lasts, 0, 1)
-        return 10 * s**3 - 15 * s**4 + 6 * s**5
-
     wind_ups = np.array([20.0, 30.0, 40.0, 50.0])
     strikes = STARTS + wind_ups + 2
     each = zip(STARTS, wind_ups, strikes, SIZES, strict=True)
-    swing = [size * stroke(hit, 20) - 1.2 * stroke(back, lasts) for back, lasts, hit, size in each]
-    plans = np.stack(swing)[:, :, None] * [1.0, -0.7]
+    swing = [
+        size * stroke(frames, hit, 20) - 1.2 * stroke(frames, back, lasts)
+        for back, lasts, hit, size in each
+    ]
+    return np.stack(swing)[:, :, None] * [1.0, -0.7], strikes
+
+
+def stroke(frames, begins, lasts):
+    s = np.clip((frames - begins) / lasts, 0, 1)
+    return 10 * s**3 - 15 * s**4 + 6 * s**5
+
+
+def lags_of(plans):
+    return correlation_lags(velocity_profiles(plans, ("rad", "rad"), SMOOTHING / 0.0125))
+
+
+def test_motions_of_uneven_pace_start_so_that_their_strikes_coincide():
+    plans, strikes = wind_ups_and_strikes()
     starts = take_apart(demonstrations(plans), "start").numbers[:, 0]
-    lags = correlation_lags(velocity_profiles(plans, ("rad", "rad"), SMOOTHING / 0.0125))
-    assert np.ptp(-lags - strikes) > 3.0
+    assert np.ptp(-lags_of(plans) - strikes) > 3.0
     assert np.ptp(starts - strikes) < 1.1
+
+
+def test_a_gripper_times_motions_of_uneven_pace_all_the_same():
+    plans, strikes = wind_ups_and_strikes()
+    opens = np.round(strikes) + np.array([3, 5, 4, 6])
+    channel = np.stack([np.clip(np.arange(140) - at, 0, 1) for at in opens])
+    demos = demonstrations(np.dstack([plans, channel]), ("rad", "rad", "1"))
+    starts = take_apart(demos, "start").numbers[:, 0]
+    np.testing.assert_allclose(starts - starts[0], opens - opens[0], atol=1e-9)
+
+
+@pytest.mark.parametrize("ahead", [0.6, 1.0])
+def test_pushes_to_either_side_that_differ_in_their_start_alone_keep_it(ahead):
+    """Their mean goes straight on, and would be matched where only that channel moves."""
+    frames, sides = np.arange(120.0), np.array([-1.0, 0.0, 1.0, -0.8, 0.1, 0.9])
+    begins = np.array([10.0, 22.0, 31.0, 15.0, 27.0, 38.0])
+    plans = np.stack(
+        [
+            np.stack([ahead * stroke(frames, b, 40), side * stroke(frames, b + 8, 32)], axis=1)
+            for b, side in zip(begins, sides, strict=True)
+        ]
+    )
+    outcomes = np.stack([1.0 + 0.1 * np.arange(6) % 0.3, sides], axis=1)
+    plan_format = PlanFormat(("x", "y"), ("rad", "rad"), 0.0125)
+    starts = take_apart(Demonstrations(plans, outcomes, plan_format), "start").numbers[:, 0]
+    np.testing.assert_allclose(starts - starts.mean(), begins - begins.mean(), atol=0.3)
+
+
+def test_a_mirrored_motion_is_not_carried_off():
+    plans = swings()
+    plans[3] = plans[3, :1] - (plans[3] - plans[3, :1])
+    starts = take_apart(demonstrations(plans), "start").numbers[:, 0]
+    np.testing.assert_allclose(np.diff(starts), -np.diff(lags_of(plans)), rtol=0, atol=1e-9)
+
+
+def test_estimates_that_differ_by_little_do_not_move_our_own_demonstrations():
+    demos = make_task("curling").demonstrations("A")  # by 0.6 % of the motion
+    starts = take_apart(demos, "start").numbers[:, 0]
+    profiles = velocity_profiles(demos.plans, demos.format.units, SMOOTHING / demos.format.dt)
+    np.testing.assert_allclose(np.diff(starts), -np.diff(correlation_lags(profiles)), atol=1e-6)
 
 
 def test_motions_that_differ_in_when_they_start_stay_where_they_agree_as_wholes():
     starts = take_apart(demonstrations(swings()), "start").numbers[:, 0]
-    lags = correlation_lags(velocity_profiles(swings(), ("rad", "rad"), SMOOTHING / 0.0125))
-    np.testing.assert_allclose(np.diff(starts), -np.diff(lags), rtol=0, atol=1e-12)
+    np.testing.assert_allclose(np.diff(starts), -np.diff(lags_of(swings())), rtol=0, atol=1e-12)
 
 
 def test_tempos_come_back():
