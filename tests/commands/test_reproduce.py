@@ -141,3 +141,18 @@ def test_a_table_wider_than_the_terminal_is_folded_into_several_with_the_first_c
     assert sum("by eye" in line for line in lines) == 3
     assert max(map(len, lines)) <= 100
     assert len([*_terminal(table, "", 1000)]) == 1
+
+
+def test_every_part_of_a_folded_table_names_its_rows_and_fits():
+    rows = tuple(("diffusion", f"set {key}", *(f"{i}.00 cm" for i in range(9))) for key in "AB")
+    table = Table(("method", "set", *(f"figure {i}" for i in range(9))), rows)
+    parts = [*_terminal(table, "Zero-shot", 60)]
+    console = Console(width=60, file=io.StringIO())
+    for part in parts:
+        assert console.measure(part).maximum <= 60
+        console.print(part)
+    assert len(parts) == 3
+    assert console.file.getvalue().count("set A") == 3
+    assert console.file.getvalue().count("Zero-shot") == 1
+    (alone,) = _terminal(Table(("name",), (("one",),)), "", 60)
+    assert alone.row_count == 1

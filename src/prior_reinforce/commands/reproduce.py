@@ -33,6 +33,8 @@ _SLOWEST = "diffusion"
 """Takes twice as long to learn as the next."""
 _WIDEST = 28
 """Characters of a cell before it is wrapped."""
+_BORDER = 3
+"""Of each column: a space to either side, and a line."""
 
 
 @dataclass(frozen=True)
@@ -226,20 +228,23 @@ def _progress(console: Console, name: str) -> Iterator[OnProgress]:
 
 
 def _terminal(table: Table, title: str, width: int) -> Iterator[TerminalTable]:
-    """Tables of as many columns as a line has room for, each with the first column."""
+    """Tables of as many columns as a line has room for, each with those that name its rows."""
     columns = list(zip(table.header, *table.rows, strict=True))
-    sizes = [2 + min(_WIDEST, max(map(len, column))) for column in columns]
-    end = 1
-    while end < len(columns):
+    sizes = [_BORDER + min(_WIDEST, max(map(len, column))) for column in columns]
+    names = 1  # leading columns that make a row one of its own
+    while names < len(columns) and len({row[:names] for row in table.rows}) < len(table.rows):
+        names += 1
+    end = names
+    while end < len(columns) or end == names == len(columns):
         begin, end = end, end + 1
-        while end < len(columns) and sizes[0] + sum(sizes[begin : end + 1]) <= width:
+        while end < len(columns) and sum(sizes[:names] + sizes[begin : end + 1]) < width:
             end += 1
-        heads = (table.header[0], *table.header[begin:end])
+        heads = (*table.header[:names], *table.header[begin:end])
         # As Text: rich would take [cm] for a style.
-        name = Text(title) if begin == 1 else None
+        name = Text(title) if begin == names else None
         shown = TerminalTable(*map(_column, heads), title=name, box=box.SIMPLE)
         for row in table.rows:
-            shown.add_row(*map(Text, (row[0], *row[begin:end])))
+            shown.add_row(*map(Text, (*row[:names], *row[begin:end])))
         yield shown
 
 
