@@ -67,7 +67,10 @@ def test_a_picture_that_cannot_be_drawn_leaves_the_one_before(tmp_path, monkeypa
     assert [p.name for p in tmp_path.iterdir()] == ["picture.png"]
 
 
-def test_a_figure_is_arranged_as_when_it_is_drawn_and_only_once():
+@pytest.mark.parametrize("theirs", [{}, {"figure.autolayout": True}])
+def test_a_figure_is_arranged_as_when_it_is_drawn_and_only_once(theirs, monkeypatch):
+    for name, value in theirs.items():
+        monkeypatch.setitem(matplotlib.rcParams, name, value)
     once, drawn = new_figure(4, 3), new_figure(4, 3)
     for figure in (once, drawn):
         figure.subplots(1, 2)[0].set_ylabel("where it lands [cm]")
