@@ -64,7 +64,9 @@ def main() -> None:
                 adapter = session.informed_adapter()
                 assert isinstance(adapter, BayesianAdapter)
                 seen = prior.outcomes_seen
-                corrected = replace(prior, outcomes_seen=seen + adapter.displacement(seen))
+                corrected = replace(
+                    prior, outcomes_seen=seen + adapter.displacement(seen, hardware=False)
+                )
                 off = [
                     100 * np.sqrt(np.square(d.outcomes_seen - recorded.outcomes_seen).sum(1).mean())
                     for d in (prior, corrected)

@@ -225,6 +225,15 @@ def test_what_a_reading_would_teach_is_what_it_takes_off_the_variance():
     assert gain == pytest.approx(1 - after / before, abs=0.02)
 
 
+def test_the_displacement_is_what_outcomes_were_off_by_and_of_which_hardware_is_a_part():
+    adapter, shift = started(), np.array([0.06, -0.03])
+    for corner in CORNERS:
+        adapter.observe(corner, corner, Reading.measured(shift, 0.001))
+    np.testing.assert_allclose(adapter.displacement(CORNERS), np.tile(shift, (6, 1)), atol=0.004)
+    of_old = adapter.displacement(CORNERS, hardware=False)
+    assert np.linalg.norm(of_old, axis=1).max() < 0.5 * np.linalg.norm(shift)
+
+
 def test_a_throw_teaches_more_than_a_demonstration_where_hardware_changed():
     adapter = started(hardware_sd=(0.5, 0.5))
     region = np.random.default_rng(0).uniform([0.8, -0.2], [1.0, 0.2], size=(40, 2))

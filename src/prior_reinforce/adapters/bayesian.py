@@ -254,13 +254,18 @@ class BayesianAdapter(Adapter):
         """How far apart outcomes of one plan lie, where so small a radius is asked for."""
         return np.asarray(np.minimum(self.config.execution_sd, _REPEATABLE * np.asarray(radius)))
 
-    def displacement(self, conditions: Points) -> Points:
+    def displacement(self, conditions: Points, *, hardware: bool = True) -> Points:
         """Return where outcomes are expected to lie, seen from these conditions.
 
         Args:
             conditions: Shape (n, k), in the outcomes' units.
+            hardware: With what differs from the demonstrations' day; otherwise what labels and
+                generator get wrong alone.
+
+        Returns:
+            Outcome minus condition, shape (n, k), in the outcomes' units.
         """
-        mean, _ = self._predict(self._normalisation.apply(conditions))
+        mean, _ = self._predict(self._normalisation.apply(conditions), None if hardware else -1)
         return self._mixed(mean) * self._normalisation.scale
 
     def gain(
