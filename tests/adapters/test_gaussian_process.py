@@ -19,7 +19,7 @@ def observe(adapter, condition, outcome):
     adapter.observe(condition, np.zeros(len(outcome)), outcome)
 
 
-DATA_SETS = int(os.environ.get("DATA_SETS", "30"))  # docs/decisions-adapter.md: 200
+DATA_SETS = int(os.environ.get("DATA_SETS", "20"))  # docs/decisions-adapter.md: 200
 REGION = np.array([[0.80, -0.25], [1.05, 0.25]])
 
 
