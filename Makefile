@@ -14,10 +14,10 @@ demo: $(VENV)/.core
 # What a user needs; `. .venv/bin/activate` then has `prior-reinforce`.
 install: $(VENV)/.core
 
-# Four processes share the tests, the longest first: a third of the time of some is waiting.
+# Three processes share the tests, the longest first: a third of the time of some is waiting.
 # Bytecode is kept, or every program that a test starts would compile the package again.
 test: $(VENV)/.all
-	PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n 4 --dist load --maxschedchunk 4 $(ARGS)
+	PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n 3 --dist load --maxschedchunk 4 $(ARGS)
 
 # CASES generated attacks with a table by class, a sixth as many on the way to the arm, a tenth kills.
 CASES ?= 3000
