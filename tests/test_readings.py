@@ -35,6 +35,14 @@ def test_a_two_beside_zeros_may_be_a_miss_shared_among_the_components():
     assert Reading.by_eye([0.02, 0.05]).low[0] == 0.01
 
 
+def test_an_error_is_expected_in_the_middle_of_its_interval():
+    assert Reading.by_eye([-0.1, 0.05]).expected.tolist() == pytest.approx([-0.1125, 0.055])
+    assert Reading.measured([0.03, -0.01], 0.005).expected.tolist() == [0.03, -0.01]
+    open_ended = Reading([0.05, 0.02], [0.0, 0.01], [np.inf, 0.035], [0.0, 0.0])
+    assert open_ended.expected.tolist() == pytest.approx([0.05, 0.0225])
+    assert Reading.only(False, 2).expected.tolist() == [0.0, 0.0]
+
+
 def test_what_is_no_word_of_an_observer_is_an_estimate_by_hand():
     reading = Reading.by_eye([0.04, 0.05])
     np.testing.assert_allclose(reading.sd, [np.sqrt(0.01**2 + 0.01**2), 0])

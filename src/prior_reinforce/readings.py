@@ -80,6 +80,13 @@ class Reading:
         width = self.high - self.low
         return np.asarray(np.sqrt(width**2 / 12.0 + self.sd**2))
 
+    @property
+    def expected(self) -> Point:
+        """Mean of the error given this reading: its middle; `error_seen` where an end is open."""
+        is_open = np.isinf(self.low) | np.isinf(self.high)
+        low, high = (np.where(is_open, self.error_seen, end) for end in (self.low, self.high))
+        return np.asarray(0.5 * (low + high))
+
     def __post_init__(self) -> None:
         """Check, copy, and make read-only."""
         k = np.size(self.error_seen)

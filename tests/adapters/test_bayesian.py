@@ -20,7 +20,7 @@ GOAL = np.array([0.9, 0.05])
 TOLERANCE = 0.015
 
 
-def started(outcomes=CORNERS, units=(), noise=(), **settings) -> BayesianAdapter:
+def started(outcomes=CORNERS, units=(), noise=(), correction=(), **settings) -> BayesianAdapter:
     plans = np.random.default_rng(0).normal(size=(len(outcomes), 4, 1))
     format_ = PlanFormat(("j1",), ("rad",), 0.02)
     adapter = BayesianAdapter(BayesianConfig(**settings))
@@ -32,6 +32,7 @@ def started(outcomes=CORNERS, units=(), noise=(), **settings) -> BayesianAdapter
             (),
             units,
             outcome_noise=np.reshape(noise, (-1, outcomes.shape[1])),
+            outcome_correction=np.reshape(correction, (-1, outcomes.shape[1])),
         )
     )
     return adapter
@@ -52,6 +53,37 @@ def throw(adapter, goal, moved, seen=Reading.by_eye, words=True):
 def test_the_first_condition_is_the_goal():
     for goal in np.random.default_rng(0).uniform([0.7, -0.3], [1.1, 0.3], size=(20, 2)):
         np.testing.assert_allclose(started().propose(goal), goal, atol=1e-9)
+
+
+def test_what_labels_say_to_be_off_is_corrected_from_the_first_throw_on():
+    adapter = started(noise=np.full((6, 2), 0.02), correction=np.full((6, 2), [0.0125, -0.01]))
+    np.testing.assert_allclose(adapter.propose(GOAL), GOAL - [0.0125, -0.01], atol=1e-4)
+
+
+@pytest.mark.parametrize("trials", [0, 6, 40])
+@pytest.mark.parametrize("hit_or_miss", [False, True])
+def test_beyond_what_labels_say_everything_is_learned_as_without(trials, hit_or_miss):
+    """Goals that lie as much farther, and the same readings, give as much more displacement."""
+    slope, shift, noise = np.array([[0.1, 0.02], [0.0, -0.05]]), [0.01, 0.0], np.full((6, 2), 0.02)
+    known = started(noise=noise, correction=CORNERS @ slope + shift)
+    plain = started(noise=noise)
+    rng = np.random.default_rng(0)
+    for condition in rng.uniform([0.8, -0.2], [1.0, 0.2], size=(trials, 2)):
+        reading = Reading.by_eye(rng.choice([-0.05, 0.0, 0.02], size=2))
+        if hit_or_miss:
+            reading = Reading.only(False, 2).within(np.full(2, TOLERANCE))
+        plain.observe(condition, condition, reading)
+        known.observe(condition, condition + condition @ slope + shift, reading)
+    assert len(known._memory.changes) <= 24
+    places = rng.uniform([0.8, -0.2], [1.0, 0.2], size=(10, 2))
+    more = places @ slope + shift
+    np.testing.assert_allclose(
+        known.displacement(places), plain.displacement(places) + more, atol=1e-7
+    )
+    np.testing.assert_allclose(
+        known.p_hit(places, places + more, TOLERANCE), plain.p_hit(places, places, TOLERANCE),
+        atol=1e-7,
+    )  # fmt: skip
 
 
 def test_a_shift_of_six_centimetres_is_found_in_three_trials_by_eye():
@@ -125,7 +157,7 @@ def test_what_a_demonstration_would_teach_is_what_adding_it_takes_off():
         more = started(np.vstack([CORNERS, one]))
         same = adapter._normalisation  # a seventh changes the spread a little
         more._prior.normalisation = more._normalisation = same
-        more._prior._mix(same.apply(np.vstack([CORNERS, one])), np.zeros((7, 2)))
+        more._prior._mix(same.apply(np.vstack([CORNERS, one])), np.zeros((7, 2)), np.zeros((7, 2)))
         after = more._unknown(same.apply(places))
         assert gain == pytest.approx(1 - after / before, abs=1e-9)
 

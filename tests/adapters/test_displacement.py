@@ -8,12 +8,13 @@ from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 OUTCOMES = np.array([[0.8, -0.2], [0.8, 0.2], [1.0, -0.2], [1.0, 0.2], [0.9, 0.0]])
 
 
-def prior(noise=0.0, **settings) -> DisplacementPrior:
+def prior(noise=0.0, correction=(), **settings) -> DisplacementPrior:
     demonstrations = Demonstrations(
         np.random.default_rng(0).normal(size=(len(OUTCOMES), 4, 1)),
         OUTCOMES,
         PlanFormat(("j1",), ("rad",), 0.02),
         outcome_noise=np.full(OUTCOMES.shape, noise),
+        outcome_correction=np.reshape(correction, (-1, OUTCOMES.shape[1])),
     )
     return DisplacementPrior(BayesianConfig(**settings), demonstrations)
 
@@ -83,3 +84,19 @@ def test_one_more_demonstration_makes_less_unknown_beside_it():
 def test_settings_out_of_range_are_refused(settings, word):
     with pytest.raises(ConfigurationError, match=word):
         BayesianConfig(**settings)
+
+
+def test_what_labels_say_to_be_off_is_expected_between_them_too():
+    """An affine correction is that everywhere, since the weights reproduce what is affine."""
+    plain = prior(noise=0.02)
+    correction = OUTCOMES @ np.array([[0.1, 0.02], [0.0, -0.05]]) + [0.01, 0.0]
+    known = prior(noise=0.02, correction=correction)
+    places = np.random.default_rng(0).uniform([0.75, -0.25], [1.05, 0.25], size=(20, 2))
+    at = known.normalisation.apply(places)
+    expected = places @ np.array([[0.1, 0.02], [0.0, -0.05]]) + [0.01, 0.0]
+    scale = known.normalisation.scale
+    np.testing.assert_allclose(known.mean(at).T * scale, expected, atol=1e-9)
+    assert not plain.mean(at).any()
+    np.testing.assert_array_equal(known.covariance(at, 0, at, 0), plain.covariance(at, 0, at, 0))
+    more = known.with_demonstration(at[:1])
+    assert np.all(np.isfinite(more.mean(at)))

@@ -114,12 +114,14 @@ def test_an_endpoint_that_does_not_answer_is_no_eye(tmp_path):
         unit.run(tmp_path)
 
 
-def test_what_an_earlier_version_perceived_is_refused_in_one_line(tmp_path):
+def test_what_was_perceived_is_kept_and_that_of_an_earlier_version_refused(tmp_path):
     training = Training("basketball-v1", "A", "nearest", 0, perception="eye")
-    training.learned(tmp_path)
+    prior = training.learned(tmp_path).prior
+    assert prior.outcome_noise.any()
+    assert prior.outcome_correction.any()
     path = result_path(tmp_path, training.perceived)
     kept = json.loads(path.read_text())
-    del kept["result"]["outcome_noise"]
+    del kept["result"]["outcome_correction"]
     path.write_text(json.dumps(kept))
     shutil.rmtree(tmp_path / "models")
     with pytest.raises(FileFormatError, match=r"is of an earlier version.*fresh --out"):

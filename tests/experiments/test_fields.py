@@ -27,6 +27,7 @@ def field():
     return Field(
         "by hand", grid[0, 0], np.array([x[1] - x[0], y[1] - y[0]]), d(grid),
         np.array([0.004, 0.002]), REGION, 0.015, corners, np.full((4, 2), 0.01),
+        np.full((4, 2), 0.0125),
     )  # fmt: skip
 
 
@@ -47,6 +48,8 @@ def test_a_field_comes_back_from_its_file(field, tmp_path):
     conditions = np.random.default_rng(0).uniform(*REGION, size=(5, 2))
     np.testing.assert_array_equal(again.at(conditions), field.at(conditions))
     np.testing.assert_array_equal(again.demonstrations.outcome_noise, field.outcome_noise)
+    correction = again.demonstrations.outcome_correction
+    np.testing.assert_array_equal(correction, field.outcome_correction)
 
 
 def test_a_plan_comes_down_at_its_condition_and_the_displacement(field):

@@ -65,6 +65,20 @@ def test_outcomes_are_seen_from_the_middle_of_the_region():
     assert np.abs(seen(Eye()) - seen(Exact())).max() > 0.02  # as coarse as that from far off
 
 
+def test_a_word_by_eye_is_expected_in_the_middle_of_what_it_stands_for():
+    by_eye = perceive_demonstrations(TASK, RECORDED, Eye(), seed=0)
+    errors = by_eye.outcomes_seen - MIDDLE
+    tens = np.isclose(np.abs(errors), 0.1)
+    assert tens.any()  # from 7.5 to 15 cm
+    np.testing.assert_allclose(by_eye.outcome_correction[tens], 0.0125 * np.sign(errors[tens]))
+    off, off_expected = (
+        np.square(by_eye.outcomes_seen + given - seen(Exact())).mean()
+        for given in (0.0, by_eye.outcome_correction)
+    )
+    assert off_expected < off
+    assert not perceive_demonstrations(TASK, RECORDED, Exact(), seed=0).outcome_correction.any()
+
+
 def test_noise_of_perception_is_drawn_anew_for_each_seed_and_demonstration():
     noise = [seen(Amplified(1.0, 1.0), seed) - seen(Exact(), seed) for seed in (0, 0, 1)]
     np.testing.assert_allclose(noise[0], noise[1])

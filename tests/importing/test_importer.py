@@ -278,6 +278,18 @@ def test_only_demonstrations_of_one_kind_are_joined(originals):
         appended(fifty, twenty)
 
 
+def test_what_is_known_of_outcomes_is_joined_too(originals):
+    kept = import_demonstrations(originals["npz"]).demonstrations
+    known = {"outcome_noise": 0.02, "outcome_correction": -0.01}
+    parts = [
+        replace(kept.only(chosen), **{name: np.full((2, 2), of) for name, of in known.items()})
+        for chosen in ((0, 1), (2, 3))
+    ]
+    joined = appended(*parts)
+    for name, of in known.items():
+        np.testing.assert_array_equal(getattr(joined, name), np.full((4, 2), of))
+
+
 def test_a_motion_that_comes_twice_is_refused(originals, tmp_path):
     folder = tmp_path / "recordings"
     shutil.copytree(originals["npz"], folder)

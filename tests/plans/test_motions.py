@@ -69,10 +69,27 @@ def test_some_demonstrations_keep_their_outcomes_and_noise():
         replace(demos, outcome_noise=-noisy.outcome_noise)
 
 
+def test_what_outcomes_are_expected_to_be_is_kept_with_them(tmp_path):
+    demos = make()
+    correction = np.linspace(-0.02, 0.03, demos.outcomes_seen.size).reshape(demos.n, -1)
+    known = replace(demos, outcome_correction=correction)
+    np.testing.assert_array_equal(known.only((2, 0)).outcome_correction, correction[[2, 0]])
+    assert known.sha256 != demos.sha256
+    assert known.sha256 != replace(demos, outcome_noise=np.abs(correction)).sha256
+    known.save(tmp_path / "demos.npz")
+    again = Demonstrations.load(tmp_path / "demos.npz")
+    np.testing.assert_array_equal(again.outcome_correction, correction)
+    with pytest.raises(InvalidDemonstrationsError, match="outcome_correction"):
+        replace(demos, outcome_correction=correction[:, :1])
+    with pytest.raises(InvalidDemonstrationsError, match="outcome_correction"):
+        replace(demos, outcome_correction=correction + np.nan)
+
+
 def test_saving_twice_gives_the_same_arrays_and_no_pickle(tmp_path):
     make().save(tmp_path / "demos.npz")
     with np.load(tmp_path / "demos.npz", allow_pickle=False) as archive:
-        assert set(archive.files) == {"plans", "outcomes_seen", "outcome_noise", "metadata"}
+        arrays = {"plans", "outcomes_seen", "outcome_noise", "outcome_correction"}
+        assert set(archive.files) == {*arrays, "metadata"}
         assert json.loads(str(archive["metadata"]))["format"]["dt"] == 0.01
 
 

@@ -63,10 +63,11 @@ class BayesianAdapter(Adapter):
 
         r = c + d(c) + noise,    d_j(c) = sum_i w_i(c) e_ij + f_j(c) + u_j(c) + h_j(c)    j = 1..k
 
-    with independent Gaussian terms of prior mean 0:
+    with independent Gaussian terms, all but e of prior mean 0:
 
-        e   sd s_i              by how much the outcome of demonstration i is off: the noise that it
-                                states (mean over components), and 0.03 or 0.1 more
+        e   mean m_i, sd s_i    by how much the outcome of demonstration i is off: m_i as its label
+                                says (`Demonstrations.outcome_correction`), give or take the noise
+                                that it states (mean over components), and 0.03 or 0.1 more
         f   sd a, reach 0.5     what the generator itself gets wrong: 0, or with probability 0.1 0.3
         u   sd 0.025, reach 0.32    what lies between the demonstrations
         h   sd b, reach 2.5     what is different from their day: 0.03, or with probability 0.2 0.3;
@@ -85,7 +86,8 @@ class BayesianAdapter(Adapter):
 
     The next condition is the fixed point c = g - E d(c): the posterior mean, which is as good as
     the greatest probability of a hit on our tasks, and knows no tolerance
-    (docs/decisions-adapter.md). With nothing but demonstrations it is the goal. Where the fixed
+    (docs/decisions-adapter.md). With nothing but demonstrations it is the goal, less what their
+    labels say to be off: nothing, where they were measured. Where the fixed
     point has just missed the same goal, since its reading did not say what to change (a word
     coarser than the tolerance, or "a miss" and nothing else), the condition beside it that most
     probably hits is next, given all that missed (`adapters.p_hit`).
@@ -235,7 +237,8 @@ class BayesianAdapter(Adapter):
         mean, variance = self._predict(at)
         belief = Belief(
             share=known.model_weights,
-            at_missed=(to_missed @ known.weights[..., None])[..., 0],
+            at_missed=self._prior.mean(missed.conditions)
+            + (to_missed @ known.weights[..., None])[..., 0],
             among_missed=self._prior.covariance(*then, *then)[:, None] - to_missed @ from_missed,
             mean=mean,
             variance=variance,
@@ -319,7 +322,9 @@ class BayesianAdapter(Adapter):
         if self._posterior is None:
             memory, outlier = self._memory, self.config.outlier
             at = memory.conditions, memory.changes
-            readings = Readings(memory.low.T, memory.high.T, memory.variance.T, outlier)
+            mean = self._prior.mean(memory.conditions)
+            low, high = memory.low.T - mean, memory.high.T - mean
+            readings = Readings(low, high, memory.variance.T, outlier)
             covariance = self._prior.covariance(*at, *at)
             self._posterior = infer(covariance, readings, self._prior.log_share)
         return self._posterior
@@ -331,7 +336,7 @@ class BayesianAdapter(Adapter):
         posterior, memory = self._known(), self._memory
         after = self._now if changes is None else changes
         cross = self._prior.covariance(at, after, memory.conditions, memory.changes)[:, None]
-        mean = (cross @ posterior.weights[..., None])[..., 0]
+        mean = self._prior.mean(at) + (cross @ posterior.weights[..., None])[..., 0]
         explained = np.sum((cross @ posterior.precision) * cross, axis=-1)
         variance = self._prior.variance(at, after)[:, None] - explained
         return mean, np.maximum(variance, 1e-10)

@@ -7,6 +7,7 @@ under each of m models the prior covariance
 
 with w the weights of a spline over the demonstrated outcomes, S the variances of their labels, K
 the squared-exponential kernel of a reach, and the last term between trials of one hardware alone.
+Their prior mean is w(a)' m, with m what the labels say to be off: "10 cm" by eye is 11.25 at mean.
 
 Source: ours; the figures are in docs/decisions-adapter.md.
 """
@@ -102,6 +103,7 @@ class DisplacementPrior:
         self._mix(
             self.normalisation.apply(demonstrations.outcomes_seen),
             demonstrations.outcome_noise / self.normalisation.scale,
+            demonstrations.outcome_correction / self.normalisation.scale,
         )
 
     def with_demonstration(self, outcome: Float[np.ndarray, "1 k"]) -> DisplacementPrior:
@@ -110,15 +112,20 @@ class DisplacementPrior:
         other._mix(
             np.vstack([self._demonstrated, outcome]),
             np.vstack([self._noise, self._noise.mean(axis=0)]),
+            np.vstack([self._correction, np.zeros(outcome.shape[1])]),
         )
         return other
 
-    def _mix(self, demonstrated: Points, noise: Points) -> None:
+    def _mix(self, demonstrated: Points, noise: Points, correction: Points) -> None:
         """Know by which weights demonstrations are mixed, and how far they are off."""
-        self._demonstrated, self._noise = demonstrated, noise
+        self._demonstrated, self._noise, self._correction = demonstrated, noise, correction
         outcomes = self.normalisation.undo(demonstrated)
         self._weights = smooth_weights(outcomes, noise=noise * self.normalisation.scale)
         self._stated = np.mean(noise**2, axis=1)
+
+    def mean(self, at: Float[np.ndarray, "p k"]) -> Float[np.ndarray, "k p"]:
+        """Displacements that are expected there, before any trial and under each model."""
+        return np.asarray((self._mixed_by(at) @ self._correction).T)
 
     def of_difference(
         self, conditions: Points, other: Point, changes: int

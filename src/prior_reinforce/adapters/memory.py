@@ -89,7 +89,7 @@ class Memory:
         tau, nu = (np.einsum("m,mkn->nk", share, of) for of in (known.tau, known.nu))
         old = np.arange(len(self.changes) - LATEST)
         sites = self.only(old)
-        number = nu[old] / tau[old]
+        number = nu[old] / tau[old] + prior.mean(self.conditions[old]).T
         sites = replace(sites, low=number, high=number, variance=1.0 / tau[old])
         sites = sites.only(np.any(tau[old] > _TELLS_NOTHING, axis=1))
         # Trials of different hardware are never merged, so there may be none left that can be.
@@ -100,7 +100,9 @@ class Memory:
             middle = np.average(both, axis=0, weights=np.sum(1.0 / variance, axis=1))
             moved = share @ prior.of_difference(both, middle, int(changes))
             precision = 1.0 / (variance + moved[:, None])
-            number = np.sum(precision * sites.low[[i, j]], axis=0) / precision.sum(axis=0)
+            expected, expected_there = prior.mean(both).T, prior.mean(middle[None])[:, 0]
+            beyond = np.sum(precision * (sites.low[[i, j]] - expected), axis=0)
+            number = expected_there + beyond / precision.sum(axis=0)
             rest = sites.only(np.setdiff1d(np.arange(len(sites.changes)), [i, j]))
             sites = rest.with_one(middle, changes, number, number, 1.0 / precision.sum(axis=0))
         return sites.and_then(self.only(slice(-LATEST, None)))

@@ -84,6 +84,7 @@ class PerceivedDemonstrations(Unit):
         return {
             "outcomes_seen": perceived.outcomes_seen.tolist(),
             "outcome_noise": perceived.outcome_noise.tolist(),
+            "outcome_correction": perceived.outcome_correction.tolist(),
             "failed_readings": len(failures),
         }
 
@@ -174,15 +175,16 @@ class Training(Unit):
         demonstrations = self.recorded()
         if self.perceived is not None:
             seen = result_of(folder, self.perceived)
-            if "outcome_noise" not in seen:
+            if "outcome_correction" not in seen:
                 raise FileFormatError(
                     f"{result_path(folder, self.perceived)} is of an earlier version, which did "
-                    "not keep how uncertain outcomes are; delete it, or choose a fresh --out"
+                    "not keep how far outcomes are off; delete it, or choose a fresh --out"
                 )
             demonstrations = replace(
                 demonstrations,
                 outcomes_seen=np.array(seen["outcomes_seen"]),
                 outcome_noise=np.array(seen["outcome_noise"]),
+                outcome_correction=np.array(seen["outcome_correction"]),
             )
         return demonstrations if self.subset is None else demonstrations.only(self.subset)
 

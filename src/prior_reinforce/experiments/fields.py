@@ -73,6 +73,8 @@ class Field:
     """Of the demonstrations, in [m]."""
     outcome_noise: Points
     """How uncertain they are, in [m]."""
+    outcome_correction: Points
+    """What they are expected to be, minus those seen, in [m]."""
 
     @property
     def demonstrations(self) -> Demonstrations:
@@ -82,6 +84,7 @@ class Field:
             self.outcomes_seen,
             _FORMAT,
             outcome_noise=self.outcome_noise,
+            outcome_correction=self.outcome_correction,
         )
 
     @cached_property
@@ -149,6 +152,7 @@ def measure(
     return Field(
         name, low, (high - low) / (counts - 1), landed - grid, np.sqrt(apart), task.region,
         task.tolerance, demonstrations.outcomes_seen, demonstrations.outcome_noise,
+        demonstrations.outcome_correction,
     )  # fmt: skip
 
 

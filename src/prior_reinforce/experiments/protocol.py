@@ -117,14 +117,15 @@ def perceive_demonstrations(
         on_failed_reading: Called where perception gives up.
 
     Returns:
-        The same plans with the outcomes seen, and how uncertain each is.
+        The same plans with the outcomes seen, how uncertain each is, and what it is expected to
+        be.
 
     Raises:
         InvalidDemonstrationsError: An execution was lost, or all outcomes look alike.
     """
     reference = task.region.mean(axis=0)
     rng = np.random.default_rng([seed, 5])
-    seen, noise = [], []
+    seen, noise, correction = [], [], []
     rollouts = task.rollout(demonstrations.plans, np.random.default_rng([seed, 4]))
     for number, rollout in enumerate(rollouts):
         if not rollout.valid:
@@ -138,8 +139,14 @@ def perceive_demonstrations(
             reading = on_failed_reading(failure, rollout, reference, rng)
         seen.append(reference + reading.error_seen)
         noise.append(reading.spread)
+        correction.append(reading.expected - reading.error_seen)
     try:
-        return replace(demonstrations, outcomes_seen=np.array(seen), outcome_noise=np.array(noise))
+        return replace(
+            demonstrations,
+            outcomes_seen=np.array(seen),
+            outcome_noise=np.array(noise),
+            outcome_correction=np.array(correction),
+        )
     except InvalidDemonstrationsError as error:
         raise InvalidDemonstrationsError(
             f"as {type(perception).__name__} saw {task.name} (seed {seed}), {error}; choose "

@@ -275,9 +275,13 @@ def appended(before: Demonstrations, more: Demonstrations) -> Demonstrations:
     ]
     said = [f"demonstration {i} so far" for i in range(before.n)]
     refuse_copies(np.concatenate(plans), [*said, *(f"new one {i}" for i in range(more.n))])
-    outcomes = np.concatenate([before.outcomes_seen, more.outcomes_seen])
-    noise = np.concatenate([before.outcome_noise, more.outcome_noise])
-    return replace(more, plans=np.concatenate(plans), outcomes_seen=outcomes, outcome_noise=noise)
+    return replace(
+        more,
+        plans=np.concatenate(plans),
+        outcomes_seen=np.concatenate([before.outcomes_seen, more.outcomes_seen]),
+        outcome_noise=np.concatenate([before.outcome_noise, more.outcome_noise]),
+        outcome_correction=np.concatenate([before.outcome_correction, more.outcome_correction]),
+    )
 
 
 def outcome_places(source: str | os.PathLike[str], format: str | None = None) -> list[Path]:

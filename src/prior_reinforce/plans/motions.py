@@ -134,6 +134,10 @@ class Demonstrations:
     outcome_noise: Points = field(default_factory=lambda: np.empty((0, 0)))
     """How uncertain each outcome is, as a standard deviation, shape (N, k); zero where none is
     given: measured. What is learned is exact at the demonstrations only where they are."""
+    outcome_correction: Points = field(default_factory=lambda: np.empty((0, 0)))
+    """What each outcome is expected to be, minus the one seen, shape (N, k); zero where none is
+    given. "10 cm" by eye is anything from 7.5 to 15, 11.25 at mean. Generators learn what was seen,
+    as in the paper; an adapter may know better."""
 
     def __post_init__(self) -> None:
         """Copy and check everything; warn of units that look wrong, and of repeated outcomes.
@@ -182,6 +186,15 @@ class Demonstrations:
             )
         noise.flags.writeable = False
         object.__setattr__(self, "outcome_noise", noise)
+        correction = np.array(self.outcome_correction, dtype=np.float64)
+        correction = correction if correction.any() else np.zeros_like(outcomes)
+        if correction.shape != outcomes.shape or not np.all(np.isfinite(correction)):
+            raise InvalidDemonstrationsError(
+                f"outcome_correction must be one finite number for each of the outcomes "
+                f"{outcomes.shape}, got shape {correction.shape}"
+            )
+        correction.flags.writeable = False
+        object.__setattr__(self, "outcome_correction", correction)
         object.__setattr__(self, "plans", plans)
         object.__setattr__(self, "outcomes_seen", outcomes)
         object.__setattr__(self, "outcome_names", names)
@@ -211,11 +224,11 @@ class Demonstrations:
 
     @property
     def sha256(self) -> str:
-        """Fingerprint of plans, outcomes, their noise, and what they mean: names, units, tempo."""
+        """Fingerprint of plans, outcomes, how they are off, and what they mean."""
         about = [asdict(self.format), self.outcome_names, self.outcome_units]
         digest = hashlib.sha256(json.dumps(about, sort_keys=True).encode())
-        noise = (self.outcome_noise,) if np.any(self.outcome_noise) else ()
-        for array in (self.plans, self.outcomes_seen, *noise):
+        off = [of for of in (self.outcome_noise, self.outcome_correction) if np.any(of)]
+        for array in (self.plans, self.outcomes_seen, *off):
             digest.update(str(array.shape).encode())
             digest.update(array.tobytes())
         return digest.hexdigest()
@@ -238,6 +251,7 @@ class Demonstrations:
                 plans=self.plans[members],
                 outcomes_seen=self.outcomes_seen[members],
                 outcome_noise=self.outcome_noise[members],
+                outcome_correction=self.outcome_correction[members],
             )
 
     def repeated_outcomes(self) -> list[tuple[int, int]]:
@@ -297,6 +311,7 @@ class Demonstrations:
             "plans": self.plans,
             "outcomes_seen": self.outcomes_seen,
             "outcome_noise": self.outcome_noise,
+            "outcome_correction": self.outcome_correction,
             "metadata": np.array(json.dumps(metadata)),
         }
         with open(path, "wb") as file:
@@ -316,7 +331,8 @@ class Demonstrations:
         remedy = "it must be a demonstrations file; write one with Demonstrations.save"
         with open_npz(path, remedy) as archive:
             plans, outcomes = archive["plans"], archive["outcomes_seen"]
-            noise = archive["outcome_noise"] if "outcome_noise" in archive else np.empty((0, 0))
+            of_outcomes = ("outcome_noise", "outcome_correction")
+            off = [archive[of] if of in archive else np.empty((0, 0)) for of in of_outcomes]
             metadata = json.loads(str(archive["metadata"]))
             if metadata["file_format"] != _FILE_FORMAT or metadata["version"] != _FILE_VERSION:
                 raise ValueError(f"written as {metadata['file_format']} {metadata['version']}")
@@ -324,7 +340,7 @@ class Demonstrations:
             names = tuple(metadata["outcome_names"])
             units = tuple(metadata["outcome_units"])
         with _warned_before():
-            return cls(plans, outcomes, format_, names, units, noise)
+            return cls(plans, outcomes, format_, names, units, *off)
 
     def _warn_about_repeated_outcomes(self) -> None:
         pairs = self.repeated_outcomes()

@@ -38,7 +38,7 @@ def by_hand(monkeypatch):
         return Field(
             "by hand", np.array([0.85, -0.3]), np.array([x[1] - x[0], y[1] - y[0]]), off,
             np.array([0.004, 0.004]), np.array([[0.9, -0.2], [1.1, 0.2]]), 0.015, corners,
-            np.full((4, 2), 0.01),
+            np.full((4, 2), 0.01), np.zeros((4, 2)),
         )  # fmt: skip
 
     monkeypatch.setattr(MeasuredField, "field", measured)
