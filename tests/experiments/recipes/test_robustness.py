@@ -62,6 +62,22 @@ def test_conditions_give_table_picture_and_remarks(by_hand, tmp_path):
     assert "Brier" in RECIPE.remarks(figures)[-1]
 
 
+def test_where_goals_are_tried_alone_nothing_is_remembered_and_ours_is_alone_too(by_hand, tmp_path):
+    alone = Robustness(conditions=(Condition("by eye, alone", FIELDS, goals=4, alone=True),))
+    run = Run(tmp_path, Scale(rounds=4), include=("frozen",))
+    figures = json.loads(json.dumps(alone.run(run)))
+    table = RECIPE.table(figures)
+    assert table.header[2] == "Bayesian, each goal alone"
+    assert not any("earlier goals too" in label for label in table.header)
+    assert "(" not in table.rows[0][2]  # not compared with itself
+    assert "(" in table.rows[0][3]
+    kept = [json.loads(path.read_text())["unit"] for path in tmp_path.glob("units/*")]
+    assert not any(unit["carry_over"] for unit in kept if "carry_over" in unit)
+    rules = figures["conditions"][0]["rules"]
+    assert rules["Bayesian, each goal alone"]["ours_minus"]["value"] == 0.0
+    assert rules["frozen"]["ours_minus"]["value"] < 0.0
+
+
 def test_who_is_ahead_of_ours_is_named(by_hand, tmp_path):
     figures = SMALL.run(Run(tmp_path, Scale(rounds=2)))
     figures["conditions"][0]["rules"]["mean offset"]["ours_minus"]["value"] = 0.5
