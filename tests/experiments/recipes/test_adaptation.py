@@ -32,5 +32,13 @@ def test_one_afternoon_of_every_rule_gives_table_picture_and_remark(tmp_path):
     assert figures["trials"]["Bayesian, earlier goals too"]["mean"]["value"] < frozen
     (picture,) = RECIPE.draw(figures, tmp_path)
     assert picture.path.is_file()
-    (remark,) = RECIPE.remarks(figures)
-    assert "Brier" in remark
+    alone, said = RECIPE.remarks(figures)
+    assert "Brier" in said
+    assert "no adapter -" in alone  # fewer trials than without
+    assert "earlier goals" not in alone
+    minus = figures["alone_minus"]["GP, m = 2, each goal alone"]["value"]
+    ours, theirs = (
+        figures["trials"][f"{name}, each goal alone"]["mean"]["value"]
+        for name in ("Bayesian", "GP, m = 2")
+    )
+    assert minus == pytest.approx(ours - theirs)

@@ -52,7 +52,7 @@ RULES = (
     ("frozen", False, "no adapter"),
 )
 """The adapters compared, whether earlier goals' trials serve them, and what each is called."""
-_OURS = "Bayesian, earlier goals too"
+_OURS, _OURS_ALONE = "Bayesian, earlier goals too", "Bayesian, each goal alone"
 _GOALS = 8
 _ALONE = "each goal alone, all rules"
 _DASHES = ("--", ":", "-.")
@@ -102,7 +102,7 @@ class Adaptation(Measurement):
         flat = trials.reshape(*shape[:3], sequences * (_GOALS - 1))
         overall = flat.mean(axis=1)
         names = [label for _, _, label in rules]
-        ours = names.index(_OURS)
+        ours, alone = names.index(_OURS), names.index(_OURS_ALONE)
         by_place = trials_counted(solved, scale.rounds).mean(axis=(1, 2, 3))
         expected = [
             pair
@@ -128,6 +128,11 @@ class Adaptation(Measurement):
                 name: asdict(bootstrap_difference(overall[ours], overall[i]))
                 for i, name in enumerate(names)
                 if i != ours
+            },
+            "alone_minus": {
+                name: asdict(bootstrap_difference(overall[alone], overall[i]))
+                for i, (_, carried, name) in enumerate(rules)
+                if i != alone and not carried
             },
             "by_place": {name: by_place[i].tolist() for i, name in enumerate(names)},
             "p_hit": reliability(np.array(expected, dtype=float)),
@@ -226,8 +231,15 @@ def draw(figures: Figures, folder: Path) -> list[Picture]:
 
 
 def remarks(figures: Figures) -> list[str]:
-    """How far the probabilities that were said before each trial can be trusted."""
-    return [reliability_in_words(figures["p_hit"])]
+    """Who is ahead where nothing is remembered, and how far what is said can be trusted."""
+    alone = "; ".join(
+        f"{name.removesuffix(', each goal alone')} {interval_of(of):+.2f}"
+        for name, of in figures["alone_minus"].items()
+    )
+    return [
+        f"Each goal alone, the Bayesian adapter minus: {alone}.",
+        reliability_in_words(figures["p_hit"]),
+    ]
 
 
 def reliability_in_words(p: Mapping[str, Any]) -> str:
