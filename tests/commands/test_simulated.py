@@ -82,7 +82,7 @@ def test_what_the_demo_learned_serves_adapt_together_with_what_it_saw(tmp_path, 
 
 @pytest.mark.slow
 def test_what_the_camera_saw_of_demonstrations_and_trials_is_kept(tmp_path, capsys):
-    quick = ["--generator", "nearest", "--goals", "1", "--no-film", "--out", str(tmp_path)]
+    quick = ["--generator", "interpolation", "--goals", "1", "--no-film", "--out", str(tmp_path)]
     assert main(["demo", "--perception", "camera", *quick]) in (0, 1)
     pictures = {path.stem for path in (tmp_path / "seen").glob("*.png")}
     assert pictures > {f"demonstration{number}" for number in range(1, 7)}

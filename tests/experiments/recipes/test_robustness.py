@@ -63,7 +63,7 @@ def test_conditions_give_table_picture_and_remarks(by_hand, tmp_path):
 
 
 def test_where_goals_are_tried_alone_nothing_is_remembered_and_ours_is_alone_too(by_hand, tmp_path):
-    alone = Robustness(conditions=(Condition("by eye, alone", FIELDS, goals=4, alone=True),))
+    alone = Robustness(conditions=(Condition("by eye, alone", FIELDS, goals=2, alone=True),))
     run = Run(tmp_path, Scale(rounds=4), include=("frozen",))
     figures = json.loads(json.dumps(alone.run(run)))
     table = RECIPE.table(figures)
