@@ -61,7 +61,13 @@ class GoalTrials:
 
 
 def is_hit(rollout: Rollout, goal: Point, tolerance: float) -> bool:
-    """Whether the true outcome is within the tolerance of the goal; a lost object never is."""
+    """Whether the true outcome is within the tolerance of the goal; a lost object never is.
+
+    Args:
+        rollout: What came of an execution.
+        goal: g, shape (k,), in the outcomes' units.
+        tolerance: epsilon, in the first component's unit.
+    """
     return bool(rollout.valid and np.linalg.norm(rollout.outcome - goal) <= tolerance)
 
 
