@@ -65,7 +65,9 @@ def main() -> None:
                 assert isinstance(adapter, BayesianAdapter)
                 seen = prior.outcomes_seen
                 corrected = replace(
-                    prior, outcomes_seen=seen + adapter.displacement(seen, hardware=False)
+                    prior,
+                    outcomes_seen=seen + adapter.displacement(seen, hardware=False),
+                    outcome_correction=np.zeros_like(seen),
                 )
                 off = [
                     100 * np.sqrt(np.square(d.outcomes_seen - recorded.outcomes_seen).sum(1).mean())

@@ -60,6 +60,15 @@ def test_what_labels_say_to_be_off_is_corrected_from_the_first_throw_on():
     np.testing.assert_allclose(adapter.propose(GOAL), GOAL - [0.0125, -0.01], atol=1e-4)
 
 
+@pytest.mark.parametrize("units", [("s",), ("m", "rad"), ("m", "m", "deg")])
+def test_a_correction_is_in_each_components_own_unit(units):
+    off, spread = np.array([0.0125, -0.3, 20.0])[: len(units)], [1.0, 30.0, 2000.0]
+    outcomes = np.random.default_rng(1).uniform(0.0, 1.0, (6, len(units))) * spread[: len(units)]
+    adapter = started(outcomes, units, correction=np.tile(off, (6, 1)))
+    goal = outcomes.mean(axis=0)
+    np.testing.assert_allclose(adapter.propose(goal), goal - off, atol=1e-4 * spread[-1])
+
+
 @pytest.mark.parametrize("trials", [0, 6, 40])
 @pytest.mark.parametrize("hit_or_miss", [False, True])
 def test_beyond_what_labels_say_everything_is_learned_as_without(trials, hit_or_miss):

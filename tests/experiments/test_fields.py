@@ -1,8 +1,10 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from prior_reinforce.adapters import make_adapter
-from prior_reinforce.errors import ConfigurationError
+from prior_reinforce.errors import ConfigurationError, FileFormatError
 from prior_reinforce.experiments.fields import Change, Conditions, Field, FieldTask, measure
 from prior_reinforce.experiments.protocol import run_goals
 from prior_reinforce.generators import make_generator
@@ -50,6 +52,11 @@ def test_a_field_comes_back_from_its_file(field, tmp_path):
     np.testing.assert_array_equal(again.demonstrations.outcome_noise, field.outcome_noise)
     correction = again.demonstrations.outcome_correction
     np.testing.assert_array_equal(correction, field.outcome_correction)
+    with np.load(tmp_path / "field.npz") as kept:
+        older = {name: array for name, array in kept.items() if name != "outcome_correction"}
+    np.savez(tmp_path / "field.npz", **older)
+    with pytest.raises(FileFormatError, match=r"is of an earlier version.*fresh --out"):
+        Field.load(tmp_path / "field.npz")
 
 
 def test_a_plan_comes_down_at_its_condition_and_the_displacement(field):
@@ -119,9 +126,12 @@ def test_measuring_a_field_finds_the_field(field):
 def test_a_field_measured_in_physics_tells_where_other_plans_land():
     task = make_task("basketball-v1")
     own = task.demonstrations("A")
+    known = np.linspace(-0.01, 0.02, own.outcomes_seen.size).reshape(own.outcomes_seen.shape)
+    own = replace(own, outcome_correction=known)
     generator = make_generator("interpolation,timing=align").fit(own, seed=0)
     field = measure(task, generator, own, "V1", seed=0)
     conditions = task.sample_goals(20, np.random.default_rng(0))
     landed = [r.outcome for r in task.rollout(generator.generate(conditions), None)]
+    np.testing.assert_array_equal(field.outcome_correction, known)
     off = conditions + field.at(conditions) - landed
     assert np.sqrt(np.mean(off**2)) < 0.003

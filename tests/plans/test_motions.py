@@ -71,11 +71,11 @@ def test_some_demonstrations_keep_their_outcomes_and_noise():
 
 def test_what_outcomes_are_expected_to_be_is_kept_with_them(tmp_path):
     demos = make()
-    correction = np.linspace(-0.02, 0.03, demos.outcomes_seen.size).reshape(demos.n, -1)
+    correction = np.linspace(0.01, 0.03, demos.outcomes_seen.size).reshape(demos.n, -1)
     known = replace(demos, outcome_correction=correction)
     np.testing.assert_array_equal(known.only((2, 0)).outcome_correction, correction[[2, 0]])
     assert known.sha256 != demos.sha256
-    assert known.sha256 != replace(demos, outcome_noise=np.abs(correction)).sha256
+    assert known.sha256 != replace(demos, outcome_noise=correction).sha256
     known.save(tmp_path / "demos.npz")
     again = Demonstrations.load(tmp_path / "demos.npz")
     np.testing.assert_array_equal(again.outcome_correction, correction)

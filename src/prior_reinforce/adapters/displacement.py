@@ -107,12 +107,12 @@ class DisplacementPrior:
         )
 
     def with_demonstration(self, outcome: Float[np.ndarray, "1 k"]) -> DisplacementPrior:
-        """The same with one demonstration more, seen as the others are on average."""
+        """The same with one demonstration more, seen as the others are on average and near it."""
         other = copy.copy(self)
         other._mix(
             np.vstack([self._demonstrated, outcome]),
             np.vstack([self._noise, self._noise.mean(axis=0)]),
-            np.vstack([self._correction, np.zeros(outcome.shape[1])]),
+            np.vstack([self._correction, self.mean(outcome).T]),
         )
         return other
 

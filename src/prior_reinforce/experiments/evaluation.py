@@ -154,7 +154,11 @@ class Training(Unit):
         return make_task(self.task).demonstrations(self.demonstrations)
 
     def learned(self, folder: Path) -> Learned:
-        """What was learned: from the folder's models, or now, and put there."""
+        """What was learned: from the folder's models, or now, and put there.
+
+        Raises:
+            FileFormatError: What was perceived is of an earlier version, which kept less of it.
+        """
         home = self._home(folder)
         if not home.is_dir():
             prior = self._prior(folder)
@@ -165,7 +169,10 @@ class Training(Unit):
                 generator.save(unfinished / "generator")
                 prior.save(unfinished / "demonstrations.npz")
         generator = load_generator(home / "generator", own=own_class(self.generator))
-        return Learned(generator, Demonstrations.load(home / "demonstrations.npz"))
+        prior = Demonstrations.load(home / "demonstrations.npz")
+        if self.perceived is not None:  # a model of an earlier version does not say it
+            prior = replace(prior, outcome_correction=self._prior(folder).outcome_correction)
+        return Learned(generator, prior)
 
     def _home(self, folder: Path) -> Path:
         return folder / "models" / digest_of(self)

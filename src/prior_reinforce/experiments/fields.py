@@ -25,7 +25,11 @@ from scipy.interpolate import RectBivariateSpline
 from typing_extensions import Self
 
 from prior_reinforce.arrays import Plans, Points, as_plans
-from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
+from prior_reinforce.errors import (
+    ConfigurationError,
+    FileFormatError,
+    InvalidDemonstrationsError,
+)
 from prior_reinforce.experiments.evaluation import GOAL_SEED
 from prior_reinforce.experiments.protocol import perceive_demonstrations
 from prior_reinforce.experiments.units import Unit, digest_of
@@ -109,9 +113,18 @@ class Field:
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Self:
-        """Read what `save` wrote."""
+        """Read what `save` wrote.
+
+        Raises:
+            FileFormatError: An earlier version wrote it, which kept less of the labels.
+        """
         with np.load(path) as data:
             arrays = dict(data)
+        if "outcome_correction" not in arrays:
+            raise FileFormatError(
+                f"{path} is of an earlier version, which did not keep how far outcomes are off; "
+                "delete it, or choose a fresh --out"
+            )
         return cls(
             **{**arrays, "name": str(arrays["name"]), "tolerance": float(arrays["tolerance"])}
         )
@@ -241,6 +254,7 @@ class MeasuredField(Unit):
             plans=np.concatenate([d.plans for d in both]),
             outcomes_seen=np.concatenate([d.outcomes_seen for d in both]),
             outcome_noise=np.concatenate([d.outcome_noise for d in both]),
+            outcome_correction=np.concatenate([d.outcome_correction for d in both]),
         )
         drawn = [self.seed, ord(self.demonstrations), *[attempt] * (attempt > 0)]
         order = np.random.default_rng(drawn).permutation(pool.n)

@@ -106,7 +106,7 @@ class Preview:
             squeeze=False,
             gridspec_kw={
                 "left": 0.7 / width, "right": 1 - 0.15 / width, "bottom": 0.5 / height,
-                "top": 1 - 0.75 / height, "wspace": 0.28, "hspace": 0.45,
+                "top": 1 - 0.75 / height, "wspace": 0.34, "hspace": 0.45,
             },
         )  # fmt: skip
         axes = panels.ravel()

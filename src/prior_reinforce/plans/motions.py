@@ -227,10 +227,12 @@ class Demonstrations:
         """Fingerprint of plans, outcomes, how they are off, and what they mean."""
         about = [asdict(self.format), self.outcome_names, self.outcome_units]
         digest = hashlib.sha256(json.dumps(about, sort_keys=True).encode())
-        off = [of for of in (self.outcome_noise, self.outcome_correction) if np.any(of)]
-        for array in (self.plans, self.outcomes_seen, *off):
+        noise = (self.outcome_noise,) if np.any(self.outcome_noise) else ()
+        for array in (self.plans, self.outcomes_seen, *noise):
             digest.update(str(array.shape).encode())
             digest.update(array.tobytes())
+        if np.any(self.outcome_correction):
+            digest.update(b"outcome_correction" + self.outcome_correction.tobytes())
         return digest.hexdigest()
 
     def with_plans(self, plans: Plans, format: PlanFormat | None = None) -> Self:

@@ -96,6 +96,8 @@ def test_every_draw_is_another_and_every_rule_has_its_own_name():
     assert len({field.demonstrations for field in sets}) == 30
     assert len({rule.label for rule in RULES}) == len(RULES)
     assert len({condition.label for condition in CONDITIONS}) == len(CONDITIONS)
+    assert all(c.alone == c.label.endswith(", alone") for c in CONDITIONS)
+    assert sum(c.alone for c in CONDITIONS) == 10
 
 
 def test_a_field_of_a_draw_is_measured_once_and_kept(monkeypatch, tmp_path):
