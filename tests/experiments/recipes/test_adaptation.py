@@ -6,18 +6,32 @@ import numpy as np
 import pytest
 
 from prior_reinforce.experiments.recipes import Run, Scale
-from prior_reinforce.experiments.recipes.adaptation import RECIPE, Adaptation, reliability
+from prior_reinforce.experiments.recipes.adaptation import (
+    RECIPE,
+    Adaptation,
+    reliability,
+    said_and_came,
+)
 
 SMALL = Scale(goals=8, seeds=(0,), sets=("A",), rounds=2)
 
 
 def test_reliability_by_hand():
-    expected = np.array([[0.2, 0], [0.2, 0], [0.2, 1], [0.8, 1]], dtype=float)
-    found = reliability(expected)
+    found = reliability(np.array([[0.2, 0, 3], [0.2, 0, 2], [0.2, 1, 1], [0.8, 1, 1]], dtype=float))
     assert found["brier"] == pytest.approx((0.04 + 0.04 + 0.64 + 0.04) / 4)
     assert found["base_rate"] == 0.25
     assert [b["n"] for b in found["bins"]] == [3, 1]
     assert found["bins"][0]["hit"] == pytest.approx(1 / 3)
+    assert [b["to_go"] for b in found["bins"]] == [2.0, 1.0]
+
+
+def test_trials_to_go_of_a_goal_that_was_reached_and_of_one_that_was_not():
+    said = [[0.3, False], [0.5, True], [0.2, False], [0.1, False], [0.1, False]]
+    result = {"solved_at": [[2, 0]], "expected": said}  # three trials at most
+    rows = said_and_came(result, rounds=3)
+    assert [to_go for _, _, to_go in rows] == [2.0, 1.0, 4.0, 3.0, 2.0]
+    assert [p for p, _, _ in rows] == [p for p, _ in said]
+    assert [hit for _, hit, _ in rows] == [0.0, 1.0, 0.0, 0.0, 0.0]
 
 
 @pytest.mark.slow

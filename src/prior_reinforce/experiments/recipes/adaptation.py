@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
 from prior_reinforce.experiments.evaluation import GOAL_SEED, Training
 from prior_reinforce.experiments.recipes.base import (
@@ -104,11 +105,11 @@ class Adaptation(Measurement):
         names = [label for _, _, label in rules]
         ours, alone = names.index(_OURS), names.index(_OURS_ALONE)
         by_place = trials_counted(solved, scale.rounds).mean(axis=(1, 2, 3))
-        expected = [
-            pair
+        said = [
+            row
             for unit, result in zip(units, results, strict=True)
             if unit.adapter == "bayes"
-            for pair in result["expected"]
+            for row in said_and_came(result, scale.rounds)
         ]
         return {
             "tasks": list(self.tasks),
@@ -135,7 +136,7 @@ class Adaptation(Measurement):
                 if i != alone and not carried
             },
             "by_place": {name: by_place[i].tolist() for i, name in enumerate(names)},
-            "p_hit": reliability(np.array(expected, dtype=float)),
+            "p_hit": reliability(np.array(said)),
         }
 
     def _trainings(self, task: str, scale: Scale) -> list[Training]:
@@ -146,20 +147,42 @@ class Adaptation(Measurement):
         ]
 
 
-def reliability(expected: Any) -> dict[str, Any]:
+def said_and_came(result: Mapping[str, Any], rounds: int) -> list[tuple[float, float, float]]:
+    """P(hit) as it was said before each trial, whether it hit, and the trials to go, this one too.
+
+    Args:
+        result: What a unit of afternoons gave.
+        rounds: Trials a goal at most; a goal that was not reached would have taken one more.
+    """
+    said = iter(result["expected"])
+    rows = []
+    for solved_at in np.ravel(result["solved_at"]):
+        needed = int(trials_counted(np.array(solved_at), rounds))
+        for before in range(min(needed, rounds)):
+            p_hit, hit = next(said)
+            rows.append((p_hit, float(hit), float(needed - before)))
+    return rows
+
+
+def reliability(said: Float[np.ndarray, "n 3"]) -> dict[str, Any]:
     """What was said of P(hit) and what came of it, over trials; Brier score beside the base rate's.
 
     Args:
-        expected: Shape (n, 2): probability, and 1 where the trial hit.
+        said: Rows of `said_and_came`.
     """
-    said, hit = expected.T
-    which = np.clip(np.digitize(said, _BINS) - 1, 0, len(_BINS) - 2)
+    p_hit, hit, to_go = said.T
+    which = np.clip(np.digitize(p_hit, _BINS) - 1, 0, len(_BINS) - 2)
     return {
         "n": len(said),
-        "brier": float(np.mean((said - hit) ** 2)),
+        "brier": float(np.mean((p_hit - hit) ** 2)),
         "base_rate": float(hit.mean() * (1 - hit.mean())),
         "bins": [
-            {"said": float(said[which == b].mean()), "hit": float(hit[which == b].mean()), "n": n}
+            {
+                "said": float(p_hit[which == b].mean()),
+                "hit": float(hit[which == b].mean()),
+                "to_go": float(to_go[which == b].mean()),
+                "n": n,
+            }
             for b in range(len(_BINS) - 1)
             if (n := int(np.sum(which == b)))
         ],
@@ -244,11 +267,13 @@ def remarks(figures: Figures) -> list[str]:
 
 def reliability_in_words(p: Mapping[str, Any]) -> str:
     """A reliability table in a sentence."""
-    bins = "; ".join(f"{b['said']:.2f}: {b['hit']:.2f} of {b['n']}" for b in p["bins"])
+    bins = "; ".join(
+        f"{b['said']:.2f}: {b['hit']:.2f} of {b['n']}, {b['to_go']:.2f}" for b in p["bins"]
+    )
     return (
         f"P(hit), as the Bayesian adapter said it before each of {p['n']} trials: Brier score "
-        f"{p['brier']:.3f}, that of the base rate {p['base_rate']:.3f}. Said, and the share that "
-        f"hit: {bins}."
+        f"{p['brier']:.3f}, that of the base rate {p['base_rate']:.3f}. Said, the share that hit, "
+        f"and the mean of trials to go, this one included: {bins}."
     )
 
 

@@ -17,7 +17,12 @@ import numpy as np
 
 from prior_reinforce.experiments.evaluation import GOAL_SEED
 from prior_reinforce.experiments.fields import Change, MeasuredField
-from prior_reinforce.experiments.recipes.adaptation import TASKS, reliability, reliability_in_words
+from prior_reinforce.experiments.recipes.adaptation import (
+    TASKS,
+    reliability,
+    reliability_in_words,
+    said_and_came,
+)
 from prior_reinforce.experiments.recipes.base import (
     Figures,
     Measurement,
@@ -228,7 +233,7 @@ class Robustness(Measurement):
         }
         ours = trials[rules[0].label]
         of_ours = [unit for row in units[rules[0].label] for unit in row]
-        expected = [pair for unit in of_ours for pair in results[unit]["expected"]]
+        said = [row for unit in of_ours for row in said_and_came(results[unit], run.scale.rounds)]
         bounds = (1, run.scale.rounds + 1)
         return {
             "label": condition.label,
@@ -242,7 +247,7 @@ class Robustness(Measurement):
                 }
                 for label, rows in trials.items()
             },
-            "p_hit": reliability(np.array(expected, dtype=float)),
+            "p_hit": reliability(np.array(said)),
         }
 
 
