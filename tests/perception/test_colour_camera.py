@@ -125,7 +125,7 @@ def test_outliers_cost_less_than_a_trial():
     task = make_task("basketball-v3")
     prior = align(task.demonstrations("A")).demonstrations
     generator = SmoothInterpolation().fit(prior, seed=0)
-    goals = task.sample_goals(6, np.random.default_rng(8))
+    goals = task.sample_goals(4, np.random.default_rng(8))
     trials = []
     for rate in (0.0, 0.1):
         with ColourCamera(task.scene, outlier_rate=rate, seed=2) as perception:

@@ -180,7 +180,7 @@ def test_between_aligned_demonstrations_linear_interpolation_lands_within_a_tole
                 aligned[i, :, j] = np.interp(
                     frames + middle[i] - middle.mean(), frames, plans[i, :, j]
                 )
-        goals = task.sample_goals(120, np.random.default_rng(0))
+        goals = task.sample_goals(60, np.random.default_rng(0))
         between = LinearNDInterpolator(seen, aligned.reshape(len(plans), -1))(goals)
         inside = np.all(np.isfinite(between), axis=1)
         landed = task.rollout(between[inside].reshape(-1, *plans.shape[1:]), None)

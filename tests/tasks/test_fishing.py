@@ -128,7 +128,7 @@ def test_demonstrations_start_over_a_third_of_the_horizon(task):
 
 @pytest.mark.slow
 def test_a_repeated_plan_lands_within_about_three_millimetres(task):
-    plans = np.repeat(casts([0.1]), 32, axis=0)
+    plans = np.repeat(casts([0.1]), 16, axis=0)
     spread = outcomes(task.rollout(plans, np.random.default_rng(0))).std(axis=0)
     assert np.all((spread > 0.001) & (spread < 0.0045))
     quiet = Fishing(FishingDisturbances(ArmDisturbances(0.0, 0.0), sway=0.0, rope=0.0))
