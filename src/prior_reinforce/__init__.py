@@ -5,9 +5,15 @@ names is `__init__.pyi`; each is imported when it is first used, so that a comma
 network does not wait for one.
 """
 
-from importlib.metadata import version
-
 import lazy_loader
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
-__version__ = version("prior-reinforce")
+_member, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+
+
+def __getattr__(name: str) -> object:
+    """A public name, imported now; the version is looked up among all installed packages."""
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version("prior-reinforce")
+    return _member(name)

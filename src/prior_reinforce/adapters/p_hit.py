@@ -25,7 +25,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
-from scipy.special import ndtr, ndtri
 
 _POINTS = 192
 """Where the share within a ball is evaluated (ours): right to 0.002, for k up to 3."""
@@ -74,6 +73,8 @@ class Targets:
 
         Of the noise across the way to the middle its mean square is taken, and along it all.
         """
+        from scipy.special import ndtr  # as in `expectation_propagation`
+
         across = (len(drawn) - 1) * self.execution_sd**2
         distance = np.sqrt(np.square(drawn - self.aims.T[:, None]).sum(axis=0) + across)
         return np.asarray(ndtr((self.radii - distance) / self.execution_sd))
@@ -124,6 +125,8 @@ def share_within(
     1, and smooth in everything. Source: Genz, Numerical computation of multivariate normal
     probabilities, 1992, for a box; the ball is ours.
     """
+    from scipy.special import ndtr, ndtri
+
     k = mean.shape[1]
     points = evenly_spread(k - 1)
     square = np.square(radius)[..., None]
