@@ -23,6 +23,7 @@ HEAVY = {
     "imageio",
     "openai",
     "scipy.interpolate",
+    "scipy.special",
     "scipy.optimize",
     "scipy.spatial",
     "scipy.linalg",

@@ -16,7 +16,6 @@ from .errors import RenderingUnavailableError as RenderingUnavailableError
 from .errors import UnclearUnitsError as UnclearUnitsError
 from .experiments.learned import load_learned as load_learned
 from .experiments.protocol import GoalTrials as GoalTrials
-from .experiments.protocol import is_hit as is_hit
 from .experiments.protocol import perceive_demonstrations as perceive_demonstrations
 from .experiments.protocol import run_goals as run_goals
 from .experiments.protocol import run_sequences as run_sequences

@@ -7,7 +7,7 @@ import pytest
 from prior_reinforce.generators import GENERATORS, make_generator
 from prior_reinforce.testing import GeneratorContract, tiny_networks
 
-VARIANTS = ("dmp,segmented=false", "interpolation,timing=start")
+VARIANTS = ("diffusion,timing=none", "dmp,segmented=false", "interpolation,timing=start")
 
 
 class TestGenerators(GeneratorContract):

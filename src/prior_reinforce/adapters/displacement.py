@@ -7,7 +7,8 @@ under each of m models the prior covariance
 
 with w the weights of a spline over the demonstrated outcomes, S the variances of their labels, K
 the squared-exponential kernel of a reach, and the last term between trials of one hardware alone.
-Their prior mean is w(a)' m, with m what the labels say to be off: "10 cm" by eye is 11.25 at mean.
+Their prior mean is w(a)' m, with m what the labels say to be off: "10 cm" by eye is 11.25 on
+average.
 
 Source: ours; the figures are in docs/decisions-adapter.md.
 """

@@ -66,7 +66,8 @@ def is_hit(rollout: Rollout, goal: Point, tolerance: float) -> bool:
     Args:
         rollout: What came of an execution.
         goal: g, shape (k,), in the outcomes' units.
-        tolerance: epsilon, in the first component's unit.
+        tolerance: epsilon of the task. The plain norm is compared with it, also where units are
+            mixed; a session without such a judge uses `Normalisation.metric`.
     """
     return bool(rollout.valid and np.linalg.norm(rollout.outcome - goal) <= tolerance)
 

@@ -180,7 +180,7 @@ def _outcomes(units: Sequence[Unit], folder: Path, workers: Workers) -> Iterator
 
 def _run(folder: Path, unit: Unit) -> _Outcome:
     """Run a unit and keep its result; or keep how it failed."""
-    # Now, not when a unit needs it: joblib would take its memory for a leak and stop the worker.
+    # Loads torch before any unit can: joblib would take it for a memory leak, and stop the worker.
     from prior_reinforce.generators.threads import torch_threads
 
     sweep(folder / "units")

@@ -135,9 +135,9 @@ class Demonstrations:
     """How uncertain each outcome is, as a standard deviation, shape (N, k); zero where none is
     given: measured. What is learned is exact at the demonstrations only where they are."""
     outcome_correction: Points = field(default_factory=lambda: np.empty((0, 0)))
-    """What each outcome is expected to be, minus the one seen, shape (N, k); zero where none is
-    given. "10 cm" by eye is anything from 7.5 to 15, 11.25 at mean. Generators learn what was seen,
-    as in the paper; an adapter may know better."""
+    """What each outcome is expected to be, minus the one seen, shape (N, k), in the outcomes'
+    units; zero where none is given. "10 cm" by eye is anything from 7.5 to 15, 11.25 on average.
+    Generators learn what was seen, as in the paper; `BayesianAdapter` corrects it."""
 
     def __post_init__(self) -> None:
         """Copy and check everything; warn of units that look wrong, and of repeated outcomes.
@@ -224,7 +224,7 @@ class Demonstrations:
 
     @property
     def sha256(self) -> str:
-        """Fingerprint of plans, outcomes, how they are off, and what they mean."""
+        """Fingerprint of plans, outcomes, their noise and correction, and what they mean."""
         about = [asdict(self.format), self.outcome_names, self.outcome_units]
         digest = hashlib.sha256(json.dumps(about, sort_keys=True).encode())
         noise = (self.outcome_noise,) if np.any(self.outcome_noise) else ()
