@@ -16,12 +16,12 @@ from pathlib import Path
 import numpy as np
 
 from prior_reinforce.adapters.bayesian import BayesianAdapter
-from prior_reinforce.experiments.fields import Conditions, FieldTask, MeasuredField
-from prior_reinforce.experiments.protocol import is_hit
-from prior_reinforce.experiments.recipes.adaptation import TASKS
+from prior_reinforce.environment import Task
 from prior_reinforce.generators.base import Generator
+from prior_reinforce.lab.experiments.fields import Conditions, FieldTask, MeasuredField
+from prior_reinforce.lab.experiments.protocol import is_hit
+from prior_reinforce.lab.experiments.recipes.adaptation import TASKS
 from prior_reinforce.perception.eye import Eye
-from prior_reinforce.tasks.base import Task
 
 LABELS = 10
 THROWS = (0, 2, 4)

@@ -21,9 +21,9 @@ import mujoco
 import numpy as np
 from PIL import Image, ImageDraw
 
-from prior_reinforce.rollouts import Rollout
-from prior_reinforce.tasks.basketball import HARDWARE, BasketballShot
-from prior_reinforce.tasks.demonstrations import basketball as making
+from prior_reinforce.environment import Rollout
+from prior_reinforce.lab.tasks.basketball import HARDWARE, BasketballShot
+from prior_reinforce.lab.tasks.demonstrations import basketball as making
 
 DRAWN = 5
 """The demonstration of set A that the picture shows: one to the middle of the region."""

@@ -23,10 +23,10 @@ from prior_reinforce.adapters.base import Adapter
 from prior_reinforce.adapters.bayesian import BayesianAdapter
 from prior_reinforce.adapters.gaussian_process import GaussianProcessAdapter
 from prior_reinforce.arrays import Point
+from prior_reinforce.environment import Rollout
 from prior_reinforce.perception.eye import Eye
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 from prior_reinforce.readings import Reading
-from prior_reinforce.rollouts import Rollout
 
 REGION = np.array([0.25, 0.50, 0.40])  # [m]
 TOLERANCE = 0.015  # [m]

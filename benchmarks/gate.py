@@ -17,10 +17,10 @@ from pathlib import Path
 import numpy as np
 
 from prior_reinforce import make_task
+from prior_reinforce.bench.robots import check_plan, robot_limits
+from prior_reinforce.bench.robots.report import LimitReport
 from prior_reinforce.generators import load_generator, make_generator
 from prior_reinforce.plans.motions import Plan
-from prior_reinforce.robots import check_plan, robot_limits
-from prior_reinforce.robots.report import LimitReport
 
 
 def main() -> None:

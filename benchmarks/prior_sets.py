@@ -14,10 +14,10 @@ import argparse
 import numpy as np
 from scipy.spatial import Delaunay
 
+from prior_reinforce.environment import Task
 from prior_reinforce.generators import make_generator
+from prior_reinforce.lab.tasks import make_task
 from prior_reinforce.plans.motions import Demonstrations
-from prior_reinforce.tasks import make_task
-from prior_reinforce.tasks.base import Task
 
 HULL_GOALS = 2000
 

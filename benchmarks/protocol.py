@@ -22,11 +22,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from prior_reinforce.adapters.gaussian_process import GaussianProcessAdapter
-from prior_reinforce.experiments.protocol import run_goals
 from prior_reinforce.generators import make_generator
+from prior_reinforce.lab.experiments.protocol import run_goals
+from prior_reinforce.lab.tasks import make_task
 from prior_reinforce.perception.amplified import Amplified
 from prior_reinforce.readings import Reading
-from prior_reinforce.tasks import make_task
 
 
 class Stopwatch:

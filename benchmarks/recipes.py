@@ -14,8 +14,8 @@ import tempfile
 import time
 from pathlib import Path
 
-from prior_reinforce.experiments.recipes import RECIPES, Run, Scale
-from prior_reinforce.experiments.units import Workers
+from prior_reinforce.lab.experiments.recipes import RECIPES, Run, Scale
+from prior_reinforce.lab.experiments.units import Workers
 
 
 def main() -> None:

@@ -20,12 +20,12 @@ from pathlib import Path
 import numpy as np
 
 from prior_reinforce.adapters.bayesian import BayesianAdapter
-from prior_reinforce.experiments.fields import Conditions, FieldTask, MeasuredField
-from prior_reinforce.experiments.protocol import perceive_demonstrations, reach_goals
 from prior_reinforce.generators import make_generator
+from prior_reinforce.lab.experiments.fields import Conditions, FieldTask, MeasuredField
+from prior_reinforce.lab.experiments.protocol import perceive_demonstrations, reach_goals
+from prior_reinforce.lab.tasks import make_task
 from prior_reinforce.perception.eye import Eye
-from prior_reinforce.session import Session
-from prior_reinforce.tasks import make_task
+from prior_reinforce.session.session import Session
 
 TASK, LABELS, ROUNDS, NEW_GOALS = "basketball-v1", 10, 10, 40
 

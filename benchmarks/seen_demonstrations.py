@@ -13,15 +13,15 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from prior_reinforce.experiments.evaluation import Training, Trials
-from prior_reinforce.experiments.recipes.base import Run, Scale
-from prior_reinforce.experiments.statistics import (
+from prior_reinforce.lab.experiments.evaluation import Training, Trials
+from prior_reinforce.lab.experiments.recipes.base import Run, Scale
+from prior_reinforce.lab.experiments.statistics import (
     SHARE,
     bootstrap_mean,
     reached_by,
     trials_counted,
 )
-from prior_reinforce.experiments.units import Workers
+from prior_reinforce.lab.experiments.units import Workers
 
 
 def main() -> None:

@@ -16,9 +16,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from prior_reinforce.rollouts import Rollout
-from prior_reinforce.tasks import TASKS, make_task
-from prior_reinforce.tasks.base import Task
+from prior_reinforce.environment import Rollout, Task
+from prior_reinforce.lab.tasks import TASKS, make_task
 
 ANGLE = 0.002  # [rad]
 POSITION = 0.001  # [m]

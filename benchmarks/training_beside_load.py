@@ -23,7 +23,7 @@ import joblib
 _TRAIN = """
 import sys, time
 from prior_reinforce.generators import DiffusionConfig, DiffusionGenerator, Timed
-from prior_reinforce.tasks import make_task
+from prior_reinforce.lab.tasks import make_task
 import prior_reinforce.generators.denoiser
 demos = make_task("basketball-v1").demonstrations("A")
 config = DiffusionConfig(training_steps=int(sys.argv[1]))

@@ -24,15 +24,14 @@ os.environ.setdefault("MUJOCO_GL", "egl")
 
 import numpy as np
 
+from prior_reinforce.environment import Rollout, Task
 from prior_reinforce.errors import PerceptionFailedError
 from prior_reinforce.generators import Generator, make_generator
+from prior_reinforce.lab.tasks import TASKS, make_task
 from prior_reinforce.perception.camera import Camera
 from prior_reinforce.perception.colour_camera import ColourCamera
 from prior_reinforce.perception.vlm import VisionLanguageModel
 from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
-from prior_reinforce.rollouts import Rollout
-from prior_reinforce.tasks import TASKS, make_task
-from prior_reinforce.tasks.base import Task
 
 MISS = 0.04
 """Standard deviation of condition minus goal, along each axis, in [m]; ours: first trials of a

@@ -22,16 +22,16 @@ os.environ.setdefault("MUJOCO_GL", "egl")
 import numpy as np
 
 from prior_reinforce.adapters.gaussian_process import GaussianProcessAdapter
-from prior_reinforce.experiments.evaluation import Training
-from prior_reinforce.experiments.protocol import GoalTrials, run_goals
-from prior_reinforce.experiments.statistics import (
+from prior_reinforce.lab.experiments.evaluation import Training
+from prior_reinforce.lab.experiments.protocol import GoalTrials, run_goals
+from prior_reinforce.lab.experiments.statistics import (
     bootstrap_difference,
     bootstrap_mean,
     trials_counted,
 )
+from prior_reinforce.lab.tasks import make_task
 from prior_reinforce.perception.colour_camera import ColourCamera
 from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
-from prior_reinforce.tasks import make_task
 
 GOAL_SEED = 500  # of the goals; no other measurement uses them
 

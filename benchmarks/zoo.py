@@ -17,12 +17,12 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 
+from prior_reinforce.environment import Task
 from prior_reinforce.generators import make_generator
-from prior_reinforce.tasks import make_task
-from prior_reinforce.tasks.base import Task
-from prior_reinforce.tasks.zoo import DEVELOPED_ON, MEMBERS
-from prior_reinforce.tasks.zoo.base import ZooTask
-from prior_reinforce.tasks.zoo.human import KINDS
+from prior_reinforce.lab.tasks import make_task
+from prior_reinforce.lab.tasks.zoo import DEVELOPED_ON, MEMBERS
+from prior_reinforce.lab.tasks.zoo.base import ZooTask
+from prior_reinforce.lab.tasks.zoo.human import KINDS
 
 SHOWN = "zoo-scoop"
 """Task whose demonstrations show what each kind of set varies."""

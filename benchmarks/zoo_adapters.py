@@ -20,14 +20,14 @@ import numpy as np
 
 from prior_reinforce.adapters import make_adapter
 from prior_reinforce.arrays import Point
-from prior_reinforce.experiments.protocol import run_sequences
+from prior_reinforce.environment import Rollout
 from prior_reinforce.generators import make_generator
+from prior_reinforce.lab.experiments.protocol import run_sequences
+from prior_reinforce.lab.tasks import make_task
+from prior_reinforce.lab.tasks.zoo import DEVELOPED_ON, REPORTED
 from prior_reinforce.perception import make_perception
 from prior_reinforce.perception.base import Perception
 from prior_reinforce.readings import Reading
-from prior_reinforce.rollouts import Rollout
-from prior_reinforce.tasks import make_task
-from prior_reinforce.tasks.zoo import DEVELOPED_ON, REPORTED
 
 ADAPTERS = ("bayes+", "gp-all+", "gp+", "bayes", "gp", "proportional")
 SETS = ("mixed-8-0", "mixed-8-1", "scattered-6-0", "scattered-6-1")

@@ -23,14 +23,14 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline, RBFInterpolator
 
 from prior_reinforce.adapters import make_adapter
-from prior_reinforce.experiments.protocol import is_hit, run_goals
+from prior_reinforce.environment import Task
 from prior_reinforce.generators import make_generator
 from prior_reinforce.generators.base import Generator
+from prior_reinforce.lab.experiments.protocol import is_hit, run_goals
+from prior_reinforce.lab.tasks import make_task
+from prior_reinforce.lab.tasks.zoo import DEVELOPED_ON, REPORTED
 from prior_reinforce.perception import make_perception
 from prior_reinforce.plans.motions import Demonstrations
-from prior_reinforce.tasks import make_task
-from prior_reinforce.tasks.base import Task
-from prior_reinforce.tasks.zoo import DEVELOPED_ON, REPORTED
 
 METHODS = (
     "plain",

@@ -40,8 +40,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 @pytest.fixture(scope="session")
 def learned_folder(tmp_path_factory):
     """A small workspace with a model and no goal; copy it, never change it."""
-    from prior_reinforce.workspace.workspace import Workspace
-    from tests.workspace.planar import demonstrations, manifest
+    from prior_reinforce.bench.workspace.workspace import Workspace
+    from tests.bench.workspace.planar import demonstrations, manifest
 
     folder = tmp_path_factory.mktemp("learned") / "planar"
     with Workspace.create(folder, manifest()) as workspace:
@@ -53,7 +53,7 @@ def learned_folder(tmp_path_factory):
 @pytest.fixture
 def workspace(learned_folder, tmp_path):
     """A copy of it, with a goal."""
-    from prior_reinforce.workspace.workspace import Workspace
+    from prior_reinforce.bench.workspace.workspace import Workspace
 
     shutil.copytree(learned_folder, tmp_path / "planar")
     with Workspace(tmp_path / "planar") as workspace:

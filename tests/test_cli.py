@@ -8,7 +8,7 @@ import pytest
 
 from prior_reinforce.cli import main
 from prior_reinforce.errors import WorkspaceError
-from tests.workspace.planar import events_in
+from tests.bench.workspace.planar import events_in
 
 
 @pytest.mark.parametrize(

@@ -76,7 +76,8 @@ def test_every_part_of_the_package_is_on_the_page_of_the_architecture():
     page = (DOCS / "architecture.md").read_text()
     package = Path(pr.__file__).parent
     parts = {p.name + "/" if p.is_dir() else p.name for p in package.iterdir()}
-    parts -= {"__init__.py", "__init__.pyi", "py.typed", "__pycache__/"}
+    parts |= {f"{wing}/{p.name}/" for wing in ("bench", "lab") for p in (package / wing).glob("*/")}
+    parts = {part for part in parts if "__" not in part} - {"py.typed"}
     table = re.search(r"^\| part \| job \|\n(.*?)\n\n", page, re.DOTALL | re.MULTILINE)[1]
     rows = [line.split("|")[1] for line in table.splitlines()]
     assert {name for row in rows for name in re.findall(r"`(.+?)`", row)} == parts

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from prior_reinforce.cli import main
+from prior_reinforce.environment import Rollout
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
-from prior_reinforce.rollouts import Rollout
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 
@@ -106,7 +106,7 @@ def test_own_task_and_generator_run_by_name(tmp_path, capsys):
     [
         ("--task", "toss", "no task 'toss'; known are basketball-v1"),
         ("--task", "own_task:Tos", "cannot find own_task:Tos: .*no attribute 'Tos'"),
-        ("--task", "own_adapter:RidgeAdapter", "must derive from prior_reinforce.tasks.base.Task"),
+        ("--task", "own_adapter:RidgeAdapter", "must derive from prior_reinforce.environment.Task"),
         ("--generator", "neural", "no generator 'neural'; known are auto, diffusion"),
     ],
 )

@@ -12,13 +12,13 @@ import pytest
 
 from prior_reinforce.adapters import ADAPTERS, make_adapter
 from prior_reinforce.cli import main
-from prior_reinforce.experiments.recipes import RECIPES, Run, Scale
-from prior_reinforce.experiments.recipes.adapters import Adapters
-from prior_reinforce.experiments.recipes.generators import Generators, Method
 from prior_reinforce.generators import GENERATORS, Timed, load_generator, make_generator
+from prior_reinforce.lab.experiments.recipes import RECIPES, Run, Scale
+from prior_reinforce.lab.experiments.recipes.adapters import Adapters
+from prior_reinforce.lab.experiments.recipes.generators import Generators, Method
+from prior_reinforce.lab.tasks import TASKS, make_task
 from prior_reinforce.perception import PERCEPTIONS, make_perception
 from prior_reinforce.registry import Member
-from prior_reinforce.tasks import TASKS, make_task
 from prior_reinforce.testing import synthetic_demonstrations
 
 REPOSITORY = Path(__file__).parents[1]
@@ -33,7 +33,7 @@ REGISTRIES = {
 LINES = "\n".join(
     f"from prior_reinforce.{family} import {registry}\n{registry}.members[{name!r}] = {member!r}"
     for family, (registry, (_, name, member)) in zip(
-        ("adapters", "generators", "perception", "tasks"), REGISTRIES.items(), strict=True
+        ("adapters", "generators", "perception", "lab.tasks"), REGISTRIES.items(), strict=True
     )
 )
 """One a family, for a process of its own: as if they stood in the registries."""

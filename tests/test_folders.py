@@ -17,8 +17,8 @@ from mcap_ros2.writer import Writer as McapWriter
 from rosbags.rosbag1 import Writer as Writer1
 from rosbags.typesys import Stores, get_typestore
 
-from tests.importing.recorded import JOINTS, lerobot_set
-from tests.robots.arms import UR, ur5e, write_urdf
+from tests.bench.importing.recorded import JOINTS, lerobot_set
+from tests.bench.robots.arms import UR, ur5e, write_urdf
 
 N = 6
 NOISE = 2e-5

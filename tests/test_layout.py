@@ -10,13 +10,11 @@ SOURCE, TESTS = REPOSITORY / "src" / "prior_reinforce", REPOSITORY / "tests"
 
 TESTED_ELSEWHERE = {
     "errors": "only names, which every test of bad input uses",
-    "rollouts": "two records that every test of a task reads",
     "adapters/base": "what the base does for all is in testing/test_adapters",
     "perception/base": "an interface, held to in testing/test_perception",
-    "tasks/base": "an interface, held to in testing/test_tasks",
-    "tasks/demonstrations/basketball": "made again in tasks/demonstrations/test_init",
-    "tasks/demonstrations/curling": "made again in tasks/demonstrations/test_init",
-    "tasks/demonstrations/fishing": "made again in tasks/demonstrations/test_init",
+    "lab/tasks/demonstrations/basketball": "made again in lab/tasks/demonstrations/test_init",
+    "lab/tasks/demonstrations/curling": "made again in lab/tasks/demonstrations/test_init",
+    "lab/tasks/demonstrations/fishing": "made again in lab/tasks/demonstrations/test_init",
 }
 """Modules without a test file of their own, and where they are tested instead."""
 
@@ -33,9 +31,9 @@ OF_THE_WHOLE = {
     "shapes": "the check of shapes that runs during the tests",
     "tutorial": "the tutorial from top to bottom",
     "odd_recordings": "damaged and odd recordings: one line each, nothing changed",
-    "workspace/bad_input": "generated bad input, from the command line to the disk",
-    "workspace/power_cut": "kill -9 at random moments of a session",
-    "workspace/refused_disk": "commands on a disk that is full or read-only",
+    "bench/workspace/bad_input": "generated bad input, from the command line to the disk",
+    "bench/workspace/power_cut": "kill -9 at random moments of a session",
+    "bench/workspace/refused_disk": "commands on a disk that is full or read-only",
 }
 """Test files of no single module, and what they are about."""
 

@@ -16,10 +16,10 @@ import pandas as pd
 import pytest
 import zarr
 
+from prior_reinforce.bench.workspace.workspace import Workspace
 from prior_reinforce.cli import main
-from prior_reinforce.workspace.workspace import Workspace
-from tests.importing import recorded
-from tests.workspace.planar import demonstrations, manifest
+from tests.bench.importing import recorded
+from tests.bench.workspace.planar import demonstrations, manifest
 
 EACH = 20
 REMEDY = re.compile(

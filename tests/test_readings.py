@@ -92,8 +92,8 @@ coordinates = st.floats(-0.3, 0.3)
 
 @given(coordinates, coordinates)
 def test_no_interval_is_cut_off_from_the_truth(x, y):
+    from prior_reinforce.environment import Rollout
     from prior_reinforce.perception.eye import Eye
-    from prior_reinforce.rollouts import Rollout
 
     error = np.array([x, y])
     hit = bool(np.linalg.norm(error) <= 0.015)

@@ -7,13 +7,13 @@ from scipy.stats import norm
 from prior_reinforce.adapters import displacement
 from prior_reinforce.adapters.bayesian import BayesianAdapter
 from prior_reinforce.adapters.displacement import BayesianConfig
-from prior_reinforce.experiments.protocol import run_goals
 from prior_reinforce.generators import make_generator
+from prior_reinforce.lab.experiments.protocol import run_goals
+from prior_reinforce.lab.tasks import make_task
 from prior_reinforce.perception.exact import Exact
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 from prior_reinforce.plans.outcome_weights import smooth_weights
 from prior_reinforce.readings import Reading
-from prior_reinforce.tasks import make_task
 
 CORNERS = np.array([[0.8, -0.2], [0.8, 0.0], [0.8, 0.2], [1.0, -0.2], [1.0, 0.0], [1.0, 0.2]])
 GOAL = np.array([0.9, 0.05])

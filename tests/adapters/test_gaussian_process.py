@@ -10,8 +10,8 @@ from sklearn.gaussian_process.kernels import RBF, ConstantKernel
 
 from prior_reinforce.adapters.gaussian_process import GaussianProcessAdapter, GaussianProcessConfig
 from prior_reinforce.errors import ConfigurationError
+from prior_reinforce.lab.tasks import make_task
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
-from prior_reinforce.tasks import make_task
 
 
 def observe(adapter, condition, outcome):

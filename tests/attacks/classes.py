@@ -14,13 +14,13 @@ import numpy as np
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
+from prior_reinforce.bench.workspace.workspace import Workspace
 from prior_reinforce.files import sha256, sha256_of_folder
 from prior_reinforce.generators import load_generator
 from prior_reinforce.perception.vlm_formats import FORMATS, read_box
-from prior_reinforce.workspace.workspace import Workspace
 from tests.attacks.harness import HELD, NASTY, call, command, damage
-from tests.importing import recorded
-from tests.workspace.planar import manifest
+from tests.bench.importing import recorded
+from tests.bench.workspace.planar import manifest
 
 Attack = Callable[[random.Random, Path, Path], str]
 """Of a source of chance, an empty folder, and a workspace with one open trial to copy from."""

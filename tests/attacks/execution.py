@@ -21,15 +21,15 @@ import time
 import warnings
 from pathlib import Path
 
+from prior_reinforce.bench.robots.executors.lock import is_executing
+from prior_reinforce.bench.workspace.workspace import Workspace
 from prior_reinforce.errors import PriorReinforceError
-from prior_reinforce.robots.executors.lock import is_executing
-from prior_reinforce.workspace.workspace import Workspace
 from tests.attacks.harness import HELD, wait_until
 from tests.attacks.table import prepare
 
 PROGRAM = """
 import sys
-from prior_reinforce.workspace.workspace import Workspace
+from prior_reinforce.bench.workspace.workspace import Workspace
 with Workspace(sys.argv[1]) as workspace:
     number = workspace.session().ask().number
     print("ready", flush=True)

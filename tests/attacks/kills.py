@@ -16,15 +16,16 @@ import tempfile
 import time
 from pathlib import Path
 
-from prior_reinforce.trials import Event
-from prior_reinforce.workspace.workspace import Workspace
+from prior_reinforce.bench.workspace.workspace import Workspace
+from prior_reinforce.session.trials import Event
 from tests.attacks.table import prepare
-from tests.workspace.planar import recordings
+from tests.bench.workspace.planar import recordings
 
 PROGRAM = """
 import sys
 from prior_reinforce.cli import main
-import prior_reinforce.workspace.workspace, prior_reinforce.session  # what takes time is not it
+# What takes time is not it:
+import prior_reinforce.bench.workspace.workspace, prior_reinforce.session.session
 print("ready", flush=True)
 sys.stdin.readline()
 sys.exit(main(sys.argv[1:]))

@@ -13,10 +13,10 @@ import tempfile
 import warnings
 from pathlib import Path
 
-from prior_reinforce.workspace.workspace import Workspace
+from prior_reinforce.bench.workspace.workspace import Workspace
 from tests.attacks.classes import CLASSES
 from tests.attacks.harness import HELD
-from tests.workspace.planar import demonstrations, manifest
+from tests.bench.workspace.planar import demonstrations, manifest
 
 
 def prepare(folder: Path) -> Path:

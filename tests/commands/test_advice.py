@@ -2,7 +2,7 @@
 
 import re
 
-from tests.workspace.planar import events_in
+from tests.bench.workspace.planar import events_in
 
 
 def test_advice_names_places_and_draws_the_region(run, folder):

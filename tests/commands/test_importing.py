@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from prior_reinforce.workspace.workspace import Workspace
-from tests.workspace.planar import demonstrations, recordings
+from prior_reinforce.bench.workspace.workspace import Workspace
+from tests.bench.workspace.planar import demonstrations, recordings
 
 T = np.arange(24) * 0.02
 NEW = (

@@ -5,10 +5,10 @@ from dataclasses import replace
 import pytest
 
 from prior_reinforce.cli import main
-from prior_reinforce.experiments.learned import load_learned
+from prior_reinforce.lab.experiments.learned import load_learned
+from prior_reinforce.lab.tasks import make_task
 from prior_reinforce.plans.alignment import align
-from prior_reinforce.tasks import make_task
-from tests.workspace.planar import events_in
+from tests.bench.workspace.planar import events_in
 
 TINY = "training_steps=1"
 RECORDED = make_task("basketball-v1").demonstrations("A")

@@ -9,8 +9,8 @@ from rich.console import Console
 from rich.progress import Progress
 
 from prior_reinforce.commands.live import LiveView, drawing_progress, fit_progress, say
-from prior_reinforce.experiments.protocol import GoalTrials
 from prior_reinforce.generators.base import FitProgress
+from prior_reinforce.lab.experiments.protocol import GoalTrials
 
 TASK = SimpleNamespace(outcome_names=("x", "y"))
 GOAL = np.array([1.0, 0.1])

@@ -8,12 +8,12 @@ import imageio.v3 as imageio
 import numpy as np
 import pytest
 
+from prior_reinforce.bench.workspace.workspace import Workspace
 from prior_reinforce.cli import main
+from prior_reinforce.lab.tasks import make_task
 from prior_reinforce.perception.camera import Camera
-from prior_reinforce.tasks import make_task
-from prior_reinforce.workspace.workspace import Workspace
+from tests.bench.workspace.planar import demonstrations, manifest
 from tests.perception.vision_server import VisionServer
-from tests.workspace.planar import demonstrations, manifest
 
 GOAL = np.array([1.0, 0.05])
 SCENE = make_task("basketball-v1").scene

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.workspace.planar import events_in, trials_in
+from tests.bench.workspace.planar import events_in, trials_in
 
 
 @pytest.mark.parametrize(

@@ -11,8 +11,8 @@ from rich.console import Console
 
 from prior_reinforce.cli import main
 from prior_reinforce.commands.reproduce import Reproduce, _terminal
-from prior_reinforce.experiments.evaluation import Training
-from prior_reinforce.experiments.recipes import RECIPES, Measurement, Recipe, Run, Scale, Table
+from prior_reinforce.lab.experiments.evaluation import Training
+from prior_reinforce.lab.experiments.recipes import RECIPES, Measurement, Recipe, Run, Scale, Table
 from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
 
 GENERATOR = "prior_reinforce.generators.interpolation:SmoothInterpolation"

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from prior_reinforce.workspace.workspace import Workspace
+from prior_reinforce.bench.workspace.workspace import Workspace
 
 
 def asked(run, folder):

@@ -4,9 +4,9 @@ import sys
 
 import pytest
 
-from prior_reinforce.trials import Stage
-from prior_reinforce.workspace.workspace import Workspace
-from tests.workspace.planar import events_in, trials_in
+from prior_reinforce.bench.workspace.workspace import Workspace
+from prior_reinforce.session.trials import Stage
+from tests.bench.workspace.planar import events_in, trials_in
 
 
 @pytest.mark.parametrize(

@@ -5,8 +5,8 @@ import json
 import numpy as np
 import pytest
 
-from prior_reinforce.workspace.workspace import Workspace
-from tests.robots.arms import UR, ur5e, write_urdf
+from prior_reinforce.bench.workspace.workspace import Workspace
+from tests.bench.robots.arms import UR, ur5e, write_urdf
 
 
 def test_an_afternoon(run, folder):

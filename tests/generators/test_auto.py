@@ -9,8 +9,8 @@ from prior_reinforce.generators.auto import Auto
 from prior_reinforce.generators.corrected import Corrected
 from prior_reinforce.generators.diffusion import DiffusionGenerator
 from prior_reinforce.generators.interpolation import SmoothInterpolation
+from prior_reinforce.lab.tasks import make_task
 from prior_reinforce.plans.motions import Demonstrations
-from prior_reinforce.tasks import make_task
 from tests.generators.test_patterns import throws
 
 

@@ -73,7 +73,7 @@ def test_settings_of_a_choice():
         ("nearest,exact=perhaps", "exact must be yes or no"),
         ("nearest,speed=3", "speed"),
         ("diffusion,training_steps=0", "training_steps"),
-        ("prior_reinforce.tasks:make_task", "must derive from"),
+        ("prior_reinforce.lab.tasks:make_task", "must derive from"),
     ],
 )
 def test_a_choice_that_cannot_be_made_is_named(choice, named):

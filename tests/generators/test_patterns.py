@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from prior_reinforce.generators.patterns import patterns
+from prior_reinforce.lab.tasks import make_task
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
-from prior_reinforce.tasks import make_task
 
 OUTCOMES = np.array([[0.8, -0.2], [0.8, 0.2], [1.0, -0.1], [1.0, 0.2], [0.9, 0.0], [0.7, 0.1]])
 

@@ -11,10 +11,10 @@ from prior_reinforce.generators.config import UNetSize
 from prior_reinforce.generators.diffusion import DiffusionConfig, DiffusionGenerator
 from prior_reinforce.generators.interpolation import NearestNeighbours, SmoothInterpolation
 from prior_reinforce.generators.timed import Timed
+from prior_reinforce.lab.tasks import make_task
 from prior_reinforce.plans.alignment import align
 from prior_reinforce.plans.codec import PlanCodec
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
-from prior_reinforce.tasks import make_task
 
 STARTS = [5, 31, 12, 44]
 

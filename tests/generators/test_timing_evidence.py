@@ -5,9 +5,9 @@ import pytest
 
 from prior_reinforce.generators import timing_evidence
 from prior_reinforce.generators.timing_evidence import choose_timing, outcome_error
+from prior_reinforce.lab.tasks import make_task
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 from prior_reinforce.plans.warping import take_apart
-from prior_reinforce.tasks import make_task
 
 RNG = np.random.default_rng(0)
 AIMS = RNG.uniform(-1, 1, size=(8, 2))

@@ -9,10 +9,10 @@ os.environ.setdefault("MUJOCO_GL", "egl")
 import numpy as np
 import pytest
 
+from prior_reinforce.environment import KeyFrame
 from prior_reinforce.perception.camera import Camera, CameraConfig
 from prior_reinforce.perception.vlm import VisionLanguageModel
 from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
-from prior_reinforce.rollouts import KeyFrame
 from tests.perception.slanted_table import BALL, GOAL, RIM_HEIGHT, SCENE, slanted_table
 from tests.perception.vision_server import VisionServer
 

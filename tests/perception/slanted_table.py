@@ -7,7 +7,7 @@ import itertools
 import mujoco
 import numpy as np
 
-from prior_reinforce.scene import SeenObject, TableScene
+from prior_reinforce.environment import SeenObject, TableScene
 
 RIM_HEIGHT = 0.10
 SCENE = TableScene(

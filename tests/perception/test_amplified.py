@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
+from prior_reinforce.environment import Rollout
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.perception.amplified import Amplified
-from prior_reinforce.rollouts import Rollout
 
 
 def see(perception: Amplified, error: list[float], n: int, seed: int = 0) -> np.ndarray:

@@ -10,10 +10,10 @@ import mujoco
 import numpy as np
 import pytest
 
+from prior_reinforce.environment import KeyFrame
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.perception.camera import Camera, CameraConfig
 from prior_reinforce.perception.colour_camera import find_by_colour
-from prior_reinforce.rollouts import KeyFrame
 from tests.perception.slanted_table import RIM_HEIGHT
 
 MARKS = np.array([(x, y) for x in (0.45, 0.85, 1.25) for y in (-0.4, 0.0, 0.4)])
@@ -122,7 +122,7 @@ def test_without_opengl_the_remedy_is_named():
 import mujoco, numpy as np
 from prior_reinforce.errors import RenderingUnavailableError
 from prior_reinforce.perception.camera import Camera
-from prior_reinforce.rollouts import KeyFrame
+from prior_reinforce.environment import KeyFrame
 model = mujoco.MjModel.from_xml_string(
     '<mujoco><worldbody><camera name="birdseye"/></worldbody></mujoco>')
 try:

@@ -7,8 +7,9 @@ import pytest
 
 from prior_reinforce.adapters.gaussian_process import GaussianProcessAdapter
 from prior_reinforce.errors import ConfigurationError
-from prior_reinforce.experiments.protocol import run_goals
 from prior_reinforce.generators.interpolation import SmoothInterpolation
+from prior_reinforce.lab.experiments.protocol import run_goals
+from prior_reinforce.lab.tasks import TASKS, make_task
 from prior_reinforce.perception.colour_camera import (
     ColourCamera,
     ColourClient,
@@ -18,7 +19,6 @@ from prior_reinforce.perception.colour_camera import (
 from prior_reinforce.perception.vlm import VisionLanguageModel
 from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
 from prior_reinforce.plans.alignment import align
-from prior_reinforce.tasks import TASKS, make_task
 from tests.perception.slanted_table import SCENE
 from tests.perception.vision_server import VisionServer
 

@@ -1,7 +1,7 @@
 import numpy as np
 
+from prior_reinforce.environment import Rollout
 from prior_reinforce.perception.exact import Exact
-from prior_reinforce.rollouts import Rollout
 
 
 def test_sees_outcome_minus_goal():

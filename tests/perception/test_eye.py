@@ -3,8 +3,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from prior_reinforce.environment import Rollout
 from prior_reinforce.perception.eye import Eye
-from prior_reinforce.rollouts import Rollout
 
 
 def seen_cm(error_cm: float, goal: float = 0.0) -> float:

@@ -61,7 +61,7 @@ def test_names_of_members_load_none_of_them():
         "import sys\n"
         "from prior_reinforce.adapters import ADAPTERS\n"
         "from prior_reinforce.perception import PERCEPTIONS\n"
-        "from prior_reinforce.tasks import TASKS\n"
+        "from prior_reinforce.lab.tasks import TASKS\n"
         "print(ADAPTERS.help, PERCEPTIONS.help, TASKS.help)\n"
         "heavy = {'torch', 'mujoco', 'openai', 'scipy', 'numpy', 'joblib', 'PIL', 'msgspec'}\n"
         "assert not heavy & set(sys.modules), heavy & set(sys.modules)\n"

@@ -5,13 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from prior_reinforce.environment import Rollout, TableScene
 from prior_reinforce.errors import ConfigurationError, EndpointError, PerceptionFailedError
 from prior_reinforce.perception.camera import Camera, CameraConfig
 from prior_reinforce.perception.colour_camera import ColourClient
 from prior_reinforce.perception.vlm import VisionLanguageModel
 from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
-from prior_reinforce.rollouts import Rollout
-from prior_reinforce.scene import TableScene
 from tests.perception.slanted_table import BALL, GOAL, RIM_HEIGHT, SCENE
 from tests.perception.vision_server import VisionServer
 

@@ -14,9 +14,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from prior_reinforce.environment import Rollout
 from prior_reinforce.errors import ConfigurationError, EndpointError
 from prior_reinforce.perception.vlm_client import OpenAIClient, VisionLanguageModelConfig
-from prior_reinforce.rollouts import Rollout
 from tests.perception.slanted_table import BALL, GOAL
 from tests.perception.vision_server import VisionServer
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from prior_reinforce.errors import InvalidDemonstrationsError
+from prior_reinforce.lab.tasks import make_task
 from prior_reinforce.plans.alignment import correlation_lags
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 from prior_reinforce.plans.timing import SMOOTHING, velocity_profiles
 from prior_reinforce.plans.warping import Timeline, take_apart
-from prior_reinforce.tasks import make_task
 
 STARTS = np.array([5.3, 31.0, 12.7, 24.1])
 TEMPOS = np.array([1.0, 1.15, 0.85, 1.05])

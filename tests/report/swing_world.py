@@ -9,8 +9,8 @@ import numpy as np
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 from prior_reinforce.readings import Reading
 from prior_reinforce.report import AdaptationRecord
-from prior_reinforce.session import Session
-from prior_reinforce.trials import Stage, Trial
+from prior_reinforce.session.session import Session
+from prior_reinforce.session.trials import Stage, Trial
 
 HORIZON = 60
 DT = 0.02

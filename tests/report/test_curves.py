@@ -8,7 +8,7 @@ import pytest
 
 from prior_reinforce.report.curves import draw_errors, draw_plans, draw_trials_by_goal
 from prior_reinforce.report.style import HIT
-from prior_reinforce.trials import Stage
+from prior_reinforce.session.trials import Stage
 from tests.report.swing_world import told
 
 GOAL = np.array([0.92, -0.10])

@@ -22,7 +22,7 @@ def test_what_is_not_given_is_an_error():
 def test_another_packages_page_extends_ours():
     page = render(
         "evidence.html",
-        package="prior_reinforce.experiments",
+        package="prior_reinforce.lab.experiments",
         title="Evidence",
         counts={},
         sections=[],

@@ -13,7 +13,7 @@ from prior_reinforce.report.summary import (
     titles,
     trial_rows,
 )
-from prior_reinforce.trials import Stage
+from prior_reinforce.session.trials import Stage
 from tests.report.swing_world import adaptation
 from tests.report.swing_world import told as record
 

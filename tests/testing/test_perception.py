@@ -5,9 +5,8 @@ from functools import cache, partial
 import numpy as np
 import pytest
 
+from prior_reinforce.environment import KeyFrame, Rollout, SeenObject, TableScene
 from prior_reinforce.perception import PERCEPTIONS, make_perception
-from prior_reinforce.rollouts import KeyFrame, Rollout
-from prior_reinforce.scene import SeenObject, TableScene
 from prior_reinforce.testing import PerceptionContract
 from tests.perception.slanted_table import RIM_HEIGHT, slanted_table
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from prior_reinforce.tasks import TASKS, make_task
+from prior_reinforce.lab.tasks import TASKS, make_task
 from prior_reinforce.testing import TaskContract
 
 

@@ -11,10 +11,10 @@ import tyro
 from jaxtyping import Float
 
 from prior_reinforce.arrays import Points
+from prior_reinforce.bench.workspace.workspace import Workspace
 from prior_reinforce.commands.workspace import Folder
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.wording import say_place
-from prior_reinforce.workspace.workspace import Workspace
 
 _ACROSS = 25
 """Goals along each side of the region (ours)."""

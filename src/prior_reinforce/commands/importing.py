@@ -11,15 +11,7 @@ from typing import Annotated, Any, Literal
 
 import tyro
 
-from prior_reinforce.commands.outcome_questions import Answers, ask_for_outcomes
-from prior_reinforce.commands.workspace import Folder, print_next
-from prior_reinforce.errors import (
-    ConfigurationError,
-    InvalidDemonstrationsError,
-    UnclearUnitsError,
-)
-from prior_reinforce.files import named_disk_errors
-from prior_reinforce.importing import (
+from prior_reinforce.bench.importing import (
     FORMATS,
     HowToRead,
     ImportResult,
@@ -32,7 +24,7 @@ from prior_reinforce.importing import (
     outcome_places,
     read_recordings,
 )
-from prior_reinforce.importing.outcomes import (
+from prior_reinforce.bench.importing.outcomes import (
     OUTCOMES_FILE,
     Outcomes,
     find_outcomes,
@@ -43,10 +35,18 @@ from prior_reinforce.importing.outcomes import (
     table_beside,
     write_outcome_table,
 )
-from prior_reinforce.importing.units import Doubt, refuse_doubts
+from prior_reinforce.bench.importing.units import Doubt, refuse_doubts
+from prior_reinforce.bench.workspace.manifest import Manifest
+from prior_reinforce.bench.workspace.workspace import Workspace
+from prior_reinforce.commands.outcome_questions import Answers, ask_for_outcomes
+from prior_reinforce.commands.workspace import Folder, print_next
+from prior_reinforce.errors import (
+    ConfigurationError,
+    InvalidDemonstrationsError,
+    UnclearUnitsError,
+)
+from prior_reinforce.files import named_disk_errors
 from prior_reinforce.wording import plain
-from prior_reinforce.workspace.manifest import Manifest
-from prior_reinforce.workspace.workspace import Workspace
 
 _PICTURE = "demonstrations.png"
 

@@ -60,8 +60,8 @@ class Learn:
             )
 
     def _learn_in_workspace(self, folder: Path, choice: str) -> None:
+        from prior_reinforce.bench.workspace.workspace import Workspace
         from prior_reinforce.commands.workspace import print_next
-        from prior_reinforce.workspace.workspace import Workspace
 
         make_generator(choice, device=self.device)
         with Workspace(folder) as workspace:

@@ -18,11 +18,10 @@ from prior_reinforce.readings import Reading
 from prior_reinforce.wording import from_words, plain, say_place, to_words
 
 if TYPE_CHECKING:
-    from prior_reinforce.experiments.protocol import GoalTrials
+    from prior_reinforce.environment import Rollout, Task
     from prior_reinforce.generators.base import FitProgress
+    from prior_reinforce.lab.experiments.protocol import GoalTrials
     from prior_reinforce.perception.base import Perception
-    from prior_reinforce.rollouts import Rollout
-    from prior_reinforce.tasks.base import Task
 
 
 def say(console: Console, *parts: str | tuple[str, str]) -> None:

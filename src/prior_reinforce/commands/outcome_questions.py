@@ -14,21 +14,21 @@ from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
 
-from prior_reinforce.errors import (
-    InvalidDemonstrationsError,
-    InvalidFeedbackError,
-)
-from prior_reinforce.files import named_disk_errors, write
-from prior_reinforce.importing import Recording
-from prior_reinforce.importing.outcomes import (
+from prior_reinforce.bench.importing import Recording
+from prior_reinforce.bench.importing.outcomes import (
     OUTCOMES_FILE,
     Outcomes,
     headed,
     outcomes_of,
     uncertainty_of,
 )
+from prior_reinforce.bench.workspace.manifest import Manifest
+from prior_reinforce.errors import (
+    InvalidDemonstrationsError,
+    InvalidFeedbackError,
+)
+from prior_reinforce.files import named_disk_errors, write
 from prior_reinforce.wording import in_words, plain, read_place, say_length, say_place
-from prior_reinforce.workspace.manifest import Manifest
 
 _SKIP, _BACK = ("skip", "s"), ("back", "b")
 _SOURCE = "source"

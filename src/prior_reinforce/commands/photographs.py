@@ -14,10 +14,10 @@ import tyro
 from jaxtyping import Float, UInt8
 
 from prior_reinforce.arrays import FARTHEST, Point
+from prior_reinforce.environment import SeenObject, TableScene
 from prior_reinforce.errors import ConfigurationError, FileFormatError, PerceptionFailedError
 from prior_reinforce.files import named_disk_errors, refuse_foreign
 from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
-from prior_reinforce.scene import SeenObject, TableScene
 from prior_reinforce.wording import to_words
 
 _COLUMNS = ("x", "y", "u", "v")
@@ -139,7 +139,7 @@ class Look:
             return None, self.picture.parent, f"{self.picture.stem}-seen"
         if self.workspace is None or self.trial is None:
             raise ConfigurationError("--workspace and --trial say together which trial it was")
-        from prior_reinforce.workspace.workspace import Workspace
+        from prior_reinforce.bench.workspace.workspace import Workspace
 
         with Workspace(self.workspace) as workspace:
             session, units = workspace.session(), workspace.manifest.outcome_units

@@ -10,13 +10,13 @@ import numpy as np
 import tyro
 
 from prior_reinforce.arrays import FARTHEST, Point, as_error
+from prior_reinforce.bench.workspace.status import tell_example
+from prior_reinforce.bench.workspace.workspace import Workspace
 from prior_reinforce.commands.workspace import Folder
 from prior_reinforce.errors import ConfigurationError, InvalidFeedbackError
 from prior_reinforce.readings import Reading
-from prior_reinforce.session import Session
+from prior_reinforce.session.session import Session
 from prior_reinforce.wording import from_words, in_words
-from prior_reinforce.workspace.status import tell_example
-from prior_reinforce.workspace.workspace import Workspace
 
 Number = Annotated[int, tyro.conf.Positional, tyro.conf.arg(metavar="TRIAL")]
 

@@ -20,13 +20,13 @@ from rich.text import Text
 
 from prior_reinforce.commands.live import say
 from prior_reinforce.errors import ConfigurationError, UnitFailedError
-from prior_reinforce.experiments.evidence import claims_table, write_evidence
-from prior_reinforce.experiments.recipes import QUICK, RECIPES, Recipe, Run, Scale, Table
-from prior_reinforce.experiments.recipes.base import Progress as OnProgress
-from prior_reinforce.experiments.recipes.trials import TrialsTable
-from prior_reinforce.experiments.units import Workers
 from prior_reinforce.files import claim_folder, write
 from prior_reinforce.generators import make_generator
+from prior_reinforce.lab.experiments.evidence import claims_table, write_evidence
+from prior_reinforce.lab.experiments.recipes import QUICK, RECIPES, Recipe, Run, Scale, Table
+from prior_reinforce.lab.experiments.recipes.base import Progress as OnProgress
+from prior_reinforce.lab.experiments.recipes.trials import TrialsTable
+from prior_reinforce.lab.experiments.units import Workers
 from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
 
 _SLOWEST = "diffusion"

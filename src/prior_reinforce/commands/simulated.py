@@ -16,17 +16,17 @@ from prior_reinforce.commands.live import LiveView, Operator, fit_progress, say,
 from prior_reinforce.errors import ConfigurationError, FileFormatError, InvalidGoalError
 from prior_reinforce.files import claim_folder
 from prior_reinforce.generators import GENERATORS, make_generator
+from prior_reinforce.lab.tasks import TASKS, make_task
 from prior_reinforce.perception import PERCEPTIONS, make_perception
 from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig, without_secrets
 from prior_reinforce.plans.motions import Demonstrations
-from prior_reinforce.tasks import TASKS, make_task
 
 if TYPE_CHECKING:
-    from prior_reinforce.experiments.adaptation import FilmOrWhyNot
-    from prior_reinforce.experiments.protocol import GoalTrials
+    from prior_reinforce.environment import Task
     from prior_reinforce.generators.base import Generator
+    from prior_reinforce.lab.experiments.adaptation import FilmOrWhyNot
+    from prior_reinforce.lab.experiments.protocol import GoalTrials
     from prior_reinforce.perception.base import Perception
-    from prior_reinforce.tasks.base import Task
 
 SEEN = "seen"
 """Folder beside the report for what a camera or a model saw and said."""
@@ -73,7 +73,7 @@ def learn(
     console: Console,
 ) -> Generator:
     """Fit a generator under a progress line, say what it could not learn, and save it."""
-    from prior_reinforce.experiments.learned import save_learned
+    from prior_reinforce.lab.experiments.learned import save_learned
 
     with fit_progress(console) as progress:
         generator = generator.fit(demonstrations, seed=seed, progress=progress)
@@ -123,7 +123,7 @@ class Adapt(Simulated):
 
     def run(self) -> int:
         """Adapt; exit status 1 if the goal was not reached."""
-        from prior_reinforce.experiments.learned import load_learned
+        from prior_reinforce.lab.experiments.learned import load_learned
 
         console = Console()
         task, demonstrations = self.open()
@@ -170,13 +170,13 @@ class Adapt(Simulated):
         Returns:
             Exit status: 1 if a goal was not reached.
         """
-        from prior_reinforce.experiments.adaptation import (
+        from prior_reinforce.lab.experiments.adaptation import (
             film_last_trial,
             recording,
             report_adaptation,
         )
-        from prior_reinforce.experiments.protocol import reach_goals
-        from prior_reinforce.session import Session
+        from prior_reinforce.lab.experiments.protocol import reach_goals
+        from prior_reinforce.session.session import Session
 
         view = LiveView(console, task, demonstrations.n)
         session = Session(generator, make_adapter(self.adapter), demonstrations)
@@ -257,7 +257,7 @@ class Demo:
 
     def run(self) -> int:
         """See the demonstrations, learn, adapt, report."""
-        from prior_reinforce.experiments.protocol import unseen_goals
+        from prior_reinforce.lab.experiments.protocol import unseen_goals
 
         console = Console()
         if self.goals < 1:
@@ -294,8 +294,8 @@ class Demo:
         self, task: Task, recorded: Demonstrations, perception: Perception, console: Console
     ) -> Demonstrations:
         """Execute the demonstrations once, see where they go, and keep that for `adapt`."""
-        from prior_reinforce.experiments.adaptation import recording
-        from prior_reinforce.experiments.protocol import perceive_demonstrations
+        from prior_reinforce.lab.experiments.adaptation import recording
+        from prior_reinforce.lab.experiments.protocol import perceive_demonstrations
 
         say(console, f"executing {recorded.n} demonstrations once, seen by {self.perception}")
         eyes = recording(perception, self.out / SEEN, "demonstration")
@@ -327,7 +327,7 @@ class Rollout(Simulated):
 
     def run(self) -> None:
         """Execute and print where it went."""
-        from prior_reinforce.experiments.protocol import is_hit
+        from prior_reinforce.lab.experiments.protocol import is_hit
 
         console = Console()
         task, demonstrations = self.open()
@@ -367,7 +367,7 @@ class Rollout(Simulated):
 
     def _plan(self, demonstrations: Demonstrations) -> tuple[Frames, Point]:
         """The plan to execute, and the outcome that it is for."""
-        from prior_reinforce.experiments.learned import load_learned
+        from prior_reinforce.lab.experiments.learned import load_learned
 
         if (self.demonstration is None) == (self.condition is None):
             raise ConfigurationError("give either --demonstration or --condition")

@@ -8,19 +8,19 @@ from pathlib import Path
 import numpy as np
 
 from prior_reinforce.arrays import Point
-from prior_reinforce.commands.reading import plausible, read_seen
-from prior_reinforce.errors import FileFormatError, InvalidFeedbackError
-from prior_reinforce.importing.tables import Table, read_tables
-from prior_reinforce.importing.units import (
+from prior_reinforce.bench.importing.tables import Table, read_tables
+from prior_reinforce.bench.importing.units import (
     CHANNEL_UNITS,
     conversion,
     guess_unit,
     split_unit,
 )
+from prior_reinforce.bench.workspace.workspace import Workspace
+from prior_reinforce.commands.reading import plausible, read_seen
+from prior_reinforce.errors import FileFormatError, InvalidFeedbackError
 from prior_reinforce.readings import Reading
-from prior_reinforce.session import Session
-from prior_reinforce.trials import Stage
-from prior_reinforce.workspace.workspace import Workspace
+from prior_reinforce.session.session import Session
+from prior_reinforce.session.trials import Stage
 
 _TRIAL, _SAID, _HIT = ("trial", "trial_id", "number"), "said", "hit"
 _ANSWERS = {"yes": True, "y": True, "true": True, "1": True, "hit": True} | {

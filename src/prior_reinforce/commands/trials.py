@@ -9,21 +9,21 @@ from typing import Annotated
 
 import tyro
 
-from prior_reinforce.commands.reading import Number, Seen
-from prior_reinforce.commands.workspace import Folder, print_next
-from prior_reinforce.errors import ConfigurationError, FileFormatError
-from prior_reinforce.plans.files import check_plan_path, write_plan
-from prior_reinforce.plans.motions import Plan
-from prior_reinforce.session import Session
-from prior_reinforce.trials import Stage, Trial
-from prior_reinforce.wording import say_place
-from prior_reinforce.workspace.status import (
+from prior_reinforce.bench.robots.plan_files import check_plan_path, write_plan
+from prior_reinforce.bench.workspace.status import (
     OUTDATED,
     execution_warning,
     say_expectation,
     say_trial,
 )
-from prior_reinforce.workspace.workspace import Workspace
+from prior_reinforce.bench.workspace.workspace import Workspace
+from prior_reinforce.commands.reading import Number, Seen
+from prior_reinforce.commands.workspace import Folder, print_next
+from prior_reinforce.errors import ConfigurationError, FileFormatError
+from prior_reinforce.plans.motions import Plan
+from prior_reinforce.session.session import Session
+from prior_reinforce.session.trials import Stage, Trial
+from prior_reinforce.wording import say_place
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ class Ask:
 
     def _check_flags(self) -> None:
         """Say what cannot be before anything is changed."""
-        from prior_reinforce.robots.executors.command import check_command
+        from prior_reinforce.bench.robots.executors.command import check_command
 
         if self.run_command is not None:
             check_command(self.run_command, time_limit=self.time_limit)
@@ -108,7 +108,7 @@ class Ask:
 
     def _is_there(self, workspace: Workspace, trial: Trial) -> bool:
         """Whether the arm stands where the plan begins, as far as it says."""
-        from prior_reinforce.robots.executors.command import read_pose
+        from prior_reinforce.bench.robots.executors.command import read_pose
 
         assert trial.plan is not None
         assert self.where is not None

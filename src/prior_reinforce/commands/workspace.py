@@ -11,19 +11,19 @@ import tyro
 from rich.console import Console
 
 from prior_reinforce.adapters import ADAPTERS, DEFAULT_ADAPTER
+from prior_reinforce.bench.robots import RobotLimits, robot_limits
+from prior_reinforce.bench.robots.presets import PRESETS
+from prior_reinforce.bench.robots.urdf import read_urdf
+from prior_reinforce.bench.workspace.manifest import filled_in
+from prior_reinforce.bench.workspace.status import describe, next_step
+from prior_reinforce.bench.workspace.workspace import Workspace
 from prior_reinforce.commands.live import drawing_progress
 from prior_reinforce.errors import (
     ConfigurationError,
     InvalidFeedbackError,
     InvalidGoalError,
 )
-from prior_reinforce.robots import RobotLimits, robot_limits
-from prior_reinforce.robots.presets import PRESETS
-from prior_reinforce.robots.urdf import read_urdf
 from prior_reinforce.wording import read_place, say_place
-from prior_reinforce.workspace.manifest import filled_in
-from prior_reinforce.workspace.status import describe, next_step
-from prior_reinforce.workspace.workspace import Workspace
 
 Folder = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="WORKSPACE")]
 
@@ -187,7 +187,7 @@ class Report:
 
     def run(self) -> None:
         """Write it."""
-        from prior_reinforce.workspace.report import report_workspace
+        from prior_reinforce.bench.workspace.report import report_workspace
 
         with Workspace(self.folder) as workspace, drawing_progress(Console()) as progress:
             page = report_workspace(workspace, self.out or self.folder / "report", progress)

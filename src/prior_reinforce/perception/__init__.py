@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 from prior_reinforce.registry import Member, Registry
 
 if TYPE_CHECKING:
+    from prior_reinforce.environment import TableScene
     from prior_reinforce.perception.base import Perception
     from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
-    from prior_reinforce.scene import TableScene
 
 _HERE = "prior_reinforce.perception"
 

@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from prior_reinforce.arrays import Point
+from prior_reinforce.environment import Rollout
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.perception.base import Perception
 from prior_reinforce.readings import Reading
-from prior_reinforce.rollouts import Rollout
 
 _LEAST_SCALE = 0.1
 """Factors below it are taken for it when a reading is weighed (ours): 1/s has no variance at 0."""

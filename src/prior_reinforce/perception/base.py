@@ -8,8 +8,8 @@ import numpy as np
 from typing_extensions import Self
 
 from prior_reinforce.arrays import Point
+from prior_reinforce.environment import Rollout
 from prior_reinforce.readings import Reading
-from prior_reinforce.rollouts import Rollout
 
 
 class Perception(ABC):

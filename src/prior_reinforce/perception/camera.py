@@ -14,10 +14,9 @@ from jaxtyping import Float
 from numpy.typing import ArrayLike
 
 from prior_reinforce.arrays import Point
+from prior_reinforce.environment import KeyFrame, Picture, make_renderer
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.perception.calibration import TableCalibration
-from prior_reinforce.rendering import Picture, make_renderer
-from prior_reinforce.rollouts import KeyFrame
 
 GOAL_BODY = "goal"
 """Mocap body that is the goal's object in every scene (see `rollouts.KeyFrame`)."""

@@ -13,6 +13,7 @@ import re
 
 import numpy as np
 
+from prior_reinforce.environment import Picture, TableScene
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.perception.calibration import TableCalibration
 from prior_reinforce.perception.camera import Camera
@@ -20,8 +21,6 @@ from prior_reinforce.perception.vlm import VisionLanguageModel
 from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
 from prior_reinforce.perception.vlm_formats import FORMATS, Box, Family
 from prior_reinforce.perception.vlm_reading import Answer
-from prior_reinforce.rendering import Picture
-from prior_reinforce.scene import TableScene
 
 COLOURS = {
     "red": (-12.0, 10.0, 0.62),

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from prior_reinforce.arrays import Point
+from prior_reinforce.environment import Rollout
 from prior_reinforce.perception.base import Perception
 from prior_reinforce.readings import Reading
-from prior_reinforce.rollouts import Rollout
 
 
 class Exact(Perception):

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from prior_reinforce.arrays import Point
+from prior_reinforce.environment import Rollout
 from prior_reinforce.perception.base import Perception
 from prior_reinforce.readings import EYE_BETWEEN, EYE_NEAR, EYE_STEP, Reading
-from prior_reinforce.rollouts import Rollout
 
 _LEAST = EYE_NEAR[1]
 """Reported for the larger component where the miss is `EYE_BETWEEN[0]` or more, but every

@@ -15,6 +15,7 @@ import numpy as np
 from jaxtyping import Float
 
 from prior_reinforce.arrays import Point
+from prior_reinforce.environment import KeyFrame, Picture, Rollout, SeenObject, TableScene
 from prior_reinforce.errors import ConfigurationError, EndpointError, PerceptionFailedError
 from prior_reinforce.perception.base import Perception
 from prior_reinforce.perception.calibration import TableCalibration
@@ -35,9 +36,6 @@ from prior_reinforce.perception.vlm_formats import (
 )
 from prior_reinforce.perception.vlm_reading import Answer, PictureReading, Sighting
 from prior_reinforce.readings import Reading
-from prior_reinforce.rendering import Picture
-from prior_reinforce.rollouts import KeyFrame, Rollout
-from prior_reinforce.scene import SeenObject, TableScene
 
 CAMERA_SD = 0.003
 """Standard deviation of each component of an error that is read from a picture, in [m] (ours):

@@ -16,10 +16,10 @@ from importlib import import_module
 from typing import Any, Literal, Protocol, TypeVar
 from urllib.parse import urlsplit
 
+from prior_reinforce.environment import Picture
 from prior_reinforce.errors import ConfigurationError, EndpointError, MissingExtraError
 from prior_reinforce.perception.vlm_formats import FORMATS, Family
 from prior_reinforce.perception.vlm_reading import Answer
-from prior_reinforce.rendering import Picture
 
 T = TypeVar("T")
 _NO_KEY = "EMPTY"

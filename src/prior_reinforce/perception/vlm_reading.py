@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from jaxtyping import Float
 
+from prior_reinforce.environment import Picture
 from prior_reinforce.perception.vlm_formats import Box
-from prior_reinforce.rendering import Picture
 
 if TYPE_CHECKING:
     from PIL import ImageDraw

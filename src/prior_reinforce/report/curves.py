@@ -27,7 +27,7 @@ from prior_reinforce.report.style import (
     trial_colour,
 )
 from prior_reinforce.report.summary import numbers, say_tolerance
-from prior_reinforce.trials import Stage, Trial
+from prior_reinforce.session.trials import Stage, Trial
 from prior_reinforce.wording import say_length
 
 _COLUMNS = 4

@@ -27,7 +27,7 @@ from prior_reinforce.report.style import (
     trial_colour,
 )
 from prior_reinforce.report.summary import titles
-from prior_reinforce.trials import Stage
+from prior_reinforce.session.trials import Stage
 from prior_reinforce.wording import WORDS, in_words
 
 _Place = Float[np.ndarray, "2"]

@@ -27,7 +27,7 @@ from prior_reinforce.report.style import (
     trial_colour,
 )
 from prior_reinforce.report.summary import say_tolerance
-from prior_reinforce.trials import Stage
+from prior_reinforce.session.trials import Stage
 
 _WIDTH, _HEIGHT = 5.4, 4.5  # [inch], one of two beside each other on a page
 _LABELS = (0.7, 0.72)  # [inch], what labels take of a panel's width and height

@@ -20,7 +20,7 @@ from prior_reinforce.arrays import Point, as_goal
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.plans.normalisation import Normalisation
-from prior_reinforce.trials import Goal, Stage, Trial
+from prior_reinforce.session.trials import Goal, Stage, Trial
 
 Box = Float[np.ndarray, "2 k"]
 """Lower and upper corner of a region of outcomes."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from prior_reinforce.report.record import AdaptationRecord
-from prior_reinforce.trials import Stage, Trial
+from prior_reinforce.session.trials import Stage, Trial
 from prior_reinforce.wording import in_words, say_error, say_length, say_place, to_words
 
 _OPEN = {

@@ -9,10 +9,10 @@ import numpy as np
 from jaxtyping import Float
 
 from prior_reinforce.arrays import Point
+from prior_reinforce.environment import Rollout
 from prior_reinforce.errors import PerceptionFailedError
 from prior_reinforce.perception.base import Perception
 from prior_reinforce.readings import Reading
-from prior_reinforce.rollouts import Rollout
 
 
 class PerceptionContract:

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from prior_reinforce.arrays import Plans, Points
+from prior_reinforce.environment import Rollout, Task
 from prior_reinforce.errors import ConfigurationError, InvalidPlanError
-from prior_reinforce.rollouts import Rollout
-from prior_reinforce.tasks.base import Task
 
 
 class TaskContract:

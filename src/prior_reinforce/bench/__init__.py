@@ -1,0 +1,1 @@
+"""One's own arm: recordings, robots and their limits, and the workspace that keeps it all."""

@@ -1,0 +1,275 @@
+"""Recordings in tables: CSV of any dialect, and workbooks (.xlsx, .xls, .ods).
+
+A file an episode, or one with a column `episode`; of a workbook, a sheet an episode. One column may
+hold the time; all others are channels. Logs of libfranka and of RTDE are known by their columns.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Bool
+
+from prior_reinforce.bench.importing.clock import Clock, Times
+from prior_reinforce.bench.importing.naming import find_channels, vectors
+from prior_reinforce.bench.importing.noise import REST_SPEED
+from prior_reinforce.bench.importing.recording import (
+    NO_COLUMN,
+    Positions,
+    ReadOptions,
+    Recording,
+    files_at,
+    natural_order,
+)
+from prior_reinforce.bench.importing.tables import WORKBOOKS, Dialect, Table, read_tables
+from prior_reinforce.bench.importing.units import (
+    CHANNEL_UNITS,
+    SECONDS,
+    Doubt,
+    say_names,
+    split_unit,
+)
+from prior_reinforce.errors import ConfigurationError, FileFormatError
+
+SUFFIXES = (".csv", ".tsv")
+_WHEN_SAID = (*SUFFIXES, ".txt", ".dat", ".log")
+"""Read where the format is said, because much else has such names."""
+_TIMES = (
+    "t", "time", "times", "timestamp", "timestamps", "stamp", "elapsed", "elapsed_time", "duration",
+    "datetime", "date",
+)  # fmt: skip
+EPISODE_COLUMNS = tuple(
+    name + ending
+    for name in ("episode", "throw", "trial", "demo", "run")
+    for ending in ("", "_id", "_index", "_number")
+)
+"""Names of a column that says of which episode a row is."""
+
+
+@dataclass(frozen=True)
+class _Log:
+    """A log whose columns are documented."""
+
+    name: str
+    columns: tuple[str, ...]
+    """Those that it is known by."""
+    key: str
+    """Which of its vectors is the measured motion."""
+    time_unit: str
+    mixed: bool = False
+    """Whether a row may have its time from one cycle, and its positions from the next."""
+
+
+_LOGS = (
+    # libfranka, src/log.cpp: logToCSV writes time.toMSec(). First 0.9.2 and later, then of 2017.
+    _Log("libfranka's log", ("time", "success_rate", "state.q[0]"), "state.q", "ms"),
+    _Log("libfranka's log", ("duration", "success rate", "q[0]"), "q", "ms"),
+    # UR's rtde/csv_writer.py and ur_rtde's recorder: seconds since the controller started. The
+    # latter (1.6.5) runs beside the controller, reads the variables of a row one by one, and
+    # writes rows again where no new cycle came; the former writes each once.
+    _Log("an RTDE log", ("timestamp", "actual_q_0"), "actual_q", "s", mixed=True),
+)
+_CYCLE = 0.002
+"""Of UR's controller, in [s]."""
+
+
+def read(source: Path, options: ReadOptions) -> list[Recording]:
+    """Read a CSV file, or every CSV file of a folder."""
+    paths = files_at(source, SUFFIXES) or files_at(source, _WHEN_SAID)
+    return [recording for path in paths for recording in _of_file(path, options, len(paths) == 1)]
+
+
+def read_workbooks(source: Path, options: ReadOptions) -> list[Recording]:
+    """Read a workbook, or every workbook of a folder."""
+    paths = files_at(source, WORKBOOKS)
+    return [recording for path in paths for recording in _of_file(path, options, len(paths) == 1)]
+
+
+def _of_file(path: Path, options: ReadOptions, alone: bool) -> list[Recording]:
+    tables = read_tables(path, Dialect(options.delimiter, options.decimal))
+    recordings = []
+    for table in tables:
+        if not table.names or len(table) < 2:
+            raise FileFormatError(
+                f"{table.where} has {len(table)} frames; expected a line of column names and two "
+                "frames or more"
+            )
+        column = _episode_column(table, options)
+        if column is None:
+            sheet = table.where.removeprefix(f"{path} [").removesuffix("]")
+            episode = path.stem if len(tables) == 1 else sheet
+            if (alone and len(tables) == 1) or options.wants(episode):
+                recordings.append(_episode(table, episode, options))
+            continue
+        names = table.texts(column)
+        for episode in sorted(set(names), key=natural_order):
+            if options.wants(episode):
+                own = table.rows([i for i, name in enumerate(names) if name == episode])
+                recordings.append(_episode(own, episode, options, column))
+    return recordings
+
+
+def _episode_column(table: Table, options: ReadOptions) -> int | None:
+    if options.episode_column is not None:
+        return _named_column(table, options.episode_column, "--episode-column")
+    if not table.named:
+        return None
+    return next((i for i, n in enumerate(table.names) if n.lower() in EPISODE_COLUMNS), None)
+
+
+def _named_column(table: Table, name: str, option: str) -> int:
+    """A column by its name, with or without the unit in it, or by its number from 1."""
+    bare = [split_unit(n, SECONDS)[0] for n in table.names]
+    for names in (table.names, bare):
+        if name in names:
+            return names.index(name)
+    if name.isdigit() and 1 <= int(name) <= len(table.names):
+        return int(name) - 1
+    raise ConfigurationError(
+        f"{table.where} has no column {name!r} for {option}; it has {say_names(table.names)}"
+    )
+
+
+def _episode(
+    table: Table, episode: str, options: ReadOptions, episode_column: int | None = None
+) -> Recording:
+    log = next((g for g in _LOGS if set(g.columns) <= set(table.names)), None)
+    time, guessed = _time_column(table, options)
+    index = 0 if time is None and _no_name_first(table) and _could_be_time(table) else None
+    others = [i for i in range(len(table.names)) if i not in (time, episode_column, index)]
+    channels, named = _channels(table, others, options, log)
+    remarks: tuple[str, ...] = ()
+    if log is not None:
+        remarks = (f"{log.name}: time in {log.time_unit}, motion is {log.key} (measured)",)
+    if log is not None and log.mixed and time is not None:
+        mixed = _mixed(table.numbers(time), np.column_stack([table.numbers(i) for i in channels]))
+        if np.any(mixed):
+            table = table.rows(np.flatnonzero(~mixed).tolist())
+            why = "rows left out whose positions are of another cycle than their time"
+            remarks = (*remarks, f"{why}: {mixed.sum()}")
+    clock = _clock(table, episode, time, options, None if log is None else log.time_unit)
+    if index is not None and channels == others and not options.joints:
+        remarks = (*remarks, f"column {index + 1} left out, an index without a name")
+    texts = [i for i in channels if table.is_text(i)] if channels == others else []
+    if texts:
+        channels = [i for i in channels if i not in texts]
+        left_out = say_names([table.names[i] for i in texts])
+        remarks = (*remarks, f"{left_out} left out, which holds no number")
+    positions = np.column_stack([table.numbers(i) for i in channels] or [np.zeros((0, 0))])
+    units = tuple(table.units[i] or split_unit(table.names[i], CHANNEL_UNITS)[1] for i in channels)
+    names = tuple(
+        split_unit(table.names[i], CHANNEL_UNITS)[0] or f"column {i + 1}" for i in channels
+    )
+    if len(set(names)) < len(names):
+        names = tuple(table.names[i] for i in channels)
+    return Recording(
+        episode,
+        clock.times,
+        positions,
+        names if named else (),
+        remarks=remarks,
+        units=units,
+        clock=clock.source,
+        doubts=(*guessed, *clock.doubts),
+        columns=names if table.named else (),
+    )
+
+
+def _mixed(stamps: Times, positions: Positions) -> Bool[np.ndarray, " T"]:
+    """Which rows of ur_rtde's recorder have their positions from another cycle than their time.
+
+    Such a row has other positions than the one before at the same time, or a moving arm's that the
+    next row repeats at the time they are of. The latter is told only at the controller's own cycle,
+    in which no arm comes to rest, and where the arm moves by more than one count of the numbers.
+    Where no row is repeated as a whole, another recorder wrote the log, and none is.
+    """
+    again = (np.diff(stamps) == 0) & np.all(np.diff(positions, axis=0) == 0, axis=1)
+    if not np.any(again):
+        return np.zeros(len(stamps), dtype=bool)
+    first = np.flatnonzero(np.concatenate([[True], ~again]))  # of rows that are wholly equal
+    steps, moved = np.diff(stamps[first]), np.diff(positions[first], axis=0)
+    mixed = np.zeros(len(first), dtype=bool)
+    mixed[1:] = steps == 0
+    if np.any(steps > 0) and abs(np.median(steps[steps > 0]) - _CYCLE) < 0.1 * _CYCLE:
+        count = np.abs(moved)[moved != 0].min(initial=np.inf)
+        still = np.maximum(REST_SPEED["rad"] * steps, 1.5 * count)
+        came, repeated = np.abs(moved).max(axis=1) > still, np.all(moved == 0, axis=1)
+        mixed[1:-1] |= came[:-1] & repeated[1:]
+    return np.repeat(mixed, np.diff(np.append(first, len(stamps))))
+
+
+def _time_column(table: Table, options: ReadOptions) -> tuple[int | None, tuple[Doubt, ...]]:
+    """The column of times, None where there is none, and what is only guessed of it."""
+    if options.time_column == NO_COLUMN:
+        return None, ()
+    if options.time_column is not None:
+        return _named_column(table, options.time_column, "--time-column"), ()
+    if table.named:
+        bare = [split_unit(name, SECONDS)[0].lower() for name in table.names]
+        found = next((i for i, name in enumerate(bare) if name in _TIMES), None)
+        if found is not None or not _no_name_first(table):
+            return found, ()
+        if table.nanoseconds(0) is not None:
+            return 0, ()
+        if options.rate is not None:
+            return None, ()
+    if len(table.names) > 1 and _could_be_time(table):
+        what = f"{table.where} names no column of times, and column 1 looks like the time"
+        return 0, (Doubt(what, "--time-column 1"),)
+    return None, ()
+
+
+def _no_name_first(table: Table) -> bool:
+    """Whether the first column has no name, as pandas writes an index."""
+    return table.named and (not table.names[0] or table.names[0].startswith("Unnamed:"))
+
+
+def _could_be_time(table: Table) -> bool:
+    """Whether the first column increases steadily."""
+    stamps = table.nanoseconds(0)
+    if stamps is None and table.is_text(0):
+        return False
+    steps = np.diff(table.numbers(0) if stamps is None else stamps)
+    return bool(np.all(steps > 0) and steps.max() < 10 * np.median(steps))
+
+
+def _clock(
+    table: Table, episode: str, time: int | None, options: ReadOptions, unit: str | None
+) -> Clock:
+    if time is None:
+        return options.clock(episode, len(table))
+    dates = table.nanoseconds(time)
+    name = table.names[time] or f"column {time + 1}"
+    if dates is not None:
+        return options.clock(episode, len(table), stamps=dates, name=name, unit="ns")
+    stamps, unit = table.numbers(time), unit or table.units[time]
+    return options.clock(episode, len(table), stamps=stamps, name=name, unit=unit)
+
+
+def _channels(
+    table: Table, others: Sequence[int], options: ReadOptions, log: _Log | None
+) -> tuple[list[int], bool]:
+    """Columns of the motion, and whether their names are those of joints.
+
+    Only these need to be numbers in every row; a log may carry others beside them.
+    """
+    names = [table.names[i] for i in others]
+    if not table.named:
+        return list(others), False
+    if options.key is None and options.joints:
+        found = find_channels(options.joints, names)
+        if found is not None:
+            return [others[i] for i in found], True
+    groups = vectors(names)
+    key = options.key or (log.key if log is not None else None)
+    if key is None:
+        return list(others), True
+    if key not in groups:
+        raise FileFormatError(
+            f"{table.where} has no columns {key}_0, {key}_1, ...; numbered columns are "
+            f"{', '.join(groups) or 'none'}: say which with the key"
+        )
+    return [others[i] for i in groups[key]], False

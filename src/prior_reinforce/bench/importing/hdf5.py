@@ -1,0 +1,163 @@
+"""Recordings in HDF5: robomimic data sets and DROID trajectories.
+
+robomimic (0.3, scripts/dataset_states_to_obs.py): `data/demo_k/...` with the rate in the JSON
+attribute `env_args` of `data` where robosuite made it. DROID: one `trajectory.h5` an episode.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from prior_reinforce.bench.importing.recording import (
+    Positions,
+    ReadOptions,
+    Recording,
+    check_size,
+    files_at,
+    has_files,
+    named_damage,
+    natural_order,
+)
+from prior_reinforce.errors import FileFormatError
+
+_SUFFIXES = (".h5", ".hdf5")
+_TRAJECTORY = "trajectory.h5"
+_ROBOMIMIC_KEY = "obs/robot0_joint_pos"
+"""robosuite's name of the first arm's joint positions; `actions` are mostly pose increments."""
+_DROID_KEY = "observation/robot_state/joint_positions"
+_DROID_TIMES_MS = (
+    "observation/timestamp/robot_state/read_start",
+    "observation/timestamp/control/step_start",
+)
+
+
+def is_droid(source: Path) -> bool:
+    """Whether a path looks like DROID."""
+    if source.is_dir():
+        return next(source.rglob(_TRAJECTORY), None) is not None
+    return source.name == _TRAJECTORY
+
+
+def is_robomimic(source: Path) -> bool:
+    """Whether a path looks like robomimic."""
+    return has_files(source, _SUFFIXES) and not is_droid(source)
+
+
+def read_robomimic(source: Path, options: ReadOptions) -> list[Recording]:
+    """Read every `data/demo_k` of a robomimic file."""
+    import h5py
+
+    paths = files_at(source, _SUFFIXES)
+    if len(paths) != 1:
+        raise FileFormatError(
+            f"{source} holds {len(paths)} HDF5 files, expected one; give the path of the file"
+        )
+    (path,), key = paths, options.key or _ROBOMIMIC_KEY
+    recordings = []
+    with named_damage(path, "robomimic HDF5"), h5py.File(path, "r") as file:
+        if "data" not in file:
+            raise FileFormatError(
+                f"{path} has no group `data` but {sorted(file)}; expected a robomimic file: say "
+                "its format"
+            )
+        data = _own(path, file, "data")
+        rate = _control_rate(data)
+        for episode in filter(options.wants, sorted(data, key=natural_order)):
+            group = _own(path, data, episode)
+            positions = _array(path, group, key, f"data/{episode}")
+            declared = group.attrs.get("num_samples")
+            if declared is not None and int(declared) != len(positions):
+                raise FileFormatError(
+                    f"{path}: {episode} declares {int(declared)} samples but {key} holds "
+                    f"{len(positions)}; copy the file again, or leave that episode out"
+                )
+            clock = options.clock(episode, len(positions), name="control_freq", own_rate=rate)
+            recordings.append(Recording(episode, clock.times, positions, clock=clock.source))
+    return recordings
+
+
+def read_droid(source: Path, options: ReadOptions) -> list[Recording]:
+    """Read a `trajectory.h5`, or every one below a folder; an episode is named by its folder."""
+    import h5py
+
+    paths = [source]
+    if source.is_dir():
+        paths = sorted(source.rglob(_TRAJECTORY), key=natural_order)
+    recordings = []
+    for path in paths:
+        episode = path.parent.name if path.name == _TRAJECTORY else path.stem
+        if not options.wants(episode):
+            continue
+        with named_damage(path, "DROID HDF5"), h5py.File(path, "r") as file:
+            positions = _array(path, file, options.key or _DROID_KEY, "the file")
+            stamps = next((name for name in _DROID_TIMES_MS if name in file), None)
+            clock = options.clock(
+                episode,
+                len(positions),
+                stamps=None if stamps is None else np.asarray(_own(path, file, stamps)[()]),
+                name=stamps or "",
+                unit="ms",
+            )
+            recordings.append(Recording(episode, clock.times, positions, clock=clock.source))
+    return recordings
+
+
+def _array(path: Path, group: Any, key: str, where: str) -> Positions:
+    """The motion under a key, or an error that lists what could be meant."""
+    candidates: list[str] = []
+
+    def collect(name: str, item: Any) -> None:
+        shape = getattr(item, "shape", None)
+        if shape is not None and len(shape) == 2 and item.dtype.kind in "fiu":
+            candidates.append(name)
+
+    found = _own(path, group, key)
+    if len(getattr(found, "shape", ())) != 2:
+        group.visititems(collect)
+        raise FileFormatError(
+            f"{path} has no array (T, D) at {key} in {where}; arrays of that shape are "
+            f"{sorted(candidates) or 'none'}: say which with the key"
+        )
+    if found.dtype.kind not in "fiu":
+        raise FileFormatError(f"{path}: {key} holds {found.dtype}, expected numbers")
+    check_size(path, key, found.shape)
+    return np.asarray(found[()], dtype=np.float64)
+
+
+def _own(path: Path, group: Any, key: str, depth: int = 8) -> Any:
+    """What stands under a key, None where nothing does; never anything of another file.
+
+    A file can name others (external links, external storage, virtual data sets), and reading it
+    would copy whatever they hold into the workspace.
+    """
+    import h5py
+
+    for part in filter(None, key.split("/")):
+        link = group.get(part, getlink=True) if isinstance(group, h5py.Group) else None
+        if isinstance(link, h5py.ExternalLink) or (link is not None and depth == 0):
+            raise FileFormatError(
+                f"{path}: {key} leads to another file ({getattr(link, 'filename', 'a circle')}), "
+                "which is not read; copy the data into one file"
+            )
+        if isinstance(link, h5py.SoftLink):
+            start = group.file if link.path.startswith("/") else group
+            group = _own(path, start, link.path, depth - 1)
+        else:
+            group = None if link is None else group[part]
+    if isinstance(group, h5py.Dataset) and (group.external or group.is_virtual):
+        raise FileFormatError(
+            f"{path}: the numbers of {key} are in another file, which is not read; copy the data "
+            "into one file"
+        )
+    return group
+
+
+def _control_rate(data: Any) -> float | None:
+    """Control frequency of robosuite, where the file has it."""
+    text = data.attrs.get("env_args")
+    rate = None if text is None else json.loads(text).get("env_kwargs", {}).get("control_freq")
+    return float(rate) if rate else None

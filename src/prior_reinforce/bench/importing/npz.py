@@ -1,0 +1,128 @@
+"""Recordings in NPZ or NPY: a file an episode, or one file whose motion has shape (N, T, D).
+
+An NPY holds the motion alone. Arrays of an NPZ: the motion (`key`, or `q`, `plans`, `positions`,
+`actions`), `t` or `dt` or `rate`, and where wanted `joint_names` or `names`, `outcome` or
+`outcomes` or `outcomes_seen`.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from prior_reinforce.bench.importing.clock import Clock
+from prior_reinforce.bench.importing.recording import (
+    NO_COLUMN,
+    ReadOptions,
+    Recording,
+    files_at,
+    named_damage,
+)
+from prior_reinforce.bench.importing.units import SECONDS, split_unit
+from prior_reinforce.errors import FileFormatError
+from prior_reinforce.files import open_npz
+
+Arrays = Mapping[str, np.ndarray]
+SUFFIXES = (".npz", ".npy")
+_TIMES = ("t", "time", "timestamp", "timestamps")
+_MOTION_KEYS = ("q", "plans", "positions", "actions")
+
+
+def read(source: Path, options: ReadOptions) -> list[Recording]:
+    """Read a file, or every one of a folder as an episode."""
+    paths = files_at(source, SUFFIXES)
+    wanted = [path for path in paths if len(paths) == 1 or options.wants(path.stem)]
+    return [recording for path in wanted for recording in _episodes(path, options)]
+
+
+def _episodes(path: Path, options: ReadOptions) -> list[Recording]:
+    arrays = _arrays(path)
+    key = options.key or next((name for name in _MOTION_KEYS if name in arrays), None)
+    if key is None or key not in arrays:
+        raise FileFormatError(
+            f"{path} has no array {key or ' or '.join(_MOTION_KEYS)}; it holds "
+            f"{sorted(arrays)}: say which with the key"
+        )
+    motion = arrays[key]
+    if motion.ndim not in (2, 3) or motion.dtype.kind not in "fiu":
+        raise FileFormatError(
+            f"{path}: {key} has shape {motion.shape} and type {motion.dtype}, expected numbers of "
+            "shape (T, D) or (N, T, D)"
+        )
+    names = _first(arrays, ("joint_names", "names"))
+    outcomes = _first(arrays, ("outcome", "outcomes", "outcomes_seen"))
+    single = motion.ndim == 2
+    motions = motion[None] if single else motion
+    if outcomes is not None:
+        outcomes = np.reshape(outcomes, (1, -1)) if single else outcomes
+        if outcomes.ndim != 2 or len(outcomes) != len(motions) or outcomes.dtype.kind not in "fiu":
+            raise FileFormatError(
+                f"{path}: outcomes have shape {outcomes.shape}, expected numbers of shape "
+                f"({len(motions)}, k)"
+            )
+    episodes = [path.stem] if single else [str(index) for index in range(len(motions))]
+    recordings = []
+    for index, episode in enumerate(episodes):
+        if not (single or options.wants(episode)):
+            continue
+        clock = _clock(path, arrays, motions.shape[1], index, episode, options)
+        recordings.append(
+            Recording(
+                episode,
+                clock.times,
+                motions[index],
+                () if names is None else tuple(map(str, np.ravel(names))),
+                None if outcomes is None else outcomes[index],
+                clock=clock.source,
+                doubts=clock.doubts,
+            )
+        )
+    return recordings
+
+
+def _arrays(path: Path) -> Arrays:
+    """Everything in a file; of our own demonstrations and plans also what their metadata says."""
+    if path.suffix.lower() == ".npy":
+        with named_damage(path, "NPY with plain numbers"), path.open("rb") as file:
+            return {_MOTION_KEYS[0]: np.load(file, allow_pickle=False)}
+    remedy = "it must be an NPZ with plain number arrays; copy it again, or say its format"
+    with open_npz(path, remedy) as archive:
+        content = {name: np.array(archive[name]) for name in archive.files}
+        if "metadata" in content:
+            metadata = json.loads(str(content.pop("metadata")))
+            form = metadata.get("format", metadata)
+            content.setdefault("dt", np.array(float(form["dt"])))
+            content.setdefault("names", np.array(form.get("names") or form.get("joint_names")))
+        return content
+
+
+def _first(arrays: Arrays, keys: Sequence[str]) -> np.ndarray | None:
+    return next((arrays[key] for key in keys if key in arrays), None)
+
+
+def _clock(
+    path: Path, arrays: Arrays, count: int, index: int, episode: str, options: ReadOptions
+) -> Clock:
+    with named_damage(path, "NPZ with times t, or dt, or rate"):
+        name = options.time_column
+        if name is None:
+            name = next((n for n in arrays if split_unit(n, SECONDS)[0] in _TIMES), None)
+        elif name not in (*arrays, NO_COLUMN):
+            raise FileFormatError(f"{path} has no array {name}; it holds {sorted(arrays)}")
+        if name == NO_COLUMN:
+            return options.clock(episode, count)
+        if name is not None:
+            stamps = arrays[name]
+            if stamps.size == count:
+                stamps = stamps.ravel()  # a column, as panda_py's `get_log` has it
+            elif stamps.ndim == 2:
+                stamps = stamps[index]
+            return options.clock(episode, count, stamps=stamps, name=name)
+        if "dt" in arrays:
+            return options.clock(episode, count, name="dt", own_rate=1 / float(arrays["dt"]))
+        if "rate" in arrays:
+            return options.clock(episode, count, name="rate", own_rate=float(arrays["rate"]))
+    return options.clock(episode, count)

@@ -1,0 +1,199 @@
+"""What an import found, in about ten lines and one picture, for a person to agree with."""
+
+from __future__ import annotations
+
+import math
+import os
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from prior_reinforce.bench.importing.inspection import Inspection, in_rows, say_small
+from prior_reinforce.bench.importing.preprocessing import Preprocessed
+from prior_reinforce.bench.importing.recording import Recording
+from prior_reinforce.plans.motions import Demonstrations
+from prior_reinforce.wording import plain
+
+if TYPE_CHECKING:
+    from prior_reinforce.report.panels import View
+
+_COLUMNS = 4
+_LEAST_RANGE = 0.2
+"""Smallest vertical range of a channel's panel, as a share of the largest motion in its unit."""
+Corners = Int[np.ndarray, " corners"]
+PlanePoints = Float[np.ndarray, "n 2"]
+
+
+@dataclass(frozen=True, eq=False)
+class Preview:
+    """The last look before demonstrations are used."""
+
+    source: str
+    """What was read, with its format."""
+    found: Inspection
+    """The N recordings, and what became of them."""
+    demonstrations: Demonstrations
+    """The result."""
+    outcomes_from: str
+    """Where the outcomes are from."""
+
+    @property
+    def recordings(self) -> tuple[Recording, ...]:
+        """N recordings with the plan's channels."""
+        return self.found.recordings
+
+    @property
+    def episodes(self) -> tuple[str, ...]:
+        """Names of the recordings."""
+        return tuple(recording.episode for recording in self.recordings)
+
+    @property
+    def done(self) -> Preprocessed:
+        """How the recordings became plans."""
+        return self.found.done
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What a person should look at: gaps, ends in mid-swing, outcomes that come twice."""
+        alike = tuple(
+            f"{self.episodes[i]} and {self.episodes[j]} have the same outcome: the mean of both "
+            "motions stands for it; if that is a slip of the pen, correct it"
+            for i, j in self.demonstrations.repeated_outcomes()
+        )
+        return (*self.found.remarks, *alike)
+
+    @property
+    def text(self) -> str:
+        """About ten lines: episodes, rate, trimming, resampling, outcomes, remarks."""
+        demos = self.demonstrations
+        outcomes = zip(demos.outcome_names, demos.outcome_units, demos.outcomes_seen.T, strict=True)
+        ranges = ", ".join(f"{n} {v.min():.3g} to {v.max():.3g} {u}" for n, u, v in outcomes)
+        if np.any(demos.outcome_noise):
+            most = say_small(float(demos.outcome_noise.max()), demos.outcome_units[0])
+            ranges += f", uncertain by up to {most}"
+        rows = {
+            "episodes": f"{demos.n} from {self.source}: {', '.join(self.episodes)}",
+            **self.found.rows,
+            "outcomes": f"{ranges}, from {self.outcomes_from}",
+            "coverage": self._coverage(),
+        }
+        return in_rows(rows, self.remarks)
+
+    def draw(self, path: str | os.PathLike[str]) -> None:
+        """Write the picture (PNG): every joint over time, and the outcomes with their hull."""
+        from matplotlib import rc_context
+
+        with rc_context({"text.parse_math": False}):  # a name may hold dollar signs
+            self._draw(path)
+
+    def _draw(self, path: str | os.PathLike[str]) -> None:
+        from matplotlib import colormaps
+        from matplotlib.figure import Figure
+
+        from prior_reinforce.report.panels import views_of
+
+        demos = self.demonstrations
+        views = views_of(demos.outcome_units)
+        rows = math.ceil((demos.action_dim + len(views)) / _COLUMNS)
+        width, height = 3.4 * _COLUMNS, 2.6 * rows + 0.5
+        figure = Figure(figsize=(width, height), dpi=110)
+        # Panels are all alike, so their margins are known; to measure them took half of the time.
+        panels = figure.subplots(
+            rows,
+            _COLUMNS,
+            squeeze=False,
+            gridspec_kw={
+                "left": 0.7 / width, "right": 1 - 0.15 / width, "bottom": 0.5 / height,
+                "top": 1 - 0.75 / height, "wspace": 0.34, "hspace": 0.45,
+            },
+        )  # fmt: skip
+        axes = panels.ravel()
+        colours = [colormaps["tab10"](i % 10) for i in range(demos.n)]
+        for channel in range(demos.action_dim):
+            self._draw_channel(axes[channel], channel, colours)
+        for at, view in enumerate(views, start=demos.action_dim):
+            self._draw_outcomes(axes[at], view, colours)
+        for spare in axes[demos.action_dim + len(views) :]:
+            spare.set_axis_off()
+        figure.suptitle(
+            f"{demos.n} demonstrations as they will be learned (colour, dot where the motion ends) "
+            "and as recorded (grey)"
+        )
+        figure.savefig(path, format="png")
+
+    def _coverage(self) -> str:
+        demos, points = self.demonstrations, self.demonstrations.outcomes_seen
+        gaps = np.linalg.norm(points[:, None] - points[None], axis=-1)
+        gaps[np.diag_indices(demos.n)] = np.inf
+        i, j = np.unravel_index(int(np.argmin(gaps)), gaps.shape)
+        nearest = (
+            f"nearest two are {self.episodes[i]} and {self.episodes[j]}, {gaps[i, j]:.3g} apart"
+        )
+        if demos.outcome_dim == 1:
+            return nearest
+        corners = hull_corners(points[:, :2])
+        x, y = points[corners, 0], points[corners, 1]
+        area = 0.5 * abs(np.dot(x, np.roll(y, -1)) - np.dot(y, np.roll(x, -1)))
+        unit = demos.outcome_units[0]
+        square = f" {unit}^2" if demos.outcome_units[1] == unit else ""
+        name = " and ".join(demos.outcome_names[:2])
+        return f"hull in {name} of {area:.3g}{square} by {len(corners)} of {demos.n}; {nearest}"
+
+    def _draw_channel(self, axes: Any, channel: int, colours: list[Any]) -> None:
+        demos, form = self.demonstrations, self.demonstrations.format
+        times = np.arange(demos.horizon) * form.dt
+        for recording, start in zip(self.recordings, self.done.starts, strict=True):
+            recorded = recording.positions[:, channel]
+            axes.plot(recording.times - start, recorded, color="0.8", linewidth=2.5, zorder=1)
+        for plan, colour in zip(demos.plans, colours, strict=True):
+            axes.plot(times, plan[:, channel], color=colour, linewidth=1.1, zorder=2)
+            moving = np.flatnonzero(np.any(plan != plan[-1], axis=1))
+            end = min(int(moving[-1]) + 1, len(times) - 1) if moving.size else 0
+            axes.plot(times[end], plan[end, channel], "o", color=colour, markersize=3, zorder=3)
+        # A channel that hardly moves must not look as if it did.
+        low, high = axes.get_ylim()
+        like = np.array(form.units) == form.units[channel]
+        least = _LEAST_RANGE * float(np.ptp(demos.plans, axis=(0, 1))[like].max())
+        if high - low < least:
+            axes.set_ylim((low + high - least) / 2, (low + high + least) / 2)
+        axes.set_title(f"{form.names[channel]} [{form.units[channel]}]", fontsize=10)
+        axes.set_xlabel("time from the plan's start [s]", fontsize=8)
+        axes.tick_params(labelsize=8)
+
+    def _draw_outcomes(self, axes: Any, view: View, colours: list[Any]) -> None:
+        """Outcomes as a report draws them, with their hull; a single component on a line."""
+        demos, (across, up) = self.demonstrations, (view.across, view.up)
+        names, units = demos.outcome_names, demos.outcome_units
+        height = np.zeros(demos.n) if up is None else demos.outcomes_seen[:, up]
+        points = np.column_stack([demos.outcomes_seen[:, across], height])
+        if up is None:
+            axes.set_yticks([])
+        else:
+            corners = hull_corners(points)
+            axes.fill(*points[corners].T, color="0.9", zorder=1)
+            axes.set_ylabel(f"{names[up]} [{units[up]}]", fontsize=8)
+            if units[across] == units[up]:
+                axes.set_aspect("equal", adjustable="datalim")
+        axes.scatter(*points.T, c=colours, s=30, zorder=2)
+        for point, episode in zip(points, self.episodes, strict=True):
+            axes.annotate(
+                plain(episode), point, textcoords="offset points", xytext=(5, 4), fontsize=7
+            )
+        axes.margins(0.25)
+        if view.mirrored:
+            axes.invert_xaxis()
+        axes.set_xlabel(f"{names[across]} [{units[across]}]", fontsize=8)
+        axes.set_title(f"outcomes {view.title}".strip(), fontsize=10)
+        axes.tick_params(labelsize=8)
+
+
+def hull_corners(points: PlanePoints) -> Corners:
+    """Return indices of the corners of the points' convex hull, in order; none where it is flat."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        return np.asarray(ConvexHull(points).vertices)
+    except (QhullError, ValueError):
+        return np.zeros(0, dtype=int)

@@ -1,0 +1,291 @@
+"""One episode as it was recorded, and what the readers of all formats share."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TypedDict
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from prior_reinforce.arrays import Point
+from prior_reinforce.bench.importing.clock import Clock, Stamps, Times, clock_of
+from prior_reinforce.bench.importing.units import CHANNEL_UNITS, Doubt, say_names, split_unit
+from prior_reinforce.errors import (
+    FileFormatError,
+    InvalidDemonstrationsError,
+    PriorReinforceError,
+)
+from prior_reinforce.files import without_advice
+
+Positions = Float[np.ndarray, "T D"]
+"""D channels at T times, in their units."""
+NO_COLUMN = "none"
+"""What is said for the column of times where none shall be read."""
+
+
+_MOST_NUMBERS = 600_000_000
+"""Of one array; ours: seven joints for a day at 1 kHz."""
+
+
+class HowToRead(TypedDict, total=False):
+    """What may be said of recordings; an option that the format has no use for is refused."""
+
+    format: str | None
+    """What it is, a name of `FORMATS`; None detects it."""
+    key: str | None
+    """Where the motion is: the array of an NPZ, the column of a LeRobot data set, the path of an
+    HDF5 data set inside an episode, or the topic of a bag. None takes the only candidate."""
+    rate: float | None
+    """Frames a second, for files that hold no times; where they do, it must agree with them."""
+    time_unit: str | None
+    """Unit of the times, one of `s`, `ms`, `us`, `ns`, or `frame` for a column that counts frames.
+    None takes it from the column's name (`t_ms`); where none stands there and seconds are not
+    possible for an arm, that is an error."""
+    time_column: str | None
+    """Column or array of the times, by name, or by its number from 1; `none` leaves all unread.
+    None takes one that is called `t`, `time`, `timestamp` or the like."""
+    episode_column: str | None
+    """Column of a table that says which episode a row is of. None takes one that is called
+    `episode`, `throw_id` or the like."""
+    delimiter: str | None
+    """What stands between two cells of a CSV, a name of `DELIMITERS` or the character itself; None
+    finds it out."""
+    decimal: str | None
+    """Decimal sign of a CSV, `.` or `,`; None finds it out."""
+    episodes: Sequence[str] | None
+    """Names of the episodes to keep, in order; None keeps all."""
+    leave_out: Sequence[str] | None
+    """Names of episodes to leave out of those."""
+    joints: Sequence[str] | None
+    """Recorded names to keep, in the plan's order, so that the rest need not be there in every
+    message of a bag, nor be numbers in a CSV. None keeps all. Where the file names nothing, they
+    name its columns in order."""
+
+
+@dataclass(frozen=True)
+class ReadOptions:
+    """What the reader of a format is asked for; each field as in `HowToRead`."""
+
+    key: str | None = None
+    rate: float | None = None
+    time_unit: str | None = None
+    time_column: str | None = None
+    episode_column: str | None = None
+    delimiter: str | None = None
+    decimal: str | None = None
+    episodes: tuple[str, ...] | None = None
+    joints: tuple[str, ...] | None = None
+
+    def wants(self, episode: str) -> bool:
+        """Whether that episode was asked for."""
+        return self.episodes is None or episode in self.episodes
+
+    def clock(
+        self,
+        episode: str,
+        count: int,
+        *,
+        stamps: Stamps | None = None,
+        name: str = "",
+        unit: str | None = None,
+        own_rate: float | None = None,
+    ) -> Clock:
+        """Return the times of an episode, as in `clock_of`, with what was said of them."""
+        return clock_of(
+            episode,
+            count,
+            stamps=stamps,
+            name=name,
+            unit=unit,
+            own_rate=own_rate,
+            rate=self.rate,
+            time_unit=self.time_unit,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """One demonstration before trimming and resampling: uneven times, any channels."""
+
+    episode: str
+    """Name within its source, by which outcomes and messages refer to it."""
+    times: Times
+    """Time of each frame from the first, strictly increasing."""
+    positions: Positions
+    """What was recorded, in the recorder's units."""
+    names: tuple[str, ...] = ()
+    """Names of the D channels, as recorded but without a unit that stands in them (`x_cm` is `x`);
+    `joint1`, `joint2`, ... where the file names none."""
+    outcome: Point | None = None
+    """Where the object landed, for the rare file that says so."""
+    remarks: tuple[str, ...] = ()
+    """What a person should know about how it was read."""
+    units: tuple[str | None, ...] = ()
+    """Unit of each channel that the file says; None where it says none. Empty takes those that
+    stand in the names."""
+    clock: str = ""
+    """Where the times are from, for a person: `t in ms`."""
+    doubts: tuple[Doubt, ...] = ()
+    """What is only guessed of the times."""
+    columns: tuple[str, ...] = ()
+    """What the file calls the D channels, where that is not their `names`: numbered columns that
+    are taken as the joints in order."""
+    named: bool = field(init=False)
+    """Whether the file names the channels."""
+
+    def __post_init__(self) -> None:
+        """Copy and check.
+
+        Raises:
+            InvalidDemonstrationsError: Shapes that do not fit, fewer than two frames, repeated
+                names, times that do not increase, or values that are not finite.
+        """
+        episode = f"episode {self.episode}"
+        try:
+            times = np.array(self.times, dtype=np.float64)
+            positions = np.array(self.positions, dtype=np.float64)
+        except (TypeError, ValueError, OverflowError) as error:
+            raise InvalidDemonstrationsError(
+                f"{episode} must hold numbers: {error}; mend or drop it"
+            ) from error
+        width = positions.shape[1] if positions.ndim == 2 else 0
+        names = tuple(map(str, self.names)) or tuple(f"joint{i + 1}" for i in range(width))
+        names, units = _without_units(names) if not self.units else (names, tuple(self.units))
+        fits = positions.shape == (times.size, len(names)) and len(names) > 0
+        if times.ndim != 1 or not fits or times.size < 2:
+            raise InvalidDemonstrationsError(
+                f"{episode} has times {times.shape} and positions {positions.shape} for "
+                f"{len(names)} channels; expected (T,) and (T, {len(names)}) with T >= 2: mend or "
+                "drop it"
+            )
+        repeated = [name for name, count in Counter(names).items() if count > 1]
+        if repeated:
+            raise InvalidDemonstrationsError(
+                f"{episode} repeats a channel name: {say_names(repeated)}; rename the channels"
+            )
+        numbers = np.column_stack([positions, times])
+        bad = np.argwhere(~np.isfinite(numbers))
+        if bad.size:
+            frame, column = bad[0].tolist()
+            raise InvalidDemonstrationsError(
+                f"{episode}: {(*names, 'time')[column]} is {numbers[frame, column]} at frame "
+                f"{frame}, expected a finite number; mend or drop that episode"
+            )
+        again = _repeated(times, positions)
+        if np.any(again) and not np.all(again[1:]):
+            times, positions = times[~again], positions[~again]
+            remark = f"{again.sum()} frames were recorded twice; once is kept"
+            object.__setattr__(self, "remarks", (*self.remarks, remark))
+        backward = np.flatnonzero(np.diff(times) <= 0)
+        if backward.size:
+            frame = int(backward[0]) + 1
+            raise InvalidDemonstrationsError(
+                f"{episode}: time does not increase at frame {frame} ({times[frame - 1]:g} s, then "
+                f"{times[frame]:g} s); sort or drop those frames"
+            )
+        if self.outcome is not None:
+            outcome = np.atleast_1d(np.array(self.outcome, dtype=np.float64))
+            object.__setattr__(self, "outcome", outcome)
+        times -= times[0]
+        times.setflags(write=False)
+        positions.setflags(write=False)
+        object.__setattr__(self, "named", bool(self.names))
+        object.__setattr__(self, "units", units)
+        object.__setattr__(self, "times", times)
+        object.__setattr__(self, "positions", positions)
+        object.__setattr__(self, "names", names)
+        object.__setattr__(self, "columns", tuple(self.columns) or names)
+
+    @property
+    def duration(self) -> float:
+        """Time from the first to the last frame, in [s]."""
+        return float(self.times[-1])
+
+    @property
+    def period(self) -> float:
+        """Median time between two frames, in [s]."""
+        return float(np.median(np.diff(self.times)))
+
+
+def _repeated(times: Times, positions: Positions) -> Bool[np.ndarray, " T"]:
+    """Which frames repeat the one before, time and all.
+
+    A second, different frame at one time is not among them: it is an error.
+    """
+    same = (np.diff(times) == 0) & np.all(np.diff(positions, axis=0) == 0, axis=1)
+    return np.concatenate([[False], same])
+
+
+def _without_units(names: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[str | None, ...]]:
+    """Names and the units that stood in them; where two would be one, all stay as they are."""
+    split = [split_unit(name, CHANNEL_UNITS) for name in names]
+    stripped = tuple(name for name, _ in split)
+    units = tuple(unit for _, unit in split)
+    return (stripped if len(set(stripped)) == len(set(names)) else names), units
+
+
+def check_size(path: Path, name: str, shape: Sequence[int]) -> None:
+    """Refuse an array that could be no recording, before it is read: a header may claim anything.
+
+    Raises:
+        FileFormatError: It is larger than a day of an arm at 1 kHz.
+    """
+    numbers = math.prod(map(int, shape))
+    if numbers > _MOST_NUMBERS:
+        raise FileFormatError(
+            f"{path}: {name} has shape {tuple(shape)}, {numbers:.2g} numbers; that is no recording "
+            "of throws, copy the file again"
+        )
+
+
+@contextmanager
+def named_damage(path: Path, what: str) -> Iterator[None]:
+    """Turn whatever a format's library raises on a damaged file into one named error.
+
+    Wide on purpose: parsers of foreign formats raise anything on damaged bytes (struct.error,
+    UnicodeDecodeError, RuntimeError, KeyError, their own trees). Keep only parsing inside.
+
+    Raises:
+        FileFormatError: With the library's first words.
+    """
+    try:
+        yield
+    except PriorReinforceError:
+        raise
+    except Exception as error:
+        words = without_advice(error).split("\n")[0][:200] or "no reason given"
+        raise FileFormatError(
+            f"cannot read {path} as {what} ({type(error).__name__}: {words}); it is damaged or "
+            "something else: copy it again from where it was recorded, or say its format"
+        ) from error
+
+
+def natural_order(name: object) -> tuple[tuple[int, str], ...]:
+    """Return a sort key by which `demo_10` follows `demo_9`."""
+    parts = re.split(r"(\d+)", str(name))
+    return tuple((int(part), "") if part.isdigit() else (-1, part) for part in parts)
+
+
+def files_at(source: Path, suffixes: tuple[str, ...]) -> list[Path]:
+    """Return a file itself, or a folder's files with one of the suffixes, in natural order."""
+    if not source.is_dir():
+        return [source]
+    found = [path for path in source.iterdir() if path.is_file() and has_suffix(path, suffixes)]
+    return sorted((path for path in found if path.stem != "outcomes"), key=natural_order)
+
+
+def has_suffix(path: Path, suffixes: tuple[str, ...]) -> bool:
+    """Whether a name ends in one of the suffixes, in capitals or not."""
+    return path.suffix.lower() in suffixes
+
+
+def has_files(source: Path, suffixes: tuple[str, ...]) -> bool:
+    """Whether a file has one of the suffixes, or a folder holds one that has."""
+    return bool(files_at(source, suffixes)) and (source.is_dir() or has_suffix(source, suffixes))

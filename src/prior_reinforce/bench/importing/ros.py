@@ -1,0 +1,158 @@
+"""ROS 1 bags, ROS 2 sqlite bags and MCAP, read with rosbags (no ROS needed).
+
+A sensor_msgs/JointState topic gives one episode a bag; a trajectory_msgs/JointTrajectory topic one
+a message. Joints are matched by name in every message, because nothing fixes their order.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from prior_reinforce.bench.importing.clock import Times
+from prior_reinforce.bench.importing.naming import find_channels
+from prior_reinforce.bench.importing.recording import (
+    ReadOptions,
+    Recording,
+    check_size,
+    has_suffix,
+    named_damage,
+    natural_order,
+)
+from prior_reinforce.bench.importing.units import say_names
+from prior_reinforce.errors import FileFormatError
+from prior_reinforce.files import inside
+
+_SUFFIXES = (".bag", ".mcap", ".db3")
+_STATE, _TRAJECTORY = "sensor_msgs/msg/JointState", "trajectory_msgs/msg/JointTrajectory"
+
+
+def recognises(source: Path) -> bool:
+    """Whether a path looks like a bag, or a folder that holds one."""
+    return bool(_bags_at(source))
+
+
+def read(source: Path, options: ReadOptions) -> list[Recording]:
+    """Read a bag, or every bag of a folder."""
+    from rosbags.highlevel import AnyReader
+    from rosbags.typesys import Stores, get_typestore
+
+    bags = _bags_at(source)
+    if not bags:
+        raise FileFormatError(
+            f"{source} is no bag and holds none; expected .bag, .mcap, .db3 or a ROS 2 bag's folder"
+        )
+    recordings: list[Recording] = []
+    for bag in bags:
+        name = bag.name if bag.is_dir() else bag.stem
+        if not any(e == name or e.startswith(f"{name}-") for e in options.episodes or (name,)):
+            continue
+        # A link inside could name any file of this machine.
+        for path in bag.iterdir() if bag.is_dir() else ():
+            inside(path, bag)
+        with named_damage(bag, "a ROS bag"):
+            # Bags from before ROS 2 Iron carry no definitions; these two messages never changed.
+            definitions = get_typestore(Stores.LATEST)
+            with AnyReader([bag], default_typestore=definitions) as reader:
+                connections, kind = _topic(bag, reader, options.key)
+                check_size(bag, connections[0].topic, (reader.message_count,))
+                messages = [
+                    (stamp, reader.deserialize(raw, connection.msgtype))
+                    for connection, stamp, raw in reader.messages(connections=connections)
+                ]
+            if not messages:
+                raise FileFormatError(f"{bag}: topic {connections[0].topic} has no messages")
+            if kind == _STATE:
+                recordings.append(_states(bag, name, messages, options))
+            else:
+                recordings.extend(
+                    _trajectories(name, [message for _, message in messages], options)
+                )
+    return [recording for recording in recordings if options.wants(recording.episode)]
+
+
+def _bags_at(source: Path) -> list[Path]:
+    """The bags a path stands for: itself, or those of its folder; empty if there are none."""
+    if _is_bag(source):
+        return [source]
+    found = source.iterdir() if source.is_dir() else ()
+    return sorted(filter(_is_bag, found), key=natural_order)
+
+
+def _is_bag(path: Path) -> bool:
+    if path.is_dir():
+        return (path / "metadata.yaml").is_file()
+    return path.is_file() and has_suffix(path, _SUFFIXES)
+
+
+def _topic(bag: Path, reader: Any, key: str | None) -> tuple[list[Any], str]:
+    usable = {c.topic: c.msgtype for c in reader.connections if c.msgtype in (_STATE, _TRAJECTORY)}
+    if key is None and len(usable) == 1:
+        key = next(iter(usable))
+    if key not in usable:
+        listed = ", ".join(f"{topic} ({kind})" for topic, kind in sorted(usable.items()))
+        raise FileFormatError(
+            f"{bag}: {'no joint topic ' + key if key else f'{len(usable)} joint topics'}; topics "
+            f"of JointState or JointTrajectory are {listed or 'none'}: say which with the key"
+        )
+    return [c for c in reader.connections if c.topic == key], usable[key]
+
+
+def _states(
+    bag: Path, name: str, messages: list[tuple[int, Any]], options: ReadOptions
+) -> Recording:
+    """One episode of JointStates; messages that lack a wanted joint are another publisher's."""
+    kinds = Counter(tuple(sorted(message.name)) for _, message in messages)
+    every = list(dict.fromkeys(joint for _, message in messages for joint in message.name))
+    # Only their recorded names are looked for in each message.
+    found = None if options.joints is None else find_channels(options.joints, every)
+    wanted = options.joints if found is None else tuple(every[i] for i in found)
+    if wanted is None:
+        common = kinds.most_common(1)[0][0]
+        wanted = next(tuple(m.name) for _, m in messages if tuple(sorted(m.name)) == common)
+    kept = [(stamp, m) for stamp, m in messages if set(wanted) <= set(m.name)]
+    if not kept:
+        raise FileFormatError(
+            f"{bag}: no message holds all of {list(wanted)}; joints in it are {say_names(every)}: "
+            "name those"
+        )
+    remarks = []
+    if len(kept) < len(messages):
+        remarks.append(f"{len(messages) - len(kept)} messages without all joints skipped")
+    # Everything else a message holds, such as fingers, stays available by name.
+    names = tuple(n for n in kept[0][1].name if all(n in m.name for _, m in kept))
+    rows = [[dict(zip(m.name, m.position, strict=True))[n] for n in names] for _, m in kept]
+    positions = np.array(rows, dtype=np.float64)
+    stamps = [m.header.stamp.sec * 10**9 + m.header.stamp.nanosec for _, m in kept]
+    if stamps[0] > 0 and stamps[-1] > stamps[0] and sorted(stamps) == stamps:
+        times, source = _since_first(stamps), "header stamps"
+    else:
+        times, source = _since_first([stamp for stamp, _ in kept]), "the recorder's stamps"
+        remarks.append("header stamps unusable, times are those of the recorder")
+    clock = options.clock(name, len(kept), stamps=times, name=source, unit="ns")
+    return Recording(
+        name, clock.times, positions, names, remarks=tuple(remarks), clock=clock.source
+    )
+
+
+def _since_first(stamps: list[int]) -> Times:
+    """Nanoseconds since the first stamp; since 1970 they would be 256 ns coarse as floats."""
+    return np.array([stamp - stamps[0] for stamp in stamps], dtype=np.float64)
+
+
+def _trajectories(name: str, messages: list[Any], options: ReadOptions) -> list[Recording]:
+    recordings = []
+    for index, message in enumerate(messages):
+        times = [p.time_from_start.sec + p.time_from_start.nanosec * 1e-9 for p in message.points]
+        positions = np.array([p.positions for p in message.points], dtype=np.float64)
+        positions = positions.reshape(len(times), -1)
+        episode = name if len(messages) == 1 else f"{name}-{index}"
+        names = tuple(message.joint_names)
+        clock = options.clock(
+            episode, len(times), stamps=np.array(times), name="time_from_start", unit="s"
+        )
+        recordings.append(Recording(episode, clock.times, positions, names, clock=clock.source))
+    return recordings

@@ -1,0 +1,158 @@
+"""Diffusion Policy's replay buffers: zarr stores (format 2), as folders or zipped.
+
+Layout (real-stanford/diffusion_policy, common/replay_buffer.py): `data/<key>` holds all episodes
+one after the other, `meta/episode_ends` where each ends. It has no names, and times only where its
+writer adds `data/timestamp`, as UMI's does.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import zipfile
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from prior_reinforce.bench.importing.clock import Stamps
+from prior_reinforce.bench.importing.recording import (
+    NO_COLUMN,
+    ReadOptions,
+    Recording,
+    check_size,
+    named_damage,
+)
+from prior_reinforce.errors import FileFormatError
+from prior_reinforce.files import inside
+
+_ENDS, _TIMES = "meta/episode_ends", "timestamp"
+_NUMBERS = re.compile(r"([<>|][biuf]\d+)|(bool|u?int\d+|float\d+)")
+_CODECS = frozenset(
+    {"blosc", "bytes", "bz2", "crc32c", "delta", "gzip", "lz4", "lzma"}
+    | {"shuffle", "transpose", "zlib", "zstd"}
+)
+"""Codecs that turn bytes into bytes; others (pickle, json2, msgpack2) make objects of them."""
+
+
+def recognises(source: Path) -> bool:
+    """Whether a path looks like a replay buffer, from its name or its layout."""
+    if source.is_dir():
+        return (source / _ENDS).is_dir() and (source / "data").is_dir()
+    return source.name.lower().endswith((".zarr.zip", ".zarr"))
+
+
+def read(source: Path, options: ReadOptions) -> list[Recording]:
+    """Read every episode of a store."""
+    import zarr
+
+    with named_damage(source, "a zarr replay buffer"), ExitStack() as stack:
+        store: Any = str(source)
+        if not source.is_dir():
+            store = stack.enter_context(zarr.storage.ZipStore(store, mode="r"))
+        arrays = _plain_arrays(source)
+        newer = int(zarr.__version__.split(".")[0]) >= 3
+        # Consolidated metadata would say it all a second time, and could say something else.
+        how: Any = {"use_consolidated": False} if newer else {}
+        group: Any = zarr.open_group(store, mode="r", **how)
+        vectors = sorted(
+            name.removeprefix("data/")
+            for name, shape in arrays.items()
+            if name.startswith("data/") and len(shape) == 2
+        )
+        key = vectors[0] if options.key is None and len(vectors) == 1 else options.key
+        if key not in vectors:
+            raise FileFormatError(
+                f"{source} has no array (T, D) {key or 'that is the only one'} in data/; there are "
+                f"{vectors}: say which with the key"
+            )
+        if _ENDS not in arrays:
+            raise FileFormatError(f"{source} has no numbers at {_ENDS}; copy the store again")
+        for name in (_ENDS, f"data/{key}"):
+            check_size(source, name, arrays[name])
+        ends = np.asarray(group[_ENDS][:], dtype=np.int64).ravel()
+        if ends.size == 0:
+            raise FileFormatError(f"{source} holds no episode; copy the store again")
+        positions = np.asarray(group[f"data/{key}"][:], dtype=np.float64)
+        stamps = _stamps(source, group, arrays, options)
+    starts = np.concatenate([[0], ends[:-1]])
+    if np.any(ends <= starts) or ends[-1] != len(positions):
+        raise FileFormatError(
+            f"{source}: episodes end at {ends[:8].tolist()} but there are {len(positions)} frames; "
+            "copy the store again"
+        )
+    recordings = []
+    for episode, (start, end) in enumerate(zip(starts.tolist(), ends.tolist(), strict=True)):
+        if options.wants(str(episode)):
+            own = None if stamps is None else stamps[start:end]
+            clock = options.clock(
+                str(episode), end - start, stamps=own, name=options.time_column or _TIMES
+            )
+            recordings.append(
+                Recording(
+                    str(episode),
+                    clock.times,
+                    positions[start:end],
+                    clock=clock.source,
+                    doubts=clock.doubts,
+                )
+            )
+    return recordings
+
+
+def _stamps(
+    source: Path, group: Any, arrays: Mapping[str, tuple[int, ...]], options: ReadOptions
+) -> Stamps | None:
+    """Times of all frames, where the store has them."""
+    there = sorted(name.removeprefix("data/") for name in arrays if name.startswith("data/"))
+    name = options.time_column or (_TIMES if _TIMES in there else NO_COLUMN)
+    if name == NO_COLUMN:
+        return None
+    if name not in there:
+        raise FileFormatError(f"{source} has no array {name} in data/; it has {there}")
+    check_size(source, name, arrays[f"data/{name}"])
+    return np.asarray(group[f"data/{name}"][:]).ravel()
+
+
+def _plain_arrays(source: Path) -> dict[str, tuple[int, ...]]:
+    """Shapes of the arrays of plain numbers, by name, from their metadata alone.
+
+    Arrays of objects, and codecs that make objects, could run code when they are read; they are
+    left out, and so are never opened.
+
+    Raises:
+        FileFormatError: A part of the store is a link that leads out of it.
+    """
+    plain = {}
+    for name, text in _metadata(source):
+        array, _, file = name.rpartition("/")
+        found = json.loads(text)
+        if file == ".zarray":
+            stages = [found.get("compressor"), *(found.get("filters") or ())]
+            codecs = [stage["id"] for stage in stages if stage is not None]
+            numbers = found["dtype"]
+        elif found.get("node_type") == "array":
+            codecs, numbers = [stage["name"] for stage in found["codecs"]], found["data_type"]
+        else:
+            continue
+        if isinstance(numbers, str) and _NUMBERS.fullmatch(numbers) and _CODECS.issuperset(codecs):
+            plain[array] = tuple(map(int, found["shape"]))
+    return plain
+
+
+def _metadata(source: Path) -> Iterator[tuple[str, bytes]]:
+    """Name within the store, and content, of every file that describes an array."""
+    names = (".zarray", "zarr.json")
+    if not source.is_dir():
+        with zipfile.ZipFile(source) as packed:
+            for member in packed.namelist():
+                if member.endswith(names):
+                    yield member, packed.read(member)
+        return
+    for path in sorted(source.rglob("*")):
+        if path.is_symlink():
+            inside(path, source)
+        if path.name in names:
+            yield path.relative_to(source).as_posix(), path.read_bytes()

@@ -1,0 +1,189 @@
+"""What a plan may ask of a robot arm, and which of its columns moves which joint."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+from jaxtyping import Float
+
+from prior_reinforce.bench.robots.kinematics import Chain, JointPositions
+from prior_reinforce.errors import ConfigurationError, InvalidPlanError
+from prior_reinforce.plans.motions import PlanFormat
+
+PerJoint = Float[np.ndarray, " D"]
+"""One number for each of an arm's D joints."""
+_OF_A_GRIPPER = re.compile(r"(^|[_/.])(finger|gripper)s?\d*[_/.]")
+
+
+@dataclass(frozen=True, eq=False)
+class VelocityEnvelope:
+    """A velocity bound that shrinks towards the stops.
+
+    min(velocity, max(0, -offset + sqrt(max(0, 2 deceleration (upper - q))))), mirrored at the lower
+    end (frankarobotics/docs, robot_specifications.rst, "Position-Based Velocity Limits").
+    """
+
+    offset: PerJoint
+    """[rad/s]."""
+    deceleration: PerJoint
+    """[rad/s^2]."""
+    lower: PerJoint
+    """Lower end in the formula, [rad]; libfranka's differs a little from the position limit."""
+    upper: PerJoint
+    """Upper end in the formula, [rad]."""
+
+
+@dataclass(frozen=True, eq=False)
+class RobotLimits:
+    """What a plan may ask of an arm with D joints."""
+
+    robot: str
+    """For instance `panda` or `fr3`."""
+    firmware: str
+    """Which firmware the numbers hold for."""
+    source: str
+    """Where the numbers are published."""
+    joint_names: tuple[str, ...]
+    """Names of the D joints; a plan's columns are matched to them by name."""
+    lower: PerJoint
+    """Lowest joint positions, [rad]."""
+    upper: PerJoint
+    """Highest joint positions, [rad]."""
+    velocity: PerJoint
+    """Largest joint speeds, [rad/s]."""
+    acceleration: PerJoint | None = None
+    """Largest joint accelerations, [rad/s^2]; None where the maker publishes none."""
+    jerk: PerJoint | None = None
+    """Largest joint jerks, [rad/s^3]; None where the maker publishes none."""
+    envelopes: tuple[VelocityEnvelope, ...] = ()
+    """Position-dependent velocity bounds, where the robot has them; the narrowest counts."""
+    chain: Chain | None = None
+    """Kinematics, for the tool tip; None where they are not known, so that no box can be kept."""
+
+    def __post_init__(self) -> None:
+        """Copy and check.
+
+        Raises:
+            ConfigurationError: A wrong number of values, or values that no arm has.
+        """
+        object.__setattr__(self, "joint_names", tuple(self.joint_names))
+        d = len(self.joint_names)
+        if d == 0 or len(set(self.joint_names)) != d:
+            raise ConfigurationError(
+                f"limits of {self.robot} need joint names that differ, got {self.joint_names}"
+            )
+        for name in ("lower", "upper", "velocity", "acceleration", "jerk"):
+            if getattr(self, name) is None and name in ("acceleration", "jerk"):
+                continue
+            values = _per_joint(self.robot, name, getattr(self, name), d)
+            object.__setattr__(self, name, values)
+            if name not in ("lower", "upper") and np.any(values <= 0):
+                raise ConfigurationError(
+                    f"{name} limits of {self.robot} must be positive, got {values.tolist()}"
+                )
+        if np.any(self.lower >= self.upper):
+            joint = self.joint_names[int(np.argmax(self.lower >= self.upper))]
+            raise ConfigurationError(
+                f"the lower limit of {joint} of {self.robot} must be below its upper limit"
+            )
+        for envelope in self.envelopes:
+            for item in fields(envelope):
+                _per_joint(self.robot, item.name, getattr(envelope, item.name), d)
+        if self.chain is not None and not len(self.chain.origins) == len(self.chain.axes) == d:
+            raise ConfigurationError(
+                f"the kinematics of {self.robot} have {len(self.chain.origins)} joints, its limits "
+                f"{d}; give one row a joint"
+            )
+
+    def velocity_bounds(self, q: JointPositions) -> tuple[JointPositions, JointPositions]:
+        """Return the lowest (negative) and highest velocities allowed at positions q, [rad/s]."""
+        high = np.broadcast_to(self.velocity, q.shape)
+        low = -high
+        for e in self.envelopes:
+            upward = np.sqrt(np.maximum(0.0, 2 * e.deceleration * (e.upper - q))) - e.offset
+            downward = np.sqrt(np.maximum(0.0, 2 * e.deceleration * (q - e.lower))) - e.offset
+            high = np.minimum(high, np.maximum(0.0, upward))
+            low = np.maximum(low, np.minimum(0.0, -downward))
+        return low, high
+
+
+def is_joint(column: str, joint: str) -> bool:
+    """Whether a column moves a joint: `joint4`, `panda_joint4` (ROS) and `joint4.pos` (LeRobot) do.
+
+    Nothing else does, so that no column is held against another joint's limits. A gripper numbers
+    its own: `fr3_finger_joint1` (franka_description) is no joint of the arm.
+    """
+    found = re.search(rf"(?P<before>^|.*[_/.]){re.escape(joint)}(\.pos)?$", column)
+    return found is not None and not _OF_A_GRIPPER.search(found["before"])
+
+
+def match_joints(format: PlanFormat, limits: RobotLimits) -> dict[int, int]:
+    """Match a plan's columns to a robot's joints: by name, never guessed.
+
+    Args:
+        format: Of the plan; its columns are held against `is_joint`.
+        limits: Of the robot.
+
+    Returns:
+        Column of the plan by index of the robot's joint, for the joints that have one.
+
+    Raises:
+        InvalidPlanError: Two columns look like one joint, or a joint is in another unit than [rad].
+    """
+    columns: dict[int, int] = {}
+    for joint, name in enumerate(limits.joint_names):
+        found = [i for i, column in enumerate(format.names) if is_joint(column, name)]
+        if len(found) > 1:
+            raise InvalidPlanError(
+                f"columns {[format.names[i] for i in found]} all look like {name} of "
+                f"{limits.robot}; rename those that are not"
+            )
+        if found:
+            columns[joint] = found[0]
+    for column in columns.values():
+        if format.units[column] != "rad":
+            raise InvalidPlanError(
+                f"{format.names[column]} is in {format.units[column]!r}, but limits of "
+                f"{limits.robot} are in rad; convert the plan first"
+            )
+    return columns
+
+
+def missing_joints(
+    columns: dict[int, int], limits: RobotLimits, absent: Sequence[str]
+) -> tuple[str, ...]:
+    """Name the joints that should have a column and have none.
+
+    Args:
+        columns: What `match_joints` found.
+        limits: Of the robot.
+        absent: Joints that plans leave out on purpose.
+
+    Raises:
+        ConfigurationError: A joint is said to be absent that the robot has not, or the plan moves.
+    """
+    moved = {limits.joint_names[joint] for joint in columns}
+    for name in absent:
+        if name not in limits.joint_names or name in moved:
+            why = "the plan moves it" if name in moved else f"{limits.robot} has no such joint"
+            raise ConfigurationError(
+                f"absent_joints names {name!r}, but {why}; drop it there (joints are "
+                f"{', '.join(limits.joint_names)})"
+            )
+    return tuple(name for name in limits.joint_names if name not in moved and name not in absent)
+
+
+def _per_joint(robot: str, name: str, values: object, d: int) -> PerJoint:
+    try:
+        array = np.array(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise ConfigurationError(f"{name} limits of {robot} must be numbers: {error}") from error
+    if array.shape != (d,) or not np.all(np.isfinite(array)):
+        raise ConfigurationError(
+            f"{name} limits of {robot} must be {d} finite numbers, one a joint, got {values!r}"
+        )
+    array.setflags(write=False)
+    return array

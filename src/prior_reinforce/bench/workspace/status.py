@@ -1,0 +1,180 @@
+"""Where a workspace stands, in ten lines, and what to do next."""
+
+from __future__ import annotations
+
+import shlex
+
+import numpy as np
+
+from prior_reinforce.bench.workspace.workspace import Workspace
+from prior_reinforce.registry import parse_choice
+from prior_reinforce.session.session import Session
+from prior_reinforce.session.trials import Goal, Stage, Trial
+from prior_reinforce.wording import in_words, plain, say_place, say_reading
+
+_TRIALS_SHOWN = 3
+_POOR_TRIALS = 3
+_POOR_CHANCE = 0.35
+"""Probability of a hit below which another trial like the last ones is no good plan (ours): words
+by eye leave a chance of a half where all else is known."""
+OUTDATED = "planned before a correction: unless it was thrown, void it and ask again"
+"""What to do about a trial whose plan knows nothing of what was amended or voided since."""
+_EXAMPLE = ("5cm long", "2cm left", "1cm high")
+
+
+def describe(workspace: Workspace) -> str:
+    """Say where a workspace stands: ten lines at most, and one for each remark on the model."""
+    session, manifest = workspace.session(), workspace.manifest
+    robot = manifest.robot.robot if manifest.robot is not None else "none, no limits are checked"
+    n = 0 if workspace.log.demonstrations is None else workspace.demonstrations.n
+    training = workspace.log.training
+    rows = [
+        ("task", f"{manifest.name}, tolerance {manifest.tolerance:g} {manifest.outcome_units[0]}"),
+        (
+            "plans",
+            f"{manifest.format.action_dim} numbers a frame, a frame every "
+            f"{manifest.format.dt * 1000:g} ms; robot: {robot}",
+        ),
+        ("demonstrations", str(n or "none yet")),
+        ("model", _say_model(workspace)),
+        *(("  note", remark) for remark in (training.remarks if training is not None else ())),
+    ]
+    if session.goals:
+        goal = session.goals[-1]
+        rows.append((f"goal {goal.number}", _say_goal(workspace, session, goal, n)))
+        shown = session.trials[-_TRIALS_SHOWN:]
+        if earlier := len(session.trials) - len(shown):
+            rows.append((f"  {earlier} more", "before these; all are in the report"))
+        rows += [(f"  trial {trial.number}", say_trial(workspace, trial)) for trial in shown]
+    rows.append(("next", next_step(workspace, session) + _say_nearer(workspace, session)))
+    return "\n".join(plain(f"{name:<15} {text}") for name, text in rows)
+
+
+def say_trial(workspace: Workspace, trial: Trial) -> str:
+    """Say what became of a trial, in a line."""
+    return plain(_say_trial(workspace, trial))
+
+
+def _say_trial(workspace: Workspace, trial: Trial) -> str:
+    if trial.reading is not None:
+        manifest = workspace.manifest
+        seen = say_reading(trial.reading, manifest.outcome_names, manifest.outcome_units)
+        return f"reached ({seen})" if trial.hit else seen
+    if trial.stage is Stage.VOIDED:
+        return f"void: {trial.note}" if trial.note else "void"
+    if trial.stage is Stage.EXECUTING:
+        if workspace.log.is_executing():
+            return "is executing now"
+        return "was executing when the program stopped: did the arm move?"
+    if trial.stage is Stage.EXECUTED:
+        warning = execution_warning(workspace, trial)
+        return f"executed, {warning}" if warning else "executed, waits to be told"
+    waits = "asked for, waits to be executed and told"
+    return f"{waits}; {OUTDATED}" if trial.outdated else waits
+
+
+def say_expectation(session: Session, trial: Trial) -> list[str]:
+    """Say what the adapter expected of a trial, and after poor ones what would help."""
+    if trial.p_hit is None or trial.expected_trials is None:
+        return []
+    lines = [f"hits with probability {trial.p_hit:.2f}; {trial.expected_trials:.1f} trials to go"]
+    missed = sum(told.stage is Stage.TOLD for told in session.trials)
+    if missed >= _POOR_TRIALS and not session.solved and trial.p_hit < _POOR_CHANCE:
+        lines.append(
+            "what would help: a demonstration near this goal, or a finer look at the next trial "
+            '("5.2 +- 0.3 cm long")'
+        )
+    return lines
+
+
+def execution_warning(workspace: Workspace, trial: Trial) -> str:
+    """Why a reading of a trial might mislead: it was aborted, or went another way than planned."""
+    said, gate = trial.execution, workspace.manifest.gate
+    warnings = []
+    if said.get("outcome") == "aborted":
+        warnings.append(f"but aborted: {said.get('reason') or 'no reason was given'}")
+    for key, what, limit in (
+        ("start_error", "began {:.3g} rad from the plan's first frame", gate.start_error),
+        ("tracking_rms", "went {:.3g} rad rms off the plan", gate.tracking_error),
+    ):
+        if (said.get(key) or 0.0) > limit:
+            warnings.append(f"but {what.format(said[key])}, more than {limit:g}")
+    return "; ".join(warnings)
+
+
+def next_step(workspace: Workspace, session: Session) -> str:
+    """The command that comes next."""
+    folder = shlex.quote(str(workspace.folder))
+    if workspace.log.demonstrations is None:
+        return f"prior-reinforce import {folder} RECORDINGS"
+    if workspace.log.stale:
+        return f"prior-reinforce learn {folder}"
+    new_goal = f"prior-reinforce goal {folder} {_goal_example(workspace)}"
+    if not session.goals:
+        return new_goal
+    trial = session.open_trial
+    if trial is not None:
+        tell = f"prior-reinforce tell {folder} {trial.number} {tell_example(workspace)}"
+        if trial.stage is Stage.EXECUTING and not workspace.log.is_executing():
+            return f"if it moved: {tell}; if not: prior-reinforce ask {folder} --arm-did-not-move"
+        if trial.execution.get("outcome") == "aborted":
+            return f"prior-reinforce void {folder} {trial.number} --reason WHY"
+        return f"{tell} (or --hit)"
+    if session.solved:
+        return f"{new_goal}, or prior-reinforce report {folder}"
+    training = workspace.log.training
+    own = training.own if training is not None else None
+    adapter, _ = parse_choice(session.goals[-1].adapter)
+    return (
+        f"prior-reinforce ask {folder}"
+        + (f" --generator {shlex.quote(own)}" if own else "")
+        + (f" --adapter {shlex.quote(adapter)}" if ":" in adapter else "")
+    )
+
+
+def _say_nearer(workspace: Workspace, session: Session) -> str:
+    """What else comes next where the gate may refuse a first plan: the goal is far out."""
+    if workspace.log.stale or not session.goals or session.trials:
+        return ""
+    if not np.any(workspace.demonstrations.far_outside(session.goal)):
+        return ""
+    nearer = f"prior-reinforce goal {shlex.quote(str(workspace.folder))} {_goal_example(workspace)}"
+    return f"; if it refuses, a goal nearer to the demonstrations: {nearer}"
+
+
+def tell_example(workspace: Workspace) -> str:
+    """How an error of this task can be told."""
+    names, units = workspace.manifest.outcome_names, workspace.manifest.outcome_units
+    if in_words(units):
+        return f'--error "{", ".join(_EXAMPLE[: len(names)])}"'
+    return "--error " + " ".join(f"D{name.upper()}" for name in names)
+
+
+def _goal_example(workspace: Workspace) -> str:
+    return " ".join(name.upper() for name in workspace.manifest.outcome_names)
+
+
+def _say_model(workspace: Workspace) -> str:
+    training = workspace.log.training
+    if training is None:
+        return "none yet"
+    said = f"{training.model}, {training.generator}"
+    return f"{said}, of other demonstrations" if workspace.log.stale else said
+
+
+def _say_goal(workspace: Workspace, session: Session, goal: Goal, n: int) -> str:
+    manifest = workspace.manifest
+    place = say_place(goal.goal, manifest.outcome_names, manifest.outcome_units)
+    told = [trial for trial in session.trials if trial.stage is Stage.TOLD]
+    hits = [count for count, trial in enumerate(told, start=1) if trial.hit]
+    if hits:
+        total = f"N = {n} demonstrations + {hits[0]} = {n + hits[0]}"
+        return f"{place}: reached in {_say_count(hits[0])} ({total})"
+    changed = f", new hardware: {goal.new_hardware}" if goal.new_hardware is not None else ""
+    carried = ", with earlier goals' trials" if goal.carry_over else ""
+    so_far = f"not reached yet, {_say_count(len(told))} told"
+    return f"{place}: {so_far}; adapter {goal.adapter}{carried}{changed}"
+
+
+def _say_count(trials: int) -> str:
+    return "1 trial" if trials == 1 else f"{trials} trials"

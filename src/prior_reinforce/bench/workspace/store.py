@@ -1,0 +1,191 @@
+"""The files of a workspace that events name: written whole, durable, and never changed.
+
+    demonstrations/<hash>.npz   one file an import
+    models/<hash>/              one folder a training
+    plans/trial-NNN-<hash>.npz  one file a trial
+    .training/                  the state of a training that was interrupted; no event names it
+
+An event that names a file is appended only once the file is on the disk, so that a power cut
+leaves at worst a file that nothing names.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import shutil
+import tempfile
+from collections.abc import Collection
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from prior_reinforce.bench.robots.plan_files import PlanFile, read_plan, write_plan
+from prior_reinforce.errors import FileFormatError
+from prior_reinforce.files import (
+    in_place,
+    inside,
+    named_disk_errors,
+    sha256,
+    sha256_of_folder,
+    sweep,
+)
+from prior_reinforce.plans.motions import Demonstrations, Plan
+
+if TYPE_CHECKING:
+    from prior_reinforce.generators.base import Generator
+
+_DIGITS = 16
+"""Of a hash in a name: no two of a workspace's files will ever share 64 bits."""
+
+
+class Store:
+    """Where the files lie."""
+
+    def __init__(self, folder: Path) -> None:
+        """Remember the workspace's folder."""
+        self._folder = folder
+
+    @property
+    def training(self) -> Path:
+        """Folder of what a training goes on from."""
+        return inside(self._folder / ".training", self._folder)
+
+    def save_demonstrations(self, demonstrations: Demonstrations) -> None:
+        """Keep demonstrations under their hash.
+
+        Raises:
+            WorkspaceError: The disk is full, or the folder read-only.
+        """
+        path = self._demonstrations_path(demonstrations.sha256)
+        with named_disk_errors(self._folder), in_place(path) as unfinished:
+            demonstrations.save(unfinished)
+
+    def demonstrations(self, sha256: str) -> Demonstrations:
+        """Read what was kept.
+
+        Raises:
+            FileFormatError: The file is missing, damaged, or another one.
+        """
+        path = self._demonstrations_path(sha256)
+        found = Demonstrations.load(path)
+        if sha256 not in (found.sha256, _sha256_of_numbers(found)):
+            raise FileFormatError(
+                f"{path} is not what was imported; restore it from a copy, or import again"
+            )
+        return found
+
+    def save_model(self, generator: Generator) -> str:
+        """Keep a fitted generator; its hash is the name of its folder.
+
+        Raises:
+            WorkspaceError: The disk is full, or the folder read-only.
+        """
+        models = self._folder / "models"
+        with named_disk_errors(self._folder):
+            models.mkdir(exist_ok=True)
+            sweep(models)
+            with tempfile.TemporaryDirectory(dir=models, prefix=".new-") as scratch:
+                saved = Path(scratch) / "model"
+                generator.save(saved)
+                model = sha256_of_folder(saved)[:_DIGITS]
+                kept = inside(models / model, self._folder)
+                if not _is_model(kept, model):  # nothing can read it, and this mends it
+                    if kept.is_dir():
+                        shutil.rmtree(kept)
+                    else:
+                        kept.unlink(missing_ok=True)
+                with in_place(kept) as unfinished:
+                    shutil.copytree(saved, unfinished)
+        return model
+
+    def model(self, model: str, own: str | None = None) -> Generator:
+        """Load a generator that was kept.
+
+        Args:
+            model: Its hash.
+            own: `module:Class` of a generator of one's own. It is never taken from the folder: a
+                model is data, and names no code to run.
+
+        Raises:
+            FileFormatError: Its files are missing, damaged, or others.
+        """
+        from prior_reinforce.generators import load_generator
+
+        folder = inside(self._folder / "models" / model, self._folder)
+        if not _is_model(folder, model):
+            raise FileFormatError(
+                f"the model in {folder} is not the one that was learned; restore it from a copy, "
+                f"or run: prior-reinforce learn {self._folder}"
+            )
+        return load_generator(folder, own=own)
+
+    def save_plan(self, plan: Plan, number: int, named: Collection[str] = ()) -> PlanFile:
+        """Keep a trial's plan.
+
+        Args:
+            plan: The plan.
+            number: The trial's.
+            named: Names of the plans that events name. Any other file is what a crash left before
+                its event, and is replaced.
+
+        Raises:
+            WorkspaceError: The disk is full, or the folder read-only.
+        """
+        path = self.plan_path(f"trial-{number:03d}-{sha256(plan.actions.tobytes())[:8]}.npz")
+        with named_disk_errors(self._folder):
+            path.parent.mkdir(exist_ok=True)
+            if path.name not in named:
+                path.unlink(missing_ok=True)
+        return write_plan(plan, path)
+
+    def plan_path(self, name: str) -> Path:
+        """Where a plan lies."""
+        return inside(self._folder / "plans" / name, self._folder)
+
+    def plan(self, name: str, sha256: str) -> Plan:
+        """Read a trial's plan.
+
+        Raises:
+            FileFormatError: The file is missing, or not what was written.
+        """
+        return read_plan(self.plan_path(name), sha256=sha256)
+
+    def make_execution_folder(self, number: int) -> Path:
+        """Make an empty folder for what a command writes while it executes a trial.
+
+        Raises:
+            WorkspaceError: The disk is full, or the folder read-only.
+        """
+        with named_disk_errors(self._folder):
+            attempt = 1
+            while True:
+                folder = self.execution_folder(f"trial-{number:03d}-{attempt}")
+                try:
+                    folder.mkdir(parents=True)
+                except FileExistsError:
+                    attempt += 1
+                else:
+                    return folder
+
+    def execution_folder(self, name: str) -> Path:
+        """Where such a folder lies."""
+        return inside(self._folder / "executions" / Path(name).name, self._folder)
+
+    def _demonstrations_path(self, sha256: str) -> Path:
+        return inside(self._folder / "demonstrations" / f"{sha256[:_DIGITS]}.npz", self._folder)
+
+
+def _is_model(folder: Path, model: str) -> bool:
+    """Whether a folder holds the model that its name says, and nothing else."""
+    try:
+        return folder.is_dir() and sha256_of_folder(folder)[:_DIGITS] == model
+    except FileFormatError:
+        return False
+
+
+def _sha256_of_numbers(demonstrations: Demonstrations) -> str:
+    """What the first journals knew demonstrations by: their numbers alone."""
+    digest = hashlib.sha256()
+    for array in (demonstrations.plans, demonstrations.outcomes_seen):
+        digest.update(str(array.shape).encode())
+        digest.update(array.tobytes())
+    return digest.hexdigest()

@@ -1,0 +1,485 @@
+"""A task's folder on disk: a manifest, a journal and a store. Its trials are a `Session` over them.
+
+    workspace.toml     manifest, written by a person
+    journal.sqlite     everything that happened
+    demonstrations/    what was imported      files that events name, written
+    models/            what was learned       once and never changed (`store.py`)
+    plans/             what was executed
+    executions/        what commands wrote while they executed it
+
+Every change is one journal event, appended while no other program may. What stands is a fold over
+the events, so closing the program, or a power cut, loses nothing. Here are the events that are not
+a session's: demonstrations imported, a model trained.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from numpy.typing import ArrayLike
+from typing_extensions import Self
+
+from prior_reinforce.adapters import ADAPTERS, DEFAULT_ADAPTER
+from prior_reinforce.arrays import Frames
+from prior_reinforce.bench.robots.plan_files import PlanFile
+from prior_reinforce.bench.workspace.journal import JOURNAL_FILE
+from prior_reinforce.bench.workspace.log import Training, WorkspaceLog
+from prior_reinforce.bench.workspace.manifest import (
+    MANIFEST_FILE,
+    Manifest,
+    load_manifest,
+    parse_manifest,
+)
+from prior_reinforce.bench.workspace.store import Store
+from prior_reinforce.errors import (
+    ConfigurationError,
+    FileFormatError,
+    InvalidDemonstrationsError,
+    PriorReinforceError,
+    WorkspaceError,
+)
+from prior_reinforce.files import inside, named_disk_errors, sweep, write
+from prior_reinforce.plans.motions import Demonstrations, Plan
+from prior_reinforce.registry import parse_choice
+from prior_reinforce.session.session import Session
+from prior_reinforce.session.trials import Event, Goal, Stage, Trial
+
+if TYPE_CHECKING:
+    from prior_reinforce.adapters.base import Adapter
+    from prior_reinforce.bench.robots.executors.command import CommandResult
+    from prior_reinforce.bench.robots.report import LimitReport
+    from prior_reinforce.generators.base import FitProgress, Generator
+
+
+_OWN = (
+    *(MANIFEST_FILE, JOURNAL_FILE, "demonstrations", "models", "plans", "executions", "report"),
+    *("demonstrations.png", "outcomes.csv"),
+)
+"""What is read and written in the folder."""
+
+
+class Workspace:
+    """Trials of one task, on disk."""
+
+    def __init__(self, folder: str | os.PathLike[str]) -> None:
+        """Open a workspace that `create` made.
+
+        Raises:
+            WorkspaceError: There is none, or its journal cannot be used.
+            FileFormatError: Its manifest is no TOML, or a part of it is a link out of it.
+            ConfigurationError: Its manifest holds a wrong value.
+        """
+        self.folder = folder = Path(folder)
+        for name in _OWN:
+            inside(folder / name, folder)
+        if not (folder / MANIFEST_FILE).is_file():
+            raise WorkspaceError(
+                f"{folder} is not a workspace (it has no {MANIFEST_FILE}); make one with: "
+                f"prior-reinforce new {folder}"
+            )
+        self.manifest: Manifest = load_manifest(folder / MANIFEST_FILE)
+        self.store = Store(folder)
+        self.log = WorkspaceLog(folder, self.store, self.manifest.format)
+        self._read: dict[str, Demonstrations] = {}
+
+    @classmethod
+    def create(cls, folder: str | os.PathLike[str], manifest: str) -> Self:
+        """Make a workspace from the text of its manifest; nothing is made if that is wrong.
+
+        Raises:
+            WorkspaceError: The folder holds something already, or cannot be written.
+            FileFormatError: The manifest is no TOML.
+            ConfigurationError: The manifest holds a wrong value.
+        """
+        folder = Path(folder)
+        parse_manifest(manifest, folder / MANIFEST_FILE)
+        with named_disk_errors(folder):
+            sweep(folder)
+            if folder.is_file() or (folder.is_dir() and any(folder.iterdir())):
+                raise WorkspaceError(f"{folder} exists and is not empty; choose a new folder")
+            folder.mkdir(parents=True, exist_ok=True)
+            write(folder / MANIFEST_FILE, manifest)
+        return cls(folder)
+
+    def close(self) -> None:
+        """Close the journal."""
+        self.log.journal.close()
+
+    def __enter__(self) -> Self:
+        """Use it for the length of a block."""
+        return self
+
+    def __exit__(self, _: object, error: BaseException | None, __: object) -> None:
+        """Close the journal; an error that ends the block says whether something was recorded."""
+        if self.log.journal.appended and isinstance(error, (PriorReinforceError, OSError)):
+            error.changed = True  # type: ignore[union-attr]
+        elif self.log.journal.appended and isinstance(error, KeyboardInterrupt):
+            error.args = error.args or ("what was recorded before stays",)
+        self.close()
+
+    @property
+    def events(self) -> Sequence[Event]:
+        """The journal.
+
+        Raises:
+            WorkspaceError: The journal is damaged, or a newer version wrote it.
+        """
+        return self.log.events()
+
+    @property
+    def demonstrations(self) -> Demonstrations:
+        """The demonstrations in use.
+
+        Raises:
+            WorkspaceError: None were imported yet.
+            FileFormatError: The file is damaged.
+            InvalidDemonstrationsError: The manifest says otherwise since they were imported.
+        """
+        sha256 = self.log.demonstrations
+        if sha256 is None:
+            raise WorkspaceError(
+                f"{self.folder} has no demonstrations yet; bring them in with: prior-reinforce "
+                f"import {self.folder} RECORDINGS"
+            )
+        return self._demonstrations(sha256)
+
+    def demonstrations_of(self, model: str) -> Demonstrations:
+        """The demonstrations that a model was fitted to.
+
+        Raises:
+            FileFormatError: The file is missing or damaged.
+        """
+        return self._demonstrations(self.log.trainings[model].fitted_to)
+
+    def session(self, own: str | None = None, own_adapter: str | None = None) -> Session:
+        """The trials of this workspace. Telling needs no model; asking loads it.
+
+        Args:
+            own: `module:Class` that the model was learned by, where it is one's own: nothing in the
+                folder may start code.
+            own_adapter: `module:Class` that the goal was set with, likewise.
+
+        Raises:
+            WorkspaceError: The journal is damaged.
+            ConfigurationError: The manifest has another number of outcomes than the goals so far.
+        """
+        session = Session(
+            lambda: self._generator(own),
+            lambda: self._adapter(session.goals[-1].adapter if session.goals else "", own_adapter),
+            lambda: self.demonstrations,
+            tolerance=self.manifest.tolerance,
+            log=self.log,
+            gate=self.gate,
+            in_use=self._in_use,
+        )
+        k = len(self.manifest.outcome_names)
+        if any(goal.goal.size != k for goal in session.goals):
+            raise ConfigurationError(
+                f"{self.folder / MANIFEST_FILE} names {k} outcomes, but goals were set with "
+                f"{session.goals[0].goal.size}; put it back, or make another workspace"
+            )
+        return session
+
+    def set_goal(
+        self,
+        goal: ArrayLike,
+        *,
+        carry_over: bool | None = None,
+        adapter: str = DEFAULT_ADAPTER,
+        new_hardware: str | None = None,
+    ) -> Goal:
+        """Set the goal that the next trials are for.
+
+        Args:
+            goal: g, shape (k,), in the outcome's units.
+            carry_over: Let earlier goals' trials serve this one; by default where they serve the
+                adapter.
+            adapter: Choice of the adapter, for instance `gp` or `proportional,gain=0.6`.
+            new_hardware: What was changed on the hardware since the last trial; see
+                `Session.set_goal`.
+
+        Raises:
+            InvalidGoalError: Wrong shape, or not finite.
+            ConfigurationError: There is no such adapter.
+            TrialStateError: A trial for the goal before waits to be told.
+        """
+        ADAPTERS.check(adapter)
+        return self.session().set_goal(
+            goal, carry_over=carry_over, adapter=adapter, new_hardware=new_hardware
+        )
+
+    def gate(self, frames: Frames) -> LimitReport | None:
+        """Hold a plan against the robot's limits of now; None where the manifest names no robot.
+
+        The manifest is read again: a person may have narrowed the limits while this program waits.
+
+        Raises:
+            InvalidDemonstrationsError: The manifest says otherwise since they were imported.
+            ConfigurationError: The manifest holds a wrong value by now.
+            FileFormatError: The manifest is gone, or no TOML any more.
+        """
+        self.manifest = load_manifest(self.folder / MANIFEST_FILE)
+        if self.manifest.robot is None:
+            return None
+        from prior_reinforce.bench.robots import check_plan
+
+        training = self.log.training
+        shown = self.demonstrations if training is None else self.demonstrations_of(training.model)
+        plan = Plan(frames, shown.format)
+        return check_plan(plan, self.manifest.robot, shown, self.manifest.gate)
+
+    def plan_path(self, trial: Trial) -> Path:
+        """Where a trial's plan file is."""
+        return self.store.plan_path(trial.kept["plan_file"])
+
+    def plan(self, trial: Trial) -> Plan:
+        """A trial's plan, checked against the hash in the journal.
+
+        Raises:
+            FileFormatError: The file is missing, or not what was written.
+        """
+        return self.store.plan(trial.kept["plan_file"], trial.kept["plan_sha256"])
+
+    def import_demonstrations(self, demonstrations: Demonstrations, source: str) -> None:
+        """Take in demonstrations, in place of earlier ones.
+
+        Raises:
+            InvalidDemonstrationsError: They do not fit the manifest, or the trials so far.
+            TrialStateError: A trial waits to be told.
+        """
+        self._check_fit(demonstrations, source)
+        with self.log.exclusive():
+            self.session().refuse_open_trial("importing demonstrations")
+            names = self._names_of_plans()
+            if names not in (None, demonstrations.format.names):
+                raise InvalidDemonstrationsError(
+                    f"trials were made with {names}, but {source} has "
+                    f"{demonstrations.format.names}; make another workspace for it"
+                )
+            self.store.save_demonstrations(demonstrations)
+            self.log.append(
+                "demonstrations_imported",
+                {"n": demonstrations.n, "sha256": demonstrations.sha256, "source": source},
+            )
+
+    def learn(
+        self,
+        generator: str = "auto",
+        *,
+        seed: int = 0,
+        device: str = "cpu",
+        progress: Callable[[FitProgress], None] | None = None,
+    ) -> Training:
+        """Fit a generator to the demonstrations and put it in use.
+
+        Args:
+            generator: Choice of the generator, for instance `auto`, `diffusion`,
+                `interpolation,timing=align` or `module:Class`.
+            seed: Of the fit.
+            device: Where torch computes while it learns, `cpu` or `cuda`.
+            progress: Called now and then while fitting.
+
+        Raises:
+            ConfigurationError: There is no such generator.
+            TrialStateError: A trial waits to be told.
+            WorkspaceError: No demonstrations were imported yet.
+            InvalidDemonstrationsError: They cannot be learned from.
+        """
+        from prior_reinforce.generators import make_generator
+
+        self.session().refuse_open_trial("learning")
+        demonstrations, known_as = self.demonstrations, self.log.demonstrations
+        made = make_generator(generator, device=device, states=self.store.training)
+        made.check_savable()
+        fitted = made.fit(demonstrations, seed=seed, progress=progress)
+        data = {
+            "model": self.store.save_model(fitted),
+            "generator": generator,
+            "seed": seed,
+            "demonstrations_sha256": known_as,
+            "remarks": list(fitted.remarks),
+        }
+        with self.log.exclusive():
+            self.session().refuse_open_trial("learning")
+            self.log.append("model_trained", data)
+        training = self.log.training
+        assert training is not None
+        return training
+
+    def execute(
+        self,
+        number: int,
+        command: str,
+        *,
+        time_limit: float,
+        show: Callable[[str], None] | None = None,
+    ) -> CommandResult:
+        """Execute a trial's plan by a command, once.
+
+        The journal says `executing` before the command starts and `executed` after all that it
+        started ended, so a program that dies in between leaves a trial of which only a person knows
+        what moved (or `recover`). While what it left behind goes on, the trial still counts as
+        executing.
+
+        Args:
+            number: The open trial.
+            command: For instance `mycontroller {plan} {result}`.
+            time_limit: Of the command, in [s].
+            show: Called with the command's output as it comes.
+
+        Raises:
+            TrialStateError: The trial was executed already, is not open, or another program
+                executes one.
+            RobotLimitError: The plan breaks a limit of now; nothing moved.
+            ConfigurationError: The command could not be started; nothing moved, and the journal
+                says so.
+            FileFormatError: The plan's file is not what was written; nothing moved.
+            KeyboardInterrupt: Interrupted; the command was stopped, and the journal says so.
+        """
+        from prior_reinforce.bench.robots.executors.command import (
+            Interruptions,
+            check_command,
+            hide_secrets,
+            run_command,
+        )
+        from prior_reinforce.bench.robots.executors.lock import executing_lock
+
+        check_command(command, time_limit=time_limit)
+        with executing_lock(self.folder) as lock, Interruptions() as interruptions:
+            session = self.session()
+            trial = session.trial(number)
+            if trial.stage is Stage.ASKED:
+                verdict = self.gate(self.plan(trial).actions)
+                if verdict is not None:
+                    verdict.require()
+            else:
+                session.begin_execution(number, "")  # refuses, and says why
+            folder = self.store.make_execution_folder(number)
+            session.begin_execution(number, hide_secrets(command), folder.name)
+            plan_file = PlanFile(self.plan_path(trial), trial.kept["plan_sha256"])
+            try:
+                result = run_command(
+                    command,
+                    plan_file,
+                    time_limit=time_limit,
+                    keep_open=(lock,),
+                    folder=folder,
+                    show=show,
+                    interruptions=interruptions,
+                )
+            except (ConfigurationError, FileFormatError, KeyboardInterrupt):
+                session.end_execution(number, None)  # never started: nothing moved
+                raise
+            if result.outcome != "unknown":
+                result = self._measured(result, trial, folder)
+                session.end_execution(number, result.as_json())
+        if interruptions.came:
+            raise KeyboardInterrupt(f"trial {number}: {result.outcome} ({result.reason})")
+        return result
+
+    def recover(self) -> Trial | None:
+        """Note how an execution ended whose program was killed, where its supervisor wrote it down.
+
+        Returns:
+            The trial as it stands now; None where there is nothing to recover.
+        """
+        from prior_reinforce.bench.robots.executors.command import read_ended
+
+        session = self.session()
+        trial = session.open_trial
+        if trial is None or trial.stage is not Stage.EXECUTING or self.log.is_executing():
+            return None
+        name = trial.execution.get("folder", "")
+        result = None
+        if name:
+            folder = self.store.execution_folder(name)
+            result = read_ended(folder, trial.execution["command"])
+        if result is None:
+            return None
+        result = self._measured(result, trial, folder)
+        return session.end_execution(trial.number, result.as_json())
+
+    def _measured(self, result: CommandResult, trial: Trial, folder: Path) -> CommandResult:
+        """A result with the distance from the plan, where the driver measured its path."""
+        from prior_reinforce.bench.robots.executors.result import measure_tracking
+
+        try:
+            rms = measure_tracking(folder, self.plan(trial))
+        except FileFormatError as error:
+            return replace(result, reason="; ".join(filter(None, [result.reason, str(error)])))
+        return result if rms is None else replace(result, tracking_rms=rms)
+
+    def _names_of_plans(self) -> tuple[str, ...] | None:
+        """Names of the columns of earlier trials' plans; None where none can be read."""
+        for event in self.events:
+            if event.kind == "asked":
+                with suppress(FileFormatError):
+                    plan = self.store.plan(event.data["plan_file"], event.data["plan_sha256"])
+                    return plan.format.names
+        return None
+
+    def _in_use(self) -> tuple[str, str]:
+        """The model and the demonstrations of now."""
+        training = self.log.training
+        return "" if training is None else training.model, self.log.demonstrations or ""
+
+    def _generator(self, own: str | None) -> Generator:
+        """The model in use."""
+        self.demonstrations  # noqa: B018  (whether there are any that fit the manifest)
+        training = self.log.training
+        if training is None:
+            raise WorkspaceError(
+                f"nothing is learned yet; run: prior-reinforce learn {self.folder}"
+            )
+        if self.log.stale:
+            raise WorkspaceError(
+                "other demonstrations were imported since the model was learned; run: "
+                f"prior-reinforce learn {self.folder}"
+            )
+        if own != training.own:
+            remedy = "drop --generator, or learn again"
+            if training.own:
+                remedy = f"name it, for the journal starts no code: --generator {training.own}"
+            raise ConfigurationError(f"the model was learned by {training.generator}; {remedy}")
+        return self.store.model(training.model, own)
+
+    def _adapter(self, choice: str, own: str | None) -> Adapter:
+        """The adapter that a goal was set with."""
+        from prior_reinforce.adapters import make_adapter
+
+        choice = choice or DEFAULT_ADAPTER
+        name, _ = parse_choice(choice)
+        if (name if ":" in name else None) != own:
+            remedy = "drop --adapter, or set the goal again"
+            if ":" in name:
+                remedy = f"name it, for the journal starts no code: --adapter {name}"
+            raise ConfigurationError(f"the goal was set with the adapter {choice}; {remedy}")
+        return make_adapter(choice)
+
+    def _demonstrations(self, sha256: str) -> Demonstrations:
+        if sha256 not in self._read:
+            self._read[sha256] = self.store.demonstrations(sha256)
+        self._check_fit(self._read[sha256], "what was imported")
+        return self._read[sha256]
+
+    def _check_fit(self, demonstrations: Demonstrations, source: str) -> None:
+        manifest = self.manifest
+        pairs = [
+            ("action names", demonstrations.format.names, manifest.format.names),
+            ("action units", demonstrations.format.units, manifest.format.units),
+            ("outcome names", demonstrations.outcome_names, manifest.outcome_names),
+            ("outcome units", demonstrations.outcome_units, manifest.outcome_units),
+            # A picosecond is rounding; anything more is another tempo.
+            ("dt", round(demonstrations.format.dt, 12), round(manifest.format.dt, 12)),
+        ]
+        for what, given, expected in pairs:
+            if given != expected:
+                raise InvalidDemonstrationsError(
+                    f"{source} has {what} {given}, but {self.folder / MANIFEST_FILE} says "
+                    f"{expected}; change the manifest, or import again"
+                )

@@ -1,0 +1,329 @@
+"""The units that everything is made of: perceive demonstrations; learn; throw once; try goals."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from prior_reinforce.adapters import make_adapter
+from prior_reinforce.arrays import Points
+from prior_reinforce.errors import FileFormatError
+from prior_reinforce.files import in_place
+from prior_reinforce.generators import Generator, load_generator, make_generator
+from prior_reinforce.lab.experiments.learned import own_class
+from prior_reinforce.lab.experiments.protocol import (
+    GoalTrials,
+    estimate_by_eye,
+    perceive_demonstrations,
+    run_goals,
+    unseen_goals,
+)
+from prior_reinforce.lab.experiments.units import Unit, digest_of, result_of, result_path
+from prior_reinforce.lab.tasks import make_task
+from prior_reinforce.perception import make_perception
+from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
+from prior_reinforce.plans.alignment import align
+from prior_reinforce.plans.motions import Demonstrations
+from prior_reinforce.registry import parse_choice, source_digest
+
+GOAL_SEED = 100
+"""Seed of the reported goals; what was decided looking at them is in docs/decisions.md."""
+
+
+@dataclass(frozen=True)
+class PerceivedDemonstrations(Unit):
+    """Execute a prior set once and see where it went (paper, Stage 1); whoever learns shares it."""
+
+    task: str
+    """Where it is executed."""
+    demonstrations: str
+    """Prior set, A or B."""
+    perception: str
+    """Perception, by its choice."""
+    seed: int
+    """Seed of the training that it is for."""
+    model: VisionLanguageModelConfig | None = None
+    """Endpoint to ask where `perception` is vlm."""
+
+    @property
+    def label(self) -> str:
+        """What it is, for a progress line."""
+        return f"perceive {self.task} {self.demonstrations} by {self.perception}, {self.seed}"
+
+    @property
+    def own_sources(self) -> tuple[str, ...]:
+        """Hashes of a task's and a perception's own files; see `Unit`."""
+        return source_digest(self.task), source_digest(self.perception)
+
+    def run(self, folder: Path) -> Mapping[str, Any]:
+        """Execute and look."""
+        task = make_task(self.task)
+        failures: list[str] = []
+
+        def count_and_estimate(failure: Any, *seen: Any) -> Any:
+            failures.append(str(failure))
+            return estimate_by_eye(failure, *seen)
+
+        seed = GOAL_SEED + self.seed
+        with make_perception(
+            self.perception, scene=task.scene, config=self.model, seed=seed
+        ) as perception:
+            perceived = perceive_demonstrations(
+                task,
+                task.demonstrations(self.demonstrations),
+                perception,
+                seed=seed,
+                on_failed_reading=count_and_estimate,
+            )
+        return {
+            "outcomes_seen": perceived.outcomes_seen.tolist(),
+            "outcome_noise": perceived.outcome_noise.tolist(),
+            "outcome_correction": perceived.outcome_correction.tolist(),
+            "failed_readings": len(failures),
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class Learned:
+    """What a training gives."""
+
+    generator: Generator
+    """pi."""
+    prior: Demonstrations
+    """What it was learned from, with the outcomes that were seen."""
+
+
+@dataclass(frozen=True)
+class Training(Unit):
+    """Learn one generator from one prior set."""
+
+    task: str
+    """Name of the task that the demonstrations are of."""
+    demonstrations: str
+    """Prior set, A or B."""
+    generator: str
+    """Generator, by its choice: `nearest,timing=align`."""
+    seed: int
+    """Seed of the training."""
+    subset: tuple[int, ...] | None = None
+    """Which of the demonstrations to learn from; None for all."""
+    perception: str | None = None
+    """How the outcomes of the demonstrations are seen, by its choice; None for the exact ones."""
+    model: VisionLanguageModelConfig | None = None
+    """Endpoint to ask where `perception` is vlm."""
+
+    @property
+    def label(self) -> str:
+        """What it is, for a progress line."""
+        how = "" if self.perception is None else f" by {self.perception}"
+        return f"learn {self.generator} on {self.task} {self.demonstrations}{how}, {self.seed}"
+
+    @property
+    def own_sources(self) -> tuple[str, ...]:
+        """Hashes of your own files behind what is learned; see `Unit`."""
+        own = source_digest(self.task), source_digest(self.generator)
+        return own if self.perceived is None else (*own, *self.perceived.own_sources)
+
+    @property
+    def perceived(self) -> PerceivedDemonstrations | None:
+        """The demonstrations as perceived, the same for every generator; None: exact outcomes."""
+        if self.perception is None:
+            return None
+        return PerceivedDemonstrations(
+            self.task, self.demonstrations, self.perception, self.seed, self.model
+        )
+
+    def run(self, folder: Path) -> Mapping[str, Any]:
+        """Learn; the model itself is the result.
+
+        A model that lies there already was left by a run that ended before it could say what code
+        had made it.
+        """
+        shutil.rmtree(self._home(folder), ignore_errors=True)
+        self.learned(folder)
+        return {}
+
+    def recorded(self) -> Demonstrations:
+        """The whole prior set with its exact outcomes."""
+        return make_task(self.task).demonstrations(self.demonstrations)
+
+    def learned(self, folder: Path) -> Learned:
+        """What was learned: from the folder's models, or now, and put there.
+
+        Raises:
+            FileFormatError: What was perceived is of an earlier version, which kept less of it.
+        """
+        home = self._home(folder)
+        if not home.is_dir():
+            prior = self._prior(folder)
+            generator = make_generator(self.generator, states=folder / "training")
+            generator.fit(prior, seed=self.seed)
+            with in_place(home) as unfinished:
+                unfinished.mkdir()
+                generator.save(unfinished / "generator")
+                prior.save(unfinished / "demonstrations.npz")
+        generator = load_generator(home / "generator", own=own_class(self.generator))
+        prior = Demonstrations.load(home / "demonstrations.npz")
+        if self.perceived is not None:  # a model of an earlier version does not say it
+            prior = replace(prior, outcome_correction=self._prior(folder).outcome_correction)
+        return Learned(generator, prior)
+
+    def _home(self, folder: Path) -> Path:
+        return folder / "models" / digest_of(self)
+
+    def _prior(self, folder: Path) -> Demonstrations:
+        """The demonstrations that are learned from."""
+        demonstrations = self.recorded()
+        if self.perceived is not None:
+            seen = result_of(folder, self.perceived)
+            if "outcome_correction" not in seen:
+                raise FileFormatError(
+                    f"{result_path(folder, self.perceived)} is of an earlier version, which did "
+                    "not keep how far outcomes are off; delete it, or choose a fresh --out"
+                )
+            demonstrations = replace(
+                demonstrations,
+                outcomes_seen=np.array(seen["outcomes_seen"]),
+                outcome_noise=np.array(seen["outcome_noise"]),
+                outcome_correction=np.array(seen["outcome_correction"]),
+            )
+        return demonstrations if self.subset is None else demonstrations.only(self.subset)
+
+
+@dataclass(frozen=True)
+class Trials(Unit):
+    """Try goals with one learned generator and one adapter."""
+
+    training: Training
+    """What was learned."""
+    task: str
+    """Where it is tried; another hardware variant than the training's, perhaps."""
+    adapter: str
+    """Adapter, by its choice."""
+    perception: str
+    """Perception, by its choice."""
+    goals: int
+    """Number of goals."""
+    unseen: bool = False
+    """Goals far from the demonstrations, as the paper places them by hand; else uniform."""
+    rounds: int = 10
+    """Trials a goal at most."""
+    model: VisionLanguageModelConfig | None = None
+    """Endpoint to ask where `perception` is vlm."""
+
+    @property
+    def label(self) -> str:
+        """What it is, for a progress line."""
+        return (
+            f"{self.task}: {self.training.generator} + {self.adapter}, {self.perception}, "
+            f"set {self.training.demonstrations}, {self.training.seed}"
+        )
+
+    @property
+    def own_sources(self) -> tuple[str, ...]:
+        """Hashes of your own files behind what is tried; see `Unit`."""
+        own = (self.task, self.adapter, self.perception)
+        return super().own_sources + tuple(source_digest(choice) for choice in own)
+
+    def run(self, folder: Path) -> Mapping[str, Any]:
+        """Run the protocol, and keep plain numbers, a row a goal."""
+        results = self.trials(folder)
+        return {
+            "goals": [result.goal.tolist() for result in results],
+            "solved_at": [result.solved_at or 0 for result in results],
+            "first_error": [float(np.linalg.norm(result.errors[0])) for result in results],
+            "lost": [sum(not rollout.valid for rollout in result.rollouts) for result in results],
+            "failed_readings": [result.failed_readings for result in results],
+        }
+
+    def learned(self, folder: Path) -> Learned:
+        """What is tried: from the folder's models, or learned now."""
+        return self.training.learned(folder)
+
+    def trials(self, folder: Path) -> list[GoalTrials]:
+        """Run the protocol."""
+        task = make_task(self.task)
+        learned = self.learned(folder)
+        rng = np.random.default_rng(GOAL_SEED)
+        # Far from where demonstrations truly went, so that goals are the same for every perception.
+        goals = (
+            unseen_goals(task, self.training.recorded(), self.goals, rng)
+            if self.unseen
+            else task.sample_goals(self.goals, rng)
+        )
+        seed = GOAL_SEED + self.training.seed
+        with make_perception(
+            self.perception, scene=task.scene, config=self.model, seed=seed
+        ) as perception:
+            return run_goals(
+                task,
+                learned.generator,
+                lambda: make_adapter(self.adapter),
+                perception,
+                learned.prior,
+                goals,
+                rounds=self.rounds,
+                seed=seed,
+            )
+
+
+@dataclass(frozen=True)
+class ZeroShot(Unit):
+    """Generate for a dense grid of goals and for the demonstrations' own outcomes; throw once."""
+
+    training: Training
+    """What was learned."""
+    spacing: float = 0.02
+    """Of the grid inside the outcomes' hull, in [m]."""
+
+    @property
+    def label(self) -> str:
+        """What it is, for a progress line."""
+        return f"zero shot of {self.training.label.removeprefix('learn ')}"
+
+    def run(self, folder: Path) -> Mapping[str, Any]:
+        """Throw, with execution's disturbances switched off: the generator's error alone."""
+        task = make_task(self.training.task)
+        learned = self.training.learned(folder)
+        generator, prior = learned.generator, learned.prior
+        own = generator.generate(prior.outcomes_seen)
+        if is_aligned(self.training.generator):
+            prior = align(prior).demonstrations
+        own_rms = np.sqrt(np.mean((own - prior.plans) ** 2, axis=(1, 2)))
+        shown = np.array([rollout.outcome for rollout in task.rollout(prior.plans, None)])
+        landed = np.array([rollout.outcome for rollout in task.rollout(own, None)])
+        grid = _grid(prior.outcomes_seen, self.spacing)
+        rollouts = task.rollout(generator.generate(grid), None)
+        errors = np.linalg.norm([r.outcome for r in rollouts] - grid, axis=1)
+        return {
+            "own_rms_rad": own_rms.tolist(),
+            "own_landing_from_demonstrated_m": np.linalg.norm(landed - shown, axis=1).tolist(),
+            "grid_points": len(grid),
+            "grid_median_m": float(np.median(errors)),
+            "grid_p90_m": float(np.percentile(errors, 90)),
+            "grid_within_tolerance": float(np.mean(errors <= task.tolerance)),
+            "grid_lost": float(np.mean([not rollout.valid for rollout in rollouts])),
+        }
+
+
+def is_aligned(choice: str) -> bool:
+    """Whether a choice of a generator is fitted to aligned demonstrations."""
+    return parse_choice(choice)[1].get("timing") == "align"
+
+
+def _grid(outcomes: Points, spacing: float) -> Float[np.ndarray, "m k"]:
+    """Points of a square grid inside the outcomes' hull."""
+    from scipy.spatial import Delaunay
+
+    axes = [
+        np.arange(low, high + spacing, spacing)
+        for low, high in zip(outcomes.min(axis=0), outcomes.max(axis=0), strict=True)
+    ]
+    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(axes))
+    return points[Delaunay(outcomes).find_simplex(points) >= 0]

@@ -1,0 +1,343 @@
+"""The pictures that are charts: success by round, means of trials, fields, motions in time.
+
+A marker goes with each colour (Okabe and Ito 2008, "Color Universal Design"), so that nothing is
+said by colour alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+from matplotlib import colormaps
+from matplotlib.axes import Axes
+from matplotlib.colors import ListedColormap
+from matplotlib.patches import Rectangle
+from matplotlib.ticker import MaxNLocator
+
+from prior_reinforce.lab.experiments.statistics import Curve, Interval
+from prior_reinforce.report.style import (
+    GOAL,
+    INK,
+    INK_SOFT,
+    calm_axes,
+    drawing,
+    new_figure,
+    save_png,
+    trial_colour,
+)
+
+_COLOURS = ("#0072b2", "#d55e00", "#e69f00", "#cc79a7", "#009e73", "#56b4e9", "#000000", "#999999")
+_MARKERS = ("o", "s", "D", "^", "v", "P", "X", "*")
+_SPREAD = 0.34
+"""Part of a round over which the methods' markers are spread, so that their bars do not hide one
+another."""
+_APART = 0.24
+"""Between the three marks of a row of trials, of the distance between rows."""
+_LARGEST_SHOWN = 10.0
+"""Errors from here on have one colour, in [cm]: else a few far misses would hide all else."""
+# The light part of matplotlib's Blues, on which dark arrows can be seen.
+_ERROR_COLOURS = ListedColormap(colormaps["Blues"](np.linspace(0.0, 0.62, 128)))
+_DEMONSTRATION = "#f0c800"
+
+
+@dataclass(frozen=True)
+class Line:
+    """One method."""
+
+    label: str
+    curve: Curve
+    place: int
+    """Which colour and marker; the same method has the same in every panel."""
+    dashed: bool = False
+    each: Sequence[Sequence[float]] = ()
+    """What each point of the curve is the mean of, where that is drawn instead of intervals."""
+
+
+@dataclass(frozen=True)
+class Panel:
+    """Methods on one pair of axes."""
+
+    title: str
+    lines: Sequence[Line]
+    """The first is ours where shares are drawn: on top, and thicker."""
+    difference: str = ""
+    """Label of the vertical axis where the curves are differences; shares of goals without."""
+
+
+@drawing()
+def draw_success(panels: Sequence[Panel], path: Path) -> Path:
+    """Draw success fraction by round, panels side by side: a line a method, its intervals."""
+    figure = new_figure(5.6 * len(panels), 5.2)
+    for axes, panel in zip(figure.subplots(1, len(panels), squeeze=False)[0], panels, strict=True):
+        _draw_panel(axes, panel)
+        axes.set_title(panel.title, loc="left", fontsize=12, color=INK)
+        axes.legend(
+            loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=2,
+            frameon=False, fontsize=9.5, labelcolor=INK,
+        )  # fmt: skip
+    return save_png(figure, path)
+
+
+def _draw_panel(axes: Axes, panel: Panel) -> None:
+    calm_axes(axes)
+    lines, shares = panel.lines, not panel.difference
+    n_rounds = len(lines[0].curve)
+    offsets = np.linspace(-_SPREAD / 2, _SPREAD / 2, len(lines)) if len(lines) > 1 else [0.0]
+    for i, (line, offset) in enumerate(zip(lines, offsets, strict=True)):
+        value, low, high = (
+            np.array([point[key] for point in line.curve]) for key in ("value", "low", "high")
+        )
+        axes.errorbar(
+            np.arange(1, n_rounds + 1) + offset,
+            value,
+            yerr=[value - low, high - value],
+            color=_COLOURS[line.place % len(_COLOURS)],
+            marker=_MARKERS[line.place % len(_MARKERS)],
+            markersize=5.5,
+            linewidth=2.6 if shares and i == 0 else 1.5,
+            linestyle="--" if line.dashed else "-",
+            elinewidth=1.1,
+            zorder=10 - i,
+            label=line.label,
+            clip_on=False,
+        )
+    axes.set_xlim(0.5, n_rounds + 0.5)
+    if shares:
+        axes.set_ylim(0, 1.02)
+    else:
+        axes.axhline(0.0, color=INK, linewidth=1.0)
+    axes.set_ylabel(panel.difference or "share of goals reached")
+    axes.set_xticks(range(1, n_rounds + 1))
+    axes.set_xlabel("round")
+    axes.tick_params(labelcolor=INK_SOFT)
+
+
+@drawing()
+def draw_kinds(kinds: Sequence[str], panels: Mapping[str, Sequence[Line]], path: Path) -> Path:
+    """Draw a value by kind, panels side by side: a mark a method, and what it is the mean of.
+
+    Args:
+        kinds: What stands below each group of marks.
+        panels: Label of the vertical axis, and the methods' values by kind.
+        path: PNG to write.
+    """
+    figure = new_figure(5.6 * len(panels), 4.6)
+    subplots = figure.subplots(1, len(panels), squeeze=False)[0]
+    for axes, (label, lines) in zip(subplots, panels.items(), strict=True):
+        calm_axes(axes)
+        for line, offset in zip(lines, np.linspace(-0.3, 0.3, len(lines)), strict=True):
+            colour = _COLOURS[line.place % len(_COLOURS)]
+            marker = _MARKERS[line.place % len(_MARKERS)]
+            at = np.arange(len(kinds)) + offset
+            means = [point["value"] for point in line.curve]
+            axes.plot(at, means, marker, color=colour, markersize=9, label=line.label)
+            for x, cells in zip(at, line.each, strict=True):
+                axes.plot([x] * len(cells), cells, marker, color=colour, markersize=4, alpha=0.45)
+        axes.set_xticks(range(len(kinds)), kinds)
+        axes.set_ylim(bottom=0)
+        axes.set_ylabel(label)
+        axes.tick_params(labelcolor=INK_SOFT)
+    handles, labels = subplots[0].get_legend_handles_labels()
+    figure.legend(
+        handles, labels, loc="outside lower center", ncols=len(labels),
+        frameon=False, fontsize=9.5, labelcolor=INK,
+    )  # fmt: skip
+    return save_png(figure, path)
+
+
+@dataclass(frozen=True)
+class TrialsRow:
+    """One line of the table of trials."""
+
+    label: str
+    unseen: Interval
+    """Mean trials on the paper's number of goals."""
+    many: Interval
+    """Mean trials on many goals."""
+    paper: float
+    """The paper's mean."""
+    paper_sd: float
+    """The paper's standard deviation."""
+
+
+@drawing()
+def draw_trials(rows: Sequence[TrialsRow], path: Path) -> Path:
+    """Draw the mean trials of all rows, the first on top, the paper's mean beside ours."""
+    figure = new_figure(8.2, 1.5 + 0.62 * len(rows))
+    axes = figure.subplots()
+    calm_axes(axes)
+    axes.grid(visible=False, axis="y")
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    places = np.arange(len(rows))
+    axes.errorbar(
+        [row.paper for row in rows],
+        places - _APART,
+        xerr=[row.paper_sd for row in rows],
+        fmt="D",
+        color=GOAL,
+        elinewidth=1,
+        markersize=6,
+        label="paper, real arm (standard deviation)",
+    )
+    for intervals, offset, place, label in (
+        ([row.many for row in rows], 0.0, 0, "ours, many goals (95 % interval)"),
+        ([row.unseen for row in rows], _APART, 5, "ours, five unseen goals a set (95 % interval)"),
+    ):
+        value, low, high = np.array([(i.value, i.low, i.high) for i in intervals]).T
+        axes.errorbar(
+            value,
+            places + offset,
+            xerr=[value - low, high - value],
+            fmt="os"[bool(offset)],
+            color=_COLOURS[place],
+            markersize=6.5,
+            capsize=3,
+            label=label,
+        )
+    axes.set_yticks(places, [row.label for row in rows], color=INK, fontsize=10.5)
+    axes.set_ylim(len(rows) - 0.4, -0.6)
+    axes.set_xlim(left=0.8)
+    axes.set_xlabel("Stage-2 trials to the first hit")
+    figure.legend(loc="outside lower center", frameon=False, fontsize=9.5, labelcolor=INK)
+    return save_png(figure, path)
+
+
+@drawing()
+def draw_fields(
+    fields: Sequence[Mapping[str, Any]], region: Float[np.ndarray, "2 2"], path: Path
+) -> Path:
+    """Draw displacement fields one above the other, y to the left and x upwards.
+
+    Args:
+        fields: Each with the grid's `axes_m`, its `displacements_m` and the `outcomes_m` of the
+            demonstrations.
+        region: Reachable region, lower and upper corner, [m].
+        path: PNG to write.
+    """
+    figure = new_figure(8.6, 5.0 * len(fields))
+    for axes, field in zip(
+        figure.subplots(len(fields), 1, squeeze=False)[:, 0], fields, strict=True
+    ):
+        calm_axes(axes, grid=False)
+        x, y = (100 * np.array(axis) for axis in field["axes_m"])
+        arrows, outcomes = (100 * np.array(field[key]) for key in ("displacements_m", "outcomes_m"))
+        colours = axes.pcolormesh(
+            y,
+            x,
+            np.linalg.norm(arrows, axis=-1),
+            cmap=_ERROR_COLOURS,
+            vmin=0,
+            vmax=_LARGEST_SHOWN,
+            shading="nearest",
+            rasterized=True,
+        )
+        axes.quiver(
+            y,
+            x,
+            arrows[..., 1],
+            arrows[..., 0],
+            angles="xy",
+            scale_units="xy",
+            scale=1,
+            width=0.0022,
+            color=INK,
+            clip_on=True,
+        )
+        axes.plot(
+            *outcomes[:, ::-1].T,
+            "o",
+            markersize=11,
+            color=_DEMONSTRATION,
+            markeredgecolor=INK,
+            zorder=5,
+        )
+        (x_low, y_low), (x_high, y_high) = 100 * region
+        axes.add_patch(
+            Rectangle(
+                (y_low, x_low),
+                y_high - y_low,
+                x_high - x_low,
+                fill=False,
+                linestyle="--",
+                edgecolor=INK,
+                linewidth=1.2,
+            )
+        )
+        axes.set_aspect("equal")
+        axes.set_xlim(y[-1], y[0])
+        axes.set_ylim(x[0], x[-1])
+        axes.set_title(f"{len(outcomes)} demonstrations", loc="left", fontsize=12, color=INK)
+        axes.set_xlabel("← left      y [cm]      right →")
+        axes.set_ylabel("x, away from the robot [cm]")
+        bar = figure.colorbar(colours, ax=axes, extend="max", shrink=0.9, pad=0.02)
+        bar.set_label("distance from goal to landing [cm]")
+        bar.outline.set_visible(False)
+    return save_png(figure, path)
+
+
+@drawing()
+def draw_alignment(
+    before: Float[np.ndarray, "N H"],
+    after: Float[np.ndarray, "N longer"],
+    joint: str,
+    dt: float,
+    path: Path,
+) -> Path:
+    """Draw one joint of all demonstrations, before and after alignment, on one time axis.
+
+    Args:
+        before: Its positions.
+        after: The same, aligned.
+        joint: Label of the vertical axis.
+        dt: Time of a frame, in [s].
+        path: PNG to write.
+    """
+    figure = new_figure(8.0, 5.6)
+    for axes, plans, title in zip(
+        figure.subplots(2, 1, sharex=True, sharey=True),
+        (before, after),
+        ("as recorded", "aligned in time"),
+        strict=True,
+    ):
+        calm_axes(axes)
+        for i, plan in enumerate(plans):
+            colour = trial_colour(i, len(plans))
+            axes.plot(dt * np.arange(len(plan)), plan, color=colour, linewidth=1.8)
+        axes.set_title(title, loc="left", fontsize=12, color=INK)
+        axes.set_ylabel(joint)
+    figure.axes[-1].set_xlabel("time [s]")
+    figure.axes[-1].set_xlim(0, dt * (max(before.shape[1], after.shape[1]) - 1))
+    return save_png(figure, path)
+
+
+@drawing()
+def draw_rows(
+    rows: Mapping[str, Mapping[str, Interval]], marks: Mapping[str, str], label: str, path: Path
+) -> Path:
+    """Draw intervals, a row a condition and a mark a method; the first method is ours."""
+    figure = new_figure(7.5, 0.55 * len(rows) + 1.3)
+    axes = figure.subplots()
+    calm_axes(axes)
+    axes.grid(visible=False, axis="y")
+    others = [colour for colour in _COLOURS if colour != GOAL]
+    for place, of_method in enumerate(rows.values()):
+        for i, (method, mark) in enumerate(marks.items()):
+            if method not in of_method:
+                continue
+            y, of = place + 0.17 * (i - (len(marks) - 1) / 2), of_method[method]
+            colour = GOAL if i == 0 else others[i - 1]
+            axes.plot([of.low, of.high], [y, y], color=colour, linewidth=1.5)
+            name = method if place == 0 else None
+            axes.plot(of.value, y, mark, color=colour, markersize=6, label=name)
+    axes.set_yticks(range(len(rows)), list(rows))
+    axes.invert_yaxis()
+    axes.set_xlabel(label)
+    figure.legend(
+        loc="outside upper center", ncols=2, frameon=False, fontsize=9, labelcolor=INK_SOFT
+    )
+    return save_png(figure, path)

@@ -1,0 +1,141 @@
+"""Afternoons: goals worked through one after another, with or without what came before.
+
+In physics, or by the thousand on a displacement field.
+
+Ours; the paper starts every goal from the demonstrations alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from prior_reinforce.adapters import make_adapter
+from prior_reinforce.lab.experiments.evaluation import GOAL_SEED, Training
+from prior_reinforce.lab.experiments.fields import Change, Conditions, FieldTask, MeasuredField
+from prior_reinforce.lab.experiments.protocol import GoalTrials, run_sequences
+from prior_reinforce.lab.experiments.units import Unit
+from prior_reinforce.lab.tasks import make_task
+from prior_reinforce.perception import make_perception
+from prior_reinforce.registry import source_digest
+
+
+@dataclass(frozen=True)
+class Afternoons(Unit):
+    """Work through sequences of goals with one learned generator and one adapter."""
+
+    training: Training
+    """What was learned."""
+    task: str
+    """Where it is tried; another hardware variant than the training's, perhaps."""
+    adapter: str
+    """Adapter, by its choice."""
+    perception: str
+    """Perception, by its choice."""
+    carry_over: bool
+    """Whether earlier goals' trials serve later ones."""
+    sequences: int
+    """Number of afternoons."""
+    goals: int = 8
+    """Goals in each."""
+    rounds: int = 10
+    """Trials a goal at most."""
+    seed: int = GOAL_SEED
+    """Of the goals; what is decided is decided on others than the reported ones."""
+
+    @property
+    def label(self) -> str:
+        """What it is, for a progress line."""
+        carried = ", carried" if self.carry_over else ""
+        return f"{self.task}: sequences with {self.adapter}{carried}, {self.training.label}"
+
+    @property
+    def own_sources(self) -> tuple[str, ...]:
+        """Hashes of your own files behind what is tried; see `Unit`."""
+        own = (self.task, self.adapter, self.perception)
+        return super().own_sources + tuple(source_digest(choice) for choice in own)
+
+    def run(self, folder: Path) -> Mapping[str, Any]:
+        """Run them in lock step, and keep plain numbers, a row a sequence."""
+        task, learned = make_task(self.task), self.training.learned(folder)
+        goals = task.sample_goals(self.sequences * self.goals, np.random.default_rng(self.seed))
+        seed = self.seed + self.training.seed
+        with make_perception(self.perception, scene=task.scene, seed=seed) as perception:
+            results = run_sequences(
+                task,
+                learned.generator,
+                lambda: make_adapter(self.adapter),
+                perception,
+                learned.prior,
+                goals.reshape(self.sequences, self.goals, -1),
+                carry_over=self.carry_over,
+                rounds=self.rounds,
+                seed=seed,
+            )
+        return _kept(results)
+
+
+@dataclass(frozen=True)
+class FieldAfternoons(Unit):
+    """Work through a sequence of goals on a field with one adapter."""
+
+    measured: MeasuredField
+    """Where."""
+    adapter: str
+    """Adapter, by its choice."""
+    carry_over: bool
+    """Whether earlier goals' trials serve later ones."""
+    change: Change = field(default_factory=Change)
+    """What is different since it was measured."""
+    perception: str = "eye"
+    """Through which trials are seen."""
+    goals: int = 8
+    """In the sequence."""
+    rounds: int = 10
+    """Trials a goal at most."""
+    seed: int = GOAL_SEED
+    """Of the goals."""
+
+    @property
+    def label(self) -> str:
+        """What it is, for a progress line."""
+        carried = ", carried" if self.carry_over else ""
+        return f"{self.adapter}{carried}, {self.measured.label.removeprefix('measure ')}"
+
+    @property
+    def own_sources(self) -> tuple[str, ...]:
+        """Hashes of your own files behind it; see `Unit`."""
+        own = (self.adapter, self.perception)
+        return super().own_sources + tuple(source_digest(choice) for choice in own)
+
+    def run(self, folder: Path) -> Mapping[str, Any]:
+        """Work through them, and keep plain numbers; one row, of the one sequence."""
+        task = FieldTask(self.measured.field(folder), self.change)
+        prior = task.demonstrations("own")
+        goals = task.sample_goals(self.goals, np.random.default_rng(self.seed))
+        with make_perception(self.perception, seed=self.seed) as perception:
+            results = run_sequences(
+                task,
+                Conditions().fit(prior, seed=0),
+                lambda: make_adapter(self.adapter),
+                perception,
+                prior,
+                goals[None],
+                carry_over=self.carry_over,
+                rounds=self.rounds,
+                seed=self.seed + self.measured.labels,
+            )
+        return _kept(results)
+
+
+def _kept(results: Sequence[Sequence[GoalTrials]]) -> dict[str, Any]:
+    """Which trial reached each goal, and what was said before each trial and came of it."""
+    trials = [trial for of_one in results for goal in of_one for trial in goal.trials]
+    return {
+        "solved_at": [[goal.solved_at or 0 for goal in of_one] for of_one in results],
+        "expected": [[trial.p_hit, trial.hit] for trial in trials if trial.p_hit is not None],
+    }

@@ -1,0 +1,213 @@
+"""Work cut into units: each runs alone, gives the same result anywhere, and is written once.
+
+A killed run goes on where it was, because a unit whose result is on disk is not run again; a
+result is moved into place whole. Results do not depend on how many workers there are, because a
+unit depends on nothing but its own fields: one thread, its own seeds.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import subprocess
+import traceback
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import asdict, dataclass, fields
+from functools import lru_cache, partial
+from pathlib import Path
+from typing import Any
+
+from threadpoolctl import threadpool_limits
+
+from prior_reinforce.errors import UnitFailedError
+from prior_reinforce.files import sweep, write
+from prior_reinforce.lab.experiments.cluster import run_on_ray
+
+
+@dataclass(frozen=True)
+class Unit(ABC):
+    """A piece of work: a frozen dataclass of plain values."""
+
+    @property
+    @abstractmethod
+    def label(self) -> str:
+        """What it is, for a progress line."""
+
+    @property
+    def own_sources(self) -> tuple[str, ...]:
+        """Hashes of the files of your own classes that it runs: when one is edited, it runs anew.
+
+        Those of the units that are its fields, unless a unit says more.
+        """
+        parts = (getattr(self, field.name) for field in fields(self))
+        return tuple(s for part in parts if isinstance(part, Unit) for s in part.own_sources)
+
+    @abstractmethod
+    def run(self, folder: Path) -> Mapping[str, Any]:
+        """Do it and return a JSON-able result; `folder` holds models shared between units."""
+
+
+_Outcome = tuple[Unit, str | None]
+"""A unit, and why it failed; None where it did not."""
+
+
+@dataclass(frozen=True)
+class Workers:
+    """Where units run."""
+
+    count: int = 1
+    """Processes on this machine."""
+    ray: str | None = None
+    """Address of a Ray cluster to run on instead; it decides how many units run at a time."""
+
+
+def run_units(
+    units: Sequence[Unit], folder: Path, workers: Workers, progress: Callable[[int, int, str], None]
+) -> list[Mapping[str, Any]]:
+    """Run what is not done yet, and return what is kept of every unit, in order.
+
+    A result on disk is taken whatever commit made it: the caller is told which one did.
+
+    Args:
+        units: What to do.
+        folder: Where results and shared models lie; on a cluster, a folder that all nodes share.
+        workers: Where to do it.
+        progress: Called with units done, units in all, and the label of the last one.
+
+    Returns:
+        The unit's fields (`unit`), the code that ran it (`commit`), what it gave (`result`).
+
+    Raises:
+        UnitFailedError: Some units failed, or a worker process was killed. All others' results
+            are on disk, and running again goes on from there.
+        MissingExtraError: A Ray address was given and Ray is not installed.
+        ConfigurationError: No Ray cluster answers at the address.
+    """
+    folder = folder.resolve()
+    for part in ("units", "failures"):
+        (folder / part).mkdir(parents=True, exist_ok=True)
+    left = [unit for unit in units if not result_path(folder, unit).is_file()]
+    done = len(units) - len(left)
+    progress(done, len(units), "found on disk" if done else "")
+    failed: list[tuple[Unit, str]] = []
+    for unit, reason in _outcomes(left, folder, workers):
+        if reason is None:
+            done += 1
+            progress(done, len(units), unit.label)
+        else:
+            failed.append((unit, reason))
+    if failed:
+        unit, reason = failed[0]
+        more = f", and {len(failed) - 1} more" if len(failed) > 1 else ""
+        raise UnitFailedError(
+            f"{unit.label!r} failed: {reason}{more}; {done} of {len(units)} results are kept, mend "
+            f"it and run again (what happened: {_failure_path(folder, unit)})"
+        )
+    return [json.loads(result_path(folder, unit).read_text()) for unit in units]
+
+
+def result_of(folder: Path, unit: Unit) -> Mapping[str, Any]:
+    """What a unit gave, within another one: kept, or run now and kept."""
+    if not result_path(folder, unit).is_file():
+        run_units([unit], folder, Workers(), lambda done, total, label: None)
+    result: Mapping[str, Any] = json.loads(result_path(folder, unit).read_text())["result"]
+    return result
+
+
+def result_path(folder: Path, unit: Unit) -> Path:
+    """Where a unit's result lies: named by its kind, and a hash of its fields and own code."""
+    return folder / "units" / f"{_name(unit)}.json"
+
+
+def digest_of(unit: Unit) -> str:
+    """What tells a unit from others of its kind: its fields, and your own code behind it."""
+    told = json.dumps(asdict(unit), sort_keys=True) + "".join(unit.own_sources)
+    return hashlib.sha256(told.encode()).hexdigest()[:16]
+
+
+@lru_cache(maxsize=1)
+def commit() -> str:
+    """The checkout's commit when first asked, and a hash of what was changed since.
+
+    Returns:
+        As `git describe --dirty` gives it, with the hash of the difference where there is one;
+        `not a checkout` where the package is in none, or there is no git.
+    """
+    described = _git("describe", "--always", "--dirty")
+    if described is None or _git("ls-files", "--error-unmatch", Path(__file__).name) is None:
+        return "not a checkout"
+    if not described.endswith("-dirty"):
+        return described
+    return f"{described}-{hashlib.sha256((_git('diff', 'HEAD') or '').encode()).hexdigest()[:8]}"
+
+
+def _git(*arguments: str) -> str | None:
+    """What git says, or None where it cannot."""
+    try:
+        done = subprocess.run(
+            ["git", *arguments],
+            capture_output=True,
+            text=True,
+            cwd=Path(__file__).parent,
+            check=False,
+        )
+    except OSError:
+        return None
+    return done.stdout.strip() if done.returncode == 0 else None
+
+
+def _outcomes(units: Sequence[Unit], folder: Path, workers: Workers) -> Iterator[_Outcome]:
+    """Run units and yield what became of each, as they come."""
+    if not units:
+        return
+    if workers.ray is not None:
+        lost = partial(_keep_failure, folder)
+        yield from run_on_ray(partial(_run, folder), units, workers.ray, lost=lost)
+        return
+    import joblib
+
+    parallel = joblib.Parallel(n_jobs=workers.count, return_as="generator_unordered")
+    try:
+        yield from parallel(joblib.delayed(_run)(folder, unit) for unit in units)
+    except BrokenProcessPool as error:
+        raise UnitFailedError(
+            "a worker process was killed, mostly for want of memory; the results so far are kept, "
+            "run again with fewer --workers"
+        ) from error
+
+
+def _run(folder: Path, unit: Unit) -> _Outcome:
+    """Run a unit and keep its result; or keep how it failed."""
+    # Loads torch before any unit can: joblib would take it for a memory leak, and stop the worker.
+    from prior_reinforce.generators.threads import torch_threads
+
+    sweep(folder / "units")
+    sweep(folder / "models")
+    made_by = commit()  # before the work: a commit made meanwhile is not what ran
+    try:
+        # The last digits of a sum depend on how many threads share it.
+        with threadpool_limits(1), torch_threads(1):
+            result = unit.run(folder)
+        kept = {"unit": asdict(unit), "commit": made_by, "result": result}
+        text = json.dumps(kept, allow_nan=False)
+    except Exception as error:
+        return _keep_failure(folder, unit, error)
+    write(result_path(folder, unit), text)
+    _failure_path(folder, unit).unlink(missing_ok=True)
+    return unit, None
+
+
+def _keep_failure(folder: Path, unit: Unit, error: Exception) -> _Outcome:
+    write(_failure_path(folder, unit), "".join(traceback.format_exception(error)))
+    first_line = str(error).partition("\n")[0]
+    return unit, f"{type(error).__name__}: {first_line}"
+
+
+def _failure_path(folder: Path, unit: Unit) -> Path:
+    return folder / "failures" / f"{_name(unit)}.txt"
+
+
+def _name(unit: Unit) -> str:
+    return f"{type(unit).__name__.lower()}-{digest_of(unit)}"

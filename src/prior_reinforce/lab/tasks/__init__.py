@@ -1,0 +1,29 @@
+"""Env: dynamic manipulation tasks in contact physics, each a `.py` with its `.xml`; and `zoo`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from prior_reinforce.lab.tasks import zoo
+from prior_reinforce.registry import Member, Registry
+
+if TYPE_CHECKING:
+    from prior_reinforce.environment import Task
+
+_HERE = "prior_reinforce.lab.tasks"
+_SHOT = f"{_HERE}.basketball:BasketballShot"
+
+TASKS: Registry[Task] = Registry(
+    "task",
+    "prior_reinforce.environment:Task",
+    {
+        "basketball-v1": Member(_SHOT, "throw a ball into a hoop"),
+        "basketball-v2": Member(_SHOT, "the same with a shorter spoon", {"hardware": "v2"}),
+        "basketball-v3": Member(_SHOT, "a smaller ball and a cup", {"hardware": "v3"}),
+        "curling": Member(f"{_HERE}.curling:Curling", "slide a stone to a target"),
+        "fishing": Member(f"{_HERE}.fishing:Fishing", "swing a hook onto a magnet"),
+        **zoo.MEMBERS,
+    },
+)
+
+make_task = TASKS.make

@@ -1,0 +1,378 @@
+"""The gate finds the joint, the time and the margin of plans whose peaks are known."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import prior_reinforce.lab.tasks
+from prior_reinforce.bench.robots import GateSettings, RobotLimits, check_plan, robot_limits
+from prior_reinforce.errors import ConfigurationError, InvalidPlanError, RobotLimitError
+from prior_reinforce.plans.interpolation import join_frames
+from prior_reinforce.plans.motions import Demonstrations, Plan, PlanFormat
+
+HOME = np.array([0.0, -0.4, 0.0, -2.0, 0.0, 1.8, 0.8])
+DT = 0.01
+FORMAT = PlanFormat(tuple(f"joint{i}" for i in range(1, 8)), ("rad",) * 7, DT)
+PANDA = robot_limits("panda")
+
+
+def swing(joint: int, amplitude: float, duration: float, frames: int = 0) -> np.ndarray:
+    """Minimum jerk of one joint (from 1) away from HOME; peak speed 15/8 amplitude/duration."""
+    n = frames or round(duration / DT) + 1
+    s = np.linspace(0, 1, n)
+    plan = np.tile(HOME, (n, 1))
+    plan[:, joint - 1] += amplitude * (10 * s**3 - 15 * s**4 + 6 * s**5)
+    return plan
+
+
+def lines(report):
+    return {line.check: line for line in report.lines}
+
+
+def test_a_gentle_swing_passes_everything():
+    report = check_plan(Plan(swing(4, 0.5, 1.0), FORMAT), PANDA)
+    assert not report.refused
+    assert not report.warned
+    assert [line.check for line in report.lines] == [
+        "joints",
+        "position",
+        "velocity",
+        "acceleration",
+        "jerk",
+        "rest at start",
+        "rest at end",
+        "demonstrations",
+        "box",
+    ]
+    report.require()
+
+
+def test_speed_is_found_with_its_joint_time_and_margin():
+    # Peak 15/8 * 1.2 / 1.0 = 2.25 rad/s at half time, beyond the Panda's 2.175.
+    report = check_plan(Plan(swing(4, 1.2, 1.0), FORMAT), PANDA)
+    line = lines(report)["velocity"]
+    assert line.status == "refuse"
+    assert line.joint == "joint4"
+    assert line.time == pytest.approx(0.5, abs=0.002)
+    assert line.value == pytest.approx(2.25, rel=1e-4)
+    assert line.limit == 2.175
+    assert line.margin == pytest.approx(-0.075, abs=1e-3)
+    with pytest.raises(RobotLimitError, match=r"velocity: joint4 at 2\.25 rad/s.*0\.500 s"):
+        report.require()
+
+
+def test_what_is_worst_while_a_pose_is_held_is_said_to_be_at_the_end_of_the_motion():
+    towards = swing(4, -0.9, 1.0)  # nearest to its end in the last frame
+    for plan, time in ((towards, 1.0), (towards[::-1], 0.0)):
+        line = lines(check_plan(Plan(plan, FORMAT), PANDA))["position"]
+        assert line.time == pytest.approx(time)
+        assert line.text.endswith(f"at {time:.3f} s")
+
+
+def test_acceleration_is_found():
+    # Peak 10/sqrt(3) * 0.4 / 0.5^2 = 9.24 rad/s^2 on joint 2, whose limit is 7.5.
+    line = lines(check_plan(Plan(swing(2, 0.4, 0.5), FORMAT), PANDA))["acceleration"]
+    assert (line.status, line.joint, line.limit) == ("refuse", "joint2", 7.5)
+    assert line.value == pytest.approx(10 / np.sqrt(3) * 0.4 / 0.25, rel=1e-3)
+
+
+def test_nearly_used_up_warns():
+    amplitude = 0.97 * 2.175 * 8 / 15
+    report = check_plan(Plan(swing(1, amplitude, 1.0), FORMAT), PANDA)
+    assert lines(report)["velocity"].status == "warn"
+    assert report.warned
+    assert not report.refused
+    report.require()
+
+
+def test_jitter_shows_in_acceleration_and_jerk_though_not_in_position():
+    plan = swing(4, 0.3, 1.0)
+    plan[40:60, 3] += 0.002 * (-1) ** np.arange(20)
+    found = lines(check_plan(Plan(plan, FORMAT), PANDA))
+    assert found["position"].status == "pass"
+    assert found["acceleration"].status == "refuse"
+    assert found["jerk"].status == "refuse"
+    assert found["jerk"].joint == "joint4"
+
+
+def test_position_beyond_the_range():
+    line = lines(check_plan(Plan(swing(4, 2.0, 3.0), FORMAT), PANDA))["position"]
+    assert (line.status, line.joint, line.limit) == ("refuse", "joint4", -0.0698)
+    assert line.margin == pytest.approx(-0.0698, abs=1e-6)
+
+
+@pytest.mark.parametrize("end", ["start", "end"])
+def test_motion_at_an_end_is_refused(end):
+    plan = swing(4, 0.5, 1.0)
+    plan = plan[30:] if end == "start" else plan[:-30]
+    found = lines(check_plan(Plan(plan, FORMAT), PANDA))
+    assert found[f"rest at {end}"].status == "refuse"
+    assert found[f"rest at {end}"].joint == "joint4"
+    other = "end" if end == "start" else "start"
+    assert found[f"rest at {other}"].status == "pass"
+    # The step where the held pose meets the motion is seen by the rates as well.
+    assert found["jerk"].status == "refuse"
+
+
+def test_an_fr3_near_its_stop_is_slower():
+    limits = robot_limits("fr3", ">=5.9")
+    # Peak 15/8 * 0.7 / 0.6 = 2.19 rad/s at 2.35 rad, where -0.6599 + sqrt(12 * 0.5507) = 1.911.
+    s = np.linspace(0, 1, 61)
+    plan = np.tile(HOME, (61, 1))
+    plan[:, 0] = 2.0 + 0.7 * (10 * s**3 - 15 * s**4 + 6 * s**5)
+    found = lines(check_plan(Plan(plan, FORMAT), limits))["velocity"]
+    assert (found.status, found.joint) == ("refuse", "joint1")
+    assert found.value > found.limit
+    assert found.limit < 1.911
+    centre = plan.copy()
+    centre[:, 0] -= 2.0
+    assert lines(check_plan(Plan(centre, FORMAT), limits))["velocity"].status == "pass"
+    # The same motion away from the stop is held against the other side's bound.
+    assert lines(check_plan(Plan(plan[::-1], FORMAT), limits))["velocity"].status == "pass"
+
+
+def demonstrations():
+    plans = [swing(4, amplitude, 1.0) for amplitude in (0.4, 0.5, 0.6)]
+    return Demonstrations(np.array(plans), np.array([[0.8, 0.0], [0.9, 0.1], [1.0, -0.1]]), FORMAT)
+
+
+@pytest.mark.parametrize(
+    ("amplitude", "status"), [(0.5, "pass"), (0.65, "pass"), (0.75, "warn"), (1.0, "refuse")]
+)
+def test_distance_from_the_demonstrations(amplitude, status):
+    # Demonstrated range of joint 4 is 0.6; 0.65 lies 8 % of it beyond, 0.75 25 %, 1.0 67 %.
+    line = lines(check_plan(Plan(swing(4, amplitude, 1.0), FORMAT), PANDA, demonstrations()))[
+        "demonstrations"
+    ]
+    assert line.status == status
+    assert line.value == pytest.approx(max(0.0, amplitude - 0.6) / 0.6, abs=1e-9)
+
+
+def test_the_envelope_follows_time():
+    # The same path in reverse stays within the overall range, but not within the band in time.
+    line = lines(check_plan(Plan(swing(4, 0.5, 1.0)[::-1], FORMAT), PANDA, demonstrations()))[
+        "demonstrations"
+    ]
+    assert line.status == "refuse"
+    other = Plan(swing(4, 0.5, 1.2)[::-1], FORMAT)
+    assert lines(check_plan(other, PANDA, demonstrations()))["demonstrations"].status == "pass"
+
+
+def test_demonstrations_of_other_columns_are_named():
+    renamed = PlanFormat(tuple("abcdefg"), ("rad",) * 7, DT)
+    with pytest.raises(InvalidPlanError, match="learned from"):
+        check_plan(Plan(swing(4, 0.5, 1.0), renamed), PANDA, demonstrations())
+
+
+@pytest.mark.parametrize("frame", [1, 50, 99])
+def test_absurd_numbers_never_pass(frame):
+    """1e305 overflows in the spline; what is not a number is beyond every limit."""
+    plan = Plan(swing(4, 0.5, 1.0), FORMAT)
+    frames = plan.actions.copy()
+    frames[frame, 3] = 1e305  # a Plan would not take it
+    object.__setattr__(plan, "actions", frames)
+    assert check_plan(plan, PANDA).refused
+
+
+def test_frames_between_two_cycles_are_refused():
+    """A spike of 2 rad between two milliseconds, of which no sample at 1 kHz knows."""
+    plan = swing(4, 0.5, 1.0, frames=1_001)
+    plan[501, 3] += 2.0
+    quick = PlanFormat(FORMAT.names, FORMAT.units, 1e-6)
+    with pytest.raises(InvalidPlanError, match="closer than a cycle of the arm"):
+        check_plan(Plan(plan, quick), PANDA)
+
+
+def test_acceleration_is_exact_between_two_cycles():
+    """It is largest at a frame, here 0.5 ms from both cycles; half as large at these."""
+    form = PlanFormat(FORMAT.names, FORMAT.units, 0.0015)
+    plan = np.tile(HOME, (41, 1))
+    plan[20:23, 3] += np.array([1.0, 2.0, 1.0]) * 1e-6
+    found = lines(check_plan(Plan(plan, form), PANDA))["acceleration"]
+    exact = np.abs(join_frames(plan, 0.0015)(np.arange(41) * 0.0015, 2)).max()
+    assert found.value == pytest.approx(exact, rel=1e-12)
+
+
+def test_a_box_that_cannot_be_checked_refuses():
+    """It was asked for: a dash would pass the plan."""
+    box = GateSettings(box_low=(-1, -1, 0), box_high=(1, 1, 1.5))
+    swung = swing(4, 0.5, 1.0)
+    six = PlanFormat(FORMAT.names[1:], ("rad",) * 6, DT)
+    without = replace(box, absent_joints=("joint1",))
+    for plan, limits, settings_ in (
+        (Plan(swung, FORMAT), replace(PANDA, robot="own", chain=None), box),
+        (Plan(swung[:, 1:], six), PANDA, without),
+    ):
+        report = check_plan(plan, limits, settings=settings_)
+        assert lines(report)["box"].status == "refuse"
+        with pytest.raises(RobotLimitError, match="box: cannot be checked"):
+            report.require()
+
+
+def test_without_a_box_it_is_said_what_is_not_looked_at():
+    line = lines(check_plan(Plan(np.tile(HOME, (5, 1)), FORMAT), PANDA))["box"]
+    assert line.status == "unchecked"
+    assert "the table is not looked at: set tool_tip, workspace_low" in line.text
+
+
+def test_the_box_for_the_tool_tip():
+    plan = Plan(swing(4, 0.5, 1.0), FORMAT)
+    free = GateSettings(box_low=(-1, -1, 0), box_high=(1, 1, 1.5))
+    line = lines(check_plan(plan, PANDA, settings=free))["box"]
+    assert line.status == "pass"
+    low = GateSettings(box_low=(-1, -1, 0), box_high=(1, 1, 1.5), tool_tip=(0.0, 0.0, 0.9))
+    line = lines(check_plan(plan, PANDA, settings=low))["box"]
+    assert (line.status, line.joint, line.limit) == ("refuse", "z", 0.0)
+    assert line.margin < 0
+
+
+def test_columns_are_matched_by_name_whatever_their_order():
+    plan = swing(4, 1.2, 1.0)
+    order = [6, 3, 0, 5, 1, 4, 2]
+    names = ("gripper", *(f"fr3_joint{i + 1}" for i in order))
+    shuffled = np.column_stack([np.zeros(len(plan)), plan[:, order]])
+    report = check_plan(Plan(shuffled, PlanFormat(names, ("m", *("rad",) * 7), DT)), PANDA)
+    straight = check_plan(Plan(plan, FORMAT), PANDA)
+    assert [(a.value, a.joint) for a in report.lines[1:5]] == [
+        (b.value, b.joint) for b in straight.lines[1:5]
+    ]
+
+
+def test_some_joints_only():
+    form = PlanFormat(("joint4.pos", "joint6.pos"), ("rad", "rad"), DT)
+    report = check_plan(Plan(swing(4, 1.2, 1.0)[:, [3, 5]], form), PANDA)
+    found = lines(report)
+    assert found["velocity"].joint == "joint4"
+    assert found["box"].status == "unchecked"
+    assert (found["joints"].status, found["joints"].value) == ("warn", 5)
+    assert found["joints"].text.endswith("joint1, joint2, joint3, joint5, joint7")
+
+
+def test_a_joint_without_a_column_never_just_passes():
+    """`Joint4` may be joint4, or another arm's: it is not guessed, and not passed over."""
+    gentle = swing(4, 0.5, 1.0)
+    names = ("joint1", "joint2", "joint3", "Joint4", "joint5", "j6", "joint7")
+    plan = Plan(gentle, PlanFormat(names, ("rad",) * 7, DT))
+    report = check_plan(plan, PANDA)
+    assert report.warned
+    assert report.text().startswith("plan passes with warnings")
+    assert "WARN   joints         not in the plan, so not checked: joint4, joint6" in report.text()
+    meant = check_plan(plan, PANDA, settings=GateSettings(absent_joints=("joint4", "joint6")))
+    assert meant.text().startswith("plan passes:")
+    assert "5 of 7, without joint4, joint6 on purpose" in meant.text()
+    for wrong, why in (("joint1", "the plan moves it"), ("joint9", "no such joint")):
+        with pytest.raises(ConfigurationError, match=why):
+            check_plan(plan, PANDA, settings=GateSettings(absent_joints=(wrong,)))
+
+
+def test_what_cannot_be_checked_says_so():
+    form = PlanFormat(("x", "y", "z"), ("m",) * 3, DT)
+    report = check_plan(Plan(np.zeros((10, 3)), form), PANDA)
+    assert {line.status for line in report.lines[1:]} == {"unchecked"}
+    assert lines(report)["joints"].status == "warn"
+    assert not report.refused
+    assert report.text().startswith("plan NOT CHECKED for the arm: limits of panda")
+    assert report.as_json()["unchecked"] == [line.check for line in report.lines[1:]]
+
+
+def test_degrees_are_refused():
+    form = PlanFormat(FORMAT.names, ("deg",) * 7, DT)
+    with pytest.raises(InvalidPlanError, match="in rad"):
+        check_plan(Plan(swing(4, 0.5, 1.0), form), PANDA)
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"warn_above": 0.0},
+        {"beyond_warn": 2.0},
+        {"rest_speed": -1.0},
+        {"box_low": (0, 0, 0)},
+        {"box_low": (0, 0, 0), "box_high": (1, 1, 0)},
+        {"tool_tip": (0.0, np.nan, 0.0)},
+    ],
+)
+def test_settings_are_checked(values):
+    with pytest.raises(ConfigurationError):
+        GateSettings(**values)
+
+
+def test_a_joint_resting_at_a_stop_breaks_no_velocity_bound():
+    limits = robot_limits("fr3", ">=5.9")
+    plan = np.tile(HOME, (50, 1))
+    plan[:, 0] = limits.upper[0] - 1e-4
+    line = lines(check_plan(Plan(plan, FORMAT), limits))["velocity"]
+    assert line.status == "pass"
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_a_plan_passes_exactly_when_looser_limits_of_its_own_peaks_hold(seed):
+    """Limits a hair above the plan's own peaks pass; a hair below any of them is refused."""
+    rng = np.random.default_rng(seed)
+    plan = Plan(swing(int(rng.integers(1, 8)), rng.uniform(0.1, 0.6), 1.0), FORMAT)
+    loose = RobotLimits(
+        "arm", "1", "test", FORMAT.names, *(np.full(7, v) for v in (-9, 9, 1e3, 1e4, 1e7))
+    )
+    peaks = {line.check: line.value for line in check_plan(plan, loose).lines[2:5]}
+    for check, peak in peaks.items():
+        for factor, status in ((1.001, "warn"), (0.999, "refuse")):
+            values = {"velocity": 1e3, "acceleration": 1e4, "jerk": 1e7} | {check: peak * factor}
+            limits = RobotLimits(
+                "arm",
+                "1",
+                "test",
+                FORMAT.names,
+                np.full(7, -9.0),
+                np.full(7, 9.0),
+                *(np.full(7, value) for value in values.values()),
+            )
+            assert lines(check_plan(plan, limits))[check].status == status
+
+
+SETS = sorted((Path(prior_reinforce.lab.tasks.__file__).parent / "demonstrations").glob("*.npz"))
+
+
+def test_the_shipped_demonstrations_of_joints_pass():
+    """Those of the other tasks are no joint positions; inverse kinematics answers for them."""
+    shipped = [Demonstrations.load(path) for path in SETS]
+    checked = [demos for demos in shipped if "joint1" in demos.format.names]
+    assert len(checked) >= 4
+    for demos in checked:
+        for frames in demos.plans:
+            check_plan(Plan(frames, demos.format), PANDA, demos).require()
+
+
+def test_where_no_acceleration_is_published_a_plan_is_compared_with_the_demonstrations():
+    ur = robot_limits("ur5e")
+    form = PlanFormat(ur.joint_names, ("rad",) * 6, 0.01)
+    s = np.linspace(0, 1, 101)[:, None]
+    swing = 10 * s**3 - 15 * s**4 + 6 * s**5
+    plans = np.array([swing * a * np.eye(6)[1] for a in (0.8, 1.0)])
+    shown = Demonstrations(plans, [[0.8], [1.0]], form)
+    alone = check_plan(Plan(plans[0], form), ur)
+    assert {"acceleration", "jerk"} < set(alone.unchecked)
+    # Peak acceleration of this swing is 10 / sqrt(3) rad/s^2 a radian.
+    for size, status in ((1.2, "pass"), (2.0, "warn")):
+        report = check_plan(Plan(size * plans[1], form), ur, shown)
+        line = next(line for line in report.lines if line.check == "acceleration")
+        assert line.status == status
+        assert line.limit == pytest.approx(10 / np.sqrt(3), rel=0.01)
+        assert f"no limit of ur5e is known; shoulder_lift_joint at {line.value:.4g}" in line.text
+        assert f"{100 * size:.0f} % of the demonstrations' largest" in line.text
+
+
+def test_a_box_is_kept_by_any_arm_whose_kinematics_are_known():
+    ur = robot_limits("ur5e")
+    form = PlanFormat(ur.joint_names, ("rad",) * 6, 0.01)
+    still = Plan(np.zeros((50, 6)), form)
+    # Stretched out it is 0.817 m ahead.
+    for reach, refused in ((0.85, False), (0.8, True)):
+        box = GateSettings(box_low=(0, -1, -1), box_high=(reach, 1, 1))
+        (line,) = [x for x in check_plan(still, ur, None, box).lines if x.check == "box"]
+        assert (line.status == "refuse") == refused
+        assert line.value == pytest.approx(0.8172)

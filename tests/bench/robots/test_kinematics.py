@@ -1,0 +1,67 @@
+"""Forward kinematics against poses worked by hand and against MuJoCo's model of the same arm."""
+
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+import prior_reinforce.lab.tasks
+from prior_reinforce.bench.robots.kinematics import Chain, tool_tip
+from prior_reinforce.bench.robots.presets import FRANKA
+
+
+def test_stretched_arm_by_hand():
+    # All joints 0: the flange points down, 0.088 m before the axis, 0.333 + 0.316 + 0.384 - 0.107.
+    np.testing.assert_allclose(tool_tip(FRANKA, np.zeros(7)), [0.088, 0, 0.926], atol=1e-12)
+    np.testing.assert_allclose(
+        tool_tip(FRANKA, np.zeros(7), (0.0, 0.0, 0.1)), [0.088, 0, 0.826], atol=1e-12
+    )
+
+
+def test_turning_the_base_turns_the_tip():
+    q = np.array([0.0, -0.3, 0.1, -2.0, 0.2, 1.7, 0.4])
+    x, y, z = tool_tip(FRANKA, q, (0.05, 0.02, 0.1))
+    q[0] = np.pi / 2
+    np.testing.assert_allclose(tool_tip(FRANKA, q, (0.05, 0.02, 0.1)), [-y, x, z], atol=1e-12)
+
+
+def test_agrees_with_the_simulated_arm():
+    path = Path(prior_reinforce.lab.tasks.__file__).with_name("panda.xml")
+    model = mujoco.MjModel.from_xml_path(str(path))
+    data = mujoco.MjData(model)
+    base = model.body("link0").id
+    flange = model.site("flange").id
+    rng = np.random.default_rng(1)
+    tip = np.array([0.03, -0.02, 0.15])
+    # That model's site is turned by -45 degrees about the flange, as the maker mounts the hand.
+    turn = np.array([[1, -1, 0], [1, 1, 0], [0, 0, np.sqrt(2)]]) / np.sqrt(2)
+    for q in rng.uniform(-1.5, 1.5, size=(20, 7)):
+        data.qpos[:7] = q
+        mujoco.mj_kinematics(model, data)
+        rotation = data.site_xmat[flange].reshape(3, 3)
+        expected = data.site_xpos[flange] + rotation @ turn @ tip - data.xpos[base]
+        np.testing.assert_allclose(tool_tip(FRANKA, q, tip), expected, atol=1e-12)
+
+
+def test_shapes_broadcast():
+    q = np.random.default_rng(2).normal(size=(4, 5, 7))
+    tips = tool_tip(FRANKA, q)
+    assert tips.shape == (4, 5, 3)
+    np.testing.assert_allclose(tips[2, 3], tool_tip(FRANKA, q[2, 3]))
+
+
+def test_both_tables_of_denavit_and_hartenberg_say_the_same_arm():
+    # An elbow: two parallel axes 0.3 m apart, then 0.2 m to the flange along x.
+    standard = Chain.standard([(0.3, 0.1, 0.0), (0.2, 0.0, 0.0)])
+    craig = Chain.craig([(0.0, 0.1, 0.0), (0.3, 0.0, 0.0)], flange=0.0)
+    q = np.random.default_rng(3).uniform(-3, 3, (9, 2))
+    x = 0.3 * np.cos(q[:, 0]) + 0.2 * np.cos(q.sum(axis=1))
+    y = 0.3 * np.sin(q[:, 0]) + 0.2 * np.sin(q.sum(axis=1))
+    expected = np.column_stack([x, y, np.full(9, 0.1)])
+    np.testing.assert_allclose(tool_tip(standard, q), expected, atol=1e-12)
+    np.testing.assert_allclose(tool_tip(craig, q, (0.2, 0, 0)), expected, atol=1e-12)
+
+
+def test_a_base_may_be_turned():
+    turned = Chain.standard([(0.3, 0.1, 0.0)], yaw=np.pi)
+    np.testing.assert_allclose(tool_tip(turned, np.zeros(1)), [-0.3, 0, 0.1], atol=1e-12)

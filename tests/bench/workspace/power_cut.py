@@ -1,0 +1,129 @@
+"""Kill -9 at random moments of a scripted session: nothing missing, nothing doubled.
+
+    python tests/bench/workspace/power_cut.py FOLDER KILLS
+
+A program of its own, because a process that has used other libraries' threads cannot be forked.
+"""
+
+import os
+import shutil
+import signal
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+from planar import demonstrations, manifest
+
+from prior_reinforce.bench.workspace.workspace import Workspace
+
+TRIALS = 20
+
+
+def script():
+    """Each step appends exactly one event, so the number of events says where one stands."""
+    rng = np.random.default_rng(0)
+    steps = []
+    for number in range(1, TRIALS + 1):
+        if number % 5 == 1:
+            goal = rng.uniform([0.82, -0.15], [0.98, 0.15]).tolist()
+            carried = number > 10
+            steps.append(lambda w, g=goal, c=carried: w.set_goal(g, carry_over=c))
+        steps.append(lambda w: w.session().ask())
+        error = rng.normal(0, 0.03, 2).round(3).tolist()
+        if number % 7 == 0:
+            steps.append(lambda w, n=number: w.session().void(n, "ball slipped"))
+        else:
+            steps.append(lambda w, n=number, e=error: w.session().tell(n, e))
+        if number % 6 == 0:
+            steps.append(lambda w, n=number - 1, e=error: w.session().amend(n, e))
+    return steps
+
+
+def go_on(folder):
+    """Do what is left of the script."""
+    workspace = Workspace(folder)
+    steps = script()
+    for step in steps[len(workspace.events) - 2 :]:  # imported and trained came before
+        step(workspace)
+    workspace.close()
+
+
+def in_child(folder):
+    pid = os.fork()
+    if pid == 0:
+        status = 1
+        try:
+            go_on(folder)
+            status = 0
+        finally:
+            os._exit(status)
+    return pid
+
+
+def learn_in_child(folder):
+    """Make the workspace in a child too: torch's threads do not survive a fork."""
+    pid = os.fork()
+    if pid == 0:
+        workspace = Workspace.create(folder, manifest())
+        workspace.import_demonstrations(demonstrations(), "made up")
+        workspace.learn("diffusion,training_steps=3,sampling_steps=2")
+        workspace.close()
+        os._exit(0)
+    assert os.waitpid(pid, 0)[1] == 0
+
+
+def check(folder, told_before):
+    """After a kill: no told trial missing, none doubled, no plan other than its hash."""
+    workspace = Workspace(folder)
+    told = sum(event.kind in {"told", "voided"} for event in workspace.events)
+    assert told >= told_before, "a told trial is missing"
+    session = workspace.session()
+    trials = [trial for goal in session.goals for trial in session.trials_of(goal.number)]
+    assert [trial.number for trial in trials] == list(range(1, len(trials) + 1))
+    for trial in trials:
+        workspace.plan(trial)
+    workspace.close()
+    return told
+
+
+def said(folder):
+    workspace = Workspace(folder)
+    events = [(event.kind, event.data) for event in workspace.events]
+    workspace.close()
+    return events
+
+
+def main(folder, n_kills):
+    learned, reference, killed = folder / "learned", folder / "reference", folder / "killed"
+    learn_in_child(learned)
+    shutil.copytree(learned, reference)
+    started = time.monotonic()
+    assert os.waitpid(in_child(reference), 0)[1] == 0
+    whole = time.monotonic() - started
+    rng = np.random.default_rng(1)
+    kills = sessions = 0
+    while kills < n_kills:
+        if not killed.exists():
+            shutil.copytree(learned, killed)
+            sessions += 1
+            told = 0
+        pid = in_child(killed)
+        time.sleep(rng.uniform(0.0, 0.1 * whole))
+        done, status = os.waitpid(pid, os.WNOHANG)
+        if done:
+            assert status == 0
+            assert said(killed) == said(reference)
+            shutil.rmtree(killed)
+            continue
+        os.kill(pid, signal.SIGKILL)
+        os.waitpid(pid, 0)
+        kills += 1
+        told = check(killed, told)
+    assert os.waitpid(in_child(killed), 0)[1] == 0
+    assert said(killed) == said(reference)
+    print(f"{kills} kills in {sessions} sessions of {len(said(reference))} events: all whole")
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]), int(sys.argv[2]))

@@ -1,0 +1,103 @@
+"""The report of a workspace."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from prior_reinforce.bench.workspace.report import _checks
+from prior_reinforce.session.trials import Stage, Trial
+
+
+def test_the_report_shows_every_goal_and_the_voided_trials(run, folder, tmp_path):
+    run("goal", folder, "0.9", "0.05")
+    run("ask", folder)
+    run("tell", folder, 1, "--error", "3cm long")
+    run("ask", folder)
+    run("void", folder, 2, "--reason", "ball slipped")
+    run("goal", folder, "0.95", "-0.05", "--memory", "workspace")
+    run("ask", folder)
+    status, out, _ = run("report", folder)
+    assert status == 0
+    page = (tmp_path / "planar" / "report" / "report.html").read_text()
+    assert out == "report: planar/report/report.html\n"
+    for text in ("Goal 1", "Goal 2", "ball slipped", "3 cm long"):
+        assert text in page
+    path = next((tmp_path / "planar" / "plans").glob("trial-001*"))
+    path.chmod(0o644)
+    path.write_bytes(path.read_bytes()[:-20])
+    assert run("ask", folder)[0] == 0  # goes on, for that trial was told
+    assert run("report", folder)[0] == 0
+    page = (tmp_path / "planar" / "report" / "report.html").read_text()
+    assert "the plan of trial 1 is not drawn" in page
+    assert path.name in page
+    path.unlink()
+    run("void", folder, 1)
+    assert run("report", folder)[0] == 0
+
+
+def test_goals_are_called_what_status_calls_them_and_none_is_left_out_without_a_word(
+    run, folder, tmp_path
+):
+    run("goal", folder, "0.9", "0.05")
+    run("ask", folder)
+    run("tell", folder, 1, "--error", "3cm long")
+    run("goal", folder, "0.85", "0.05")
+    run("goal", folder, "0.95", "-0.05")
+    run("ask", folder)
+    assert run("report", folder)[0] == 0
+    page = (tmp_path / "planar" / "report" / "report.html").read_text()
+    for text in (
+        "0 of 1 goal reached",
+        "Left out, with no trial that counts: Goal 3.",
+        "No plan was given for goal 2.",
+        "trial 2 waits to be executed",
+        "<dd>by goal 3</dd>",  # goal 1 had no earlier trials
+    ):
+        assert text in page
+    names = {path.name for path in (tmp_path / "planar" / "report").glob("*-table.png")}
+    assert names == {"goal-1-table.png", "goal-3-table.png"}
+
+
+def test_an_aborted_execution_is_said_as_status_says_it(run, folder, tmp_path):
+    run("goal", folder, "0.9", "0.05")
+    said = run("ask", folder, "--yes", "--run", "false {plan}")
+    assert said[0] == 1
+    assert "executed, but aborted: the command ended" in run("status", folder)[1]
+    run("report", folder)
+    page = (tmp_path / "planar" / "report" / "report.html").read_text()
+    assert "executed, but aborted: the command ended" in page
+    assert "trial 1 waits to be told" in page
+
+
+def trial(number, **lines):
+    """A trial whose gate said this of each check: its status and margin."""
+    said = [
+        {"check": check, "status": status, "margin": margin, "text": f"{check} of {number}"}
+        for check, (status, margin) in lines.items()
+    ]
+    return Trial(number, 1, np.zeros(2), stage=Stage.ASKED, kept={"gate": {"lines": said}})
+
+
+def test_the_plan_that_came_nearest_to_a_limit_is_shown():
+    trials = [
+        trial(1, velocity=("pass", 0.5), jerk=("warn", 0.1), box=("unchecked", None)),
+        trial(2, velocity=("pass", 0.2), jerk=("pass", 0.05), box=("pass", 0.3)),
+        Trial(3, 1, np.zeros(2), stage=Stage.ASKED, kept={"gate": None}),
+    ]
+    rows = [(row.check, row.status, row.trial) for row in _checks(trials)]
+    assert rows == [("velocity", "pass", 2), ("jerk", "warn", 1), ("box", "pass", 2)]
+
+
+@pytest.mark.slow
+def test_two_reports_at_once_are_both_whole(run, folder, tmp_path):
+    run("goal", folder, "0.9", "0.05")
+    run("ask", folder)
+    program = [sys.executable, "-m", "prior_reinforce.cli", "report", folder]
+    both = [subprocess.Popen(program, stderr=subprocess.PIPE, text=True) for _ in range(2)]
+    said = [program.communicate()[1] for program in both]
+    assert [program.returncode for program in both] == [0, 0], said
+    report = tmp_path / "planar" / "report"
+    assert "</html>" in (report / "report.html").read_text()
+    assert not list(report.glob(".unfinished*"))

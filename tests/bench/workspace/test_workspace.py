@@ -1,0 +1,586 @@
+"""A workspace: what happened is kept, whatever happens in between."""
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from contextlib import suppress
+
+import numpy as np
+import pytest
+
+from prior_reinforce.adapters.bayesian import BayesianAdapter
+from prior_reinforce.adapters.proportional import ProportionalAdapter
+from prior_reinforce.bench.workspace.status import describe
+from prior_reinforce.bench.workspace.workspace import Workspace
+from prior_reinforce.errors import (
+    ConfigurationError,
+    FileFormatError,
+    InvalidDemonstrationsError,
+    InvalidFeedbackError,
+    InvalidGoalError,
+    RobotLimitError,
+    TrialStateError,
+    WorkspaceError,
+)
+from prior_reinforce.generators import make_generator, training
+from prior_reinforce.generators.base import Generator
+from prior_reinforce.generators.interpolation import SmoothInterpolation
+from prior_reinforce.plans.motions import Demonstrations, PlanFormat
+from prior_reinforce.readings import Reading
+from prior_reinforce.session.session import Session
+from prior_reinforce.session.trials import Stage
+from tests.bench.workspace.planar import (
+    amend,
+    ask,
+    demonstrations,
+    manifest,
+    reopened,
+    tell,
+    trials,
+    void,
+)
+
+GOAL = [0.9, 0.05]
+SLOW = (
+    'model = "given"\njoint_names = ["joint1", "joint2"]\nlower = [-3, -3]\nupper = [3, 3]\n'
+    "velocity = [0.1, 0.1]\nacceleration = [100, 100]\njerk = [10000, 10000]\n"
+)
+
+
+class OwnInterpolation(SmoothInterpolation):
+    """Not one of ours, as far as the package knows."""
+
+    name = "own-interpolation"
+
+
+OWN = f"{__name__}:OwnInterpolation"
+
+
+def test_a_told_trial_is_there_when_the_program_starts_again(workspace):
+    trial = ask(workspace)
+    tell(workspace, trial.number, [0.05, -0.02])
+    again = reopened(workspace)
+    (kept,) = trials(again)
+    assert kept.stage is Stage.TOLD
+    np.testing.assert_array_equal(kept.error_seen, [0.05, -0.02])
+    np.testing.assert_array_equal(kept.condition, trial.condition)
+    again.close()
+
+
+def test_ask_gives_the_same_plan_also_from_another_program(workspace):
+    first = ask(workspace)
+    again = reopened(workspace)
+    second = ask(again)
+    assert (second.number, second.kept["plan_sha256"]) == (first.number, first.kept["plan_sha256"])
+    assert len(list((workspace.folder / "plans").glob("*.npz"))) == 1
+    again.close()
+
+
+def test_the_next_condition_is_the_sessions(workspace):
+    """The workspace adds nothing to Algorithm 1: a session in memory goes the same way."""
+    generator = workspace.session().generator
+    session = Session(generator, BayesianAdapter(), demonstrations(), GOAL, 0.015)
+    for error in ([0.05, 0.0], [0.01, -0.02]):
+        trial = session.ask()
+        session.tell(trial.number, error)
+        number = ask(workspace).number
+        tell(workspace, number, error)
+    np.testing.assert_array_equal(ask(workspace).condition, session.ask().condition)
+
+
+def test_numbers_run_over_all_goals_and_an_earlier_goals_trial_can_be_amended(workspace):
+    tell(workspace, ask(workspace).number, [0.0, 0.0])
+    workspace.set_goal([0.95, 0.0])
+    assert ask(workspace).number == 2
+    amend(workspace, 1, [0.03, 0.0])
+    assert not trials(workspace)[0].hit
+    np.testing.assert_array_equal(trials(workspace)[0].error_seen, [0.03, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("adapter", "carry_over", "carried"),
+    [
+        ("bayes", None, True),
+        ("bayes", False, False),
+        ("gp", None, False),
+        ("gp", True, True),
+    ],
+)
+def test_earlier_goals_serve_a_later_one_where_they_serve_its_adapter(
+    workspace, adapter, carry_over, carried
+):
+    tell(workspace, ask(workspace).number, [0.06, 0.03])
+    goal = workspace.set_goal([0.91, 0.05], carry_over=carry_over, adapter=adapter)
+    assert goal.carry_over is carried
+    moved = np.linalg.norm(ask(workspace).condition - [0.91, 0.05])
+    assert moved > 0.01 if carried else moved < 0.0005
+
+
+def test_new_hardware_is_noted_and_forgets_the_shift_alone(workspace):
+    for goal in ([0.9, 0.05], [0.95, -0.05], [0.85, 0.0]):
+        workspace.set_goal(goal)
+        for _ in range(2):
+            number = ask(workspace).number
+            session = workspace.session()
+            error = session.trials[-1].condition - np.subtract(goal, [0.08, 0.0])
+            session.tell(number, Reading.measured(error, 0.001), hit=False)
+    shifted = workspace.set_goal([0.9, 0.0])
+    known = ask(workspace).condition - shifted.goal
+    void(workspace, ask(workspace).number, "")
+    goal = workspace.set_goal([0.9, 0.0], new_hardware="another ball")
+    assert goal.new_hardware == "another ball"
+    anew = ask(workspace).condition - shifted.goal
+    assert known[0] < -0.06
+    assert -0.04 < anew[0] < 0.0
+    assert "another ball" in describe(workspace)
+
+
+def test_the_adapter_is_the_goals(workspace):
+    workspace.set_goal(GOAL, adapter="proportional,gain=0.5")
+    tell(workspace, ask(workspace).number, [0.06, 0.03])
+    again = reopened(workspace)
+    np.testing.assert_allclose(ask(again).condition, np.subtract(GOAL, [0.03, 0.015]))
+    assert "adapter proportional,gain=0.5" in describe(again)
+    before = again.events
+    for wrong in ("spline", "gp,size=2"):
+        with pytest.raises(ConfigurationError):
+            again.set_goal(GOAL, adapter=wrong)
+    assert again.events == before
+    again.close()
+
+
+def test_a_trial_of_another_model_is_left_out(workspace):
+    first = ask(workspace)
+    tell(workspace, first.number, [0.06, 0.03])
+    workspace.learn("nearest")
+    np.testing.assert_array_equal(ask(workspace).condition, first.condition)
+
+
+@pytest.mark.parametrize("choice", ["interpolation", "interpolation,timing=align"])
+def test_a_workspace_plans_as_its_generator_does_by_itself(tmp_path, choice):
+    """Recordings that start at different times, aligned or not."""
+    demos = demonstrations()
+    late = [
+        np.concatenate([p[:1].repeat(n, 0), p[: len(p) - n]]) for n, p in enumerate(demos.plans)
+    ]
+    rest = np.repeat(np.array(late)[:, -1:], 4, axis=1)
+    demos = Demonstrations(np.concatenate([late, rest], axis=1), demos.outcomes_seen, demos.format)
+    with Workspace.create(tmp_path / "planar", manifest()) as workspace:
+        workspace.import_demonstrations(demos, "made up")
+        model = workspace.learn(choice).model
+        workspace.set_goal(GOAL)
+        trial = ask(workspace)
+        alone = make_generator(choice).fit(demos, seed=0)
+        expected = alone.generate(trial.condition[None])[0]
+        np.testing.assert_array_equal(workspace.plan(trial).actions, expected)
+        assert f"{model}, {choice}" in describe(workspace)
+
+
+def test_what_a_fit_chose_is_kept_and_shown(workspace):
+    training = workspace.learn()
+    assert [remark.split(":")[0] for remark in training.remarks] == ["generator", "timing"]
+    assert all(remark in describe(workspace) for remark in training.remarks)
+
+
+def test_ones_own_generator_is_named_by_a_person_not_by_the_journal(workspace):
+    workspace.learn(OWN)
+    assert f"prior-reinforce ask {workspace.folder} --generator {OWN}" in describe(workspace)
+    before = workspace.events
+    with pytest.raises(ConfigurationError, match=f"--generator {OWN}"):
+        ask(workspace)
+    with pytest.raises(ConfigurationError, match="learned by"):
+        ask(workspace, own="examples:Another")
+    assert workspace.events == before
+    assert ask(workspace, own=OWN).number == 1
+    void(workspace, 1, "")
+    workspace.learn("interpolation")
+    with pytest.raises(ConfigurationError, match="drop --generator"):
+        ask(workspace, own=OWN)
+
+
+class OwnAdapter(ProportionalAdapter):
+    """Not one of ours, as far as the package knows."""
+
+
+def test_ones_own_adapter_is_named_by_a_person_not_by_the_journal(workspace):
+    own = f"{__name__}:OwnAdapter"
+    workspace.set_goal(GOAL, adapter=f"{own},gain=0.5")
+    assert f"prior-reinforce ask {workspace.folder} --adapter {own}" in describe(workspace)
+    before = workspace.events
+    with pytest.raises(ConfigurationError, match=f"--adapter {own}"):
+        ask(workspace)
+    assert workspace.events == before
+    number = workspace.session(own_adapter=own).ask().number
+    tell(workspace, number, [0.06, 0.03])
+    again = workspace.session(own_adapter=own).ask()
+    np.testing.assert_allclose(again.condition, np.subtract(GOAL, [0.03, 0.015]))
+
+
+def test_bad_feedback_changes_nothing(workspace):
+    number = ask(workspace).number
+    before = workspace.events
+    for error in ([0.1], [np.nan, 0.0], "far"):
+        with pytest.raises(InvalidFeedbackError):
+            tell(workspace, number, error)
+    for call in (
+        lambda: tell(workspace, 7, [0.0, 0.0]),
+        lambda: amend(workspace, number, [0.0, 0.0]),
+        lambda: workspace.set_goal([0.9, 0.0]),
+        lambda: workspace.learn("interpolation"),
+    ):
+        with pytest.raises(TrialStateError):
+            call()
+    assert workspace.events == before
+
+
+def test_a_bad_goal_changes_nothing(workspace):
+    before = workspace.events
+    for goal in ([0.9], [np.inf, 0.0], ["a", "b"]):
+        with pytest.raises(InvalidGoalError):
+            workspace.set_goal(goal)
+    assert workspace.events == before
+
+
+def test_the_order_of_things_is_told(tmp_path):
+    workspace = Workspace.create(tmp_path / "new", manifest())
+    with pytest.raises(WorkspaceError, match="prior-reinforce import"):
+        workspace.set_goal(GOAL)
+    workspace.import_demonstrations(demonstrations(), "made up")
+    with pytest.raises(WorkspaceError, match="prior-reinforce learn"):
+        ask(workspace)
+    workspace.learn("interpolation")
+    with pytest.raises(WorkspaceError, match="prior-reinforce goal"):
+        ask(workspace)
+    workspace.close()
+
+
+def test_demonstrations_must_fit_the_manifest(workspace):
+    other = demonstrations()
+    slow = Demonstrations(
+        other.plans, other.outcomes_seen, PlanFormat(other.format.names, other.format.units, 0.04)
+    )
+    with pytest.raises(InvalidDemonstrationsError, match=r"dt 0\.04.*0\.02"):
+        workspace.import_demonstrations(slow, "slow.npz")
+
+
+def test_a_plan_that_breaks_a_limit_is_refused_and_nothing_is_written(workspace):
+    path = workspace.folder / "workspace.toml"
+    path.write_text(path.read_text().replace('model = "none"', SLOW, 1))
+    slow = reopened(workspace)
+    before = slow.events
+    with pytest.raises(RobotLimitError, match="velocity"):
+        ask(slow)
+    assert slow.events == before
+    assert not list((slow.folder / "plans").glob("*"))
+    slow.close()
+
+
+def test_a_command_runs_once_and_its_end_is_kept(workspace):
+    number = ask(workspace).number
+    done = workspace.execute(number, "cat {plan}", time_limit=20)
+    assert done.succeeded
+    assert trials(workspace)[0].stage is Stage.EXECUTED
+    with pytest.raises(TrialStateError, match="a plan runs once"):
+        workspace.execute(number, "cat {plan}", time_limit=20)
+    assert len(list((workspace.folder / "executions").iterdir())) == 1
+    tell(workspace, number, [0.02, 0.0])
+    assert workspace.events[-2].data["exit_status"] == 0
+
+
+def test_a_plan_that_the_limits_refuse_by_now_is_neither_given_out_nor_executed(workspace):
+    """The verdict counts at the moment of leaving, whatever it was when the plan was made."""
+    number = ask(workspace).number
+    path = workspace.folder / "workspace.toml"
+    path.write_text(path.read_text().replace('model = "none"', SLOW, 1))
+    narrow = reopened(workspace)
+    before = narrow.events
+    ran = workspace.folder / "ran"
+    with pytest.raises(RobotLimitError, match="void it and ask again"):
+        ask(narrow)
+    with pytest.raises(RobotLimitError, match="velocity"):
+        narrow.execute(number, f"touch {ran} {{plan}}", time_limit=20)
+    assert narrow.events == before
+    assert not ran.exists()
+    narrow.close()
+
+
+def test_a_program_that_is_not_there_leaves_the_trial_to_be_executed(workspace):
+    number = ask(workspace).number
+    with pytest.raises(ConfigurationError):
+        workspace.execute(number, "no-such-controller {plan}", time_limit=5)
+    assert trials(workspace)[0].stage is Stage.ASKED
+
+
+def test_an_execution_that_was_cut_off_is_never_repeated_by_itself(workspace):
+    number = ask(workspace).number
+    with workspace.log.journal.exclusive():  # what execute writes before the program dies
+        workspace.log.journal.append("executing", {"trial": number, "command": "arm {plan}"})
+    again = reopened(workspace)
+    with pytest.raises(TrialStateError, match="did the arm move"):
+        ask(again)
+    assert "did the arm move" in describe(again)
+    assert ask(again, arm_did_not_move=True).stage is Stage.ASKED
+    again.execute(number, "cat {plan}", time_limit=20)
+    again.close()
+
+
+def test_a_workspace_that_was_copied_goes_on(workspace, tmp_path):
+    tell(workspace, ask(workspace).number, [0.05, -0.02])
+    shutil.copytree(workspace.folder, tmp_path / "elsewhere")
+    copy = Workspace(tmp_path / "elsewhere")
+    np.testing.assert_array_equal(ask(copy).condition, ask(workspace).condition)
+    copy.close()
+
+
+def test_folders_that_are_no_workspace_are_named(tmp_path):
+    with pytest.raises(WorkspaceError, match="prior-reinforce new"):
+        Workspace(tmp_path)
+    (tmp_path / "file").write_text("x")
+    with pytest.raises(WorkspaceError, match="not empty"):
+        Workspace.create(tmp_path, manifest())
+
+
+def test_a_trial_is_told_once_and_voided_once(workspace):
+    number = ask(workspace).number
+    tell(workspace, number, [0.05, 0.0])
+    with pytest.raises(TrialStateError, match="amend it"):
+        tell(workspace, number, [0.01, 0.0])
+    void(workspace, number, "slipped")
+    before = workspace.events
+    for call in (
+        lambda: void(workspace, number, "again"),
+        lambda: tell(workspace, number, [0.0, 0.0]),
+        lambda: amend(workspace, number, [0.0, 0.0]),
+    ):
+        with pytest.raises(TrialStateError, match="ask for another"):
+            call()
+    assert workspace.events == before
+
+
+def wait_for(what):
+    deadline = time.monotonic() + 60
+    while not what():
+        assert time.monotonic() < deadline, "waited a minute in vain"
+        time.sleep(0.02)
+
+
+CONTROLLER = """
+import pathlib, sys, time
+here = pathlib.Path(sys.argv[1])
+with open(here / "runs", "a") as file:
+    file.write("moved\\n")
+until = time.monotonic() + 60
+while not (here / "stop").exists() and time.monotonic() < until:
+    time.sleep(0.02)
+"""
+PROGRAM = """
+import sys
+from prior_reinforce.bench.workspace.workspace import Workspace
+Workspace(sys.argv[1]).execute(1, sys.argv[2], time_limit=120)
+"""
+
+
+@pytest.mark.slow
+def test_a_controller_that_outlives_our_program_keeps_the_arm_to_itself(workspace, tmp_path):
+    workspace.session().ask()
+    (tmp_path / "arm.py").write_text(CONTROLLER)
+    command = f"{sys.executable} {tmp_path}/arm.py {tmp_path} {{plan}}"
+    program = subprocess.Popen([sys.executable, "-c", PROGRAM, workspace.folder, command])
+    wait_for((tmp_path / "runs").exists)
+    os.kill(program.pid, signal.SIGKILL)
+    program.wait()
+
+    for moved_or_not in ({}, {"arm_did_not_move": True}):
+        with pytest.raises(TrialStateError, match="executing now"):
+            workspace.session().ask(**moved_or_not)
+    # Even told trials make no room for the next while the arm moves.
+    workspace.session().tell(1, [0.05, 0.0])
+    assert workspace.session().ask().number == 2
+    with pytest.raises(TrialStateError, match="executed right now"):
+        workspace.execute(2, command, time_limit=1)
+
+    (tmp_path / "stop").touch()
+    wait_for(lambda: not workspace.log.is_executing())
+    assert (tmp_path / "runs").read_text() == "moved\n"
+    assert workspace.execute(2, command, time_limit=60).succeeded
+    assert workspace.session().trial(2).stage is Stage.EXECUTED
+
+
+def test_an_execution_whose_program_was_killed_is_recorded_by_what_watched_over_it(
+    workspace, tmp_path
+):
+    workspace.session().ask()
+    (tmp_path / "arm.py").write_text(CONTROLLER)
+    command = f"{sys.executable} {tmp_path}/arm.py {tmp_path} {{plan}}"
+    program = subprocess.Popen([sys.executable, "-c", PROGRAM, workspace.folder, command])
+    wait_for((tmp_path / "runs").exists)
+    program.kill()
+    program.wait()
+    assert workspace.recover() is None  # it goes on
+    assert workspace.session().trial(1).stage is Stage.EXECUTING
+    (tmp_path / "stop").touch()
+    wait_for(lambda: not workspace.log.is_executing())
+    trial = workspace.recover()
+    assert trial.stage is Stage.EXECUTED
+    assert trial.execution["outcome"] == "done"
+    assert workspace.recover() is None
+
+
+def test_an_execution_that_was_interrupted_is_recorded_as_aborted(workspace, tmp_path):
+    workspace.session().ask()
+    (tmp_path / "arm.py").write_text(CONTROLLER)
+    command = f"{sys.executable} {tmp_path}/arm.py {tmp_path} {{plan}}"
+    program = subprocess.Popen(
+        [
+            *(sys.executable, "-m", "prior_reinforce.cli"),
+            *("ask", workspace.folder, "--yes", "--run", command),
+        ],
+        stderr=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    wait_for((tmp_path / "runs").exists)
+    program.send_signal(signal.SIGINT)
+    _, err = program.communicate(timeout=60)
+    assert program.returncode == 130
+    assert "interrupted; trial 1: aborted" in err
+    assert workspace.session().trial(1).stage is Stage.EXECUTED
+    assert "void" in describe(workspace).splitlines()[-1]
+    assert not workspace.log.is_executing()
+
+
+def test_nothing_moves_where_an_interruption_came_first(workspace, tmp_path, monkeypatch):
+    number = ask(workspace).number
+    begin = Session.begin_execution
+
+    def interrupted(session, *args):
+        begin(session, *args)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    monkeypatch.setattr(Session, "begin_execution", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        workspace.execute(number, f"touch {tmp_path}/ran {{plan}}", time_limit=20)
+    assert not (tmp_path / "ran").exists()
+    assert trials(workspace)[0].stage is Stage.ASKED
+
+
+def test_limits_that_were_narrowed_while_the_program_waited_are_the_ones_that_count(workspace):
+    number = ask(workspace).number
+    path = workspace.folder / "workspace.toml"
+    path.write_text(path.read_text().replace('model = "none"', SLOW, 1))
+    ran = workspace.folder / "ran"
+    for call in (
+        lambda: ask(workspace),
+        lambda: workspace.execute(number, f"touch {ran} {{plan}}", time_limit=20),
+    ):
+        with pytest.raises(RobotLimitError, match="velocity"):
+            call()
+    assert not ran.exists()
+    assert not (workspace.folder / "executions").exists()
+
+
+@pytest.mark.parametrize(
+    "name", ["journal.sqlite", "models", "plans", "demonstrations.png", "report", "workspace.toml"]
+)
+def test_links_out_of_the_folder_are_refused_before_anything_is_read_or_written(
+    workspace, tmp_path, name
+):
+    workspace.close()
+    target = tmp_path / "elsewhere"
+    if (workspace.folder / name).exists():
+        (workspace.folder / name).rename(target)
+    (workspace.folder / name).symlink_to(target)
+    with pytest.raises(FileFormatError, match=f"{name} is a link out of"):
+        Workspace(workspace.folder)
+
+
+@pytest.mark.parametrize("part", ["plans", "models", "demonstrations"])
+def test_links_further_down_are_refused_too(workspace, tmp_path, part):
+    ask(workspace)
+    (path,) = (workspace.folder / part).iterdir()
+    path.rename(tmp_path / "elsewhere")
+    path.symlink_to(tmp_path / "elsewhere")
+    again = reopened(workspace)
+    if part != "plans":  # an open trial has its plan already
+        void(again, 1, "")
+    with pytest.raises(FileFormatError, match="is a link out of"):
+        ask(again)
+    again.close()
+
+
+def test_no_training_goes_on_in_another_folder(workspace, tmp_path):
+    (tmp_path / "elsewhere").mkdir()
+    (workspace.folder / ".training").symlink_to(tmp_path / "elsewhere")
+    with pytest.raises(FileFormatError, match=r"\.training is a link out of"):
+        workspace.learn("nearest")
+
+
+class Unsavable(Generator):
+    """Knows how to learn, and not how to be kept."""
+
+    def _fit(self, demonstrations, seed, progress):
+        raise AssertionError("must be refused before it is fitted")
+
+    def _generate(self, conditions): ...
+
+
+def test_a_generator_that_cannot_be_kept_is_refused_before_it_is_fitted(workspace):
+    with pytest.raises(ConfigurationError, match=r"give the class state\(\) and from_state"):
+        workspace.learn(f"{__name__}:Unsavable")
+
+
+def test_one_long_session_follows_what_is_learned_and_chosen_meanwhile(tmp_path):
+    with Workspace.create(tmp_path / "planar", manifest()) as workspace:
+        workspace.import_demonstrations(demonstrations(), "made up")
+        session = workspace.session()
+        first = workspace.learn("interpolation").model
+        session.set_goal(GOAL)
+        alone = session.ask()
+        assert alone.model == first
+        session.tell(1, [0.06, 0.03])
+        assert not np.allclose(session.ask().condition, alone.condition)
+        session.void(2, "")
+        with Workspace(workspace.folder) as elsewhere:
+            second = elsewhere.learn("nearest").model
+        trial = session.ask()
+        assert trial.model == second
+        np.testing.assert_array_equal(trial.condition, alone.condition)
+        session.tell(3, [0.06, 0.03])
+        session.set_goal(GOAL, adapter="proportional,gain=0.5", carry_over=True)
+        expected = trial.condition - [0.03, 0.015]
+        np.testing.assert_allclose(session.ask().condition, expected)
+
+
+def test_a_session_that_was_open_sees_what_another_window_executes(workspace):
+    session = workspace.session()
+    session.ask()
+    workspace.session().begin_execution(1, "arm {plan}")
+    with pytest.raises(TrialStateError, match="did the arm move"):
+        session.ask()
+    assert session.ask(arm_did_not_move=True).stage is Stage.ASKED
+    assert session.end_execution(np.int64(1), None).stage is Stage.ASKED
+
+
+def test_a_training_that_was_interrupted_goes_on_where_it_was(tmp_path, monkeypatch):
+    monkeypatch.setattr(training, "_SAVED_EVERY", 0.0)
+    monkeypatch.setattr(training, "_SAVING", np.inf)
+    choice = "regression,training_steps=4,network.widths=8,network.groups=2,timing=none"
+    steps = []
+
+    def interrupt(progress):
+        steps.append(progress.step)
+        if len(steps) == 2:
+            raise KeyboardInterrupt
+
+    models = []
+    for folder, progresses in ((tmp_path / "a", (None,)), (tmp_path / "b", (interrupt,) * 2)):
+        with Workspace.create(folder, manifest()) as workspace:
+            workspace.import_demonstrations(demonstrations(), "made up")
+            for progress in progresses:
+                with suppress(KeyboardInterrupt):
+                    models.append(workspace.learn(choice, progress=progress).model)
+    assert steps == [1, 2, 2, 3, 4]
+    assert models[0] == models[1]

@@ -1,0 +1,134 @@
+"""The same files whatever the number of workers, and however a run ends."""
+
+import json
+from pathlib import Path
+
+import pytest
+from killed_runs import printed_by, results
+from quick_units import Ends, Roots, real_units
+
+from prior_reinforce.errors import UnitFailedError
+from prior_reinforce.lab.experiments.evaluation import Training, Trials, ZeroShot
+from prior_reinforce.lab.experiments.recipes import Run, Scale
+from prior_reinforce.lab.experiments.recipes.displacement import Displacement
+from prior_reinforce.lab.experiments.recipes.process import Process
+from prior_reinforce.lab.experiments.units import Workers, commit, result_path, run_units
+
+KILLS = 8
+
+
+def silent(done, total, label):
+    pass
+
+
+@pytest.mark.slow
+def test_any_number_of_workers_gives_the_same_files_bit_for_bit(tmp_path):
+    units = [*real_units(), *map(Roots, range(4))]
+    for count in (1, 2, 3):
+        run_units(units, tmp_path / str(count), Workers(count), silent)
+    one = results(tmp_path / "1")
+    assert len(one) == len(units) + 9  # three models of three files each
+    assert results(tmp_path / "2") == one
+    assert results(tmp_path / "3") == one
+
+
+def test_a_model_of_which_nobody_says_what_made_it_is_learned_anew(tmp_path):
+    training = Training("basketball-v1", "A", "nearest", 0)
+    training.learned(tmp_path)
+    (left,) = tmp_path.glob("models/*/generator/config.json")
+    left.write_text("{}")
+    run_units([training], tmp_path, Workers(), silent)
+    learned = training.learned(tmp_path)
+    assert (
+        learned.generator.generate(learned.prior.outcomes_seen).shape == learned.prior.plans.shape
+    )
+
+
+@pytest.mark.slow
+def test_runs_killed_at_any_moment_end_with_the_same_files(tmp_path):
+    text = printed_by("killed_runs.py", tmp_path, KILLS)
+    assert f"{KILLS} kills" in text
+    assert ", 0 unfinished ones" not in text  # some kills came while a file was being written
+
+
+def test_what_is_done_is_not_run_again(tmp_path):
+    units = [Roots(seed) for seed in range(3)]
+    first = run_units(units[:2], tmp_path, Workers(), silent)
+    result_path(tmp_path, units[0]).write_text(json.dumps({"kept": True}))
+    calls = []
+    again = run_units(units, tmp_path, Workers(), lambda *call: calls.append(call))
+    assert again[:2] == [{"kept": True}, first[1]]
+    assert calls == [(2, 3, "found on disk"), (3, 3, "roots 2")]
+
+
+def test_what_other_code_made_is_kept_and_named(tmp_path):
+    units = [Roots(seed) for seed in range(2)]
+    kept, _ = run_units(units, tmp_path, Workers(), silent)
+    assert kept["commit"] == commit()
+    result_path(tmp_path, units[0]).write_text(json.dumps({**kept, "commit": "of May"}))
+    run = Run(tmp_path, Scale())
+    assert run.results(units)[0] == kept["result"]
+    assert run.commits == {"of May", commit()}
+
+
+def test_a_failing_unit_is_named_and_the_others_stay(tmp_path):
+    units = [Ends("raise"), Roots(0), Ends("give nothing"), Roots(1)]
+    with pytest.raises(UnitFailedError) as caught:
+        run_units(units, tmp_path, Workers(), silent)
+    message = str(caught.value)
+    assert "\n" not in message
+    assert message.startswith("'one that raises' failed: ArithmeticError: 0 is no divisor, and 1")
+    assert "2 of 4 results are kept" in message
+    assert [result_path(tmp_path, unit).is_file() for unit in units] == [False, True, False, True]
+    told = Path(message.partition("what happened: ")[2].rstrip(")")).read_text()
+    assert "second line" in told
+    assert "quick_units.py" in told
+
+
+def test_an_edited_class_of_ones_own_is_run_anew(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(tmp_path)
+    own = tmp_path / "edited_adapter.py"
+    own.write_text("from prior_reinforce.adapters import FrozenAdapter\n")
+    training = Training("basketball-v1", "A", "nearest", seed=0)
+    unit = Trials(training, training.task, "edited_adapter:FrozenAdapter", "exact", goals=1)
+    before, learned = result_path(tmp_path, unit), result_path(tmp_path, training)
+    own.write_text("from prior_reinforce.adapters import FrozenAdapter  # another\n")
+    assert result_path(tmp_path, unit) != before
+    assert result_path(tmp_path, training) == learned
+
+
+def test_what_was_learned_by_an_edited_class_is_thrown_anew(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(tmp_path)
+    own = tmp_path / "edited_generator.py"
+    own.write_text("from prior_reinforce.generators import NearestNeighbours\n")
+    training = Training("basketball-v1", "A", "edited_generator:NearestNeighbours", seed=0)
+    units = [training, ZeroShot(training), Displacement(training), Process(training)]
+    before = [result_path(tmp_path, unit) for unit in units]
+    own.write_text("from prior_reinforce.generators import NearestNeighbours  # another\n")
+    assert all(
+        result_path(tmp_path, unit) != path for unit, path in zip(units, before, strict=True)
+    )
+
+
+def test_without_git_a_result_says_so(monkeypatch):
+    monkeypatch.setenv("PATH", "")
+    commit.cache_clear()
+    try:
+        assert commit() == "not a checkout"
+    finally:
+        commit.cache_clear()
+
+
+@pytest.mark.slow
+def test_a_worker_that_is_killed_is_told_in_a_line(tmp_path):
+    with pytest.raises(UnitFailedError, match=r"a worker process was killed.* fewer --workers"):
+        run_units([Ends("die"), Roots(0)], tmp_path, Workers(2), silent)
+
+
+def test_a_mended_unit_leaves_no_failure_behind(tmp_path):
+    unit = Roots(0)
+    failure = tmp_path / "failures" / f"{result_path(tmp_path, unit).stem}.txt"
+    failure.parent.mkdir()
+    failure.write_text("of yesterday")
+    run_units([unit], tmp_path, Workers(), silent)
+    assert not failure.exists()

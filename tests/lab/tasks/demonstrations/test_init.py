@@ -1,0 +1,19 @@
+"""Every set that is shipped can be made again, to the last bit."""
+
+import numpy as np
+import pytest
+
+from prior_reinforce.lab.tasks import make_task
+from prior_reinforce.lab.tasks.demonstrations import basketball, curling, fishing
+
+MAKING = {"basketball-v1": basketball, "curling": curling, "fishing": fishing}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "making"), MAKING.items(), ids=MAKING)
+def test_shipped_sets_are_made_again_bit_for_bit(name, making):
+    task = make_task(name)
+    for which in task.demonstration_sets:
+        made, shipped = making.make(which), task.demonstrations(which)
+        np.testing.assert_array_equal(made.plans, shipped.plans)
+        np.testing.assert_array_equal(made.outcomes_seen, shipped.outcomes_seen)

@@ -1,0 +1,647 @@
+"""Algorithm 1 as a state machine, on a closed-form world."""
+
+import threading
+import warnings
+
+import numpy as np
+import pytest
+
+from prior_reinforce.adapters.base import Adapter, Expectation
+from prior_reinforce.adapters.bayesian import BayesianAdapter
+from prior_reinforce.errors import (
+    ConfigurationError,
+    InvalidFeedbackError,
+    InvalidGoalError,
+    InvalidPlanError,
+    RobotLimitError,
+    TrialStateError,
+    WorkspaceError,
+)
+from prior_reinforce.generators.base import Generator
+from prior_reinforce.plans.motions import Demonstrations, PlanFormat
+from prior_reinforce.readings import Reading
+from prior_reinforce.session.session import Session, ask_all
+from prior_reinforce.session.trials import MemoryLog, Stage
+
+DEMOS = Demonstrations(
+    plans=np.arange(2 * 3 * 2, dtype=float).reshape(2, 3, 2),
+    outcomes_seen=[[0.8, -0.2], [1.0, 0.2]],
+    format=PlanFormat(("a", "b"), ("m", "m"), 0.1),
+)
+GOAL = np.array([0.9, 0.1])
+
+
+class RepeatingGenerator(Generator):
+    """Says the condition in every frame, and counts its calls."""
+
+    name = "repeating"
+
+    def __init__(self):
+        self.calls = 0
+
+    def _fit(self, demonstrations, seed, progress): ...
+
+    def _generate(self, conditions):
+        self.calls += 1
+        return np.repeat(conditions[:, None, :], 3, axis=1)
+
+
+class FullStepAdapter(Adapter):
+    """Subtracts the whole last error: solves a constant offset in two trials."""
+
+    def _start(self, demonstrations):
+        self.seen = []
+
+    def _propose(self, goal_seen):
+        if not self.seen:
+            return goal_seen.copy()
+        condition, outcome_seen = self.seen[-1]
+        return condition - (outcome_seen - goal_seen)
+
+    def _observe(self, condition, outcome_seen):
+        self.seen.append((condition.copy(), outcome_seen.copy()))
+
+
+@pytest.fixture
+def session():
+    return Session(RepeatingGenerator().fit(DEMOS, seed=0), FullStepAdapter(), DEMOS, GOAL, 0.015)
+
+
+def test_a_constant_offset_is_corrected_in_the_second_trial(session):
+    """World: outcome = condition + offset. Trial 1 misses by the offset, trial 2 hits."""
+    offset = np.array([0.05, -0.02])
+    for _ in range(2):
+        trial = session.ask()
+        session.tell(trial.number, trial.condition + offset - GOAL)
+    np.testing.assert_allclose(session.trials[0].condition, GOAL)
+    np.testing.assert_allclose(session.trials[1].condition, GOAL - offset)
+    assert session.solved
+    assert [trial.hit for trial in session.trials] == [False, True]
+    assert session.n_trials == 2
+
+
+def test_the_first_condition_is_m_of_the_goal_and_the_plan_is_pi_of_it(session):
+    trial = session.ask()
+    assert trial.number == 1
+    np.testing.assert_array_equal(trial.condition, GOAL)
+    np.testing.assert_array_equal(trial.plan, np.repeat(GOAL[None], 3, axis=0))
+
+
+def test_ask_is_idempotent_until_told(session):
+    first = session.ask()
+    assert session.ask() is first
+    assert session.generator.calls == 1
+    session.tell(1, [0.05, 0.0])
+    assert session.ask().number == 2
+
+
+def test_ask_is_idempotent_until_voided_and_a_void_trial_is_not_data(session):
+    session.ask()
+    session.void(1, "ball slipped")
+    second = session.ask()
+    assert second.number == 2
+    np.testing.assert_array_equal(second.condition, GOAL)
+    assert session.n_trials == 0
+    assert session.trials[0].note == "ball slipped"
+
+
+def test_hit_as_seen_overrides_the_judgement_by_error(session):
+    session.ask()
+    session.tell(1, [0.0, 0.0], hit=False)
+    assert not session.solved
+    session.ask()
+    session.tell(2, [0.05, 0.0], hit=True)
+    assert session.solved
+
+
+class Listening(FullStepAdapter):
+    """Keeps all that it hears."""
+
+    def _start(self, demonstrations):
+        super()._start(demonstrations)
+        self.heard = []
+
+    def _observe_reading(self, condition, goal, reading):
+        self.heard.append((goal, reading))
+        super()._observe_reading(condition, goal, reading)
+
+
+@pytest.fixture
+def listening():
+    return Session(RepeatingGenerator().fit(DEMOS, seed=0), Listening(), DEMOS, GOAL, 0.015)
+
+
+def test_words_and_readings_reach_the_adapter_as_they_were_said(listening):
+    for seen in ("5 cm long, 2 cm left", Reading.measured([0.05, 0.02], 0.001)):
+        listening.tell(listening.ask().number, seen)
+    listening.ask()
+    (_, by_eye), (_, measured) = listening.adapter.heard
+    np.testing.assert_allclose([by_eye.low, by_eye.high], [[0.035, 0.01], [0.075, 0.035]])
+    np.testing.assert_allclose(measured.sd, 0.001)
+    assert [trial.reading.said for trial in listening.trials[:2]] == ["5 cm long, 2 cm left", ""]
+
+
+def test_numbers_are_of_unknown_origin_to_two_thirds_of_the_tolerance(listening):
+    listening.tell(listening.ask().number, [0.0, -0.08])
+    np.testing.assert_allclose(listening.trials[0].reading.sd, [0.01, np.hypot(0.01, 0.02)])
+
+
+def test_a_hit_alone_is_a_reading_within_the_tolerance(listening):
+    listening.tell(listening.ask().number, hit=True)
+    listening.ask()
+    assert listening.solved
+    ((goal, reading),) = listening.adapter.heard
+    np.testing.assert_array_equal(goal, GOAL)
+    np.testing.assert_array_equal([reading.low, reading.high], [[-0.015] * 2, [0.015] * 2])
+
+
+def test_a_miss_alone_teaches_nobody_who_wants_numbers(session):
+    session.tell(session.ask().number, hit=False)
+    assert not session.solved
+    np.testing.assert_array_equal(session.ask().condition, GOAL)
+
+
+def test_misses_alone_make_the_default_adapter_try_beside_them():
+    seen = Demonstrations(
+        DEMOS.plans, DEMOS.outcomes_seen, DEMOS.format, outcome_noise=[[0.02] * 2] * 2
+    )
+    session = Session(RepeatingGenerator().fit(seen, seed=0), BayesianAdapter(), seen, GOAL, 0.015)
+    for _ in range(4):
+        session.tell(session.ask().number, hit=False)
+    tried = np.array([trial.condition for trial in session.trials])
+    np.testing.assert_allclose(tried[0], GOAL, atol=1e-9)
+    apart = np.linalg.norm(tried[:, None] - tried, axis=2)[np.triu_indices(4, 1)]
+    assert np.all((apart > 0.003) & (apart < 0.1))
+    p_hit = [trial.p_hit for trial in session.trials]
+    assert 0.0 < p_hit[3] < p_hit[0]
+
+
+def test_a_hit_that_is_seen_overrules_what_the_reading_knows(session):
+    session.tell(session.ask().number, Reading.by_eye([0.05, 0.0], hit=False), hit=True)
+    assert session.trials[0].reading.hit is True
+    assert session.solved
+
+
+def test_nothing_at_all_cannot_be_told(session):
+    session.ask()
+    with pytest.raises(InvalidFeedbackError, match="whether it hit"):
+        session.tell(1)
+    with pytest.raises(InvalidFeedbackError, match="3"):
+        session.tell(1, Reading.by_eye([0.05, 0.0, 0.0]))
+    with pytest.raises(InvalidFeedbackError, match="cannot read"):
+        session.tell(1, "far away")
+    assert session.open_trial is not None
+
+
+MIXED = Demonstrations(
+    np.random.default_rng(0).normal(size=(4, 3, 2)),
+    [[0.8, 1.0], [1.0, 3.0], [0.8, 3.0], [1.0, 1.0]],  # spreads 0.1 m and 1 s
+    PlanFormat(("x", "y"), ("rad", "rad"), 0.02),
+    ("x", "t"),
+    ("m", "s"),
+)
+
+
+def test_metres_and_seconds_are_measured_by_their_spreads():
+    generator = RepeatingGenerator().fit(MIXED, seed=0)
+    session = Session(generator, FullStepAdapter(), MIXED, [0.9, 2.0], 0.02)
+    session.tell(session.ask().number, [0.0, 0.21])  # as bad as 2.1 cm
+    session.tell(session.ask().number, [0.012, 0.15])  # 1.92 cm
+    assert [trial.hit for trial in session.trials] == [False, True]
+    np.testing.assert_allclose(session.goals[0].radius, [0.02, 0.2])
+    with pytest.raises(InvalidFeedbackError, match="words are for lengths"):
+        session.tell(session.ask().number, "5 cm long")
+
+
+def test_the_tolerance_itself_is_a_hit(session):
+    session.ask()
+    session.tell(1, [0.015, 0.0])
+    assert session.solved
+
+
+def test_amend_replaces_the_observation(session):
+    session.ask()
+    session.tell(1, [0.05, 0.0])
+    session.amend(1, [0.0, 0.04])
+    np.testing.assert_allclose(session.ask().condition, GOAL - [0.0, 0.04])
+
+
+def test_amend_leaves_a_pending_plan_as_it_is(session):
+    session.ask()
+    session.tell(1, [0.05, 0.0])
+    pending = session.ask()
+    session.amend(1, [0.0, 0.04])
+    again = session.ask()
+    assert (again.number, again.outdated, pending.outdated) == (2, True, False)
+    np.testing.assert_array_equal(again.plan, pending.plan)
+
+
+def test_voiding_a_told_trial_forgets_it(session):
+    for error in ([0.05, 0.0], [0.0, 0.03]):
+        session.tell(session.ask().number, error)
+    session.void(2, "misread")
+    np.testing.assert_allclose(session.ask().condition, GOAL - [0.05, 0.0])
+
+
+def test_a_session_goes_on_from_its_log(session):
+    session.tell(session.ask().number, [0.05, 0.0])
+    session.ask()
+    again = Session(
+        RepeatingGenerator().fit(DEMOS, seed=0), FullStepAdapter(), DEMOS, log=session.log
+    )
+    np.testing.assert_array_equal(again.goal, GOAL)
+    assert again.open_trial.number == session.open_trial.number == 2
+    again.tell(2, [0.01, 0.02])
+    assert session.ask().number == 3
+    np.testing.assert_array_equal(again.ask().condition, GOAL - [0.05, 0.0] - [0.01, 0.02])
+
+
+def test_two_sessions_on_one_log_tell_a_trial_once(session):
+    other = Session(
+        RepeatingGenerator().fit(DEMOS, seed=0), FullStepAdapter(), DEMOS, log=session.log
+    )
+    assert other.ask().number == session.ask().number == 1
+    other.tell(1, [0.05, 0.0])
+    with pytest.raises(TrialStateError, match="already told"):
+        session.tell(1, [0.0, 0.0])
+
+
+@pytest.mark.parametrize("carry_over", [False, True])
+def test_trials_of_earlier_goals_reach_the_adapter_where_they_are_carried_over(carry_over):
+    session = Session(
+        RepeatingGenerator().fit(DEMOS, seed=0),
+        FullStepAdapter(),
+        DEMOS,
+        [0.8, 0.0],
+        0.015,
+        carry_over=carry_over,
+    )
+    session.tell(session.ask().number, [0.05, 0.0])
+    session.set_goal(GOAL)
+    expected = [0.8, 0.0] - (np.array([0.85, 0.0]) - GOAL) if carry_over else GOAL
+    trial = session.ask()
+    np.testing.assert_allclose(trial.condition, expected)
+    assert (trial.number, trial.goal_number, session.n_trials) == (2, 2, 0)
+
+
+def test_trials_of_another_model_teach_nothing(session):
+    session.tell(session.ask().number, [0.05, 0.0])
+    other = Session(
+        RepeatingGenerator().fit(DEMOS, seed=0),
+        FullStepAdapter(),
+        DEMOS,
+        log=session.log,
+        in_use=lambda: ("another",),
+    )
+    np.testing.assert_array_equal(other.ask().condition, GOAL)
+
+
+class Carrying(FullStepAdapter):
+    """Wants earlier goals' trials, counts changes of hardware, and expects something."""
+
+    carries_over = True
+
+    def _start(self, demonstrations):
+        super()._start(demonstrations)
+        self.events = []
+
+    def change_hardware(self):
+        self.events.append("changed")
+
+    def _observe(self, condition, outcome_seen):
+        super()._observe(condition, outcome_seen)
+        self.events.append(round(outcome_seen[0], 2))
+
+    def _expect(self, condition, goal, tolerance):
+        return Expectation(0.25, 2.5)
+
+
+def carrying(log=None):
+    generator = RepeatingGenerator().fit(DEMOS, seed=0)
+    return Session(generator, Carrying(), DEMOS, None if log else [0.8, 0.0], 0.015, log=log)
+
+
+def test_trials_are_carried_over_where_they_serve_the_adapter():
+    session = carrying()
+    session.tell(session.ask().number, [0.05, 0.0])
+    session.set_goal(GOAL)
+    assert session.goals[-1].carry_over
+    session.ask()
+    assert session.adapter.events == [0.85]
+    session.void(2, "")
+    assert not session.set_goal(GOAL, carry_over=False).carry_over
+
+
+def test_the_adapter_hears_of_new_hardware_between_the_trials_before_and_after():
+    session = carrying()
+    session.tell(session.ask().number, [0.05, 0.0])
+    for note, error in (("another ball", 0.01), (None, 0.02), ("gripper", 0.03)):
+        session.set_goal([0.8, 0.0], new_hardware=note)
+        session.tell(session.ask().number, [error, 0.0], hit=False)
+    session.ask()
+    heard = [0.85, "changed", 0.81, 0.82, "changed", 0.83]
+    assert session.adapter.events == heard
+    assert [goal.new_hardware for goal in session.goals] == [None, "another ball", None, "gripper"]
+    again = carrying(session.log)
+    again.void(5, "")
+    again.ask()
+    assert again.adapter.events == heard
+    again.amend(2, [-0.05, 0.0])  # an earlier goal's
+    again.void(3, "misread")
+    again.tell(6, [0.0, 0.0])
+    again.ask()
+    assert again.adapter.events == [0.85, "changed", 0.75, "changed", 0.83, 0.8]
+
+
+def test_what_was_expected_is_kept_with_the_trial(session):
+    assert session.ask().p_hit is None
+    expecting = carrying()
+    trial = expecting.ask()
+    assert (trial.p_hit, trial.expected_trials) == (0.25, 2.5)
+    assert carrying(expecting.log).open_trial.p_hit == 0.25
+
+
+def test_a_goal_waits_for_the_open_trial(session):
+    session.ask()
+    with pytest.raises(TrialStateError, match="tell or void it"):
+        session.set_goal([0.8, 0.0])
+    session.void(1, "")
+    assert session.set_goal([0.8, 0.0], 0.02).tolerance == 0.02
+
+
+class Gate:
+    """Refuses plans that go beyond a limit, which may change."""
+
+    limit = 10.0
+
+    def __call__(self, plan):
+        self.largest = float(np.abs(plan).max())
+        return self
+
+    def require(self):
+        if self.largest > self.limit:
+            raise RobotLimitError(f"{self.largest} is beyond {self.limit}")
+
+    def as_json(self):
+        return {"largest": self.largest}
+
+
+def test_a_refused_plan_never_leaves_whenever_it_is_asked_for():
+    gate = Gate()
+    session = Session(
+        RepeatingGenerator().fit(DEMOS, seed=0), FullStepAdapter(), DEMOS, GOAL, 0.015, gate=gate
+    )
+    gate.limit = 0.5
+    with pytest.raises(RobotLimitError, match=r"no plan for the goal \[0\.9, 0\.1\]: 0\.9 is"):
+        session.ask()
+    assert session.trials == ()
+    gate.limit = 10.0
+    assert session.ask().kept["gate"] == {"largest": 0.9}
+    gate.limit = 0.5
+    with pytest.raises(RobotLimitError, match="void it and ask again"):
+        session.ask()
+    session.void(1, "refused")
+
+
+class Beside(FullStepAdapter):
+    def _propose(self, goal_seen):
+        return goal_seen + np.array([0.01, 0.0])
+
+
+def test_a_refusal_names_the_goal_what_was_asked_for_and_that_it_is_too_far():
+    gate = Gate()
+    gate.limit = 0.5
+    with pytest.warns(UserWarning, match="outside"):
+        session = Session(
+            RepeatingGenerator().fit(DEMOS, seed=0), Beside(), DEMOS, [2.0, 0.1], 0.015, gate=gate
+        )
+    with pytest.raises(RobotLimitError) as refused:
+        session.ask()
+    assert str(refused.value).startswith(
+        "no plan for the goal [2.0, 0.1], asked of the generator as [2.01, 0.1], which lies far "
+        "outside the demonstrations (choose one nearer to them): "
+    )
+
+
+def test_a_goal_is_not_spoken_of_while_a_trial_waits(session):
+    session.ask()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        with pytest.raises(TrialStateError, match="trial 1 waits to be told"):
+            session.set_goal([2.0, 0.1])
+
+
+def test_a_plan_is_executed_once_and_what_was_cut_off_is_for_a_person_to_say(session):
+    session.ask()
+    session.begin_execution(1, "arm {plan}")
+    with pytest.raises(TrialStateError, match="did the arm move"):
+        session.ask()
+    assert session.ask(arm_did_not_move=True).stage is Stage.ASKED
+    session.begin_execution(1, "arm {plan}")
+    assert session.end_execution(1, {"exit_status": 0}).stage is Stage.EXECUTED
+    with pytest.raises(TrialStateError, match="a plan runs once"):
+        session.begin_execution(1, "arm {plan}")
+    assert session.tell(1, [0.0, 0.0]).hit
+
+
+def test_told_while_it_executes_it_stays_told(session):
+    session.ask()
+    session.begin_execution(1, "arm {plan}")
+    session.tell(1, [0.05, 0.0])
+    assert session.end_execution(1, {"exit_status": 0}).stage is Stage.TOLD
+
+
+@pytest.mark.parametrize("hit", ["no", 1, [True]])
+def test_a_hit_is_yes_or_no(session, hit):
+    session.ask()
+    with pytest.raises(InvalidFeedbackError, match="hit must be"):
+        session.tell(1, [0.0, 0.0], hit=hit)
+    assert session.tell(1, [0.5, 0.0], hit=np.True_).hit is True
+
+
+@pytest.mark.parametrize("error", [[0.1], [np.nan, 0.0], [0.1, np.inf], "x", [[1], [1, 2]]])
+def test_bad_feedback_changes_nothing(session, error):
+    trial = session.ask()
+    with pytest.raises(InvalidFeedbackError):
+        session.tell(1, error)
+    assert session.open_trial is trial
+    assert session.n_trials == 0
+
+
+def test_wrong_numbers_and_states_are_named_and_change_nothing(session):
+    with pytest.raises(TrialStateError, match="ask for one first"):
+        session.tell(1, [0.0, 0.0])
+    session.ask()
+    for call in (session.tell, session.amend):
+        with pytest.raises(TrialStateError, match="no trial 7"):
+            call(7, [0.0, 0.0])
+    with pytest.raises(TrialStateError, match="only a told trial"):
+        session.amend(1, [0.0, 0.0])
+    session.tell(1, [0.05, 0.0])
+    with pytest.raises(TrialStateError, match="already told"):
+        session.tell(1, [0.0, 0.0])
+    session.void(1, "slipped")
+    with pytest.raises(TrialStateError, match="already voided"):
+        session.void(1, "again")
+    assert [trial.stage for trial in session.trials] == [Stage.VOIDED]
+
+
+@pytest.mark.parametrize("number", [1.0, "1", None, True, [1]])
+def test_a_number_that_is_no_whole_number_is_named(session, number):
+    trial = session.ask()
+    for call in (session.tell, session.amend, session.void):
+        with pytest.raises(TrialStateError, match="whole number"):
+            call(number, [0.05, 0.0])
+    assert session.trials == (trial,)
+    assert session.tell(np.int64(1), [0.05, 0.0]).number == 1
+
+
+@pytest.mark.parametrize("tolerance", [0.0, -1.0, np.nan, np.inf, "x", "0.01", None, True, [0.1]])
+def test_bad_tolerances_are_named(tolerance):
+    with pytest.raises(ConfigurationError, match="tolerance"):
+        Session(RepeatingGenerator().fit(DEMOS, seed=0), FullStepAdapter(), DEMOS, GOAL, tolerance)
+
+
+def test_a_goal_of_the_wrong_dimension_is_named():
+    with pytest.raises(InvalidGoalError, match="2 components"):
+        Session(RepeatingGenerator().fit(DEMOS, seed=0), FullStepAdapter(), DEMOS, [0.9], 0.01)
+
+
+def test_a_log_that_does_not_fit_together_is_refused(session):
+    session.tell(session.ask().number, [0.05, 0.0])
+    log = MemoryLog()
+    for event in reversed(session.log.events()):
+        log.append(event.kind, event.data)
+    with pytest.raises(WorkspaceError, match="does not fit the ones before"):
+        Session(RepeatingGenerator().fit(DEMOS, seed=0), FullStepAdapter(), DEMOS, log=log)
+
+
+def test_asking_many_sessions_calls_the_generator_once_and_agrees_with_asking_each():
+    generator = RepeatingGenerator().fit(DEMOS, seed=0)
+    goals = [[0.85, 0.0], [0.9, 0.1], [0.95, -0.1]]
+    sessions = [Session(generator, FullStepAdapter(), DEMOS, goal, 0.015) for goal in goals]
+    pending = sessions[1].ask()
+    trials = ask_all(sessions)
+    assert generator.calls == 2
+    assert trials[1] is pending
+    np.testing.assert_allclose([trial.condition for trial in trials], goals)
+
+
+def test_sessions_with_different_generators_cannot_be_asked_together():
+    sessions = [
+        Session(RepeatingGenerator().fit(DEMOS, seed=0), FullStepAdapter(), DEMOS, GOAL, 0.1)
+        for _ in "ab"
+    ]
+    with pytest.raises(ConfigurationError, match="share one generator"):
+        ask_all(sessions)
+
+
+def test_trials_cannot_be_changed_from_outside(session):
+    trial = session.ask()
+    with pytest.raises(ValueError, match="read-only"):
+        trial.plan[0, 0] = 1.0
+
+
+def test_a_session_cannot_be_asked_twice_at_once(session):
+    with pytest.raises(ConfigurationError, match="different ones"):
+        ask_all([session, session])
+    assert session.ask().number == 1
+
+
+class CallableAdapter(FullStepAdapter):
+    """As a network would be."""
+
+    def __call__(self, x):
+        raise AssertionError("is no function that loads an adapter")
+
+
+def test_a_member_that_can_be_called_is_not_called():
+    generator = RepeatingGenerator().fit(DEMOS, seed=0)
+    session = Session(generator, CallableAdapter(), DEMOS, GOAL, 0.015)
+    np.testing.assert_array_equal(session.ask().condition, GOAL)
+
+
+class Interrupted(FullStepAdapter):
+    """Stops once in the middle of observing."""
+
+    stops = True
+
+    def _observe(self, condition, outcome_seen):
+        super()._observe(condition, outcome_seen)
+        if self.stops:
+            self.stops = False
+            raise KeyboardInterrupt
+
+
+def test_what_an_interrupt_cut_off_is_observed_once():
+    generator = RepeatingGenerator().fit(DEMOS, seed=0)
+    session = Session(generator, Interrupted(), DEMOS, GOAL, 0.015)
+    session.tell(session.ask().number, [0.05, 0.0])
+    with pytest.raises(KeyboardInterrupt):
+        session.ask()
+    session.ask()
+    assert len(session.adapter.seen) == 1
+
+
+def test_absurd_errors_are_refused_before_anything_is_told(session):
+    number = session.ask().number
+    for error in ([1e308, 1e308], [2e6, 0.0]):
+        with pytest.raises(InvalidFeedbackError, match="absurd in any unit"):
+            session.tell(number, error)
+    assert session.trials[0].stage is Stage.ASKED
+    session.tell(number, [0.05, 0.0])
+
+
+def test_two_sessions_that_share_an_adapter_go_as_if_each_had_its_own(session):
+    adapter = FullStepAdapter()
+    generator = session.generator
+    shared = [Session(generator, adapter, DEMOS, GOAL, 0.015) for _ in range(2)]
+    alone = [Session(generator, FullStepAdapter(), DEMOS, GOAL, 0.015) for _ in range(2)]
+    errors = np.array([[[0.05, -0.02], [0.01, 0.03]], [[-0.04, 0.0], [0.02, 0.02]]])
+    for error in (*errors, np.zeros((2, 2))):
+        for sessions in (shared, alone):
+            for each, seen in zip(sessions, error, strict=True):
+                each.tell(each.ask().number, seen)
+    for ours, theirs in zip(shared, alone, strict=True):
+        for trial, expected in zip(ours.trials, theirs.trials, strict=True):
+            np.testing.assert_array_equal(trial.condition, expected.condition)
+
+
+class BrokenGenerator(RepeatingGenerator):
+    """As a network whose weights were lost."""
+
+    def generate(self, conditions):
+        return super().generate(conditions) * np.nan
+
+
+def test_a_plan_that_holds_no_numbers_is_never_given_out():
+    generator = BrokenGenerator().fit(DEMOS, seed=0)
+    session = Session(generator, FullStepAdapter(), DEMOS, GOAL, 0.015)
+    with pytest.raises(InvalidPlanError, match="hold no numbers"):
+        session.ask()
+    assert not session.trials
+
+
+def test_threads_may_share_a_session(session):
+    """Each tells what it asked for; of each trial one telling counts, and none is lost."""
+    told, problems = [], []
+
+    def work():
+        for _ in range(25):
+            try:
+                trial = session.ask()
+                session.tell(trial.number, [0.05, 0.0])
+                told.append(trial.number)
+            except TrialStateError:
+                pass  # another was quicker
+            except Exception as error:
+                problems.append(error)
+
+    threads = [threading.Thread(target=work) for _ in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not problems
+    assert sorted(told) == list(range(1, len(told) + 1))
+    assert session.n_trials == len(told)
