@@ -11,7 +11,8 @@ export MUJOCO_GL ?= egl
 demo: $(VENV)/.core
 	$(BIN)/prior-reinforce demo --out runs/demo $(ARGS)
 
-# What a user needs; `. .venv/bin/activate` then has `prior-reinforce`.
+# What `demo` needs; `. .venv/bin/activate` then has `prior-reinforce`. The computer beside the arm
+# needs less: `pip install .` brings neither torch nor MuJoCo.
 install: $(VENV)/.core
 
 # Three processes share the tests, the longest first: a third of the time of some is waiting.
@@ -39,19 +40,19 @@ reproduce: $(VENV)/.all
 docs: $(VENV)/.docs
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet $(ARGS)
 
-# The exact versions of constraints.txt. `.core` is what a user needs; `.all` adds every extra.
+# The exact versions of constraints.txt. `.core` is what `demo` needs; `.all` adds every extra.
 $(VENV)/.core: pyproject.toml constraints.txt
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt torch==2.13.0
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e .
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[diffusion,lab]'
 	touch $@
 
 $(VENV)/.all: $(VENV)/.core
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev,baselines,vlm,lerobot,hdf5,ros,zarr,excel,urdf,ray]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[diffusion,lab,dev,baselines,vlm,lerobot,hdf5,ros,zarr,excel,urdf,ray]'
 	touch $@
 
 $(VENV)/.docs: $(VENV)/.core
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[docs]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[diffusion,lab,docs]'
 	touch $@
 
 clean:

@@ -16,4 +16,12 @@ def __getattr__(name: str) -> object:
         from importlib.metadata import version
 
         return version("prior-reinforce")
-    return _member(name)
+    try:
+        return _member(name)
+    except ImportError as error:
+        from prior_reinforce.extras import missing_extra
+
+        missing = missing_extra(error)
+        if missing is None:
+            raise
+        raise missing from error

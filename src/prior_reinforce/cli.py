@@ -22,6 +22,7 @@ from typing import Protocol
 import tyro
 
 from prior_reinforce.errors import ConfigurationError, PriorReinforceError
+from prior_reinforce.extras import missing_extra
 from prior_reinforce.wording import plain
 
 
@@ -85,6 +86,11 @@ def main(args: Sequence[str] | None = None) -> int:
         return _NOBODY_READS
     except PriorReinforceError as error:
         return _refuse(str(error), error)
+    except ImportError as error:
+        missing = missing_extra(error)
+        if missing is None:
+            raise
+        return _refuse(str(missing), error)
     except OSError as error:
         where = f"{error.filename}: " if error.filename is not None else ""
         what = f"{where}{error.strerror or error}"

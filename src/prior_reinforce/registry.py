@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import Any, Generic, TypeVar, cast
 
 from prior_reinforce.errors import ConfigurationError
+from prior_reinforce.extras import missing_extra
 
 T = TypeVar("T")
 
@@ -103,6 +104,7 @@ class Registry(Generic[T]):
 
         Raises:
             ConfigurationError: It is unknown, cannot be imported, or is of another family.
+            MissingExtraError: It needs a library of an extra that is not installed.
         """
         name, _ = parse_choice(choice)
         member = self.members.get(name)
@@ -221,6 +223,9 @@ def _resolve(target: str) -> Any:
     except AttributeError as error:
         raise ConfigurationError(f"cannot find {target}: {error}; check its spelling") from error
     except (ImportError, ValueError) as error:
+        missing = missing_extra(error) if isinstance(error, ImportError) else None
+        if missing is not None:
+            raise missing from error
         raise ConfigurationError(
             f"cannot import {target}: {error}; it must be importable from here (PYTHONPATH)"
         ) from error

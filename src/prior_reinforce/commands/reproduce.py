@@ -20,6 +20,7 @@ from rich.text import Text
 
 from prior_reinforce.commands.live import say
 from prior_reinforce.errors import ConfigurationError, UnitFailedError
+from prior_reinforce.extras import check_installed
 from prior_reinforce.files import claim_folder, write
 from prior_reinforce.generators import make_generator
 from prior_reinforce.lab.experiments.evidence import claims_table, write_evidence
@@ -69,6 +70,7 @@ class Reproduce:
 
     def run(self) -> None:
         """Run, save, print, and write the page of evidence."""
+        check_installed("mujoco")
         recipes = self._recipes()
         included = {recipe.name: self._joining(recipe) for recipe in recipes}
         self._check()

@@ -19,6 +19,7 @@ from typing_extensions import Self
 
 from prior_reinforce.arrays import Plans, Points
 from prior_reinforce.errors import ConfigurationError
+from prior_reinforce.extras import check_installed
 from prior_reinforce.files import sha256
 from prior_reinforce.generators.base import ConditionScale, Generator, Report
 from prior_reinforce.generators.config import UNetConfig
@@ -76,7 +77,9 @@ class NetworkGenerator(Generator):
 
         Raises:
             ConfigurationError: A device that is not there, or no thread.
+            MissingExtraError: The extra [diffusion] is not installed.
         """
+        check_installed("torch")
         if threads < 1:
             raise ConfigurationError(f"threads must be at least 1, got {threads}")
         self.config = config or self.config_type()

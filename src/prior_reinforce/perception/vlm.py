@@ -9,7 +9,7 @@ ours, because models return no labels with their boxes, refuse, ramble and now a
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from jaxtyping import Float
@@ -19,7 +19,6 @@ from prior_reinforce.environment import KeyFrame, Picture, Rollout, SeenObject, 
 from prior_reinforce.errors import ConfigurationError, EndpointError, PerceptionFailedError
 from prior_reinforce.perception.base import Perception
 from prior_reinforce.perception.calibration import TableCalibration
-from prior_reinforce.perception.camera import Camera
 from prior_reinforce.perception.vlm_client import (
     ModelClient,
     OpenAIClient,
@@ -36,6 +35,9 @@ from prior_reinforce.perception.vlm_formats import (
 )
 from prior_reinforce.perception.vlm_reading import Answer, PictureReading, Sighting
 from prior_reinforce.readings import Reading
+
+if TYPE_CHECKING:
+    from prior_reinforce.perception.camera import Camera
 
 CAMERA_SD = 0.003
 """Standard deviation of each component of an error that is read from a picture, in [m] (ours):
@@ -83,7 +85,7 @@ class VisionLanguageModel(Perception):
         self.scene = scene
         self.config = config or VisionLanguageModelConfig()
         self.last_reading: PictureReading | None = None
-        self._camera = camera or Camera()
+        self._camera = camera
         self._client = client or OpenAIClient(self.config)
         self._calibration = calibration
         self._scene_model: object = None
@@ -110,8 +112,8 @@ class VisionLanguageModel(Perception):
                 "this trial left no key frame to draw; pass the camera's picture to `read`, or "
                 "ask the operator for the error"
             )
-        self._calibrate_in(rollout.key_frame)
-        reading = self.read(self._camera.picture(rollout.key_frame, goal))
+        camera = self._calibrated_in(rollout.key_frame)
+        reading = self.read(camera.picture(rollout.key_frame, goal))
         if reading.error_seen is None:
             kind = EndpointError if reading.unanswered else PerceptionFailedError
             raise kind(f"{reading.problem}; ask the operator for the error")
@@ -150,16 +152,20 @@ class VisionLanguageModel(Perception):
     def close(self) -> None:
         """Close the connections and free the camera."""
         self._client.close()
-        self._camera.close()
+        if self._camera is not None:
+            self._camera.close()
 
-    def _calibrate_in(self, key_frame: KeyFrame) -> None:
-        """Calibrate on a simulated scene's marks, once a scene, unless a calibration was given."""
+    def _calibrated_in(self, key_frame: KeyFrame) -> Camera:
+        """The camera, calibrated once a scene on its marks unless a calibration was given."""
+        from prior_reinforce.perception.camera import Camera  # photographs need no simulator
+
+        camera = self._camera = self._camera or Camera()
         given = self._calibration is not None and self._scene_model is None
-        if given or self._scene_model is key_frame.model:
-            return
-        marks, height = np.array(self.scene.marks), self.scene.plane_height
-        self._calibration = self._camera.calibrate(key_frame.model, marks, height=height)
-        self._scene_model = key_frame.model
+        if not given and self._scene_model is not key_frame.model:
+            marks, height = np.array(self.scene.marks), self.scene.plane_height
+            self._calibration = camera.calibrate(key_frame.model, marks, height=height)
+            self._scene_model = key_frame.model
+        return camera
 
     def _find(
         self,

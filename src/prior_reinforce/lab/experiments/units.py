@@ -19,8 +19,6 @@ from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
-from threadpoolctl import threadpool_limits
-
 from prior_reinforce.errors import UnitFailedError
 from prior_reinforce.files import sweep, write
 from prior_reinforce.lab.experiments.cluster import run_on_ray
@@ -181,7 +179,8 @@ def _outcomes(units: Sequence[Unit], folder: Path, workers: Workers) -> Iterator
 def _run(folder: Path, unit: Unit) -> _Outcome:
     """Run a unit and keep its result; or keep how it failed."""
     # Loads torch before any unit can: joblib would take it for a memory leak, and stop the worker.
-    from prior_reinforce.generators.threads import torch_threads
+    from prior_reinforce.generators.threads import torch_threads  # isort: skip
+    from threadpoolctl import threadpool_limits
 
     sweep(folder / "units")
     sweep(folder / "models")

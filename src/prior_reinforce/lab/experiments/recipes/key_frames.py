@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import mujoco
 import numpy as np
 from jaxtyping import Float, UInt8
 from matplotlib.axes import Axes
@@ -15,9 +14,13 @@ from matplotlib.patches import FancyArrowPatch, Rectangle
 from prior_reinforce.environment import KeyFrame, TableScene, Task
 from prior_reinforce.lab.tasks import make_task
 from prior_reinforce.perception.calibration import TableCalibration
-from prior_reinforce.perception.camera import Camera, CameraConfig
 from prior_reinforce.report.style import GOAL, HIT, INK, drawing, new_figure, save_png
 from prior_reinforce.wording import to_words
+
+if TYPE_CHECKING:
+    import mujoco
+
+    from prior_reinforce.perception.camera import Camera
 
 Row = Mapping[str, Any]
 """A goal: `task`, `goal`, `demonstrated` and its `trials`, each with `error_seen`, `outcome`, `hit`
@@ -49,6 +52,8 @@ def draw_process(rows: Mapping[str, Row], path: Path) -> Path:
     Raises:
         RenderingUnavailableError: There is no OpenGL on this machine.
     """
+    from prior_reinforce.perception.camera import Camera, CameraConfig
+
     n_columns = 1 + max(min(len(row["trials"]), _MOST_TRIALS) for row in rows.values())
     figure = new_figure(_INCHES * n_columns, (_INCHES + 0.42) * len(rows))
     grid = figure.subplots(len(rows), n_columns, squeeze=False)
