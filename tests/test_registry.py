@@ -8,7 +8,7 @@ import pytest
 
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.generators import make_generator
-from prior_reinforce.generators.diffusion import DiffusionConfig
+from prior_reinforce.generators.config import DiffusionConfig
 from prior_reinforce.registry import Member, Registry, build, parse_choice, source_digest
 
 

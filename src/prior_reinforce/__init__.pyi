@@ -40,9 +40,10 @@ from .generators import make_generator as make_generator
 from .generators.auto import Auto as Auto
 from .generators.base import FitProgress as FitProgress
 from .generators.base import Generator as Generator
+from .generators.config import DiffusionConfig as DiffusionConfig
+from .generators.config import UNetRegressionConfig as UNetRegressionConfig
 from .generators.config import UNetSize as UNetSize
 from .generators.corrected import Corrected as Corrected
-from .generators.diffusion import DiffusionConfig as DiffusionConfig
 from .generators.diffusion import DiffusionGenerator as DiffusionGenerator
 from .generators.dmp import DynamicMovementPrimitives as DynamicMovementPrimitives
 from .generators.dmp import DynamicMovementPrimitivesConfig as DynamicMovementPrimitivesConfig
@@ -51,7 +52,6 @@ from .generators.interpolation import NearestNeighboursConfig as NearestNeighbou
 from .generators.interpolation import SmoothInterpolation as SmoothInterpolation
 from .generators.interpolation import SmoothInterpolationConfig as SmoothInterpolationConfig
 from .generators.regression import UNetRegression as UNetRegression
-from .generators.regression import UNetRegressionConfig as UNetRegressionConfig
 from .generators.timed import Timed as Timed
 from .lab.experiments.learned import load_learned as load_learned
 from .lab.experiments.protocol import GoalTrials as GoalTrials

@@ -5,9 +5,7 @@ from dataclasses import asdict
 import pytest
 
 from prior_reinforce.errors import ConfigurationError
-from prior_reinforce.generators.config import UNetSize
-from prior_reinforce.generators.diffusion import DiffusionConfig
-from prior_reinforce.generators.regression import UNetRegressionConfig
+from prior_reinforce.generators.config import DiffusionConfig, UNetRegressionConfig, UNetSize
 from prior_reinforce.registry import build
 
 

@@ -7,9 +7,9 @@ import pytest
 
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.generators import make_generator
-from prior_reinforce.generators.config import UNetSize
+from prior_reinforce.generators.config import DiffusionConfig, UNetSize
 from prior_reinforce.generators.corrected import Corrected
-from prior_reinforce.generators.diffusion import DiffusionConfig, DiffusionGenerator
+from prior_reinforce.generators.diffusion import DiffusionGenerator
 from prior_reinforce.generators.timed import Timed
 from prior_reinforce.plans.motions import Demonstrations
 

@@ -9,9 +9,9 @@ import torch
 
 from prior_reinforce.errors import ConfigurationError, FileFormatError
 from prior_reinforce.generators import load_generator, training
-from prior_reinforce.generators.config import UNetSize
-from prior_reinforce.generators.diffusion import DiffusionConfig, DiffusionGenerator
-from prior_reinforce.generators.regression import UNetRegression, UNetRegressionConfig
+from prior_reinforce.generators.config import DiffusionConfig, UNetRegressionConfig, UNetSize
+from prior_reinforce.generators.diffusion import DiffusionGenerator
+from prior_reinforce.generators.regression import UNetRegression
 from prior_reinforce.generators.unet import ConditionalUNet
 
 TINY = UNetSize(widths=(8, 16), groups=2, step_width=8, condition_width=16)
@@ -65,14 +65,14 @@ def test_another_seed_draws_other_initial_weights(make, throws):
 
 @each
 def test_weights_of_another_network_are_a_damaged_model(make, throws):
-    saved = make().fit(throws(2, 20), seed=0).pack()
-    state = copy.deepcopy(saved.settings["state"])
-    state["config"]["network"]["widths"] = (8, 32)
+    (layer,) = make().fit(throws(2, 20), seed=0).pack()
+    settings = copy.deepcopy(layer.settings)
+    settings["config"]["network"]["widths"] = (8, 32)
     with pytest.raises(FileFormatError, match="learn it again"):
-        make().unpack(replace(saved, settings={**saved.settings, "state": state}))
-    fewer = {k: v for k, v in saved.tensors.items() if not k.endswith("head.1.bias")}
+        make().unpack_layer(replace(layer, settings=settings))
+    fewer = {k: v for k, v in layer.tensors.items() if not k.endswith("head.1.bias")}
     with pytest.raises(FileFormatError, match="learn it again"):
-        make().unpack(replace(saved, tensors=fewer))
+        make().unpack_layer(replace(layer, tensors=fewer))
 
 
 @each

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from prior_reinforce.generators.config import UNetSize
-from prior_reinforce.generators.regression import UNetRegression, UNetRegressionConfig
+from prior_reinforce.generators.config import UNetRegressionConfig, UNetSize
+from prior_reinforce.generators.regression import UNetRegression
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 
 SMALL = UNetRegressionConfig(

@@ -4,34 +4,44 @@ import json
 
 import numpy as np
 import pytest
+from safetensors.numpy import save
 
 from prior_reinforce.errors import FileFormatError
-from prior_reinforce.generators import load_generator
+from prior_reinforce.files import sha256
+from prior_reinforce.generators import NearestNeighbours, load_generator
 from prior_reinforce.generators.saving import (
     CONFIG_FILE,
     TENSOR_FILE,
-    SavedModel,
+    SavedLayer,
     read_model,
     write_model,
 )
 
-TENSORS = {"a": np.arange(6, dtype=np.float32).reshape(2, 3), "b": np.array([np.pi])}
-SETTINGS = {"gain": 0.1, "widths": [1, 2], "name": "x"}
+LAYERS = (
+    SavedLayer("outer", 2, ("a remark",), {"gain": 0.1}, {"a.b": np.array([np.pi])}),
+    SavedLayer("nothing", 2, (), {}),
+    SavedLayer("inner", 2, (), {"widths": [1, 2]}, {"a": np.ones((2, 3), np.float32)}),
+)
 
 
 @pytest.fixture
 def folder(tmp_path):
-    write_model(tmp_path / "model", SavedModel("some kind", SETTINGS, TENSORS))
+    write_model(tmp_path / "model", LAYERS)
     return tmp_path / "model"
 
 
+def without_tensors(layers):
+    return [(each.name, each.outcome_dim, each.remarks, each.settings) for each in layers]
+
+
 def test_what_is_written_is_read(folder):
-    saved = read_model(folder, expected="some kind")
-    assert saved.settings == SETTINGS
-    assert saved.tensors.keys() == TENSORS.keys()
-    for name, array in TENSORS.items():
-        np.testing.assert_array_equal(saved.tensors[name], array)
-        assert saved.tensors[name].dtype == array.dtype
+    read = read_model(folder)
+    assert without_tensors(read) == without_tensors(LAYERS)
+    for ours, theirs in zip(read, LAYERS, strict=True):
+        assert ours.tensors.keys() == theirs.tensors.keys()
+        for name, array in theirs.tensors.items():
+            np.testing.assert_array_equal(ours.tensors[name], array)
+            assert ours.tensors[name].dtype == array.dtype
     assert sorted(path.name for path in folder.iterdir()) == [CONFIG_FILE, TENSOR_FILE]
 
 
@@ -67,7 +77,7 @@ def test_every_flipped_bit_is_noticed_or_harmless(folder, name):
             continue
         # A flip in the white space between two words of JSON can leave white space.
         assert name == CONFIG_FILE
-        assert saved.settings == intact.settings
+        assert without_tensors(saved) == without_tensors(intact)
 
 
 def test_another_kind_of_file_is_refused(folder):
@@ -76,9 +86,57 @@ def test_another_kind_of_file_is_refused(folder):
         read_model(folder)
 
 
+def crafted(folder, layers=None, tensors=None):
+    """Change a model as somebody would who knows how its checksums are made."""
+    config, weights = folder / CONFIG_FILE, folder / TENSOR_FILE
+    content = json.loads(config.read_text())
+    if layers is not None:
+        content["layers"] = layers
+    if tensors is not None:
+        weights.write_bytes(save(tensors))
+        content["tensors_sha256"] = sha256(weights.read_bytes())
+    del content["config_sha256"]
+    digest = sha256(json.dumps(content, sort_keys=True).encode())
+    config.write_text(json.dumps({**content, "config_sha256": digest}))
+
+
+LAYER = {"name": "nearest", "outcome_dim": 2, "remarks": [], "settings": {}}
+
+
+@pytest.mark.parametrize(
+    "layers",
+    [
+        [],
+        {},
+        [1],
+        [{**LAYER, "outcome_dim": 0}],
+        [{**LAYER, "settings": None}],
+        [{"name": "nearest"}],
+    ],
+)
+def test_a_stack_of_another_form_is_refused(folder, layers):
+    crafted(folder, layers)
+    with pytest.raises(FileFormatError, match=CONFIG_FILE):
+        read_model(folder)
+
+
+@pytest.mark.parametrize("key", ["3.a", "-9.a", "a", "", "0x1.a", "1e0.a"])
+def test_a_tensor_of_no_layer_is_refused(folder, key):
+    crafted(folder, tensors={key: np.zeros(2)})
+    with pytest.raises(FileFormatError, match=TENSOR_FILE):
+        read_model(folder)
+
+
+@pytest.mark.parametrize("names", [["nearest", "nearest"], ["timed"], ["timed"] * 5000, ["auto"]])
+def test_a_stack_that_nobody_wrapped_is_refused(folder, names):
+    crafted(folder, [{**LAYER, "name": name} for name in names], tensors={})
+    with pytest.raises(FileFormatError):
+        load_generator(folder)
+
+
 def test_another_generator_is_refused(folder):
-    with pytest.raises(FileFormatError, match="load_generator"):
-        read_model(folder, expected="diffusion")
+    with pytest.raises(FileFormatError, match=r"outer generator, not nearest.*load_generator"):
+        NearestNeighbours.load(folder)
     with pytest.raises(FileFormatError, match="known here"):
         load_generator(folder)
 

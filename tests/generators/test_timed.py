@@ -7,8 +7,8 @@ import pytest
 
 from prior_reinforce.errors import ConfigurationError, FileFormatError
 from prior_reinforce.generators import load_generator, make_generator
-from prior_reinforce.generators.config import UNetSize
-from prior_reinforce.generators.diffusion import DiffusionConfig, DiffusionGenerator
+from prior_reinforce.generators.config import DiffusionConfig, UNetSize
+from prior_reinforce.generators.diffusion import DiffusionGenerator
 from prior_reinforce.generators.interpolation import NearestNeighbours, SmoothInterpolation
 from prior_reinforce.generators.timed import Timed
 from prior_reinforce.lab.tasks import make_task

@@ -8,6 +8,7 @@ from prior_reinforce.generators import GENERATORS, load_generator, make_generato
 from prior_reinforce.generators.corrected import Corrected
 from prior_reinforce.generators.interpolation import NearestNeighbours
 from prior_reinforce.generators.timed import Timed
+from prior_reinforce.generators.wrapping import Wrapper
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 
 
@@ -41,7 +42,37 @@ def test_a_generator_is_wrapped_once_in_each_way():
 
 
 def test_a_wrapper_without_a_generator_is_refused():
-    saved = Timed(NearestNeighbours(), "start").fit(demonstrations(), seed=0).pack()
-    del saved.settings["generator"]
-    with pytest.raises(FileFormatError, match="no generator within"):
-        Timed.wrapped(saved)
+    layer, _ = Timed(NearestNeighbours(), "start").fit(demonstrations(), seed=0).pack()
+    with pytest.raises(FileFormatError, match="around another"):
+        Timed.unpack_layer(layer)
+
+
+class Remarking(NearestNeighbours):
+    """Has something to say of every fit."""
+
+    name = "remarking"
+
+    def _fit(self, demonstrations, seed, progress):
+        super()._fit(demonstrations, seed, progress)
+        self.remarks = (f"{demonstrations.n} demonstrations",)
+
+
+class Plain(Wrapper):
+    """A wrapper that says nothing of remarks."""
+
+    name = "plain"
+
+    def _fit(self, demonstrations, seed, progress):
+        self.generator.fit(demonstrations, seed=seed, progress=progress)
+
+    def _generate(self, conditions):
+        return self.generator.generate(conditions)
+
+
+def test_remarks_of_what_is_wrapped_are_never_lost():
+    wrapped = Plain(Corrected(Remarking()))
+    for _ in range(2):
+        assert wrapped.fit(demonstrations(), seed=0).remarks == ("4 demonstrations",)
+    timed = Timed(wrapped, "auto").fit(demonstrations(), seed=0)
+    assert timed.remarks[0].startswith("timing")
+    assert timed.remarks[1:] == ("4 demonstrations",)

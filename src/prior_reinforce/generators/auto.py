@@ -16,8 +16,6 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, ClassVar
 
-from typing_extensions import Self
-
 from prior_reinforce.arrays import Plans, Points
 from prior_reinforce.errors import InvalidDemonstrationsError
 from prior_reinforce.generators.base import Generator, Report
@@ -85,7 +83,7 @@ class Auto(Wrapper):
                 "do not mix: " + "; ".join(_listed([i + 1 for i in group]) for group in groups)
             )
         self.generator.fit(learned, seed=seed, progress=progress)
-        self.remarks = (*remarks, *self.generator.remarks)
+        self.remarks = tuple(remarks)
 
     def _generate(self, conditions: Points) -> Plans:
         return self.generator.generate(conditions)
@@ -94,9 +92,8 @@ class Auto(Wrapper):
         """Nothing of its own; see `Generator.state`."""
         return {}, {}
 
-    @classmethod
-    def _around(cls, generator: Generator, settings: Mapping[str, Any], tensors: Tensors) -> Self:
-        return cls(generator)
+    def restore(self, settings: Mapping[str, Any], tensors: Tensors) -> None:
+        """Nothing to take up; see `Wrapper.restore`."""
 
 
 def _listed(numbers: list[int]) -> str:

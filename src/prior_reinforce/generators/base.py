@@ -19,7 +19,8 @@ from typing_extensions import Self
 
 from prior_reinforce.arrays import Plans, Points, as_conditions
 from prior_reinforce.errors import ConfigurationError, FileFormatError, NotFittedError
-from prior_reinforce.generators.saving import SavedModel, Tensors, read_model, write_model
+from prior_reinforce.generators.members import unpack
+from prior_reinforce.generators.saving import SavedLayer, Tensors, read_model, write_model
 from prior_reinforce.plans.motions import Demonstrations
 
 
@@ -93,11 +94,10 @@ class Generator(ABC):
         Raises:
             ConfigurationError: Its class has no `state`, or no `from_state`.
         """
-        kind = type(self)
-        base = Generator.from_state.__func__  # type: ignore[attr-defined]
-        if kind.state is Generator.state or kind.from_state.__func__ is base:  # type: ignore[attr-defined]
+        classes = type(self).__mro__[: type(self).__mro__.index(Generator)]
+        if not {"state", "from_state"} <= {name for each in classes for name in vars(each)}:
             raise ConfigurationError(
-                f"a {kind.__name__} cannot be saved; give the class state() and from_state()"
+                f"a {type(self).__name__} cannot be saved; give the class state() and from_state()"
             )
 
     def save(self, folder: str | os.PathLike[str]) -> None:
@@ -117,7 +117,13 @@ class Generator(ABC):
         Raises:
             FileFormatError: Files are missing, truncated, or of another generator.
         """
-        return cls.unpack(read_model(Path(folder), expected=cls.name))
+        outer, *inner = read_model(Path(folder))
+        if outer.name != cls.name:
+            raise FileFormatError(
+                f"{folder} holds a {outer.name} generator, not {cls.name}; load it with "
+                "load_generator"
+            )
+        return cls.unpack_layer(outer, unpack(inner) if inner else None)
 
     def to(self, device: str) -> Self:
         """Compute on another device from now on.
@@ -134,37 +140,34 @@ class Generator(ABC):
             )
         return self
 
-    def pack(self) -> SavedModel:
-        """Return all that was learned, as data.
+    def pack(self) -> list[SavedLayer]:
+        """Return all that was learned, as data; a wrapper first, then what it wraps.
 
         Raises:
             NotFittedError: Before `fit`.
         """
-        common = {"outcome_dim": self._fitted_to(), "remarks": list(self.remarks)}
-        settings, tensors = self.state()
-        return SavedModel(self.name, {**common, "state": settings}, tensors)
+        outcome_dim = self._fitted_to()
+        return [SavedLayer(self.name, outcome_dim, self.remarks, *self.state())]
 
     @classmethod
-    def unpack(cls, saved: SavedModel, **context: Any) -> Self:
-        """Rebuild a fitted generator from what `pack` gave.
+    def unpack_layer(cls, layer: SavedLayer, inner: Generator | None = None) -> Self:
+        """Rebuild a fitted generator from its layer of what `pack` gave.
 
         Args:
-            saved: All that was learned.
-            context: What its `from_state` takes beside that.
+            layer: What it learned.
+            inner: What it wraps, if it is a wrapper.
 
         Raises:
             FileFormatError: Something is missing, or does not fit.
         """
         try:
-            generator = cls.from_state(saved.settings["state"], saved.tensors, **context)
-            generator.remarks = tuple(map(str, saved.settings["remarks"]))
-            generator._outcome_dim = int(saved.settings["outcome_dim"])
-        except FileFormatError:
-            raise
+            around = () if inner is None else (inner,)
+            generator = cls.from_state(layer.settings, layer.tensors, *around)
         except Exception as error:  # whatever numbers and settings of another kind lead to
             raise FileFormatError(
                 f"this is no complete {cls.name} generator ({error!r}); learn it again"
             ) from error
+        generator.remarks, generator._outcome_dim = layer.remarks, layer.outcome_dim
         return generator
 
     @abstractmethod

@@ -1,30 +1,34 @@
-"""Any generator, made exact at its demonstrations.
+"""A closed-form spline, plus what a generator does between demonstrations.
 
-A network comes back to its demonstrations to a milliradian or two, which moves a landing point by
-centimetres. What it leaves there is known, so it is corrected in closed form: the residuals,
-interpolated over outcomes, are added to what is generated.
+A network misses its own demonstrations by a milliradian or two, which moves a landing point by
+centimetres. What it misses there is known, so a spline over outcomes (`SmoothInterpolation`) is
+fitted to it and added:
 
     A(c) = pi(c) + sum_i w_i(c) (A_i - pi(r_i))
+         = sum_i w_i(c) A_i + [pi(c) - sum_i w_i(c) pi(r_i)]
 
-Ours. Where outcomes are coarse, the residuals are smoothed instead of interpolated: two
-demonstrations of nearly one outcome must not make plans steep in the condition.
+Read the second line: at the demonstrations the plan is the spline's, whatever pi is, and between
+them pi adds its deviation from the spline through its own plans. The weights w reproduce affine
+functions, so whatever is affine in c cancels in the deviation. A corrected network that learned
+nothing is therefore as good as closed form; how good a network is shows without correction only.
+
+Ours. Where outcomes are coarse, the spline smooths instead of interpolating: two demonstrations of
+nearly one outcome must not make plans steep in the condition.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, ClassVar
-
-import numpy as np
-from typing_extensions import Self
 
 from prior_reinforce.arrays import Plans, Points
 from prior_reinforce.generators.base import Generator, Report
+from prior_reinforce.generators.interpolation import SmoothInterpolation
 from prior_reinforce.generators.saving import Tensors
 from prior_reinforce.generators.wrapping import Wrapper
 from prior_reinforce.plans.channels import kinds
 from prior_reinforce.plans.motions import Demonstrations
-from prior_reinforce.plans.outcome_weights import smooth_weights
 
 
 class Corrected(Wrapper):
@@ -34,41 +38,29 @@ class Corrected(Wrapper):
     """
 
     name: ClassVar[str] = "corrected"
-    _residuals: Plans
-    _outcomes: Points
-    _noise: Points
+
+    def __init__(self, generator: Generator) -> None:
+        """Wrap a generator; see `Wrapper`."""
+        super().__init__(generator)
+        self._residual = SmoothInterpolation()
 
     def _fit(self, demonstrations: Demonstrations, seed: int, progress: Report) -> None:
         self.generator.fit(demonstrations, seed=seed, progress=progress)
-        self.remarks = self.generator.remarks
-        self._outcomes = demonstrations.outcomes_seen.copy()
-        self._noise = demonstrations.outcome_noise.copy()
-        self._residuals = demonstrations.plans - self.generator.generate(self._outcomes)
+        missed = demonstrations.plans - self.generator.generate(demonstrations.outcomes_seen)
         # A switch has no values between its own: it is right, or at another frame.
-        found = kinds(demonstrations.plans, demonstrations.format.units)
-        self._residuals[:, :, [kind == "switch" for kind in found]] = 0.0
+        of_channel = kinds(demonstrations.plans, demonstrations.format.units)
+        missed[:, :, [kind == "switch" for kind in of_channel]] = 0.0
+        without_numbers = replace(demonstrations.format, per_plan=())  # which may not be constant
+        self._residual.fit(demonstrations.with_plans(missed, without_numbers), seed=seed)
 
     def _generate(self, conditions: Points) -> Plans:
-        weights = smooth_weights(self._outcomes, noise=self._noise)(conditions)
-        return self.generator.generate(conditions) + np.tensordot(weights, self._residuals, axes=1)
+        return self.generator.generate(conditions) + self._residual.generate(conditions)
 
     def state(self) -> tuple[dict[str, Any], Tensors]:
-        """The residuals; see `Generator.state`."""
-        return {}, {
-            "residuals": self._residuals,
-            "outcomes": self._outcomes,
-            "noise": self._noise,
-        }
+        """The spline; see `Generator.state`."""
+        return self._residual.state()
 
-    @classmethod
-    def _around(cls, generator: Generator, settings: Mapping[str, Any], tensors: Tensors) -> Self:
-        corrected = cls(generator)
-        corrected._residuals, corrected._outcomes = tensors["residuals"], tensors["outcomes"]
-        corrected._noise = tensors["noise"]
-        if (
-            corrected._residuals.ndim != 3
-            or len(corrected._residuals) != len(corrected._outcomes)
-            or corrected._noise.shape != corrected._outcomes.shape
-        ):
-            raise ValueError("residuals and outcomes do not fit")
-        return corrected
+    def restore(self, settings: Mapping[str, Any], tensors: Tensors) -> None:
+        """Take up the spline; see `Wrapper.restore`."""
+        self._residual = SmoothInterpolation.from_state(settings, tensors)
+        self._residual._outcome_dim = tensors["outcomes"].shape[1]

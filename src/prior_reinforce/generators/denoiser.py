@@ -19,7 +19,7 @@ from pathlib import Path
 from jaxtyping import Float, Int
 
 from prior_reinforce.generators.base import Report
-from prior_reinforce.generators.diffusion import DiffusionConfig
+from prior_reinforce.generators.config import DiffusionConfig
 from prior_reinforce.generators.noise_schedule import (
     NoiseSchedule,
     inference_steps,

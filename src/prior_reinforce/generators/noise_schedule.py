@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from jaxtyping import Float, Int
 from typing_extensions import assert_never
 
-from prior_reinforce.generators.diffusion import Prediction
+from prior_reinforce.generators.config import Prediction
 from prior_reinforce.generators.threads import torch
 
 # Nichol and Dhariwal 2021, "Improved Denoising Diffusion Probabilistic Models", section 3.2.

@@ -14,36 +14,17 @@ Notation:
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
 from prior_reinforce.generators.base import Report
-from prior_reinforce.generators.config import UNetConfig
+from prior_reinforce.generators.config import UNetRegressionConfig
 from prior_reinforce.generators.network import Learned, NetworkGenerator
-from prior_reinforce.settings import Count, NonNegative, Positive
 
 if TYPE_CHECKING:
     from torch import Tensor, nn
 
     from prior_reinforce.generators.unet import RegressionNetwork
-
-
-@dataclass(frozen=True)
-class UNetRegressionConfig(UNetConfig):
-    """Everything that decides what `UNetRegression` learns; docs/baselines.md tells what was tried.
-
-    Network and representation default to the diffusion generator's, so that the two differ in
-    nothing but diffusion.
-    """
-
-    training_steps: Count = 800
-    """Optimiser steps, each on all demonstrations."""
-    learning_rate: Positive = 3e-3
-    """Peak of the cosine schedule, which ends at 0."""
-    weight_decay: NonNegative = 2.0
-    """Of AdamW. Large, because a network that meets six demonstrations to a milliradian ripples
-    between them: with next to none the error at new goals was three times as large."""
 
 
 class UNetRegression(NetworkGenerator):

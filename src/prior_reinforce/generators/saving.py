@@ -1,113 +1,137 @@
-"""Models on disk: `config.json` says what it is, `model.safetensors` holds the numbers.
+"""Models on disk: `config.json` says what a model is, `model.safetensors` holds its numbers.
 
-Both are data; reading them runs no code. A SHA-256 of either file's content is kept in
-`config.json`, so that a damaged copy is an error rather than a slightly different throw.
+A model is a stack of layers, the outermost first: a generator, and what it wraps. Both files are
+data, and reading them runs no code. `config.json` holds a SHA-256 of either file's content, so that
+a damaged copy is an error rather than a slightly different throw.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
+import msgspec
 import numpy as np
 from jaxtyping import Shaped
 
 from prior_reinforce.errors import FileFormatError
 from prior_reinforce.files import sha256, write
 
-_FILE_FORMAT = "prior-reinforce generator"
-_FILE_VERSION = 4
-"""3: start times and alignment are a `timed` generator around another, no setting of its own."""
 CONFIG_FILE = "config.json"
 TENSOR_FILE = "model.safetensors"
 
 Tensors = Mapping[str, Shaped[np.ndarray, "..."]]
 
 
-@dataclass(frozen=True)
-class SavedModel:
-    """What the two files of a model folder say."""
+class _LayerConfig(msgspec.Struct):
+    name: str
+    outcome_dim: Annotated[int, msgspec.Meta(ge=1)]
+    remarks: tuple[str, ...]
+    settings: dict[str, Any]
 
-    generator: str
-    """`Generator.name` of what was saved."""
+
+class _Config(msgspec.Struct):
+    """What `config.json` holds, beside its own checksum."""
+
+    layers: Annotated[list[_LayerConfig], msgspec.Meta(min_length=1)]
+    tensors_sha256: str
+    file_format: Literal["prior-reinforce generator"] = "prior-reinforce generator"
+    version: Literal[5] = 5
+
+
+@dataclass(frozen=True)
+class SavedLayer:
+    """One generator of a stack, without what it wraps."""
+
+    name: str
+    """`Generator.name`."""
+    outcome_dim: int
+    """k."""
+    remarks: tuple[str, ...]
+    """`Generator.remarks`."""
     settings: Mapping[str, Any]
     """JSON types."""
-    tensors: Tensors
+    tensors: Tensors = field(default_factory=dict)
 
 
-def write_model(folder: Path, model: SavedModel) -> None:
-    """Write both files, `config.json` last; files of these names in the folder are replaced."""
+def write_model(folder: Path, layers: Sequence[SavedLayer]) -> None:
+    """Write both files, `config.json` last; files of these names in the folder are replaced.
+
+    Args:
+        folder: Made if need be.
+        layers: At least one, the outermost first.
+    """
     from safetensors.numpy import save
 
-    packed = save({name: np.ascontiguousarray(array) for name, array in model.tensors.items()})
-    content = {
-        "file_format": _FILE_FORMAT,
-        "version": _FILE_VERSION,
-        "generator": model.generator,
-        "settings": dict(model.settings),
-        "tensors_sha256": sha256(packed),
-    }
-    content["config_sha256"] = _digest(content)
+    packed = save(
+        {
+            f"{depth}.{name}": np.ascontiguousarray(array)
+            for depth, layer in enumerate(layers)
+            for name, array in layer.tensors.items()
+        }
+    )
+    described = [
+        _LayerConfig(layer.name, layer.outcome_dim, layer.remarks, dict(layer.settings))
+        for layer in layers
+    ]
+    content = msgspec.to_builtins(_Config(described, sha256(packed)))
     write(folder / TENSOR_FILE, packed)
+    content["config_sha256"] = _digest(content)
     write(folder / CONFIG_FILE, json.dumps(content, indent=2) + "\n")
 
 
-def read_model(folder: Path, expected: str | None = None) -> SavedModel:
+def read_model(folder: Path) -> tuple[SavedLayer, ...]:
     """Read what `write_model` wrote.
 
-    Args:
-        folder: Of the model.
-        expected: The `Generator.name` that it must be of; any when None.
+    Returns:
+        At least one layer, the outermost first.
 
     Raises:
-        FileFormatError: Files are missing, truncated, damaged, or of another generator.
+        FileFormatError: Files are missing, truncated or damaged.
     """
     from safetensors import SafetensorError
     from safetensors.numpy import load
 
-    content = _read_config(folder / CONFIG_FILE)
-    generator = content["generator"]
-    if expected is not None and generator != expected:
-        raise FileFormatError(
-            f"{folder} holds a {generator} generator, not {expected}; load it with load_generator"
-        )
+    config = _read_config(folder / CONFIG_FILE)
     packed = _read(folder / TENSOR_FILE)
-    if sha256(packed) != content["tensors_sha256"]:
+    if sha256(packed) != config.tensors_sha256:
         raise FileFormatError(
             f"{folder / TENSOR_FILE} is damaged or belongs to another model: its checksum is not "
             f"the one in {CONFIG_FILE}; copy the folder again, or learn the model again"
         )
+    tensors: list[dict[str, np.ndarray]] = [{} for _ in config.layers]
     try:
-        return SavedModel(generator, content["settings"], load(packed))
-    except SafetensorError as error:
+        for key, array in load(packed).items():
+            depth, _, name = key.partition(".")
+            tensors[int(depth)][name] = array
+    except (SafetensorError, ValueError, IndexError) as error:
         raise FileFormatError(
-            f"{folder / TENSOR_FILE} is not a safetensors file: {error}"
+            f"{folder / TENSOR_FILE} does not hold the tensors of this model: {error}"
         ) from error
+    return tuple(
+        SavedLayer(layer.name, layer.outcome_dim, layer.remarks, layer.settings, own)
+        for layer, own in zip(config.layers, tensors, strict=True)
+    )
 
 
-def _read_config(path: Path) -> dict[str, Any]:
+def _read_config(path: Path) -> _Config:
     try:
         content = json.loads(_read(path))
-        if content["file_format"] != _FILE_FORMAT or content["version"] != _FILE_VERSION:
-            raise ValueError(f"it says {content['file_format']!r} {content['version']!r}")
+        config = msgspec.convert(content, _Config)
         digest = content.pop("config_sha256")
-        for name, kind in (("generator", str), ("settings", dict), ("tensors_sha256", str)):
-            if not isinstance(content[name], kind):
-                raise TypeError(f"{name} is {content[name]!r:.40}")
-    except (ValueError, KeyError, TypeError, RecursionError) as error:
+    except (ValueError, KeyError, RecursionError) as error:
         raise FileFormatError(
-            f"{path} is not the {CONFIG_FILE} of a saved generator (version {_FILE_VERSION}): "
-            f"{error}; learn the model again"
+            f"{path} is not the {CONFIG_FILE} of a saved generator: {error}; learn the model again"
         ) from error
     if digest != _digest(content):
         raise FileFormatError(
             f"{path} was changed after it was saved, its checksum does not fit; copy the folder "
             "again, or learn the model again"
         )
-    return dict(content)
+    return config
 
 
 def _digest(content: Mapping[str, Any]) -> str:

@@ -22,7 +22,6 @@ from dataclasses import replace
 from typing import Any, ClassVar, Literal, get_args
 
 import numpy as np
-from typing_extensions import Self
 
 from prior_reinforce.arrays import Plans, Points
 from prior_reinforce.errors import ConfigurationError
@@ -72,7 +71,6 @@ class Timed(Wrapper):
             self._timeline = apart.timeline
             learned = _as_plans(apart, demonstrations)
         self.generator.fit(learned, seed=seed, progress=progress)
-        self.remarks = (*self.remarks, *self.generator.remarks)
 
     def _generate(self, conditions: Points) -> Plans:
         plans = self.generator.generate(conditions)
@@ -86,12 +84,11 @@ class Timed(Wrapper):
         timeline = None if self._timeline is None else self._timeline.settings()
         return {"timing": self.timing, "timeline": timeline}, {}
 
-    @classmethod
-    def _around(cls, generator: Generator, settings: Mapping[str, Any], tensors: Tensors) -> Self:
-        timed = cls(generator, settings["timing"])
+    def restore(self, settings: Mapping[str, Any], tensors: Tensors) -> None:
+        """Take up the common phase; see `Wrapper.restore`."""
+        self.timing = settings["timing"]
         if settings["timeline"] is not None:
-            timed._timeline = Timeline.restore(settings["timeline"])
-        return timed
+            self._timeline = Timeline.restore(settings["timeline"])
 
     def _apart(self, demonstrations: Demonstrations) -> Apart:
         if self.timing == "auto":

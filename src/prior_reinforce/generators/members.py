@@ -1,0 +1,162 @@
+"""All generators by name: choosing one, and loading a saved one.
+
+Classes are named, not imported: `Registry` resolves a name when it is used. So a generator can be
+loaded by its base class, and a list of names imports neither scipy nor torch.
+"""
+
+from __future__ import annotations
+
+import inspect
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, cast
+
+from prior_reinforce.errors import ConfigurationError, FileFormatError
+from prior_reinforce.generators.config import PAPER
+from prior_reinforce.generators.saving import SavedLayer, read_model
+from prior_reinforce.registry import Member, Registry, parse_choice
+
+if TYPE_CHECKING:
+    from prior_reinforce.generators.base import Generator
+
+_HERE = "prior_reinforce.generators"
+_BASE = f"{_HERE}.base:Generator"
+_TIMED_BY_DEFAULT = ("diffusion", "regression", "interpolation")
+_EXACT_BY_DEFAULT = ("diffusion", "regression", "dmp")
+
+
+class GeneratorRegistry(Registry["Generator"]):
+    """All generators; each can be chosen with `timing` and `exact`, which wrap it."""
+
+    @property
+    def help(self) -> str:
+        """The choices in one sentence, for help texts."""
+        return (
+            f"{super().help}; each but auto also with timing=start, tempo or warp (learn when and "
+            "how fast a motion runs apart from its shape), timing=auto (what the demonstrations "
+            "ask for), timing=align (align the demonstrations first) or timing=none, and with "
+            "exact=yes (demonstrations come back as recorded) or exact=no; default: timing=auto "
+            f"for {' and '.join(_TIMED_BY_DEFAULT)}, "
+            f"exact=yes for {' and '.join(_EXACT_BY_DEFAULT)}"
+        )
+
+    def make(self, choice: str, **context: Any) -> Generator:
+        """Make a generator; see `Registry.make`.
+
+        Args:
+            choice: `name` or `module:Class`, with settings if need be: `nearest,timing=align`.
+            context: `device`, `threads` and `states`, for those that take them.
+
+        Raises:
+            ConfigurationError: Also where `exact` is neither yes nor no, or another device is asked
+                for than the generator computes on.
+        """
+        name, settings = parse_choice(choice)
+        device = context.get("device", "cpu")
+        if device != "cpu" and "device" not in inspect.signature(self.kind(name)).parameters:
+            raise ConfigurationError(f"{name} computes on the CPU, not on device {device!r}")
+        if name == "auto" and settings.keys() & {"timing", "exact"}:
+            raise ConfigurationError(
+                "auto chooses its timing itself, and is exact; name the generator that is to have "
+                "another, for instance interpolation,timing=align"
+            )
+        timing = settings.pop("timing", "auto" if name in _TIMED_BY_DEFAULT else "none")
+        exact = settings.pop("exact", "yes" if name in _EXACT_BY_DEFAULT else "no")
+        if exact not in ("yes", "no"):
+            raise ConfigurationError(f"exact must be yes or no, got {exact!r}")
+        plain = ",".join([name, *(f"{key}={value}" for key, value in settings.items())])
+        generator = super().make(plain, **context)
+        if exact == "yes":
+            generator = WRAPPERS.wrap("corrected", generator)
+        return generator if timing == "none" else WRAPPERS.wrap("timed", generator, timing)
+
+    def name_of(self, made: Generator) -> str:
+        """Return the name of a generator's class, wrapped or not; `module:Class` for one's own."""
+        while getattr(made, "name", None) in WRAPPERS.members:
+            made = cast(Any, made).generator
+        return super().name_of(made)
+
+
+class _Wrappers(Registry["Generator"]):
+    """Generators around another one, by the names that saved models know them by."""
+
+    def wrap(self, name: str, generator: Generator, *settings: Any) -> Generator:
+        wrapper: Any = self.kind(name)
+        return cast("Generator", wrapper(generator, *settings))
+
+
+GENERATORS = GeneratorRegistry(
+    "generator",
+    _BASE,
+    {
+        "auto": Member(
+            f"{_HERE}.auto:Auto", "what the demonstrations ask for: closed form, or diffusion"
+        ),
+        "diffusion": Member(
+            f"{_HERE}.diffusion:DiffusionGenerator", "the paper's method, sized for a laptop"
+        ),
+        "diffusion-paper": Member(
+            f"{_HERE}.diffusion:DiffusionGenerator", "with the paper's settings", PAPER
+        ),
+        "regression": Member(f"{_HERE}.regression:UNetRegression", "the same network, supervised"),
+        "dmp": Member(f"{_HERE}.dmp:DynamicMovementPrimitives", "dynamic movement primitives"),
+        "nearest": Member(
+            f"{_HERE}.interpolation:NearestNeighbours", "nearest demonstrations, mixed"
+        ),
+        "interpolation": Member(
+            f"{_HERE}.interpolation:SmoothInterpolation", "all demonstrations, mixed by a spline"
+        ),
+    },
+)
+WRAPPERS = _Wrappers(
+    "wrapper",
+    _BASE,
+    {
+        "timed": Member(f"{_HERE}.timed:Timed", "timing apart from shape"),
+        "corrected": Member(f"{_HERE}.corrected:Corrected", "exact at the demonstrations"),
+    },
+)
+make_generator = GENERATORS.make
+
+
+def load_generator(
+    folder: str | os.PathLike[str], *, own: str | None = None, device: str = "cpu"
+) -> Generator:
+    """Read a saved generator of any kind.
+
+    Args:
+        folder: What it was saved to.
+        own: `module:Class` of the generator, where it is not one of ours, timed or not. It is never
+            taken from the folder: a model is data, and names no code to run.
+        device: Where torch computes, `cpu` or `cuda`; only networks run on the latter.
+
+    Raises:
+        FileFormatError: Files are missing, damaged, or of a generator that is not known here.
+        ConfigurationError: The device is not there, or the generator does not run on it.
+    """
+    return unpack(read_model(Path(folder)), own).to(device)
+
+
+def unpack(layers: Sequence[SavedLayer], own: str | None = None) -> Generator:
+    """Rebuild a saved generator, from the innermost layer outwards; see `load_generator`."""
+    generator: Generator | None = None
+    for layer in reversed(layers):
+        generator = _class_of(layer.name, own).unpack_layer(layer, generator)
+    assert generator is not None
+    return generator
+
+
+def _class_of(name: str, own: str | None) -> type[Generator]:
+    """The class of a saved layer: a wrapper, `own` where that is given, or one of ours."""
+    if name in WRAPPERS.members:
+        return WRAPPERS.kind(name)
+    if own is None and name not in GENERATORS.members:
+        raise FileFormatError(
+            f"the model is of a generator {name!r}; known here are "
+            f"{', '.join(GENERATORS.members)}, others have to be named as module:Class"
+        )
+    kind = GENERATORS.kind(own or name)
+    if kind.name != name:
+        raise FileFormatError(f"the model is of a {name} generator, not of {own or name}")
+    return kind
