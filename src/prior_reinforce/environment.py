@@ -44,10 +44,10 @@ class SeenObject:
     is not around this object, however often the model repeats it."""
 
     def __post_init__(self) -> None:
-        if not (self.words.strip() and self.size > 0):
+        if not (self.words.strip() and self.words.isprintable() and self.size > 0):
             raise ConfigurationError(
-                f"object '{self.words}' of {self.size} m cannot be looked for; give it words and "
-                "its size in metres"
+                f"object {self.words!r} of {self.size} m cannot be looked for; give it words in "
+                "one line and its size in metres"
             )
 
 

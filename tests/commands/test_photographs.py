@@ -7,6 +7,7 @@ import re
 import imageio.v3 as imageio
 import numpy as np
 import pytest
+from PIL import Image
 
 from prior_reinforce.bench.workspace.workspace import Workspace
 from prior_reinforce.cli import main
@@ -71,6 +72,9 @@ def test_calibrate_replaces_only_what_it_wrote(tmp_path, run):
         (1, ("--height", "nan"), "--height must be metres"),
         (1, ("--height", "10"), "--height must be metres"),
         (1, ("--outcome-height", "inf", "--camera", "0", "0", "2"), "--outcome-height must be"),
+        (1, ("--outcome-height", "0.1", "--camera", "nan", "0", "2.5"), "must be three numbers in"),
+        (1, ("--outcome-height", "0.1", "--camera", "0", "0", "inf"), "must be three numbers in"),
+        (1, ("--outcome-height", "0.1", "--camera", "85", "0", "255"), "must be three numbers in"),
     ],
 )
 def test_calibrate_takes_no_nonsense(tmp_path, run, scale, flags, says):
@@ -167,3 +171,76 @@ def test_a_trial_is_named_with_its_workspace(folder, tmp_path, run):
     assert status == 2
     assert "4" in err
     assert not (tmp_path / "planar" / "pictures").exists()
+
+
+@pytest.fixture
+def photographed(folder, tmp_path, run):
+    """A workspace with an open trial, its photograph, and a camera: all but the endpoint."""
+    with Workspace(folder) as workspace:
+        workspace.set_goal([0.9, 0.05])
+        workspace.session().ask()
+    points = "x,y,u,v\n0,0,100,200\n1,0,100,100\n1,1,0,100\n0,1,0,200\n"
+    (tmp_path / "points.csv").write_text(points)
+    assert run("calibrate", "points.csv")[0] == 0
+    Image.new("RGB", (200, 200)).save("photo.png")
+    what = "--reached-size 0.06 --goal-size 0.1 --vlm.max-retries 0 --vlm.base-url"
+    return ["look", "photo.png", *what.split(), "http://127.0.0.1:9/v1"]
+
+
+OBJECTS = ("--reached", "the orange ball", "--goal", "the red hoop")
+
+
+@pytest.mark.parametrize("linked", ["pictures", "trial-001-seen.png", "trial-001-seen.json"])
+def test_what_was_seen_is_not_written_through_a_link(photographed, folder, tmp_path, run, linked):
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    pictures = tmp_path / folder / "pictures"
+    if linked == "pictures":
+        pictures.symlink_to(elsewhere)
+    else:
+        pictures.mkdir()
+        (pictures / "trial-001-seen.json").write_text('{"picture_size_px": 1}')
+        (elsewhere / "mine").write_text('{"picture_size_px": 1}')
+        (pictures / linked).unlink(missing_ok=True)
+        (pictures / linked).symlink_to(elsewhere / "mine")
+    before = {path: path.read_bytes() for path in elsewhere.iterdir()}
+    status, _, err = run(*photographed, *OBJECTS, "--workspace", folder, "--trial", "1")
+    assert status == 2
+    assert "link" in err
+    assert {path: path.read_bytes() for path in elsewhere.iterdir()} == before
+
+
+@pytest.mark.parametrize("kind", ["GIF", "EPS", "TIFF"])
+def test_only_a_png_or_a_jpeg_is_opened(photographed, run, kind):
+    """Whatever its name: Pillow starts Ghostscript for PostScript."""
+    Image.new("RGB", (20, 20)).save("photo.png", format=kind)
+    status, _, err = run(*photographed, *OBJECTS)
+    assert status == 2
+    assert "expected a PNG or JPEG" in err
+
+
+def test_a_picture_of_several_frames_is_read_as_its_first(photographed, run):
+    frames = [Image.new("RGB", (20, 20), colour) for colour in ("red", "blue")]
+    frames[0].save("photo.png", save_all=True, append_images=frames[1:])
+    assert "is the server running?" in run(*photographed, *OBJECTS)[2]
+
+
+def test_a_picture_of_too_many_pixels_is_refused(photographed, run, monkeypatch):
+    monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", 1000)
+    assert "expected a PNG or JPEG" in run(*photographed, *OBJECTS)[2]
+
+
+def test_a_calibration_that_maps_nothing_is_refused(photographed, run, tmp_path):
+    path = tmp_path / "table.json"
+    flat = re.sub(r'"homography": \[.*?\]\s*\]', '"homography": [[0,0,0],[0,0,0],[0,0,0]]',
+                  path.read_text(), flags=re.DOTALL)  # fmt: skip
+    path.write_text(flat)
+    status, _, err = run(*photographed, *OBJECTS)
+    assert status == 2
+    assert "is not a table calibration" in err
+
+
+def test_words_of_two_lines_are_refused(photographed, run):
+    status, _, err = run(*photographed, "--reached", "the ball", "--goal", "a hoop\nand more")
+    assert status == 2
+    assert "one line" in err

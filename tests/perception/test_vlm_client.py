@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import gzip
 import json
 import socketserver
 import threading
-import time
 from contextlib import contextmanager, suppress
 
 import numpy as np
@@ -155,54 +153,6 @@ def body(content, **head):
     return OK + more.encode() + f"Content-Length: {len(data)}\r\n\r\n".encode() + data
 
 
-@pytest.mark.parametrize(("begin", "part"), [(b"", b"X: y\r\n"), (b"\r\n", b" ")])
-def test_an_answer_that_trickles_in_is_given_up(begin, part):
-    """A byte before each limit from byte to byte; in the head, or in the body."""
-
-    def trickle(file):
-        file.write(OK + begin)
-        while True:
-            file.write(part)
-            time.sleep(0.05)
-
-    with endpoint(trickle) as (address, _), pytest.raises(EndpointError, match="raise timeout"):
-        ask(address, timeout=0.5)
-
-
-def test_an_endless_answer_is_not_read_to_its_end():
-    written = []
-
-    def flood(file):
-        file.write(OK + b"\r\n")
-        for _ in range(1000):
-            file.write(b" " * 100_000)
-            written.append(100_000)
-
-    with endpoint(flood) as (address, _), pytest.raises(EndpointError, match="4000000 bytes"):
-        ask(address)
-    assert sum(written) < 50_000_000
-
-
-@pytest.mark.parametrize("status", [b"200 OK", b"500 Oh"])
-def test_an_error_is_bounded_as_an_answer_is(status):
-    content = body(b" " * 5_000_000).replace(b"200 OK", status)
-    with (
-        endpoint(lambda file: file.write(content)) as (address, _),
-        pytest.raises(EndpointError, match="4000000 bytes"),
-    ):
-        ask(address)
-
-
-def test_a_packed_answer_is_not_unpacked():
-    content = body(gzip.compress(b" " * 10_000_000), Content_Encoding="gzip")
-    with (
-        endpoint(lambda file: file.write(content)) as (address, requests),
-        pytest.raises(EndpointError, match="packed"),
-    ):
-        ask(address)
-    assert any("accept-encoding: identity" in line.lower() for line in requests[0])
-
-
 def test_the_picture_goes_to_no_other_host():
     with endpoint(lambda file: file.write(body({}))) as (elsewhere, requests):
         moved = f"Moved\r\nLocation: http://{elsewhere}".encode()
@@ -215,12 +165,14 @@ def test_the_picture_goes_to_no_other_host():
         assert not requests
 
 
+@pytest.mark.parametrize("length", [25, 164])
 @pytest.mark.parametrize("status", [b"200 OK", b"400 Bad", b"401 No", b"500 Oh"])
-def test_a_key_that_is_sent_back_is_not_kept(monkeypatch, status):
-    key = "sk-very-secret-0123456789"
+def test_a_key_that_is_sent_back_is_not_kept(monkeypatch, status, length):
+    key = "sk-very-secret-0123456789".ljust(length, "x")
     monkeypatch.setenv("A_KEY", key)
     said = f"you sent Bearer {key}"
-    completion = {"choices": [{"message": {"content": said, "reasoning_content": said}}]}
+    message = {"content": said, "reasoning_content": said}
+    completion = {"choices": [{"message": message, "finish_reason": said}]}
     content = body(completion | {"error": {"message": said}}).replace(b"200 OK", status)
     with endpoint(lambda file: file.write(content)) as (address, requests):
         try:
@@ -228,7 +180,7 @@ def test_a_key_that_is_sent_back_is_not_kept(monkeypatch, status):
         except EndpointError as error:
             found = f"{error} {error.__cause__!r} {error.__suppress_context__}"
     assert any(key in line for line in requests[0])
-    assert key not in found
+    assert "secret" not in found
 
 
 def test_a_password_in_the_address_is_in_no_message():
@@ -236,9 +188,33 @@ def test_a_password_in_the_address_is_in_no_message():
         endpoint(lambda file: file.write(body({}))) as (address, _),
         pytest.raises(EndpointError) as caught,
     ):
-        ask(f"user:hunter2@{address}?token=hunter3")
+        ask(f"user:hunter2@{address}?token=hunter3#hunter4")
     assert "hunter" not in str(caught.value)
     assert address.partition("/")[0] in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "url",
+    [
+        "http://u:hunter@hunter@host/v1",
+        "http://u:hunter/hunter@host/v1",
+        "http:/u:hunter@host",
+        "u:hunter@host",
+        "http://u:hunter?@host/v1",
+        "http://u:hunter#@host/v1",
+        "ftp://host/v1?token=hunter",
+    ],
+)
+def test_an_address_that_cannot_be_taken_apart_is_refused_unseen(url):
+    with pytest.raises(ConfigurationError, match="is no address") as caught:
+        VisionLanguageModelConfig(base_url=url)
+    assert "hunter" not in str(caught.value)
+
+
+def test_a_text_that_no_file_can_hold_is_a_failed_reading():
+    content = body(b'{"choices": [{"message": {"content": "\\ud800"}}]}')
+    with endpoint(lambda file: file.write(content)) as (address, _), pytest.raises(EndpointError):
+        ask(address)
 
 
 @pytest.mark.parametrize("url", ["", "127.0.0.1:8000", "http://", "http://[::1", "http://a:b/v1"])

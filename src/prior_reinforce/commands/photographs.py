@@ -98,6 +98,9 @@ class Look:
         goal, folder, stem = self._of_trial()
         drawn = folder / f"{stem}.png"
         written = drawn.with_suffix(".json")
+        for path in (folder, drawn, written):
+            if self.workspace is not None and path.is_symlink():
+                raise FileFormatError(f"{path} is a link; nothing is written through it, remove it")
         refuse_foreign(drawn if not written.exists() else written, "picture_size_px")
         calibration = TableCalibration.load(self.calibration)
         scene = TableScene(
@@ -167,11 +170,13 @@ def _read_points(path: Path) -> Float[np.ndarray, "n 4"]:
 
 def _read_picture(path: Path) -> UInt8[np.ndarray, "height width 3"]:
     """RGB, upright as the camera says."""
-    import imageio.v3 as imageio
+    from PIL import Image, ImageOps
 
     try:
-        return np.asarray(imageio.imread(path, plugin="pillow", mode="RGB", rotate=True))
-    except (OSError, ValueError) as error:
+        # Pillow goes by content and not by name, and starts other programs for some formats.
+        with Image.open(path, formats=("PNG", "JPEG")) as image:
+            return np.asarray(ImageOps.exif_transpose(image).convert("RGB"))
+    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
         first_line = str(error).partition("\n")[0]
         raise FileFormatError(
             f"cannot read the picture {path} ({first_line}); expected a PNG or JPEG"

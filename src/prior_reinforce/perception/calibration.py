@@ -40,6 +40,8 @@ class _Saved(msgspec.Struct):
 # Singular values of the design matrix below this share of the largest count as zero: points on
 # one line leave about 1e-16, points clicked to a pixel on a real table 1e-2 (ours).
 _RANK_FLOOR = 1e-6
+_HIGHEST = 20.0
+"""Of a camera above a table, in [m]; ours: beyond any hall, and below any height in centimetres."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,13 +106,15 @@ class TableCalibration:
                 difference of two points in the same plane but for its vertical part.
 
         Raises:
-            ConfigurationError: The camera is not above both planes.
+            ConfigurationError: The camera is not above both planes, or not within 20 m.
         """
         camera = np.asarray(camera_position, dtype=float)
-        if camera.shape != (3,) or not camera[2] > max(height, self.height):
+        above = camera.shape == (3,) and camera[2] > max(height, self.height)
+        if not above or not np.abs(camera).max() <= _HIGHEST:
             raise ConfigurationError(
-                f"camera position {camera.tolist()} must be three numbers in metres, higher than "
-                f"the planes at {self.height} m and {height} m; measure it from the table's frame"
+                f"camera position {camera.tolist()} must be three numbers in metres, at most "
+                f"{_HIGHEST:g} and higher than the planes at {self.height} m and {height} m; "
+                "measure it from the table's frame"
             )
         scale = (camera[2] - self.height) / (camera[2] - height)
         from_new_plane = np.eye(3)
@@ -150,7 +154,8 @@ class TableCalibration:
         """
         try:
             saved = msgspec.json.decode(path.read_bytes(), type=_Saved)
-        except (OSError, msgspec.DecodeError) as error:
+            np.linalg.inv(saved.homography)
+        except (OSError, msgspec.DecodeError, np.linalg.LinAlgError) as error:
             raise FileFormatError(
                 f"{path} is not a table calibration ({error}); write one with TableCalibration.save"
             ) from error

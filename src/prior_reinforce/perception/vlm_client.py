@@ -6,28 +6,22 @@ import base64
 import io
 import math
 import os
-import re
-import threading
-from collections.abc import Callable, Iterator
-from concurrent.futures import Future
-from concurrent.futures import TimeoutError as FutureTimeoutError
 from dataclasses import dataclass
-from importlib import import_module
-from typing import Any, Literal, Protocol, TypeVar
+from typing import Any, Literal, Protocol
 from urllib.parse import urlsplit
 
+import msgspec
+
 from prior_reinforce.environment import Picture
-from prior_reinforce.errors import ConfigurationError, EndpointError, MissingExtraError
+from prior_reinforce.errors import ConfigurationError, EndpointError
+from prior_reinforce.extras import check_installed
 from prior_reinforce.perception.vlm_formats import FORMATS, Family
 from prior_reinforce.perception.vlm_reading import Answer
 
-T = TypeVar("T")
 _NO_KEY = "EMPTY"
-_MOST_BYTES = 4_000_000
-"""Of a response; ours: a hundred times the longest answer with all its thinking."""
 _MOST_RETRIES = 20
-_PAUSE = 10.0
-"""Between two tries at most, in [s]: openai waits up to 8 s by itself."""
+_MOST_SHOWN = 160
+"""Characters of a server's own words in a message."""
 _THIS_MACHINE = {"127.0.0.1", "localhost", "::1"}
 
 
@@ -60,24 +54,14 @@ class VisionLanguageModelConfig:
     max_tokens: int = 2048
     """Longest answer, thinking included."""
     timeout: float = 60.0
-    """For one request, in [s], however its answer trickles in."""
+    """For a connection, and from one part of an answer to the next, in [s]."""
     max_retries: int = 2
     """Repetitions of a request after a timeout, a lost connection, HTTP 429 or 5xx."""
     max_image_side: int = 1000
     """Larger pictures are shrunk before they are sent, in [px]: the scale is no finer."""
 
     def __post_init__(self) -> None:
-        try:
-            address = urlsplit(self.base_url)
-            usable = address.scheme in ("http", "https") and bool(address.hostname)
-            _ = address.port
-        except ValueError:
-            usable = False
-        if not usable:
-            raise ConfigurationError(
-                f"base_url {without_secrets(self.base_url)!r} is no address; give one such as "
-                "http://127.0.0.1:8000/v1"
-            )
+        without_secrets(self.base_url)
         if self.family not in FORMATS:
             raise ConfigurationError(
                 f"model family '{self.family}' is unknown; use one of {', '.join(FORMATS)}"
@@ -98,6 +82,22 @@ class VisionLanguageModelConfig:
                 f"max_retries = {self.max_retries} must be 0 to {_MOST_RETRIES}, temperature = "
                 f"{self.temperature} finite and not negative; use 0 for none"
             )
+
+
+class _Message(msgspec.Struct):
+    content: str | None = None
+    reasoning_content: str | None = None
+
+
+class _Choice(msgspec.Struct):
+    message: _Message
+    finish_reason: str | None = None
+
+
+class _Completion(msgspec.Struct):
+    """What is read of a chat completion; the client does not check what a server sends."""
+
+    choices: list[_Choice]
 
 
 class ModelClient(Protocol):
@@ -135,33 +135,23 @@ class OpenAIClient:
             MissingExtraError: The extra [vlm] is not installed.
             ConfigurationError: The variable that should hold the key is not set.
         """
-        try:
-            import openai
-        except ImportError as error:
-            raise MissingExtraError(
-                "perception by a vision-language model needs the openai client; install it with: "
-                "pip install 'prior-reinforce[vlm]'"
-            ) from error
-        self.config = config
-        self.model = config.model
-        # A proxy, set for the internet at large, does not know a server on this machine.
-        is_here = urlsplit(config.base_url).hostname in _THIS_MACHINE
-        key = _key(config)
-        http = import_module(openai.DefaultHttpxClient.__mro__[1].__module__.partition(".")[0])
+        check_installed("openai")
+        import openai
+
+        self.config, self.model = config, config.model
+        self._key = _key(config)
         self._client = openai.OpenAI(
             base_url=config.base_url,
-            api_key=key,
+            api_key=self._key,
             timeout=config.timeout,
             max_retries=config.max_retries,
-            # A redirection would send the picture, and maybe the key, somewhere else.
             http_client=openai.DefaultHttpxClient(
-                trust_env=not is_here,
+                # A proxy, set for the internet at large, does not know a server on this machine.
+                trust_env=urlsplit(config.base_url).hostname not in _THIS_MACHINE,
+                # A redirection would send the picture, and maybe the key, somewhere else.
                 follow_redirects=False,
-                headers={"Accept-Encoding": "identity"},
-                event_hooks={"response": [_bounded(http)]},
             ),
         )
-        self._key = key
         self._sent: tuple[object, str] = (None, "")
 
     def ask(self, words: str, picture: Picture) -> Answer:
@@ -173,84 +163,57 @@ class OpenAIClient:
             {"type": "image_url", "image_url": {"url": self._sent[1]}},
             {"type": "text", "text": prompt},
         ]
-
-        def request() -> object:
-            return self._client.chat.completions.create(
+        try:
+            response = self._client.chat.completions.with_raw_response.create(
                 model=self.config.model,
                 messages=[{"role": "user", "content": content}],
                 temperature=self.config.temperature,
                 max_tokens=self.config.max_tokens,
                 extra_body=_extra_body(self.config),
             )
-
-        try:
-            completion = _within(_longest(self.config), request)
+            choice = msgspec.json.decode(response.content, type=_Completion).choices[0]
         # Whatever a server sends, the client's parsing included, is no reason to break off.
         except Exception as error:
-            said = self._hidden(_what_failed(error, self.config))
-            raise EndpointError(said) from None
-        return self._answer(completion)
+            raise EndpointError(self._what_failed(error)) from None
+        thinking = choice.message.reasoning_content
+        return Answer(
+            self._hidden(choice.message.content or ""),
+            None if thinking is None else self._hidden(thinking),
+            None if choice.finish_reason is None else self._hidden(choice.finish_reason),
+        )
 
     def close(self) -> None:
         """Close the connections."""
         self._client.close()
 
-    def _answer(self, completion: object) -> Answer:
-        """What a completion says, of whatever types a server has made it."""
-        # The client's types promise choices; servers do not (a web page with status 200).
-        choices: Any = getattr(completion, "choices", None)
-        choices = choices if isinstance(choices, list) else []
-        message = getattr(choices[0], "message", None) if choices else None
-        if message is None:
-            raise EndpointError(
-                f"{without_secrets(self.config.base_url)} answers, but not with a chat "
-                "completion; the address of an OpenAI-compatible endpoint mostly ends in /v1"
-            )
-        content = getattr(message, "content", None)
-        thinking = getattr(message, "reasoning_content", None)
-        finish = getattr(choices[0], "finish_reason", None)
-        return Answer(
-            self._hidden(content) if isinstance(content, str) else "",
-            self._hidden(thinking) if isinstance(thinking, str) else None,
-            finish if isinstance(finish, str) else None,
-        )
-
     def _hidden(self, text: str) -> str:
         """A text without the key, which a server may send back."""
         return text if self._key == _NO_KEY else text.replace(self._key, "***")
 
+    def _what_failed(self, error: Exception) -> str:
+        """One line with the remedy for each way in which a request fails."""
+        import openai
 
-class _NotThatMuchError(Exception):
-    """A response is larger than any chat completion, or packed, so that its size is unknown."""
-
-
-def _bounded(http: Any) -> Callable[[Any], None]:
-    """A hook that lets no more of a response be read than a chat completion can be.
-
-    Args:
-        http: The library that openai sends its requests with: httpx, or what follows it.
-    """
-
-    def bound(response: Any) -> None:
-        stream = response.stream
-
-        class Bounded(http.SyncByteStream):  # type: ignore[misc]
-            def __iter__(self) -> Iterator[bytes]:
-                received = 0
-                for part in stream:
-                    received += len(part)
-                    if received > _MOST_BYTES:
-                        raise _NotThatMuchError(f"more than {_MOST_BYTES} bytes")
-                    yield part
-
-            def close(self) -> None:
-                stream.close()
-
-        response.stream = Bounded()
-        if response.headers.get("Content-Encoding", "identity").lower() != "identity":
-            raise _NotThatMuchError("packed, though asked for as it is")
-
-    return bound
+        config = self.config
+        url, tries = without_secrets(config.base_url), f"after {config.max_retries + 1} tries"
+        if isinstance(error, openai.APITimeoutError):
+            return f"no answer from {url} in {config.timeout:g} s {tries}; raise timeout"
+        if isinstance(error, openai.APIConnectionError):
+            return f"cannot reach {url} {tries}; is the server running?"
+        if isinstance(error, openai.RateLimitError):
+            return f"{url} refuses more requests for now (HTTP 429) {tries}; wait a minute"
+        if isinstance(error, openai.AuthenticationError):
+            return f"{url} refuses the key (HTTP 401); set api_key_variable"
+        if isinstance(error, openai.NotFoundError):
+            return f"{url} does not serve model '{config.model}' (HTTP 404); set base_url and model"
+        # The key is hidden before anything is cut: the rest of it would be no longer found.
+        said = " ".join(self._hidden(str(error)).split())[:_MOST_SHOWN]
+        if isinstance(error, openai.APIStatusError):
+            return f"{url} failed with HTTP {error.status_code} ({said}); see the server's log"
+        return (
+            f"{url} answers, but not with a chat completion ({said}); the address of an "
+            "OpenAI-compatible endpoint mostly ends in /v1"
+        )
 
 
 def _png_address(picture: Picture) -> str:
@@ -283,61 +246,22 @@ def _extra_body(config: VisionLanguageModelConfig) -> dict[str, Any]:
     return {}
 
 
-def _what_failed(error: Exception, config: VisionLanguageModelConfig) -> str:
-    """One line with the remedy for each way in which a request fails."""
-    import openai
-
-    url, tries = without_secrets(config.base_url), f"after {config.max_retries + 1} tries"
-    cause: BaseException | None = error
-    while cause is not None:
-        if isinstance(cause, _NotThatMuchError):
-            return f"{url} gave an answer that is not the protocol's ({cause}); see its log"
-        cause = cause.__cause__ or cause.__context__
-    if isinstance(error, TimeoutError):
-        return f"no answer from {url} in {_longest(config):g} s {tries}; raise timeout"
-    if isinstance(error, openai.APITimeoutError):
-        return f"no answer from {url} in {config.timeout:g} s {tries}; raise timeout"
-    if isinstance(error, openai.APIConnectionError):
-        return f"cannot reach {url} {tries}; is the server running?"
-    if isinstance(error, openai.RateLimitError):
-        return f"{url} refuses more requests for now (HTTP 429) {tries}; wait a minute"
-    if isinstance(error, openai.AuthenticationError):
-        return f"{url} refuses the key (HTTP 401); set api_key_variable"
-    if isinstance(error, openai.NotFoundError):
-        return f"{url} does not serve model '{config.model}' (HTTP 404); set base_url and model"
-    if isinstance(error, openai.APIStatusError):
-        said = " ".join(str(error).split())[:160]
-        return f"{url} failed with HTTP {error.status_code} ({said}); see the server's log"
-    said = " ".join(str(error).split())[:160]
-    return f"{url} gave an answer that is not the protocol's ({said}); is it the right address?"
-
-
-def _longest(config: VisionLanguageModelConfig) -> float:
-    """Of asking once, in [s]: every try, and the pauses between them."""
-    return config.timeout * (config.max_retries + 1) + _PAUSE * config.max_retries
-
-
-def _within(seconds: float, request: Callable[[], T]) -> T:
-    """What a request gives, unless that takes longer: its own limits count from byte to byte.
+def without_secrets(url: str) -> str:
+    """Return an address without a user's name, password, query and fragment.
 
     Raises:
-        TimeoutError: It does; the thread that waits for it is left to itself.
+        ConfigurationError: It is no address; what may hold a secret then is not shown.
     """
-    given: Future[T] = Future()
-
-    def fetch() -> None:
-        try:
-            given.set_result(request())
-        except BaseException as error:
-            given.set_exception(error)
-
-    threading.Thread(target=fetch, daemon=True).start()
     try:
-        return given.result(seconds)
-    except FutureTimeoutError as error:
-        raise TimeoutError from error
-
-
-def without_secrets(url: str) -> str:
-    """An address without a user's name, password or query."""
-    return re.sub(r"//[^/@]*@", "//", url.partition("?")[0])
+        address = urlsplit(url)
+        usable = address.scheme in ("http", "https") and bool(address.hostname)
+        _ = address.port
+    except ValueError:
+        usable = False
+    # A second "@", or one behind the host, means that a password was cut in the wrong place.
+    if not usable or url.count("@") > ("@" in address.netloc):
+        shown = "that was given" if set(url) & set("@?#") else repr(url)
+        raise ConfigurationError(
+            f"the base_url {shown} is no address; give one such as http://127.0.0.1:8000/v1"
+        )
+    return f"{address.scheme}://{address.netloc.rpartition('@')[2]}{address.path}"

@@ -6,6 +6,7 @@ on the picture for the operator.
 
 from __future__ import annotations
 
+import io
 import json
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +16,7 @@ import numpy as np
 from jaxtyping import Float
 
 from prior_reinforce.environment import Picture
+from prior_reinforce.files import write
 from prior_reinforce.perception.vlm_formats import Box
 
 if TYPE_CHECKING:
@@ -127,11 +129,13 @@ class PictureReading:
 
     def save(self, folder: Path, stem: str) -> None:
         """Write `stem`.png (the picture with boxes) and `stem`.json (every answer) to a folder."""
-        import imageio.v3 as imageio
+        from PIL import Image
 
-        imageio.imwrite(folder / f"{stem}.png", self.drawn())
-        content = json.dumps(self._record(), indent=2, ensure_ascii=False)
-        (folder / f"{stem}.json").write_text(content + "\n", encoding="utf-8")
+        drawn = io.BytesIO()
+        Image.fromarray(self.drawn()).save(drawn, format="PNG")
+        write(folder / f"{stem}.png", drawn.getvalue())
+        record = json.dumps(self._record(), indent=2, ensure_ascii=False)
+        write(folder / f"{stem}.json", record + "\n")
 
     def _record(self) -> dict[str, Any]:
         error = self.error_seen
