@@ -2,13 +2,14 @@
 
 import json
 
+import msgspec
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from prior_reinforce.errors import InvalidFeedbackError
-from prior_reinforce.readings import Reading
+from prior_reinforce.readings import Reading, ReadingRecord
 
 RADIUS = np.array([0.015, 0.015])
 INF = np.inf
@@ -105,8 +106,8 @@ def test_no_interval_is_cut_off_from_the_truth(x, y):
 
 def test_a_reading_comes_back_from_plain_text_with_its_open_ends():
     reading = Reading([0.05, 0.0], [0.01, -INF], [INF, INF], [0.002, 0.0], False, "long")
-    text = json.dumps(reading.as_json(), allow_nan=False)
-    again = Reading.from_json([0.05, 0.0], json.loads(text))
+    text = json.dumps(msgspec.to_builtins(reading.record()), allow_nan=False)
+    again = Reading.from_record(msgspec.json.decode(text, type=ReadingRecord))
     for name in ("error_seen", "low", "high", "sd"):
         np.testing.assert_array_equal(getattr(again, name), getattr(reading, name))
     assert (again.hit, again.said) == (False, "long")

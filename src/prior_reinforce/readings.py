@@ -15,10 +15,9 @@ evidence, and an adapter stands still.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
+import msgspec
 import numpy as np
 from jaxtyping import Float
 from numpy.typing import ArrayLike
@@ -47,6 +46,17 @@ _SAME = 1e-9
 _MEASURED = 0.5
 """A number whose sd is below this share of the tolerance says more of a hit than that it hit
 (ours)."""
+
+
+class ReadingRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A `Reading` as plain data; an open end of an interval is None."""
+
+    error_seen: list[float]
+    low: list[float | None]
+    high: list[float | None]
+    sd: list[float]
+    hit: bool | None = None
+    said: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -224,25 +234,31 @@ class Reading:
             missed_by_at_least=np.asarray(radius),
         )
 
-    def as_json(self) -> dict[str, Any]:
-        """Plain data for a log, an open end as None; without `error_seen`."""
-        return {
-            "low": _ends_as_json(self.low),
-            "high": _ends_as_json(self.high),
-            "sd": self.sd.tolist(),
-            "hit": None if self.hit is None else bool(self.hit),
-            "said": self.said,
-        }
+    def record(self) -> ReadingRecord:
+        """Plain data for a log."""
+        return ReadingRecord(
+            error_seen=self.error_seen.tolist(),
+            low=_ends(self.low),
+            high=_ends(self.high),
+            sd=self.sd.tolist(),
+            hit=None if self.hit is None else bool(self.hit),
+            said=self.said,
+        )
 
     @classmethod
-    def from_json(cls, error_seen: Any, data: Mapping[str, Any]) -> Self:
-        """Read what `as_json` wrote, beside the error seen."""
-        ends = {
-            name: np.array([open_end if end is None else end for end in data[name]])
-            for name, open_end in (("low", -math.inf), ("high", math.inf))
-        }
-        return cls(error_seen, ends["low"], ends["high"], data["sd"], data["hit"], data["said"])
+    def from_record(cls, record: ReadingRecord) -> Self:
+        """Read what `record` returned."""
+        low = [-math.inf if end is None else end for end in record.low]
+        high = [math.inf if end is None else end for end in record.high]
+        return cls(
+            np.array(record.error_seen),
+            np.array(low),
+            np.array(high),
+            np.array(record.sd),
+            record.hit,
+            record.said,
+        )
 
 
-def _ends_as_json(ends: Float[np.ndarray, " k"]) -> list[float | None]:
+def _ends(ends: Float[np.ndarray, " k"]) -> list[float | None]:
     return [end if math.isfinite(end) else None for end in ends.tolist()]

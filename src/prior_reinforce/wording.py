@@ -24,7 +24,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
-from prior_reinforce.arrays import BEYOND_DOUBT, FARTHEST
+from prior_reinforce.arrays import BEYOND_DOUBT, FARTHEST, as_error
 from prior_reinforce.errors import InvalidFeedbackError
 from prior_reinforce.readings import EYE_BETWEEN, OPEN_ERROR, Reading
 
@@ -178,6 +178,45 @@ def from_words(text: str, outcome_dim: int) -> Reading:
         elif said[j].sd is not None:
             low[j], high[j], sd[j] = number[j], number[j], said[j].sd
     return Reading(number, low, high, sd, hit, text)
+
+
+def as_reading(
+    seen: Reading | ArrayLike | None,
+    hit: bool | None,
+    units: Sequence[str],
+    least_sd: _Point,
+) -> Reading:
+    """Return what was seen of a trial as a reading.
+
+    Args:
+        seen: A reading, words, or outcome minus goal as numbers of unknown origin, shape (k,); None
+            where nothing but `hit` is known.
+        hit: Whether the goal was reached, where that was seen directly.
+        units: Units of the k components.
+        least_sd: Least standard deviation of numbers of unknown origin, shape (k,), in `units`.
+
+    Raises:
+        InvalidFeedbackError: Wrong shape, not finite, or words that cannot be read.
+    """
+    if not (hit is None or isinstance(hit, (bool, np.bool_))):
+        raise InvalidFeedbackError(f"hit must be True, False or None, got {hit!r}")
+    k = len(units)
+    if seen is None:
+        if hit is None:
+            raise InvalidFeedbackError("say what was seen, or whether it hit")
+        return Reading.only(bool(hit), k)
+    if isinstance(seen, str):
+        if not in_words(units):
+            raise InvalidFeedbackError(
+                f"words are for lengths, these outcomes are in {', '.join(units)}; give {k} numbers"
+            )
+        reading = from_words(seen, k)
+    elif isinstance(seen, Reading):
+        as_error(seen.error_seen, k)
+        reading = seen
+    else:
+        reading = Reading.estimated(as_error(seen, k), least_sd)
+    return reading.with_hit(hit)
 
 
 def read_place(text: str, names: Sequence[str], units: Sequence[str]) -> _Point:

@@ -10,6 +10,7 @@ from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
@@ -301,7 +302,7 @@ def journals(rng: random.Random, here: Path, asked: Path) -> str:
         kinds = ["goal_set", "asked", "executing", "executed", "not_executed", "told", "amended"]
         kinds += ["voided", "demonstrations_imported", "model_trained", "unknown"]
         with Workspace(folder) as workspace:
-            whole = [(event.kind, dict(event.data)) for event in workspace.events]
+            whole = [(entry.kind, msgspec.to_builtins(entry.event)) for entry in workspace.events]
             kind, data = rng.choice(whole)
             data = json.loads(json.dumps(data))
             if rng.random() < 0.5:
@@ -309,7 +310,8 @@ def journals(rng: random.Random, here: Path, asked: Path) -> str:
                 data |= {"error_seen": rng.choice([[0.1, 0.2], [], "x", [1e308, 0], None])}
             _edit(rng, data)
             with workspace.log.exclusive():
-                workspace.log.append(rng.choice([kind, rng.choice(kinds)]), data)
+                data["kind"] = rng.choice([kind, rng.choice(kinds)])
+                workspace.log.append(msgspec.Raw(json.dumps(data).encode()))
     name = rng.choice([*_READERS, *["tell", "void", "export"] * 3])
     more = {"tell": ["1", "--hit"], "void": ["1"], "export": ["1", "plan.csv"]}.get(name, [])
     return command(here, name, "planar", *more)

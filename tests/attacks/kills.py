@@ -17,7 +17,7 @@ import time
 from pathlib import Path
 
 from prior_reinforce.bench.workspace.workspace import Workspace
-from prior_reinforce.session.trials import Event
+from prior_reinforce.session.events import Entry
 from tests.attacks.table import prepare
 from tests.bench.workspace.planar import recordings
 
@@ -85,18 +85,18 @@ def _start(here: Path, *args: str) -> subprocess.Popen[str]:
     return program
 
 
-def _check(folder: Path, before: list[Event], here: Path) -> list[Event]:
+def _check(folder: Path, before: list[Entry], here: Path) -> list[Entry]:
     """Nothing of before is missing, and what events name is whole."""
     with Workspace(folder) as workspace:
         events = list(workspace.events)
-        assert [event.data for event in events[: len(before)]] == [e.data for e in before]
+        assert [entry.event for entry in events[: len(before)]] == [entry.event for entry in before]
         assert len(events) <= len(before) + 2, "doubled"
         session = workspace.session()
         for goal in session.goals:
-            for trial in session.trials_of(goal.number):
+            for trial in session.state.trials_of(goal.number):
                 workspace.plan(trial)
         assert workspace.demonstrations.n == 4
-        training = workspace.log.training
+        training = workspace.state.training
         assert training is not None
         workspace.store.model(training.model)
     for path in here.glob("plan.*"):

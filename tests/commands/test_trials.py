@@ -1,10 +1,15 @@
 """`ask` and `export`: where plans go, and what runs them."""
 
+import sqlite3
 import sys
+from collections import Counter
 
 import pytest
 
+from prior_reinforce.bench.workspace import workspace as workspace_module
+from prior_reinforce.bench.workspace.log import Executing
 from prior_reinforce.bench.workspace.workspace import Workspace
+from prior_reinforce.session.session import Session
 from prior_reinforce.session.trials import Stage
 from tests.bench.workspace.planar import events_in, trials_in
 
@@ -31,6 +36,55 @@ def test_what_ask_cannot_do_is_said_before_a_trial_is_made(run, folder, flags, r
     assert remedy in err
     assert len(err.splitlines()) == 1
     assert events_in(folder) == before
+
+
+@pytest.fixture
+def work(monkeypatch):
+    """Counts what commands do: journal queries, sessions, manifests read, calls of the gate."""
+    done = Counter()
+
+    def count(owner, name, what):
+        real = getattr(owner, name)
+
+        def counted(*args, **kwargs):
+            done[what] += 1
+            return real(*args, **kwargs)
+
+        monkeypatch.setattr(owner, name, counted)
+
+    def connect(*args, connect=sqlite3.connect, **kwargs):
+        connection = connect(*args, **kwargs)
+        connection.set_trace_callback(lambda sql: done.update(queries="FROM events" in sql))
+        return connection
+
+    monkeypatch.setattr(sqlite3, "connect", connect)
+    count(Session, "__init__", "sessions")
+    count(workspace_module, "parse_manifest", "manifests")
+    count(Workspace, "gate", "gated")
+    return done
+
+
+@pytest.mark.parametrize(
+    ("command", "sessions", "gated"),
+    [
+        (("goal", "0.9", "0.05"), 1, 0),
+        (("ask",), 1, 1),
+        (("ask", "--yes", "--run", "true {plan}"), 1, 2),
+        (("tell", "1", "hit"), 1, 0),
+        (("void", "1"), 1, 0),
+        (("status",), 0, 0),
+    ],
+)
+def test_a_command_reads_the_journal_once(run, folder, work, command, sessions, gated):
+    """And builds one session, and asks the gate once more right before a motion."""
+    run("goal", folder, "0.9", "0.05")
+    if command[0] not in ("goal", "ask"):
+        run("ask", folder)
+    work.clear()
+    name, *rest = command
+    assert run(name, folder, *rest)[0] == 0
+    expected = {"queries": 1, "sessions": sessions, "manifests": 1, "gated": gated}
+    assert {what: work[what] for what in expected} == expected
 
 
 def test_ask_says_what_the_trial_may_expect(run, folder):
@@ -196,7 +250,7 @@ def test_the_arm_is_held_against_the_plans_first_pose(
 def cut_off(folder):
     with Workspace(folder) as workspace, workspace.log.journal.exclusive():
         # What is written before the program dies.
-        workspace.log.journal.append("executing", {"trial": 1, "command": "arm {plan}"})
+        workspace.log.journal.append(Executing(trial=1, command="arm {plan}", folder=""))
 
 
 @pytest.mark.parametrize(("answer", "stage"), [("no", "asked"), ("yes", "executing")])
@@ -221,7 +275,7 @@ def test_export_writes_what_was_handed_out(run, folder):
     run("ask", folder)
     status, out, _ = run("export", folder, 1, "plan.npz")
     assert status == 0
-    assert trials_in(folder)[0].kept["plan_sha256"] in out
+    assert trials_in(folder)[0].kept.sha256 in out
 
 
 def test_a_plan_of_before_a_correction_is_named_until_it_is_voided(run, folder):

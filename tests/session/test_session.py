@@ -21,7 +21,7 @@ from prior_reinforce.generators.base import Generator
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 from prior_reinforce.readings import Reading
 from prior_reinforce.session.session import Session, ask_all
-from prior_reinforce.session.trials import MemoryLog, Stage
+from prior_reinforce.session.trials import MemoryLog, Stage, State
 
 DEMOS = Demonstrations(
     plans=np.arange(2 * 3 * 2, dtype=float).reshape(2, 3, 2),
@@ -284,16 +284,10 @@ def test_trials_of_earlier_goals_reach_the_adapter_where_they_are_carried_over(c
     assert (trial.number, trial.goal_number, session.n_trials) == (2, 2, 0)
 
 
-def test_trials_of_another_model_teach_nothing(session):
+def test_trials_of_another_model_teach_nothing(session, monkeypatch):
     session.tell(session.ask().number, [0.05, 0.0])
-    other = Session(
-        RepeatingGenerator().fit(DEMOS, seed=0),
-        FullStepAdapter(),
-        DEMOS,
-        log=session.log,
-        in_use=lambda: ("another",),
-    )
-    np.testing.assert_array_equal(other.ask().condition, GOAL)
+    monkeypatch.setattr(State, "in_use", ("another",))
+    np.testing.assert_array_equal(session.ask().condition, GOAL)
 
 
 class Carrying(FullStepAdapter):
@@ -374,7 +368,10 @@ class Gate:
 
     limit = 10.0
 
+    calls = 0
+
     def __call__(self, plan):
+        self.calls += 1
         self.largest = float(np.abs(plan).max())
         return self
 
@@ -396,7 +393,9 @@ def test_a_refused_plan_never_leaves_whenever_it_is_asked_for():
         session.ask()
     assert session.trials == ()
     gate.limit = 10.0
-    assert session.ask().kept["gate"] == {"largest": 0.9}
+    assert (trial := session.ask()).gate == {"largest": 0.9}
+    assert trial.verdict is gate
+    assert (gate.calls, session.ask().verdict, gate.calls) == (2, gate, 3)
     gate.limit = 0.5
     with pytest.raises(RobotLimitError, match="void it and ask again"):
         session.ask()
@@ -429,26 +428,6 @@ def test_a_goal_is_not_spoken_of_while_a_trial_waits(session):
         warnings.simplefilter("error")
         with pytest.raises(TrialStateError, match="trial 1 waits to be told"):
             session.set_goal([2.0, 0.1])
-
-
-def test_a_plan_is_executed_once_and_what_was_cut_off_is_for_a_person_to_say(session):
-    session.ask()
-    session.begin_execution(1, "arm {plan}")
-    with pytest.raises(TrialStateError, match="did the arm move"):
-        session.ask()
-    assert session.ask(arm_did_not_move=True).stage is Stage.ASKED
-    session.begin_execution(1, "arm {plan}")
-    assert session.end_execution(1, {"exit_status": 0}).stage is Stage.EXECUTED
-    with pytest.raises(TrialStateError, match="a plan runs once"):
-        session.begin_execution(1, "arm {plan}")
-    assert session.tell(1, [0.0, 0.0]).hit
-
-
-def test_told_while_it_executes_it_stays_told(session):
-    session.ask()
-    session.begin_execution(1, "arm {plan}")
-    session.tell(1, [0.05, 0.0])
-    assert session.end_execution(1, {"exit_status": 0}).stage is Stage.TOLD
 
 
 @pytest.mark.parametrize("hit", ["no", 1, [True]])
@@ -510,10 +489,8 @@ def test_a_goal_of_the_wrong_dimension_is_named():
 def test_a_log_that_does_not_fit_together_is_refused(session):
     session.tell(session.ask().number, [0.05, 0.0])
     log = MemoryLog()
-    for event in reversed(session.log.events()):
-        log.append(event.kind, event.data)
     with pytest.raises(WorkspaceError, match="does not fit the ones before"):
-        Session(RepeatingGenerator().fit(DEMOS, seed=0), FullStepAdapter(), DEMOS, log=log)
+        log.append(session.log.entries()[-1].event)
 
 
 def test_asking_many_sessions_calls_the_generator_once_and_agrees_with_asking_each():
@@ -559,6 +536,20 @@ def test_a_member_that_can_be_called_is_not_called():
     generator = RepeatingGenerator().fit(DEMOS, seed=0)
     session = Session(generator, CallableAdapter(), DEMOS, GOAL, 0.015)
     np.testing.assert_array_equal(session.ask().condition, GOAL)
+
+
+@pytest.mark.parametrize("which", [0, 1, 2])
+def test_a_class_is_no_object(which):
+    given = [RepeatingGenerator().fit(DEMOS, seed=0), FullStepAdapter(), DEMOS]
+    given[which] = type(given[which])
+    with pytest.raises(ConfigurationError, match="is a class; give an object, for instance"):
+        Session(*given, GOAL, 0.015)
+
+
+def test_nothing_is_written_into_an_adapter(session):
+    session.tell(session.ask().number, [0.05, 0.0])
+    session.ask()
+    assert set(vars(session.adapter)) == {"n_starts", "_outcome_dim", "seen"}
 
 
 class Interrupted(FullStepAdapter):

@@ -38,10 +38,13 @@ class Adapter(ABC):
     carries_over: ClassVar[bool] = False
     """Whether trials of earlier goals serve it, so that a session gives it those unless told
     otherwise."""
+    n_starts: int = 0
+    """How often it was started: two sessions that share it tell by this that it is the other's."""
     _outcome_dim: int | None = None
 
     def start(self, demonstrations: Demonstrations) -> None:
         """Begin anew with D_M = {(c_i, r_i) | c_i = r_i} (Algorithm 1), forgetting all trials."""
+        self.n_starts += 1
         self._start(demonstrations)
         self._outcome_dim = demonstrations.outcome_dim
 

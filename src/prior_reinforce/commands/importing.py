@@ -123,7 +123,7 @@ class Import:
             if self.inspect:
                 self._inspect(workspace)
                 return
-            workspace.session().refuse_open_trial("importing demonstrations")
+            workspace.state.refuse_open_trial("importing demonstrations")
             at_terminal = sys.stdin.isatty()
             guesses = at_terminal and self._agreed(workspace)
             answers = self._asked(workspace, guesses) if at_terminal else None

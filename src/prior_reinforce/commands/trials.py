@@ -140,14 +140,14 @@ class Ask:
         manifest = workspace.manifest
         place = say_place(trial.condition, manifest.outcome_names, manifest.outcome_units)
         print(f"trial {trial.number}: aimed at {place}")
-        for line in say_expectation(session, trial):
+        for line in say_expectation(workspace.state, trial):
             print(line)
         _print_outdated(session)
         if reached_before:
             print("the goal is reached already: this trial repeats it")
         assert trial.plan is not None
-        report = workspace.gate(trial.plan)
-        print("no robot in the manifest, no limits checked" if report is None else report.text())
+        verdict = trial.verdict
+        print("no robot in the manifest, no limits checked" if verdict is None else verdict.text())
         print(f"plan: {workspace.plan_path(trial)}")
         begins = ", ".join(
             f"{name} {q + 0.0:.4g} {unit}"
@@ -171,7 +171,7 @@ class Ask:
     def _check_out(self, session: Session) -> None:
         """Say what --out cannot do before a trial is made."""
         trial = session.open_trial
-        number = session.n_trials_asked + 1 if trial is None else trial.number
+        number = len(session.state.trials) + 1 if trial is None else trial.number
         out = self._out_of(number)
         if out is None:
             return
@@ -199,7 +199,7 @@ class Ask:
         elif result.outcome == "unknown":
             said = f"trial {number}{why}; nobody knows what moved: look, then ask again"
         else:
-            trial = workspace.session().trial(number)
+            trial = workspace.state.trial(number)
             said = f"trial {number}: {say_trial(workspace, trial)}"
             if result.outcome == "aborted":
                 said += f"; if the object flew all the same, tell trial {number}"
@@ -302,7 +302,7 @@ class Export:
     def run(self) -> None:
         """Write it, if it may still be executed."""
         with Workspace(self.folder) as workspace:
-            plan = workspace.plan(workspace.session().trial(self.number))
+            plan = workspace.plan(workspace.state.trial(self.number))
             verdict = workspace.gate(plan.actions)
             if verdict is not None:
                 verdict.require()

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
+import msgspec
 import tyro
 from rich.console import Console
 
@@ -30,7 +31,7 @@ Folder = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="WORKSPACE"
 
 def print_next(workspace: Workspace) -> None:
     """Say which command comes next."""
-    print(f"next: {next_step(workspace, workspace.session())}")
+    print(f"next: {next_step(workspace)}")
 
 
 @dataclass(frozen=True)
@@ -169,11 +170,10 @@ class Log:
     def run(self) -> None:
         """Print it."""
         with Workspace(self.folder) as workspace:
-            events = workspace.events
-        for event in events:
-            print(
-                json.dumps({"id": event.id, "time": event.time, "kind": event.kind, **event.data})
-            )
+            entries = workspace.events
+        for entry in entries:
+            event = msgspec.to_builtins(entry.event)
+            print(json.dumps({"id": entry.id, "time": entry.time, **event}))
 
 
 @dataclass(frozen=True)

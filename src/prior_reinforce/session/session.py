@@ -15,23 +15,22 @@ Notation (docs/notation.md):
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from functools import cached_property
-from numbers import Integral, Real
+from numbers import Real
 from threading import RLock
 from types import FunctionType, MethodType
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from prior_reinforce.adapters import ADAPTERS
-from prior_reinforce.arrays import Frames, Point, as_error
+from prior_reinforce.arrays import Frames, Point
 from prior_reinforce.errors import (
     ConfigurationError,
-    InvalidFeedbackError,
     InvalidPlanError,
     RobotLimitError,
     TrialStateError,
@@ -39,23 +38,14 @@ from prior_reinforce.errors import (
 )
 from prior_reinforce.plans.normalisation import Normalisation
 from prior_reinforce.readings import Reading
-from prior_reinforce.session.trials import Goal, History, Log, MemoryLog, Stage, Trial
-from prior_reinforce.wording import from_words, in_words
+from prior_reinforce.session.events import Amended, Asked, GoalSet, Told, Voided
+from prior_reinforce.session.trials import Goal, Log, MemoryLog, Stage, State, Trial, Verdict
+from prior_reinforce.wording import as_reading
 
 if TYPE_CHECKING:
     from prior_reinforce.adapters.base import Adapter
     from prior_reinforce.generators.base import Generator
     from prior_reinforce.plans.motions import Demonstrations
-
-
-class Verdict(Protocol):
-    """What a gate says of a plan; see `robots.report.LimitReport`."""
-
-    def require(self) -> None:
-        """Raise RobotLimitError unless the plan may be executed."""
-
-    def as_json(self) -> Mapping[str, Any]:
-        """The same as plain data, for the log."""
 
 
 class Session:
@@ -75,12 +65,13 @@ class Session:
         carry_over: bool | None = None,
         log: Log | None = None,
         gate: Callable[[Frames], Verdict | None] | None = None,
-        in_use: Callable[[], tuple[str, ...]] = lambda: ("",),
     ) -> None:
         """Begin, or go on where a log ends.
 
-        The first three may be functions that load them, called when first needed: telling, voiding
-        and amending need neither generator nor adapter.
+        The first three may be functions that load them, called when first needed, and again when
+        the log names another model in use (`State.in_use`): telling, voiding and amending need
+        neither generator nor adapter. Trials of other models teach nothing, since their conditions
+        mean other motions.
 
         Args:
             generator: pi, fitted to `demonstrations`.
@@ -93,26 +84,30 @@ class Session:
                 does where they serve it (`Adapter.carries_over`).
             log: What happened so far, and where to write what happens; in memory if not given.
             gate: Holds a plan against a robot's limits whenever it is to leave; none by default.
-            in_use: Returns the name of the model in use, and whatever else the functions above
-                load: when it changes, they are called again. Trials of other models teach nothing,
-                since their conditions mean other motions.
 
         Raises:
             InvalidGoalError: The goal has a wrong shape, or is not finite.
-            ConfigurationError: The tolerance is not a positive number.
+            ConfigurationError: The tolerance is not a positive number, or a class is given instead
+                of an object.
             TrialStateError: A goal is given, and a trial for the one before waits to be told.
         """
+        for given in (generator, adapter, demonstrations):
+            if isinstance(given, type):
+                raise ConfigurationError(
+                    f"{given.__name__} is a class; give an object, for instance {given.__name__}()"
+                )
         self.log: Log = MemoryLog() if log is None else log
+        self.state: State = self.log.state()
+        """What happened so far, as this session last read it from its log."""
         self._given: Any = (generator, adapter, demonstrations)
         self._gate = gate
-        self._in_use = in_use
         self._loaded_for: tuple[str, ...] = ()
         self._carry_over = carry_over
         self._tolerance = tolerance
-        self._history = History()
-        self._observed: list[Trial] | None = None
         self._lock = RLock()
-        self._mark = object()
+        self._observed: list[Trial] | None = None
+        """Readings that the adapter has observed since its start `_start`."""
+        self._start = 0
         self._on_hardware_of = 0
         """The latest goal whose change of hardware the adapter knows of."""
         self._refresh()
@@ -137,7 +132,7 @@ class Session:
     @property
     def goals(self) -> tuple[Goal, ...]:
         """All goals so far, in order."""
-        return tuple(self._history.goals)
+        return tuple(self.state.goals)
 
     @property
     def goal(self) -> Point:
@@ -151,36 +146,23 @@ class Session:
 
     @property
     def trials(self) -> tuple[Trial, ...]:
-        """All trials for the goal that is worked on, in order."""
-        return self.trials_of(len(self._history.goals))
-
-    def trials_of(self, goal_number: int) -> tuple[Trial, ...]:
-        """All trials for one goal, in order."""
-        return self._history.trials_of(goal_number)
-
-    def readings_for(self, goal: Goal, model: str) -> list[Trial]:
-        """Told trials that count for a goal and that a model planned, oldest first."""
-        return self._history.readings_for(goal, model)
+        """All trials for the goal that is worked on, in order; `state.trials` has all."""
+        return self.state.current
 
     @property
     def open_trial(self) -> Trial | None:
         """The trial that waits to be told, if any."""
-        return self._history.open_trial
+        return self.state.open_trial
 
     @property
     def solved(self) -> bool:
         """Whether a told trial reached the goal that is worked on."""
-        return any(trial.hit for trial in self.trials)
+        return self.state.solved
 
     @property
     def n_trials(self) -> int:
         """Trials told so far for the goal that is worked on; voided ones are not counted."""
         return sum(trial.stage is Stage.TOLD for trial in self.trials)
-
-    @property
-    def n_trials_asked(self) -> int:
-        """Trials asked for so far, for all goals: the number of the latest."""
-        return len(self._history.trials)
 
     def trial(self, number: int) -> Trial:
         """Return a trial of any goal as it stands.
@@ -188,15 +170,7 @@ class Session:
         Raises:
             TrialStateError: There is no such trial.
         """
-        if not isinstance(number, Integral) or isinstance(number, bool):
-            raise TrialStateError(
-                f"a trial's number is a whole number, got {number!r}; give .number"
-            )
-        trials = self._history.trials
-        if not 1 <= number <= len(trials):
-            known = f"give a number from 1 to {len(trials)}" if trials else "ask for one first"
-            raise TrialStateError(f"there is no trial {number}; {known}")
-        return trials[number - 1]
+        return self.state.trial(number)
 
     def set_goal(
         self,
@@ -224,7 +198,7 @@ class Session:
             TrialStateError: A trial for the goal before waits to be told.
         """
         self._refresh()
-        self.refuse_open_trial("setting a goal")  # before anything is said of the goal
+        self.state.refuse_open_trial("setting a goal")  # before anything is said of the goal
         checked = self.demonstrations.check_goal(goal)
         tolerance = _as_tolerance(self._tolerance if tolerance is None else tolerance)
         carried = self._carry_over if carry_over is None else carry_over
@@ -232,19 +206,19 @@ class Session:
             kind = ADAPTERS.kind(adapter) if adapter else type(self.adapter)
             carried = kind.carries_over
         with self._exclusive():
-            self.refuse_open_trial("setting a goal")
-            data = {
-                "goal": checked.tolist(),
-                "tolerance": tolerance,
-                "metric": Normalisation.of(self.demonstrations).metric.tolist(),
-                "memory": "workspace" if carried else "goal",
-                "adapter": adapter,
-            }
-            if new_hardware is not None:
-                data["new_hardware"] = new_hardware
-            self.log.append("goal_set", data)
+            self.state.refuse_open_trial("setting a goal")
+            event = GoalSet(
+                goal=checked.tolist(),
+                tolerance=tolerance,
+                metric=Normalisation.of(self.demonstrations).metric.tolist(),
+                units=list(self.demonstrations.outcome_units),
+                carry_over=carried,
+                adapter=adapter,
+                new_hardware=new_hardware,
+            )
+            self.log.append(event)
         self._refresh()
-        return self._history.goals[-1]
+        return self.state.goals[-1]
 
     def ask(self, *, arm_did_not_move: bool = False) -> Trial:
         """Return the trial to execute next: the open one, or a new one.
@@ -256,6 +230,9 @@ class Session:
         Args:
             arm_did_not_move: What a person saw of a trial that was executing when the program died:
                 nothing moved, it may be executed after all.
+
+        Returns:
+            The trial, with its plan and the gate's verdict on it.
 
         Raises:
             RobotLimitError: The plan breaks a limit of the robot.
@@ -294,7 +271,7 @@ class Session:
                     f"trial {number} is already {trial.stage.value}; "
                     + ("amend it to correct it" if trial.stage is Stage.TOLD else "ask for another")
                 )
-            self._append_reading("told", trial, seen, hit)
+            self._append_reading(Told, trial, seen, hit)
         return self._now(number)
 
     def amend(
@@ -317,7 +294,7 @@ class Session:
                     f"trial {number} is {trial.stage.value}, only a told trial can be amended; "
                     + ("tell it" if trial.open else "ask for another")
                 )
-            self._append_reading("amended", trial, seen, hit)
+            self._append_reading(Amended, trial, seen, hit)
         return self._now(number)
 
     def void(self, number: int, reason: str) -> Trial:
@@ -332,61 +309,11 @@ class Session:
                 raise TrialStateError(f"trial {number} is already voided; ask for another")
             # What a terminal could not decode cannot be printed again.
             text = reason.encode(errors="replace").decode()
-            self.log.append("voided", {"trial": trial.number, "reason": text})
+            self.log.append(Voided(trial=trial.number, reason=text))
         return self._now(number)
-
-    def begin_execution(self, number: int, command: str, folder: str = "") -> Trial:
-        """Note that a trial's plan is given to a command now: a plan is executed once.
-
-        Args:
-            number: The trial.
-            command: Its text.
-            folder: Name of the folder for what it writes, if any.
-
-        Raises:
-            TrialStateError: There is no such trial, or it was executed already.
-        """
-        with self._exclusive():
-            trial = self.trial(number)
-            if trial.stage is not Stage.ASKED:
-                raise TrialStateError(
-                    f"trial {number} is {trial.stage.value} already; a plan runs once: tell it or "
-                    "void it, then ask for the next"
-                )
-            data = {"trial": trial.number, "command": command, "folder": folder}
-            self.log.append("executing", data)
-        return self._now(number)
-
-    def end_execution(self, number: int, result: Mapping[str, Any] | None) -> Trial:
-        """Note how the command ended.
-
-        Args:
-            number: The trial.
-            result: What came of it; None if it was never started. Where nothing moved, as then or
-                where its `outcome` is `not_moved`, the trial may be executed after all.
-        """
-        with self._exclusive():
-            trial = self.trial(number)
-            if trial.stage is Stage.EXECUTING:  # it may have been told meanwhile
-                moved = result is not None and result.get("outcome") != "not_moved"
-                kind = "executed" if moved else "not_executed"
-                self.log.append(kind, {"trial": trial.number, **(result or {})})
-        return self._now(number)
-
-    def refuse_open_trial(self, doing: str) -> None:
-        """Do nothing unless a trial waits to be told.
-
-        Raises:
-            TrialStateError: One does.
-        """
-        trial = self.open_trial
-        if trial is not None:
-            raise TrialStateError(
-                f"trial {trial.number} waits to be told; tell or void it before {doing}"
-            )
 
     def _current_goal(self) -> Goal:
-        goal = self._history.goal
+        goal = self.state.goal
         if goal is None:
             raise WorkspaceError(
                 "no goal is set; set one (Session.set_goal, or: prior-reinforce goal)"
@@ -396,9 +323,9 @@ class Session:
     def _refresh(self) -> None:
         """Know all that the log says, and forget what was loaded if other things are in use."""
         with self._lock:
-            self._history.update(self.log.events())
-            goal = self._history.goal
-            now = (*self._in_use(), "" if goal is None else goal.adapter)
+            self.state = self.log.state()
+            goal = self.state.goal
+            now = (*self.state.in_use, "" if goal is None else goal.adapter)
             if now != self._loaded_for:
                 self._loaded_for, self._observed = now, None
                 for name in ("generator", "adapter", "demonstrations"):
@@ -406,7 +333,7 @@ class Session:
 
     def _now(self, number: int) -> Trial:
         self._refresh()
-        return self._history.trials[number - 1]
+        return self.state.trials[number - 1]
 
     def _exclusive(self) -> ExitStack:
         """Hold the log, and know all that it says."""
@@ -417,55 +344,18 @@ class Session:
             return stack.pop_all()
 
     def _append_reading(
-        self, kind: str, trial: Trial, seen: Reading | ArrayLike | None, hit: bool | None
+        self,
+        event: type[Told],
+        trial: Trial,
+        seen: Reading | ArrayLike | None,
+        hit: bool | None,
     ) -> None:
-        goal = self._history.goals[trial.goal_number - 1]
-        if not (hit is None or isinstance(hit, (bool, np.bool_))):
-            raise InvalidFeedbackError(f"hit must be True, False or None, got {hit!r}")
-        reading = self._as_reading(seen, goal, hit).with_hit(hit)
+        goal = self.state.goals[trial.goal_number - 1]
+        reading = as_reading(seen, hit, goal.units, goal.least_sd)
         reached = reading.hit
         if reached is None:
             reached = goal.distance(reading.error_seen) <= goal.tolerance
-        data = {
-            "trial": trial.number,
-            "error_seen": reading.error_seen.tolist(),
-            "reading": reading.as_json(),
-            "hit": bool(reached),
-        }
-        self.log.append(kind, data)
-
-    def _as_reading(
-        self, seen: Reading | ArrayLike | None, goal: Goal, hit: bool | None
-    ) -> Reading:
-        k = goal.goal.size
-        if seen is None:
-            if hit is None:
-                raise InvalidFeedbackError("say what was seen, or whether it hit")
-            return Reading.only(bool(hit), k)
-        if isinstance(seen, str):
-            units = self.demonstrations.outcome_units
-            if not in_words(units):
-                raise InvalidFeedbackError(
-                    f"words are for lengths, these outcomes are in {', '.join(units)}; give {k} "
-                    "numbers"
-                )
-            return from_words(seen, k)
-        if not isinstance(seen, Reading):
-            return goal.estimated(as_error(seen, k))
-        as_error(seen.error_seen, k)
-        return seen
-
-    def _settle(self, trial: Trial, arm_did_not_move: bool) -> None:
-        """Note that a trial that was executing may be executed after all; within `_exclusive`."""
-        if self.log.is_executing():
-            raise TrialStateError(f"trial {trial.number} is executing now; wait for it")
-        if not arm_did_not_move:
-            raise TrialStateError(
-                f"trial {trial.number} was executing when the program stopped; did the arm move? "
-                f"If it did, tell or void trial {trial.number}; if it did not, ask again with "
-                "--arm-did-not-move"
-            )
-        self.log.append("not_executed", {"trial": trial.number})
+        self.log.append(event(trial=trial.number, reading=reading.record(), hit=bool(reached)))
 
     def informed_adapter(self) -> Adapter:
         """The adapter, after it has seen every reading that counts for the goal of now.
@@ -486,16 +376,15 @@ class Session:
 
     def _inform(self) -> None:
         """Let the adapter see every reading that counts."""
-        readings = self._history.readings_for(self._current_goal(), self._loaded_for[0])
+        readings = self.state.readings_for(self._current_goal(), self._loaded_for[0])
         seen, self._observed = self._observed, None  # until it has seen them all
-        # Another session's readings are in it, where two share it by mistake.
-        if vars(self.adapter).get("_used_by") is not self._mark:
-            vars(self.adapter)["_used_by"], seen = self._mark, None
-        if seen is None or seen != readings[: len(seen)]:  # one was voided or amended: start again
+        # Start again if one was voided or amended, or if another session has used the adapter.
+        again = self.adapter.n_starts != self._start
+        if again or seen is None or seen != readings[: len(seen)]:
             self.adapter.start(self.demonstrations)
-            seen, self._on_hardware_of = [], 0
+            seen, self._start, self._on_hardware_of = [], self.adapter.n_starts, 0
         for trial in readings[len(seen) :]:
-            goal = self._history.goals[trial.goal_number - 1]
+            goal = self.state.goals[trial.goal_number - 1]
             assert trial.reading is not None
             self._change_hardware_until(goal.number)
             reading = trial.reading.within(goal.radius)
@@ -505,28 +394,29 @@ class Session:
 
     def _change_hardware_until(self, goal_number: int) -> None:
         """Tell the adapter of every change of hardware up to a goal, once."""
-        for goal in self._history.goals[self._on_hardware_of : goal_number]:
+        for goal in self.state.goals[self._on_hardware_of : goal_number]:
             if goal.new_hardware is not None:
                 self.adapter.change_hardware()
         self._on_hardware_of = max(self._on_hardware_of, goal_number)
 
-    def _open(self, condition: Point, plan: Frames) -> None:
+    def _open(self, condition: Point, plan: Frames) -> Verdict | None:
         """Write a new trial down, if its plan may be executed."""
         goal = self._current_goal()
         verdict = self._check(plan, self._say_no_plan(goal.goal, condition))
-        number = len(self._history.trials) + 1
+        number = len(self.state.trials) + 1
         expected = self.adapter.expect(condition, goal.goal, goal.tolerance)
-        data = {
-            "trial": number,
-            "goal": goal.number,
-            "condition": condition.tolist(),
-            "model": self._loaded_for[0],
-            "gate": None if verdict is None else verdict.as_json(),
-            "p_hit": None if expected is None else expected.p_hit,
-            "expected_trials": None if expected is None else expected.trials,
-            **self.log.keep_plan(number, plan),
-        }
-        self.log.append("asked", data)
+        event = Asked(
+            trial=number,
+            goal=goal.number,
+            condition=condition.tolist(),
+            model=self._loaded_for[0],
+            gate=None if verdict is None else verdict.as_json(),
+            p_hit=None if expected is None else expected.p_hit,
+            expected_trials=None if expected is None else expected.trials,
+            plan=self.log.keep_plan(number, plan),
+        )
+        self.log.append(event)
+        return verdict
 
     def _say_no_plan(self, goal: Point, condition: Point) -> str:
         """For which goal there is no plan, and why that is, where it is simply too far."""
@@ -538,15 +428,20 @@ class Session:
             said += ", which lies far outside the demonstrations (choose one nearer to them)"
         return said
 
-    def _with_plan(self, number: int, *, is_new: bool) -> Trial:
-        """A trial with its plan, unless the gate refuses it now."""
+    def _with_plan(self, number: int, opened: Sequence[Verdict | None]) -> Trial:
+        """A trial with its plan and the gate's verdict, unless the gate refuses it now.
+
+        `opened` holds the verdict on a trial that was opened just now.
+        """
         trial = self._now(number)
         if not trial.open:
             raise TrialStateError(f"trial {number} was {trial.stage.value} meanwhile; ask again")
         plan = self.log.plan(trial) if trial.plan is None else trial.plan
-        if not is_new:
-            self._check(plan, f"trial {number} may not be executed now, void it and ask again")
-        return trial if trial.plan is not None else replace(trial, plan=plan)
+        refusal = f"trial {number} may not be executed now, void it and ask again"
+        verdict = opened[0] if opened else self._check(plan, refusal)
+        if trial.plan is plan and verdict is None:
+            return trial
+        return replace(trial, plan=plan, verdict=verdict)
 
     def _check(self, plan: Frames, refusal: str) -> Verdict | None:
         """What the gate says of a plan; an error that begins with `refusal` if it refuses."""
@@ -584,9 +479,10 @@ def ask_all(sessions: Sequence[Session], *, arm_did_not_move: bool = False) -> l
             logs.enter_context(session._exclusive())
             trial = session.open_trial
             if trial is not None and trial.stage is Stage.EXECUTING:
-                session._settle(trial, arm_did_not_move)
-            numbers.append(session.n_trials_asked + 1 if trial is None else trial.number)
+                session.log.settle(trial, arm_did_not_move=arm_did_not_move)
+            numbers.append(len(session.state.trials) + 1 if trial is None else trial.number)
         new = [session for session in sessions if session.open_trial is None]
+        verdicts: dict[Session, Verdict | None] = {}
         if new:
             generator = new[0].generator
             if any(session.generator is not generator for session in new):
@@ -598,9 +494,9 @@ def ask_all(sessions: Sequence[Session], *, arm_did_not_move: bool = False) -> l
                     "the generator gives plans that hold no numbers (nan or inf); learn again"
                 )
             for session, condition, plan in zip(new, conditions, plans, strict=True):
-                session._open(condition, plan)
+                verdicts[session] = session._open(condition, plan)
     return [
-        session._with_plan(number, is_new=session in new)
+        session._with_plan(number, [verdicts[session]] if session in verdicts else [])
         for session, number in zip(sessions, numbers, strict=True)
     ]
 

@@ -1,30 +1,51 @@
-"""What a session knows: its goals, its trials, and the log of events that they follow from.
+"""What a session knows: its goals and trials, as the fold of a log of events.
 
-A log is a list of events that only grows. What stands is a fold over it (`History`), so a session
-can be brought back from its log alone. `MemoryLog` is a list; a workspace keeps a journal on disk.
-
-| event | data |
-|---|---|
-| `goal_set` | goal, tolerance, metric, memory (`workspace` carries over), adapter, new_hardware |
-| `asked` | trial, goal (its number), condition, model, gate, p_hit, expected_trials, and its plan |
-| `executing`, `executed`, `not_executed` | trial, and what executed it |
-| `told`, `amended` | trial, error_seen, reading (what was said, `Reading.as_json`), hit |
-| `voided` | trial, reason |
+What stands is `State`, so a session can be brought back from its log alone. `MemoryLog` keeps the
+events in a list; a workspace keeps a journal on disk.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from enum import Enum
+from numbers import Integral
 from typing import Any, Protocol
 
 import numpy as np
 
 from prior_reinforce.arrays import Frames, Point
-from prior_reinforce.errors import InvalidFeedbackError, WorkspaceError
+from prior_reinforce.errors import (
+    InvalidFeedbackError,
+    PriorReinforceError,
+    TrialStateError,
+    WorkspaceError,
+)
 from prior_reinforce.readings import Reading
+from prior_reinforce.session.events import (
+    Amended,
+    Asked,
+    Entry,
+    Event,
+    GoalSet,
+    KeptPlan,
+    Told,
+    Voided,
+)
+
+
+class Verdict(Protocol):
+    """What a gate says of a plan; see `bench.robots.report.LimitReport`."""
+
+    def require(self) -> None:
+        """Raise RobotLimitError unless the plan may be executed."""
+
+    def text(self) -> str:
+        """The same for a person."""
+
+    def as_json(self) -> dict[str, Any]:
+        """The same as plain data, for the log."""
 
 
 class Stage(Enum):
@@ -66,6 +87,8 @@ class Goal:
     """The adapter's name; empty where the session was given one by hand."""
     new_hardware: str | None = None
     """What was changed on the hardware before its first trial; None where nothing was."""
+    units: tuple[str, ...] = ()
+    """Units of the components."""
 
     def distance(self, error: Point) -> float:
         """How far an error, outcome minus goal, is from the goal, in the first component's unit."""
@@ -76,9 +99,10 @@ class Goal:
         """The tolerance along each component alone, in its own unit."""
         return np.asarray(self.tolerance / self.metric)
 
-    def estimated(self, error: Point) -> Reading:
-        """Return what a number of unknown origin says, whatever its unit."""
-        return Reading.estimated(error, _LEAST_SD * self.radius)
+    @property
+    def least_sd(self) -> Point:
+        """Least standard deviation of an error of unknown origin, in each component's unit."""
+        return _LEAST_SD * self.radius
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,11 +132,12 @@ class Trial:
     """Trials until the goal is reached, this one included, likewise."""
     model: str = ""
     """Which model planned it: the name of its folder in a workspace, else empty."""
-    kept: Mapping[str, Any] = field(default_factory=dict)
-    """What its log keeps of the plan, for instance a file and its hash."""
-    execution: Mapping[str, Any] = field(default_factory=dict)
-    """What is known of its execution: how the command ended, what the driver said; empty where a
-    person executed it."""
+    kept: KeptPlan | None = None
+    """The plan's file; None where the log keeps plans in memory."""
+    gate: dict[str, Any] | None = None
+    """The gate's verdict when the trial was asked for, as plain data."""
+    verdict: Verdict | None = None
+    """The gate's verdict of now, on a trial that `Session.ask` returned; None without a gate."""
 
     @property
     def error_seen(self) -> Point | None:
@@ -125,82 +150,46 @@ class Trial:
         return self.stage in {Stage.ASKED, Stage.EXECUTING, Stage.EXECUTED}
 
 
-@dataclass(frozen=True)
-class Event:
-    """Something that happened, and will always have happened."""
-
-    id: int
-    """Order of events, from 1."""
-    kind: str
-    """One of this module's table, or a workspace's own."""
-    data: Mapping[str, Any]
-    """What it says; JSON types in a journal."""
-    time: str = ""
-    """When it was written, ISO 8601, UTC; empty in memory."""
-
-
 class Log(Protocol):
     """Where the events of a session are kept."""
 
-    def events(self) -> Sequence[Event]:
-        """All events so far, in order."""
+    def state(self) -> State:
+        """What happened so far, whoever wrote it."""
 
     def exclusive(self) -> AbstractContextManager[object]:
         """Hold the log for reading and then appending; what is appended is kept when it ends."""
 
-    def append(self, kind: str, data: Mapping[str, Any]) -> None:
+    def append(self, event: Event) -> None:
         """Add an event; called within `exclusive`."""
 
-    def keep_plan(self, number: int, plan: Frames) -> Mapping[str, Any]:
-        """Keep a trial's plan, and return what its event says of it."""
+    def keep_plan(self, number: int, plan: Frames) -> KeptPlan | None:
+        """Keep a trial's plan, and return its file if it has one."""
 
     def plan(self, trial: Trial) -> Frames:
         """Return a plan that was kept."""
 
-    def is_executing(self) -> bool:
-        """Whether something executes a plan right now."""
+    def settle(self, trial: Trial, *, arm_did_not_move: bool) -> None:
+        """Note that an executing trial may be executed after all; called within `exclusive`.
+
+        Raises:
+            TrialStateError: It is executing now, or nobody has said whether the arm moved.
+        """
 
 
-class MemoryLog:
-    """A log that lasts as long as the program."""
-
-    def __init__(self) -> None:
-        """Start empty."""
-        self._events: list[Event] = []
-
-    def events(self) -> Sequence[Event]:
-        """See `Log.events`."""
-        return self._events
-
-    def exclusive(self) -> AbstractContextManager[object]:
-        """Nobody else can append."""
-        return nullcontext()
-
-    def append(self, kind: str, data: Mapping[str, Any]) -> None:
-        """See `Log.append`."""
-        self._events.append(Event(len(self._events) + 1, kind, data))
-
-    def keep_plan(self, number: int, plan: Frames) -> Mapping[str, Any]:
-        """The plan stays in its event."""
-        return {"plan": plan}
-
-    def plan(self, trial: Trial) -> Frames:
-        """See `Log.plan`."""
-        return np.asarray(trial.plan)
-
-    def is_executing(self) -> bool:
-        """Nothing that this log knows of."""
-        return False
-
-
-class History:
+class State:
     """What the events of a log add up to."""
 
     def __init__(self) -> None:
         """Nothing has happened."""
         self.goals: list[Goal] = []
         self.trials: list[Trial] = []
-        self._n_events = 0
+        self.plans: dict[int, Frames] = {}
+        """Plans that are kept in memory, by the trial's number."""
+
+    @property
+    def in_use(self) -> tuple[str, ...]:
+        """Name of the model in use, and of whatever else a session loads."""
+        return ("",)
 
     @property
     def goal(self) -> Goal | None:
@@ -211,6 +200,32 @@ class History:
     def open_trial(self) -> Trial | None:
         """The trial that waits to be told, if any."""
         return next((trial for trial in self.trials if trial.open), None)
+
+    @property
+    def solved(self) -> bool:
+        """Whether a told trial reached the goal that is worked on."""
+        return any(trial.hit for trial in self.current)
+
+    @property
+    def current(self) -> tuple[Trial, ...]:
+        """Trials for the goal that is worked on, in order."""
+        return self.trials_of(len(self.goals))
+
+    def trial(self, number: int) -> Trial:
+        """Return a trial of any goal as it stands.
+
+        Raises:
+            TrialStateError: There is no such trial.
+        """
+        if not isinstance(number, Integral) or isinstance(number, bool):
+            raise TrialStateError(
+                f"a trial's number is a whole number, got {number!r}; give .number"
+            )
+        n = len(self.trials)
+        if not 1 <= number <= n:
+            known = f"give a number from 1 to {n}" if n else "ask for one first"
+            raise TrialStateError(f"there is no trial {number}; {known}")
+        return self.trials[number - 1]
 
     def trials_of(self, goal_number: int) -> tuple[Trial, ...]:
         """Trials of one goal, in order."""
@@ -231,106 +246,141 @@ class History:
             and trial.goal_number <= goal.number
         ]
 
-    def update(self, events: Sequence[Event]) -> None:
-        """Take in the events of the log that came since the last time.
+    def refuse_open_trial(self, doing: str) -> None:
+        """Do nothing unless a trial waits to be told.
 
         Raises:
-            WorkspaceError: An event cannot follow the others.
+            TrialStateError: One does.
         """
-        for event in events[self._n_events :]:
-            try:
-                self._apply(event.kind, event.data)
-            except (KeyError, IndexError, TypeError, ValueError, InvalidFeedbackError) as error:
-                raise WorkspaceError(
-                    f"event {event.id} ({event.kind}) does not fit the ones before it: {error!r}; "
-                    "restore the journal from a copy"
-                ) from error
-            self._n_events += 1
+        trial = self.open_trial
+        if trial is not None:
+            raise TrialStateError(
+                f"trial {trial.number} waits to be told; tell or void it before {doing}"
+            )
 
-    def _apply(self, kind: str, data: Mapping[str, Any]) -> None:
-        if kind == "goal_set":
-            self.goals.append(
-                Goal(
-                    len(self.goals) + 1,
-                    _read_only(data["goal"]),
-                    data["tolerance"],
-                    _read_only(data.get("metric", [1.0] * len(data["goal"]))),
-                    data["memory"] == "workspace",
-                    data.get("adapter", "gp"),  # the first journals knew no other
-                    data.get("new_hardware"),
+    def add(self, entry: Entry) -> None:
+        """Take in the next event.
+
+        Raises:
+            WorkspaceError: It cannot follow the others.
+        """
+        try:
+            self._apply(entry.event)
+        except (IndexError, ValueError, PriorReinforceError) as error:
+            raise WorkspaceError(
+                f"event {entry.id} ({entry.kind}) does not fit the ones before it: {error}; "
+                "restore the journal from a copy"
+            ) from error
+
+    def _apply(self, event: Event) -> None:
+        match event:
+            case GoalSet():
+                self.goals.append(
+                    Goal(
+                        len(self.goals) + 1,
+                        _read_only(event.goal),
+                        event.tolerance,
+                        _read_only(event.metric),
+                        event.carry_over,
+                        event.adapter,
+                        event.new_hardware,
+                        tuple(event.units),
+                    )
                 )
-            )
-        elif kind == "asked":
-            number = data["trial"]
-            if number != len(self.trials) + 1 or self.open_trial is not None:
-                raise ValueError(f"trial {number} after {len(self.trials)}")
-            plan = data.get("plan")
-            self.trials.append(
-                Trial(
-                    number,
-                    data["goal"],
-                    _read_only(data["condition"]),
-                    None if plan is None else _read_only(plan),
-                    p_hit=data.get("p_hit"),
-                    expected_trials=data.get("expected_trials"),
-                    model=data.get("model", ""),
-                    kept=data,
+            case Asked():
+                if event.trial != len(self.trials) + 1 or self.open_trial is not None:
+                    raise ValueError(f"trial {event.trial} after {len(self.trials)}")
+                if not 1 <= event.goal <= len(self.goals):
+                    raise ValueError(f"there is no goal {event.goal}")
+                self.trials.append(
+                    Trial(
+                        event.trial,
+                        event.goal,
+                        _read_only(event.condition),
+                        self.plans.get(event.trial),
+                        p_hit=event.p_hit,
+                        expected_trials=event.expected_trials,
+                        model=event.model,
+                        kept=event.plan,
+                        gate=event.gate,
+                    )
                 )
-            )
-        elif kind in _CHANGES:
-            changes: dict[str, Any] = {"stage": _CHANGES[kind]}
-            if kind in {"told", "amended"}:
-                changes |= {"reading": self._reading(data), "hit": data["hit"]}
-            if kind in {"executing", "executed", "not_executed"}:
-                changes["execution"] = data
-            if kind == "voided":
-                changes |= {"reading": None, "hit": False, "note": data["reason"]}
-            index = range(1, len(self.trials) + 1).index(data["trial"])
-            before, after = self.trials[index], replace(self.trials[index], **changes)
-            if kind in {"amended", "voided"} and _meaning(before) != _meaning(after):
-                self._outdate(before)
-            self.trials[index] = after
+            case Amended():
+                told = self._told(event)
+                self._outdate(told)
+                self.trials[event.trial - 1] = told
+            case Told():
+                self.trials[event.trial - 1] = self._told(event)
+            case Voided():
+                trial = self.trial(event.trial)
+                void = replace(
+                    trial, stage=Stage.VOIDED, reading=None, hit=False, note=event.reason
+                )
+                self._outdate(void)
+                self.trials[event.trial - 1] = void
+            case _:
+                raise ValueError("no event of a session")
+
+    def _told(self, event: Told) -> Trial:
+        trial = self.trial(event.trial)
+        reading = Reading.from_record(event.reading)
+        if reading.error_seen.size != self.goals[trial.goal_number - 1].goal.size:
+            raise InvalidFeedbackError("the reading has another number of components than the goal")
+        return replace(trial, stage=Stage.TOLD, reading=reading, hit=event.hit)
 
     def _outdate(self, corrected: Trial) -> None:
         """Mark the open trial if it was planned from a reading that is corrected now."""
-        trial = self.open_trial
-        if trial is None or corrected.open:
+        before, waiting = self.trial(corrected.number), self.open_trial
+        if waiting is None or before.open or _meaning(before) == _meaning(corrected):
             return
-        used = self.readings_for(self.goals[trial.goal_number - 1], trial.model)
-        if corrected.number in {reading.number for reading in used}:
-            self.trials[trial.number - 1] = replace(trial, outdated=True)
-
-    def _reading(self, data: Mapping[str, Any]) -> Reading:
-        """What was told; the first journals kept a number a component, and nothing of its origin.
-
-        Nor whether a hit was seen or judged: what differs from the judgement was seen.
-        """
-        if "reading" in data:
-            return Reading.from_json(data["error_seen"], data["reading"])
-        goal = self.goals[self.trials[data["trial"] - 1].goal_number - 1]
-        reading = goal.estimated(_read_only(data["error_seen"]))
-        judged = goal.distance(reading.error_seen) <= goal.tolerance
-        return reading.with_hit(data["hit"] if data["hit"] != judged else None)
+        used = self.readings_for(self.goals[waiting.goal_number - 1], waiting.model)
+        if before.number in {reading.number for reading in used}:
+            self.trials[waiting.number - 1] = replace(waiting, outdated=True)
 
 
-_CHANGES = {
-    "executing": Stage.EXECUTING,
-    "executed": Stage.EXECUTED,
-    "not_executed": Stage.ASKED,
-    "told": Stage.TOLD,
-    "amended": Stage.TOLD,
-    "voided": Stage.VOIDED,
-}
-KINDS = frozenset({"goal_set", "asked", *_CHANGES})
-"""Events that a session writes."""
+class MemoryLog:
+    """A log that lasts as long as the program."""
+
+    def __init__(self) -> None:
+        """Start empty."""
+        self._entries: list[Entry] = []
+        self._state = State()
+
+    def entries(self) -> Sequence[Entry]:
+        """All events so far, in order."""
+        return self._entries
+
+    def state(self) -> State:
+        """See `Log.state`."""
+        return self._state
+
+    def exclusive(self) -> AbstractContextManager[object]:
+        """Nobody else can append."""
+        return nullcontext()
+
+    def append(self, event: Event) -> None:
+        """See `Log.append`."""
+        entry = Entry(len(self._entries) + 1, event)
+        self._state.add(entry)
+        self._entries.append(entry)
+
+    def keep_plan(self, number: int, plan: Frames) -> None:
+        """See `Log.keep_plan`."""
+        self._state.plans[number] = _read_only(plan)
+
+    def plan(self, trial: Trial) -> Frames:
+        """See `Log.plan`."""
+        return self._state.plans[trial.number]
+
+    def settle(self, trial: Trial, *, arm_did_not_move: bool) -> None:
+        """See `Log.settle`; nothing is executed from here."""
+        raise NotImplementedError("only a workspace executes trials")
 
 
 def _meaning(trial: Trial) -> object:
     """What was seen of a trial, in whatever words; None unless told."""
     reading = trial.reading
-    if reading is None:
-        return None
-    return reading.error_seen.tolist(), trial.hit, {**reading.as_json(), "said": ""}
+    return None if reading is None else (replace(reading, said="").record(), trial.hit)
 
 
 def _read_only(values: Any) -> np.ndarray:

@@ -54,7 +54,7 @@ def void(workspace, number, reason):
 
 def trials(workspace):
     session = workspace.session()
-    return [trial for goal in session.goals for trial in session.trials_of(goal.number)]
+    return [trial for goal in session.goals for trial in session.state.trials_of(goal.number)]
 
 
 def recordings(folder, outcomes=range(4)):

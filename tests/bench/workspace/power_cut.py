@@ -79,7 +79,7 @@ def check(folder, told_before):
     told = sum(event.kind in {"told", "voided"} for event in workspace.events)
     assert told >= told_before, "a told trial is missing"
     session = workspace.session()
-    trials = [trial for goal in session.goals for trial in session.trials_of(goal.number)]
+    trials = [trial for goal in session.goals for trial in session.state.trials_of(goal.number)]
     assert [trial.number for trial in trials] == list(range(1, len(trials) + 1))
     for trial in trials:
         workspace.plan(trial)
@@ -89,7 +89,7 @@ def check(folder, told_before):
 
 def said(folder):
     workspace = Workspace(folder)
-    events = [(event.kind, event.data) for event in workspace.events]
+    events = [entry.event for entry in workspace.events]
     workspace.close()
     return events
 

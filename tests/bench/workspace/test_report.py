@@ -6,6 +6,7 @@ import sys
 import numpy as np
 import pytest
 
+from prior_reinforce.bench.robots.report import LimitLine, LimitReport
 from prior_reinforce.bench.workspace.report import _checks
 from prior_reinforce.session.trials import Stage, Trial
 
@@ -74,17 +75,18 @@ def test_an_aborted_execution_is_said_as_status_says_it(run, folder, tmp_path):
 def trial(number, **lines):
     """A trial whose gate said this of each check: its status and margin."""
     said = [
-        {"check": check, "status": status, "margin": margin, "text": f"{check} of {number}"}
+        LimitLine(check=check, status=status, margin=margin, text=f"{check} of {number}")
         for check, (status, margin) in lines.items()
     ]
-    return Trial(number, 1, np.zeros(2), stage=Stage.ASKED, kept={"gate": {"lines": said}})
+    gate = LimitReport("arm", "any", "a manual", tuple(said)).as_json()
+    return Trial(number, 1, np.zeros(2), stage=Stage.ASKED, gate=gate)
 
 
 def test_the_plan_that_came_nearest_to_a_limit_is_shown():
     trials = [
         trial(1, velocity=("pass", 0.5), jerk=("warn", 0.1), box=("unchecked", None)),
         trial(2, velocity=("pass", 0.2), jerk=("pass", 0.05), box=("pass", 0.3)),
-        Trial(3, 1, np.zeros(2), stage=Stage.ASKED, kept={"gate": None}),
+        Trial(3, 1, np.zeros(2), stage=Stage.ASKED),
     ]
     rows = [(row.check, row.status, row.trial) for row in _checks(trials)]
     assert rows == [("velocity", "pass", 2), ("jerk", "warn", 1), ("box", "pass", 2)]

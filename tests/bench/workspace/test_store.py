@@ -1,10 +1,8 @@
 """Files that events name: what was damaged on the disk is never handed out."""
 
-import hashlib
 import shutil
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from prior_reinforce.bench.robots.plan_files import write_plan
@@ -18,7 +16,6 @@ from tests.bench.workspace.planar import (
     manifest,
     reopened,
     tell,
-    trials,
     void,
 )
 
@@ -86,13 +83,13 @@ def test_importing_again_mends_damaged_demonstrations(workspace):
 def test_what_a_crash_left_blocks_nothing(workspace):
     """A plan's file that no event names, with the same motion at another tempo, or half of it."""
     number = ask(workspace).number
-    name = workspace.session().trial(1).kept["plan_file"]
+    kept = workspace.state.trial(1).kept
     void(workspace, number, "")
-    frames = workspace.store.plan(name, trials(workspace)[0].kept["plan_sha256"]).actions
-    left = name.replace("trial-001", "trial-002")
+    frames = workspace.store.plan(kept).actions
+    left = kept.file.replace("trial-001", "trial-002")
     write_plan(Plan(frames, replace(FORMAT, dt=0.04)), workspace.store.plan_path(left))
     trial = ask(workspace)
-    assert trial.kept["plan_file"] == left
+    assert trial.kept.file == left
     assert workspace.plan(trial).format.dt == 0.02
 
 
@@ -133,27 +130,6 @@ def test_an_import_that_was_killed_before_its_event_can_be_repeated(tmp_path):
         workspace.store.save_demonstrations(demonstrations())
     with Workspace(tmp_path / "planar") as workspace:
         workspace.import_demonstrations(demonstrations(), "made up")
-
-
-def test_workspaces_that_knew_demonstrations_by_their_numbers_alone_go_on(tmp_path):
-    demos = demonstrations()
-    digest = hashlib.sha256()
-    for array in (demos.plans, demos.outcomes_seen):
-        digest.update(str(array.shape).encode())
-        digest.update(array.tobytes())
-    old = digest.hexdigest()
-    with Workspace.create(tmp_path / "planar", manifest()) as workspace:
-        (workspace.folder / "demonstrations").mkdir()
-        demos.save(workspace.folder / "demonstrations" / f"{old[:16]}.npz")
-        with workspace.log.exclusive():
-            data = {"n": demos.n, "sha256": old, "source": "made up"}
-            workspace.log.append("demonstrations_imported", data)
-        workspace.learn("interpolation")
-        workspace.set_goal([0.9, 0.05])
-        assert ask(workspace).number == 1
-        assert not workspace.log.stale
-        shown = workspace.demonstrations_of(workspace.log.training.model)
-        np.testing.assert_array_equal(shown.plans, demos.plans)
 
 
 def test_the_same_motions_at_another_tempo_need_another_model(tmp_path):

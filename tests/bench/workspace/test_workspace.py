@@ -13,6 +13,7 @@ import pytest
 
 from prior_reinforce.adapters.bayesian import BayesianAdapter
 from prior_reinforce.adapters.proportional import ProportionalAdapter
+from prior_reinforce.bench.workspace.log import Executing
 from prior_reinforce.bench.workspace.status import describe
 from prior_reinforce.bench.workspace.workspace import Workspace
 from prior_reinforce.errors import (
@@ -74,7 +75,7 @@ def test_ask_gives_the_same_plan_also_from_another_program(workspace):
     first = ask(workspace)
     again = reopened(workspace)
     second = ask(again)
-    assert (second.number, second.kept["plan_sha256"]) == (first.number, first.kept["plan_sha256"])
+    assert (second.number, second.kept.sha256) == (first.number, first.kept.sha256)
     assert len(list((workspace.folder / "plans").glob("*.npz"))) == 1
     again.close()
 
@@ -287,7 +288,7 @@ def test_a_command_runs_once_and_its_end_is_kept(workspace):
         workspace.execute(number, "cat {plan}", time_limit=20)
     assert len(list((workspace.folder / "executions").iterdir())) == 1
     tell(workspace, number, [0.02, 0.0])
-    assert workspace.events[-2].data["exit_status"] == 0
+    assert workspace.events[-2].event.exit_status == 0
 
 
 def test_a_plan_that_the_limits_refuse_by_now_is_neither_given_out_nor_executed(workspace):
@@ -317,7 +318,7 @@ def test_a_program_that_is_not_there_leaves_the_trial_to_be_executed(workspace):
 def test_an_execution_that_was_cut_off_is_never_repeated_by_itself(workspace):
     number = ask(workspace).number
     with workspace.log.journal.exclusive():  # what execute writes before the program dies
-        workspace.log.journal.append("executing", {"trial": number, "command": "arm {plan}"})
+        workspace.log.journal.append(Executing(trial=number, command="arm {plan}", folder=""))
     again = reopened(workspace)
     with pytest.raises(TrialStateError, match="did the arm move"):
         ask(again)
@@ -376,6 +377,11 @@ until = time.monotonic() + 60
 while not (here / "stop").exists() and time.monotonic() < until:
     time.sleep(0.02)
 """
+TELLING = """
+import sys
+from prior_reinforce.bench.workspace.workspace import Workspace
+Workspace(sys.argv[1]).session().tell(1, [0.05, 0.0])
+"""
 PROGRAM = """
 import sys
 from prior_reinforce.bench.workspace.workspace import Workspace
@@ -425,7 +431,7 @@ def test_an_execution_whose_program_was_killed_is_recorded_by_what_watched_over_
     wait_for(lambda: not workspace.log.is_executing())
     trial = workspace.recover()
     assert trial.stage is Stage.EXECUTED
-    assert trial.execution["outcome"] == "done"
+    assert workspace.state.executions[1].outcome == "done"
     assert workspace.recover() is None
 
 
@@ -454,13 +460,13 @@ def test_an_execution_that_was_interrupted_is_recorded_as_aborted(workspace, tmp
 
 def test_nothing_moves_where_an_interruption_came_first(workspace, tmp_path, monkeypatch):
     number = ask(workspace).number
-    begin = Session.begin_execution
+    begin = Workspace._begin_execution
 
-    def interrupted(session, *args):
-        begin(session, *args)
+    def interrupted(*args):
+        begin(*args)
         os.kill(os.getpid(), signal.SIGINT)
 
-    monkeypatch.setattr(Session, "begin_execution", interrupted)
+    monkeypatch.setattr(Workspace, "_begin_execution", interrupted)
     with pytest.raises(KeyboardInterrupt):
         workspace.execute(number, f"touch {tmp_path}/ran {{plan}}", time_limit=20)
     assert not (tmp_path / "ran").exists()
@@ -557,11 +563,21 @@ def test_one_long_session_follows_what_is_learned_and_chosen_meanwhile(tmp_path)
 def test_a_session_that_was_open_sees_what_another_window_executes(workspace):
     session = workspace.session()
     session.ask()
-    workspace.session().begin_execution(1, "arm {plan}")
+    with workspace.log.exclusive():
+        workspace.log.append(Executing(trial=1, command="arm {plan}", folder=""))
     with pytest.raises(TrialStateError, match="did the arm move"):
         session.ask()
     assert session.ask(arm_did_not_move=True).stage is Stage.ASKED
-    assert session.end_execution(np.int64(1), None).stage is Stage.ASKED
+
+
+def test_a_plan_runs_once_and_told_while_it_runs_the_trial_stays_told(workspace, tmp_path):
+    number = ask(workspace).number
+    (tmp_path / "tell.py").write_text(TELLING)
+    command = f"{sys.executable} {tmp_path}/tell.py {workspace.folder} {{plan}}"
+    assert workspace.execute(number, command, time_limit=60).succeeded
+    assert workspace.state.trial(number).stage is Stage.TOLD
+    with pytest.raises(TrialStateError, match="told already; a plan runs once"):
+        workspace.execute(number, command, time_limit=60)
 
 
 def test_a_training_that_was_interrupted_goes_on_where_it_was(tmp_path, monkeypatch):

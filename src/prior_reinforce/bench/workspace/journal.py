@@ -1,28 +1,29 @@
 """The trial journal: append-only events in SQLite, each durable before a command returns.
 
 Nothing is ever changed or deleted; what happened is the list of events, and everything else is a
-fold over it (`trials.py`). One program at a time may read-then-append (`Journal.exclusive`). Every
-event carries a digest of itself and of all before it, so that a damaged copy is an error rather
-than a reading that is slightly another one.
+fold over it (`log.WorkspaceState`). One program at a time may read-then-append
+(`Journal.exclusive`). Every event carries a digest of itself and of all before it, so that a
+damaged copy is an error rather than a reading that is slightly another one.
 """
 
 from __future__ import annotations
 
 import hashlib
-import json
 import sqlite3
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from datetime import datetime, timezone
 from pathlib import Path
 from threading import RLock
 from typing import Any
 
+import msgspec
+
 from prior_reinforce.errors import WorkspaceError
-from prior_reinforce.session.trials import Event
+from prior_reinforce.session.events import Entry, Event
 
 JOURNAL_FILE = "journal.sqlite"
-_VERSION = 1
+_VERSION = 2
 # Ours: an operator's second window should wait out a command, not a training.
 _LOCK_TIMEOUT_S = 10.0
 
@@ -30,8 +31,7 @@ _SCHEMA = """
 CREATE TABLE IF NOT EXISTS events (
     id INTEGER PRIMARY KEY AUTOINCREMENT,
     time TEXT NOT NULL,
-    kind TEXT NOT NULL,
-    data TEXT NOT NULL,
+    event TEXT NOT NULL,
     digest TEXT NOT NULL
 ) STRICT;
 CREATE TRIGGER IF NOT EXISTS events_are_never_changed BEFORE UPDATE ON events
@@ -46,19 +46,25 @@ _HEADER_BYTES = 100
 class Journal:
     """Events of one workspace."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, events: Any) -> None:
         """Open a journal; made if there is none.
+
+        Args:
+            path: Its file.
+            events: Union of the events that it may hold.
 
         Raises:
             WorkspaceError: It cannot be opened, is damaged, or was written by a newer version.
         """
         self._path = path
-        self._events: list[Event] = []
+        self._entries: list[Entry] = []
         self._last_digest = ""
+        self._data_version: int | None = None
+        self._decoder = msgspec.json.Decoder(events)
         self._lock = RLock()
         self.appended = False
         """Whether anything became durable since it was opened here."""
-        self._pending = False
+        self._pending: list[tuple[Entry, str]] = []
         # SQLite takes a file of a few bytes for an empty one, and would write over it.
         if path.exists() and 0 < path.stat().st_size < _HEADER_BYTES:
             raise WorkspaceError(
@@ -85,40 +91,47 @@ class Journal:
         """Close the file."""
         self._connection.close()
 
-    @property
-    def empty(self) -> bool:
-        """Whether nothing has happened."""
-        with self._named_errors():
-            return self._connection.execute("SELECT 1 FROM events LIMIT 1").fetchone() is None
-
-    def events(self) -> Sequence[Event]:
-        """All events, in order; only what came since the last time is read from the disk.
+    def entries(self) -> Sequence[Entry]:
+        """All events, in order; they are read anew only where another program has added some.
 
         Raises:
-            WorkspaceError: The file is damaged.
+            WorkspaceError: The file is damaged, or another version wrote it.
         """
         with self._lock, self._named_errors():
-            rows = self._connection.execute(
-                "SELECT id, time, kind, data, digest FROM events WHERE id > ? ORDER BY id",
-                (self._events[-1].id if self._events else 0,),
-            )
-            for id_, time, kind, data, written in rows:
-                digest = _digest(self._last_digest, time, kind, data)
-                if digest != written:
-                    raise WorkspaceError(
-                        f"{self._path}: event {id_} is not what was written; restore the journal "
-                        "from a copy"
-                    )
-                self._events.append(Event(id_, kind, json.loads(data), time))
-                self._last_digest = digest
-        return self._events
+            (version,) = self._connection.execute("PRAGMA data_version").fetchone()
+            if version != self._data_version:
+                self._read()
+                self._data_version = version
+        return self._entries
+
+    def _read(self) -> None:
+        rows = self._connection.execute(
+            "SELECT id, time, event, digest FROM events WHERE id > ? ORDER BY id",
+            (self._entries[-1].id if self._entries else 0,),
+        )
+        for id_, time, text, written in rows:
+            digest = _digest(self._last_digest, time, text)
+            if digest != written:
+                raise WorkspaceError(
+                    f"{self._path}: event {id_} is not what was written; restore the journal "
+                    "from a copy"
+                )
+            try:
+                event = self._decoder.decode(text)
+            except msgspec.ValidationError as error:
+                raise WorkspaceError(
+                    f"event {id_} does not say what it should ({error}); use the version that "
+                    "wrote it, or restore the journal from a copy"
+                ) from error
+            self._entries.append(Entry(id_, event, time))
+            self._last_digest = digest
 
     @contextmanager
     def exclusive(self) -> Iterator[None]:
         """Hold the journal for reading and then appending; others wait, and then say so.
 
-        Appends inside become durable together when the block ends; none does if it raises. Read
-        before the first append: what is not durable yet is no event.
+        Appends inside become durable together when the block ends; none does if it raises. What is
+        not durable yet is no event: `entries` has it once the block has ended.
 
         Raises:
             WorkspaceError: Another program holds it, or the disk refuses.
@@ -126,46 +139,54 @@ class Journal:
         with self._lock:
             with self._named_errors():
                 self._connection.execute("BEGIN IMMEDIATE")
-            self._pending = False
+            self._pending = []
             try:
+                self.entries()
                 yield
                 with self._named_errors():
                     self._connection.execute("COMMIT")
-                self.appended |= self._pending
+                self._keep_pending()
             except BaseException:
-                # A full disk has made SQLite roll back by itself already.
+                self._pending = []
                 if self._connection.in_transaction:
                     self._connection.execute("ROLLBACK")
-                else:
-                    self.appended |= self._pending  # committed, then interrupted
+                else:  # committed and then interrupted, or rolled back already for a full disk
+                    n, self._data_version = len(self._entries), None
+                    with suppress(WorkspaceError):
+                        self.appended |= len(self.entries()) > n
                 raise
 
-    def append(self, kind: str, data: Mapping[str, Any]) -> None:
+    def append(self, event: Event) -> None:
         """Add an event; call it inside `exclusive`.
 
         Raises:
             WorkspaceError: The disk is full, or the folder is read-only.
         """
         assert self._connection.in_transaction, "append inside Journal.exclusive"
+        before = self._pending[-1][1] if self._pending else self._last_digest
         now = datetime.now(timezone.utc).isoformat(timespec="milliseconds")
-        text = json.dumps(data, allow_nan=False)
+        text = msgspec.json.encode(event).decode()
+        digest = _digest(before, now, text)
         with self._named_errors():
-            last = self._connection.execute(
-                "SELECT digest FROM events ORDER BY id DESC LIMIT 1"
-            ).fetchone()
-            digest = _digest(last[0] if last else "", now, kind, text)
-            self._connection.execute(
-                "INSERT INTO events (time, kind, data, digest) VALUES (?, ?, ?, ?)",
-                (now, kind, text, digest),
+            added = self._connection.execute(
+                "INSERT INTO events (time, event, digest) VALUES (?, ?, ?)", (now, text, digest)
             )
-        self._pending = True
+        assert added.lastrowid is not None
+        self._pending.append((Entry(added.lastrowid, event, now), digest))
+
+    def _keep_pending(self) -> None:
+        """What was appended is durable now."""
+        for entry, digest in self._pending:
+            self._entries.append(entry)
+            self._last_digest, self.appended = digest, True
+        self._pending = []
 
     @contextmanager
     def _named_errors(self) -> Iterator[None]:
         try:
             yield
         # A damaged file has texts that are none, also in the errors themselves.
-        except (sqlite3.Error, UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
+        except (sqlite3.Error, UnicodeDecodeError, msgspec.DecodeError, RecursionError) as error:
             text = str(error)
             remedy = "restore it from a copy"
             if "locked" in text or "busy" in text:
@@ -177,5 +198,5 @@ class Journal:
             raise WorkspaceError(f"{self._path}: {text}; {remedy}") from error
 
 
-def _digest(before: str, time: str, kind: str, data: str) -> str:
-    return hashlib.sha256("\0".join(map(str, (before, time, kind, data))).encode()).hexdigest()
+def _digest(before: str, time: str, event: str) -> str:
+    return hashlib.sha256("\0".join((before, time, event)).encode()).hexdigest()

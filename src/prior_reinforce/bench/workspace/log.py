@@ -1,93 +1,41 @@
-"""The journal and the store as one log: the events of trials, and of what is learned from."""
+"""The journal and the store as one log: events of trials, of learning and of executing."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
-
-import msgspec
 
 from prior_reinforce.arrays import Frames
+from prior_reinforce.bench.robots.executors.result import Outcome
 from prior_reinforce.bench.workspace.journal import JOURNAL_FILE, Journal
 from prior_reinforce.bench.workspace.store import Store
-from prior_reinforce.errors import WorkspaceError
+from prior_reinforce.errors import TrialStateError, WorkspaceError
 from prior_reinforce.plans.motions import Plan, PlanFormat
 from prior_reinforce.registry import parse_choice
-from prior_reinforce.session.trials import KINDS, Event, Trial
+from prior_reinforce.session.events import Entry, Event, KeptPlan, SessionEvent
+from prior_reinforce.session.trials import Stage, State, Trial
 
-_KINDS = KINDS | {"demonstrations_imported", "model_trained"}
 
+class DemonstrationsImported(Event, frozen=True):
+    """Demonstrations were imported, in place of earlier ones."""
 
-class _Imported(msgspec.Struct):
     n: int
     sha256: str
+    source: str
 
 
-class _Trained(msgspec.Struct):
-    model: str
-    demonstrations_sha256: str
-    fitted_to_sha256: str = ""
-    generator: str = ""
-    remarks: list[str] = []
-
-
-class _Asked(msgspec.Struct):
-    trial: int
-    goal: int
-    condition: list[float]
-    plan_file: str
-    plan_sha256: str
-    model: str = ""
-
-
-class _GoalSet(msgspec.Struct):
-    goal: list[float]
-    tolerance: float
-    adapter: str = ""
-
-
-class _Executing(msgspec.Struct):
-    trial: int
-    command: str
-    folder: str = ""
-
-
-class _Ended(msgspec.Struct):
-    trial: int
-    outcome: str = ""
-    reason: str = ""
-    start_error: float | None = None
-    tracking_rms: float | None = None
-
-
-_SHAPES: Mapping[str, Any] = {
-    "goal_set": _GoalSet,
-    "executing": _Executing,
-    "executed": _Ended,
-    "not_executed": _Ended,
-    "voided": _Ended,
-    "demonstrations_imported": _Imported,
-    "model_trained": _Trained,
-    "asked": _Asked,
-}
-"""What is read of events here; the others are the session's (`trials.py`)."""
-
-
-@dataclass(frozen=True)
-class Training:
-    """One training."""
+class ModelTrained(Event, frozen=True):
+    """A generator was fitted to the demonstrations, and is in use from now on."""
 
     model: str
     """Hash of the model, the name of its folder."""
-    demonstrations: str
-    """SHA-256 of the demonstrations as they were imported."""
-    fitted_to: str
-    """SHA-256 of what the generator was fitted to; the first journals name aligned copies here."""
     generator: str
     """Its choice, for instance `diffusion`, or `module:Class` of one's own."""
+    seed: int
+    demonstrations_sha256: str
+    """Of the demonstrations that it was fitted to."""
     remarks: tuple[str, ...] = ()
     """What the fit could not do."""
 
@@ -98,8 +46,96 @@ class Training:
         return name if ":" in name else None
 
 
+class Executing(Event, frozen=True):
+    """A trial's plan is about to be given to a command."""
+
+    trial: int
+    command: str
+    folder: str
+    """Name of the folder for what it writes; empty if it was never made."""
+
+
+class Executed(Event, frozen=True):
+    """The command ended, and all that it started. Fields as in `CommandResult`."""
+
+    trial: int
+    outcome: Outcome
+    reason: str = ""
+    start_error: float | None = None
+    tracking_rms: float | None = None
+    command: tuple[str, ...] = ()
+    exit_status: int | None = None
+    timed_out: bool = False
+    interrupted: bool = False
+    seconds: float = 0.0
+    output_tail: str = ""
+
+
+class NotExecuted(Executed, frozen=True):
+    """Nothing moved: the trial may be executed after all."""
+
+    outcome: Outcome = "not_moved"
+
+
+WorkspaceEvent = (
+    SessionEvent | DemonstrationsImported | ModelTrained | Executing | Executed | NotExecuted
+)
+
+
+class WorkspaceState(State):
+    """What the events of a workspace add up to."""
+
+    def __init__(self) -> None:
+        """Nothing has happened."""
+        super().__init__()
+        self.demonstrations: str | None = None
+        """SHA-256 of the demonstrations in use; None before the first import."""
+        self.trainings: dict[str, ModelTrained] = {}
+        """The latest training of every model by its hash; the last is in use."""
+        self.executions: dict[int, Executing | Executed] = {}
+        """The latest event of each trial that a command executed, by its number."""
+
+    @property
+    def training(self) -> ModelTrained | None:
+        """The training of the model in use; None before the first."""
+        return next(reversed(self.trainings.values()), None)
+
+    @property
+    def stale(self) -> bool:
+        """Whether there is no model, or demonstrations were imported since it was learned."""
+        training = self.training
+        return training is None or training.demonstrations_sha256 != self.demonstrations
+
+    @property
+    def in_use(self) -> tuple[str, ...]:
+        """The model and the demonstrations of now."""
+        training = self.training
+        return "" if training is None else training.model, self.demonstrations or ""
+
+    def _apply(self, event: Event) -> None:
+        match event:
+            case DemonstrationsImported():
+                self.demonstrations = event.sha256
+            case ModelTrained():
+                self.trainings.pop(event.model, None)  # learned again, it becomes the last
+                self.trainings[event.model] = event
+            case Executing():
+                self._executed(event, Stage.EXECUTING)
+            case NotExecuted():
+                self._executed(event, Stage.ASKED)
+            case Executed():
+                self._executed(event, Stage.EXECUTED)
+            case _:
+                super()._apply(event)
+
+    def _executed(self, event: Executing | Executed, stage: Stage) -> None:
+        trial = self.trial(event.trial)
+        self.trials[event.trial - 1] = replace(trial, stage=stage)
+        self.executions[event.trial] = event
+
+
 class WorkspaceLog:
-    """The `Log` of a workspace's session (see `trials.Log`), and what else its journal says."""
+    """The `Log` of a workspace's session (see `session.trials.Log`)."""
 
     def __init__(self, folder: Path, store: Store, format: PlanFormat) -> None:
         """Open the journal in a folder; plans are kept in the store, in that format.
@@ -108,14 +144,19 @@ class WorkspaceLog:
             WorkspaceError: The journal cannot be used.
         """
         self._folder, self._store, self._format = folder, store, format
-        self._checked = 0
+        self._state = WorkspaceState()
+        self._n_added = 0
         path = folder / JOURNAL_FILE
         # A new workspace's journal is empty until the first import has ended.
         if not path.exists() or path.stat().st_size == 0:
             self._refuse_files(("demonstrations", "models", "plans"))
-        self.journal = Journal(path)
-        if self.journal.empty:
-            self._refuse_files(("models", "plans"))
+        self.journal = Journal(path, WorkspaceEvent)
+        try:
+            if not self.journal.entries():
+                self._refuse_files(("models", "plans"))
+        except WorkspaceError:
+            self.journal.close()
+            raise
 
     def _refuse_files(self, parts: Sequence[str]) -> None:
         """Refuse to begin anew beside what an earlier journal named."""
@@ -127,46 +168,39 @@ class WorkspaceLog:
                     "that it named; restore the journal from a copy, or make another workspace"
                 )
 
-    def events(self) -> Sequence[Event]:
-        """The journal.
+    def entries(self) -> Sequence[Entry]:
+        """See `Journal.entries`."""
+        return self.journal.entries()
+
+    def state(self) -> WorkspaceState:
+        """What happened so far, in any program.
 
         Raises:
-            WorkspaceError: The journal is damaged, or a newer version wrote it.
+            WorkspaceError: The journal is damaged, or another version wrote it.
         """
-        events = self.journal.events()
-        for event in events[self._checked :]:
-            if event.kind not in _KINDS:
-                raise WorkspaceError(
-                    f"event {event.id} is a {event.kind!r}, which this version does not know; use "
-                    "the version that wrote it, or restore the journal from a copy"
-                )
-            try:
-                msgspec.convert(event.data, _SHAPES.get(event.kind, dict))
-            except msgspec.ValidationError as error:
-                raise WorkspaceError(
-                    f"event {event.id} ({event.kind}) does not say what it should ({error}); "
-                    "restore the journal from a copy"
-                ) from error
-            self._checked += 1
-        return events
+        for entry in self.journal.entries()[self._n_added :]:
+            self._state.add(entry)
+            self._n_added += 1
+        return self._state
 
     def exclusive(self) -> AbstractContextManager[None]:
         """See `Journal.exclusive`."""
         return self.journal.exclusive()
 
-    def append(self, kind: str, data: Mapping[str, Any]) -> None:
+    def append(self, event: Event) -> None:
         """See `Journal.append`."""
-        self.journal.append(kind, data)
+        self.journal.append(event)
 
-    def keep_plan(self, number: int, plan: Frames) -> Mapping[str, Any]:
+    def keep_plan(self, number: int, plan: Frames) -> KeptPlan:
         """Write the plan's file, before the event that names it."""
-        named = {event.data["plan_file"] for event in self.events() if event.kind == "asked"}
+        named = {trial.kept.file for trial in self._state.trials if trial.kept is not None}
         file = self._store.save_plan(Plan(plan, self._format), number, named)
-        return {"plan_file": file.path.name, "plan_sha256": file.sha256}
+        return KeptPlan(file.path.name, file.sha256)
 
     def plan(self, trial: Trial) -> Frames:
         """Read a trial's plan, checked against the hash in the journal."""
-        return self._store.plan(trial.kept["plan_file"], trial.kept["plan_sha256"]).actions
+        assert trial.kept is not None
+        return self._store.plan(trial.kept).actions
 
     def is_executing(self) -> bool:
         """Whether a trial is being executed right now, by any program."""
@@ -174,38 +208,14 @@ class WorkspaceLog:
 
         return is_executing(self._folder)
 
-    @property
-    def demonstrations(self) -> str | None:
-        """SHA-256 of the demonstrations in use; None before the first import."""
-        imported = [e for e in self.events() if e.kind == "demonstrations_imported"]
-        return imported[-1].data["sha256"] if imported else None
-
-    @property
-    def trainings(self) -> Mapping[str, Training]:
-        """Every training, by the model's hash; the last is in use."""
-        trainings: dict[str, Training] = {}
-        for event in self.events():
-            if event.kind == "model_trained":
-                data = event.data
-                sha256 = data["demonstrations_sha256"]
-                trainings.pop(data["model"], None)  # learned again, it becomes the last
-                trainings[data["model"]] = Training(
-                    data["model"],
-                    sha256,
-                    data.get("fitted_to_sha256", sha256),
-                    data.get("generator", "diffusion")  # the first journals knew no other
-                    + (",timing=align" if data.get("fitted_to_sha256", sha256) != sha256 else ""),
-                    tuple(data.get("remarks", ())),
-                )
-        return trainings
-
-    @property
-    def training(self) -> Training | None:
-        """The training of the model in use; None before the first."""
-        return next(reversed(list(self.trainings.values())), None)
-
-    @property
-    def stale(self) -> bool:
-        """Whether there is no model, or demonstrations were imported since it was learned."""
-        training = self.training
-        return training is None or training.demonstrations != self.demonstrations
+    def settle(self, trial: Trial, *, arm_did_not_move: bool) -> None:
+        """See `Log.settle`."""
+        if self.is_executing():
+            raise TrialStateError(f"trial {trial.number} is executing now; wait for it")
+        if not arm_did_not_move:
+            raise TrialStateError(
+                f"trial {trial.number} was executing when the program stopped; did the arm move? "
+                f"If it did, tell or void trial {trial.number}; if it did not, ask again with "
+                "--arm-did-not-move"
+            )
+        self.append(NotExecuted(trial=trial.number))

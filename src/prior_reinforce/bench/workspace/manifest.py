@@ -173,15 +173,23 @@ def load_manifest(path: Path) -> Manifest:
         FileFormatError: The file is missing or is no TOML.
         ConfigurationError: A value is missing, unknown, of the wrong kind, or out of range.
     """
+    return parse_manifest(read_manifest(path), path)
+
+
+def read_manifest(path: Path) -> str:
+    """Read a manifest's text.
+
+    Raises:
+        FileFormatError: The file is missing, or is no text.
+    """
     try:
-        text = path.read_text(encoding="utf-8")
+        return path.read_text(encoding="utf-8")
     except OSError as error:
         raise FileFormatError(
             f"no manifest at {path} ({error.strerror}); make a workspace with: prior-reinforce new"
         ) from error
     except ValueError as error:
         raise FileFormatError(f"{path} is not a text in UTF-8: {error}; save it as one") from error
-    return parse_manifest(text, path)
 
 
 def parse_manifest(text: str, path: Path) -> Manifest:

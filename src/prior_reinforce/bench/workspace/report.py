@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
 
 import numpy as np
+from msgspec import convert
 
+from prior_reinforce.bench.robots.report import LimitLine, LimitReport
+from prior_reinforce.bench.workspace.log import WorkspaceState
 from prior_reinforce.bench.workspace.status import execution_warning
 from prior_reinforce.bench.workspace.workspace import Workspace
 from prior_reinforce.errors import FileFormatError, WorkspaceError
 from prior_reinforce.files import claim_folder, named_disk_errors
 from prior_reinforce.report import AdaptationRecord, write_report
 from prior_reinforce.report.record import CheckRow
-from prior_reinforce.session.session import Session
 from prior_reinforce.session.trials import Goal, Trial
 
 
@@ -38,15 +39,15 @@ def report_workspace(
         FileFormatError: The demonstrations are damaged. A plan that is lost or damaged stops
             nothing: it is not drawn, and named.
     """
-    session = workspace.session()
-    goals = [goal for goal in session.goals if session.trials_of(goal.number)]
+    state = workspace.state
+    goals = [goal for goal in state.goals if state.trials_of(goal.number)]
     if not goals:
         raise WorkspaceError(
             f"there is no trial to report yet; run: prior-reinforce ask {workspace.folder}"
         )
-    records = [_record(workspace, session, goal) for goal in goals]
-    robot, training = workspace.manifest.robot, workspace.log.training
-    models = (trial.model for goal in goals for trial in session.trials_of(goal.number))
+    records = [_record(workspace, goal) for goal in goals]
+    robot, training = workspace.manifest.robot, state.training
+    models = (trial.model for goal in goals for trial in state.trials_of(goal.number))
     facts = {
         "Task": workspace.manifest.name,
         "Demonstrations": str(records[-1].demonstrations.n),
@@ -54,7 +55,7 @@ def report_workspace(
         "Adapter": ", ".join(dict.fromkeys(goal.adapter for goal in goals)),
         "Robot": "none, no limits checked" if robot is None else robot.robot,
         "Earlier goals' trials used": "by "
-        + _name_goals(goal.number for goal in goals if _used_earlier(session, goal)),
+        + _name_goals(goal.number for goal in goals if _used_earlier(state, goal)),
         "Version": version("prior-reinforce"),
     }
     if training is not None and training.remarks:
@@ -63,14 +64,14 @@ def report_workspace(
     title = f"{workspace.manifest.name}: {len(goals)} goal" + "s" * (len(goals) > 1)
     with named_disk_errors(folder):
         return write_report(
-            folder, records, title=title, facts=facts, note=_say_without_plan(session),
+            folder, records, title=title, facts=facts, note=_say_without_plan(state),
             progress=progress,
         )  # fmt: skip
 
 
-def _say_without_plan(session: Session) -> str:
+def _say_without_plan(state: WorkspaceState) -> str:
     """Name the goals that were set and that no plan was given for."""
-    without = [goal.number for goal in session.goals if not session.trials_of(goal.number)]
+    without = [goal.number for goal in state.goals if not state.trials_of(goal.number)]
     return f"No plan was given for {_name_goals(without)}." if without else ""
 
 
@@ -81,17 +82,17 @@ def _name_goals(numbers: Iterable[int]) -> str:
     return f"goals {', '.join(most)} and {last}" if most else f"goal {last}"
 
 
-def _used_earlier(session: Session, goal: Goal) -> bool:
+def _used_earlier(state: WorkspaceState, goal: Goal) -> bool:
     """Whether trials of earlier goals counted for a goal."""
-    models = {trial.model for trial in session.trials_of(goal.number)}
-    readings = [reading for model in models for reading in session.readings_for(goal, model)]
+    models = {trial.model for trial in state.trials_of(goal.number)}
+    readings = [reading for model in models for reading in state.readings_for(goal, model)]
     return any(reading.goal_number < goal.number for reading in readings)
 
 
-def _record(workspace: Workspace, session: Session, goal: Goal) -> AdaptationRecord:
+def _record(workspace: Workspace, goal: Goal) -> AdaptationRecord:
     trials: list[Trial] = []
     remarks: list[str] = []
-    for trial in session.trials_of(goal.number):
+    for trial in workspace.state.trials_of(goal.number):
         try:
             trials.append(replace(trial, plan=workspace.plan(trial).actions))
         except FileFormatError as error:
@@ -111,17 +112,16 @@ def _record(workspace: Workspace, session: Session, goal: Goal) -> AdaptationRec
 
 def _checks(trials: Sequence[Trial]) -> tuple[CheckRow, ...]:
     """Each check of the gate, with the plan that came nearest to its limit, as it was asked for."""
-    said = [
-        (t.number, line) for t in trials for line in (t.kept.get("gate") or {}).get("lines", ())
-    ]
+    gated = [(t.number, convert(t.gate, LimitReport)) for t in trials if t.gate is not None]
+    lines = [(number, line) for number, report in gated for line in report.lines]
     rows = []
-    for check in dict.fromkeys(line["check"] for _, line in said):
-        number, line = max((x for x in said if x[1]["check"] == check), key=lambda x: _worse(x[1]))
-        rows.append(CheckRow(check, line["status"], number, line["text"]))
+    for check in dict.fromkeys(line.check for _, line in lines):
+        number, line = max((x for x in lines if x[1].check == check), key=lambda x: _worse(x[1]))
+        rows.append(CheckRow(check, line.status, number, line.text))
     return tuple(rows)
 
 
-def _worse(line: Mapping[str, Any]) -> tuple[int, float]:
+def _worse(line: LimitLine) -> tuple[int, float]:
     """Orders what the gate said of one check in several plans."""
-    rank = ("unchecked", "pass", "warn", "refuse").index(line["status"])
-    return rank, 0.0 if line["margin"] is None else -float(line["margin"])
+    rank = ("unchecked", "pass", "warn", "refuse").index(line.status)
+    return rank, 0.0 if line.margin is None else -line.margin

@@ -6,9 +6,9 @@ import shlex
 
 import numpy as np
 
+from prior_reinforce.bench.workspace.log import Executed, WorkspaceState
 from prior_reinforce.bench.workspace.workspace import Workspace
 from prior_reinforce.registry import parse_choice
-from prior_reinforce.session.session import Session
 from prior_reinforce.session.trials import Goal, Stage, Trial
 from prior_reinforce.wording import in_words, plain, say_place, say_reading
 
@@ -24,10 +24,10 @@ _EXAMPLE = ("5cm long", "2cm left", "1cm high")
 
 def describe(workspace: Workspace) -> str:
     """Say where a workspace stands: ten lines at most, and one for each remark on the model."""
-    session, manifest = workspace.session(), workspace.manifest
+    state, manifest = workspace.state, workspace.manifest
     robot = manifest.robot.robot if manifest.robot is not None else "none, no limits are checked"
-    n = 0 if workspace.log.demonstrations is None else workspace.demonstrations.n
-    training = workspace.log.training
+    n = 0 if state.demonstrations is None else workspace.demonstrations.n
+    training = state.training
     rows = [
         ("task", f"{manifest.name}, tolerance {manifest.tolerance:g} {manifest.outcome_units[0]}"),
         (
@@ -39,14 +39,14 @@ def describe(workspace: Workspace) -> str:
         ("model", _say_model(workspace)),
         *(("  note", remark) for remark in (training.remarks if training is not None else ())),
     ]
-    if session.goals:
-        goal = session.goals[-1]
-        rows.append((f"goal {goal.number}", _say_goal(workspace, session, goal, n)))
-        shown = session.trials[-_TRIALS_SHOWN:]
-        if earlier := len(session.trials) - len(shown):
+    if state.goals:
+        goal = state.goals[-1]
+        rows.append((f"goal {goal.number}", _say_goal(workspace, goal, n)))
+        shown = state.current[-_TRIALS_SHOWN:]
+        if earlier := len(state.current) - len(shown):
             rows.append((f"  {earlier} more", "before these; all are in the report"))
         rows += [(f"  trial {trial.number}", say_trial(workspace, trial)) for trial in shown]
-    rows.append(("next", next_step(workspace, session) + _say_nearer(workspace, session)))
+    rows.append(("next", next_step(workspace) + _say_nearer(workspace)))
     return "\n".join(plain(f"{name:<15} {text}") for name, text in rows)
 
 
@@ -73,13 +73,13 @@ def _say_trial(workspace: Workspace, trial: Trial) -> str:
     return f"{waits}; {OUTDATED}" if trial.outdated else waits
 
 
-def say_expectation(session: Session, trial: Trial) -> list[str]:
+def say_expectation(state: WorkspaceState, trial: Trial) -> list[str]:
     """Say what the adapter expected of a trial, and after poor ones what would help."""
     if trial.p_hit is None or trial.expected_trials is None:
         return []
     lines = [f"hits with probability {trial.p_hit:.2f}; {trial.expected_trials:.1f} trials to go"]
-    missed = sum(told.stage is Stage.TOLD for told in session.trials)
-    if missed >= _POOR_TRIALS and not session.solved and trial.p_hit < _POOR_CHANCE:
+    missed = sum(told.stage is Stage.TOLD for told in state.current)
+    if missed >= _POOR_TRIALS and not state.solved and trial.p_hit < _POOR_CHANCE:
         lines.append(
             "what would help: a demonstration near this goal, or a finer look at the next trial "
             '("5.2 +- 0.3 cm long")'
@@ -89,42 +89,50 @@ def say_expectation(session: Session, trial: Trial) -> list[str]:
 
 def execution_warning(workspace: Workspace, trial: Trial) -> str:
     """Why a reading of a trial might mislead: it was aborted, or went another way than planned."""
-    said, gate = trial.execution, workspace.manifest.gate
+    ended, gate = workspace.state.executions.get(trial.number), workspace.manifest.gate
+    if not isinstance(ended, Executed):
+        return ""
     warnings = []
-    if said.get("outcome") == "aborted":
-        warnings.append(f"but aborted: {said.get('reason') or 'no reason was given'}")
-    for key, what, limit in (
-        ("start_error", "began {:.3g} rad from the plan's first frame", gate.start_error),
-        ("tracking_rms", "went {:.3g} rad rms off the plan", gate.tracking_error),
-    ):
-        if (said.get(key) or 0.0) > limit:
-            warnings.append(f"but {what.format(said[key])}, more than {limit:g}")
+    if ended.outcome == "aborted":
+        warnings.append(f"but aborted: {ended.reason or 'no reason was given'}")
+    if (ended.start_error or 0.0) > gate.start_error:
+        warnings.append(
+            f"but began {ended.start_error:.3g} rad from the plan's first frame, more than "
+            f"{gate.start_error:g}"
+        )
+    if (ended.tracking_rms or 0.0) > gate.tracking_error:
+        warnings.append(
+            f"but went {ended.tracking_rms:.3g} rad rms off the plan, more than "
+            f"{gate.tracking_error:g}"
+        )
     return "; ".join(warnings)
 
 
-def next_step(workspace: Workspace, session: Session) -> str:
+def next_step(workspace: Workspace) -> str:
     """The command that comes next."""
+    state = workspace.state
     folder = shlex.quote(str(workspace.folder))
-    if workspace.log.demonstrations is None:
+    if state.demonstrations is None:
         return f"prior-reinforce import {folder} RECORDINGS"
-    if workspace.log.stale:
+    if state.stale:
         return f"prior-reinforce learn {folder}"
     new_goal = f"prior-reinforce goal {folder} {_goal_example(workspace)}"
-    if not session.goals:
+    if not state.goals:
         return new_goal
-    trial = session.open_trial
+    trial = state.open_trial
     if trial is not None:
         tell = f"prior-reinforce tell {folder} {trial.number} {tell_example(workspace)}"
         if trial.stage is Stage.EXECUTING and not workspace.log.is_executing():
             return f"if it moved: {tell}; if not: prior-reinforce ask {folder} --arm-did-not-move"
-        if trial.execution.get("outcome") == "aborted":
+        ended = state.executions.get(trial.number)
+        if isinstance(ended, Executed) and ended.outcome == "aborted":
             return f"prior-reinforce void {folder} {trial.number} --reason WHY"
         return f"{tell} (or --hit)"
-    if session.solved:
+    if state.solved:
         return f"{new_goal}, or prior-reinforce report {folder}"
-    training = workspace.log.training
+    training = state.training
     own = training.own if training is not None else None
-    adapter, _ = parse_choice(session.goals[-1].adapter)
+    adapter, _ = parse_choice(state.goals[-1].adapter)
     return (
         f"prior-reinforce ask {folder}"
         + (f" --generator {shlex.quote(own)}" if own else "")
@@ -132,11 +140,12 @@ def next_step(workspace: Workspace, session: Session) -> str:
     )
 
 
-def _say_nearer(workspace: Workspace, session: Session) -> str:
+def _say_nearer(workspace: Workspace) -> str:
     """What else comes next where the gate may refuse a first plan: the goal is far out."""
-    if workspace.log.stale or not session.goals or session.trials:
+    state = workspace.state
+    if state.stale or not state.goals or state.current:
         return ""
-    if not np.any(workspace.demonstrations.far_outside(session.goal)):
+    if not np.any(workspace.demonstrations.far_outside(state.goals[-1].goal)):
         return ""
     nearer = f"prior-reinforce goal {shlex.quote(str(workspace.folder))} {_goal_example(workspace)}"
     return f"; if it refuses, a goal nearer to the demonstrations: {nearer}"
@@ -155,17 +164,17 @@ def _goal_example(workspace: Workspace) -> str:
 
 
 def _say_model(workspace: Workspace) -> str:
-    training = workspace.log.training
+    training = workspace.state.training
     if training is None:
         return "none yet"
     said = f"{training.model}, {training.generator}"
-    return f"{said}, of other demonstrations" if workspace.log.stale else said
+    return f"{said}, of other demonstrations" if workspace.state.stale else said
 
 
-def _say_goal(workspace: Workspace, session: Session, goal: Goal, n: int) -> str:
+def _say_goal(workspace: Workspace, goal: Goal, n: int) -> str:
     manifest = workspace.manifest
     place = say_place(goal.goal, manifest.outcome_names, manifest.outcome_units)
-    told = [trial for trial in session.trials if trial.stage is Stage.TOLD]
+    told = [trial for trial in workspace.state.current if trial.stage is Stage.TOLD]
     hits = [count for count, trial in enumerate(told, start=1) if trial.hit]
     if hits:
         total = f"N = {n} demonstrations + {hits[0]} = {n + hits[0]}"

@@ -11,7 +11,6 @@ leaves at worst a file that nothing names.
 
 from __future__ import annotations
 
-import hashlib
 import shutil
 import tempfile
 from collections.abc import Collection
@@ -29,6 +28,7 @@ from prior_reinforce.files import (
     sweep,
 )
 from prior_reinforce.plans.motions import Demonstrations, Plan
+from prior_reinforce.session.events import KeptPlan
 
 if TYPE_CHECKING:
     from prior_reinforce.generators.base import Generator
@@ -67,7 +67,7 @@ class Store:
         """
         path = self._demonstrations_path(sha256)
         found = Demonstrations.load(path)
-        if sha256 not in (found.sha256, _sha256_of_numbers(found)):
+        if sha256 != found.sha256:
             raise FileFormatError(
                 f"{path} is not what was imported; restore it from a copy, or import again"
             )
@@ -141,13 +141,13 @@ class Store:
         """Where a plan lies."""
         return inside(self._folder / "plans" / name, self._folder)
 
-    def plan(self, name: str, sha256: str) -> Plan:
+    def plan(self, kept: KeptPlan) -> Plan:
         """Read a trial's plan.
 
         Raises:
             FileFormatError: The file is missing, or not what was written.
         """
-        return read_plan(self.plan_path(name), sha256=sha256)
+        return read_plan(self.plan_path(kept.file), sha256=kept.sha256)
 
     def make_execution_folder(self, number: int) -> Path:
         """Make an empty folder for what a command writes while it executes a trial.
@@ -180,12 +180,3 @@ def _is_model(folder: Path, model: str) -> bool:
         return folder.is_dir() and sha256_of_folder(folder)[:_DIGITS] == model
     except FileFormatError:
         return False
-
-
-def _sha256_of_numbers(demonstrations: Demonstrations) -> str:
-    """What the first journals knew demonstrations by: their numbers alone."""
-    digest = hashlib.sha256()
-    for array in (demonstrations.plans, demonstrations.outcomes_seen):
-        digest.update(str(array.shape).encode())
-        digest.update(array.tobytes())
-    return digest.hexdigest()

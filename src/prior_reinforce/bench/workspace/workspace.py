@@ -21,6 +21,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from msgspec import convert
 from numpy.typing import ArrayLike
 from typing_extensions import Self
 
@@ -28,12 +29,20 @@ from prior_reinforce.adapters import ADAPTERS, DEFAULT_ADAPTER
 from prior_reinforce.arrays import Frames
 from prior_reinforce.bench.robots.plan_files import PlanFile
 from prior_reinforce.bench.workspace.journal import JOURNAL_FILE
-from prior_reinforce.bench.workspace.log import Training, WorkspaceLog
+from prior_reinforce.bench.workspace.log import (
+    DemonstrationsImported,
+    Executed,
+    Executing,
+    ModelTrained,
+    NotExecuted,
+    WorkspaceLog,
+    WorkspaceState,
+)
 from prior_reinforce.bench.workspace.manifest import (
     MANIFEST_FILE,
     Manifest,
-    load_manifest,
     parse_manifest,
+    read_manifest,
 )
 from prior_reinforce.bench.workspace.store import Store
 from prior_reinforce.errors import (
@@ -41,13 +50,15 @@ from prior_reinforce.errors import (
     FileFormatError,
     InvalidDemonstrationsError,
     PriorReinforceError,
+    TrialStateError,
     WorkspaceError,
 )
 from prior_reinforce.files import inside, named_disk_errors, sweep, write
 from prior_reinforce.plans.motions import Demonstrations, Plan
 from prior_reinforce.registry import parse_choice
+from prior_reinforce.session.events import Entry, KeptPlan
 from prior_reinforce.session.session import Session
-from prior_reinforce.session.trials import Event, Goal, Stage, Trial
+from prior_reinforce.session.trials import Goal, Stage, Trial
 
 if TYPE_CHECKING:
     from prior_reinforce.adapters.base import Adapter
@@ -82,7 +93,8 @@ class Workspace:
                 f"{folder} is not a workspace (it has no {MANIFEST_FILE}); make one with: "
                 f"prior-reinforce new {folder}"
             )
-        self.manifest: Manifest = load_manifest(folder / MANIFEST_FILE)
+        self._manifest_text: str | None = None
+        self._read_manifest()
         self.store = Store(folder)
         self.log = WorkspaceLog(folder, self.store, self.manifest.format)
         self._read: dict[str, Demonstrations] = {}
@@ -106,6 +118,14 @@ class Workspace:
             write(folder / MANIFEST_FILE, manifest)
         return cls(folder)
 
+    def _read_manifest(self) -> None:
+        """Know what the manifest says now."""
+        path = self.folder / MANIFEST_FILE
+        text = read_manifest(path)
+        if text != self._manifest_text:
+            self.manifest: Manifest = parse_manifest(text, path)
+            self._manifest_text = text
+
     def close(self) -> None:
         """Close the journal."""
         self.log.journal.close()
@@ -123,13 +143,25 @@ class Workspace:
         self.close()
 
     @property
-    def events(self) -> Sequence[Event]:
-        """The journal.
+    def events(self) -> Sequence[Entry]:
+        """The journal; errors as `state`."""
+        return self.log.entries()
+
+    @property
+    def state(self) -> WorkspaceState:
+        """What the journal adds up to.
 
         Raises:
-            WorkspaceError: The journal is damaged, or a newer version wrote it.
+            WorkspaceError: The journal is damaged, or another version wrote it.
+            ConfigurationError: The manifest has another number of outcomes than the goals so far.
         """
-        return self.log.events()
+        state, k = self.log.state(), len(self.manifest.outcome_names)
+        if any(goal.goal.size != k for goal in state.goals):
+            raise ConfigurationError(
+                f"{self.folder / MANIFEST_FILE} names {k} outcomes, but goals were set with "
+                f"{state.goals[0].goal.size}; put it back, or make another workspace"
+            )
+        return state
 
     @property
     def demonstrations(self) -> Demonstrations:
@@ -140,7 +172,7 @@ class Workspace:
             FileFormatError: The file is damaged.
             InvalidDemonstrationsError: The manifest says otherwise since they were imported.
         """
-        sha256 = self.log.demonstrations
+        sha256 = self.state.demonstrations
         if sha256 is None:
             raise WorkspaceError(
                 f"{self.folder} has no demonstrations yet; bring them in with: prior-reinforce "
@@ -154,7 +186,7 @@ class Workspace:
         Raises:
             FileFormatError: The file is missing or damaged.
         """
-        return self._demonstrations(self.log.trainings[model].fitted_to)
+        return self._demonstrations(self.state.trainings[model].demonstrations_sha256)
 
     def session(self, own: str | None = None, own_adapter: str | None = None) -> Session:
         """The trials of this workspace. Telling needs no model; asking loads it.
@@ -165,25 +197,17 @@ class Workspace:
             own_adapter: `module:Class` that the goal was set with, likewise.
 
         Raises:
-            WorkspaceError: The journal is damaged.
-            ConfigurationError: The manifest has another number of outcomes than the goals so far.
+            WorkspaceError, ConfigurationError: See `state`.
         """
-        session = Session(
+        goals = self.state.goals
+        return Session(
             lambda: self._generator(own),
-            lambda: self._adapter(session.goals[-1].adapter if session.goals else "", own_adapter),
+            lambda: self._adapter(goals[-1].adapter if goals else "", own_adapter),
             lambda: self.demonstrations,
             tolerance=self.manifest.tolerance,
             log=self.log,
             gate=self.gate,
-            in_use=self._in_use,
         )
-        k = len(self.manifest.outcome_names)
-        if any(goal.goal.size != k for goal in session.goals):
-            raise ConfigurationError(
-                f"{self.folder / MANIFEST_FILE} names {k} outcomes, but goals were set with "
-                f"{session.goals[0].goal.size}; put it back, or make another workspace"
-            )
-        return session
 
     def set_goal(
         self,
@@ -223,19 +247,19 @@ class Workspace:
             ConfigurationError: The manifest holds a wrong value by now.
             FileFormatError: The manifest is gone, or no TOML any more.
         """
-        self.manifest = load_manifest(self.folder / MANIFEST_FILE)
+        self._read_manifest()
         if self.manifest.robot is None:
             return None
         from prior_reinforce.bench.robots import check_plan
 
-        training = self.log.training
+        training = self.state.training
         shown = self.demonstrations if training is None else self.demonstrations_of(training.model)
         plan = Plan(frames, shown.format)
         return check_plan(plan, self.manifest.robot, shown, self.manifest.gate)
 
     def plan_path(self, trial: Trial) -> Path:
         """Where a trial's plan file is."""
-        return self.store.plan_path(trial.kept["plan_file"])
+        return self.store.plan_path(_kept(trial).file)
 
     def plan(self, trial: Trial) -> Plan:
         """A trial's plan, checked against the hash in the journal.
@@ -243,7 +267,7 @@ class Workspace:
         Raises:
             FileFormatError: The file is missing, or not what was written.
         """
-        return self.store.plan(trial.kept["plan_file"], trial.kept["plan_sha256"])
+        return self.store.plan(_kept(trial))
 
     def import_demonstrations(self, demonstrations: Demonstrations, source: str) -> None:
         """Take in demonstrations, in place of earlier ones.
@@ -254,7 +278,7 @@ class Workspace:
         """
         self._check_fit(demonstrations, source)
         with self.log.exclusive():
-            self.session().refuse_open_trial("importing demonstrations")
+            self.state.refuse_open_trial("importing demonstrations")
             names = self._names_of_plans()
             if names not in (None, demonstrations.format.names):
                 raise InvalidDemonstrationsError(
@@ -263,8 +287,9 @@ class Workspace:
                 )
             self.store.save_demonstrations(demonstrations)
             self.log.append(
-                "demonstrations_imported",
-                {"n": demonstrations.n, "sha256": demonstrations.sha256, "source": source},
+                DemonstrationsImported(
+                    n=demonstrations.n, sha256=demonstrations.sha256, source=source
+                )
             )
 
     def learn(
@@ -274,7 +299,7 @@ class Workspace:
         seed: int = 0,
         device: str = "cpu",
         progress: Callable[[FitProgress], None] | None = None,
-    ) -> Training:
+    ) -> ModelTrained:
         """Fit a generator to the demonstrations and put it in use.
 
         Args:
@@ -292,24 +317,23 @@ class Workspace:
         """
         from prior_reinforce.generators import make_generator
 
-        self.session().refuse_open_trial("learning")
-        demonstrations, known_as = self.demonstrations, self.log.demonstrations
+        self.state.refuse_open_trial("learning")
+        demonstrations, known_as = self.demonstrations, self.state.demonstrations
+        assert known_as is not None
         made = make_generator(generator, device=device, states=self.store.training)
         made.check_savable()
         fitted = made.fit(demonstrations, seed=seed, progress=progress)
-        data = {
-            "model": self.store.save_model(fitted),
-            "generator": generator,
-            "seed": seed,
-            "demonstrations_sha256": known_as,
-            "remarks": list(fitted.remarks),
-        }
+        trained = ModelTrained(
+            model=self.store.save_model(fitted),
+            generator=generator,
+            seed=seed,
+            demonstrations_sha256=known_as,
+            remarks=tuple(fitted.remarks),
+        )
         with self.log.exclusive():
-            self.session().refuse_open_trial("learning")
-            self.log.append("model_trained", data)
-        training = self.log.training
-        assert training is not None
-        return training
+            self.state.refuse_open_trial("learning")
+            self.log.append(trained)
+        return trained
 
     def execute(
         self,
@@ -351,17 +375,13 @@ class Workspace:
 
         check_command(command, time_limit=time_limit)
         with executing_lock(self.folder) as lock, Interruptions() as interruptions:
-            session = self.session()
-            trial = session.trial(number)
-            if trial.stage is Stage.ASKED:
-                verdict = self.gate(self.plan(trial).actions)
-                if verdict is not None:
-                    verdict.require()
-            else:
-                session.begin_execution(number, "")  # refuses, and says why
+            trial = self._to_execute(number)
+            verdict = self.gate(self.plan(trial).actions)
+            if verdict is not None:
+                verdict.require()
             folder = self.store.make_execution_folder(number)
-            session.begin_execution(number, hide_secrets(command), folder.name)
-            plan_file = PlanFile(self.plan_path(trial), trial.kept["plan_sha256"])
+            self._begin_execution(number, hide_secrets(command), folder.name)
+            plan_file = PlanFile(self.plan_path(trial), _kept(trial).sha256)
             try:
                 result = run_command(
                     command,
@@ -373,11 +393,11 @@ class Workspace:
                     interruptions=interruptions,
                 )
             except (ConfigurationError, FileFormatError, KeyboardInterrupt):
-                session.end_execution(number, None)  # never started: nothing moved
+                self._end_execution(NotExecuted(trial=number))  # never started: nothing moved
                 raise
             if result.outcome != "unknown":
                 result = self._measured(result, trial, folder)
-                session.end_execution(number, result.as_json())
+                self._end_execution(_ended(number, result))
         if interruptions.came:
             raise KeyboardInterrupt(f"trial {number}: {result.outcome} ({result.reason})")
         return result
@@ -390,19 +410,43 @@ class Workspace:
         """
         from prior_reinforce.bench.robots.executors.command import read_ended
 
-        session = self.session()
-        trial = session.open_trial
+        trial = self.state.open_trial
         if trial is None or trial.stage is not Stage.EXECUTING or self.log.is_executing():
             return None
-        name = trial.execution.get("folder", "")
-        result = None
-        if name:
-            folder = self.store.execution_folder(name)
-            result = read_ended(folder, trial.execution["command"])
+        began = self.state.executions[trial.number]
+        assert isinstance(began, Executing)
+        folder = self.store.execution_folder(began.folder)
+        result = read_ended(folder, began.command) if began.folder else None
         if result is None:
             return None
-        result = self._measured(result, trial, folder)
-        return session.end_execution(trial.number, result.as_json())
+        self._end_execution(_ended(trial.number, self._measured(result, trial, folder)))
+        return self.state.trial(trial.number)
+
+    def _to_execute(self, number: int) -> Trial:
+        """A trial whose plan was not executed yet.
+
+        Raises:
+            TrialStateError: There is no such trial, or it was executed already.
+        """
+        trial = self.state.trial(number)
+        if trial.stage is not Stage.ASKED:
+            raise TrialStateError(
+                f"trial {number} is {trial.stage.value} already; a plan runs once: tell it or "
+                "void it, then ask for the next"
+            )
+        return trial
+
+    def _begin_execution(self, number: int, command: str, folder: str) -> None:
+        """Note that a trial's plan is given to a command now: a plan is executed once."""
+        with self.log.exclusive():
+            self._to_execute(number)
+            self.log.append(Executing(trial=number, command=command, folder=folder))
+
+    def _end_execution(self, event: Executed) -> None:
+        """Note how the command ended, unless the trial was told meanwhile."""
+        with self.log.exclusive():
+            if self.state.trial(event.trial).stage is Stage.EXECUTING:
+                self.log.append(event)
 
     def _measured(self, result: CommandResult, trial: Trial, folder: Path) -> CommandResult:
         """A result with the distance from the plan, where the driver measured its path."""
@@ -416,27 +460,20 @@ class Workspace:
 
     def _names_of_plans(self) -> tuple[str, ...] | None:
         """Names of the columns of earlier trials' plans; None where none can be read."""
-        for event in self.events:
-            if event.kind == "asked":
-                with suppress(FileFormatError):
-                    plan = self.store.plan(event.data["plan_file"], event.data["plan_sha256"])
-                    return plan.format.names
+        for trial in self.state.trials:
+            with suppress(FileFormatError):
+                return self.plan(trial).format.names
         return None
-
-    def _in_use(self) -> tuple[str, str]:
-        """The model and the demonstrations of now."""
-        training = self.log.training
-        return "" if training is None else training.model, self.log.demonstrations or ""
 
     def _generator(self, own: str | None) -> Generator:
         """The model in use."""
         self.demonstrations  # noqa: B018  (whether there are any that fit the manifest)
-        training = self.log.training
+        training = self.state.training
         if training is None:
             raise WorkspaceError(
                 f"nothing is learned yet; run: prior-reinforce learn {self.folder}"
             )
-        if self.log.stale:
+        if self.state.stale:
             raise WorkspaceError(
                 "other demonstrations were imported since the model was learned; run: "
                 f"prior-reinforce learn {self.folder}"
@@ -483,3 +520,15 @@ class Workspace:
                     f"{source} has {what} {given}, but {self.folder / MANIFEST_FILE} says "
                     f"{expected}; change the manifest, or import again"
                 )
+
+
+def _kept(trial: Trial) -> KeptPlan:
+    """A trial's plan, which every trial of a workspace has."""
+    assert trial.kept is not None
+    return trial.kept
+
+
+def _ended(number: int, result: CommandResult) -> Executed:
+    """The event of a command that ended."""
+    event = NotExecuted if result.outcome == "not_moved" else Executed
+    return convert({"trial": number, **result.as_json()}, event)

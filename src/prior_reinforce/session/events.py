@@ -1,0 +1,117 @@
+"""What can happen to the trials of a session, as typed events.
+
+A log is a list of events that only grows; what stands is a fold over it (`trials.State`). In a
+journal on disk an event is a JSON object whose `kind` is the name of its class, in snake case.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import msgspec
+
+from prior_reinforce.readings import ReadingRecord
+
+
+def _snake_case(name: str) -> str:
+    return re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name).lower()
+
+
+class Event(
+    msgspec.Struct,
+    frozen=True,
+    kw_only=True,
+    tag_field="kind",
+    tag=_snake_case,
+    forbid_unknown_fields=True,
+    omit_defaults=True,
+):
+    """Something that happened, and will always have happened."""
+
+    @property
+    def kind(self) -> str:
+        """Name of the event: `goal_set`, `told`."""
+        return str(self.__struct_config__.tag)
+
+
+class GoalSet(Event, frozen=True):
+    """A goal was set."""
+
+    goal: list[float]
+    """g, shape (k,), in the outcomes' units."""
+    tolerance: float
+    """epsilon."""
+    metric: list[float]
+    """See `Goal.metric`."""
+    units: list[str]
+    """Units of the outcomes."""
+    carry_over: bool
+    """Whether the adapter also learns from the trials of earlier goals."""
+    adapter: str = ""
+    """Choice of the adapter; empty where the session was given an object."""
+    new_hardware: str | None = None
+    """What was changed on the hardware before; None where nothing was."""
+
+
+class KeptPlan(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A plan's file."""
+
+    file: str
+    sha256: str
+
+
+class Asked(Event, frozen=True):
+    """A plan was given out."""
+
+    trial: int
+    goal: int
+    """Number of the goal."""
+    condition: list[float]
+    """c = M(g)."""
+    model: str = ""
+    """Name of the model that generated the plan."""
+    gate: dict[str, Any] | None = None
+    """The gate's verdict as plain data (`Verdict.as_json`)."""
+    p_hit: float | None = None
+    expected_trials: float | None = None
+    plan: KeptPlan | None = None
+    """None where the log keeps plans in memory."""
+
+
+class Told(Event, frozen=True):
+    """What was seen of a trial was told."""
+
+    trial: int
+    reading: ReadingRecord
+    hit: bool
+    """Whether the goal was reached: as seen, or judged by the perceived error."""
+
+
+class Amended(Told, frozen=True):
+    """What was told of a trial was corrected."""
+
+
+class Voided(Event, frozen=True):
+    """A trial was declared no data."""
+
+    trial: int
+    reason: str
+
+
+SessionEvent = GoalSet | Asked | Told | Amended | Voided
+
+
+class Entry(msgspec.Struct, frozen=True):
+    """An event in a log."""
+
+    id: int
+    """Order of events, from 1."""
+    event: Event
+    time: str = ""
+    """When it was written, ISO 8601, UTC; empty in memory."""
+
+    @property
+    def kind(self) -> str:
+        """See `Event.kind`."""
+        return self.event.kind
