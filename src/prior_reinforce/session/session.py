@@ -83,7 +83,8 @@ class Session:
             carry_over: Let the adapter learn from the trials of earlier goals too; by default it
                 does where they serve it (`Adapter.carries_over`).
             log: What happened so far, and where to write what happens; in memory if not given.
-            gate: Holds a plan against a robot's limits whenever it is to leave; none by default.
+            gate: Holds a plan against a robot's limits whenever it is to leave, such as
+                `check_plan`; by default nothing is checked.
 
         Raises:
             InvalidGoalError: The goal has a wrong shape, or is not finite.

@@ -20,6 +20,7 @@ FAST = LimitLine(
 )
 NEAR = LimitLine(check="position", status="warn", text="joint2 near its end")
 FINE = LimitLine(check="jerk", status="pass", text="joint1 at 5")
+LACKS = LimitLine(check="joints", status="warn", text="not in the plan: joint4")
 NO_BOX = LimitLine(check="box", status="unchecked", text="not checked: no box given")
 
 
@@ -30,10 +31,12 @@ def report(*lines):
 @pytest.mark.parametrize(
     ("lines", "verdict"),
     [
-        ((FINE, NO_BOX), "plan passes: limits of panda (firmware any) at 1 kHz"),
+        ((FINE,), "plan passes: limits of panda (firmware any)\n"),
+        ((FINE, NO_BOX), "plan passes: limits of panda (firmware any); not looked at: box\n"),
         ((FINE, NEAR), "plan passes with warnings: "),
         ((FAST, NEAR), "plan refused: "),
-        ((LimitLine(check="velocity", status="unchecked", text=""),), "plan NOT CHECKED for "),
+        ((LimitLine(check="velocity", status="unchecked", text=""),), "plan NOT CHECKED for the "),
+        ((LACKS, FINE), "plan NOT CHECKED for every joint: "),
     ],
 )
 def test_the_verdict_is_that_of_the_worst_line(lines, verdict):

@@ -78,6 +78,8 @@ def write_plan(
 ) -> PlanFile:
     """Write a plan, durable and read-only; the suffix gives the format unless `format` does.
 
+    Nothing is held against a robot's limits: call `check_plan(plan, ...).require()` before.
+
     The same plan always gives the same bytes, and so the same hash.
 
     Args:

@@ -2,10 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
+import numpy as np
+from jaxtyping import Float
+
 from prior_reinforce.errors import RobotLimitError
+
+Samples = Float[np.ndarray, "T d"]
+"""Of d joints or axes at T times."""
+Times = Float[np.ndarray, " T"]
+"""Of as many samples, in [s]."""
 
 Status = Literal["pass", "warn", "refuse", "unchecked"]
 _MARK: dict[Status, str] = {
@@ -41,6 +50,62 @@ class LimitLine:
     """The same for a person, without the check's name."""
 
 
+@dataclass(frozen=True, eq=False)
+class Check:
+    """A quantity of a plan at T times for d joints, and what is allowed there."""
+
+    name: str
+    """As in `LimitLine.check`."""
+    unit: str
+    """Of `value` and `limit`."""
+    says: str
+    """The line's text; `{joint}`, `{value}`, `{unit}`, `{limit}`, `{margin}`, `{percent}`, `{time}`
+    and `{within}` stand for those of the worst place."""
+    joints: Sequence[str]
+    """Names of the d joints or axes."""
+    t: Times
+    """From the plan's first frame."""
+    value: Samples
+    limit: Float[np.ndarray, "*T d"]
+    """Of the same at each time, or of each joint."""
+    warn: float | Float[np.ndarray, " d"] = 1.0
+    """Share of a limit from which on it warns."""
+    used: Samples | None = None
+    """Share of the limit that is used, 1 and more being refused; None is value / limit."""
+
+    def line(self) -> LimitLine:
+        """The worst place: of what refuses where anything does, else of what is nearest to warning.
+
+        What is no number refuses.
+        """
+        limits = np.broadcast_to(self.limit, self.value.shape)
+        used = self.used
+        if used is None:
+            used = np.where(self.value == 0, 0.0, self.value / np.maximum(limits, 1e-12))
+        refuses, warns = ~(used < 1), used > self.warn
+        status: Status = "refuse" if refuses.any() else "warn" if warns.any() else "pass"
+        worst = int(np.argmax(used if status == "refuse" else used - self.warn))
+        sample, joint = divmod(worst, len(self.joints))
+        value, limit = float(self.value[sample, joint]), float(limits[sample, joint])
+        beyond = bool(refuses[sample, joint])
+        margin = abs(limit - value) * (-1 if beyond else 1)
+        place = {"joint": self.joints[joint], "time": float(self.t[sample]), "unit": self.unit}
+        said = {"within": "beyond" if beyond else "within", "margin": abs(margin)}
+        percent = 100 * (value if self.unit == "1" else float(used[sample, joint]))
+        text = self.says.format(value=value, limit=limit, percent=percent, **said, **place)
+        return LimitLine(
+            check=self.name,
+            status=status,
+            value=value,
+            limit=limit,
+            margin=margin,
+            unit=self.unit,
+            joint=self.joints[joint],
+            time=float(self.t[sample]),
+            text=text,
+        )
+
+
 @dataclass(frozen=True)
 class LimitReport:
     """All checks of one plan against one robot."""
@@ -71,13 +136,18 @@ class LimitReport:
 
     def text(self) -> str:
         """Return a readable report: a verdict and a line a check."""
+        missing = any(line.check == "joints" and line.status == "warn" for line in self.lines)
         if self.refused:
             verdict = "refused"
         elif "velocity" in self.unchecked:
             verdict = "NOT CHECKED for the arm"
+        elif missing:
+            verdict = "NOT CHECKED for every joint"
         else:
             verdict = "passes with warnings" if self.warned else "passes"
-        head = f"plan {verdict}: limits of {self.robot} (firmware {self.firmware}) at 1 kHz"
+        head = f"plan {verdict}: limits of {self.robot} (firmware {self.firmware})"
+        if self.unchecked:
+            head += f"; not looked at: {', '.join(self.unchecked)}"
         return "\n".join(
             [head, *(f"  {_MARK[line.status]} {line.check:<14} {line.text}" for line in self.lines)]
         )

@@ -177,7 +177,8 @@ def run_command(
 
     At the time limit, and when this program is interrupted, the command and everything it started
     are asked to stop (SIGTERM), and killed two seconds later. The command has this program's
-    standard input, so it can ask a person at the terminal.
+    standard input, so it can ask a person at the terminal. Nothing is held against a robot's
+    limits: call `check_plan` before the plan is written.
 
     Args:
         command: Program and arguments, `{plan}` among them.
