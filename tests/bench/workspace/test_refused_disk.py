@@ -1,9 +1,7 @@
 """A read-only folder and a full disk: a clear error, and a journal that is good."""
 
-import shutil
 import subprocess
 import sys
-import tempfile
 from pathlib import Path
 
 import pytest
@@ -14,17 +12,12 @@ pytestmark = pytest.mark.slow
 
 
 @pytest.fixture
-def folder(learned_folder):
-    """In a place that any user may read, as pytest's own folders are not."""
-    with tempfile.TemporaryDirectory() as place:
-        Path(place).chmod(0o755)
-        folder = Path(place) / "planar"
-        shutil.copytree(learned_folder, folder)
-        workspace = Workspace(folder)
-        workspace.set_goal([0.9, 0.05])
-        workspace.session().ask()
-        workspace.close()
-        yield folder
+def folder(workspace):
+    """Of a workspace with an open trial, in a place that only its owner may read."""
+    workspace.session().ask()
+    workspace.close()
+    workspace.folder.parent.chmod(0o700)
+    return workspace.folder
 
 
 def refused(how, *command):
