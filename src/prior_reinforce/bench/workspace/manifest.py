@@ -6,15 +6,18 @@ Every message names the file, the line, the value and the remedy.
 from __future__ import annotations
 
 import json
+import math
 import re
 import sys
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any, TypeVar, get_type_hints
+from typing import Annotated, Any, get_type_hints
 
 import msgspec
 import numpy as np
+from msgspec import Meta, Struct, structs
 
 from prior_reinforce.bench.robots import (
     GateSettings,
@@ -34,7 +37,6 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
-T = TypeVar("T")
 MANIFEST_FILE = "workspace.toml"
 TEMPLATE = Path(__file__).with_name("template.toml").read_text(encoding="utf-8")
 """The manifest that `new` writes, for `format` to fill in."""
@@ -63,36 +65,72 @@ class Manifest:
     """The gate's own lines."""
 
 
-_TEXTS, _NUMBERS = tuple[str, ...], tuple[float, ...]
-_ROWS = tuple[tuple[float, float, float, float, float, float, float, float, float], ...]
-_SIX = tuple[float, float, float, float, float, float]
-_REQUIRED = ("lower", "upper", "velocity")
-_LISTS = (*_REQUIRED, "acceleration", "jerk")
-_GIVEN = ("joint_names", *_LISTS, "kinematics", "flange", "source")
-"""Keys that go with an arm whose numbers stand in the manifest."""
+_Texts = Annotated[tuple[str, ...], Meta(min_length=1)]
+_Numbers = Annotated[tuple[float, ...], Meta(min_length=1)]
+_Six = tuple[float, float, float, float, float, float]
+_Nine = tuple[float, float, float, float, float, float, float, float, float]
+
+
+class _Section(Struct, frozen=True, forbid_unknown_fields=True):
+    """A section of the file; keys with defaults may be left out."""
+
+
+class _Task(_Section, frozen=True):
+    name: Annotated[str, Meta(pattern=r"\S")]
+
+
+class _Plan(_Section, frozen=True):
+    names: _Texts
+    units: _Texts
+    dt: float
+
+
+class _Outcome(_Section, frozen=True):
+    names: _Texts
+    units: _Texts
+    tolerance: Annotated[float, Meta(gt=0)]
+
+
+class _Robot(_Section, frozen=True):
+    model: str
+    firmware: str = "any"
+    joint_names: _Texts | None = None
+    lower: _Numbers | None = None
+    upper: _Numbers | None = None
+    velocity: _Numbers | None = None
+    acceleration: _Numbers | None = None
+    jerk: _Numbers | None = None
+    kinematics: Annotated[tuple[_Nine, ...], Meta(min_length=1)] | None = None
+    flange: _Six | None = None
+    source: str = ""
+
+
+_BOX = {"box_low": "workspace_low", "box_high": "workspace_high"}
+"""Corners of the tool tip's box, in `GateSettings` and in the file."""
+_Gate = msgspec.defstruct(
+    "_Gate",
+    [(f.name, get_type_hints(GateSettings)[f.name], f.default) for f in fields(GateSettings)],
+    bases=(_Section,),
+    rename=_BOX,
+    frozen=True,
+)
+
+
+class _File(_Section, frozen=True):
+    task: _Task
+    plan: _Plan
+    outcome: _Outcome
+    robot: _Robot
+    gate: _Gate = _Gate()  # type: ignore[valid-type]
+
+
+_LISTS = ("lower", "upper", "velocity", "acceleration", "jerk")
+_REQUIRED = ("joint_names", "lower", "upper", "velocity")
+"""Keys that an arm needs whose numbers stand in the manifest."""
 _LARGEST_PLAUSIBLE = {"lower": 13.0, "upper": 13.0, "velocity": 50.0}
 """In [rad] and [rad/s]; ours: two turns either way, and twice what the fastest small joints do."""
 _LENGTH_OF_AXIS = 1e-3
 """By how much an axis may differ from length 1: three written digits."""
-_BOX, _BOX_KEY = "box_", "workspace_"
-"""How the two corners of the tool tip's box begin in `GateSettings` and in the file."""
-_SECTIONS: Mapping[str, Mapping[str, Any]] = {
-    "task": {"name": str},
-    "plan": {"names": _TEXTS, "units": _TEXTS, "dt": float},
-    "outcome": {"names": _TEXTS, "units": _TEXTS, "tolerance": float},
-    "robot": {"model": str, "firmware": str, "joint_names": _TEXTS, "source": str}
-    | dict.fromkeys(_LISTS, _NUMBERS)
-    | {"kinematics": _ROWS, "flange": _SIX},
-    "gate": {k.replace(_BOX, _BOX_KEY): v for k, v in get_type_hints(GateSettings).items()},
-}
-_WANTED = {
-    str: "a text in quotes",
-    float: "a number",
-    _TEXTS: 'a list of texts, such as ["x", "y"]',
-    _NUMBERS: "a list of finite numbers",
-    _ROWS: "a list with nine finite numbers a joint: x, y, z, roll, pitch, yaw and the axis",
-    _SIX: "six finite numbers: x, y, z, roll, pitch, yaw",
-}
 
 
 def filled_in(
@@ -166,16 +204,6 @@ def _list(values: Sequence[str]) -> str:
     return "[" + ", ".join(_quoted(value) for value in values) + "]"
 
 
-def load_manifest(path: Path) -> Manifest:
-    """Read and check a manifest.
-
-    Raises:
-        FileFormatError: The file is missing or is no TOML.
-        ConfigurationError: A value is missing, unknown, of the wrong kind, or out of range.
-    """
-    return parse_manifest(read_manifest(path), path)
-
-
 def read_manifest(path: Path) -> str:
     """Read a manifest's text.
 
@@ -208,7 +236,7 @@ def parse_manifest(text: str, path: Path) -> Manifest:
 
 @dataclass(frozen=True)
 class _Reader:
-    """Reads sections, and says where a wrong value stands."""
+    """Checks what sections say together, and says where a wrong value stands."""
 
     path: Path
     lines: list[str]
@@ -216,94 +244,121 @@ class _Reader:
 
     def manifest(self) -> Manifest:
         """Everything, checked."""
-        for section in self.data:
-            if section not in _SECTIONS:
-                raise self.error(section, None, f"unknown; sections are {', '.join(_SECTIONS)}")
-        task, plan, outcome, robot, gate = map(self.section, _SECTIONS)
-        if not task["name"].strip():
-            raise self.error("task", "name", "must not be empty")
-        if plan["dt"] > _IMPLAUSIBLE_SECONDS:
+        self.check_values()
+        try:
+            file = msgspec.convert(self.data, _File)
+        except msgspec.ValidationError as error:
+            raise self.explained(str(error)) from error
+        task, plan, outcome, robot = file.task.name, file.plan, file.outcome, file.robot
+        if plan.dt > _IMPLAUSIBLE_SECONDS:
             raise self.error("plan", "dt", "looks like milliseconds or a rate; give seconds")
-        if robot["model"] != "none" and plan["dt"] < (1 - 1e-9) / RATE:
+        if robot.model != "none" and plan.dt < (1 - 1e-9) / RATE:
             cycle = (
                 f"is less than an arm's cycle of {1 / RATE:g} s, within which nothing is checked"
             )
             raise self.error("plan", "dt", f"{cycle}; give more")
-        names, units, tolerance = outcome["names"], outcome["units"], outcome["tolerance"]
+        names, units, tolerance = outcome.names, outcome.units, outcome.tolerance
         if len(names) != len(units):
             raise self.error("outcome", "units", f"must name one unit for each of {list(names)}")
         if len(set(names)) < len(names):
             raise self.error("outcome", "names", "must differ from each other")
-        if tolerance <= 0:
-            raise self.error("outcome", "tolerance", "must be more than 0")
         if set(units) == {"m"} and tolerance >= _IMPLAUSIBLE_METRES:
             raise self.error("outcome", "tolerance", "looks like centimetres; give metres")
-        form = self.made("plan", lambda: PlanFormat(**plan))
-        limits = self.made("robot", lambda: self.limits(robot, task["name"]))
-        gate = {key.replace(_BOX_KEY, _BOX): value for key, value in gate.items()}
-        settings = self.made("gate", lambda: GateSettings(**gate))
+        with self.named("plan"):
+            form = PlanFormat(plan.names, plan.units, plan.dt)
+        with self.named("robot"):
+            limits = self.limits(robot, task)
+        with self.named("gate"):
+            gate = GateSettings(**structs.asdict(file.gate))
         if limits is not None:
-            self.check_joints(form, limits, settings)
-        elif settings.box_low is not None:
+            self.check_joints(form, limits, gate)
+        elif gate.box_low is not None:
             why = "with no robot there is no tool tip to check; take it out, or name the robot"
-            raise self.error("gate", f"{_BOX_KEY}low", why)
-        if limits is not None and limits.chain is None and settings.box_low is not None:
+            raise self.error("gate", _BOX["box_low"], why)
+        if limits is not None and limits.chain is None and gate.box_low is not None:
             why = (
                 f"cannot be checked, since the kinematics of {limits.robot} are not known; take it "
                 "out, or make the workspace with: prior-reinforce new --robot path/to/arm.urdf"
             )
-            raise self.error("gate", f"{_BOX_KEY}low", why)
-        return Manifest(task["name"], form, names, units, tolerance, limits, settings)
+            raise self.error("gate", _BOX["box_low"], why)
+        return Manifest(task, form, names, units, tolerance, limits, gate)
 
-    def limits(self, robot: dict[str, Any], task: str) -> RobotLimits | None:
+    def check_values(self) -> None:
+        """Refuse what a type does not say: numbers that are not finite, control characters."""
+        for section, content in self.data.items():
+            for key, given in content.items() if isinstance(content, dict) else ():
+                for value in _flat(given):
+                    if isinstance(value, float) and not math.isfinite(value):
+                        raise self.error(section, key, "must be finite")
+                    if isinstance(value, str) and plain(value) != value:
+                        raise self.error(section, key, "must hold no control characters")
+
+    def explained(self, message: str) -> ConfigurationError:
+        """What msgspec found wrong, with its place."""
+        problem, _, path = message.partition(" - at `$")
+        place = re.findall(r"\.(\w+)", path)
+        if lacking := re.search(r"required field `(.*)`", problem):
+            problem = "missing; add it, `prior-reinforce new` shows how"
+            place += [lacking[1]]
+        elif unknown := re.search(r"unknown field `(.*)`", problem):
+            kind = next((f.type for f in structs.fields(_File) if [f.name] == place), _File)
+            known = ", ".join(sorted(f.encode_name for f in structs.fields(kind)))
+            problem = f"unknown; {'keys' if place else 'sections'} are {known}"
+            place += [unknown[1]]
+        else:
+            problem = f"{problem}; mend it, `prior-reinforce new` shows how"
+        section, key, *_ = (*place, None)
+        return self.error(str(section), key, problem[0].lower() + problem[1:])
+
+    def limits(self, robot: _Robot, task: str) -> RobotLimits | None:
         """Limits of the robot's model; None where there is none."""
-        if robot["model"] != "given":
-            for key in _GIVEN:
-                if key in robot:
+        if robot.model != "given":
+            for key in self.data["robot"]:
+                if key not in ("model", "firmware"):
                     raise self.error("robot", key, 'goes with model = "given"; take it out')
-        if robot["model"] == "none":
-            return None
-        if robot["model"] != "given":
-            return robot_limits(robot["model"], robot.get("firmware", "any"))
-        missing = [key for key in ("joint_names", *_REQUIRED) if key not in robot]
+            return None if robot.model == "none" else robot_limits(robot.model, robot.firmware)
+        missing = [key for key in _REQUIRED if getattr(robot, key) is None]
         if missing:
             also = f" (and {', '.join(missing[1:])})" if missing[1:] else ""
             raise self.error(
                 "robot", missing[0], f"missing{also}; add it, `prior-reinforce new` shows how"
             )
         for key, largest in _LARGEST_PLAUSIBLE.items():
-            if np.abs(robot[key]).max() > largest:
+            if np.abs(getattr(robot, key)).max() > largest:
                 raise self.error("robot", key, "looks like degrees; give radians")
-        numbers: dict[str, Any] = {k: np.array(robot[k]) for k in _LISTS if k in robot}
+        given = {key: getattr(robot, key) for key in _LISTS}
+        numbers: dict[str, Any] = {k: np.array(v) for k, v in given.items() if v is not None}
         return RobotLimits(
             robot=task,
             firmware="as given",
-            source=robot.get("source", str(self.path)),
-            joint_names=robot["joint_names"],
+            source=robot.source or str(self.path),
+            joint_names=robot.joint_names or (),
             chain=self.chain(robot),
             **numbers,
         )
 
-    def chain(self, robot: dict[str, Any]) -> Chain | None:
+    def chain(self, robot: _Robot) -> Chain | None:
         """Kinematics that are given."""
-        if "kinematics" not in robot:
-            if "flange" in robot:
+        if robot.kinematics is None:
+            if robot.flange is not None:
                 raise self.error(
                     "robot", "flange", "goes with kinematics; add them, or take it out"
                 )
             return None
-        rows = np.array(robot["kinematics"])
+        rows = np.array(robot.kinematics)
         lengths = np.linalg.norm(rows[:, 6:], axis=1)
         if np.any(np.abs(lengths - 1) > _LENGTH_OF_AXIS):
             raise self.error("robot", "kinematics", "axes (the last three) must have length 1")
         axes = [(x, y, z) for x, y, z in (rows[:, 6:] / lengths[:, None]).tolist()]
-        origins = tuple(row[:6] for row in robot["kinematics"])
-        return Chain(origins, tuple(axes), robot.get("flange", (0.0,) * 6))
+        origins = tuple(row[:6] for row in robot.kinematics)
+        return Chain(origins, tuple(axes), robot.flange or (0.0,) * 6)
 
     def check_joints(self, form: PlanFormat, robot: RobotLimits, gate: GateSettings) -> None:
         """Refuse a plan format that lacks joints of the robot: nothing of them would be checked."""
-        columns = self.made("plan", lambda: match_joints(form, robot))
-        missing = self.made("gate", lambda: missing_joints(columns, robot, gate.absent_joints))
+        with self.named("plan"):
+            columns = match_joints(form, robot)
+        with self.named("gate"):
+            missing = missing_joints(columns, robot, gate.absent_joints)
         if missing:
             raise self.error(
                 "plan",
@@ -314,41 +369,11 @@ class _Reader:
                 '[robot] model = "none"',
             )
 
-    def section(self, name: str) -> dict[str, Any]:
-        """Values of one section, each of its type; numbers are finite."""
-        content, types = self.data.get(name, {}), _SECTIONS[name]
-        if not isinstance(content, dict):
-            raise self.error(name, None, f"must be a section, [{name}]")
-        for key in content:
-            if key not in types:
-                raise self.error(name, key, f"unknown; keys are {', '.join(sorted(types))}")
-        required = {"robot": ["model"], "gate": []}.get(name, types)
-        for key in required:
-            if key not in content:
-                raise self.error(name, key, "missing; add it, `prior-reinforce new` shows how")
-        return {key: self.value(name, key, content[key], types[key]) for key in content}
-
-    def value(self, section: str, key: str, given: Any, kind: Any) -> Any:
-        """A value of the kind that is wanted; an empty list is of no kind."""
-        wanted = _WANTED.get(kind, "a list of three finite numbers")
+    @contextmanager
+    def named(self, section: str) -> Iterator[None]:
+        """Say where a section stands that an object cannot be made of."""
         try:
-            value = msgspec.convert(given, kind)
-        except msgspec.ValidationError:
-            value = ()
-        texts = (value,) if kind is str else value if kind == _TEXTS else ()
-        if any(plain(text) != text for text in texts):
-            raise self.error(section, key, "must hold no control characters")
-        if value == ():
-            raise self.error(section, key, f"must be {wanted}")
-        if kind not in (str, _TEXTS) and not np.all(np.isfinite(value)):
-            finite = "finite" if kind is float else wanted
-            raise self.error(section, key, f"must be {finite}")
-        return value
-
-    def made(self, section: str, make: Callable[[], T]) -> T:
-        """What a function makes of a section; where it finds a value wrong, say where it stands."""
-        try:
-            return make()
+            yield
         except PriorReinforceError as error:
             if str(self.path) in str(error):
                 raise
@@ -378,3 +403,8 @@ class _Reader:
             elif (inside or key is None) and wanted.match(line):
                 return number
         return found
+
+
+def _flat(value: Any) -> list[Any]:
+    """All that lists within lists hold."""
+    return [x for each in value for x in _flat(each)] if isinstance(value, list) else [value]
