@@ -17,6 +17,8 @@ check_shapes("prior_reinforce")
 # Threads that wait for each other by spinning crawl on a busy machine; two test processes are one.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("MUJOCO_GL", "egl")
+# Other tests that run at the same time move other arms.
+os.environ["PRIOR_REINFORCE_ARM"] = f"tests-{os.getpid()}"
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -1,11 +1,13 @@
 """`ask` and `export`: where plans go, and what runs them."""
 
+import shutil
 import sqlite3
 import sys
 from collections import Counter
 
 import pytest
 
+from prior_reinforce.bench.robots.executors.lock import executing_lock
 from prior_reinforce.bench.workspace import workspace as workspace_module
 from prior_reinforce.bench.workspace.log import Executing
 from prior_reinforce.bench.workspace.workspace import Workspace
@@ -228,7 +230,8 @@ def test_a_check_moves_nothing(run, folder, driver, tmp_path):
     [
         ('{"joint1": 0.001, "joint2": -0.004}', 0, "off it by up to 0.004 rad (joint2)"),
         ("[0.0, 0.3]", 1, "off it by up to 0.3 rad (joint2), more than 0.02"),
-        ('{"joint1": 0.0}', 0, "nothing is said of joint2"),
+        ('{"joint1": 0.0}', 1, "says nothing of joint2 [rad]"),
+        ('{"joint1": 0.0, "panda_joint2": 0.0}', 1, "says nothing of joint2 [rad]"),
         ("[0.0]", 1, "must end with a line of JSON"),
         ("nan", 1, "must end with a line of JSON"),
         ("[NaN, 0]", 1, "must end with a line of JSON"),
@@ -289,3 +292,68 @@ def test_a_plan_of_before_a_correction_is_named_until_it_is_voided(run, folder):
     assert said in run("void", folder, 1)[1]
     assert "before a correction" not in run("void", folder, 2)[1]
     assert "before a correction" not in run("ask", folder)[1]
+
+
+def test_a_plan_that_is_refused_while_it_is_shown_leaves_nothing(
+    run, folder, tmp_path, monkeypatch
+):
+    """The limits are narrowed between opening the workspace and the trial."""
+    run("goal", folder, "0.9", "0.05")
+    path = tmp_path / folder / "workspace.toml"
+    narrow = (
+        'model = "given"\njoint_names = ["joint1", "joint2"]\nlower = [-3, -3]\nupper = [3, 3]\n'
+        "velocity = [0.1, 0.1]\nacceleration = [1000, 1000]\njerk = [1000000, 1000000]"
+    )
+    ask = Session.ask
+
+    def narrowed(session, **how):
+        path.write_text(path.read_text().replace('model = "none"', narrow, 1))
+        return ask(session, **how)
+
+    monkeypatch.setattr(Session, "ask", narrowed)
+    status, out, err = run("ask", folder, "--out", "plan.npz")
+    assert status != 0
+    assert "velocity" in err
+    assert "written" not in out
+    assert not (tmp_path / "plan.npz").exists()
+
+
+def test_a_restored_journal_asks_whether_that_was_this_trial(run, folder, driver, tmp_path):
+    run("goal", folder, "0.9", "0.05")
+    (tmp_path / "say.json").write_text('{"outcome": "done"}')
+    journal = tmp_path / folder / "journal.sqlite"
+    backup = journal.read_bytes()  # before the trial was asked for
+    assert run("ask", folder, "--yes", "--run", driver)[0] == 0
+    journal.write_bytes(backup)
+    for suffix in ("-wal", "-shm"):
+        journal.with_name(journal.name + suffix).unlink(missing_ok=True)
+    for _ in range(2):
+        status, _, err = run("ask", folder, "--yes", "--run", driver)
+        assert status != 0
+        assert (tmp_path / "motions").read_text() == "moved\n"
+    assert "did the arm move?" in err
+    assert "restored from a copy" in run("status", folder)[1]
+    # A person says that it was another one.
+    status, _, err = run("ask", folder, "--yes", "--arm-did-not-move", "--run", driver)
+    assert status == 0, err
+    assert (tmp_path / "motions").read_text() == "moved\n" * 2
+
+
+def test_a_copied_workspace_waits_for_the_arm(run, folder, driver, tmp_path):
+    run("goal", folder, "0.9", "0.05")
+    shutil.copytree(tmp_path / folder, tmp_path / "copy")
+    (tmp_path / "say.json").write_text('{"outcome": "done"}')
+    with executing_lock(tmp_path / folder):
+        status, _, err = run("ask", "copy", "--yes", "--run", driver)
+        assert status != 0
+        assert "[robot] arm" in err
+        assert not (tmp_path / "motions").exists()
+        manifest = tmp_path / "copy" / "workspace.toml"
+        manifest.write_text(manifest.read_text().replace("# arm = ", "arm = "))
+        assert run("ask", "copy", "--yes", "--run", driver)[0] == 0
+
+
+def test_the_journal_keeps_no_argument(run, folder, driver):
+    run("goal", folder, "0.9", "0.05")
+    run("ask", folder, "--yes", "--run", f"{driver} -p hunter2")
+    assert "hunter2" not in run("log", folder)[1]

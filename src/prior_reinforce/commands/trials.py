@@ -46,7 +46,7 @@ class Ask:
     """Check everything that --run needs, and move nothing."""
     where: str | None = None
     """Ask this command first where the arm stands, and compare: its last line is JSON such as
-    {"joint1": 0.1}. It must move nothing."""
+    {"joint1": 0.1}, with every joint, in the plan's units. It must move nothing."""
     time_limit: float = 120.0
     """Seconds that the command may take."""
     arm_did_not_move: bool = False
@@ -67,7 +67,7 @@ class Ask:
                 print(f"trial {recovered.number}: {say_trial(workspace, recovered)}")
             did_not_move = self.arm_did_not_move
             if not did_not_move and _was_cut_off(workspace, session) and sys.stdin.isatty():
-                if _ask_whether_it_moved(session):
+                if _ask_whether_it_moved(workspace, session):
                     print_next(workspace)
                     return 1
                 did_not_move = True
@@ -93,7 +93,7 @@ class Ask:
 
     def _check_flags(self) -> None:
         """Say what cannot be before anything is changed."""
-        from prior_reinforce.bench.robots.executors.command import check_command
+        from prior_reinforce.bench.robots.executors.arguments import check_command
 
         if self.run_command is not None:
             check_command(self.run_command, time_limit=self.time_limit)
@@ -108,13 +108,13 @@ class Ask:
 
     def _is_there(self, workspace: Workspace, trial: Trial) -> bool:
         """Whether the arm stands where the plan begins, as far as it says."""
-        from prior_reinforce.bench.robots.executors.command import read_pose
+        from prior_reinforce.bench.robots.executors.pose import read_pose
 
         assert trial.plan is not None
         assert self.where is not None
         form, limit = workspace.manifest.format, workspace.manifest.gate.start_error
         try:
-            pose = read_pose(self.where, form.names)
+            pose = read_pose(self.where, form)
         except ConfigurationError as error:
             print(f"prior-reinforce: {error}; nothing moved", file=sys.stderr)
             return False
@@ -122,8 +122,6 @@ class Ask:
         name = max(off, key=lambda n: abs(off[n]))
         unit = form.units[form.names.index(name)]
         said = f"the arm is off it by up to {abs(off[name]):.3g} {unit} ({name})"
-        if missing := [n for n in form.names if n not in pose]:
-            said += f"; nothing is said of {', '.join(missing)}"
         if abs(off[name]) <= limit:
             print(said)
             return True
@@ -351,9 +349,9 @@ def _may_move() -> bool:
         return False
 
 
-def _ask_whether_it_moved(session: Session) -> bool:
+def _ask_whether_it_moved(workspace: Workspace, session: Session) -> bool:
     assert session.open_trial is not None
-    print(f"trial {session.open_trial.number} was executing when the program stopped")
+    print(f"trial {session.open_trial.number}: {say_trial(workspace, session.open_trial)}")
     while True:
         try:
             answer = input("did the arm move? (yes/no) ").strip().lower()

@@ -458,6 +458,22 @@ def test_an_execution_that_was_interrupted_is_recorded_as_aborted(workspace, tmp
     assert not workspace.log.is_executing()
 
 
+@pytest.mark.parametrize("error", [ConfigurationError, KeyboardInterrupt])
+def test_what_is_raised_while_the_arm_moves_is_no_sign_that_it_did_not(workspace, error):
+    number = ask(workspace).number
+
+    def show(text):
+        raise error("shown")
+
+    with pytest.raises(error, match="shown"):
+        workspace.execute(
+            number, "sh -c 'echo moves; exec sleep 60' {plan}", time_limit=120, show=show
+        )
+    assert trials(workspace)[0].stage is Stage.EXECUTED
+    assert workspace.state.executions[number].outcome == "aborted"
+    assert not workspace.log.is_executing()
+
+
 def test_nothing_moves_where_an_interruption_came_first(workspace, tmp_path, monkeypatch):
     number = ask(workspace).number
     begin = Workspace._begin_execution

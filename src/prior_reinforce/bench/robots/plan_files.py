@@ -50,23 +50,24 @@ class PlanFile:
     sha256: str
     """Hash of the file's bytes, 64 hexadecimal digits."""
 
-    def verify(self) -> None:
-        """Do nothing if the file is still what was written.
+    def verify(self) -> bytes:
+        """Return the file's bytes, if they are still what was written.
 
         Raises:
             FileFormatError: It is gone, unreadable, or its bytes have another hash.
         """
         try:
-            found = sha256(self.path.read_bytes())
+            content = self.path.read_bytes()
         except OSError as error:
             raise FileFormatError(
                 f"cannot read the plan {self.path} ({error.strerror}); put the file back"
             ) from error
-        if found != self.sha256:
+        if (found := sha256(content)) != self.sha256:
             raise FileFormatError(
                 f"{self.path} has SHA-256 {found[:12]}..., expected {self.sha256[:12]}...; plans "
                 "never change: put the original back, or void the trial"
             )
+        return content
 
 
 def write_plan(

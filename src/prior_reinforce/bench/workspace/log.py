@@ -51,6 +51,7 @@ class Executing(Event, frozen=True):
 
     trial: int
     command: str
+    """Its program, without its arguments; empty where the execution was found in `folder` only."""
     folder: str
     """Name of the folder for what it writes; empty if it was never made."""
 
@@ -63,7 +64,6 @@ class Executed(Event, frozen=True):
     reason: str = ""
     start_error: float | None = None
     tracking_rms: float | None = None
-    command: tuple[str, ...] = ()
     exit_status: int | None = None
     timed_out: bool = False
     interrupted: bool = False

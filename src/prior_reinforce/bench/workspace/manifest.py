@@ -63,6 +63,8 @@ class Manifest:
     """Limits that every plan is held against; None where the manifest says `none`."""
     gate: GateSettings
     """The gate's own lines."""
+    arm: str = ""
+    """Name of the arm, where this computer moves several: one motion at a time is made on each."""
 
 
 _Texts = Annotated[tuple[str, ...], Meta(min_length=1)]
@@ -103,6 +105,7 @@ class _Robot(_Section, frozen=True):
     kinematics: Annotated[tuple[_Nine, ...], Meta(min_length=1)] | None = None
     flange: _Six | None = None
     source: str = ""
+    arm: str = ""
 
 
 _BOX = {"box_low": "workspace_low", "box_high": "workspace_high"}
@@ -281,7 +284,7 @@ class _Reader:
                 "out, or make the workspace with: prior-reinforce new --robot path/to/arm.urdf"
             )
             raise self.error("gate", _BOX["box_low"], why)
-        return Manifest(task, form, names, units, tolerance, limits, gate)
+        return Manifest(task, form, names, units, tolerance, limits, gate, robot.arm)
 
     def check_values(self) -> None:
         """Refuse what a type does not say: numbers that are not finite, control characters."""
@@ -314,7 +317,7 @@ class _Reader:
         """Limits of the robot's model; None where there is none."""
         if robot.model != "given":
             for key in self.data["robot"]:
-                if key not in ("model", "firmware"):
+                if key not in ("model", "firmware", "arm"):
                     raise self.error("robot", key, 'goes with model = "given"; take it out')
             return None if robot.model == "none" else robot_limits(robot.model, robot.firmware)
         missing = [key for key in _REQUIRED if getattr(robot, key) is None]

@@ -6,7 +6,7 @@ import shlex
 
 import numpy as np
 
-from prior_reinforce.bench.workspace.log import Executed, WorkspaceState
+from prior_reinforce.bench.workspace.log import Executed, Executing, WorkspaceState
 from prior_reinforce.bench.workspace.workspace import Workspace
 from prior_reinforce.registry import parse_choice
 from prior_reinforce.session.trials import Goal, Stage, Trial
@@ -65,6 +65,12 @@ def _say_trial(workspace: Workspace, trial: Trial) -> str:
     if trial.stage is Stage.EXECUTING:
         if workspace.log.is_executing():
             return "is executing now"
+        began = workspace.state.executions[trial.number]
+        if isinstance(began, Executing) and began.folder and not began.command:
+            return (
+                f"its plan was executed, as executions/{began.folder} shows, of which the journal, "
+                "restored from a copy, knows nothing: was that this trial, did the arm move?"
+            )
         return "was executing when the program stopped: did the arm move?"
     if trial.stage is Stage.EXECUTED:
         warning = execution_warning(workspace, trial)
@@ -105,7 +111,7 @@ def execution_warning(workspace: Workspace, trial: Trial) -> str:
             f"but went {ended.tracking_rms:.3g} rad rms off the plan, more than "
             f"{gate.tracking_error:g}"
         )
-    return "; ".join(warnings)
+    return plain("; ".join(warnings))
 
 
 def next_step(workspace: Workspace) -> str:

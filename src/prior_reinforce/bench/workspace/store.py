@@ -166,6 +166,10 @@ class Store:
                 else:
                     return folder
 
+    def execution_folders(self, number: int) -> list[Path]:
+        """Such folders that are there, of a trial."""
+        return sorted((self._folder / "executions").glob(f"trial-{number:03d}-*"))
+
     def execution_folder(self, name: str) -> Path:
         """Where such a folder lies."""
         return inside(self._folder / "executions" / Path(name).name, self._folder)

@@ -365,39 +365,44 @@ class Workspace:
             FileFormatError: The plan's file is not what was written; nothing moved.
             KeyboardInterrupt: Interrupted; the command was stopped, and the journal says so.
         """
-        from prior_reinforce.bench.robots.executors.command import (
-            Interruptions,
+        from prior_reinforce.bench.robots.executors.arguments import (
             check_command,
-            hide_secrets,
-            run_command,
+            without_arguments,
         )
+        from prior_reinforce.bench.robots.executors.command import execute_command
         from prior_reinforce.bench.robots.executors.lock import executing_lock
+        from prior_reinforce.bench.robots.executors.supervision import Interruptions
 
         check_command(command, time_limit=time_limit)
-        with executing_lock(self.folder) as lock, Interruptions() as interruptions:
+        with (
+            executing_lock(self.folder, self.manifest.arm) as lock,
+            Interruptions() as interruptions,
+        ):
+            self._note_unknown_execution(self.state.trial(number))
             trial = self._to_execute(number)
             verdict = self.gate(self.plan(trial).actions)
             if verdict is not None:
                 verdict.require()
             folder = self.store.make_execution_folder(number)
-            self._begin_execution(number, hide_secrets(command), folder.name)
-            plan_file = PlanFile(self.plan_path(trial), _kept(trial).sha256)
+            self._begin_execution(number, without_arguments(command), folder.name)
             try:
-                result = run_command(
+                result, raised = execute_command(
                     command,
-                    plan_file,
+                    self._plan_file(trial),
+                    folder,
                     time_limit=time_limit,
-                    keep_open=(lock,),
-                    folder=folder,
-                    show=show,
+                    lock=lock,
                     interruptions=interruptions,
+                    show=show,
                 )
-            except (ConfigurationError, FileFormatError, KeyboardInterrupt):
+            except (PriorReinforceError, KeyboardInterrupt):
                 self._end_execution(NotExecuted(trial=number))  # never started: nothing moved
                 raise
             if result.outcome != "unknown":
                 result = self._measured(result, trial, folder)
                 self._end_execution(_ended(number, result))
+        if raised is not None:
+            raise raised
         if interruptions.came:
             raise KeyboardInterrupt(f"trial {number}: {result.outcome} ({result.reason})")
         return result
@@ -411,12 +416,14 @@ class Workspace:
         from prior_reinforce.bench.robots.executors.command import read_ended
 
         trial = self.state.open_trial
-        if trial is None or trial.stage is not Stage.EXECUTING or self.log.is_executing():
+        if trial is None or self.log.is_executing():
             return None
-        began = self.state.executions[trial.number]
-        assert isinstance(began, Executing)
+        self._note_unknown_execution(trial)
+        began = self.state.executions.get(trial.number)
+        if not isinstance(began, Executing) or not began.command or not began.folder:
+            return None  # a person has to say
         folder = self.store.execution_folder(began.folder)
-        result = read_ended(folder, began.command) if began.folder else None
+        result = read_ended(folder, began.command, self._plan_file(trial))
         if result is None:
             return None
         self._end_execution(_ended(trial.number, self._measured(result, trial, folder)))
@@ -447,6 +454,24 @@ class Workspace:
         with self.log.exclusive():
             if self.state.trial(event.trial).stage is Stage.EXECUTING:
                 self.log.append(event)
+
+    def _note_unknown_execution(self, trial: Trial) -> None:
+        """Note where a trial's plan was given to a command and no event says so.
+
+        Such a journal was restored from a copy; a person has to say whether that was this trial.
+        """
+        from prior_reinforce.bench.robots.executors.command import was_executed
+
+        if trial.stage is Stage.ASKED:
+            folders = self.store.execution_folders(trial.number)
+            known = {e.event.folder for e in self.log.entries() if isinstance(e.event, Executing)}
+            for folder in folders:
+                if folder.name not in known and was_executed(folder, self._plan_file(trial)):
+                    self._begin_execution(trial.number, "", folder.name)
+                    return
+
+    def _plan_file(self, trial: Trial) -> PlanFile:
+        return PlanFile(self.plan_path(trial), _kept(trial).sha256)
 
     def _measured(self, result: CommandResult, trial: Trial, folder: Path) -> CommandResult:
         """A result with the distance from the plan, where the driver measured its path."""

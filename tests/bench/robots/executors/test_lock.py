@@ -1,11 +1,21 @@
-"""The lock of an execution: one at a time."""
+"""The lock of an execution: one at a time, on a workspace and on an arm."""
 
+import os
 import subprocess
+import sys
 
 import pytest
 
-from prior_reinforce.bench.robots.executors.lock import executing_lock, is_executing
+from prior_reinforce.bench.robots.executors.lock import (
+    MARK,
+    executing_lock,
+    is_executing,
+    marked,
+    stop_marked,
+)
 from prior_reinforce.errors import TrialStateError, WorkspaceError
+
+on_linux = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="sockets and /proc")
 
 
 def test_one_holds_it_and_leaving_frees_it(tmp_path):
@@ -25,23 +35,62 @@ def test_looking_keeps_nobody_from_executing(tmp_path):
         assert not is_executing(tmp_path)
 
 
-def test_what_holds_it_outlives_who_took_it(tmp_path):
-    """A driver that inherited it goes on, though we left the block."""
+@on_linux
+def test_an_arm_is_one_whatever_workspace_moves_it(tmp_path):
+    (tmp_path / "copy").mkdir()
+    with executing_lock(tmp_path):
+        with (
+            pytest.raises(TrialStateError, match=r"\[robot\] arm"),
+            executing_lock(tmp_path / "copy"),
+        ):
+            pass
+        assert not is_executing(tmp_path / "copy")
+        with executing_lock(tmp_path / "copy", arm="left"):
+            pass
+
+
+@on_linux
+@pytest.mark.parametrize("close", [False, True])
+def test_what_holds_it_outlives_who_took_it(tmp_path, close):
+    """A driver that inherited it goes on, though we left the block; or closed what it inherited."""
     with executing_lock(tmp_path) as lock:
-        driver = subprocess.Popen(["sleep", "60"], pass_fds=(lock,))
+        driver = subprocess.Popen(
+            ["sleep", "60"],
+            pass_fds=() if close else lock.descriptors,
+            env=os.environ | ({MARK: " ".join(lock.names)} if close else {}),
+        )
     try:
         assert is_executing(tmp_path)
+        for folder in (tmp_path, None):
+            with pytest.raises(TrialStateError, match="wait for it"), executing_lock(folder):
+                pass
     finally:
         driver.kill()
         driver.wait()
     assert not is_executing(tmp_path)
 
 
+@on_linux
+def test_what_bears_a_mark_is_stopped_whatever_it_ignores():
+    drivers = [
+        subprocess.Popen(["sh", "-c", text], env=os.environ | {MARK: f"arm-0 {name}"})
+        for text, name in (("sleep 60", "run-1"), ("trap '' TERM; exec sleep 60", "run-1"))
+        for name in (name, name.replace("1", "2"))
+    ]
+    try:
+        assert len(marked("run-1")) >= 2
+        stop_marked("run-1", 0.2)
+        assert not marked("run-1")
+        assert [driver.poll() is None for driver in drivers] == [False, True, False, True]
+    finally:
+        stop_marked("arm-0", 0.0)
+        for driver in drivers:
+            driver.wait()
+
+
 def test_there_is_no_file_to_delete(tmp_path):
     with executing_lock(tmp_path):
         assert not list(tmp_path.iterdir())
-        (tmp_path / "executing.lock").touch()  # what older versions used
-        (tmp_path / "executing.lock").unlink()
         assert is_executing(tmp_path)
 
 

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -23,11 +24,18 @@ PROGRAM = """
 import sys
 from pathlib import Path
 from prior_reinforce.bench.robots.plan_files import PlanFile
-from prior_reinforce.bench.robots.executors.command import run_command
+from prior_reinforce.bench.robots.executors.command import execute_command
 from prior_reinforce.bench.robots.executors.lock import executing_lock
+from prior_reinforce.bench.robots.executors.supervision import Interruptions
 folder, path, sha256, command, limit = sys.argv[1:]
-with executing_lock(Path(folder)) as lock:
-    run_command(command, PlanFile(Path(path), sha256), time_limit=float(limit), keep_open=(lock,))
+result = Path(folder, "result")
+result.mkdir()
+with executing_lock(Path(folder)) as lock, Interruptions() as interruptions:
+    ended, _ = execute_command(
+        command, PlanFile(Path(path), sha256), result, time_limit=float(limit), lock=lock,
+        interruptions=interruptions,
+    )
+sys.exit(interruptions.came)
 """
 MOVES = "trap '' TERM; echo $$ > {here}/pid; while [ ! -e {here}/stop ]; do sleep 0.02; done"
 RESTS = """
@@ -91,13 +99,6 @@ def start(tmp_path, plan_file):
     wait_for(lambda: not is_executing(tmp_path))
 
 
-def supervisor_of(program):
-    """The program's only child."""
-    children = Path(f"/proc/{program.pid}/task/{program.pid}/children").read_text().split()
-    assert len(children) == 1
-    return int(children[0])
-
-
 def test_a_driver_that_detaches_is_found_at_the_time_limit(tmp_path, plan_file):
     script = tmp_path / "drive.sh"
     script.write_text(f"setsid sh -c '(sleep 60 & echo $! > {tmp_path}/pid) &'")
@@ -120,30 +121,128 @@ def test_a_driver_that_detaches_is_waited_for(tmp_path, plan_file):
     assert (tmp_path / "moved").exists()
 
 
-@pytest.mark.parametrize("killed", ["program", "supervisor", "both"])
-def test_nobody_else_may_execute_while_a_driver_goes_on(start, tmp_path, killed):
-    program = start(MOVES)
-    watcher = supervisor_of(program)
-    if killed != "program":
-        os.kill(watcher, signal.SIGKILL)
-    if killed != "supervisor":
-        program.kill()
+# What a wrapper in Python starts has none of the descriptors that the wrapper inherited.
+WRAPS = "import subprocess, sys; sys.exit(subprocess.run(sys.argv[1:]).returncode)"
+
+
+def tree_of(program):
+    """What a program started: the guard, what runs the command, the command, ..."""
+    found = [int(program.pid)]
+    for pid in found:
+        found += map(int, Path(f"/proc/{pid}/task/{pid}/children").read_text().split())
+    return found[1:]
+
+
+@pytest.mark.parametrize("wrapped", [False, True])
+@pytest.mark.parametrize(
+    ("killed", "goes_on"),
+    [
+        (("program",), True),
+        (("guard",), False),
+        (("runner",), False),
+        (("program", "guard"), True),
+        (("program", "runner"), False),
+        (("guard", "runner"), False),
+        (("program", "guard", "runner"), True),
+    ],
+)
+def test_whoever_is_killed_the_motion_ends_or_the_lock_stands(
+    start, tmp_path, killed, goes_on, wrapped
+):
+    how = f'{sys.executable} -c "{WRAPS}" sh {{script}} {{plan}}' if wrapped else None
+    program = start(MOVES, **({"how": how} if how else {}))
+    guard, runner, *_ = tree_of(program)
+    driver = int((tmp_path / "pid").read_text())
+    pids = {"program": program.pid, "guard": guard, "runner": runner}
+    for name in killed:
+        os.kill(pids[name], signal.SIGKILL)
     program.wait(30)
-    for path in tmp_path.glob("*.lock"):  # a deleted lock changes nothing: none is a file
-        path.unlink()
-    assert is_executing(tmp_path)
-    with pytest.raises(TrialStateError, match="executed right now"), executing_lock(tmp_path):
-        pass
-    (tmp_path / "stop").touch()
+    if goes_on:
+        assert is_executing(tmp_path)
+        for folder in (tmp_path, None):  # the workspace's, and the arm's
+            with pytest.raises(TrialStateError, match="right now"), executing_lock(folder):
+                pass
+        assert running(driver)
+        (tmp_path / "stop").touch()
+    # The lock is free no sooner than the motion has ended.
     wait_for(lambda: not is_executing(tmp_path))
+    assert not running(driver)
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def running(pid):
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+@pytest.mark.parametrize("kill", [False, True])
+def test_a_driver_of_another_user_is_told_of_at_once_and_waited_for(tmp_path, kill):
+    """As with `sudo` in the command: what may not be signalled goes on."""
+    (tmp_path / "moves").symlink_to(shutil.which("sleep"))
+    program = (
+        "import json, os, sys\n"
+        "from prior_reinforce.bench.robots.executors import supervisor\n"
+        "kill = os.kill\n"
+        "def refused(pid, number):\n"
+        "    if open(f'/proc/{pid}/comm').read() == 'moves\\n': raise PermissionError\n"
+        "    kill(pid, number)\n"
+        "os.kill = refused\n"
+        "supervisor.main(json.loads(sys.argv[1]))\n"
+    )
+    start = time.monotonic()
+    with (tmp_path / "output").open("wb") as output, (tmp_path / "ended").open("wb") as ended:
+        given = {
+            "arguments": ["sh", "-c", f"trap '' TERM; exec {tmp_path}/moves 3"],
+            "output": output.fileno(), "ended": ended.fileno(),
+            "keep_open": [], "time_limit": 0.3, "grace": 0.1,
+        }  # fmt: skip
+        guard = subprocess.Popen(
+            [sys.executable, "-c", program, json.dumps(given)],
+            pass_fds=[output.fileno(), ended.fileno()],
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+    said = guard.stderr.readline()
+    assert "CANNOT STOP moves" in said
+    assert "use its stop button" in said
+    runner, driver = tree_of(guard)
+    assert running(driver)
+    if kill:  # the guard adopts it, tells again, and keeps the lock
+        os.kill(runner, signal.SIGKILL)
+        assert "CANNOT STOP moves" in guard.stderr.readline()
+    guard.communicate(timeout=60)
+    assert not running(driver)
+    assert time.monotonic() - start >= 3
+    if not kill:
+        assert "moves" in json.loads((tmp_path / "ended").read_text())["unstoppable"]
+
+
+def test_a_driver_may_delete_its_folder(tmp_path, plan_file):
+    command = "sh -c 'rm -r $0; echo gone' {result} {plan}"
+    result = run_command(command, plan_file, time_limit=60)
+    assert (result.outcome, result.output_tail) == ("done", "gone\n")
+
+
+def test_a_driver_that_is_stopped_and_continued_ends_as_what_it_was(tmp_path, plan_file):
+    text = "(sleep 0.3; kill -CONT $$) & kill -STOP $$; echo on; exit 4"
+    result = run_command(f"sh -c '{text}' {{plan}}", plan_file, time_limit=60)
+    assert (result.exit_status, result.timed_out, result.interrupted) == (4, False, False)
+    assert result.output_tail == "on\n"
+
+
+def test_what_is_over_at_once_ends_as_what_it_was(plan_file):
+    for status in (0, 3, 75) * 3:
+        result = run_command(f"sh -c 'echo x; exit {status}' {{plan}}", plan_file, time_limit=60)
+        assert (result.exit_status, result.output_tail) == (status, "x\n")
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGTSTP])
 @pytest.mark.parametrize("whole_group", [False, True])
 def test_a_driver_comes_to_rest_however_often_we_are_interrupted(
     start, tmp_path, number, whole_group
 ):
-    """A terminal's Ctrl-C reaches the whole group; `kill` only the program."""
+    """A terminal's Ctrl-C and Ctrl-Z reach the whole group; `kill` only the program."""
     program = start(RESTS, how=f"{sys.executable} {{script}} {{plan}}")
     for _ in range(5):
         (os.killpg if whole_group else os.kill)(program.pid, number)
@@ -205,16 +304,11 @@ def test_a_driver_can_ask_a_person(tmp_path, plan_file):
 
 
 def test_endless_output_fills_no_disk(tmp_path, plan_file):
-    folder = tmp_path / "result"
-    folder.mkdir()
-    result = run_command(
-        "sh -c 'head -c 30000000 /dev/zero; echo end' {plan}",
-        plan_file,
-        time_limit=60,
-        folder=folder,
-    )
+    size = f"wc -c < $0/output.txt > {tmp_path}/size"
+    text = "head -c 30000000 /dev/zero; echo end; sleep 0.3"
+    result = run_command(f"sh -c '{text}; {size}' {{result}} {{plan}}", plan_file, time_limit=60)
     assert result.output_tail.endswith("end\n")
-    assert (folder / "output.txt").stat().st_size < 17_000_000
+    assert int((tmp_path / "size").read_text()) < 17_000_000
 
 
 def test_a_command_that_fails_before_anybody_looks_has_failed(tmp_path):
@@ -228,15 +322,14 @@ def test_a_command_that_fails_before_anybody_looks_has_failed(tmp_path):
         "subprocess.Popen.__init__ = slow\n"
         "supervisor.main(json.loads(sys.argv[1]))\n"
     )
-    ended = tmp_path / "ended.json"
-    with (tmp_path / "output").open("wb") as output:
+    with (tmp_path / "output").open("wb") as output, (tmp_path / "ended").open("wb") as ended:
         request = {
-            "arguments": ["false"], "output": output.fileno(), "ended": str(ended),
+            "arguments": ["false"], "output": output.fileno(), "ended": ended.fileno(),
             "keep_open": [], "time_limit": 5.0, "grace": 1.0,
         }  # fmt: skip
         subprocess.run(
             [sys.executable, "-c", program, json.dumps(request)],
             check=True,
-            pass_fds=[output.fileno()],
+            pass_fds=[output.fileno(), ended.fileno()],
         )
-    assert json.loads(ended.read_text())["exit_status"] == 1
+    assert json.loads((tmp_path / "ended").read_text())["exit_status"] == 1

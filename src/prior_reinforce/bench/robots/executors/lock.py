@@ -1,51 +1,84 @@
-"""Whether a trial is being executed right now: by a program that lives, or by what it started.
+"""Whether an arm moves right now, or a trial is being executed: by us, or by what we started.
 
 The journal cannot tell: its last word on such a trial is `executing`, whether the program that
-wrote it still runs or died. A lock can, because the system frees it when its last holder is gone.
-The supervisor and the command that moves the arm hold it too: where our program is killed and the
-controller goes on, the trial is still being executed. That takes `flock`, whose lock belongs to the
-open file that all share; SQLite's, as in the journal, would end with our program.
+wrote it still runs or died. Locks can, because the system frees them when their last holder is
+gone, and the supervisor and the command hold them too. There are two: `flock` on the workspace's
+folder, and, for the arm, a Linux abstract socket: one for all workspaces and users of a computer.
+Neither is a file that somebody could delete.
 
-What is locked is the workspace's folder itself: there is no file that somebody could delete.
+A command that closes what it inherited, as Python's `subprocess` does, holds neither. What executes
+is therefore marked in its environment, which children inherit, and found by that mark in /proc.
 """
 
 from __future__ import annotations
 
+import errno
+import hashlib
 import os
+import signal
+import socket
+import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
-from prior_reinforce.errors import TrialStateError, WorkspaceError
+from prior_reinforce.errors import ConfigurationError, TrialStateError, WorkspaceError
 
-# Ours: longer than `is_executing` ever holds it, shorter than any execution.
+ARM_VARIABLE = "PRIOR_REINFORCE_ARM"
+"""Environment variable that names the arm where nothing else does."""
+MARK = "PRIOR_REINFORCE_EXECUTION"
+"""Environment variable of what executes: the names of its locks."""
+# Ours: longer than a look at a lock ever holds it, shorter than any execution.
 _WAIT_S = 1.0
 _POLL_S = 0.01
 
 
-@contextmanager
-def executing_lock(folder: Path) -> Iterator[int]:
-    """Hold the right to execute a trial of the workspace in `folder`.
+@dataclass(frozen=True)
+class ExecutingLock:
+    """The right to move an arm, for what is started to share."""
 
-    Yields:
-        A file descriptor for what is started to keep open: as long as anything does, it holds the
-        right too, even where this program is killed or leaves the block.
+    descriptors: tuple[int, ...]
+    """To keep open: as long as anything does, the lock is held."""
+    names: tuple[str, ...]
+    """To be marked with."""
+
+
+@contextmanager
+def executing_lock(folder: Path | None = None, arm: str = "") -> Iterator[ExecutingLock]:
+    """Hold the right to move an arm, and to execute a trial of a workspace.
+
+    Args:
+        folder: The workspace's, if it is a workspace's trial.
+        arm: Name of the arm; without one, what PRIOR_REINFORCE_ARM says, or the one arm that all
+            without a name share.
 
     Raises:
-        TrialStateError: Another program holds it.
+        TrialStateError: Somebody else holds it, or something that was executed still runs.
         WorkspaceError: The folder cannot be opened, or its file system has no locks.
     """
-    descriptor = _open(folder)
-    try:
-        if not _lock(folder, descriptor, "alone", wait=_WAIT_S):
-            raise TrialStateError(
-                f"a trial of {folder} is being executed right now; wait for it, or stop its command"
-            )
-        yield descriptor
-    finally:
-        os.close(descriptor)
+    deadline = time.monotonic() + _WAIT_S
+    name = _name_of_arm(arm)
+    with ExitStack() as stack:
+        names, descriptors = [name], []
+        if folder is not None:
+            descriptors.append(stack.enter_context(_opened(folder)))
+            names.append(_name_of_folder(folder))
+            while not _flock(folder, descriptors[0], shared=False):
+                _wait(deadline, f"a trial of {folder} is being executed")
+        busy = (
+            "this arm is moved by another workspace or program; if it is another arm, name each in "
+            f"its manifest ([robot] arm) or in {ARM_VARIABLE}: a motion is being executed"
+        )
+        if sys.platform.startswith("linux"):  # elsewhere nothing is executed
+            owner = stack.enter_context(socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM))
+            while not _bind(owner, name):
+                _wait(deadline, busy)
+            descriptors.append(owner.fileno())
+        while any(map(marked, names)):
+            _wait(deadline, busy)
+        yield ExecutingLock(tuple(descriptors), tuple(names))
 
 
 def is_executing(folder: Path) -> bool:
@@ -54,36 +87,91 @@ def is_executing(folder: Path) -> bool:
     Raises:
         WorkspaceError: The folder cannot be opened, or its file system has no locks.
     """
-    descriptor = _open(folder)
+    with _opened(folder) as descriptor:
+        return not _flock(folder, descriptor, shared=True) or bool(marked(_name_of_folder(folder)))
+
+
+def marked(name: str) -> list[int]:
+    """Processes whose environment bears a name; those of other users cannot be looked at."""
+    found = []
+    with suppress(OSError):
+        for entry in os.listdir("/proc"):
+            if entry.isdecimal():
+                with suppress(OSError):
+                    for variable in Path("/proc", entry, "environ").read_bytes().split(b"\0"):
+                        key, _, value = variable.partition(b"=")
+                        if key == MARK.encode() and name.encode() in value.split():
+                            found.append(int(entry))
+    return found
+
+
+def stop_marked(name: str, grace: float) -> None:
+    """Stop all processes that bear a name, by SIGKILL after `grace` seconds; wait for them."""
+    start, number = time.monotonic(), signal.SIGTERM
+    asked: set[tuple[int, int]] = set()
+    while running := marked(name):
+        if time.monotonic() > start + grace:
+            number = signal.SIGKILL
+        for pid in running:
+            if (pid, number) not in asked:
+                asked.add((pid, number))
+                with suppress(OSError):
+                    os.kill(pid, number)
+                    os.kill(pid, signal.SIGCONT)
+        time.sleep(_POLL_S)
+
+
+def _name_of_arm(arm: str) -> str:
+    arm = arm or os.environ.get(ARM_VARIABLE, "")
+    return f"arm-{hashlib.sha256(arm.encode()).hexdigest()[:32]}"
+
+
+def _name_of_folder(folder: Path) -> str:
+    stat = folder.stat()
+    return f"folder-{stat.st_dev}-{stat.st_ino}"
+
+
+def _wait(deadline: float, why: str) -> None:
+    if time.monotonic() >= deadline:
+        raise TrialStateError(f"{why} right now; wait for it, or stop its command")
+    time.sleep(_POLL_S)
+
+
+def _bind(owner: socket.socket, name: str) -> bool:
+    """Take the arm; False if it is taken."""
     try:
-        return not _lock(folder, descriptor, "shared", wait=0.0)
+        owner.bind(f"\0prior-reinforce-{name}")
+    except OSError as error:
+        if error.errno != errno.EADDRINUSE:
+            raise ConfigurationError(
+                f"the arm cannot be locked ({error.strerror}); let this program use Unix sockets"
+            ) from error
+        return False
+    return True
+
+
+@contextmanager
+def _opened(folder: Path) -> Iterator[int]:
+    try:
+        descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    except OSError as error:
+        raise WorkspaceError(f"{folder}: {error.strerror}; make it a readable folder") from error
+    try:
+        yield descriptor
     finally:
         os.close(descriptor)
 
 
-def _open(folder: Path) -> int:
-    try:
-        return os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-    except OSError as error:
-        raise WorkspaceError(f"{folder}: {error.strerror}; make it a readable folder") from error
-
-
-def _lock(folder: Path, descriptor: int, kind: Literal["alone", "shared"], *, wait: float) -> bool:
-    """Take a lock within `wait` seconds; False if another program holds it."""
+def _flock(folder: Path, descriptor: int, *, shared: bool) -> bool:
+    """Take a lock; False if another program holds it."""
     import fcntl  # not on Windows, where all commands but a workspace's work
 
-    operation = fcntl.LOCK_EX if kind == "alone" else fcntl.LOCK_SH
-    deadline = time.monotonic() + wait
-    while True:
-        try:
-            fcntl.flock(descriptor, operation | fcntl.LOCK_NB)
-        except BlockingIOError:
-            if time.monotonic() >= deadline:
-                return False
-            time.sleep(_POLL_S)
-        except OSError as error:
-            raise WorkspaceError(
-                f"{folder} cannot be locked ({error.strerror}); move the workspace to a local disk"
-            ) from error
-        else:
-            return True
+    try:
+        fcntl.flock(descriptor, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except OSError as error:
+        raise WorkspaceError(
+            f"{folder} cannot be locked ({error.strerror}); move the workspace to a local disk"
+        ) from error
+    return True

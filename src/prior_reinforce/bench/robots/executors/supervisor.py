@@ -6,13 +6,16 @@ Whoever moves the arm with it may be interrupted, killed or stopped: this proces
 it the lock that it inherited. It adopts what detaches itself (Linux' child subreaper), so that a
 driver in the background, in a session of its own or orphaned is waited for like any other. It takes
 every signal that can be taken as the wish to stop: SIGTERM to all, SIGKILL to what is left after a
-grace period, however often it is asked. Killed itself (SIGKILL), it leaves the lock with the
-command, which has inherited it too.
+grace period, however often it is asked.
+
+It is two processes: one that runs the command, and its parent, the guard, which adopts and stops
+what is left where the first is killed. Where both are, the lock stays with the command, which has
+inherited it too, or is found by its mark (`lock.py`).
 
 REQUEST is JSON: `arguments` of the command, `time_limit` and `grace` in [s], `keep_open`
-(descriptors that the command inherits), `output` (descriptor of a file for what it writes) and
-`ended` (path of the file that says how it ended). It imports nothing but the standard library, so
-that it starts fast and cannot fail by what is installed.
+(descriptors that the command inherits), `output` and `ended` (descriptors of files for what it
+writes, and for how it ended). It imports nothing but the standard library, so that it starts fast
+and cannot fail by what is installed.
 """
 
 from __future__ import annotations
@@ -27,11 +30,12 @@ import subprocess
 import sys
 import time
 import tty
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 _SET_CHILD_SUBREAPER, _SET_PARENT_DEATH_SIGNAL = 36, 1  # linux/prctl.h
-_STOPS = (signal.SIGHUP, signal.SIGINT, signal.SIGQUIT, signal.SIGTERM)
+_STOPS = (signal.SIGHUP, signal.SIGINT, signal.SIGQUIT, signal.SIGTERM, signal.SIGTSTP)
 # A terminal sends these to all that it knows. The command is asked to stop by SIGTERM instead, as
 # its time limit does: one that knows only that signal would be cut off by Ctrl-C in mid-swing.
 _TERMINALS = (signal.SIGHUP, signal.SIGINT, signal.SIGQUIT, signal.SIGTSTP)
@@ -47,27 +51,31 @@ _SAY_AFTER = 1.0
 
 def main(request: dict[str, Any]) -> None:
     """Run the command; write how it ended."""
-    stop_asked: list[int] = []
-    for number in _STOPS:
-        signal.signal(number, lambda n, _: stop_asked.append(n))
-    signal.signal(signal.SIGTSTP, signal.SIG_IGN)
-    libc = ctypes.CDLL(None, use_errno=True)
-    if libc.prctl(_SET_CHILD_SUBREAPER, 1, 0, 0, 0) != 0:
-        raise OSError(ctypes.get_errno(), "cannot adopt what a command detaches")
-    # What started us blocked them, so that none came too early.
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, _STOPS)
     # A terminal of its own for the output: programs write to one line by line.
     master, slave = os.openpty()
     tty.setraw(slave)
     output = _Output(master, request["output"])
+    runner = os.fork()
+    if runner == 0:
+        _run(request, output, slave)
+        return
+    os.close(slave)
+    _adopt_and_hear(lambda number, _: _send(runner, number))
+    if os.waitpid(runner, 0)[1] != 0:  # killed
+        for number in _STOPS:
+            signal.signal(number, signal.SIG_IGN)
+        _see_out(output, request, 0, [signal.SIGTERM])
+
+
+def _run(request: dict[str, Any], output: _Output, slave: int) -> None:
+    stop_asked: list[int] = []
+    libc = _adopt_and_hear(lambda number, _: stop_asked.append(number))
 
     def in_the_child() -> None:
         for number in _TERMINALS:
             signal.signal(number, signal.SIG_IGN)
         libc.prctl(_SET_PARENT_DEATH_SIGNAL, signal.SIGTERM, 0, 0, 0)
 
-    ended = Path(request["ended"])
-    start = time.monotonic()
     try:
         # Kept: where nothing holds it, Python itself takes the status of what has ended already.
         process = subprocess.Popen(
@@ -77,19 +85,40 @@ def main(request: dict[str, Any]) -> None:
             pass_fds=request["keep_open"],
             preexec_fn=in_the_child,
         )
+        os.close(slave)
+        report = _see_out(output, request, process.pid, stop_asked)
     except (OSError, ValueError, subprocess.SubprocessError) as error:
-        _write(ended, {"started": False, "error": str(error)})
-        return
-    os.close(slave)
-    report: dict[str, Any] = {"started": True, "timed_out": False, "interrupted": False}
-    status, since, left = 0, 0.0, ""
+        report = {"started": False, "error": str(error)}
+    os.write(request["ended"], json.dumps(report).encode())
+    os.fsync(request["ended"])
+
+
+def _adopt_and_hear(hear: Callable[[int, Any], object]) -> ctypes.CDLL:
+    """Become the parent of what descendants leave, and take every wish to stop."""
+    libc = ctypes.CDLL(None, use_errno=True)
+    if libc.prctl(_SET_CHILD_SUBREAPER, 1, 0, 0, 0) != 0:
+        raise OSError(ctypes.get_errno(), "cannot adopt what a command detaches")
+    for number in _STOPS:
+        signal.signal(number, hear)
+    # What started us blocked them all, so that none came too early.
+    signal.pthread_sigmask(signal.SIG_SETMASK, ())
+    return libc
+
+
+def _see_out(
+    output: _Output, request: dict[str, Any], command: int, stop_asked: list[int]
+) -> dict[str, Any]:
+    """Wait for all descendants, stop them where that is asked or it is time; how it went."""
+    start = time.monotonic()
+    status, since, left, unstoppable = 0, 0.0, "", ""
     kill_at: float | None = None
+    report: dict[str, Any] = {"started": True, "timed_out": False, "interrupted": False}
     while True:
         output.take(_LOOK)
         try:
-            while (ended_now := os.waitpid(-1, os.WNOHANG))[0] != 0:
-                if ended_now[0] == process.pid:
-                    status, since = os.waitstatus_to_exitcode(ended_now[1]), time.monotonic()
+            while (ended := os.waitpid(-1, os.WNOHANG))[0] != 0:
+                if ended[0] == command:
+                    status, since = os.waitstatus_to_exitcode(ended[1]), time.monotonic()
         except ChildProcessError:
             break  # whatever loses its parent becomes our child: nothing is left
         now = time.monotonic()
@@ -102,16 +131,30 @@ def main(request: dict[str, Any]) -> None:
             running = _descendants()
             if since:
                 left = _names(running)
-            for pid in running:  # once: what they start to come to rest may do its work
-                _send(pid, signal.SIGTERM)
-                _send(pid, signal.SIGCONT)  # one that waits for a terminal
+            # Once: what they start to come to rest may do its work. SIGCONT is for one that waits
+            # for a terminal.
+            deaf = {
+                pid: name
+                for pid, name in running.items()
+                if not (_send(pid, signal.SIGTERM) and _send(pid, signal.SIGCONT))
+            }
+            if deaf:
+                unstoppable = _names(deaf)
+                output.shout(
+                    f"CANNOT STOP {unstoppable}: it runs as another user. THE ARM MAY GO ON "
+                    "MOVING: use its stop button\n"
+                )
         if kill_at is not None and now > kill_at:
             for pid in _descendants():
                 _send(pid, signal.SIGKILL)
     output.take_rest()
-    seconds = (since or time.monotonic()) - start
-    report |= {"exit_status": status, "seconds": seconds, "left_running": left}
-    _write(ended, report | {"output_tail": output.tail.decode(errors="replace")})
+    return report | {
+        "exit_status": status,
+        "seconds": (since or time.monotonic()) - start,
+        "left_running": left,
+        "unstoppable": unstoppable,
+        "output_tail": output.tail.decode(errors="replace"),
+    }
 
 
 class _Output:
@@ -141,6 +184,12 @@ class _Output:
     def say(self, text: str) -> None:
         """Words of our own among its output."""
         self._keep(f"prior-reinforce: {text}".encode())
+
+    def shout(self, text: str) -> None:
+        """The same, and to the terminal at once, whether or not somebody shows the output."""
+        self.say(text)
+        with contextlib.suppress(OSError):
+            os.write(2, f"\aprior-reinforce: {text}".encode())
 
     def _keep(self, content: bytes) -> None:
         self.tail = (self.tail + content)[-_TAIL_BYTES:]
@@ -175,19 +224,15 @@ def _names(processes: dict[int, str]) -> str:
     return ", ".join(f"{name} ({pid})" for pid, name in sorted(processes.items()))
 
 
-def _send(pid: int, number: int) -> None:
-    with contextlib.suppress(ProcessLookupError, PermissionError):
+def _send(pid: int, number: int) -> bool:
+    """Send a signal; False where that is not allowed."""
+    try:
         os.kill(pid, number)
-
-
-def _write(path: Path, report: dict[str, Any]) -> None:
-    """Put the report in place, whole, before the lock is given back."""
-    unfinished = path.with_name(f".{path.name}")
-    with unfinished.open("w", encoding="utf-8") as file:
-        json.dump(report, file)
-        file.flush()
-        os.fsync(file.fileno())
-    unfinished.replace(path)
+    except ProcessLookupError:
+        pass
+    except PermissionError:
+        return False
+    return True
 
 
 if __name__ == "__main__":

@@ -1,0 +1,65 @@
+"""Asking a command where the arm stands, before a plan is executed."""
+
+from __future__ import annotations
+
+import json
+import math
+import tempfile
+from pathlib import Path
+
+from prior_reinforce.bench.robots.executors.arguments import check_program, split
+from prior_reinforce.bench.robots.executors.supervision import Interruptions, supervise
+from prior_reinforce.errors import ConfigurationError
+from prior_reinforce.plans.motions import PlanFormat
+
+
+def read_pose(command: str, form: PlanFormat, *, time_limit: float = 10.0) -> dict[str, float]:
+    """Ask a command where the arm stands; it must move nothing.
+
+    Args:
+        command: Writes one line of JSON last, in the plan's units: `{"joint1": 0.1, ...}`, or a
+            list in the order of the plan's columns.
+        form: Of the plan.
+        time_limit: In [s].
+
+    Returns:
+        Position by column: of every joint (a column in radians; of every column where none is),
+        and of others that it names.
+
+    Raises:
+        ConfigurationError: It cannot be used, fails, or leaves a joint out.
+    """
+    check_program(command)
+    with tempfile.TemporaryDirectory() as folder, Interruptions() as noted:
+        ended, raised = supervise(
+            tuple(split(command)), Path(folder), time_limit=time_limit, interruptions=noted
+        )
+    if raised is not None:
+        raise raised
+    if noted.came:
+        raise KeyboardInterrupt
+    if ended is None or not ended["started"] or ended["timed_out"] or ended["exit_status"]:
+        said = "" if ended is None else ended.get("error") or ended["output_tail"].strip()
+        raise ConfigurationError(
+            f"the command {command!r} did not say where the arm stands: "
+            f"{said.splitlines()[-1] if said else 'no output'}; try it by itself"
+        )
+    try:
+        said = json.loads(ended["output_tail"].strip().splitlines()[-1])
+        pose = said if isinstance(said, dict) else dict(zip(form.names, said, strict=True))
+        pose = {name: float(value) for name, value in pose.items() if name in form.names}
+        if not all(map(math.isfinite, pose.values())):
+            raise ValueError("a position is not finite")
+    except (IndexError, ValueError, TypeError, OverflowError, RecursionError) as error:
+        raise ConfigurationError(
+            f"the command {command!r} must end with a line of JSON such as "
+            f'{{"{form.names[0]}": 0.1}}: {error}'
+        ) from error
+    units = dict(zip(form.names, form.units, strict=True))
+    joints = [name for name in form.names if units[name] == "rad"] or form.names
+    if missing := [f"{name} [{units[name]}]" for name in joints if name not in pose]:
+        raise ConfigurationError(
+            f"the command {command!r} says nothing of {', '.join(missing)}; it must name every "
+            "joint as the plan does, in the plan's units"
+        )
+    return pose
