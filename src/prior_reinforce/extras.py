@@ -30,7 +30,6 @@ EXTRA_OF = {
     "zarr": "zarr",
     "numcodecs": "zarr",
     "python_calamine": "excel",
-    "yourdfpy": "urdf",
 }
 """Library, as it is imported -> extra of `pyproject.toml`."""
 

@@ -1,6 +1,7 @@
 """A URDF gives the limits and kinematics that MuJoCo finds in it, and says what it lacks."""
 
 import re
+from xml.etree import ElementTree
 
 import mujoco
 import numpy as np
@@ -85,6 +86,7 @@ def test_two_arms_need_the_flange_to_be_named(tmp_path):
     one = [("a", "revolute", (0, 0, 1), (0, 0, 0), limit(-1, 1, 2))]
     other = (
         '<link name="other"/><joint name="b" type="revolute"><parent link="link0"/>'
+        '<origin xyz="0 0 0"/><axis xyz="0 0 1"/>'
         f'<child link="other"/><limit {limit(-2, 2, 2)}/></joint>'
     )
     path = write_urdf(tmp_path / "a.urdf", one, last="left", more=other)
@@ -118,3 +120,112 @@ def test_what_is_no_urdf_is_named(tmp_path, content):
     (tmp_path / "c.urdf.xacro").write_text("<robot/>")
     with pytest.raises(FileFormatError, match="make a URDF of it: xacro"):
         read_urdf(tmp_path / "c.urdf.xacro")
+
+
+SMALL = [
+    ("base", "fixed", (0, 0.5, 0), (0, 0, 1.57), ""),
+    ("a", "revolute", (0, 0, 0.333), (0, 0, 0), limit(-1.5, 2.25, 2)),
+    ("b", "continuous", (0.1, -0.4, 0), (-1.57, 0, 0), limit(0, 0, 3.1)),
+]
+FINGER = (
+    '<link name="f"/><joint name="finger" type="revolute"><parent link="tool0"/><child link="f"/>'
+    '<origin xyz="0 0 0.1"/><axis xyz="0 1 0"/><limit lower="-1" upper="1" velocity="1"/>'
+    '<mimic joint="a"/></joint>'
+)
+NUMBERS = {"xyz", "rpy", "lower", "upper", "velocity"}
+
+
+def said(text):
+    """Every attribute of joints and of their elements, by a lenient look at well-formed XML."""
+    root = ElementTree.fromstring(text)
+    parts = [(joint.tag, joint.attrib) for joint in root.iter("joint")]
+    parts += [(part.tag, part.attrib) for joint in root.iter("joint") for part in joint]
+    return [(tag, key, value) for tag, pairs in parts for key, value in pairs.items()]
+
+
+def same(arm, other):
+    """Joints' kinds, limits and kinematics; not their names."""
+    q = np.random.default_rng(0).uniform(-3, 3, (5, 2))
+    return (
+        len(other.joint_names) == 2
+        and np.array_equal([arm.lower, arm.upper], [other.lower, other.upper])
+        and np.array_equal(arm.velocity, other.velocity)
+        and np.array_equal(tool_tip(arm.chain, q, TIP), tool_tip(other.chain, q, TIP))
+    )
+
+
+def test_a_urdf_that_lacks_a_character_is_refused_or_is_the_same_arm(tmp_path):
+    """A copy that passes is well-formed XML with all elements and attributes.
+
+    It is another arm only where the character was of a number, which leaves another number.
+    """
+    path = write_urdf(tmp_path / "a.urdf", SMALL, more=FINGER)
+    text = re.sub("<(visual|inertial)>.*?</(visual|inertial)>", "", path.read_text())
+    path.write_text(text)
+    arm, intact = read_urdf(path), said(text)
+    refused = passed = 0
+    for i in range(text.index("<link"), text.index("</robot>")):
+        copy = text[:i] + text[i + 1 :]
+        path.write_text(copy)
+        try:
+            other = read_urdf(path)
+        except (FileFormatError, ConfigurationError):
+            refused += 1
+            continue
+        now = said(copy)
+        changed = [key for (_, key, a), (_, _, b) in zip(intact, now, strict=True) if a != b]
+        assert [x[:2] for x in now] == [x[:2] for x in intact], copy[i - 20 : i + 20]
+        assert len(changed) <= 1
+        assert same(arm, other) or changed[0] in NUMBERS, copy[i - 20 : i + 20]
+        passed += 1
+    assert refused > 500  # most of what is no number
+    assert passed > 50  # digits, blanks and letters of joints' names
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ('<axis xyz="0 0 1"/>', "", "joint a needs an axis of length 1"),
+        ('<axis xyz="0 0 1"/>', '<axis xyz="0 1"/>', "joint a has <axis xyz=.*give 3 finite"),
+        (
+            '<axis xyz="0 0 1"/>',
+            '<axis xyz="0 0 nan"/>',
+            "joint a has <axis.*3 finite",
+        ),
+        ('<axis xyz="0 0 1"/>', '<axis xyz="0 0 10"/>', "joint a needs an axis of length 1"),
+        ('<origin xyz="0 0 0.333" rpy="0 0 0"/>', "", "joint a has no <origin>"),
+        ("0 0 0.333", "0 0 1e999", "give 3 finite numbers"),
+        ("0 0 0.333", "0 0 ${height}", "give 3 finite numbers"),
+        ('velocity="2"', 'velocty="2"', "joint a has an unknown velocty in <limit>"),
+        ("<axis", "axis", "text in joint base"),
+        ('<axis xyz="0 0 1"/>', '<axs xyz="0 0 1"/>', "joint base has an unknown <axs>"),
+        ('<link name="link2"/>', "", "names 'link2', which is no link"),
+        ('<child link="tool0"/>', '<child link="link2"/>', "two joints move one link"),
+        ('<link name="link2"/>', '<link name="link2"/><link name="x"/>', "2 links hang from no"),
+        ('<parent link="link1"/>', '<parent link="tool0"/>', "its joints form a loop"),
+        ('name="b" type', 'name="a" type', "two joints are called a"),
+        ('type="continuous"', 'type="continous"', "joint b has no type, or none of"),
+        ("</joint></robot>", '<mimic joint="a"/></joint></robot>', "joint b follows another"),
+        ("<robot", "<!DOCTYPE robot><robot", "it has a DOCTYPE"),
+    ],
+)
+def test_what_is_wrong_in_a_urdf_is_named(tmp_path, old, new, says):
+    path = write_urdf(tmp_path / "a.urdf", SMALL)
+    text = re.sub("<(visual|inertial)>.*?</(visual|inertial)>", "", path.read_text())
+    text = text.replace("></link>", "/>")
+    assert old in text
+    at = text.index(old, text.index('name="a"') if says.startswith("joint a ") else 0)
+    path.write_text(text[:at] + new + text[at + len(old) :])
+    with pytest.raises((FileFormatError, ConfigurationError), match=says):
+        read_urdf(path, "tool0")
+
+
+def test_soft_limits_narrow_a_joints_range(tmp_path):
+    path = write_urdf(tmp_path / "a.urdf", SMALL)
+    soft = '<safety_controller soft_lower_limit="-1" soft_upper_limit="9" k_velocity="1"/></joint>'
+    text = path.read_text()
+    at = text.index("</joint>", text.index('name="a"'))
+    path.write_text(text[:at] + soft + text[at + len("</joint>") :])
+    arm = read_urdf(path)
+    assert (arm.lower[0], arm.upper[0]) == (-1, 2.25)
+    assert arm.source.endswith("soft limits too")

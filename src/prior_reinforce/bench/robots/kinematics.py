@@ -89,17 +89,20 @@ def tool_tip(
     return place
 
 
-def _moved(pose: Pose, points: Places) -> Places:
-    """Points of a frame, in the frame that its pose is given in."""
-    x, y, z, roll, pitch, yaw = pose
+def rotation(roll: float, pitch: float, yaw: float) -> Float[np.ndarray, "3 3"]:
+    """Return Rz(yaw) Ry(pitch) Rx(roll), angles in [rad]."""
     cr, sr, cp, sp, cy, sy = (
         f(angle) for angle in (roll, pitch, yaw) for f in (math.cos, math.sin)
     )
-    rotation = np.array(
+    return np.array(
         [
             [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
             [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
             [-sp, cp * sr, cp * cr],
         ]
     )
-    return np.asarray(points @ rotation.T + (x, y, z))
+
+
+def _moved(pose: Pose, points: Places) -> Places:
+    """Points of a frame, in the frame that its pose is given in."""
+    return np.asarray(points @ rotation(*pose[3:]).T + pose[:3])

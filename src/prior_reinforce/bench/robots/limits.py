@@ -116,8 +116,11 @@ def is_joint(column: str, joint: str) -> bool:
     Nothing else does, so that no column is held against another joint's limits. A gripper numbers
     its own: `fr3_finger_joint1` (franka_description) is no joint of the arm.
     """
-    found = re.search(rf"(?P<before>^|.*[_/.]){re.escape(joint)}(\.pos)?$", column)
-    return found is not None and not _OF_A_GRIPPER.search(found["before"])
+    for name in (column, column.removesuffix(".pos")):
+        before = name.removesuffix(joint)
+        if before != name and (not before or before[-1] in "_/."):
+            return not _OF_A_GRIPPER.search(before)
+    return False
 
 
 def match_joints(format: PlanFormat, limits: RobotLimits) -> dict[int, int]:

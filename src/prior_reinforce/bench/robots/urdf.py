@@ -1,18 +1,43 @@
-"""Limits and kinematics of any serial arm from its URDF, read with yourdfpy."""
+"""Limits and kinematics of any serial arm from its URDF, read strictly.
+
+Ours rather than a library's: yourdfpy, urdfdom and MuJoCo pass over what they do not understand and
+take defaults for what is missing; with one character gone, an arm has another axis or fewer joints.
+Here, XML that is not well formed is an error, and so is whatever in a joint is unknown, missing or
+no number (elements and attributes: wiki.ros.org/urdf/XML).
+"""
 
 from __future__ import annotations
 
 import math
+import re
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 
-from prior_reinforce.bench.robots.kinematics import Chain, Pose
+from prior_reinforce.bench.robots.kinematics import Chain, Pose, rotation
 from prior_reinforce.bench.robots.limits import RobotLimits
-from prior_reinforce.errors import ConfigurationError, FileFormatError, MissingExtraError
+from prior_reinforce.errors import ConfigurationError, FileFormatError
 
 _TURNING = ("revolute", "continuous")
+_TYPES = (*_TURNING, "fixed", "prismatic", "floating", "planar")
+_ATTRIBUTES = {
+    "parent": {"link"},
+    "child": {"link"},
+    "origin": {"xyz", "rpy"},
+    "axis": {"xyz"},
+    "limit": {"lower", "upper", "effort", "velocity"},
+    "mimic": {"joint", "multiplier", "offset"},
+    "safety_controller": {"soft_lower_limit", "soft_upper_limit", "k_position", "k_velocity"},
+}
+"""What a joint may say that matters to its motion."""
+_ELSEWHERE = ("dynamics", "calibration")
+"""What else it may say, whatever that is."""
+_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?", re.ASCII)
+_LENGTH_OF_AXIS = 0.01
+"""By how much an axis may differ from length 1: two written digits."""
+_LONGEST_NAME = 200
 _ENDLESS = 4 * math.pi
 """What a joint without ends may turn either way, in [rad]. Ours: two turns, since a throw that
 needs more is a wrong unit."""
@@ -23,6 +48,8 @@ _TIPS = ("tool0", "flange", "link_eef")
 def read_urdf(path: Path, tip: str | None = None) -> RobotLimits:
     """Read the limits and the kinematics of an arm.
 
+    Soft limits of a `safety_controller` narrow a joint's range.
+
     Args:
         path: Of a URDF; meshes that it names are not read.
         tip: The link that is the flange; None takes `tool0`, `flange` or `link_eef`, else the link
@@ -32,18 +59,20 @@ def read_urdf(path: Path, tip: str | None = None) -> RobotLimits:
         Its limits, the root link being the base frame; no accelerations, which URDF does not have.
 
     Raises:
-        FileFormatError: No URDF, or one without such a chain.
+        FileFormatError: No URDF, a damaged one, or one without such a chain.
         ConfigurationError: No such link, or a joint without limits.
-        MissingExtraError: yourdfpy is not installed.
     """
     robot = _parsed(path)
-    parent = {joint.child: joint for joint in robot.joints}
-    names = [link.name for link in robot.links]
+    joints = _joints(path, robot)
+    links, parent = _links(path, robot, joints), {joint.child: joint for joint in joints}
     if tip is None:
-        tip = next((name for name in _TIPS if name in names), None) or _longest(path, names, parent)
-    elif tip not in names:
-        raise ConfigurationError(f"{path} has no link {tip!r}; it has {', '.join(names[:40])}")
-    chain = _to_root(path, tip, parent)
+        tip = next((name for name in _TIPS if name in links), None) or _longest(path, links, parent)
+    elif tip not in links:
+        raise ConfigurationError(f"{path} has no link {tip!r}; it has {', '.join([*links][:40])}")
+    chain, link = list[_Joint](), tip
+    while link in parent:
+        chain.insert(0, parent[link])
+        link = chain[0].parent
     turning = [joint for joint in chain if joint.type in _TURNING]
     if not turning:
         raise FileFormatError(f"{path}: no joint turns between the base and {tip}; say --tip")
@@ -53,12 +82,14 @@ def read_urdf(path: Path, tip: str | None = None) -> RobotLimits:
                 f"{path}: {joint.name} is {joint.type}, and arms of turning joints are known only; "
                 "say --tip for a link before it"
             )
-    limits = [_limits(path, joint) for joint in turning]
-    lower, upper, velocity = (np.array(values) for values in zip(*limits, strict=True))
+    lower, upper, velocity = (
+        np.array(values) for values in zip(*(joint.limits() for joint in turning), strict=True)
+    )
+    soft = any("safety_controller" in joint.parts for joint in turning)
     return RobotLimits(
-        robot=robot.name or path.stem,
+        robot=robot.get("name") or path.stem,
         firmware="any",
-        source=f"{path.name}, from {chain[0].parent} to {tip}",
+        source=f"{path.name}, from {chain[0].parent} to {tip}" + ", soft limits too" * soft,
         joint_names=tuple(joint.name for joint in turning),
         lower=lower,
         upper=upper,
@@ -67,88 +98,196 @@ def read_urdf(path: Path, tip: str | None = None) -> RobotLimits:
     )
 
 
-def _parsed(path: Path) -> Any:
-    try:
-        import yourdfpy
-    except ImportError as error:
-        raise MissingExtraError(
-            "yourdfpy is not installed, which reading a URDF needs; run: pip install "
-            '"prior-reinforce[urdf]"'
-        ) from error
+@dataclass(frozen=True)
+class _Joint:
+    """A joint of which every element and attribute is known."""
+
+    path: Path
+    name: str
+    type: str
+    parts: dict[str, dict[str, str]]
+    """Attributes by element."""
+
+    @property
+    def parent(self) -> str:
+        return self.parts["parent"]["link"]
+
+    @property
+    def child(self) -> str:
+        return self.parts["child"]["link"]
+
+    def error(self, problem: str) -> ConfigurationError:
+        return ConfigurationError(f"{self.path}: joint {self.name} {problem}")
+
+    def number(self, part: str, key: str) -> float | None:
+        """One number; None where it is not said."""
+        return None if key not in self.parts.get(part, {}) else self.vector(part, key, 1)[0]
+
+    def vector(self, part: str, key: str, n: int = 3) -> list[float]:
+        """So many numbers; zeros where they are not said."""
+        text = self.parts.get(part, {}).get(key, "0 " * n)
+        words = text.split()
+        values = [float(word) for word in words if _NUMBER.fullmatch(word)]
+        if not (len(values) == len(words) == n and np.all(np.isfinite(values))):
+            wants = "a finite number" if n == 1 else f"{n} finite numbers"
+            raise self.error(f'has <{part} {key}="{text[:80]}">; give {wants}')
+        return values
+
+    def pose(self) -> np.ndarray:
+        """Of the joint's frame in the frame before, 4 x 4."""
+        if self.type in _TURNING and "origin" not in self.parts:
+            raise self.error('has no <origin>; write <origin xyz="0 0 0" rpy="0 0 0"/> if it is so')
+        pose = np.eye(4)
+        roll, pitch, yaw = self.vector("origin", "rpy")
+        pose[:3, :3], pose[:3, 3] = rotation(roll, pitch, yaw), self.vector("origin", "xyz")
+        return pose
+
+    def axis(self) -> tuple[float, float, float]:
+        """About which it turns."""
+        x, y, z = self.vector("axis", "xyz")
+        length = math.hypot(x, y, z)
+        if abs(length - 1) > _LENGTH_OF_AXIS:
+            raise self.error('needs an axis of length 1, such as <axis xyz="0 0 1"/>')
+        return x / length, y / length, z / length
+
+    def limits(self) -> tuple[float, float, float]:
+        """Lowest and highest position, and largest speed."""
+        if "mimic" in self.parts:
+            raise self.error("follows another (<mimic>), and so is no joint of its own; say --tip")
+        velocity = self.number("limit", "velocity")
+        if not velocity or velocity <= 0:
+            raise self.error("has no velocity limit; write the maker's into its <limit>")
+        low, high = self.number("limit", "lower"), self.number("limit", "upper")
+        if self.type == "continuous":
+            low, high = -_ENDLESS, _ENDLESS
+        soft = [self.number("safety_controller", f"soft_{end}_limit") for end in ("lower", "upper")]
+        if low is not None and high is not None:
+            low = low if soft[0] is None else max(low, soft[0])
+            high = high if soft[1] is None else min(high, soft[1])
+        if low is None or high is None or not low < high:
+            raise self.error("has no range; write lower and upper into its <limit>")
+        return low, high, velocity
+
+
+class _Builder(ElementTree.TreeBuilder):
+    def doctype(self, name: str, pubid: str | None, system: str | None) -> None:
+        """Entities stand for other text, which a URDF needs none of."""
+        raise ValueError("it has a DOCTYPE, which no URDF has")
+
+
+def _parsed(path: Path) -> ElementTree.Element:
+    """The file's XML, well formed."""
     if not path.is_file():
         raise FileFormatError(f"no URDF at {path}; give the path of a .urdf file")
     if path.name.endswith(".xacro"):
         raise FileFormatError(f"{path} is a xacro; make a URDF of it: xacro {path} > arm.urdf")
     try:
-        model = yourdfpy.URDF.load(
-            str(path), build_scene_graph=False, load_meshes=False, load_collision_meshes=False
-        )
-    except Exception as error:  # lxml and yourdfpy raise a dozen kinds on damaged files
-        words = str(error).split("\n")[0][:200] or "no reason given"
-        raise FileFormatError(
-            f"cannot read {path} as URDF ({type(error).__name__}: {words}); export it again"
-        ) from error
-    if not model.robot.joints:
+        robot = ElementTree.parse(path, ElementTree.XMLParser(target=_Builder())).getroot()
+    except (ElementTree.ParseError, OSError, ValueError, LookupError) as error:
+        raise _damaged(path, f"{error}"[:200]) from error
+    if robot.tag != "robot":
+        raise _damaged(path, f"it begins with <{robot.tag[:80]}>, not <robot>")
+    _refuse_text(path, robot, "robot")
+    return robot
+
+
+def _damaged(path: Path, problem: str) -> FileFormatError:
+    return FileFormatError(f"cannot read {path} as URDF: {problem}; export it again")
+
+
+def _refuse_text(path: Path, element: ElementTree.Element, where: str) -> None:
+    """Refuse text, which is an element that lacks its bracket."""
+    for text in (element.text, *(part.tail for part in element)):
+        if text and text.strip():
+            raise _damaged(path, f"text in {where}: {text.strip()[:80]!r}")
+
+
+def _name(path: Path, element: ElementTree.Element) -> str:
+    name = element.get("name", "")
+    if not (name and name.isprintable() and len(name) <= _LONGEST_NAME):
+        raise _damaged(path, f"a <{element.tag}> has no name, or one that is none: {name[:80]!r}")
+    return name
+
+
+def _joints(path: Path, robot: ElementTree.Element) -> list[_Joint]:
+    """Every joint, with nothing in it that is unknown or said twice."""
+    found: dict[str, _Joint] = {}
+    for element in robot.findall("joint"):
+        name, kind = _name(path, element), element.get("type", "")
+        _refuse_text(path, element, f"joint {name}")
+        if kind not in _TYPES or set(element.attrib) != {"name", "type"}:
+            raise _damaged(path, f"joint {name} has no type, or none of {', '.join(_TYPES)}")
+        parts: dict[str, dict[str, str]] = {}
+        for part in element:
+            unknown = set(part.attrib) - _ATTRIBUTES.get(part.tag, set(part.attrib))
+            if part.tag not in (*_ATTRIBUTES, *_ELSEWHERE) or unknown:
+                what = f"{min(unknown)[:80]} in <{part.tag}>" if unknown else f"<{part.tag[:80]}>"
+                raise _damaged(path, f"joint {name} has an unknown {what}")
+            if part.tag in parts:
+                raise _damaged(path, f"joint {name} has two <{part.tag}>")
+            parts[part.tag] = dict(part.attrib)
+        if not all(parts.get(end, {}).get("link") for end in ("parent", "child")):
+            raise _damaged(path, f"joint {name} has no <parent link> or <child link>")
+        if name in found:
+            raise _damaged(path, f"two joints are called {name}")
+        found[name] = _Joint(path, name, kind, parts)
+    if not found:
         raise FileFormatError(f"{path} is no URDF of an arm: it has no joint; export it again")
-    return model.robot
+    return list(found.values())
 
 
-def _to_root(path: Path, link: str, parent: dict[str, Any]) -> list[Any]:
-    """Joints from the root to a link."""
-    chain: list[Any] = []
-    while link in parent:
-        chain.append(parent[link])
-        link = parent[link].parent
-        if len(chain) > len(parent):
-            raise FileFormatError(f"{path}: its joints form a loop; export it again")
-    return chain[::-1]
+def _links(path: Path, robot: ElementTree.Element, joints: list[_Joint]) -> dict[str, int]:
+    """How many joints turn between the root and each link; all links hang from one root."""
+    names = {_name(path, element) for element in robot.findall("link")}
+    moved = [joint.child for joint in joints]
+    if len(names) < len(robot.findall("link")) or len(set(moved)) < len(moved):
+        raise _damaged(path, "two links have one name, or two joints move one link")
+    behind: dict[str, list[_Joint]] = {name: [] for name in names}
+    for joint in joints:
+        for end in (joint.parent, joint.child):
+            if end not in names:
+                raise _damaged(path, f"joint {joint.name} names {end[:80]!r}, which is no link")
+        behind[joint.parent].append(joint)
+    turning = dict.fromkeys(names.difference(moved), 0)
+    if len(turning) != 1:
+        raise _damaged(path, f"{len(turning)} links hang from no joint instead of one")
+    reached = [*turning]
+    for link in reached:
+        for joint in behind[link]:
+            free = joint.type in _TURNING and "mimic" not in joint.parts
+            turning[joint.child] = turning[link] + free
+            reached.append(joint.child)
+    if len(turning) < len(names):
+        raise _damaged(path, "its joints form a loop")
+    return turning
 
 
-def _longest(path: Path, links: list[str], parent: dict[str, Any]) -> str:
+def _longest(path: Path, turning: dict[str, int], parent: dict[str, _Joint]) -> str:
     """The link behind the last turning joint of the chain that has most of them."""
-    turning = {
-        link: sum(joint.type in _TURNING and joint.mimic is None for joint in chain)
-        for link in links
-        if (chain := _to_root(path, link, parent))
-    }
-    most = max(turning.values(), default=0)
-    moved = [link for link in links if turning.get(link) == most and parent[link].type in _TURNING]
+    most = max(turning.values())
+    moved = [
+        link
+        for link, n in turning.items()
+        if n == most > 0 and parent[link].type in _TURNING and "mimic" not in parent[link].parts
+    ]
     if len(moved) != 1:
         raise ConfigurationError(
-            f"{path} ends in {', '.join(moved) or 'no turning joint'}; say which link is the "
+            f"{path} ends in {', '.join(moved[:40]) or 'no turning joint'}; say which link is the "
             "flange with --tip"
         )
     return moved[0]
 
 
-def _limits(path: Path, joint: Any) -> tuple[float, float, float]:
-    limit = joint.limit
-    velocity = None if limit is None else limit.velocity
-    if not velocity or not velocity > 0:
-        raise ConfigurationError(
-            f"{path}: joint {joint.name} has no velocity limit; write the maker's into its <limit>"
-        )
-    if joint.type == "continuous":
-        return -_ENDLESS, _ENDLESS, float(velocity)
-    if limit.lower is None or limit.upper is None or not limit.lower < limit.upper:
-        raise ConfigurationError(
-            f"{path}: joint {joint.name} has no range; write lower and upper into its <limit>"
-        )
-    return float(limit.lower), float(limit.upper), float(velocity)
-
-
-def _chain(joints: list[Any]) -> Chain:
+def _chain(joints: list[_Joint]) -> Chain:
     """Origins of the turning joints, with the fixed ones before each taken in."""
     origins: list[Pose] = []
     axes: list[tuple[float, float, float]] = []
     since = np.eye(4)
     for joint in joints:
-        since = since @ (np.eye(4) if joint.origin is None else np.asarray(joint.origin))
+        since = since @ joint.pose()
         if joint.type in _TURNING:
             origins.append(_pose(since))
-            axis = np.array([1.0, 0.0, 0.0]) if joint.axis is None else np.asarray(joint.axis)
-            x, y, z = (axis / np.linalg.norm(axis)).tolist()
-            axes.append((x, y, z))
+            axes.append(joint.axis())
             since = np.eye(4)
     return Chain(tuple(origins), tuple(axes), _pose(since))
 
