@@ -22,7 +22,7 @@ def test_sizes_that_do_not_fit_are_named(wrong):
 
 @pytest.mark.parametrize(
     "wrong",
-    [{"training_steps": 0}, {"sampling_steps": 101}, {"learning_rate": 0.0}, {"ema_limit": 1.0},
+    [{"training_steps": -1}, {"sampling_steps": 101}, {"learning_rate": 0.0}, {"ema_limit": 1.0},
      {"margin": -0.1}, {"warmup_steps": -1}, {"noise_draws": 3}, {"prediction": "eps"},
      {"sampler": "dpm"}, {"representation": "spline"},
      {"margin": float("nan")}, {"training_steps": 2.5}],

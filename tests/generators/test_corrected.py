@@ -3,7 +3,7 @@
 import numpy as np
 
 from prior_reinforce.generators.corrected import Corrected
-from prior_reinforce.generators.interpolation import NearestNeighbours
+from prior_reinforce.generators.interpolation import NearestNeighbours, SmoothInterpolation
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 
 OUTCOMES = np.array([[0.8, -0.2], [0.8, 0.2], [1.0, -0.1], [1.0, 0.2], [0.9, 0.0]])
@@ -40,6 +40,39 @@ def test_what_is_off_by_an_affine_function_is_right_everywhere():
     right = NearestNeighbours().fit(demos, seed=0).generate(conditions)
     exact = Corrected(Off()).fit(demos, seed=0).generate(conditions)
     np.testing.assert_allclose(exact, right, atol=1e-12)
+
+
+def test_between_demonstrations_it_deviates_from_the_spline_as_the_generator_within_does():
+    """What a generator does is its deviation from the spline through its own plans."""
+    demos = demonstrations()
+    within = Curved().fit(demos, seed=0)
+    corrected = Corrected(Curved()).fit(demos, seed=0)
+    spline = SmoothInterpolation().fit(demos, seed=0)
+    of_its_own_plans = SmoothInterpolation().fit(
+        demos.with_plans(within.generate(OUTCOMES)), seed=0
+    )
+    conditions = np.array([[0.86, 0.07], [0.95, -0.05], [0.9, 0.15]])
+    deviation = within.generate(conditions) - of_its_own_plans.generate(conditions)
+    assert np.abs(deviation).max() > 5e-3
+    np.testing.assert_allclose(
+        corrected.generate(conditions) - spline.generate(conditions), deviation, atol=1e-12
+    )
+
+
+def test_a_number_a_plan_need_not_come_out_as_one():
+    """A primitive's number may drift over a plan; what it misses by does then, too."""
+    demos = demonstrations()
+    numbered = demos.with_plans(
+        np.concatenate([demos.plans, np.repeat(OUTCOMES[:, :1, None], 30, axis=1)], axis=2),
+        PlanFormat(("a", "b", "n"), ("rad",) * 3, 0.02, per_plan=("n",)),
+    )
+
+    class Drifting(NearestNeighbours):
+        def _generate(self, conditions):
+            return super()._generate(conditions) + np.linspace(0, 1e-3, 30)[:, None]
+
+    exact = Corrected(Drifting()).fit(numbered, seed=0)
+    np.testing.assert_allclose(exact.generate(OUTCOMES), numbered.plans, atol=1e-12)
 
 
 class Curved(NearestNeighbours):

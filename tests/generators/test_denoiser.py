@@ -8,8 +8,12 @@ import pytest
 import torch
 
 from prior_reinforce.generators import DiffusionConfig
-from prior_reinforce.generators.denoiser import draw_batch, sample
+from prior_reinforce.generators.config import UNetSize
+from prior_reinforce.generators.denoiser import draw_batch, sample, train
 from prior_reinforce.generators.noise_schedule import NoiseSchedule, mean_shift_levels
+from prior_reinforce.generators.threads import torch_threads
+from prior_reinforce.generators.training import build
+from prior_reinforce.generators.unet import ConditionalUNet
 
 CONFIG = DiffusionConfig(prediction="sample", margin=1.0)
 SCHEDULE = NoiseSchedule.squared_cosine(CONFIG.noise_levels)
@@ -111,3 +115,41 @@ def test_the_papers_batch_is_one_pass_over_the_demonstrations():
     assert sorted(rows.tolist()) == [0, 1, 2, 3, 4, 5]
     assert levels.min() >= 0
     assert levels.max() < 100
+
+
+TINY = UNetSize(
+    widths=(16, 32), groups=4, step_width=16, condition_width=32, activation="silu"
+)  # fmt: skip
+SHOWN = torch.tensor([[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0], [0.0, 0.0]])
+BETWEEN = torch.tensor([[0.5, 0.5], [-0.5, 0.0], [0.0, 0.6], [0.3, -0.7]])
+
+
+def ramps(conditions):
+    """Codes in closed form: a condition's components weigh two motions of two channels."""
+    t = torch.linspace(0, 1, 8)
+    motions = torch.stack(
+        [torch.stack([t, 1 - t]), torch.stack([torch.sin(3 * t), torch.full_like(t, -0.5)])]
+    )
+    return 0.5 * torch.einsum("nk,kct->nct", conditions, motions)
+
+
+@pytest.mark.parametrize("prediction", ["epsilon", "v", "sample"])
+def test_the_network_itself_learns_codes_and_what_lies_between_them(prediction):
+    """Nothing in closed form helps here; untrained it is off by more than the codes are large."""
+    errors = {}
+    for steps in (0, 250):
+        config = DiffusionConfig(
+            prediction=prediction, network=TINY, training_steps=steps, learning_rate=3e-3,
+            warmup_steps=20, ema_limit=0.98,
+        )  # fmt: skip
+        network = build(lambda: ConditionalUNet(2, 2, TINY), seed=0)
+        with torch_threads(1):
+            network = train(network, ramps(SHOWN), SHOWN, config, 0, lambda progress: None)
+        errors[steps] = [
+            (sample(network, c, (2, 8), config, seed=0) - ramps(c)).square().mean().sqrt().item()
+            for c in (SHOWN, BETWEEN)
+        ]
+    size = ramps(SHOWN).square().mean().sqrt()  # 0.38
+    assert min(errors[0]) > size
+    assert errors[250][0] < 0.1 * size
+    assert errors[250][1] < (0.4 if prediction == "sample" else 0.2) * size

@@ -72,7 +72,7 @@ def test_settings_of_a_choice():
         ("nearest,timing=late", "late"),
         ("nearest,exact=perhaps", "exact must be yes or no"),
         ("nearest,speed=3", "speed"),
-        ("diffusion,training_steps=0", "training_steps"),
+        ("diffusion,training_steps=-1", "training_steps"),
         ("prior_reinforce.lab.tasks:make_task", "must derive from"),
     ],
 )

@@ -76,8 +76,8 @@ class UNetConfig(Checked):
     """The network learns what an affine function of the outcome leaves of codes, or all of them."""
     network: UNetSize = field(default_factory=_laptop)
     """Size of the U-Net."""
-    training_steps: Count = 500
-    """Optimiser steps."""
+    training_steps: Annotated[int, msgspec.Meta(ge=0)] = 500
+    """Optimiser steps. 0 is the control: a network that has learned nothing."""
     learning_rate: Positive = 1e-3
     """Peak of the cosine schedule."""
     warmup_steps: Annotated[int, msgspec.Meta(ge=0)] = 0
@@ -178,7 +178,7 @@ class UNetRegressionConfig(UNetConfig):
     nothing but diffusion.
     """
 
-    training_steps: Count = 800
+    training_steps: Annotated[int, msgspec.Meta(ge=0)] = 800
     """Optimiser steps, each on all demonstrations."""
     learning_rate: Positive = 3e-3
     """Peak of the cosine schedule, which ends at 0."""

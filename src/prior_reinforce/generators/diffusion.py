@@ -1,6 +1,18 @@
-"""The paper's generator: a diffusion model of action plans, conditioned on the outcome.
+"""The paper's generator: a diffusion model of plans, conditioned on the outcome (Stage 1).
 
-What it generates is a function of the condition, which the adapter needs: see `denoiser`.
+A U-Net denoises codes of plans (`denoiser`), given the outcome that is wished for. What it
+generates is a function of the condition, which the adapter needs. Around the network:
+
+- `trend=affine`: it learns what an affine function of the outcome leaves of the codes;
+  `trend=zero`: all of them, as in the paper.
+- `exact=yes` (`Corrected`): plans are a closed-form spline plus the network's deviation from the
+  spline through its own plans. They are exact at the demonstrations, whatever the network has
+  learned, and the trend cancels.
+- `timing` (`Timed`): it learns shapes, and when they are played.
+
+By its name, `diffusion`, it comes with all three, and an untrained network in its place then hits
+as many first throws of the paper's tasks (docs/decisions-generator.md). What a network has learned
+shows with `exact=no,trend=zero` only, beside the control `training_steps=0`, which learns nothing.
 """
 
 from __future__ import annotations
