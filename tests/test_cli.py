@@ -170,3 +170,11 @@ def test_what_a_person_writes_forges_no_line(run, folder):
     for said in (out, run("status", folder)[1]):
         assert "slipped\\nnext: rm -rf \\x1b[2J\\u202e" in said
         assert "\x1b" not in said
+
+
+def test_a_message_of_any_length_can_be_read(folder, run):
+    status, _, err = run("goal", folder, "x" * 100_000)
+    assert status == 2
+    assert len(err) < 1100
+    assert " ... " in err
+    assert err.endswith(run("goal", folder, "x")[2][-30:])

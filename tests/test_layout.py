@@ -20,6 +20,8 @@ TESTED_ELSEWHERE = {
 
 OF_THE_WHOLE = {
     "attacks/attacks": "generated attacks by class, and on the way to the arm",
+    "attacks/power_cut": "kill -9 at random moments of a session",
+    "attacks/refused_disk": "commands on a disk that is full or read-only",
     "attacks/kills": "kill -9 at random moments of every command that writes",
     "dependencies": "floors of libraries, and calls that would run code from data",
     "documentation": "what the docs show, run as it stands",
@@ -30,10 +32,6 @@ OF_THE_WHOLE = {
     "public": "what the package exports, and how little small commands load",
     "shapes": "the check of shapes that runs during the tests",
     "tutorial": "the tutorial from top to bottom",
-    "odd_recordings": "damaged and odd recordings: one line each, nothing changed",
-    "bench/workspace/bad_input": "generated bad input, from the command line to the disk",
-    "bench/workspace/power_cut": "kill -9 at random moments of a session",
-    "bench/workspace/refused_disk": "commands on a disk that is full or read-only",
 }
 """Test files of no single module, and what they are about."""
 

@@ -59,6 +59,8 @@ COMMANDS = {
 _LARGEST_WHOLE = 2**32 - 1
 """Of a whole number on the command line: numpy's and torch's largest common seed, and no sensible
 size reaches it."""
+_LONGEST = 1000
+"""Characters of a message; ours: twelve lines of a terminal."""
 _NOBODY_READS = 141
 """Exit status where the reader of our output left before the end: a shell's for SIGPIPE (128 + 13),
 since what the command still had to do was not done."""
@@ -205,8 +207,11 @@ def _refuse(message: str, error: BaseException) -> int:
 
 
 def _complain(message: str) -> None:
-    """One line on standard error, whatever names and reasons hold."""
-    print(f"prior-reinforce: {plain(message)}", file=sys.stderr)
+    """One line on standard error that can be read, whatever names and reasons hold."""
+    line = plain(message)
+    if len(line) > _LONGEST:  # what is wrong stands at the beginning, the remedy at the end
+        line = f"{line[: _LONGEST // 2]} ... {line[-_LONGEST // 3 :]}"
+    print(f"prior-reinforce: {line}", file=sys.stderr)
 
 
 def _flushed() -> bool:

@@ -19,7 +19,8 @@ from prior_reinforce.bench.workspace.workspace import Workspace
 from prior_reinforce.files import sha256, sha256_of_folder
 from prior_reinforce.generators import load_generator
 from prior_reinforce.perception.vlm_formats import FORMATS, read_box
-from tests.attacks.harness import HELD, NASTY, call, command, damage
+from tests.attacks import odd
+from tests.attacks.harness import HELD, NASTY, call, command, damage, tree
 from tests.bench.importing import recorded
 from tests.bench.workspace.planar import manifest
 
@@ -68,6 +69,56 @@ def flags(rng: random.Random, here: Path, asked: Path) -> str:
     args += [rng.choice(words[name] + NASTY) for _ in range(rng.randrange(6))]
     args = [arg for arg in args if arg not in ("/", "//", "/dev/null")]  # we may be root
     return command(here, name, *args)
+
+
+def _words(rng: random.Random, most: int) -> list[str]:
+    """What a person may type for a place or an error, and what nobody would."""
+    spoken = ["5cm", "long", "left,", "-3", "0.02", "hit", "--hit", "--error", "--outcome"]
+    numbers = [str(np.float32(rng.uniform(-1, 1) * 10.0 ** rng.randrange(-30, 30)))]
+    return rng.choices(spoken + numbers * 9 + NASTY, k=rng.randrange(most + 1))
+
+
+def tells(rng: random.Random, here: Path, asked: Path) -> str:
+    """A reading in any words, of any trial."""
+    shutil.copytree(asked, here / "planar")
+    flag = rng.choice(["--error", "--outcome"])
+    return command(here, "tell", "planar", str(rng.randrange(-1, 4)), flag, *_words(rng, 4))
+
+
+def goals(rng: random.Random, here: Path, asked: Path) -> str:
+    """Any numbers for a goal: two within five metres are one, unless a trial is open."""
+    is_open = rng.random() < 0.5
+    shutil.copytree(asked if is_open else asked.parent / "learned", here / "planar")
+    numbers = [rng.choice([0.9, -4.9, 5.1, 1e-40, 3e38, np.nan, -np.inf]) for _ in range(3)]
+    numbers = numbers[: rng.randrange(1, 4)]
+    before = tree(here)
+    verdict = command(here, "goal", "planar", *map(str, numbers))
+    good = not is_open and len(numbers) == 2 and all(abs(number) <= 5 for number in numbers)
+    if verdict == HELD and (tree(here) != before) != good:
+        return f"goal {numbers} {'refused' if good else 'taken'}"
+    return verdict
+
+
+def outcomes(rng: random.Random, here: Path, asked: Path) -> str:
+    """A table of outcomes of which no row is of a recording."""
+    shutil.copytree(asked.parent / "learned", here / "planar")
+    odd.npz(here)
+    rows = [",".join(_words(rng, 4)) for _ in range(rng.randrange(7))]
+    table = "\n".join(["episode,x,y", *rows])
+    (here / "outcomes.csv").write_text(table, encoding="utf-8", errors="replace", newline="")
+    before = tree(here)
+    verdict = command(here, "import", "planar", ".", "--outcomes", "outcomes.csv")
+    return "taken in" if verdict == HELD and tree(here) != before else verdict
+
+
+def files(rng: random.Random, here: Path, asked: Path) -> str:
+    """Any file of a workspace that was damaged."""
+    folder = here / "planar"
+    shutil.copytree(asked, folder)
+    path = rng.choice(sorted(path for path in folder.rglob("*") if path.is_file()))
+    path.chmod(0o644)
+    path.write_bytes(damage(rng, path.read_bytes()))
+    return command(here, rng.choice(_READERS), "planar")
 
 
 _VALUES = [
@@ -127,7 +178,9 @@ def recordings(rng: random.Random, here: Path, asked: Path) -> str:
     if inside == Path() and rng.random() < 0.3:
         _write_odd_bag(rng, source / "odd")
     more = ["--joints", "joint1", "joint2", "--rate", "100"] if rng.random() < 0.8 else []
-    return command(here, "import", "planar", str(path), *more)
+    before = tree(source)
+    verdict = command(here, "import", "planar", str(path), *more)
+    return "recordings changed" if tree(source) != before else verdict
 
 
 _WRITERS: dict[str, Callable[[Path], Path]] = {
@@ -139,6 +192,7 @@ _WRITERS: dict[str, Callable[[Path], Path]] = {
     "ros1": partial(recorded.write_bags, kind="ros1", rate=20),
     "sqlite": partial(recorded.write_bags, kind="sqlite", rate=20),
     "mcap": partial(recorded.write_bags, kind="mcap", rate=20),
+    **{f"odd {name}": write for name, write in odd.WRITERS.items()},
 }
 _YAML = (
     *("", "- x", "a: &a [*a]", "  message_count: 99999999999999", "  storage_identifier: sh"),
@@ -153,7 +207,8 @@ def _written(kind: str, place: Path) -> tuple[Path, Path]:
     folder = place / f"recorded-{kind}"
     folder.mkdir()
     path = _WRITERS[kind](folder)
-    recorded.write_outcomes(folder)
+    count = 4 if kind.startswith("odd ") else recorded.N
+    recorded.write_outcomes(folder, dict(list(recorded.OUTCOMES.items())[:count]))
     return folder, path.relative_to(folder)
 
 
@@ -317,6 +372,5 @@ def journals(rng: random.Random, here: Path, asked: Path) -> str:
     return command(here, name, "planar", *more)
 
 
-CLASSES: dict[str, Attack] = {
-    attack.__name__: attack for attack in (flags, manifests, recordings, models, replies, journals)
-}
+_ALL = (flags, tells, goals, outcomes, manifests, recordings, files, models, replies, journals)
+CLASSES: dict[str, Attack] = {attack.__name__: attack for attack in _ALL}

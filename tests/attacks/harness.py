@@ -10,6 +10,7 @@ import hashlib
 import io
 import os
 import random
+import re
 import signal
 import time
 import traceback
@@ -20,6 +21,15 @@ from pathlib import Path
 from prior_reinforce.cli import main
 from prior_reinforce.errors import PriorReinforceError
 
+REMEDY = re.compile(
+    r"add|ask|call|check|choose|copy|correct|demonstrate|drop|expected|export|give|help|known|"
+    r"leave out|looks like|make|measure|mend|missing|must|name|need|put|record|rename|restore|run:|"
+    r"say|see|tell|unknown; |use|valid|void|wait|want|write",
+    re.IGNORECASE,
+)
+"""What a refusal says must be done, in one of these words."""
+LONGEST = 1200
+"""Characters of a refusal that somebody still reads."""
 LIMIT_S = 30.0
 """For one attack; nothing here takes a second on a quiet machine."""
 HELD = "held"
@@ -83,6 +93,10 @@ def command(folder: Path, *args: str) -> str:
         return f"status {status}"
     if status == 2 and len(refusal) != 1:
         return f"{len(refusal)} lines"
+    if status == 2 and not REMEDY.search(refusal[0]):
+        return f"no remedy: {refusal[0]:.80}"
+    if status == 2 and len(refusal[0]) > LONGEST:
+        return f"a refusal of {len(refusal[0])} characters"
     if status == 2 and tree(folder) != before:
         return "changed by a refusal"
     said = out.getvalue() + err.getvalue()
@@ -121,11 +135,19 @@ def where(error: BaseException) -> str:
     return f"{Path(ours[-1].filename).name}:{ours[-1].lineno} {str(error)[:80]!r}"
 
 
+ODD = (
+    b"", b"nan", b"1e400", b"-inf", b"\xff\xfe", b"\0", b'"', b";", b",", b"\t", b"\n", b"abc",
+    b"2026-13-45", b"99999999999999999999", b"1.234,5", b"=SUM(A1)", "µ°".encode(), b"--", b"../x",
+)  # fmt: skip
+"""What a cell or a line of a file should not be."""
+
+
 def damage(rng: random.Random, content: bytes) -> bytes:
     """The bytes of a file after something happened to it."""
     data = bytearray(content)
-    how = rng.randrange(6)
+    how = rng.randrange(11)
     at = rng.randrange(len(data) + 1)
+    lines = content.split(b"\n")
     if how == 0:
         del data[at:]
     elif how == 1 and data:
@@ -136,6 +158,19 @@ def damage(rng: random.Random, content: bytes) -> bytes:
         data[at : at + rng.randrange(1, 200)] = b""
     elif how == 4:
         data[at : at + 8] = rng.choice([b"\x00", b"\xff"]) * 8
+    elif how == 5:
+        written = rng.choice(ODD)
+        data[at : at + len(written)] = written
+    elif how == 6:
+        data = data[:at] + data[at // 2 :]
+    elif how == 7:
+        rng.shuffle(lines)
+        data = bytearray(b"\n".join(lines))
+    elif how == 8:
+        lines[rng.randrange(len(lines))] = rng.choice(ODD)
+        data = bytearray(b"\n".join(lines))
+    elif how == 9:
+        data *= 2
     else:
         data = bytearray(rng.randbytes(rng.randrange(100)))
     return bytes(data)

@@ -1,4 +1,4 @@
-"""Formats are told apart and episodes chosen; damage is `tests/test_odd_recordings.py`."""
+"""Formats are told apart and episodes chosen; damage is `tests/attacks/`."""
 
 import builtins
 import importlib

@@ -64,7 +64,9 @@ def read(source: Path, options: ReadOptions) -> list[Recording]:
                     for connection, stamp, raw in reader.messages(connections=connections)
                 ]
             if not messages:
-                raise FileFormatError(f"{bag}: topic {connections[0].topic} has no messages")
+                raise FileFormatError(
+                    f"{bag}: topic {connections[0].topic} has no messages; leave it out"
+                )
             if kind == _STATE:
                 recordings.append(_states(bag, name, messages, options))
             else:

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from prior_reinforce.arrays import Frames, Point
 from prior_reinforce.lab.tasks.zoo.base import ZooTask
 from prior_reinforce.lab.tasks.zoo.human import Strategy, Submovement, reach_and_strike
-from prior_reinforce.lab.tasks.zoo.physics import first_passage, flight, hung, moving
+from prior_reinforce.lab.tasks.zoo.physics import first_passage, hung, landing, moving
 from prior_reinforce.plans.motions import PlanFormat
 
 _POSE = ("x", "y", "z", "rx", "ry", "rz")
@@ -61,8 +61,7 @@ class Pour(ZooTask):
             return None
         lip = moving(plan[:, :3] + self.ladle * ahead, self.format.dt)
         rolling = self.roll * moving(ahead, self.format.dt)(time)
-        landed = flight(lip(time), (lip(time, 1) + rolling) * (1.0 + disturbed[0]))
-        return None if landed is None else landed[0][:2]
+        return landing(lip(time), (lip(time, 1) + rolling) * (1.0 + disturbed[0]))
 
 
 class Swing(ZooTask):
@@ -101,5 +100,4 @@ class Swing(ZooTask):
         tip = moving(plan[:, :3] + self.rod * _turned(plan, (1.0, 0.0, 0.0)), self.format.dt)
         until, step = self.clock * self.format.dt, self.format.dt / 2.0
         place, velocity = hung(tip, self.string, until, step)
-        landed = flight(place, velocity * (1.0 + disturbed[0]))
-        return None if landed is None else landed[0][:2]
+        return landing(place, velocity * (1.0 + disturbed[0]))

@@ -34,6 +34,11 @@ class Arm:
     base: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Of the first joint, in [m]."""
 
+    @classmethod
+    def straight(cls, axes: str, *lengths: float, base: float = 0.0) -> Arm:
+        """An arm whose links all lie along z, of these lengths, on a base of this height [m]."""
+        return cls(axes, tuple((0.0, 0.0, length) for length in lengths), (0.0, 0.0, base))
+
     def hand(self, joints: Float[np.ndarray, "*t D"]) -> Places:
         """Where the hand is, in [m]."""
         point = np.zeros((*joints.shape[:-1], 3))
@@ -102,6 +107,12 @@ def flight(start: Place, velocity: Place, height: float = 0.0) -> tuple[Place, f
         return None
     time = float((velocity[2] + math.sqrt(rise)) / GRAVITY)
     return on_parabola(start, velocity, time), time
+
+
+def landing(start: Place, velocity: Place) -> Float[np.ndarray, "2"] | None:
+    """Where a parabola comes down to z = 0, (x, y) in [m]; None if it stays below."""
+    landed = flight(start, velocity)
+    return None if landed is None else landed[0][:2]
 
 
 def on_parabola(start: Place, velocity: Place, time: float) -> Place:

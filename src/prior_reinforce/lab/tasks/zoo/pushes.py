@@ -227,7 +227,7 @@ class Strike(ZooTask):
     bandwidth = 8.0
     posture = (0.0, 0.03, 0.04, 0.03)
     aim_range = ((-0.6, 0.6), (0.6, 1.4))
-    arm = Arm("zyyz", ((0.0, 0.0, -0.05), (0.0, 0.0, -0.30), (0.0, 0.0, -0.15), (0.0, 0.0, -0.15)))
+    arm = Arm.straight("zyyz", -0.05, -0.30, -0.15, -0.15)
     """It hangs; its first joint turns about the ball's vertical."""
     ball = (0.0, 0.0, -0.65)
     """Where the ball lies, from the arm's base, in [m]."""

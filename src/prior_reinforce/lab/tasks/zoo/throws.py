@@ -17,6 +17,7 @@ from prior_reinforce.lab.tasks.zoo.physics import (
     first_passage,
     flight,
     flight_in_air,
+    landing,
     lift_off,
     moving,
     on_parabola,
@@ -42,15 +43,7 @@ class Lob(ZooTask):
     aim_range = ((-0.8, 0.8), (0.4, 1.3))
     arm = Arm(
         "zyzyzyz",
-        (
-            (0.0, 0.0, 0.25),
-            (0.0, 0.0, 0.20),
-            (0.0, 0.0, 0.18),
-            (0.0, 0.0, 0.22),
-            (0.0, 0.0, 0.14),
-            (0.0, 0.0, 0.10),
-            (0.03, 0.0, 0.08),
-        ),
+        (*((0.0, 0.0, z) for z in (0.25, 0.20, 0.18, 0.22, 0.14, 0.10)), (0.03, 0.0, 0.08)),
     )
     clock = 56
     """Frame at which the ball is let go."""
@@ -70,8 +63,7 @@ class Lob(ZooTask):
             return None
         hand = moving(self.arm.hand(plan), self.format.dt)
         time = self.clock * self.format.dt
-        landed = flight(hand(time), hand(time, 1) * (1.0 + disturbed[0]))
-        return None if landed is None else landed[0][:2]
+        return landing(hand(time), hand(time, 1) * (1.0 + disturbed[0]))
 
 
 class Scoop(ZooTask):
@@ -86,18 +78,7 @@ class Scoop(ZooTask):
     bandwidth = 8.0
     posture = (0.02, 0.04, 0.05, 0.04, 0.05, 0.04, 0.03)
     aim_range = ((-0.8, 0.8), (0.35, 1.5))
-    arm = Arm(
-        "zyxyzyx",
-        (
-            (0.0, 0.0, 0.30),
-            (0.0, 0.0, 0.16),
-            (0.0, 0.0, 0.16),
-            (0.0, 0.0, 0.20),
-            (0.0, 0.0, 0.10),
-            (0.0, 0.0, 0.08),
-            (0.0, 0.0, 0.15),
-        ),
-    )
+    arm = Arm.straight("zyxyzyx", 0.30, 0.16, 0.16, 0.20, 0.10, 0.08, 0.15)
 
     def strategy(self, aims: Point, style: int) -> Strategy:
         """Lay the scoop back, then swing it over; in style 1 the wrist does more."""
@@ -114,8 +95,7 @@ class Scoop(ZooTask):
         time = lift_off(hand, self.arm.direction(plan, (1.0, 0.0, 0.0)))
         if time is None:
             return None
-        landed = flight(hand(time), hand(time, 1) * (1.0 + disturbed[0]))
-        return None if landed is None else landed[0][:2]
+        return landing(hand(time), hand(time, 1) * (1.0 + disturbed[0]))
 
 
 class GripperThrow(ZooTask):
@@ -131,7 +111,7 @@ class GripperThrow(ZooTask):
     region = np.array([[1.20, -0.30, 1.10], [1.60, 0.30, 1.18]])
     posture = (0.02, 0.04, 0.04, 0.0)
     aim_range = ((-0.4, 0.4), (1.2, 3.0), (-0.1, 0.45))
-    arm = Arm("zyy", ((0.0, 0.0, 0.40), (0.0, 0.0, 0.30), (0.0, 0.0, 0.35)))
+    arm = Arm.straight("zyy", 0.40, 0.30, 0.35)
     opening = 0.12
     """How long the gripper takes to open, six frames, in [s]."""
 
@@ -189,7 +169,7 @@ class Bounce(Latched):
     bandwidth = 8.0
     posture = (0.02, 0.04, 0.05, 0.05)
     aim_range = ((-0.7, 0.7), (0.9, 2.6))
-    arm = Arm("zyyy", ((0.0, 0.0, 0.35), (0.0, 0.0, 0.25), (0.0, 0.0, 0.25), (0.0, 0.0, 0.10)))
+    arm = Arm.straight("zyyy", 0.35, 0.25, 0.25, 0.10)
     latch = -0.3
     restitution, slip = 0.65, 0.8
     """What a bounce leaves of the vertical speed, and of the horizontal [-]."""
@@ -197,9 +177,8 @@ class Bounce(Latched):
     def strategy(self, aims: Point, style: int) -> Strategy:
         """Lean back and swing over; in style 1 the wrist does more."""
         heading, swing = aims
-        shoulder, elbow, wrist = swing * np.array(
-            (0.5, 0.3, 0.2) if style == 0 else (0.3, 0.3, 0.4)
-        )
+        share = (0.5, 0.3, 0.2) if style == 0 else (0.3, 0.3, 0.4)
+        shoulder, elbow, wrist = swing * np.array(share)
         wound = (heading, -0.5, -0.4, -0.3)
         struck = (heading, shoulder - 0.5, elbow - 0.4, wrist - 0.3)
         return reach_and_strike((0.0, -0.3, -0.2, -0.1), wound, struck, 0.4, 0.5)
@@ -216,8 +195,7 @@ class Bounce(Latched):
         down = velocity[2] - GRAVITY * time
         after = velocity * self.slip
         after[2] = -self.restitution * down
-        second = flight(np.array([*place[:2], 0.0]), after)
-        return None if second is None else second[0][:2]
+        return landing(np.array([*place[:2], 0.0]), after)
 
 
 class Drag(Latched):
@@ -233,7 +211,7 @@ class Drag(Latched):
     spread = (0.0005,)  # an even ball
     posture = (0.05, 0.06)
     aim_range = ((1.0, 3.2),)
-    arm = Arm("yy", ((0.0, 0.0, 0.40), (0.0, 0.0, 0.35)), base=(0.0, 0.0, 0.5))
+    arm = Arm.straight("yy", 0.40, 0.35, base=0.5)
     latch = -0.5
     drag = 0.25
     """Deceleration over speed squared, in [1/m]; of a ball of paper."""
@@ -267,15 +245,14 @@ class Arrival(Latched):
     slack = 0.1
     posture = (0.03, 0.04, 0.05)
     aim_range = ((1.1, 2.8), (0.0, 0.7))
-    arm = Arm("yyy", ((0.0, 0.0, 0.35), (0.0, 0.0, 0.30), (0.0, 0.0, 0.15)), base=(0.0, 0.0, 0.3))
+    arm = Arm.straight("yyy", 0.35, 0.30, 0.15, base=0.3)
     latch = -0.4
 
     def strategy(self, aims: Point, style: int) -> Strategy:
         """Swing, earlier or later; in style 1 with the wrist."""
         swing, early = aims
-        shoulder, elbow, wrist = swing * np.array(
-            (0.45, 0.35, 0.2) if style == 0 else (0.3, 0.3, 0.4)
-        )
+        share = (0.45, 0.35, 0.2) if style == 0 else (0.3, 0.3, 0.4)
+        shoulder, elbow, wrist = swing * np.array(share)
         wound = (-0.6, -0.5, -0.2)
         struck = (shoulder - 0.6, elbow - 0.5, wrist - 0.2)
         swung = reach_and_strike((-0.3, -0.3, 0.0), wound, struck, 0.4, 0.5)
@@ -321,9 +298,8 @@ class Hoop(ZooTask):
     def strategy(self, aims: Point, style: int) -> Strategy:
         """Swing shoulder, elbow and wrist, and let go: early for a long flight."""
         heading, swing, late = aims
-        shoulder, elbow, wrist = swing * np.array(
-            (0.4, 0.35, 0.25) if style == 0 else (0.3, 0.25, 0.45)
-        )
+        share = (0.4, 0.35, 0.25) if style == 0 else (0.3, 0.25, 0.45)
+        shoulder, elbow, wrist = swing * np.array(share)
         home = (0.0, -0.4, 0.6, -0.4, 0.0, 0.0, 1.0)
         wound = (heading, -0.7, -0.3, -0.5, 0.0, 0.0, 1.0)
         struck = (heading, shoulder - 0.7, elbow - 0.3, wrist - 0.5, 0.0, 0.0, 1.0)
@@ -385,5 +361,5 @@ class Catapult(ZooTask):
         draw, elevation = (float(np.interp(time, frames, plan[:, i])) for i in (0, 1))
         speed = self.stiffness * draw * (1.0 + disturbed[0])
         velocity = speed * np.array([np.cos(elevation), 0.0, np.sin(elevation)])
-        landed = flight(np.array([0.0, 0.0, self.height]), velocity)
-        return None if landed is None else landed[0][:1]
+        landed = landing(np.array([0.0, 0.0, self.height]), velocity)
+        return None if landed is None else landed[:1]

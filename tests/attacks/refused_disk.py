@@ -1,6 +1,6 @@
 """One command on a workspace whose disk refuses to write.
 
-    python tests/bench/workspace/refused_disk.py read-only|full COMMAND ...
+    python tests/attacks/refused_disk.py read-only|full COMMAND ...
 
 A program of its own: a limit on written files, and giving up root's rights, cannot be undone.
 """

@@ -12,9 +12,9 @@ KILLS = 25
 
 @pytest.mark.slow
 def test_a_session_survives_being_killed_at_any_moment(tmp_path):
-    program = Path(__file__).with_name("power_cut.py")
     done = subprocess.run(
-        [sys.executable, program, tmp_path, str(KILLS)],
+        [sys.executable, "-m", "tests.attacks.power_cut", tmp_path, str(KILLS)],
+        cwd=Path(__file__).parents[2],
         capture_output=True,
         text=True,
         env=os.environ | {"OMP_NUM_THREADS": "1"},

@@ -1,6 +1,6 @@
 """Kill -9 at random moments of a scripted session: nothing missing, nothing doubled.
 
-    python tests/bench/workspace/power_cut.py FOLDER KILLS
+    python -m tests.attacks.power_cut FOLDER KILLS
 
 A program of its own, because a process that has used other libraries' threads cannot be forked.
 """
@@ -13,9 +13,9 @@ import time
 from pathlib import Path
 
 import numpy as np
-from planar import demonstrations, manifest
 
 from prior_reinforce.bench.workspace.workspace import Workspace
+from tests.bench.workspace.planar import demonstrations, manifest
 
 TRIALS = 20
 
