@@ -13,8 +13,8 @@ from .bench.importing.importer import ImportResult as ImportResult
 from .bench.importing.importer import import_demonstrations as import_demonstrations
 from .bench.importing.importer import inspect_recordings as inspect_recordings
 from .bench.importing.importer import read_recordings as read_recordings
+from .bench.importing.options import ReadOptions as ReadOptions
 from .bench.importing.preprocessing import Preprocessing as Preprocessing
-from .bench.importing.recording import HowToRead as HowToRead
 from .bench.robots.executors.command import CommandResult as CommandResult
 from .bench.robots.executors.command import run_command as run_command
 from .bench.robots.gate import GateSettings as GateSettings

@@ -33,6 +33,10 @@ _LARGEST_NPZ = 4_000_000_000
 """Bytes of all arrays in a file; ours: an hour of an arm at 1 kHz is a tenth of it. A small file
 that unpacks to more is a trap."""
 
+_FORMULAS = "=+-@\t\r"
+"""What a spreadsheet takes for the start of a formula, which may run a program (OWASP, CSV
+injection)."""
+
 
 def sha256(content: bytes) -> str:
     """Return the hash of some bytes, 64 hexadecimal digits."""
@@ -59,12 +63,15 @@ def sha256_of_folder(folder: Path) -> str:
 
 
 @contextmanager
-def open_npz(path: Path, remedy: str) -> Iterator[np.lib.npyio.NpzFile]:
+def open_npz(
+    path: Path, remedy: str, largest: int = _LARGEST_NPZ
+) -> Iterator[np.lib.npyio.NpzFile]:
     """Open arrays that numpy saved, as data: no pickle is read, and no flood unpacked.
 
     Args:
         path: The file.
         remedy: What to do about a file that is none, for the message.
+        largest: Bytes that it may unpack to.
 
     Raises:
         FileFormatError: Reading it fails, in the block as well: what can go wrong in damaged or
@@ -73,8 +80,8 @@ def open_npz(path: Path, remedy: str) -> Iterator[np.lib.npyio.NpzFile]:
     try:
         with path.open("rb") as file, zipfile.ZipFile(file) as packed:
             size = sum(member.file_size for member in packed.infolist())
-            if size > _LARGEST_NPZ:
-                raise ValueError(f"it unpacks to {size:.2g} bytes")
+            if size > largest:
+                raise ValueError(f"it unpacks to {size:.2g} bytes, at most {largest:.2g} are read")
         with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
             yield archive
     except PriorReinforceError:
@@ -83,6 +90,16 @@ def open_npz(path: Path, remedy: str) -> Iterator[np.lib.npyio.NpzFile]:
         raise FileFormatError(
             f"{path} cannot be read ({without_advice(error)}); {remedy}"
         ) from error
+
+
+def as_cell(text: str) -> str:
+    """Return a text for a cell of a table, of which no spreadsheet makes a formula."""
+    return f"'{text}" if text[:1] in _FORMULAS and text[:1] else text
+
+
+def from_cell(text: str) -> str:
+    """Return what `as_cell` was given."""
+    return text[1:] if text[:1] == "'" and text[1:2] in _FORMULAS and text[1:2] else text
 
 
 def without_advice(error: BaseException) -> str:

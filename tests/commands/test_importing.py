@@ -1,7 +1,11 @@
 """`import`, from the first command on."""
 
-import numpy as np
+from collections import Counter
 
+import numpy as np
+import pytest
+
+from prior_reinforce.bench.importing import importer, inspection, npz
 from prior_reinforce.bench.workspace.workspace import Workspace
 from tests.bench.workspace.planar import demonstrations, recordings
 
@@ -181,3 +185,104 @@ def test_episodes_with_odd_names_are_printed_as_text(run, folder, tmp_path, monk
     status, out, err = run("import", folder, "all.csv")
     assert status == 0, err
     assert "\x1b" not in said + out + "".join(asked)
+
+
+@pytest.fixture
+def work(monkeypatch):
+    """How often the costly steps of an import were taken."""
+    counted = Counter()
+
+    def count(module, name):
+        real = getattr(module, name)
+
+        def counting(*arguments, **options):
+            counted[name] += 1
+            return real(*arguments, **options)
+
+        monkeypatch.setattr(module, name, counting)
+
+    count(npz, "_arrays")
+    count(importer, "select")
+    count(importer, "find_outcomes")
+    count(inspection, "preprocess")
+    count(inspection, "check_plan")
+    return counted
+
+
+ONCE = {"_arrays": 4, "select": 1, "find_outcomes": 1, "preprocess": 1, "check_plan": 4}
+
+
+def on_a_panda(run, folder, scale, outcomes):
+    """Four recordings of seven joints, and a workspace for them."""
+    recordings(folder / "recordings", outcomes=outcomes)
+    for i, plan in enumerate(demonstrations().plans):
+        q = scale * plan[:, [0, 1, 0, 1, 0, 1, 0]]
+        np.savez(folder / "recordings" / f"throw_{i}.npz", t=T * 1000, q=q)
+    assert run("new", "arm", "--robot", "panda", "--dt", "0.02")[0] == 0
+
+
+def test_an_import_reads_and_checks_everything_once(run, tmp_path, monkeypatch, work):
+    monkeypatch.chdir(tmp_path)
+    on_a_panda(run, tmp_path, 0.05, [0, 1])
+    assert run("import", "arm", "recordings", "--inspect", "--time-unit", "ms")[0] == 0
+    assert work == ONCE
+    work.clear()
+    # At a terminal: a guess is agreed to, an outcome typed, and an episode skipped.
+    answers = iter(["yes", "100cm 20cm", "skip"])
+    monkeypatch.setattr("sys.stdin.isatty", lambda: True)
+    monkeypatch.setattr("builtins.input", lambda question: next(answers))
+    status, out, err = run("import", "arm", "recordings", "--no-trim")
+    assert (status, err) == (0, "")
+    assert "throw_0, throw_1, throw_2" in out
+    assert work == ONCE | {"check_plan": 3}
+
+
+def test_smoothing_is_not_tried_where_positions_break_a_limit(run, tmp_path, monkeypatch, work):
+    monkeypatch.chdir(tmp_path)
+    on_a_panda(run, tmp_path, 3.0, range(4))
+    assert run("import", "arm", "recordings", "--time-unit", "ms", "--no-trim")[0] == 0
+    assert work == ONCE
+
+
+def test_what_is_left_out_is_not_read(run, folder, tmp_path):
+    recordings(tmp_path / "some")
+    (tmp_path / "some" / "throw_2.npz").write_bytes(b"damaged")
+    status, _, err = run("import", folder, "some", "--no-trim")
+    assert status == 2
+    assert "throw_2.npz cannot be read" in err
+    status, out, err = run("import", folder, "some", "--no-trim", "--leave-out", "throw_2")
+    assert (status, err) == (0, "")
+    assert "3 from some" in out
+
+
+def test_copies_are_found_by_inspecting(run, folder, tmp_path):
+    recordings(tmp_path / "some")
+    (tmp_path / "some" / "throw_4.npz").write_bytes((tmp_path / "some/throw_1.npz").read_bytes())
+    status, out, _ = run("import", folder, "some", "--inspect")
+    assert status == 0
+    assert "throw_1 and throw_4 are one motion to the last number" in out
+
+
+def test_a_channel_that_moves_and_is_left_out_is_named_with_its_range(run, folder, tmp_path):
+    recordings(tmp_path / "some")
+    for i, plan in enumerate(demonstrations().plans):
+        gripper = np.where(T > 0.2, 70.0 + i, 8.0)
+        still, index = np.full(len(T), 0.3), np.arange(len(T))
+        q = np.column_stack([plan, gripper, gripper, still, index])
+        names = ["joint1", "joint2", "gripper.pos", "gripper_velocity", "lamp", "index"]
+        np.savez(tmp_path / "some" / f"throw_{i}.npz", t=T, q=q, joint_names=names)
+    said = "left out although it moves: gripper.pos, 8 to 73 (take it with --joints)"
+    assert said in run("import", folder, "some", "--inspect")[1]
+    assert said in run("import", folder, "some", "--no-trim")[1]
+    assert "without what moves as well: gripper.pos, 8 to 73" in run("status", folder)[1]
+
+
+def test_one_in_a_csv_is_named_too_although_it_is_not_read(run, folder, tmp_path):
+    (tmp_path / "some").mkdir()
+    head = "t,joint1,joint2,gripper,target_joint1,target_joint2,note"
+    for i, plan in enumerate(demonstrations().plans):
+        rows = [[t, *q, 8 if t < 0.2 else 70, *q, "x"] for t, q in zip(T, plan, strict=True)]
+        lines = [head, *(",".join(map(str, row)) for row in rows)]
+        (tmp_path / "some" / f"throw_{i}.csv").write_text("\n".join(lines))
+    out = run("import", folder, "some", "--inspect")[1]
+    assert "left out although it moves: gripper, 8 to 70 (take it with --joints)" in out

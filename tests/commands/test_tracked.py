@@ -52,10 +52,10 @@ def test_words_and_hits_stand_in_a_table_too(run, folder, tmp_path):
     ("text", "says"),
     [
         ("a,b\n1,2\n", "expected column names such as trial,x,y"),
-        ("trial,x\n1,0.9\n", "no column for each of x, y"),
+        ("trial,x\n1,0.9\n", "it has x, and no column for each of x, y"),
         ("trial,q\n1,0.9\n", "no column for each of x, y, nor one called said"),
-        ("trial,x,y\n1,95,3\n", "x at 95 m looks like cm; write the unit into"),
-        ("trial,x,y\n1,far,0\n", "line 2: x is 'far', expected a number"),
+        ("trial,x,y\n1,95,3\n", "x reaches 95, too far for an arm: it looks like cm"),
+        ("trial,x,y\n1,far,0\n", "line 2: x is 'far', expected a finite number"),
         ("trial,x,y,hit\n1,0.9,0,perhaps\n", "hit is 'perhaps', expected yes or no"),
         ("trial,x,y\nnan,0.9,0\n", "trial is nan, expected its number"),
         ("trial,x,y\n7,0.9,0\n", "7"),

@@ -6,76 +6,66 @@ the same source is imported again.
 
 from __future__ import annotations
 
-import csv
-import io
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
 
-from prior_reinforce.bench.importing import Recording
 from prior_reinforce.bench.importing.outcomes import (
     OUTCOMES_FILE,
+    SD,
     Outcomes,
-    headed,
+    in_units,
     outcomes_of,
-    uncertainty_of,
+    read_outcomes,
+    write_outcome_table,
 )
+from prior_reinforce.bench.importing.selection import Selection
 from prior_reinforce.bench.workspace.manifest import Manifest
 from prior_reinforce.errors import (
     InvalidDemonstrationsError,
     InvalidFeedbackError,
+    PriorReinforceError,
 )
-from prior_reinforce.files import named_disk_errors, write
+from prior_reinforce.files import named_disk_errors
 from prior_reinforce.wording import in_words, plain, read_place, say_length, say_place
 
 _SKIP, _BACK = ("skip", "s"), ("back", "b")
 _SOURCE = "source"
-
-
-@dataclass(frozen=True)
-class Answers:
-    """What is known of the outcomes after the questions."""
-
-    table: Path
-    """Where all of it is written."""
-    skipped: tuple[str, ...]
-    """Episodes that nobody could say anything of."""
+Place = tuple[float, ...]
+"""The components of an outcome, and how uncertain they are."""
 
 
 def ask_for_outcomes(
-    folder: Path, source: Path, known: Outcomes, recordings: Sequence[Recording], manifest: Manifest
-) -> Answers | None:
+    folder: Path, source: Path, known: Outcomes, selection: Selection, manifest: Manifest
+) -> Outcomes | None:
     """Ask for the outcomes that no table has.
 
     Args:
         folder: Of the workspace, where what is typed is kept.
         source: What the recordings were read from.
         known: Outcomes of a table, in the manifest's units.
-        recordings: Of the episodes in question.
+        selection: The episodes in question.
         manifest: What an outcome is.
 
     Returns:
-        None where nothing was missing.
+        All that is known now, without episodes that were skipped; None where nothing was missing.
 
     Raises:
         InvalidDemonstrationsError: The person stopped typing; the answers so far are kept.
         WorkspaceError: The disk is full, or the folder read-only.
     """
-    outcomes: dict[str, tuple[float, ...]] = {}  # the components, and how uncertain they are
-    for recording in recordings:
+    outcomes: dict[str, Place] = {}
+    for episode in selection.episodes:
         try:
-            found = outcomes_of([recording], known, partial=True)[0]
+            place, sd = outcomes_of([episode], known, partial=True)
         except InvalidDemonstrationsError:
             continue
-        sd = uncertainty_of([recording], known)[0, 0]
-        outcomes[recording.episode] = (*found.tolist(), float(sd))
-    missing = [r.episode for r in recordings if r.episode not in outcomes]
+        outcomes[episode] = (*place[0].tolist(), float(sd[0, 0]))
+    missing = [episode for episode in selection.episodes if episode not in outcomes]
     if not missing:
         return None
-    table = _table_of(folder, source)
-    before = _typed_before(table, source, manifest)
+    table, before = _typed_before(folder, source, manifest)
     again = [episode for episode in missing if episode in before]
     outcomes |= {episode: before[episode] for episode in again}
     if again:
@@ -83,7 +73,6 @@ def ask_for_outcomes(
     missing = [episode for episode in missing if episode not in before]
     if missing:
         print(_explanation(manifest, missing))
-    skipped: set[str] = set()
     number = 0
     while number < len(missing):
         episode = missing[number]
@@ -93,67 +82,50 @@ def ask_for_outcomes(
             number = max(0, number - 1)
             continue
         if isinstance(answer, str):
-            skipped.add(episode)
             outcomes.pop(episode, None)
         else:
-            skipped.discard(episode)
             outcomes[episode] = answer
-            *place, sd = answer
-            said = say_place(place, manifest.outcome_names, manifest.outcome_units)
-            give = f", give or take {say_length(sd, manifest.outcome_units)}" if sd else ""
+            names, units, spread = manifest.outcome_names, manifest.outcome_units, answer[-1]
+            said = say_place(answer[:-1], names, units)
+            give = f", give or take {say_length(spread, units)}" if spread else ""
             print(f"  {said}{give}")
         _keep(table, source, outcomes, manifest)
         number += 1
     _keep(table, source, outcomes, manifest)
-    return Answers(table, tuple(episode for episode in missing if episode in skipped))
+    return _read(table, manifest)
 
 
-def _table_of(folder: Path, source: Path) -> Path:
-    """Where what is typed of a source is kept: a table of its own, since another's stays."""
+def _typed_before(folder: Path, source: Path, manifest: Manifest) -> tuple[Path, dict[str, Place]]:
+    """Where what is typed of a source is kept, a table of its own, and what is in it already."""
     for number in count(1):
         table = folder / (OUTCOMES_FILE if number == 1 else f"outcomes-{number}.csv")
         if not table.is_file():
-            return table
-        with table.open(newline="", encoding="utf-8", errors="replace") as file:
-            sources = {row.get(_SOURCE) for row in csv.DictReader(file)}
-        if sources == {str(source.resolve())}:
-            return table
+            return table, {}
+        try:
+            kept = _read(table, manifest)
+        except PriorReinforceError:
+            continue  # changed by hand, or of another task: asked for again, in another table
+        if set(kept.frame[_SOURCE]) == {str(source.resolve())}:
+            rows = kept.frame[[*kept.names, SD]].itertuples()
+            return table, {name: tuple(map(float, values)) for name, *values in rows}
     raise AssertionError("numbers do not end")
 
 
-def _keep(
-    table: Path, source: Path, outcomes: Mapping[str, tuple[float, ...]], manifest: Manifest
-) -> None:
+def _read(table: Path, manifest: Manifest) -> Outcomes:
+    found = read_outcomes(table, manifest.outcome_names, texts=(_SOURCE,))
+    if found.names != manifest.outcome_names or _SOURCE not in found.frame:
+        raise InvalidDemonstrationsError(f"{table} has other columns; name it with --outcomes")
+    # A place that was typed was judged then.
+    return in_units(found, manifest.outcome_units, None)[0]
+
+
+def _keep(table: Path, source: Path, outcomes: Mapping[str, Place], manifest: Manifest) -> None:
     """Write all that is known of a source to the table in the workspace."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["episode", *_heads(manifest), _SOURCE])
-    for episode, values in outcomes.items():
-        writer.writerow([episode, *map(repr, values), source.resolve()])
-    with named_disk_errors(table.parent):
-        write(table, text.getvalue())
-
-
-def _typed_before(table: Path, source: Path, manifest: Manifest) -> dict[str, tuple[float, ...]]:
-    """Outcomes that were typed for the same source."""
-    if not table.is_file():
-        return {}
-    *names, sd = _heads(manifest)  # the first tables had no such column
-    with table.open(newline="", encoding="utf-8") as file:
-        rows = [row for row in csv.DictReader(file) if row.get(_SOURCE) == str(source.resolve())]
-    try:
-        return {
-            row["episode"]: (*(float(row[name]) for name in names), float(row.get(sd) or 0.0))
-            for row in rows
-        }
-    except (KeyError, TypeError, ValueError):
-        return {}  # changed by hand, or of another task: asked for again
-
-
-def _heads(manifest: Manifest) -> list[str]:
-    """What the columns of numbers are called."""
     units = manifest.outcome_units
-    return headed((*manifest.outcome_names, "sd"), (*units, units[0]))
+    rows = {episode: (*map(repr, v), source.resolve()) for episode, v in outcomes.items()}
+    with named_disk_errors(table.parent):
+        heads = (*manifest.outcome_names, SD), (*units, units[0])
+        write_outcome_table(table, rows, *heads, beside=_SOURCE)
 
 
 def _explanation(manifest: Manifest, missing: Sequence[str]) -> str:

@@ -4,17 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from prior_reinforce.arrays import Point
-from prior_reinforce.bench.importing.tables import Table, read_tables
-from prior_reinforce.bench.importing.units import (
-    CHANNEL_UNITS,
-    conversion,
-    guess_unit,
-    split_unit,
-)
+from prior_reinforce.bench.importing.outcomes import Outcomes, in_units, read_outcomes
 from prior_reinforce.bench.workspace.workspace import Workspace
 from prior_reinforce.commands.reading import plausible, read_seen
 from prior_reinforce.errors import FileFormatError, InvalidFeedbackError
@@ -57,80 +52,59 @@ def rows_to_tell(path: Path, workspace: Workspace, session: Session) -> list[Row
         InvalidFeedbackError: A row of a trial that was told otherwise, or that cannot be meant.
         TrialStateError: A row of a trial that was never asked for.
     """
-    if not path.is_file():
-        raise FileFormatError(f"no table at {path}; give a CSV with the columns trial,x,y")
-    table = read_tables(path)[0]
-    lower = [name.lower() for name in table.names]
-    trial = next((i for i, name in enumerate(lower) if name in _TRIAL), None)
-    if trial is None:
-        raise FileFormatError(
-            f"{path} begins with {','.join(table.names)!r}, expected column names such as trial,x,y"
-        )
-    found = []
-    for i in range(len(table)):
-        row = table.rows([i])
-        number = float(row.numbers(trial)[0])
-        if not number.is_integer():
-            raise FileFormatError(
-                f"{row.where}, line {row.lines[0]}: trial is {number:g}, expected its number"
+    names, units = workspace.manifest.outcome_names, workspace.manifest.outcome_units
+    table = read_outcomes(path, names, index=_TRIAL, texts=(_SAID, _HIT))
+    if set(names) <= set(table.names):
+        table, ambiguities = in_units(table.only(names), units, None)
+        for one in ambiguities:
+            raise InvalidFeedbackError(
+                f"{one.what}; write the unit into the column's name, such as {names[0]} [cm]"
             )
-        seen, hit = _seen(row, lower, workspace, session, int(number))
-        if seen is None and hit is None:
-            continue
-        told = session.trial(int(number))
+    found = []
+    for name, row in table.frame.iterrows():
+        where = f"{path}, trial {name}"
+        number = _number(where, str(name))
+        seen, hit = _seen(where, row, table, workspace, session, number)
+        told = session.trial(number)
         if told.stage is Stage.VOIDED:
             continue
         if told.stage is not Stage.TOLD:
-            found.append(Row(int(number), seen, hit))
+            found.append(Row(number, seen, hit))
         elif not _is_said(told.error_seen, seen):
             raise InvalidFeedbackError(
-                f"{row.where}, line {row.lines[0]}: trial {told.number} was told otherwise; "
-                f"correct it with: prior-reinforce amend {workspace.folder} {told.number}, or drop "
-                "that row"
+                f"{where} was told otherwise; correct it with: prior-reinforce amend "
+                f"{workspace.folder} {told.number}, or drop that row"
             )
     return found
 
 
+def _number(where: str, text: str) -> int:
+    try:
+        return int(text)
+    except ValueError:
+        raise FileFormatError(f"{where}: trial is {text[:40]}, expected its number") from None
+
+
 def _seen(
-    row: Table, lower: list[str], workspace: Workspace, session: Session, number: int
+    where: str, row: Any, table: Outcomes, workspace: Workspace, session: Session, number: int
 ) -> tuple[Reading | Point | None, bool | None]:
-    """What one row says; nothing where its cells are empty."""
-    hit = None
-    if _HIT in lower and (text := row.texts(lower.index(_HIT))[0].lower()):
+    """What one row says."""
+    names, hit = workspace.manifest.outcome_names, None
+    if text := str(row.get(_HIT, "")).lower():
         if text not in _ANSWERS:
-            raise FileFormatError(
-                f"{row.where}, line {row.lines[0]}: hit is {text!r}, expected yes or no; mend it"
-            )
+            raise FileFormatError(f"{where}: hit is {text[:40]!r}, expected yes or no; mend it")
         hit = _ANSWERS[text]
-    if _SAID in lower and (said := row.texts(lower.index(_SAID))[0]):
+    if said := row.get(_SAID, ""):
         return read_seen(workspace, said), hit
-    split = [split_unit(name, CHANNEL_UNITS) for name in row.names]
-    names, units = workspace.manifest.outcome_names, workspace.manifest.outcome_units
-    columns = [next((i for i, (n, _) in enumerate(split) if n == name), None) for name in names]
-    there = [i for i in columns if i is not None]
-    if not any(row.texts(i)[0] for i in there):
-        if len(there) < len(names) and _SAID not in lower:
-            raise FileFormatError(
-                f"{row.where} has no column for each of {', '.join(names)}, nor one called said; "
-                f"it has {', '.join(row.names)}: add or rename one"
-            )
+    place = np.array([row.get(name, np.nan) for name in names], dtype=np.float64)
+    if np.all(np.isnan(place)) and hit is not None:
         return None, hit
-    if len(there) < len(names):
+    if np.any(np.isnan(place)):
         raise FileFormatError(
-            f"{row.where} has no column for each of {', '.join(names)}; it has "
-            f"{', '.join(row.names)}: add it"
+            f"{where}: it has {', '.join(table.names)}, and no column for each of "
+            f"{', '.join(names)}, nor one called said; add or rename one"
         )
     goal = session.goals[session.trial(number).goal_number - 1].goal
-    place = np.zeros(len(names))
-    for j, i in enumerate(there):
-        value, said_unit = float(row.numbers(i)[0]), row.units[i] or split[i][1]
-        looks = guess_unit(units[j], abs(value))
-        if said_unit is None and looks != units[j]:
-            raise InvalidFeedbackError(
-                f"{row.where}, line {row.lines[0]}: {names[j]} at {value:g} {units[j]} looks like "
-                f"{looks}; write the unit into the column's name, such as {names[j]} [{looks}]"
-            )
-        place[j] = value * conversion(said_unit or units[j], units[j], names[j])
     return plausible(workspace, place - goal), hit
 
 

@@ -49,7 +49,7 @@ def test_guesses_are_named_with_the_options_that_settle_them(tmp_path):
         t, q = sampled(i, 100)
         np.savez(tmp_path / f"{i}.npz", t=1000 * t, q=np.rad2deg(q), joint_names=JOINTS)
     found = inspect_recordings(tmp_path)
-    assert [doubt.option for doubt in found.doubts] == ["--time-unit ms", "--units deg"]
+    assert [doubt.option for doubt in found.ambiguities] == ["--time-unit ms", "--units deg"]
     assert "(--time-unit ms)" in found.text
     assert table(found.text, "channel ")["joint4"][:3] == ["joint4", "rad,", "from"]
     assert found.recordings[0].duration == pytest.approx(1.7)
@@ -152,7 +152,7 @@ def test_noise_that_takes_up_much_of_a_limit_is_said_with_what_takes_it_out(tmp_
     folder, panda = noisy(tmp_path, 1.9e-5), robot_limits("panda")
     found = inspect_recordings(folder, robot=panda)
     (remark,) = found.remarks
-    share = 2.5 * 6 * found.done.noise[1] * 80**2 * 1000 / 3750
+    share = 2.5 * 6 * found.processed.noise[1] * 80**2 * 1000 / 3750
     assert remark == (
         f"noise alone takes up about {share:.0%} of the jerk limit of joint2: --smooth 20 takes "
         "it out"

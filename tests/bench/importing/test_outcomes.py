@@ -69,7 +69,7 @@ def test_centimetres_in_a_columns_name_are_converted(tmp_path):
     path = table(tmp_path, "episode,x_cm,y [mm],z_m,t,source,comment\n0,92,-50,0.3,1.5,tape,ok\n")
     outcomes = read_outcomes(path)
     assert outcomes.names == ("x", "y", "z", "t")
-    np.testing.assert_allclose(outcomes.values["0"], (0.92, -0.05, 0.3, 1.5))
+    np.testing.assert_allclose(outcomes.frame.loc["0"], (0.92, -0.05, 0.3, 1.5, 0))
     assert outcomes.units == ("m", "m", "m", None)
 
 
@@ -129,11 +129,11 @@ def test_numbers_that_two_names_share_match_nothing(recording, tmp_path):
         ("a,b\n1,2\n", "expected column names"),
         ("episode\n1\n", "expected column names"),
         ("episode,x,x\n1,2,3\n", "expected column names"),
-        ("episode,x,y\n1,2\n", "line 2: '' is no finite number"),
+        ("episode,x,y\n1,2\n", "line 2: y is '', expected a finite number"),
         ("episode,x,y\n1,2,3\n1,2,4\n", "line 3: episode 1 again"),
-        ("episode,x,y\n1,5cm,3\n", "line 2: '5cm' is no finite number"),
-        ("episode,x,y\n1,inf,3\n", "line 2: 'inf' is no finite number"),
-        ("episode,x,y\n1,2,\n", "line 2: '' is no finite number"),
+        ("episode,x,y\n1,5cm,3\n", "line 2: x is '5cm', expected a finite number"),
+        ("episode,x,y\n1,inf,3\n", "line 2: x is 'inf', expected a finite number"),
+        ("episode,x,y\n1,2,\n", "line 2: y is '', expected a finite number"),
     ],
 )
 def test_tables_that_cannot_be_read(tmp_path, text, says):
@@ -146,7 +146,7 @@ def test_a_table_in_another_encoding(tmp_path):
     path.write_bytes(b"episode,x\n\xff\xfe,1\n")
     with pytest.raises(FileFormatError, match="CSV in UTF-8"):
         read_outcomes(path)
-    with pytest.raises(FileFormatError, match="no outcomes at"):
+    with pytest.raises(FileFormatError, match="no table at"):
         read_outcomes(tmp_path / "missing.csv")
 
 
@@ -166,11 +166,11 @@ def test_only_a_table_that_stands_beside_the_recordings_is_taken(tmp_path):
 
 def test_a_table_to_fill_in_has_the_episodes_names_and_the_units(tmp_path):
     path = tmp_path / "outcomes.csv"
-    write_outcome_table(path, ["throw_1", "a,b"], ["x", "turns"], ["m", "counts"])
+    write_outcome_table(path, {"throw_1": (), "a,b": ()}, ["x", "turns"], ["m", "counts"])
     assert path.read_text() == 'episode,x [m],turns,note\nthrow_1,,,\n"a,b",,,\n'
-    assert read_outcomes(path).values == {}
+    assert read_outcomes(path).frame.empty
     path.write_text(path.read_text().replace("[m]", "[cm]").replace("1,,", "1,92,3"))
-    assert read_outcomes(path).values == {"throw_1": (0.92, 3.0)}
+    np.testing.assert_allclose(read_outcomes(path).frame.loc["throw_1"], (0.92, 3.0, 0))
     assert missing_outcomes(["throw_1", "a,b"], read_outcomes(path)) == ["a,b"]
 
 
@@ -264,7 +264,7 @@ def test_a_table_that_is_written_to_be_filled_in_is_read_in_the_units_of_the_tas
     recording, tmp_path, unit
 ):
     path = tmp_path / "outcomes.csv"
-    write_outcome_table(path, list(OUTCOMES), ["x", "y"], [unit, unit])
+    write_outcome_table(path, dict.fromkeys(OUTCOMES, ()), ["x", "y"], [unit, unit])
     head, *_ = path.read_text().splitlines()
     rows = [f"{name},{x},{y}," for name, (x, y) in OUTCOMES.items()]
     path.write_text("\n".join([head, *rows]))

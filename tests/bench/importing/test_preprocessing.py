@@ -349,7 +349,7 @@ def test_degrees_that_were_said_are_not_advised_again(tmp_path, said):
     result = import_demonstrations(folder, units=units, robot=robot_limits("panda"))
     assert np.abs(result.demonstrations.plans).max() == pytest.approx(8.8)
     assert not any("--units" in remark for remark in result.preview.remarks)
-    assert result.preview.found.remedy == ""
+    assert result.preview.inspection.remedy == ""
 
 
 def test_a_unit_that_the_file_says_is_to_be_checked_and_not_said_otherwise(tmp_path):
@@ -360,8 +360,8 @@ def test_a_unit_that_the_file_says_is_to_be_checked_and_not_said_otherwise(tmp_p
     names = [f"joint{i}_rad" for i in range(1, 8)]
     preview = import_demonstrations(far(folder, names, 1.0), robot=robot_limits("panda")).preview
     assert preview.remarks[0] == "joint7 of 0 reaches 8.8 rad, and arms do not: check its unit"
-    assert all(report.refused for report in preview.found.reports)
-    assert preview.found.remedy == ""
+    assert all(report.refused for report in preview.inspection.reports)
+    assert preview.inspection.remedy == ""
 
 
 def test_one_unit_is_not_advised_for_channels_of_several(tmp_path):

@@ -33,7 +33,6 @@ def test_what_was_recorded_is_copied_and_starts_at_zero():
 @pytest.mark.parametrize(
     ("times", "positions", "says"),
     [
-        ([0, 1, 2], [[0], [np.nan], [0]], "episode a: joint1 is nan at frame 1"),
         ([0, np.inf, 2], [[0]] * 3, "episode a: time is inf at frame 1"),
         ([0, 2, 1], [[0]] * 3, r"time does not increase at frame 2 \(2 s, then 1 s\)"),
         ([0, 1], [[0]] * 3, r"times \(2,\) and positions \(3, 1\) for 1 channels"),

@@ -7,13 +7,12 @@ import pytest
 from prior_reinforce.bench.importing.units import (
     CHANNEL_UNITS,
     SECONDS,
-    Doubt,
+    Ambiguity,
     base_of,
-    cannot_be,
     conversion,
-    guess_unit,
+    judge_unit,
     known_unit,
-    refuse_doubts,
+    raise_if_ambiguous,
     say_names,
     split_unit,
 )
@@ -27,6 +26,9 @@ from prior_reinforce.errors import ConfigurationError, UnclearUnitsError
         ("x [cm]", "x", "cm"),
         ("joint1 (°)", "joint1", "deg"),
         ("q0_deg", "q0", "deg"),
+        ("x [in]", "x", "in"),
+        ("x_inch", "x", "in"),
+        ("plug_in", "plug_in", None),
         ("q[0]", "q[0]", None),
         ("joint1_pos", "joint1_pos", None),
         ("q [rad/s]", "q [rad/s]", None),
@@ -50,6 +52,7 @@ def test_conversions():
     assert conversion("mm", "cm", "x") == pytest.approx(0.1)
     assert conversion("counts", "counts", "x") == 1
     assert base_of("cm") == ("m", 0.01)
+    assert conversion("in", "m", "x") == 0.0254
     with pytest.raises(ConfigurationError, match="x is recorded in cm, but plans are in rad"):
         conversion("cm", "rad", "x")
 
@@ -65,23 +68,33 @@ def test_conversions():
         ("m", 78.5, "cm"),
         ("m", 785.0, "mm"),
         ("counts", 65536.0, "counts"),
+        ("s", 0.01, "s"),
+        ("s", 10.0, "ms"),
+        ("s", 2e6, "ns"),
+        ("ms", 10.0, "ms"),
+        ("ms", 0.002, "s"),
+        ("ns", 0.0, None),
     ],
 )
-def test_what_no_arm_reaches_is_another_unit(wanted, reach, looks):
-    assert guess_unit(wanted, reach) == looks
+def test_what_no_arm_does_is_another_unit(wanted, reach, looks):
+    period = wanted in SECONDS
+    assert judge_unit(wanted, reach, period=period).looks == looks
 
 
 def test_doubts_are_one_line_with_the_options_that_settle_them():
-    refuse_doubts([])
-    doubts = [Doubt("t looks like ms", "--time-unit ms"), Doubt("q looks like deg", "--units deg")]
+    raise_if_ambiguous([])
+    doubts = [
+        Ambiguity("t looks like ms", "--time-unit ms"),
+        Ambiguity("q looks like deg", "--units deg"),
+    ]
     with pytest.raises(UnclearUnitsError) as caught:
-        refuse_doubts(doubts)
+        raise_if_ambiguous(doubts)
     assert str(caught.value) == (
         "t looks like ms; q looks like deg; if so, add: --time-unit ms --units deg"
     )
     assert caught.value.options == "--time-unit ms --units deg"
     with pytest.raises(UnclearUnitsError, match="; and no outcomes") as caught:
-        refuse_doubts(doubts, also="no outcomes")
+        raise_if_ambiguous(doubts, also="no outcomes")
     assert caught.value.also == "no outcomes"
 
 
@@ -96,5 +109,5 @@ def test_many_names_are_few_words():
     [("rad", 12.0, False), ("rad", 151.0, True), ("m", 9.0, False), ("m", 92.0, True)],
 )
 def test_what_no_arm_can_do_whoever_says_it(unit, reach, cannot):
-    assert cannot_be(unit, reach) == cannot
-    assert not cannot_be("counts", 1e9)
+    assert judge_unit(unit, reach).possible is not cannot
+    assert judge_unit("counts", 1e9).possible

@@ -3,28 +3,32 @@
 from prior_reinforce.bench.importing.importer import (
     FORMATS,
     ImportResult,
+    Recordings,
     appended,
     import_demonstrations,
     inspect_recordings,
-    outcome_places,
+    read,
     read_recordings,
 )
-from prior_reinforce.bench.importing.inspection import Inspection
+from prior_reinforce.bench.importing.inspection import Inspection, inspect
+from prior_reinforce.bench.importing.options import ReadOptions
 from prior_reinforce.bench.importing.preprocessing import Preprocessing
 from prior_reinforce.bench.importing.preview import Preview
-from prior_reinforce.bench.importing.recording import HowToRead, Recording
+from prior_reinforce.bench.importing.recording import Recording
 
 __all__ = [
     "FORMATS",
-    "HowToRead",
     "ImportResult",
     "Inspection",
     "Preprocessing",
     "Preview",
+    "ReadOptions",
     "Recording",
+    "Recordings",
     "appended",
     "import_demonstrations",
+    "inspect",
     "inspect_recordings",
-    "outcome_places",
+    "read",
     "read_recordings",
 ]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Shaped
 
-from prior_reinforce.bench.importing.units import SECONDS, Doubt, split_unit
+from prior_reinforce.bench.importing.units import SECONDS, Ambiguity, judge_unit, split_unit
 from prior_reinforce.errors import ConfigurationError, FileFormatError, InvalidDemonstrationsError
 
 Times = Float[np.ndarray, " T"]
@@ -18,13 +18,12 @@ Stamps = Shaped[np.ndarray, "..."]
 FRAME = "frame"
 """The unit of a column that counts frames; the rate says how long one is."""
 TIME_UNITS = (*SECONDS, FRAME)
-_SLOWEST, _FASTEST = 5.0, 5000.0
-"""Frames a second at which arms are recorded. Ours: teleoperation at 10 Hz is the slowest in use,
-libfranka's and RTDE's logs have 1000 and 500."""
 _SHORTEST, LONGEST = 0.1, 60.0
 """Seconds that a throw, slide or swing is recorded for. Ours, and wide on purpose."""
-_AGREE = 0.05
-"""Two rates that differ by less are one."""
+_SAME_RATE = 0.05
+"""Rates that differ by a smaller share are one. Ours: clocks of recorders jitter and drift."""
+_HIGHEST_RATE = 1e6
+"""Declared frames a second above which a file is damaged. Ours."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +34,7 @@ class Clock:
     """From any origin."""
     source: str
     """For a person: `t in ms`, `the given rate`."""
-    doubts: tuple[Doubt, ...] = ()
+    ambiguities: tuple[Ambiguity, ...] = ()
     """What is only guessed of them."""
 
     @property
@@ -70,7 +69,7 @@ def clock_of(
     Raises:
         ConfigurationError: What was given contradicts the file, or has no use.
         InvalidDemonstrationsError: Stamps that are no numbers, or of another length.
-        FileFormatError: No times, no rate, and none given.
+        FileFormatError: No times, no rate, and none given; or a declared rate that is none.
     """
     if stamps is None:
         if time_unit is not None:
@@ -79,6 +78,34 @@ def clock_of(
                 "drop it, or name the column"
             )
         return _even(episode, count, name, own_rate, rate)
+    numbers = _numbers(episode, count, stamps, name)
+    known = unit or split_unit(name, SECONDS)[1]
+    if known is not None and time_unit not in (None, known):
+        raise ConfigurationError(f"{name} is in {known}, but --time-unit says {time_unit}; drop it")
+    chosen = time_unit or known
+    if chosen == FRAME:
+        if rate is None:
+            raise ConfigurationError(f"{name} counts frames, so the rate is wanted: add --rate")
+        return Clock(numbers / rate, f"{name}, frames at {rate:g} Hz")
+    if not np.all(np.isfinite(numbers)):
+        return Clock(numbers, name)  # the recording names the frame
+    period = float(np.median(np.diff(numbers))) if count > 1 else 0.0
+    length = float(numbers[-1] - numbers[0]) if count else 0.0
+    ambiguities: tuple[Ambiguity, ...] = ()
+    if chosen is None or time_unit is not None:
+        chosen, ambiguities = _judge(name, period, length, chosen)
+    if rate is not None and not (period > 0 and _same(rate, 1 / (period * SECONDS[chosen]))):
+        found = f"{1 / (period * SECONDS[chosen]):.4g} Hz" if period > 0 else "no rate"
+        raise ConfigurationError(
+            f"--rate {rate:g}, but {name} in {chosen} says {found}; drop --rate, say the unit with "
+            "--time-unit, or leave the times unread with --time-column none"
+        )
+    # From the first on, since nanoseconds since 1970 are 0.2 us coarse as floats.
+    first = numbers[0] if count else 0.0
+    return Clock((numbers - first) * SECONDS[chosen], f"{name} in {chosen}", ambiguities)
+
+
+def _numbers(episode: str, count: int, stamps: Stamps, name: str) -> Times:
     try:
         numbers = np.asarray(stamps, dtype=np.float64)
     except (TypeError, ValueError) as error:
@@ -90,40 +117,14 @@ def clock_of(
             f"episode {episode} has {count} frames, but {name} of shape {numbers.shape}; expected "
             "one time a frame"
         )
-    known = unit or split_unit(name, SECONDS)[1]
-    if known is not None and time_unit not in (None, known):
-        raise ConfigurationError(f"{name} is in {known}, but --time-unit says {time_unit}; drop it")
-    chosen = time_unit or known
-    if chosen == FRAME:
-        if rate is None:
-            raise ConfigurationError(f"{name} counts frames, so the rate is wanted: add --rate")
-        return Clock(numbers / rate, f"{name}, frames at {rate:g} Hz")
-    if not np.all(np.isfinite(numbers)):
-        return Clock(numbers, name)  # the recording names the frame
-    steps = np.diff(numbers)
-    period = float(np.median(steps)) if steps.size else 0.0
-    doubts: tuple[Doubt, ...] = ()
-    if chosen is None:
-        chosen = _guess(period)
-        doubts = _doubts(name, period, numbers, chosen)
-    elif time_unit is not None and _is_slip(chosen, period, numbers):
-        looks = _guess(period)
-        doubts = (
-            Doubt(
-                f"{name} in {chosen}, as --time-unit says, would be "
-                f"{_say_clock(period, numbers, chosen)}, in {looks} "
-                f"{_say_clock(period, numbers, looks)}: it looks like {looks}",
-                f"--time-unit {looks}",
-            ),
-        )
-        chosen = looks
-    _check_rate(rate, period * SECONDS[chosen], name, chosen)
-    # From the first on, since nanoseconds since 1970 are 0.2 us coarse as floats.
-    first = numbers[0] if numbers.size else 0.0
-    return Clock((numbers - first) * SECONDS[chosen], f"{name} in {chosen}", doubts)
+    return numbers
 
 
 def _even(episode: str, count: int, name: str, own_rate: float | None, rate: float | None) -> Clock:
+    if own_rate is not None and not 0 < own_rate < _HIGHEST_RATE:
+        raise FileFormatError(
+            f"episode {episode}: {name} says {own_rate:g} frames a second; mend it, or leave it out"
+        )
     if rate is None and own_rate is None:
         raise FileFormatError(
             f"episode {episode} holds neither times nor a rate; give the rate in frames a second: "
@@ -138,54 +139,40 @@ def _even(episode: str, count: int, name: str, own_rate: float | None, rate: flo
     return Clock(np.arange(count) / rate, source)
 
 
-def _guess(period: float) -> str:
-    """The first unit in which the frames come as fast as arms are recorded; seconds if none is."""
-    return next((unit for unit in SECONDS if _is_fit(unit, period)), "s")
+def _judge(
+    name: str, period: float, length: float, said: str | None
+) -> tuple[str, tuple[Ambiguity, ...]]:
+    """Unit of the times, and what is ambiguous of it.
+
+    Args:
+        name: Of their column.
+        period: Between two frames, in the unit in question.
+        length: Of the recording, likewise.
+        said: The unit that was given; None where nobody said one.
+    """
+    judged = judge_unit(said or "s", period, period=True)
+    looks = judged.looks or "s"
+    if judged.plausible or period <= 0:
+        return judged.unit, ()
+    if said is not None:
+        # Believed, unless another unit makes it the length of a throw.
+        if judged.looks is None or not _SHORTEST <= length * SECONDS[looks] <= LONGEST:
+            return said, ()
+        what = f"{name} in {said}, as --time-unit says, would be {_rate(period, length, said)}, "
+    else:
+        what = f"{name} in s would be {_rate(period, length, 's')}, "
+    if judged.looks is None:
+        return "s", (Ambiguity(f"{what}and no other unit fits better", "--time-unit s"),)
+    what += f"in {looks} {_rate(period, length, looks)}: it looks like {looks}"
+    if said is None and period == 1:
+        what += " (or it counts frames: --time-unit frame --rate HZ)"
+    return looks, (Ambiguity(what, f"--time-unit {looks}"),)
 
 
-def _is_slip(unit: str, period: float, stamps: Times) -> bool:
-    """Whether no arm is recorded like that, and another unit makes it a throw."""
-    looks = _guess(period)
-    if _is_fit(unit, period) or not _is_fit(looks, period):
-        return False
-    return _SHORTEST <= float(stamps[-1] - stamps[0]) * SECONDS[looks] <= LONGEST
-
-
-def _say_clock(period: float, stamps: Times, unit: str) -> str:
+def _rate(period: float, length: float, unit: str) -> str:
     scale = SECONDS[unit]
-    rate, length = 1 / (period * scale), float(stamps[-1] - stamps[0]) * scale
-    return f"{rate:.4g} Hz and {length:.3g} s long"
-
-
-def _is_fit(unit: str, period: float) -> bool:
-    """Whether arms are recorded so fast."""
-    return period > 0 and _SLOWEST <= 1 / (period * SECONDS[unit]) <= _FASTEST
-
-
-def _doubts(name: str, period: float, stamps: Times, unit: str) -> tuple[Doubt, ...]:
-    if period <= 0 or (unit == "s" and _is_fit("s", period)):
-        return ()
-    as_seconds = f"{name} in s would be {_say_clock(period, stamps, 's')}"
-    if unit == "s":
-        return (Doubt(f"{as_seconds}, and no other unit fits better", "--time-unit s"),)
-    counts = " (or it counts frames: --time-unit frame --rate HZ)" if period == 1 else ""
-    return (
-        Doubt(
-            f"{as_seconds}, in {unit} {_say_clock(period, stamps, unit)}: it looks like "
-            f"{unit}{counts}",
-            f"--time-unit {unit}",
-        ),
-    )
-
-
-def _check_rate(rate: float | None, period: float, name: str, unit: str) -> None:
-    if rate is not None and not (period > 0 and _same(rate, 1 / period)):
-        found = f"{1 / period:.4g} Hz" if period > 0 else "no rate"
-        raise ConfigurationError(
-            f"--rate {rate:g}, but {name} in {unit} says {found}; drop --rate, say the unit with "
-            "--time-unit, or leave the times unread with --time-column none"
-        )
+    return f"{1 / (period * scale):.4g} Hz and {length * scale:.3g} s long"
 
 
 def _same(one: float, two: float) -> bool:
-    return abs(one - two) <= _AGREE * two
+    return abs(one - two) <= _SAME_RATE * two

@@ -8,27 +8,29 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Bool
 
-from prior_reinforce.bench.importing.clock import Clock, Times
-from prior_reinforce.bench.importing.naming import find_channels, vectors
-from prior_reinforce.bench.importing.noise import REST_SPEED
+from prior_reinforce.bench.importing.clock import Clock
+from prior_reinforce.bench.importing.naming import could_be_forgotten, find_channels, vectors
+from prior_reinforce.bench.importing.options import ReadOptions
 from prior_reinforce.bench.importing.recording import (
     NO_COLUMN,
-    Positions,
-    ReadOptions,
+    Episodes,
     Recording,
     files_at,
     natural_order,
+    recorded,
+    unread,
 )
-from prior_reinforce.bench.importing.tables import WORKBOOKS, Dialect, Table, read_tables
+from prior_reinforce.bench.importing.rtde import mixed_rows
+from prior_reinforce.bench.importing.tables import WORKBOOKS, Table, counts, read_tables
 from prior_reinforce.bench.importing.units import (
     CHANNEL_UNITS,
     SECONDS,
-    Doubt,
+    Ambiguity,
     say_names,
     split_unit,
 )
@@ -50,7 +52,7 @@ EPISODE_COLUMNS = tuple(
 
 
 @dataclass(frozen=True)
-class _Log:
+class LogFormat:
     """A log whose columns are documented."""
 
     name: str
@@ -63,53 +65,53 @@ class _Log:
     """Whether a row may have its time from one cycle, and its positions from the next."""
 
 
-_LOGS = (
+LOG_FORMATS = (
     # libfranka, src/log.cpp: logToCSV writes time.toMSec(). First 0.9.2 and later, then of 2017.
-    _Log("libfranka's log", ("time", "success_rate", "state.q[0]"), "state.q", "ms"),
-    _Log("libfranka's log", ("duration", "success rate", "q[0]"), "q", "ms"),
-    # UR's rtde/csv_writer.py and ur_rtde's recorder: seconds since the controller started. The
-    # latter (1.6.5) runs beside the controller, reads the variables of a row one by one, and
-    # writes rows again where no new cycle came; the former writes each once.
-    _Log("an RTDE log", ("timestamp", "actual_q_0"), "actual_q", "s", mixed=True),
+    LogFormat("libfranka's log", ("time", "success_rate", "state.q[0]"), "state.q", "ms"),
+    LogFormat("libfranka's log", ("duration", "success rate", "q[0]"), "q", "ms"),
+    # UR's rtde/csv_writer.py and ur_rtde's recorder: seconds since the controller started.
+    LogFormat("an RTDE log", ("timestamp", "actual_q_0"), "actual_q", "s", mixed=True),
 )
-_CYCLE = 0.002
-"""Of UR's controller, in [s]."""
 
 
-def read(source: Path, options: ReadOptions) -> list[Recording]:
+def read(source: Path, options: ReadOptions) -> Episodes:
     """Read a CSV file, or every CSV file of a folder."""
-    paths = files_at(source, SUFFIXES) or files_at(source, _WHEN_SAID)
-    return [recording for path in paths for recording in _of_file(path, options, len(paths) == 1)]
+    return _of_files(files_at(source, SUFFIXES) or files_at(source, _WHEN_SAID), options)
 
 
-def read_workbooks(source: Path, options: ReadOptions) -> list[Recording]:
+def read_workbooks(source: Path, options: ReadOptions) -> Episodes:
     """Read a workbook, or every workbook of a folder."""
-    paths = files_at(source, WORKBOOKS)
-    return [recording for path in paths for recording in _of_file(path, options, len(paths) == 1)]
+    return _of_files(files_at(source, WORKBOOKS), options)
 
 
-def _of_file(path: Path, options: ReadOptions, alone: bool) -> list[Recording]:
-    tables = read_tables(path, Dialect(options.delimiter, options.decimal))
-    recordings = []
-    for table in tables:
-        if not table.names or len(table) < 2:
-            raise FileFormatError(
-                f"{table.where} has {len(table)} frames; expected a line of column names and two "
-                "frames or more"
-            )
-        column = _episode_column(table, options)
-        if column is None:
-            sheet = table.where.removeprefix(f"{path} [").removesuffix("]")
-            episode = path.stem if len(tables) == 1 else sheet
-            if (alone and len(tables) == 1) or options.wants(episode):
-                recordings.append(_episode(table, episode, options))
+def _of_files(paths: Sequence[Path], options: ReadOptions) -> Episodes:
+    for path in paths:
+        if len(paths) > 1 and path.stem in (options.leave_out or ()):
+            yield path.stem, unread
             continue
-        names = table.texts(column)
-        for episode in sorted(set(names), key=natural_order):
-            if options.wants(episode):
-                own = table.rows([i for i, name in enumerate(names) if name == episode])
-                recordings.append(_episode(own, episode, options, column))
-    return recordings
+        tables = read_tables(path, options.dialect)
+        for table in tables:
+            if not table.names or len(table) < 2:
+                raise FileFormatError(
+                    f"{table.where} has {len(table)} frames; expected a line of column names and "
+                    "two frames or more"
+                )
+            column = _episode_column(table, options)
+            if column is None:
+                sheet = table.where.removeprefix(f"{path} [").removesuffix("]")
+                episode = path.stem if len(tables) == 1 else sheet
+                yield episode, partial(_episode, table, episode, options)
+                continue
+            names = table.texts(column)
+            for episode in sorted(set(names), key=natural_order):
+                own = [i for i, name in enumerate(names) if name == episode]
+                yield episode, partial(_rows, table, own, episode, options, column)
+
+
+def _rows(
+    table: Table, rows: list[int], episode: str, options: ReadOptions, column: int
+) -> Recording:
+    return _episode(table.rows(rows), episode, options, column)
 
 
 def _episode_column(table: Table, options: ReadOptions) -> int | None:
@@ -136,7 +138,7 @@ def _named_column(table: Table, name: str, option: str) -> int:
 def _episode(
     table: Table, episode: str, options: ReadOptions, episode_column: int | None = None
 ) -> Recording:
-    log = next((g for g in _LOGS if set(g.columns) <= set(table.names)), None)
+    log = next((g for g in LOG_FORMATS if set(g.columns) <= set(table.names)), None)
     time, guessed = _time_column(table, options)
     index = 0 if time is None and _no_name_first(table) and _could_be_time(table) else None
     others = [i for i in range(len(table.names)) if i not in (time, episode_column, index)]
@@ -145,7 +147,9 @@ def _episode(
     if log is not None:
         remarks = (f"{log.name}: time in {log.time_unit}, motion is {log.key} (measured)",)
     if log is not None and log.mixed and time is not None:
-        mixed = _mixed(table.numbers(time), np.column_stack([table.numbers(i) for i in channels]))
+        mixed = mixed_rows(
+            table.numbers(time), np.column_stack([table.numbers(i) for i in channels])
+        )
         if np.any(mixed):
             table = table.rows(np.flatnonzero(~mixed).tolist())
             why = "rows left out whose positions are of another cycle than their time"
@@ -158,50 +162,38 @@ def _episode(
         channels = [i for i in channels if i not in texts]
         left_out = say_names([table.names[i] for i in texts])
         remarks = (*remarks, f"{left_out} left out, which holds no number")
-    positions = np.column_stack([table.numbers(i) for i in channels] or [np.zeros((0, 0))])
-    units = tuple(table.units[i] or split_unit(table.names[i], CHANNEL_UNITS)[1] for i in channels)
-    names = tuple(
-        split_unit(table.names[i], CHANNEL_UNITS)[0] or f"column {i + 1}" for i in channels
-    )
+    split = [split_unit(table.names[i], CHANNEL_UNITS) for i in channels]
+    names = tuple(name or f"column {i + 1}" for (name, _), i in zip(split, channels, strict=True))
     if len(set(names)) < len(names):
         names = tuple(table.names[i] for i in channels)
-    return Recording(
+    return recorded(
         episode,
-        clock.times,
-        positions,
+        clock,
+        np.column_stack([table.numbers(i) for i in channels] or [np.zeros((0, 0))]),
         names if named else (),
         remarks=remarks,
-        units=units,
-        clock=clock.source,
-        doubts=(*guessed, *clock.doubts),
+        units=tuple(table.units[i] or u for (_, u), i in zip(split, channels, strict=True)),
+        ambiguities=(*guessed, *clock.ambiguities),
         columns=names if table.named else (),
+        left_out=_unread_motion(table, [i for i in others if i not in channels], len(channels)),
     )
 
 
-def _mixed(stamps: Times, positions: Positions) -> Bool[np.ndarray, " T"]:
-    """Which rows of ur_rtde's recorder have their positions from another cycle than their time.
-
-    Such a row has other positions than the one before at the same time, or a moving arm's that the
-    next row repeats at the time they are of. The latter is told only at the controller's own cycle,
-    in which no arm comes to rest, and where the arm moves by more than one count of the numbers.
-    Where no row is repeated as a whole, another recorder wrote the log, and none is.
-    """
-    again = (np.diff(stamps) == 0) & np.all(np.diff(positions, axis=0) == 0, axis=1)
-    if not np.any(again):
-        return np.zeros(len(stamps), dtype=bool)
-    first = np.flatnonzero(np.concatenate([[True], ~again]))  # of rows that are wholly equal
-    steps, moved = np.diff(stamps[first]), np.diff(positions[first], axis=0)
-    mixed = np.zeros(len(first), dtype=bool)
-    mixed[1:] = steps == 0
-    if np.any(steps > 0) and abs(np.median(steps[steps > 0]) - _CYCLE) < 0.1 * _CYCLE:
-        count = np.abs(moved)[moved != 0].min(initial=np.inf)
-        still = np.maximum(REST_SPEED["rad"] * steps, 1.5 * count)
-        came, repeated = np.abs(moved).max(axis=1) > still, np.all(moved == 0, axis=1)
-        mixed[1:-1] |= came[:-1] & repeated[1:]
-    return np.repeat(mixed, np.diff(np.append(first, len(stamps))))
+def _unread_motion(
+    table: Table, columns: Sequence[int], count: int
+) -> dict[str, tuple[float, float]]:
+    """Range of each column of numbers that moves and is not read, such as a gripper's."""
+    there = [table.names[i] for i in columns]
+    numbers = {i: table.numbers(i) for i in columns if table.is_number(i)}
+    moving = could_be_forgotten(there, count)
+    return {
+        table.names[i]: (float(values.min()), float(values.max()))
+        for i, values in numbers.items()
+        if table.names[i] in moving and not counts(values) and np.ptp(values) > 0
+    }
 
 
-def _time_column(table: Table, options: ReadOptions) -> tuple[int | None, tuple[Doubt, ...]]:
+def _time_column(table: Table, options: ReadOptions) -> tuple[int | None, tuple[Ambiguity, ...]]:
     """The column of times, None where there is none, and what is only guessed of it."""
     if options.time_column == NO_COLUMN:
         return None, ()
@@ -218,7 +210,7 @@ def _time_column(table: Table, options: ReadOptions) -> tuple[int | None, tuple[
             return None, ()
     if len(table.names) > 1 and _could_be_time(table):
         what = f"{table.where} names no column of times, and column 1 looks like the time"
-        return 0, (Doubt(what, "--time-column 1"),)
+        return 0, (Ambiguity(what, "--time-column 1"),)
     return None, ()
 
 
@@ -250,7 +242,7 @@ def _clock(
 
 
 def _channels(
-    table: Table, others: Sequence[int], options: ReadOptions, log: _Log | None
+    table: Table, others: Sequence[int], options: ReadOptions, log: LogFormat | None
 ) -> tuple[list[int], bool]:
     """Columns of the motion, and whether their names are those of joints.
 

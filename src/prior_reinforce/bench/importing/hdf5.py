@@ -7,20 +7,24 @@ attribute `env_args` of `data` where robosuite made it. DROID: one `trajectory.h
 from __future__ import annotations
 
 import json
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from prior_reinforce.bench.importing.bounds import check_numbers
+from prior_reinforce.bench.importing.clock import Stamps
+from prior_reinforce.bench.importing.options import ReadOptions
 from prior_reinforce.bench.importing.recording import (
+    Episodes,
     Positions,
-    ReadOptions,
     Recording,
-    check_size,
     files_at,
     has_files,
     named_damage,
     natural_order,
+    recorded,
 )
 from prior_reinforce.errors import FileFormatError
 
@@ -47,7 +51,7 @@ def is_robomimic(source: Path) -> bool:
     return has_files(source, _SUFFIXES) and not is_droid(source)
 
 
-def read_robomimic(source: Path, options: ReadOptions) -> list[Recording]:
+def read_robomimic(source: Path, options: ReadOptions) -> Episodes:
     """Read every `data/demo_k` of a robomimic file."""
     import h5py
 
@@ -56,8 +60,7 @@ def read_robomimic(source: Path, options: ReadOptions) -> list[Recording]:
         raise FileFormatError(
             f"{source} holds {len(paths)} HDF5 files, expected one; give the path of the file"
         )
-    (path,), key = paths, options.key or _ROBOMIMIC_KEY
-    recordings = []
+    (path,) = paths
     with named_damage(path, "robomimic HDF5"), h5py.File(path, "r") as file:
         if "data" not in file:
             raise FileFormatError(
@@ -66,44 +69,46 @@ def read_robomimic(source: Path, options: ReadOptions) -> list[Recording]:
             )
         data = _own(path, file, "data")
         rate = _control_rate(data)
-        for episode in filter(options.wants, sorted(data, key=natural_order)):
-            group = _own(path, data, episode)
-            positions = _array(path, group, key, f"data/{episode}")
-            declared = group.attrs.get("num_samples")
-            if declared is not None and int(declared) != len(positions):
-                raise FileFormatError(
-                    f"{path}: {episode} declares {int(declared)} samples but {key} holds "
-                    f"{len(positions)}; copy the file again, or leave that episode out"
-                )
-            clock = options.clock(episode, len(positions), name="control_freq", own_rate=rate)
-            recordings.append(Recording(episode, clock.times, positions, clock=clock.source))
-    return recordings
+        for episode in sorted(data, key=natural_order):
+            yield episode, partial(_demo, path, data, episode, rate, options)
 
 
-def read_droid(source: Path, options: ReadOptions) -> list[Recording]:
+def _demo(
+    path: Path, data: Any, episode: str, rate: float | None, options: ReadOptions
+) -> Recording:
+    key = options.key or _ROBOMIMIC_KEY
+    with named_damage(path, "robomimic HDF5"):
+        group = _own(path, data, episode)
+        positions = _array(path, group, key, f"data/{episode}")
+        declared = group.attrs.get("num_samples")
+    if declared is not None and int(declared) != len(positions):
+        raise FileFormatError(
+            f"{path}: {episode} declares {int(declared)} samples but {key} holds "
+            f"{len(positions)}; copy the file again, or leave that episode out"
+        )
+    clock = options.clock(episode, len(positions), name="control_freq", own_rate=rate)
+    return recorded(episode, clock, positions)
+
+
+def read_droid(source: Path, options: ReadOptions) -> Episodes:
     """Read a `trajectory.h5`, or every one below a folder; an episode is named by its folder."""
-    import h5py
-
     paths = [source]
     if source.is_dir():
         paths = sorted(source.rglob(_TRAJECTORY), key=natural_order)
-    recordings = []
     for path in paths:
         episode = path.parent.name if path.name == _TRAJECTORY else path.stem
-        if not options.wants(episode):
-            continue
-        with named_damage(path, "DROID HDF5"), h5py.File(path, "r") as file:
-            positions = _array(path, file, options.key or _DROID_KEY, "the file")
-            stamps = next((name for name in _DROID_TIMES_MS if name in file), None)
-            clock = options.clock(
-                episode,
-                len(positions),
-                stamps=None if stamps is None else np.asarray(_own(path, file, stamps)[()]),
-                name=stamps or "",
-                unit="ms",
-            )
-            recordings.append(Recording(episode, clock.times, positions, clock=clock.source))
-    return recordings
+        yield episode, partial(_trajectory, path, episode, options)
+
+
+def _trajectory(path: Path, episode: str, options: ReadOptions) -> Recording:
+    import h5py
+
+    with named_damage(path, "DROID HDF5"), h5py.File(path, "r") as file:
+        positions = _array(path, file, options.key or _DROID_KEY, "the file")
+        name = next((name for name in _DROID_TIMES_MS if name in file), None)
+        stamps = None if name is None else _numbers(path, name, _own(path, file, name))
+        clock = options.clock(episode, len(positions), stamps=stamps, name=name or "", unit="ms")
+        return recorded(episode, clock, positions)
 
 
 def _array(path: Path, group: Any, key: str, where: str) -> Positions:
@@ -124,8 +129,15 @@ def _array(path: Path, group: Any, key: str, where: str) -> Positions:
         )
     if found.dtype.kind not in "fiu":
         raise FileFormatError(f"{path}: {key} holds {found.dtype}, expected numbers")
-    check_size(path, key, found.shape)
-    return np.asarray(found[()], dtype=np.float64)
+    return np.asarray(_numbers(path, key, found), dtype=np.float64)
+
+
+def _numbers(path: Path, name: str, found: Any) -> Stamps:
+    """The numbers of an array, unless its header claims more than a recording has."""
+    check_numbers(path, name, found.shape, found.dtype.itemsize)
+    if found.chunks is not None:
+        check_numbers(path, f"a chunk of {name}", found.chunks, found.dtype.itemsize)
+    return np.asarray(found[()])
 
 
 def _own(path: Path, group: Any, key: str, depth: int = 8) -> Any:

@@ -6,44 +6,27 @@ A format is a file beside this one and a line of `FORMATS`.
 from __future__ import annotations
 
 import importlib
-import math
 import os
 import warnings
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from typing_extensions import Unpack
 
 from prior_reinforce.bench.importing import csv, hdf5, lerobot, npz, ros, zarr
-from prior_reinforce.bench.importing.clock import TIME_UNITS
-from prior_reinforce.bench.importing.inspection import (
-    Inspection,
-    hold_against,
-    say_shaking,
-    would_smoothing_help,
-)
-from prior_reinforce.bench.importing.outcomes import (
-    find_outcomes,
-    in_order,
-    in_units,
-    outcomes_of,
-    uncertainty_of,
-)
-from prior_reinforce.bench.importing.preprocessing import (
-    Preprocessed,
-    Preprocessing,
-    Selection,
-    preprocess,
-    refuse_copies,
-    select,
-)
+from prior_reinforce.bench.importing.bounds import check_numbers
+from prior_reinforce.bench.importing.inspection import Inspection, inspect
+from prior_reinforce.bench.importing.options import ReadOptions
+from prior_reinforce.bench.importing.outcomes import Outcomes, find_outcomes, in_units, outcomes_of
+from prior_reinforce.bench.importing.preprocessing import Preprocessing, copies
 from prior_reinforce.bench.importing.preview import Preview
-from prior_reinforce.bench.importing.recording import HowToRead, ReadOptions, Recording, has_files
-from prior_reinforce.bench.importing.tables import DELIMITERS, WORKBOOKS
-from prior_reinforce.bench.importing.units import Doubt, refuse_doubts
+from prior_reinforce.bench.importing.recording import Episodes, Recording, has_files
+from prior_reinforce.bench.importing.selection import Selection, select
+from prior_reinforce.bench.importing.tables import WORKBOOKS
+from prior_reinforce.bench.importing.units import Ambiguity, raise_if_ambiguous
 from prior_reinforce.bench.robots import GateSettings, RobotLimits
 from prior_reinforce.errors import (
     ConfigurationError,
@@ -58,7 +41,7 @@ from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 class Format:
     """How recordings of one format are recognised and read."""
 
-    read: Callable[[Path, ReadOptions], list[Recording]]
+    read: Callable[[Path, ReadOptions], Episodes]
     recognises: Callable[[Path], bool]
     """From names and layout alone; nothing large is opened."""
     library: str = ""
@@ -66,7 +49,7 @@ class Format:
     extra: str = ""
     """Extra of this package that installs it."""
     options: frozenset[str] = frozenset({"key"})
-    """Fields of `HowToRead` that say something of this format, beside those of every format."""
+    """Fields of `ReadOptions` that say something of this format, beside those of every format."""
     whole: bool = False
     """A folder laid out like this is this format, whatever else lies in it."""
 
@@ -124,13 +107,12 @@ def import_demonstrations(
     outcome_units: Sequence[str] | None = None,
     outcome_unit: str | None = None,
     names: Sequence[str] | None = None,
-    units: Sequence[str] | None = None,
     plan_units: Sequence[str] | None = None,
     preprocessing: Preprocessing | None = None,
     robot: RobotLimits | None = None,
     gate: GateSettings | None = None,
     take_guesses: bool = False,
-    **how: Unpack[HowToRead],
+    **options: Any,
 ) -> ImportResult:
     """Read, join with the outcomes, select joints, trim, resample, and preview.
 
@@ -144,85 +126,64 @@ def import_demonstrations(
         outcome_unit: Unit in which a table holds those whose columns name none (`x_cm` does); None
             is the component's own, and an error where nothing could land there.
         names: What to call the joints in the plan format; None keeps the recorded names.
-        units: Recorded unit of each kept joint, or one for all: `rad`, `deg`, `m`, `cm`, `mm`, or
-            any other word. None takes what the recording says, and the plan's unit where it says
-            nothing; where no arm could be in that unit, that is an error.
         plan_units: Unit of each joint in the plan; None is radians for angles, metres for lengths.
         preprocessing: Time step, horizon and trimming; None takes the defaults.
         robot: Limits that the preview holds every demonstration against; None checks none.
         gate: The gate's settings for that.
         take_guesses: Take units, times and names as they look, where that would be an error.
-        how: As in `read_recordings`.
+        options: As in `read_recordings`.
 
     Raises:
         FileFormatError: As in `read_recordings`, or a damaged `outcomes.csv`.
         InvalidDemonstrationsError: Missing outcomes or joints (named), or demonstrations that
             cannot be learned from.
-        UnclearUnitsError: Units, times or names that nobody said, or that cannot be what somebody
-            said; the message has the options that say what they look like.
+        UnclearUnitsError: Units, times or names that are missing, or cannot be what was said; the
+            message has the options that settle them.
         ConfigurationError: Settings that contradict each other.
         MissingExtraError: The format's optional library is not installed.
     """
-    source = Path(source)
-    recordings, kind = _read(source, how)
-    kept = select(recordings, how.get("joints"), names, units, plan_units)
-    doubts = [] if take_guesses else [*_doubts_of(recordings), *kept.doubts]
+    recordings = read(source, ReadOptions(**options))
+    selection = recordings.select(names, plan_units)
+    ambiguities = recordings.ambiguities + selection.ambiguities
     try:
-        known = in_order(
-            find_outcomes(_places(source, kind), recordings, outcomes, outcome_names), outcome_names
-        )
+        known = recordings.outcomes(outcomes, outcome_names)
     except InvalidDemonstrationsError as missing:
-        refuse_doubts(doubts, also=str(missing))
+        raise_if_ambiguous(() if take_guesses else ambiguities, also=str(missing))
         raise
     if not isinstance(outcomes, Mapping):
-        known, guessed = in_units(known, outcome_units, outcome_unit)
-        doubts += [] if take_guesses else guessed
-    refuse_doubts(doubts)
-    partial = how.get("episodes") is not None or how.get("leave_out") is not None
-    outcomes_seen = outcomes_of(recordings, known, partial=partial)
-    settings = preprocessing or Preprocessing()
-    done = preprocess(kept.recordings, kept.units, settings)
-    refuse_copies(done.plans, [recording.episode for recording in recordings])
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # the preview's remarks say it, with the option to give
-        demonstrations = Demonstrations(
-            done.plans,
-            outcomes_seen,
-            PlanFormat(kept.names, kept.units, done.dt),
-            tuple(outcome_names) if outcome_names is not None else known.names,
-            tuple(outcome_units or [unit or "m" for unit in known.units]),
-            uncertainty_of(recordings, known),
-        )
-    found = _inspection(kept, done, settings, robot, gate)
-    preview = Preview(f"{source.name} ({kind})", found, demonstrations, known.where)
-    return ImportResult(demonstrations, preview.episodes, preview)
+        known, unclear = in_units(known, outcome_units, outcome_unit)
+        ambiguities += unclear
+    raise_if_ambiguous(() if take_guesses else ambiguities)
+    partial = not {"episodes", "leave_out"}.isdisjoint(recordings.options.given)
+    outcomes_of(selection.episodes, known, partial=partial)  # before the work of the next line
+    inspection = inspect(selection, preprocessing, robot, gate)
+    names = outcome_names if outcome_names is not None or not known.named else known.names
+    units = outcome_units or [unit or "m" for unit in known.units]
+    return recordings.demonstrations(inspection, known, names, units, partial=partial)
 
 
 def inspect_recordings(
     source: str | os.PathLike[str],
     *,
     names: Sequence[str] | None = None,
-    units: Sequence[str] | None = None,
     plan_units: Sequence[str] | None = None,
     preprocessing: Preprocessing | None = None,
     robot: RobotLimits | None = None,
     gate: GateSettings | None = None,
-    **how: Unpack[HowToRead],
+    **options: Any,
 ) -> Inspection:
     """Say what recordings hold and what an import would make of them; nothing is needed but them.
 
-    What nobody said of units, times and names, and what was said and cannot be, is taken as it
-    looks, and named as a guess.
+    Missing or implausible units, times and names are inferred, and named as ambiguous.
 
     Args:
         source: As in `read_recordings`.
         names: As in `import_demonstrations`, and so are the next four.
-        units: See there.
         plan_units: See there.
         preprocessing: See there.
         robot: See there.
         gate: See there.
-        how: As in `read_recordings`.
+        options: As in `read_recordings`.
 
     Raises:
         FileFormatError: As in `read_recordings`.
@@ -230,26 +191,171 @@ def inspect_recordings(
         ConfigurationError: Settings that contradict each other.
         MissingExtraError: The format's optional library is not installed.
     """
-    recordings, _ = _read(Path(source), how)
-    kept = select(recordings, how.get("joints"), names, units, plan_units)
-    settings = preprocessing or Preprocessing()
-    done = preprocess(kept.recordings, kept.units, settings)
-    found = _inspection(kept, done, settings, robot, gate)
-    return replace(found, doubts=(*_doubts_of(recordings), *kept.doubts))
+    recordings = read(source, ReadOptions(**options))
+    selection = recordings.select(names, plan_units)
+    found = inspect(selection, preprocessing, robot, gate)
+    return replace(found, ambiguities=recordings.ambiguities + selection.ambiguities)
 
 
-def _inspection(
-    kept: Selection,
-    done: Preprocessed,
-    settings: Preprocessing,
-    robot: RobotLimits | None,
-    gate: GateSettings | None,
-) -> Inspection:
-    reports = hold_against(kept, done, robot, gate)
-    name = None if robot is None else robot.robot
-    shaking = say_shaking(kept, done, robot) if reports else ""
-    helps = bool(shaking) and would_smoothing_help(kept, reports, settings, robot, gate)
-    return Inspection(kept, done, name, reports, shaking, helps)
+def read_recordings(
+    source: str | os.PathLike[str], *, take_guesses: bool = False, **options: Any
+) -> list[Recording]:
+    """Read every episode as it was recorded, for instance to ask for each one's outcome.
+
+    Args:
+        source: A file, or the folder that holds the recording.
+        take_guesses: Take times as they look, where that would be an error.
+        options: Fields of `ReadOptions`.
+
+    Raises:
+        ConfigurationError: An unknown format, an option that the format has no use for, or one
+            that contradicts the recording.
+        UnclearUnitsError: The unit of the times is not said, and they cannot be seconds.
+        FileFormatError: Missing, truncated, too large, of another format, or ambiguous without
+            `key`.
+        InvalidDemonstrationsError: An episode that cannot be used, or one asked for that is not
+            there.
+        MissingExtraError: The format's optional library is not installed.
+    """
+    recordings = read(source, ReadOptions(**options))
+    raise_if_ambiguous(() if take_guesses else recordings.ambiguities)
+    return list(recordings.episodes)
+
+
+@dataclass(frozen=True, eq=False)
+class Recordings:
+    """The episodes of a source, read once: to be inspected, and turned into demonstrations."""
+
+    source: Path
+    format: str
+    """A name of `FORMATS`."""
+    options: ReadOptions
+    episodes: tuple[Recording, ...]
+    """Those that were asked for, in order."""
+
+    @property
+    def ambiguities(self) -> tuple[Ambiguity, ...]:
+        """What is only guessed of the times: the first episode's, for all with the same remedy."""
+        by_option = {one.option: one for r in reversed(self.episodes) for one in r.ambiguities}
+        return tuple(by_option.values())
+
+    @property
+    def outcome_places(self) -> list[Path]:
+        """Where a table of outcomes stands beside them: the first is where to write one.
+
+        A folder of recordings holds its own. A file, and a data set that is a folder, has it
+        beside.
+        """
+        if self.source.is_file():
+            return [self.source.parent]
+        alone = FORMATS[self.format].whole or (self.source / "metadata.yaml").is_file()
+        return [self.source.parent, self.source] if alone else [self.source]
+
+    def select(
+        self, names: Sequence[str] | None = None, plan_units: Sequence[str] | None = None
+    ) -> Selection:
+        """Return the channels of the plan, as in `selection.select`."""
+        options = self.options
+        return select(self.episodes, options.joints, names, options.units, plan_units)
+
+    def outcomes(
+        self,
+        given: str | os.PathLike[str] | Mapping[str, Sequence[float]] | None = None,
+        names: Sequence[str] | None = None,
+    ) -> Outcomes:
+        """Return the outcomes that are known, as in `find_outcomes`."""
+        return find_outcomes(self.outcome_places, self.episodes, given, names)
+
+    def demonstrations(
+        self,
+        inspection: Inspection,
+        outcomes: Outcomes,
+        names: Sequence[str] | None,
+        units: Sequence[str],
+        *,
+        partial: bool,
+    ) -> ImportResult:
+        """Join plans with outcomes.
+
+        Args:
+            inspection: What becomes of these recordings, or of some of them.
+            outcomes: In the wanted units.
+            names: Of their components; None calls them as `Demonstrations` does.
+            units: Of their components.
+            partial: Only some episodes were asked for, so outcomes of others are no mistake.
+
+        Raises:
+            InvalidDemonstrationsError: As in `outcomes_of`, or a motion that comes twice.
+        """
+        selection, processed = inspection.selection, inspection.processed
+        seen, sd = outcomes_of(selection.episodes, outcomes, partial=partial)
+        _refuse(inspection.copies)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # the preview's remarks say it, with the option to give
+            demonstrations = Demonstrations(
+                processed.plans,
+                seen,
+                PlanFormat(selection.names, selection.units, processed.dt),
+                tuple(names or ()),
+                tuple(units),
+                sd,
+            )
+        title = f"{self.source.name} ({self.format})"
+        preview = Preview(title, inspection, demonstrations, outcomes.where)
+        return ImportResult(demonstrations, preview.episodes, preview)
+
+
+def read(source: str | os.PathLike[str], options: ReadOptions | None = None) -> Recordings:
+    """Read a source's episodes, once; those that are left out are not read.
+
+    Times that are ambiguous are taken as they look.
+
+    Args:
+        source: A file, or the folder that holds the recording.
+        options: How.
+
+    Raises:
+        As `read_recordings` does, but for UnclearUnitsError.
+    """
+    source, options = Path(source), options or ReadOptions()
+    kind = options.format or detect_format(source)
+    if kind not in FORMATS:
+        raise ConfigurationError(f"unknown format {kind!r}; give one of {', '.join(FORMATS)}")
+    if not source.exists():
+        raise FileFormatError(f"no recording at {source}; give the path of a file or a folder")
+    for name in sorted(_OPTIONAL & options.given.keys() - FORMATS[kind].options):
+        option = name.replace("_", "-")
+        raise ConfigurationError(f"--{option} {options.given[name]} has no use for {kind}; drop it")
+    _need(FORMATS[kind])
+    there: list[str] = []
+    read_ones: dict[str, Recording] = {}
+    numbers = 0
+    for name, episode in FORMATS[kind].read(source, options):
+        there.append(name)
+        if not options.leaves_out(name):
+            read_ones[name] = episode()
+            numbers += read_ones[name].positions.size
+            check_numbers(source, "all of it", (numbers,))
+    twice = sorted(name for name, n in Counter(there).items() if n > 1)
+    if twice:
+        raise InvalidDemonstrationsError(
+            f"{source} holds more than one episode named {', '.join(twice)}; rename their files"
+        )
+    if not there:
+        raise FileFormatError(f"{source} holds no episode of format {kind}; say its format")
+    wanted = there if options.episodes is None else options.episodes
+    missing = [e for e in (*wanted, *(options.leave_out or ())) if e not in there]
+    if missing or not read_ones:
+        what = f"no episode {', '.join(missing)}" if missing else "no episode is left"
+        names = ", ".join(there)
+        raise InvalidDemonstrationsError(f"{what} in {source}; it has {names}: name those")
+    chosen = tuple(read_ones[name] for name in wanted if name in read_ones)
+    return Recordings(source, kind, options, chosen)
+
+
+def _refuse(copies: str) -> None:
+    if copies:
+        raise InvalidDemonstrationsError(copies)
 
 
 def appended(before: Demonstrations, more: Demonstrations) -> Demonstrations:
@@ -274,7 +380,7 @@ def appended(before: Demonstrations, more: Demonstrations) -> Demonstrations:
         for d in (before, more)
     ]
     said = [f"demonstration {i} so far" for i in range(before.n)]
-    refuse_copies(np.concatenate(plans), [*said, *(f"new one {i}" for i in range(more.n))])
+    _refuse(copies(np.concatenate(plans), [*said, *(f"new one {i}" for i in range(more.n))]))
     return replace(
         more,
         plans=np.concatenate(plans),
@@ -282,119 +388,6 @@ def appended(before: Demonstrations, more: Demonstrations) -> Demonstrations:
         outcome_noise=np.concatenate([before.outcome_noise, more.outcome_noise]),
         outcome_correction=np.concatenate([before.outcome_correction, more.outcome_correction]),
     )
-
-
-def outcome_places(source: str | os.PathLike[str], format: str | None = None) -> list[Path]:
-    """Return where a table of outcomes stands beside recordings: the first is where to write one.
-
-    A folder of recordings holds its own. A file, and a data set that is a folder, has it beside.
-    """
-    source = Path(source)
-    return _places(source, format or detect_format(source))
-
-
-def _places(source: Path, kind: str) -> list[Path]:
-    if source.is_file():
-        return [source.parent]
-    is_bag = (source / "metadata.yaml").is_file()
-    return [source.parent, source] if FORMATS[kind].whole or is_bag else [source]
-
-
-def read_recordings(
-    source: str | os.PathLike[str], *, take_guesses: bool = False, **how: Unpack[HowToRead]
-) -> list[Recording]:
-    """Read every episode as it was recorded, for instance to ask for each one's outcome.
-
-    Args:
-        source: A file, or the folder that holds the recording.
-        take_guesses: Take times as they look, where that would be an error.
-        how: What is said of the recordings; each as in `HowToRead`.
-
-    Raises:
-        ConfigurationError: An unknown format, an option that the format has no use for, or one
-            that contradicts the recording.
-        UnclearUnitsError: The unit of the times is not said, and they cannot be seconds.
-        FileFormatError: Missing, truncated, of another format, or ambiguous without `key`.
-        InvalidDemonstrationsError: An episode that cannot be used, or one asked for that is not
-            there.
-        MissingExtraError: The format's optional library is not installed.
-    """
-    recordings, _ = _read(Path(source), how)
-    if not take_guesses:
-        refuse_doubts(_doubts_of(recordings))
-    return recordings
-
-
-def _read(source: Path, how: HowToRead) -> tuple[list[Recording], str]:
-    """The recordings, their times perhaps guessed, and their format."""
-    kind = how.get("format") or detect_format(source)
-    if kind not in FORMATS:
-        raise ConfigurationError(f"unknown format {kind!r}; give one of {', '.join(FORMATS)}")
-    if not source.exists():
-        raise FileFormatError(f"no recording at {source}; give the path of a file or a folder")
-    rate, unit = how.get("rate"), how.get("time_unit")
-    if rate is not None and not (math.isfinite(rate) and rate > 0):
-        raise ConfigurationError(f"rate must be a positive number of frames a second, got {rate}")
-    if unit is not None and unit not in TIME_UNITS:
-        raise ConfigurationError(f"time-unit must be one of {', '.join(TIME_UNITS)}, got {unit!r}")
-    said = {name: value for name, value in how.items() if value is not None}
-    for name in sorted(_OPTIONAL & said.keys() - FORMATS[kind].options):
-        option = name.replace("_", "-")
-        raise ConfigurationError(f"--{option} {said[name]} has no use for {kind}; drop it")
-    _need(FORMATS[kind])
-    joints, wanted = how.get("joints"), how.get("episodes")
-    options = ReadOptions(
-        how.get("key"),
-        rate,
-        unit,
-        how.get("time_column"),
-        how.get("episode_column"),
-        _delimiter(how.get("delimiter")),
-        how.get("decimal"),
-        None if wanted is None else tuple(map(str, wanted)),
-        None if joints is None else tuple(joints),
-    )
-    return _chosen(source, kind, options, tuple(map(str, how.get("leave_out") or ()))), kind
-
-
-def _delimiter(given: str | None) -> str | None:
-    delimiter = given if given is None else DELIMITERS.get(given, given)
-    if delimiter is not None and delimiter not in DELIMITERS.values() and len(delimiter) != 1:
-        raise ConfigurationError(
-            f"delimiter must be one of {', '.join(DELIMITERS)}, or one character, got {given!r}"
-        )
-    return delimiter
-
-
-def _chosen(
-    source: Path, kind: str, options: ReadOptions, leave_out: tuple[str, ...]
-) -> list[Recording]:
-    """The episodes that were asked for, in order."""
-    read, wanted = FORMATS[kind].read, options.episodes
-    found = read(source, options)
-    by_name = {recording.episode: recording for recording in found}
-    twice = sorted(name for name, n in Counter(r.episode for r in found).items() if n > 1)
-    if twice:
-        raise InvalidDemonstrationsError(
-            f"{source} holds more than one episode named {', '.join(twice)}; rename their files"
-        )
-    if wanted is None and not found:
-        raise FileFormatError(f"{source} holds no episode of format {kind}; say its format")
-    there = tuple(by_name) if wanted is None else wanted
-    missing = [e for e in (*there, *leave_out) if e not in by_name]
-    kept = [episode for episode in there if episode not in leave_out]
-    if missing or not kept:
-        every = found if wanted is None else read(source, replace(options, episodes=None))
-        names = ", ".join(recording.episode for recording in every) or "none"
-        what = f"no episode {', '.join(missing)}" if missing else "no episode is left"
-        raise InvalidDemonstrationsError(f"{what} in {source}; it has {names}: name those")
-    return [by_name[episode] for episode in kept]
-
-
-def _doubts_of(recordings: Sequence[Recording]) -> list[Doubt]:
-    """One of each kind: the first episode's stands for all with the same remedy."""
-    by_option = {d.option: d for r in reversed(recordings) for d in r.doubts}
-    return list(by_option.values())
 
 
 def detect_format(source: Path) -> str:

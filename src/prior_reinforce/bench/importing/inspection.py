@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -11,11 +12,12 @@ from prior_reinforce.bench.importing.noise import acceleration_of
 from prior_reinforce.bench.importing.preprocessing import (
     Preprocessed,
     Preprocessing,
-    Selection,
+    copies,
     preprocess,
 )
 from prior_reinforce.bench.importing.recording import Recording
-from prior_reinforce.bench.importing.units import Doubt, say_names
+from prior_reinforce.bench.importing.selection import Selection
+from prior_reinforce.bench.importing.units import Ambiguity, say_names
 from prior_reinforce.bench.robots import GateSettings, RobotLimits, check_plan
 from prior_reinforce.bench.robots.limits import match_joints
 from prior_reinforce.bench.robots.report import LimitReport
@@ -35,31 +37,43 @@ _MUCH_NOISE = 0.25
 class Inspection:
     """What was found in recordings, and what an import would make of them."""
 
-    kept: Selection
+    selection: Selection
     """N recordings with the plan's channels, in the plan's units."""
-    done: Preprocessed
+    processed: Preprocessed
     """What becomes of them."""
-    robot: str | None = None
-    """Whose limits the demonstrations were held against."""
+    settings: Preprocessing
+    """How."""
+    limits: RobotLimits | None = None
+    """What the demonstrations were held against."""
+    gate: GateSettings | None = None
+    """The gate's settings for that."""
     reports: tuple[LimitReport, ...] = ()
     """What the gate says of each; empty where no robot is named."""
-    shaking: str = ""
-    """What noise alone makes of limits, where that is much; empty where it is little."""
-    smoothing_helps: bool = False
-    """Whether all demonstrations break a limit, and smoothing brings one or more within them."""
-    doubts: tuple[Doubt, ...] = ()
+    ambiguities: tuple[Ambiguity, ...] = ()
     """Units, times and names of channels that are only guessed."""
+
+    @property
+    def robot(self) -> str | None:
+        """Whose limits the demonstrations were held against."""
+        return None if self.limits is None else self.limits.robot
+
+    @cached_property
+    def copies(self) -> str:
+        """Which two motions are one; empty where none are."""
+        return copies(self.processed.plans, self.selection.episodes)
 
     @property
     def recordings(self) -> tuple[Recording, ...]:
         """The N recordings."""
-        return self.kept.recordings
+        return self.selection.recordings
 
     @property
     def remarks(self) -> tuple[str, ...]:
         """What a person should know, the most important first: limits, ends, gaps, ..."""
-        shaking = (self.shaking,) if self.shaking else ()
-        return (*self.kept.remarks, *self._broken(), *shaking, *self.done.remarks)
+        left_out = self.selection.left_out
+        first = (self.copies, *self.selection.remarks, *self._broken(), self._noise_warning())
+        last = f"left out although it moves: {left_out} (take it with --joints)" if left_out else ""
+        return tuple(filter(None, (*first, last, *self.processed.remarks)))
 
     @property
     def remedy(self) -> str:
@@ -68,8 +82,8 @@ class Inspection:
             return ""
         broken = {line.check for r in self.reports for line in r.lines if line.status == "refuse"}
         if "position" in broken:
-            return self.kept.other_unit
-        return _SMOOTH if self.smoothing_helps else ""
+            return self.selection.other_unit
+        return _SMOOTH if self._smoothing_helps else ""
 
     @property
     def rows(self) -> dict[str, str]:
@@ -86,15 +100,15 @@ class Inspection:
 
     @property
     def text(self) -> str:
-        """Everything: the rows, a table of episodes and one of channels, doubts and remarks."""
-        doubts = [f"  - {doubt.what} ({doubt.option})" for doubt in self.doubts]
-        head = ["", "what is only guessed:", *doubts] if doubts else []
+        """Everything: rows, remarks, ambiguities, a table of episodes and one of channels."""
+        guesses = [f"  - {one.what} ({one.option})" for one in self.ambiguities]
+        head = ["", "what is only guessed:", *guesses] if guesses else []
         parts = [in_rows(self.rows, self.remarks), *head, "", *self._episodes(), ""]
         return "\n".join([*parts, *self._channels()])
 
     def _episodes(self) -> list[str]:
         rows = [["episode", "frames", "Hz", "length s", "cut before s", "cut after s"]]
-        spans = zip(self.done.starts, self.done.ends, strict=True)
+        spans = zip(self.processed.starts, self.processed.ends, strict=True)
         for recording, (start, end) in zip(self.recordings, spans, strict=True):
             numbers = (recording.duration, start, recording.duration - end)
             rate = f"{1 / recording.period:.4g}"
@@ -104,24 +118,26 @@ class Inspection:
 
     def _channels(self) -> list[str]:
         rows = [["channel", "recorded as", "unit", "least", "most", "noise", ""]]
-        kept = self.kept
+        selection = self.selection
         every = np.concatenate([r.positions for r in self.recordings])
-        for i, name in enumerate(kept.names):
+        for i, name in enumerate(selection.names):
             ranges = (f"{every[:, i].min():.4g}", f"{every[:, i].max():.4g}")
-            noise = say_small(float(self.done.noise[i]), kept.units[i])
-            held = "held" if i in self.done.held_channels else ""
+            noise = say_small(float(self.processed.noise[i]), selection.units[i])
+            held = "held" if i in self.processed.held_channels else ""
             recorded = self.recordings[0].columns[i]
-            unit = kept.units[i]
-            if kept.recorded_units[i] != unit:
-                unit = f"{unit}, from {kept.recorded_units[i]}"
+            unit = selection.units[i]
+            if selection.recorded_units[i] != unit:
+                unit = f"{unit}, from {selection.recorded_units[i]}"
             rows.append([name, recorded, unit, *ranges, noise, held])
         return _columns(rows)
 
     def _units(self) -> str:
         """Channels by their units."""
         groups: dict[str, list[str]] = {}
-        kept = self.kept
-        for name, unit, recorded in zip(kept.names, kept.units, kept.recorded_units, strict=True):
+        selection = self.selection
+        for name, unit, recorded in zip(
+            selection.names, selection.units, selection.recorded_units, strict=True
+        ):
             said = unit if unit == recorded else f"{unit}, recorded in {recorded}"
             groups.setdefault(said, []).append(name)
         return "; ".join(f"{say_names(names)} [{unit}]" for unit, names in groups.items())
@@ -152,14 +168,16 @@ class Inspection:
 
     def _rate(self) -> str:
         recorded = _span((1 / recording.period for recording in self.recordings), ".4g")
-        dt = self.done.dt
+        dt = self.processed.dt
         clocks = " and ".join(dict.fromkeys(r.clock for r in self.recordings if r.clock))
         by = f" ({clocks})" if clocks else ""
         return f"recorded at {recorded} Hz{by}, plans at {1 / dt:.4g} Hz (dt {dt:.4g} s)"
 
     def _trimming(self) -> str:
-        before = self.done.starts
-        after = [r.duration - end for r, end in zip(self.recordings, self.done.ends, strict=True)]
+        before = self.processed.starts
+        after = [
+            r.duration - end for r, end in zip(self.recordings, self.processed.ends, strict=True)
+        ]
         if max(*before, *after) <= 0:
             return "nothing dropped"
         return (
@@ -167,7 +185,7 @@ class Inspection:
         )
 
     def _length(self) -> str:
-        done, horizon = self.done, self.done.plans.shape[1]
+        done, horizon = self.processed, self.processed.plans.shape[1]
         lengths = [end - start for start, end in zip(done.starts, done.ends, strict=True)]
         held = f"; {done.held} hold their last pose" if done.held else ""
         return (
@@ -176,7 +194,7 @@ class Inspection:
         )
 
     def _noise(self) -> str:
-        names, units, done = self.kept.names, self.kept.units, self.done
+        names, units, done = self.selection.names, self.selection.units, self.processed
         noisiest = int(np.argmax(done.noise))
         held = say_names([names[i] for i in done.held_channels]) or "no channel"
         most = say_small(done.noise[noisiest], units[noisiest])
@@ -196,10 +214,10 @@ class Inspection:
         )
 
     def _motion(self) -> str:
-        names, units, plans = self.kept.names, self.kept.units, self.done.plans
+        names, units, plans = self.selection.names, self.selection.units, self.processed.plans
         ranges = np.ptp(plans, axis=(0, 1))
         most = int(np.argmax(ranges))
-        speeds = np.abs(np.diff(plans, axis=1)).max(axis=1) / self.done.dt
+        speeds = np.abs(np.diff(plans, axis=1)).max(axis=1) / self.processed.dt
         episode, joint = np.unravel_index(int(np.argmax(speeds)), speeds.shape)
         where = f"{names[joint]} of {self.recordings[episode].episode}"
         return (
@@ -207,67 +225,89 @@ class Inspection:
             f"{where}, {speeds[episode, joint]:.3g} {units[joint]}/s"
         )
 
+    def _noise_warning(self) -> str:
+        """What part of a limit noise alone takes up; nothing where that is little.
 
-def hold_against(
-    kept: Selection, done: Preprocessed, robot: RobotLimits | None, gate: GateSettings | None
+        Channels that are held do not count: noise on them is not learned.
+        """
+        names, limits, processed = self.selection.names, self.limits, self.processed
+        if limits is None or not self.reports or processed.smoothed is not None:
+            return ""
+        period = max(processed.dt, max(recording.period for recording in self.recordings))
+        if 2 * _SMOOTH_HZ * period >= 1:  # so few frames hardly tell noise from motion
+            return ""
+        accelerations = acceleration_of(processed.noise, period)
+        shares = [(0.0, "")]
+        form = PlanFormat(names, self.selection.units, processed.dt)
+        for joint, channel in match_joints(form, limits).items():
+            for what, most, scale in (
+                ("acceleration", limits.acceleration, 1.0),
+                ("jerk", limits.jerk, RATE),  # an end leaps to its acceleration in one cycle
+            ):
+                if most is not None and channel not in processed.held_channels:
+                    share = float(accelerations[channel] * scale / most[joint])
+                    shares.append((share, f"the {what} limit of {names[channel]}"))
+        share, where = max(shares)
+        if share < _MUCH_NOISE:
+            return ""
+        return f"noise alone takes up about {share:.0%} of {where}: {_SMOOTH} takes it out"
+
+    @cached_property
+    def _smoothing_helps(self) -> bool:
+        """Whether not all demonstrations break a limit once they are smoothed.
+
+        It is tried: what noise breaks, a motion that is too fast or starts at speed breaks as well.
+        """
+        try:
+            smooth = replace(self.settings, smooth=_SMOOTH_HZ)
+            processed = preprocess(self.recordings, self.selection.units, smooth)
+        except ConfigurationError:  # recordings too short to be smoothed
+            return False
+        reports = _check(self.selection, processed, self.limits, self.gate)
+        return not all(report.refused for report in reports)
+
+
+def inspect(
+    selection: Selection,
+    preprocessing: Preprocessing | None = None,
+    robot: RobotLimits | None = None,
+    gate: GateSettings | None = None,
+) -> Inspection:
+    """Make plans of recordings, and hold each against the robot's limits, once.
+
+    Args:
+        selection: Recordings with the plan's channels.
+        preprocessing: Time step, horizon and trimming; None takes the defaults.
+        robot: Limits that every demonstration is held against; None checks none.
+        gate: The gate's settings for that.
+
+    Raises:
+        InvalidDemonstrationsError: An episode that never moves, or is longer than the horizon.
+        ConfigurationError: Settings that contradict each other.
+    """
+    settings = preprocessing or Preprocessing()
+    processed = preprocess(selection.recordings, selection.units, settings)
+    reports = _check(selection, processed, robot, gate)
+    return Inspection(selection, processed, settings, robot, gate, reports)
+
+
+def _check(
+    selection: Selection,
+    processed: Preprocessed,
+    robot: RobotLimits | None,
+    gate: GateSettings | None,
 ) -> tuple[LimitReport, ...]:
-    """Hold every demonstration against the robot's limits; none where no robot is named.
+    """What the gate says of every plan; nothing where no robot is named.
 
     Demonstrations that the gate cannot judge, such as those in degrees, give no reports.
     """
     if robot is None:
         return ()
     try:
-        form = PlanFormat(kept.names, kept.units, done.dt)
-        return tuple(check_plan(Plan(p, form), robot, None, gate) for p in done.plans)
+        form = PlanFormat(selection.names, selection.units, processed.dt)
+        return tuple(check_plan(Plan(p, form), robot, None, gate) for p in processed.plans)
     except InvalidPlanError:
         return ()
-
-
-def say_shaking(kept: Selection, done: Preprocessed, robot: RobotLimits | None) -> str:
-    """Say what part of the robot's limits noise alone takes up; nothing where that is little.
-
-    Channels that are held do not count: noise on them is not learned.
-    """
-    if robot is None or done.smoothed is not None:
-        return ""
-    period = max(done.dt, max(recording.period for recording in kept.recordings))
-    if 2 * _SMOOTH_HZ * period >= 1:  # so few frames hardly tell noise from motion
-        return ""
-    accelerations = acceleration_of(done.noise, period)
-    said: list[tuple[float, str]] = []
-    for joint, channel in match_joints(PlanFormat(kept.names, kept.units, done.dt), robot).items():
-        for what, limits, scale in (
-            ("acceleration", robot.acceleration, 1.0),
-            ("jerk", robot.jerk, RATE),  # an end leaps to its acceleration in one cycle
-        ):
-            if limits is not None and channel not in done.held_channels:
-                share = float(accelerations[channel] * scale / limits[joint])
-                said.append((share, f"the {what} limit of {kept.names[channel]}"))
-    share, where = max(said, default=(0.0, ""))
-    if share < _MUCH_NOISE:
-        return ""
-    return f"noise alone takes up about {share:.0%} of {where}: {_SMOOTH} takes it out"
-
-
-def would_smoothing_help(
-    kept: Selection,
-    reports: Sequence[LimitReport],
-    settings: Preprocessing,
-    robot: RobotLimits | None,
-    gate: GateSettings | None,
-) -> bool:
-    """Whether the gate refuses all demonstrations, but not all of them once they are smoothed.
-
-    It is tried: what noise breaks, a motion that is too fast or starts at speed breaks as well.
-    """
-    if not reports or not all(report.refused for report in reports):
-        return False
-    try:
-        done = preprocess(kept.recordings, kept.units, replace(settings, smooth=_SMOOTH_HZ))
-    except ConfigurationError:  # recordings too short to be smoothed
-        return False
-    return not all(report.refused for report in hold_against(kept, done, robot, gate))
 
 
 def in_rows(rows: Mapping[str, str], remarks: Sequence[str]) -> str:

@@ -16,9 +16,11 @@ from typing import Any
 import numpy as np
 from jaxtyping import Shaped
 
+from prior_reinforce.bench.importing.bounds import check_bytes, check_numbers
+from prior_reinforce.bench.importing.options import ReadOptions
 from prior_reinforce.bench.importing.recording import (
+    Episodes,
     Positions,
-    ReadOptions,
     Recording,
     named_damage,
 )
@@ -33,38 +35,40 @@ def recognises(source: Path) -> bool:
     return (source / "meta" / "info.json").is_file()
 
 
-def read(source: Path, options: ReadOptions) -> list[Recording]:
+def read(source: Path, options: ReadOptions) -> Episodes:
     """Read every episode of a data set's folder."""
     info_path = source / "meta" / "info.json"
     with named_damage(info_path, "LeRobot's meta/info.json"):
+        check_bytes(info_path, info_path.stat().st_size)
         info = json.loads(info_path.read_text(encoding="utf-8"))
         features = dict(info["features"])
         rate = float(info["fps"])
-        if not 0 < rate < 1e6:
-            raise ValueError(f"fps is {rate}")
-    key = _column(source, features, options.key)
+        key = _column(source, features, options.key)
     remarks: tuple[str, ...] = ()
     if options.key is None and key == _MEASURED and _COMMANDED in features:
         remarks = (f"motion is {_MEASURED} (measured); key {_COMMANDED} has the commanded one",)
     lengths, frames = _listed_lengths(source), _frames(source, key)
-    recordings = []
-    for episode in sorted(lengths.keys() | frames.keys()):
-        if not options.wants(str(episode)):
-            continue
-        index, positions = frames.get(episode, (np.zeros(0), np.zeros((0, 0))))
-        listed = lengths.get(episode, len(index))
-        if len(index) != listed or len(index) == 0:
-            raise FileFormatError(
-                f"{source}: episode {episode} has {len(index)} of {listed} listed frames under "
-                "data/; copy the data set again, or name only the other episodes"
-            )
-        names = _names(features[key], positions.shape[1])
-        clock = options.clock(str(episode), len(index), name="fps", own_rate=rate)
-        times = index * clock.period  # by their own numbers, since frames may be missing
-        recordings.append(
-            Recording(str(episode), times, positions, names, remarks=remarks, clock=clock.source)
-        )
-    return recordings
+    nothing = np.zeros(0), np.zeros((0, 0))
+    for number in sorted(lengths.keys() | frames.keys()):
+        index, positions = frames.get(number, nothing)
+
+        def one(
+            episode: str = str(number),
+            index: FrameNumbers = index,
+            positions: Positions = positions,
+            listed: int = lengths.get(number, len(index)),
+        ) -> Recording:
+            if len(index) != listed or len(index) == 0:
+                raise FileFormatError(
+                    f"{source}: episode {episode} has {len(index)} of {listed} listed frames under "
+                    "data/; copy the data set again, or name only the other episodes"
+                )
+            names = _names(features[key], positions.shape[1])
+            clock = options.clock(episode, len(index), name="fps", own_rate=rate)
+            times = index * clock.period  # by their own numbers, since frames may be missing
+            return Recording(episode, times, positions, names, None, remarks, clock=clock.source)
+
+        yield str(number), one
 
 
 def _column(source: Path, features: dict[str, Any], key: str | None) -> str:
@@ -73,8 +77,9 @@ def _column(source: Path, features: dict[str, Any], key: str | None) -> str:
         for name, feature in features.items()
         if isinstance(feature, dict)
         and str(feature.get("dtype", "")).startswith("float")
-        and len(feature.get("shape", ())) == 1
-        and feature["shape"][0] > 1
+        and isinstance(shape := feature.get("shape"), list)
+        and len(shape) == 1
+        and int(shape[0]) > 1
     ]
     if key is None and _MEASURED in vectors:
         return _MEASURED
@@ -90,12 +95,10 @@ def _column(source: Path, features: dict[str, Any], key: str | None) -> str:
 
 def _listed_lengths(source: Path) -> dict[int, int]:
     """Frames of each episode according to the metadata; empty where it lists none."""
-    import pyarrow.parquet as parquet
-
     lengths: dict[int, int] = {}
     for path in sorted((source / "meta" / "episodes").glob("**/*.parquet")):
         with named_damage(path, "LeRobot's list of episodes"):
-            table = parquet.read_table(path, columns=["episode_index", "length"]).to_pydict()
+            table = _table(path, ["episode_index", "length"]).to_pydict()
             pairs = zip(table["episode_index"], table["length"], strict=True)
             lengths.update({int(episode): int(length) for episode, length in pairs})
     path = source / "meta" / "episodes.jsonl"
@@ -108,8 +111,6 @@ def _listed_lengths(source: Path) -> dict[int, int]:
 
 def _frames(source: Path, key: str) -> dict[int, tuple[FrameNumbers, Positions]]:
     """Frame numbers and positions of each episode, in time order."""
-    import pyarrow.parquet as parquet
-
     paths = sorted((source / "data").glob("**/*.parquet"))
     if not paths:
         raise FileFormatError(
@@ -118,12 +119,11 @@ def _frames(source: Path, key: str) -> dict[int, tuple[FrameNumbers, Positions]]
     parts = []
     for path in paths:
         with named_damage(path, "LeRobot frames, complete once its recorder called finalize()"):
-            table = parquet.read_table(path, columns=["episode_index", "frame_index", key])
-            episode = np.asarray(table["episode_index"].to_pylist(), dtype=np.int64)
-            index = np.asarray(table["frame_index"].to_pylist(), dtype=np.int64)
-            positions = np.array(table[key].to_pylist(), dtype=np.float64)
+            table = _table(path, ["episode_index", "frame_index", key])
+            episode = table["episode_index"].to_numpy().astype(np.int64)
+            index = table["frame_index"].to_numpy().astype(np.int64)
             if len(episode) > 0:
-                parts.append((episode, index, positions.reshape(len(episode), -1)))
+                parts.append((episode, index, _rows(table[key])))
     if not parts:
         return {}
     with named_damage(source, f"LeRobot data with one width of {key}"):
@@ -131,6 +131,34 @@ def _frames(source: Path, key: str) -> dict[int, tuple[FrameNumbers, Positions]]
     order = np.argsort(index, kind="stable")
     own = {number: order[episode[order] == number] for number in np.unique(episode).tolist()}
     return {number: (index[rows], positions[rows]) for number, rows in own.items()}
+
+
+def _table(path: Path, columns: list[str]) -> Any:
+    """Columns of a Parquet file, unless its footer claims more than a recording has."""
+    import pyarrow.parquet as parquet
+
+    file = parquet.ParquetFile(path)
+    groups = [file.metadata.row_group(i) for i in range(file.metadata.num_row_groups)]
+    parts = [group.column(j) for group in groups for j in range(group.num_columns)]
+    read = [part for part in parts if part.path_in_schema.split(".")[0] in {*columns}]
+    check_numbers(path, "its columns", [sum(part.num_values for part in read)])
+    check_bytes(path, sum(part.total_uncompressed_size for part in read), "unpacks to")
+    return file.read(columns=columns)
+
+
+def _rows(column: Any) -> Positions:
+    """A column of lists of one length as rows, of numbers as a single channel."""
+    import pyarrow as pa
+    import pyarrow.compute as compute
+
+    kind = column.type
+    if not (pa.types.is_list(kind) or pa.types.is_large_list(kind) or hasattr(kind, "list_size")):
+        return np.asarray(column.to_numpy(), dtype=np.float64)[:, None]
+    widths = compute.list_value_length(column).unique().to_pylist()
+    if len(widths) != 1 or not widths[0]:
+        raise ValueError(f"rows of {widths} numbers")
+    flat = compute.list_flatten(column).to_numpy()
+    return np.asarray(flat, dtype=np.float64).reshape(-1, widths[0])
 
 
 def _names(feature: dict[str, Any], count: int) -> tuple[str, ...]:

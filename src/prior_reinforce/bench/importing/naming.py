@@ -71,6 +71,20 @@ def joint_vectors(names: Sequence[str], count: int) -> dict[str, list[int]]:
     }
 
 
+def could_be_forgotten(names: Sequence[str], count: int) -> set[str]:
+    """Return which channels that are not joints may belong to the motion, such as a gripper's.
+
+    Those whose name says something else do not, and nor does a numbered group of the joints' size
+    or more, such as their commands.
+
+    Args:
+        names: Of all channels that are left out.
+        count: Of joints.
+    """
+    groups = {i for group in vectors(names).values() if len(group) >= max(count, 2) for i in group}
+    return {name for i, name in enumerate(names) if i not in groups and _ELSE.search(name) is None}
+
+
 def numbered_like(joints: Sequence[str], there: Sequence[str]) -> tuple[str, ...] | None:
     """Return numbered channels of which there are as many as joints; None where nothing is clear.
 

@@ -10,16 +10,21 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from prior_reinforce.bench.importing.bounds import MOST_BYTES, check_bytes
 from prior_reinforce.bench.importing.clock import Clock
+from prior_reinforce.bench.importing.options import ReadOptions
 from prior_reinforce.bench.importing.recording import (
     NO_COLUMN,
-    ReadOptions,
+    Episodes,
     Recording,
     files_at,
     named_damage,
+    recorded,
+    unread,
 )
 from prior_reinforce.bench.importing.units import SECONDS, split_unit
 from prior_reinforce.errors import FileFormatError
@@ -31,14 +36,17 @@ _TIMES = ("t", "time", "timestamp", "timestamps")
 _MOTION_KEYS = ("q", "plans", "positions", "actions")
 
 
-def read(source: Path, options: ReadOptions) -> list[Recording]:
+def read(source: Path, options: ReadOptions) -> Episodes:
     """Read a file, or every one of a folder as an episode."""
     paths = files_at(source, SUFFIXES)
-    wanted = [path for path in paths if len(paths) == 1 or options.wants(path.stem)]
-    return [recording for path in wanted for recording in _episodes(path, options)]
+    for path in paths:
+        if len(paths) > 1 and options.leaves_out(path.stem):
+            yield path.stem, unread
+        else:
+            yield from _episodes(path, options)
 
 
-def _episodes(path: Path, options: ReadOptions) -> list[Recording]:
+def _episodes(path: Path, options: ReadOptions) -> Episodes:
     arrays = _arrays(path)
     key = options.key or next((name for name in _MOTION_KEYS if name in arrays), None)
     if key is None or key not in arrays:
@@ -52,7 +60,6 @@ def _episodes(path: Path, options: ReadOptions) -> list[Recording]:
             f"{path}: {key} has shape {motion.shape} and type {motion.dtype}, expected numbers of "
             "shape (T, D) or (N, T, D)"
         )
-    names = _first(arrays, ("joint_names", "names"))
     outcomes = _first(arrays, ("outcome", "outcomes", "outcomes_seen"))
     single = motion.ndim == 2
     motions = motion[None] if single else motion
@@ -63,34 +70,28 @@ def _episodes(path: Path, options: ReadOptions) -> list[Recording]:
                 f"{path}: outcomes have shape {outcomes.shape}, expected numbers of shape "
                 f"({len(motions)}, k)"
             )
-    episodes = [path.stem] if single else [str(index) for index in range(len(motions))]
-    recordings = []
-    for index, episode in enumerate(episodes):
-        if not (single or options.wants(episode)):
-            continue
-        clock = _clock(path, arrays, motions.shape[1], index, episode, options)
-        recordings.append(
-            Recording(
-                episode,
-                clock.times,
-                motions[index],
-                () if names is None else tuple(map(str, np.ravel(names))),
-                None if outcomes is None else outcomes[index],
-                clock=clock.source,
-                doubts=clock.doubts,
-            )
-        )
-    return recordings
+    named = _first(arrays, ("joint_names", "names"))
+    names = () if named is None else tuple(map(str, np.ravel(named)))
+    for index in range(len(motions)):
+        episode = path.stem if single else str(index)
+        outcome = None if outcomes is None else outcomes[index]
+
+        def one(index: int = index, episode: str = episode, outcome: Any = outcome) -> Recording:
+            clock = _clock(path, arrays, motions.shape[1], index, episode, options)
+            return recorded(episode, clock, motions[index], names, outcome=outcome)
+
+        yield episode, one
 
 
 def _arrays(path: Path) -> Arrays:
     """Everything in a file; of our own demonstrations and plans also what their metadata says."""
     if path.suffix.lower() == ".npy":
-        with named_damage(path, "NPY with plain numbers"), path.open("rb") as file:
-            return {_MOTION_KEYS[0]: np.load(file, allow_pickle=False)}
+        check_bytes(path, path.stat().st_size)
+        with named_damage(path, "NPY with plain numbers"):
+            return {_MOTION_KEYS[0]: np.load(path, mmap_mode="r", allow_pickle=False)}
     remedy = "it must be an NPZ with plain number arrays; copy it again, or say its format"
-    with open_npz(path, remedy) as archive:
-        content = {name: np.array(archive[name]) for name in archive.files}
+    with open_npz(path, remedy, MOST_BYTES) as archive:
+        content = {name: archive[name] for name in archive.files}
         if "metadata" in content:
             metadata = json.loads(str(content.pop("metadata")))
             form = metadata.get("format", metadata)

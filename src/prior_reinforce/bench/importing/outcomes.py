@@ -14,8 +14,9 @@ import math
 import os
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -25,11 +26,10 @@ from prior_reinforce.bench.importing.recording import Recording
 from prior_reinforce.bench.importing.tables import Table, read_tables
 from prior_reinforce.bench.importing.units import (
     CHANNEL_UNITS,
-    Doubt,
+    Ambiguity,
     base_of,
-    cannot_be,
     conversion,
-    guess_unit,
+    judge_unit,
     known_unit,
     split_any_unit,
 )
@@ -38,29 +38,74 @@ from prior_reinforce.errors import (
     FileFormatError,
     InvalidDemonstrationsError,
 )
-from prior_reinforce.files import write
+from prior_reinforce.files import as_cell, from_cell, write
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 OUTCOMES_FILE = "outcomes.csv"
-_SD = "sd"
-_NOT_COMPONENTS = (_SD, "episode", "source", "note", "notes", "comment", "comments")
+SD = "sd"
+"""Column of the standard deviation of a row's components."""
+_NOT_COMPONENTS = (SD, "source", "note", "notes", "comment", "comments")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Outcomes:
-    """The outcomes that are known, by episode."""
+    """What a table says of outcomes, by episode or by trial."""
 
     where: str
     """Where they are from, for messages."""
+    frame: DataFrame
+    """Indexed by name: a column a component, `sd` (0 where it was measured), and columns of texts
+    that were asked for. nan in all components of a row that says none."""
     names: tuple[str, ...]
-    """Names of the k components; empty where the source names none."""
-    values: Mapping[str, tuple[float, ...]]
-    """k numbers by episode; metres and radians where their unit is said."""
-    units: tuple[str | None, ...] = ()
+    """Of the k components, which are the frame's first columns."""
+    units: tuple[str | None, ...]
     """Unit of each component; None where the source says none."""
-    sd: Mapping[str, float] = field(default_factory=dict)
-    """How uncertain each component is, by episode; nothing where it was measured."""
     sd_unit: str | None = None
-    """Unit of that; None is the first component's."""
+    """Unit of `sd`; None is the first component's."""
+    named: bool = True
+    """Whether the source names the components."""
+
+    @property
+    def values(self) -> Points:
+        """The components, shape (n, k)."""
+        return np.asarray(self.frame[list(self.names)], dtype=np.float64)
+
+    def only(self, names: Sequence[str]) -> Outcomes:
+        """Return some of the components, in that order, all of which must be there."""
+        units = tuple(self.units[self.names.index(name)] for name in names)
+        other = [name for name in self.frame if name not in self.names]
+        return replace(self, frame=self.frame[[*names, *other]], names=tuple(names), units=units)
+
+    @classmethod
+    def none(cls, names: Sequence[str]) -> Outcomes:
+        """No outcomes of these components."""
+        import pandas as pd
+
+        frame = pd.DataFrame(columns=[*names, SD], dtype=float)
+        return cls("nothing", frame, tuple(names), (None,) * len(names))
+
+    @classmethod
+    def of_numbers(cls, where: str, numbers: Mapping[str, Sequence[float]]) -> Outcomes:
+        """Outcomes that are numbers by episode.
+
+        Raises:
+            InvalidDemonstrationsError: Different numbers of components.
+        """
+        import pandas as pd
+
+        lengths = set(map(len, numbers.values())) or {0}
+        if len(lengths) != 1 or (0 in lengths and numbers):
+            raise InvalidDemonstrationsError(
+                f"outcomes in {where} have {sorted(lengths)} components, expected one number for "
+                "all, at least 1; complete them"
+            )
+        names = tuple(map(str, range(1, lengths.pop() + 1)))
+        frame = pd.DataFrame.from_dict(dict(numbers), orient="index", columns=list(names))
+        return cls(
+            where, frame.astype(float).assign(**{SD: 0.0}), names, (None,) * len(names), named=False
+        )
 
 
 def find_outcomes(
@@ -75,11 +120,11 @@ def find_outcomes(
         places: Folders beside the recordings.
         recordings: Some hold their outcomes.
         given: A table, or numbers by episode.
-        names: Of the components that are wanted, as in `read_outcomes`.
+        names: Of the components that are wanted, in order; None takes them as they stand.
 
     Raises:
         ConfigurationError: What was given are no numbers.
-        InvalidDemonstrationsError: There are none; all episodes are named.
+        InvalidDemonstrationsError: There are none (all episodes are named), or a component lacks.
         FileFormatError: The table is missing or damaged.
     """
     if isinstance(given, Mapping):
@@ -89,13 +134,13 @@ def find_outcomes(
             raise ConfigurationError(
                 f"outcomes must be numbers by episode, such as {{'0': (0.9, 0.1)}}: {error}"
             ) from error
-        return Outcomes("the given outcomes", (), numbers)
+        return Outcomes.of_numbers("the given outcomes", numbers)
     path = Path(given) if given is not None else table_beside(places)
     if path is not None:
-        return read_outcomes(path, names)
+        return _in_order(read_outcomes(path, names), names)
     own = {r.episode: tuple(r.outcome.tolist()) for r in recordings if r.outcome is not None}
     if own:
-        return Outcomes("the recording itself", (), own)
+        return Outcomes.of_numbers("the recording itself", own)
     above = table_beside([place.parent for place in places])
     hint = (
         f" ({above} is not beside them: name it with --outcomes if it is theirs)" if above else ""
@@ -120,79 +165,109 @@ def headed(names: Sequence[str], units: Sequence[str]) -> list[str]:
 
 
 def write_outcome_table(
-    path: Path, episodes: Sequence[str], names: Sequence[str], units: Sequence[str]
+    path: Path,
+    rows: Mapping[str, Sequence[object]],
+    names: Sequence[str],
+    units: Sequence[str],
+    beside: str = "note",
 ) -> None:
-    """Write a table to be filled in: the episodes' names, and a column a component with its unit.
+    """Write a table of outcomes.
+
+    Args:
+        path: Of the CSV.
+        rows: Cells by episode: of the components, and of the last column.
+        names: Of the components.
+        units: Of the components.
+        beside: Name of the last column.
 
     Raises:
         OSError: It cannot be written.
     """
-    heads = headed(names, units)
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["episode", *heads, "note"])
-    writer.writerows([episode, *[""] * len(heads), ""] for episode in episodes)
+    writer.writerow(map(as_cell, ["episode", *headed(names, units), beside]))
+    for episode, cells in rows.items():
+        filled = [*cells, *[""] * (len(names) + 1 - len(cells))]
+        writer.writerow([as_cell(episode), *filled])
     write(path, text.getvalue())
 
 
-def read_outcomes(path: Path, names: Sequence[str] | None = None) -> Outcomes:
-    """Read a table of outcomes; rows whose cells are empty count as missing.
+def read_outcomes(
+    path: Path,
+    names: Sequence[str] | None = None,
+    *,
+    index: Sequence[str] = EPISODE_COLUMNS,
+    texts: Sequence[str] = (),
+) -> Outcomes:
+    """Read a table of outcomes; rows whose cells are empty are left out.
 
     Args:
-        path: A CSV of any dialect, or a workbook.
-        names: Of the components that are wanted; None takes all columns but `episode` and notes.
+        path: A CSV of any dialect, or a workbook; rows of titles may stand above its head.
+        names: Of the components that are wanted; None takes all columns but the index and notes.
+        index: Names of the column that says whose outcome a row is.
+        texts: Further columns to keep, as texts, where they are there.
 
     Raises:
         FileFormatError: Missing, not such a table, or a cell that is no number.
     """
+    import pandas as pd
+
+    example = f"{index[0]},x,y"
     if not path.is_file():
-        raise FileFormatError(f"no outcomes at {path}; give the path of a table episode,x,y")
-    table = read_tables(path)[0]
+        raise FileFormatError(f"no table at {path}; give the path of a table {example}")
+    table = read_tables(path, head=index)[0]
     split = [split_any_unit(name) for name in table.names]
     lower = [name.lower() for name, _ in split]
-    episode = next((i for i, name in enumerate(lower) if name in EPISODE_COLUMNS), None)
-    columns = [i for i, name in enumerate(lower) if i != episode and name not in _NOT_COMPONENTS]
-    uncertain = lower.index(_SD) if _SD in lower else None
+    key = next((i for i, name in enumerate(lower) if name in index), None)
+    other = (*_NOT_COMPONENTS, *index, *texts)
+    columns = [i for i, name in enumerate(lower) if name not in other]
     if names is not None and set(names) <= {split[i][0] for i in columns}:
         columns = [i for i in columns if split[i][0] in names]
     kept = [split[i][0] for i in columns]
-    if episode is None or not columns or len(set(kept)) != len(kept):
+    there = {name: lower.index(name) for name in texts if name in lower}
+    if key is None or not (columns or there) or len(set(kept)) != len(kept):
         raise FileFormatError(
-            f"{path} begins with {','.join(table.names)!r}, expected column names such as "
-            "episode,x,y"
+            f"{path} begins with {','.join(table.names)!r:.200}, expected column names such as "
+            f"{example}"
         )
     units = [table.units[i] or split[i][1] for i in columns]
-    bases = [base_of(unit) if unit else (None, 1.0) for unit in units]
-    values: dict[str, tuple[float, ...]] = {}
-    sd: dict[str, float] = {}
-    for row, name in enumerate(table.texts(episode)):
-        line = table.lines[row]
-        if name in values:
-            raise FileFormatError(f"{path}, line {line}: episode {name} again; drop one of them")
-        one = table.rows([row])
-        if any(one.texts(i)[0] for i in columns):
-            numbers = [_number(path, line, one, i) for i in columns]
-            values[name] = tuple(n * u[1] for n, u in zip(numbers, bases, strict=True))
-            if uncertain is not None and one.texts(uncertain)[0] not in ("", "0", "0.0"):
-                sd[name] = _number(path, line, one, uncertain)
-    sd_unit = None
-    if uncertain is not None:
-        sd_unit = table.units[uncertain] or split[uncertain][1] or units[0]
-    bare = tuple(unit for unit, _ in bases)
-    return Outcomes(str(path), tuple(kept), values, bare, sd, sd_unit)
+    scale = [base_of(unit)[1] if unit else 1.0 for unit in units]
+    sd = lower.index(SD) if SD in lower else None
+    every = {i: table.texts(i) for i in (key, *columns, *there.values(), *([sd] if sd else []))}
+    rows: dict[str, list[object]] = {}
+    for row, name in enumerate(map(from_cell, every[key])):
+        if name in rows:
+            line = table.lines[row]
+            raise FileFormatError(f"{path}, line {line}: {index[0]} {name} again; drop one of them")
+        said = [every[i][row] for i in there.values()]
+        place = [math.nan] * len(columns)
+        if any(every[i][row] for i in columns):
+            place = [_finite(path, table, row, i) * s for i, s in zip(columns, scale, strict=True)]
+        elif not any(said):
+            continue
+        uncertain = 0.0 if sd is None or not every[sd][row] else _finite(path, table, row, sd)
+        rows[name] = [*place, uncertain, *said]
+    frame = pd.DataFrame.from_dict(rows, orient="index", columns=[*kept, SD, *there])
+    sd_unit = None if sd is None else table.units[sd] or split[sd][1] or (units or [None])[0]
+    bare = tuple(base_of(unit)[0] if unit else None for unit in units)
+    return Outcomes(str(path), frame, tuple(kept), bare, sd_unit)
 
 
-def in_order(outcomes: Outcomes, names: Sequence[str] | None) -> Outcomes:
-    """Return the outcomes with their components in the order of the names.
+def _finite(path: Path, table: Table, row: int, column: int) -> float:
+    one = table.rows([row])
+    value = float(one.numbers(column)[0]) if one.is_number(column) else math.nan
+    if not math.isfinite(value):
+        raise FileFormatError(
+            f"{path}, line {table.lines[row]}: {table.names[column]} is "
+            f"{one.texts(column)[0][:40]!r}, expected a finite number; measure that outcome, or "
+            "empty the whole row's numbers"
+        )
+    return value
 
-    Args:
-        outcomes: Their components are matched by name where they have names, else by position.
-        names: As wanted; None keeps the outcomes as they are.
 
-    Raises:
-        InvalidDemonstrationsError: A wanted component that the outcomes lack.
-    """
-    if names is None or not outcomes.names:
+def _in_order(outcomes: Outcomes, names: Sequence[str] | None) -> Outcomes:
+    """The outcomes with their components in the order of the names."""
+    if names is None:
         return outcomes
     missing = [name for name in names if name not in outcomes.names]
     if missing:
@@ -200,179 +275,145 @@ def in_order(outcomes: Outcomes, names: Sequence[str] | None) -> Outcomes:
             f"{outcomes.where} has no column {', '.join(missing)}; it has "
             f"{', '.join(outcomes.names)}: rename or add it"
         )
-    order = [outcomes.names.index(name) for name in names]
-    values = {name: tuple(v[i] for i in order) for name, v in outcomes.values.items()}
-    units = tuple(outcomes.units[i] for i in order)
-    return replace(outcomes, names=tuple(names), values=values, units=units)
+    return outcomes.only(names)
 
 
 def in_units(
     outcomes: Outcomes, wanted: Sequence[str] | None, given: str | None
-) -> tuple[Outcomes, tuple[Doubt, ...]]:
+) -> tuple[Outcomes, tuple[Ambiguity, ...]]:
     """Return the outcomes in the units that are wanted, and what is only guessed of them.
 
     Args:
         outcomes: Their components in order.
         wanted: Unit of each, as the task has it; None takes what is said, or metres.
         given: Unit of the components whose source says none, or that of all, said again where
-            it is doubted; None takes the wanted one, or where nothing could land there, the one it
-            looks like.
+            it is ambiguous; None takes the wanted one, or where nothing could land there, the one
+            it looks like.
 
     Raises:
         ConfigurationError: A component is in a unit that cannot be converted, `given` has no use,
             or one `sd` stands for components of several units.
         InvalidDemonstrationsError: What is said of a unit cannot be.
     """
-    k = max((len(value) for value in outcomes.values.values()), default=0)
-    said = outcomes.units or (None,) * k
+    said, where, k = outcomes.units, outcomes.where, len(outcomes.names)
     chosen = wanted is not None
     if wanted is None:
         wanted = [base_of(unit or given or "m")[0] for unit in said]
-    if len(wanted) != k or len(said) != k:
+    if len(wanted) != k:
         return outcomes, ()  # another number of components: said when they are joined
     if given is not None and None not in said and given not in said:
         raise ConfigurationError(
-            f"--outcome-unit {given} has no use, since {outcomes.where} says its units; drop it"
+            f"--outcome-unit {given} has no use, since {where} says its units; drop it"
         )
-    names = outcomes.names or tuple(map(str, range(1, k + 1)))
-    if outcomes.sd and len(set(wanted)) > 1:
+    if outcomes.frame[SD].any() and len(set(wanted)) > 1:
         raise ConfigurationError(
-            f"{_SD} in {outcomes.where} is one number for components in {', '.join(wanted)}; leave "
-            "that column out"
+            f"{SD} in {where} is one number for components in {', '.join(wanted)}; leave that "
+            "column out"
         )
-    scale, looks = [], dict[str, list[str]]()
-    for i, (name, own, spelt) in enumerate(zip(names, said, wanted, strict=True)):
+    reach = np.abs(outcomes.values).max(axis=0, initial=0.0, where=~np.isnan(outcomes.values))
+    scale, unclear = [], dict[str, list[str]]()
+    for name, own, spelt, largest in zip(outcomes.names, said, wanted, reach, strict=True):
         unit = known_unit(spelt) or spelt
-        reach = max((abs(value[i]) for value in outcomes.values.values()), default=0.0)
-        recorded = own or given or guess_unit(unit, reach) or unit
-        if own is None and given is None and recorded != unit:
-            looks.setdefault(recorded, []).append(f"{name} reaches {reach:.4g}")
+        looks = judge_unit(unit, largest).looks
+        recorded = own or given or looks or unit
         if chosen and base_of(recorded)[0] != base_of(unit)[0]:
             raise ConfigurationError(
-                f"{name} in {outcomes.where} is in {recorded}, but its unit is to be {spelt}; "
-                "correct either (a workspace has it in workspace.toml, [outcome])"
+                f"{name} in {where} is in {recorded}, but its unit is to be {spelt}; correct "
+                "either (a workspace has it in workspace.toml, [outcome])"
             )
-        scale.append(conversion(recorded, unit, f"{name} in {outcomes.where}"))
-        looks_like = guess_unit(unit, reach * scale[-1])
-        if cannot_be(unit, reach * scale[-1]):
+        scale.append(conversion(recorded, unit, f"{name} in {where}"))
+        judged = judge_unit(unit, largest * scale[-1])
+        rename = f"if that is in {judged.looks}, call its column {name} [{judged.looks}]"
+        if not judged.possible:
             raise InvalidDemonstrationsError(
-                f"in {outcomes.where}, {name} is said to be in {recorded} and would reach "
-                f"{reach * scale[-1]:.4g} {unit}, too far for an arm; if it is in {looks_like}, "
-                f"call its column {name} [{looks_like}]"
+                f"in {where}, {name} is said to be in {recorded} and would reach "
+                f"{largest * scale[-1]:.4g} {unit}, too far for an arm; {rename}"
             )
-        if own is not None and given != unit and looks_like != unit:
-            looks.setdefault(unit, []).append(
-                f"{name} reaches {reach * scale[-1]:.4g} {unit} (if that is in {looks_like}, call "
-                f"its column {name} [{looks_like}])"
-            )
-    doubts = tuple(
-        Doubt(
-            f"in {outcomes.where}, {' and '.join(reached)}, too far for an arm"
-            + (f": it looks like {unit}" if unit not in said else ""),
+        if own is None and given is None and recorded != unit:
+            unclear.setdefault(recorded, []).append(f"{name} reaches {largest:.4g}")
+        elif own is not None and given != unit and not judged.plausible:
+            what = f"{name} reaches {largest * scale[-1]:.4g} {unit} ({rename})"
+            unclear.setdefault(unit, []).append(what)
+    inches = " (or inches: --outcome-unit in)"
+    ambiguities = tuple(
+        Ambiguity(
+            f"in {where}, {' and '.join(reached)}, too far for an arm"
+            + (f": it looks like {unit}{inches * (unit == 'cm')}" if unit not in said else ""),
             f"--outcome-unit {unit}",
         )
-        for unit, reached in looks.items()
+        for unit, reached in unclear.items()
     )
-    values = {
-        episode: tuple(v * s for v, s in zip(value, scale, strict=False))
-        for episode, value in outcomes.values.items()
-    }
-    first = known_unit(wanted[0]) or wanted[0]
-    own_scale = conversion(outcomes.sd_unit, first, _SD) if outcomes.sd_unit else scale[0]
-    sd = {episode: own_scale * value for episode, value in outcomes.sd.items()}
-    return Outcomes(outcomes.where, outcomes.names, values, tuple(wanted), sd, wanted[0]), doubts
+    first = known_unit(wanted[0]) or wanted[0] if wanted else ""
+    sd_scale = conversion(outcomes.sd_unit, first, SD) if outcomes.sd_unit else [*scale, 1.0][0]
+    frame = outcomes.frame.copy()
+    frame[[*outcomes.names, SD]] *= [*scale, sd_scale]
+    return replace(outcomes, frame=frame, units=tuple(wanted), sd_unit=first), ambiguities
 
 
 def missing_outcomes(episodes: Sequence[str], outcomes: Outcomes) -> list[str]:
     """Return the episodes that a table says nothing of, by the rule of `outcomes_of`."""
-    picked = _matched(list(episodes), list(outcomes.values))
+    picked = _matched(episodes, list(outcomes.frame.index))
     return [episode for episode in episodes if episode not in picked]
 
 
-def outcomes_of(recordings: Sequence[Recording], outcomes: Outcomes, *, partial: bool) -> Points:
-    """Return the outcome of each recording, in order.
+def outcomes_of(
+    episodes: Sequence[str], outcomes: Outcomes, *, partial: bool
+) -> tuple[Points, Points]:
+    """Return the outcome of each episode in order, and its standard deviation, each (N, k).
 
     Episodes are matched by name, else by the number their names end in (`3` is `demo_003`).
 
     Args:
-        recordings: N of them.
-        outcomes: By episode.
+        episodes: N names.
+        outcomes: By episode, in the wanted units.
         partial: Only some episodes were asked for, so outcomes of others are no mistake.
 
     Raises:
-        InvalidDemonstrationsError: Outcomes that are missing, of a wrong length, not finite, or of
-            episodes that do not exist; each is named.
+        InvalidDemonstrationsError: Outcomes that are missing, not finite, or of episodes that do
+            not exist; each is named.
     """
-    episodes = [recording.episode for recording in recordings]
-    picked = _matched(episodes, list(outcomes.values))
+    there = list(outcomes.frame.index)
+    picked = _matched(episodes, there)
     missing = [episode for episode in episodes if episode not in picked]
     if missing:
         raise InvalidDemonstrationsError(
             f"no outcome for episodes {_listed(missing)} in {outcomes.where} (it has "
-            f"{_listed(list(outcomes.values))}); measure and add them, or leave those episodes out"
+            f"{_listed(there)}); measure and add them, or leave those episodes out"
         )
-    unknown = [name for name in outcomes.values if name not in picked.values()]
+    unknown = [name for name in there if name not in picked.values()]
     if unknown and not partial:
         raise InvalidDemonstrationsError(
             f"{outcomes.where} names episodes {_listed(unknown)} that were not found (there are "
             f"{_listed(episodes)}); correct the names, or record them again"
         )
-    rows = [outcomes.values[picked[episode]] for episode in episodes]
-    lengths = set(map(len, rows))
-    if len(lengths) != 1 or 0 in lengths:
-        raise InvalidDemonstrationsError(
-            f"outcomes in {outcomes.where} have {sorted(lengths)} components, expected one number "
-            "for all, at least 1; complete them"
-        )
-    for episode, row in zip(episodes, rows, strict=True):
-        if not all(map(math.isfinite, row)):
+    rows = outcomes.frame.loc[[picked[episode] for episode in episodes]]
+    values = np.array(rows[list(outcomes.names)], dtype=np.float64)
+    for episode, row in zip(episodes, values, strict=True):
+        if not np.all(np.isfinite(row)):
             raise InvalidDemonstrationsError(
-                f"the outcome of episode {episode} is {list(row)}, expected finite numbers; "
+                f"the outcome of episode {episode} is {row.tolist()}, expected finite numbers; "
                 "measure it, or leave that episode out"
             )
-    return np.array(rows, dtype=np.float64)
+    sd = np.array(rows[SD], dtype=np.float64)
+    return values, np.tile(sd[:, None], values.shape[1])
 
 
-def uncertainty_of(recordings: Sequence[Recording], outcomes: Outcomes) -> Points:
-    """Return how uncertain each recording's outcome is, shape (N, k), in order; 0 where measured.
-
-    Args:
-        recordings: N of them, all with an outcome.
-        outcomes: By episode, in the wanted units.
-    """
-    episodes = [recording.episode for recording in recordings]
-    picked = _matched(episodes, list(outcomes.values))
-    k = len(next(iter(outcomes.values.values())))
-    rows = [outcomes.sd.get(picked[episode], 0.0) for episode in episodes]
-    return np.tile(np.array(rows, dtype=np.float64)[:, None], k)
-
-
-def _matched(episodes: list[str], names: list[str]) -> dict[str, str]:
+def _matched(episodes: Sequence[str], names: Sequence[str]) -> dict[str, str]:
     """Name in the table by episode; a number that two names end in matches none."""
-    numbers, there = list(map(_number_at_end, episodes)), list(map(_number_at_end, names))
+    numbers, there = list(map(_digits_at_end, episodes)), list(map(_digits_at_end, names))
     picked: dict[str, str] = {}
     for episode, number in zip(episodes, numbers, strict=True):
         if episode in names:
             picked[episode] = episode
-        elif number >= 0 and numbers.count(number) == 1 and there.count(number) == 1:
+        elif number and numbers.count(number) == 1 and there.count(number) == 1:
             picked[episode] = names[there.index(number)]
     return picked
 
 
-def _number(path: Path, line: int, row: Table, column: int) -> float:
-    value = float(row.numbers(column)[0]) if row.is_number(column) else math.nan
-    if not math.isfinite(value):
-        raise FileFormatError(
-            f"{path}, line {line}: {row.texts(column)[0]!r} is no finite number; measure that "
-            "outcome, or empty the whole row's numbers"
-        )
-    return value
-
-
-def _number_at_end(name: str) -> int:
-    """The number a name ends in, -1 if in none."""
-    match = re.search(r"(\d+)$", name)
-    return int(match[1]) if match else -1
+def _digits_at_end(name: str) -> str:
+    """The number a name ends in, without zeros before it; empty if in none."""
+    match = re.search(r"([0-9]+)$", name)
+    return (match[1].lstrip("0") or "0") if match else ""
 
 
 def _listed(names: Sequence[str]) -> str:

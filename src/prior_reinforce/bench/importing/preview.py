@@ -32,7 +32,7 @@ class Preview:
 
     source: str
     """What was read, with its format."""
-    found: Inspection
+    inspection: Inspection
     """The N recordings, and what became of them."""
     demonstrations: Demonstrations
     """The result."""
@@ -42,7 +42,7 @@ class Preview:
     @property
     def recordings(self) -> tuple[Recording, ...]:
         """N recordings with the plan's channels."""
-        return self.found.recordings
+        return self.inspection.recordings
 
     @property
     def episodes(self) -> tuple[str, ...]:
@@ -50,9 +50,9 @@ class Preview:
         return tuple(recording.episode for recording in self.recordings)
 
     @property
-    def done(self) -> Preprocessed:
+    def processed(self) -> Preprocessed:
         """How the recordings became plans."""
-        return self.found.done
+        return self.inspection.processed
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -62,7 +62,7 @@ class Preview:
             "motions stands for it; if that is a slip of the pen, correct it"
             for i, j in self.demonstrations.repeated_outcomes()
         )
-        return (*self.found.remarks, *alike)
+        return (*self.inspection.remarks, *alike)
 
     @property
     def text(self) -> str:
@@ -75,7 +75,7 @@ class Preview:
             ranges += f", uncertain by up to {most}"
         rows = {
             "episodes": f"{demos.n} from {self.source}: {', '.join(self.episodes)}",
-            **self.found.rows,
+            **self.inspection.rows,
             "outcomes": f"{ranges}, from {self.outcomes_from}",
             "coverage": self._coverage(),
         }
@@ -144,7 +144,7 @@ class Preview:
     def _draw_channel(self, axes: Any, channel: int, colours: list[Any]) -> None:
         demos, form = self.demonstrations, self.demonstrations.format
         times = np.arange(demos.horizon) * form.dt
-        for recording, start in zip(self.recordings, self.done.starts, strict=True):
+        for recording, start in zip(self.recordings, self.processed.starts, strict=True):
             recorded = recording.positions[:, channel]
             axes.plot(recording.times - start, recorded, color="0.8", linewidth=2.5, zorder=1)
         for plan, colour in zip(demos.plans, colours, strict=True):

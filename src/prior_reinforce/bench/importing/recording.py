@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TypedDict
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float
 
 from prior_reinforce.arrays import Point
-from prior_reinforce.bench.importing.clock import Clock, Stamps, Times, clock_of
-from prior_reinforce.bench.importing.units import CHANNEL_UNITS, Doubt, say_names, split_unit
+from prior_reinforce.bench.importing.bounds import check_names
+from prior_reinforce.bench.importing.clock import Clock, Times
+from prior_reinforce.bench.importing.units import CHANNEL_UNITS, Ambiguity, say_names, split_unit
 from prior_reinforce.errors import (
     FileFormatError,
     InvalidDemonstrationsError,
@@ -26,88 +26,10 @@ from prior_reinforce.files import without_advice
 
 Positions = Float[np.ndarray, "T D"]
 """D channels at T times, in their units."""
+Episodes = Iterable[tuple[str, Callable[[], "Recording"]]]
+"""What a format's reader finds: names, and how to read each; what is left out is never read."""
 NO_COLUMN = "none"
 """What is said for the column of times where none shall be read."""
-
-
-_MOST_NUMBERS = 600_000_000
-"""Of one array; ours: seven joints for a day at 1 kHz."""
-
-
-class HowToRead(TypedDict, total=False):
-    """What may be said of recordings; an option that the format has no use for is refused."""
-
-    format: str | None
-    """What it is, a name of `FORMATS`; None detects it."""
-    key: str | None
-    """Where the motion is: the array of an NPZ, the column of a LeRobot data set, the path of an
-    HDF5 data set inside an episode, or the topic of a bag. None takes the only candidate."""
-    rate: float | None
-    """Frames a second, for files that hold no times; where they do, it must agree with them."""
-    time_unit: str | None
-    """Unit of the times, one of `s`, `ms`, `us`, `ns`, or `frame` for a column that counts frames.
-    None takes it from the column's name (`t_ms`); where none stands there and seconds are not
-    possible for an arm, that is an error."""
-    time_column: str | None
-    """Column or array of the times, by name, or by its number from 1; `none` leaves all unread.
-    None takes one that is called `t`, `time`, `timestamp` or the like."""
-    episode_column: str | None
-    """Column of a table that says which episode a row is of. None takes one that is called
-    `episode`, `throw_id` or the like."""
-    delimiter: str | None
-    """What stands between two cells of a CSV, a name of `DELIMITERS` or the character itself; None
-    finds it out."""
-    decimal: str | None
-    """Decimal sign of a CSV, `.` or `,`; None finds it out."""
-    episodes: Sequence[str] | None
-    """Names of the episodes to keep, in order; None keeps all."""
-    leave_out: Sequence[str] | None
-    """Names of episodes to leave out of those."""
-    joints: Sequence[str] | None
-    """Recorded names to keep, in the plan's order, so that the rest need not be there in every
-    message of a bag, nor be numbers in a CSV. None keeps all. Where the file names nothing, they
-    name its columns in order."""
-
-
-@dataclass(frozen=True)
-class ReadOptions:
-    """What the reader of a format is asked for; each field as in `HowToRead`."""
-
-    key: str | None = None
-    rate: float | None = None
-    time_unit: str | None = None
-    time_column: str | None = None
-    episode_column: str | None = None
-    delimiter: str | None = None
-    decimal: str | None = None
-    episodes: tuple[str, ...] | None = None
-    joints: tuple[str, ...] | None = None
-
-    def wants(self, episode: str) -> bool:
-        """Whether that episode was asked for."""
-        return self.episodes is None or episode in self.episodes
-
-    def clock(
-        self,
-        episode: str,
-        count: int,
-        *,
-        stamps: Stamps | None = None,
-        name: str = "",
-        unit: str | None = None,
-        own_rate: float | None = None,
-    ) -> Clock:
-        """Return the times of an episode, as in `clock_of`, with what was said of them."""
-        return clock_of(
-            episode,
-            count,
-            stamps=stamps,
-            name=name,
-            unit=unit,
-            own_rate=own_rate,
-            rate=self.rate,
-            time_unit=self.time_unit,
-        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,11 +54,13 @@ class Recording:
     stand in the names."""
     clock: str = ""
     """Where the times are from, for a person: `t in ms`."""
-    doubts: tuple[Doubt, ...] = ()
+    ambiguities: tuple[Ambiguity, ...] = ()
     """What is only guessed of the times."""
     columns: tuple[str, ...] = ()
     """What the file calls the D channels, where that is not their `names`: numbered columns that
     are taken as the joints in order."""
+    left_out: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    """Least and greatest value of channels that move and are not among these, by name."""
     named: bool = field(init=False)
     """Whether the file names the channels."""
 
@@ -145,8 +69,10 @@ class Recording:
 
         Raises:
             InvalidDemonstrationsError: Shapes that do not fit, fewer than two frames, repeated
-                names, times that do not increase, or values that are not finite.
+                names, or times that are not finite or do not increase.
+            FileFormatError: Names that are too long.
         """
+        check_names("a recording", (self.episode, *self.names, *self.columns))
         episode = f"episode {self.episode}"
         try:
             times = np.array(self.times, dtype=np.float64)
@@ -170,13 +96,11 @@ class Recording:
             raise InvalidDemonstrationsError(
                 f"{episode} repeats a channel name: {say_names(repeated)}; rename the channels"
             )
-        numbers = np.column_stack([positions, times])
-        bad = np.argwhere(~np.isfinite(numbers))
+        bad = np.flatnonzero(~np.isfinite(times))
         if bad.size:
-            frame, column = bad[0].tolist()
             raise InvalidDemonstrationsError(
-                f"{episode}: {(*names, 'time')[column]} is {numbers[frame, column]} at frame "
-                f"{frame}, expected a finite number; mend or drop that episode"
+                f"{episode}: time is {times[bad[0]]} at frame {bad[0]}, expected a finite number; "
+                "mend or drop that episode"
             )
         again = _repeated(times, positions)
         if np.any(again) and not np.all(again[1:]):
@@ -214,6 +138,19 @@ class Recording:
         return float(np.median(np.diff(self.times)))
 
 
+def recorded(
+    episode: str, clock: Clock, positions: Positions, names: tuple[str, ...] = (), **more: Any
+) -> Recording:
+    """Return a recording at the times of a clock; `more` are further fields."""
+    said = {"clock": clock.source, "ambiguities": clock.ambiguities} | more
+    return Recording(episode, clock.times, positions, names, **said)
+
+
+def unread() -> Recording:
+    """Stand for an episode that was left out before anything of it was read."""
+    raise AssertionError("what is left out is never read")
+
+
 def _repeated(times: Times, positions: Positions) -> Bool[np.ndarray, " T"]:
     """Which frames repeat the one before, time and all.
 
@@ -229,20 +166,6 @@ def _without_units(names: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[str |
     stripped = tuple(name for name, _ in split)
     units = tuple(unit for _, unit in split)
     return (stripped if len(set(stripped)) == len(set(names)) else names), units
-
-
-def check_size(path: Path, name: str, shape: Sequence[int]) -> None:
-    """Refuse an array that could be no recording, before it is read: a header may claim anything.
-
-    Raises:
-        FileFormatError: It is larger than a day of an arm at 1 kHz.
-    """
-    numbers = math.prod(map(int, shape))
-    if numbers > _MOST_NUMBERS:
-        raise FileFormatError(
-            f"{path}: {name} has shape {tuple(shape)}, {numbers:.2g} numbers; that is no recording "
-            "of throws, copy the file again"
-        )
 
 
 @contextmanager
@@ -269,8 +192,10 @@ def named_damage(path: Path, what: str) -> Iterator[None]:
 
 def natural_order(name: object) -> tuple[tuple[int, str], ...]:
     """Return a sort key by which `demo_10` follows `demo_9`."""
-    parts = re.split(r"(\d+)", str(name))
-    return tuple((int(part), "") if part.isdigit() else (-1, part) for part in parts)
+    parts = re.split(r"([0-9]+)", str(name))
+    # By length and digits: Python makes no number of 5,000 digits.
+    digits = [part.lstrip("0") if i % 2 else part for i, part in enumerate(parts)]
+    return tuple((len(d), d) if i % 2 else (-1, d) for i, d in enumerate(digits))
 
 
 def files_at(source: Path, suffixes: tuple[str, ...]) -> list[Path]:

@@ -7,20 +7,24 @@ a message. Joints are matched by name in every message, because nothing fixes th
 from __future__ import annotations
 
 from collections import Counter
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from prior_reinforce.bench.importing.bounds import check_names, check_numbers
 from prior_reinforce.bench.importing.clock import Times
 from prior_reinforce.bench.importing.naming import find_channels
+from prior_reinforce.bench.importing.options import ReadOptions
 from prior_reinforce.bench.importing.recording import (
-    ReadOptions,
+    Episodes,
     Recording,
-    check_size,
     has_suffix,
     named_damage,
     natural_order,
+    recorded,
+    unread,
 )
 from prior_reinforce.bench.importing.units import say_names
 from prior_reinforce.errors import FileFormatError
@@ -35,7 +39,7 @@ def recognises(source: Path) -> bool:
     return bool(_bags_at(source))
 
 
-def read(source: Path, options: ReadOptions) -> list[Recording]:
+def read(source: Path, options: ReadOptions) -> Episodes:
     """Read a bag, or every bag of a folder."""
     from rosbags.highlevel import AnyReader
     from rosbags.typesys import Stores, get_typestore
@@ -45,10 +49,13 @@ def read(source: Path, options: ReadOptions) -> list[Recording]:
         raise FileFormatError(
             f"{source} is no bag and holds none; expected .bag, .mcap, .db3 or a ROS 2 bag's folder"
         )
-    recordings: list[Recording] = []
     for bag in bags:
         name = bag.name if bag.is_dir() else bag.stem
-        if not any(e == name or e.startswith(f"{name}-") for e in options.episodes or (name,)):
+        wanted = options.episodes or (name,)
+        if name in (options.leave_out or ()) or not any(
+            e == name or e.startswith(f"{name}-") for e in wanted
+        ):
+            yield name, unread
             continue
         # A link inside could name any file of this machine.
         for path in bag.iterdir() if bag.is_dir() else ():
@@ -58,22 +65,21 @@ def read(source: Path, options: ReadOptions) -> list[Recording]:
             definitions = get_typestore(Stores.LATEST)
             with AnyReader([bag], default_typestore=definitions) as reader:
                 connections, kind = _topic(bag, reader, options.key)
-                check_size(bag, connections[0].topic, (reader.message_count,))
+                check_numbers(bag, connections[0].topic, (reader.message_count,))
                 messages = [
                     (stamp, reader.deserialize(raw, connection.msgtype))
                     for connection, stamp, raw in reader.messages(connections=connections)
                 ]
-            if not messages:
-                raise FileFormatError(
-                    f"{bag}: topic {connections[0].topic} has no messages; leave it out"
-                )
-            if kind == _STATE:
-                recordings.append(_states(bag, name, messages, options))
-            else:
-                recordings.extend(
-                    _trajectories(name, [message for _, message in messages], options)
-                )
-    return [recording for recording in recordings if options.wants(recording.episode)]
+        if not messages:
+            raise FileFormatError(
+                f"{bag}: topic {connections[0].topic} has no messages; leave it out"
+            )
+        if kind == _STATE:
+            yield name, partial(_states, bag, name, messages, options)
+            continue
+        for index, (_, message) in enumerate(messages):
+            episode = name if len(messages) == 1 else f"{name}-{index}"
+            yield episode, partial(_trajectory, bag, episode, message, options)
 
 
 def _bags_at(source: Path) -> list[Path]:
@@ -107,6 +113,7 @@ def _states(
     bag: Path, name: str, messages: list[tuple[int, Any]], options: ReadOptions
 ) -> Recording:
     """One episode of JointStates; messages that lack a wanted joint are another publisher's."""
+    check_names(bag, {joint for _, message in messages for joint in message.name})
     kinds = Counter(tuple(sorted(message.name)) for _, message in messages)
     every = list(dict.fromkeys(joint for _, message in messages for joint in message.name))
     # Only their recorded names are looked for in each message.
@@ -126,8 +133,9 @@ def _states(
         remarks.append(f"{len(messages) - len(kept)} messages without all joints skipped")
     # Everything else a message holds, such as fingers, stays available by name.
     names = tuple(n for n in kept[0][1].name if all(n in m.name for _, m in kept))
-    rows = [[dict(zip(m.name, m.position, strict=True))[n] for n in names] for _, m in kept]
-    positions = np.array(rows, dtype=np.float64)
+    with named_damage(bag, "a ROS bag"):
+        rows = [[dict(zip(m.name, m.position, strict=True))[n] for n in names] for _, m in kept]
+        positions = np.array(rows, dtype=np.float64)
     stamps = [m.header.stamp.sec * 10**9 + m.header.stamp.nanosec for _, m in kept]
     if stamps[0] > 0 and stamps[-1] > stamps[0] and sorted(stamps) == stamps:
         times, source = _since_first(stamps), "header stamps"
@@ -135,9 +143,7 @@ def _states(
         times, source = _since_first([stamp for stamp, _ in kept]), "the recorder's stamps"
         remarks.append("header stamps unusable, times are those of the recorder")
     clock = options.clock(name, len(kept), stamps=times, name=source, unit="ns")
-    return Recording(
-        name, clock.times, positions, names, remarks=tuple(remarks), clock=clock.source
-    )
+    return recorded(name, clock, positions, names, remarks=tuple(remarks))
 
 
 def _since_first(stamps: list[int]) -> Times:
@@ -145,16 +151,11 @@ def _since_first(stamps: list[int]) -> Times:
     return np.array([stamp - stamps[0] for stamp in stamps], dtype=np.float64)
 
 
-def _trajectories(name: str, messages: list[Any], options: ReadOptions) -> list[Recording]:
-    recordings = []
-    for index, message in enumerate(messages):
+def _trajectory(bag: Path, episode: str, message: Any, options: ReadOptions) -> Recording:
+    with named_damage(bag, "a ROS bag"):
         times = [p.time_from_start.sec + p.time_from_start.nanosec * 1e-9 for p in message.points]
         positions = np.array([p.positions for p in message.points], dtype=np.float64)
         positions = positions.reshape(len(times), -1)
-        episode = name if len(messages) == 1 else f"{name}-{index}"
-        names = tuple(message.joint_names)
-        clock = options.clock(
-            episode, len(times), stamps=np.array(times), name="time_from_start", unit="s"
-        )
-        recordings.append(Recording(episode, clock.times, positions, names, clock=clock.source))
-    return recordings
+        stamps, name = np.array(times), "time_from_start"
+        clock = options.clock(episode, len(times), stamps=stamps, name=name, unit="s")
+        return recorded(episode, clock, positions, tuple(message.joint_names))

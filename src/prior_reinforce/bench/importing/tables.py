@@ -10,7 +10,7 @@ from __future__ import annotations
 import io
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,9 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int
 
+from prior_reinforce.bench.importing.bounds import check_bytes, check_names, check_table
 from prior_reinforce.bench.importing.units import known_unit
+from prior_reinforce.bench.importing.workbooks import check_workbook
 from prior_reinforce.errors import FileFormatError, PriorReinforceError
 
 Column = Float[np.ndarray, " T"]
@@ -30,6 +32,7 @@ _SAMPLE = 40
 """Lines that a dialect is found out from."""
 _WESTERN = set("°µ²³äöüÄÖÜßàâçéèêëîïôùûñÀÉÈáíóúãõåæøÅÆØ")
 """What stands beside ASCII in tables that a Western Excel saves in its own code page."""
+_COMMA = re.compile(r"[+-]?(0,\d{3}|\d+,(\d{1,2}|\d{4,}))")
 _SECOND_ROW_OF_UNITS = re.compile(r"[\[(]?[A-Za-zµμ°/^*·0-9.%-]{0,12}[\])]?")
 
 
@@ -87,7 +90,7 @@ class Table:
             text = _as_text(self.cells[column][i])
             if text.lower() not in ("nan", "+nan", "-nan"):
                 raise FileFormatError(
-                    f"{self.where}, line {self.lines[i]}: {self.names[column]} is {text!r}, "
+                    f"{self.where}, line {self.lines[i]}: {self.names[column]} is {text[:40]!r}, "
                     "expected a number; mend that cell, or keep other columns"
                 )
         return values
@@ -117,20 +120,23 @@ class Table:
         return np.asarray((times - times.iloc[0]).dt.as_unit("ns").astype("int64"))
 
 
-def read_tables(path: Path, dialect: Dialect | None = None) -> list[Table]:
+def read_tables(
+    path: Path, dialect: Dialect | None = None, head: Collection[str] = ()
+) -> list[Table]:
     """Read a CSV, or every sheet of a workbook that holds something.
 
     Args:
         path: Of the file.
         dialect: What is said of a CSV.
+        head: Names of which the line of names has one; rows above it are titles.
 
     Raises:
         FileFormatError: It is no such file.
     """
     try:
         if path.suffix.lower() in WORKBOOKS:
-            return _read_workbook(path)
-        return [_read_csv(path, dialect or Dialect())]
+            return _read_workbook(path, head)
+        return [_read_csv(path, dialect or Dialect(), head)]
     except PriorReinforceError:
         raise
     except Exception as error:  # pandas and calamine raise a dozen kinds on damaged bytes
@@ -144,25 +150,43 @@ def read_tables(path: Path, dialect: Dialect | None = None) -> list[Table]:
 WORKBOOKS = (".xlsx", ".xlsm", ".xls", ".ods")
 
 
-def _read_workbook(path: Path) -> list[Table]:
+def _read_workbook(path: Path, head: Collection[str]) -> list[Table]:
     import pandas as pd
 
+    check_workbook(path)
     sheets = pd.read_excel(path, sheet_name=None, header=None, engine="calamine", dtype=object)
     tables = []
     for name, frame in sheets.items():
-        rows = [["" if pd.isna(cell) else cell for cell in row] for row in frame.values.tolist()]
+        cells = frame.values.tolist()
+        rows = [["" if pd.isna(cell) else _cell(cell) for cell in row] for row in cells]
         numbered = [(i, row) for i, row in enumerate(rows, 1) if any(_as_text(c) for c in row)]
         if numbered:
             where = f"{path}" if len(sheets) == 1 else f"{path} [{name}]"
-            tables.append(_table(where, numbered, ".", None))
+            tables.append(_table(where, _below_titles(numbered, head), ".", None))
     if not tables:
         raise FileFormatError(f"{path} has no row; expected a line of column names and frames")
     return tables
 
 
-def _read_csv(path: Path, dialect: Dialect) -> Table:
+def _cell(cell: Any) -> Any:
+    """A cell of a workbook; a text such as `148,8` is a number, `1,488` may be a thousand."""
+    return cell.replace(",", ".") if isinstance(cell, str) and _COMMA.fullmatch(cell) else cell
+
+
+def _below_titles(
+    rows: list[tuple[int, list[Any]]], head: Collection[str]
+) -> list[tuple[int, list[Any]]]:
+    """The rows from the line of names on, where one of the first has one of its names."""
+    for i, (_, row) in enumerate(rows[:_SAMPLE]):
+        if any(_as_text(cell).lower() in head for cell in row):
+            return rows[i:]
+    return rows
+
+
+def _read_csv(path: Path, dialect: Dialect, head: Collection[str]) -> Table:
     import pandas as pd
 
+    check_bytes(path, path.stat().st_size)
     lines = _decoded(path).splitlines()
     kept = [(i, line) for i, line in enumerate(lines, 1) if line.strip()]
     data = [(i, line) for i, line in kept if not line.lstrip().startswith(_COMMENTS)]
@@ -172,8 +196,11 @@ def _read_csv(path: Path, dialect: Dialect) -> Table:
     said = re.fullmatch(r"sep=(.)", data[0][1].strip())
     if said and len(data) > 1:
         dialect, data = Dialect(dialect.delimiter or said[1], dialect.decimal), data[1:]
-    delimiter, decimal = _dialect([line for _, line in data[:_SAMPLE]], dialect)
-    width = max(len(_split(line, delimiter)) for _, line in data)
+    sample = [line for _, line in data[:_SAMPLE]]
+    check_table(path, 1, 1 + max(line.count(mark) for line in sample for mark in ",;\t"))
+    delimiter, decimal = _dialect(sample, dialect)
+    width = max(_width(line, delimiter) for _, line in data)
+    check_table(path, len(data), width)
     frame = pd.read_csv(
         io.StringIO("\n".join(line for _, line in data)),
         sep=delimiter,
@@ -188,7 +215,8 @@ def _read_csv(path: Path, dialect: Dialect) -> Table:
     numbers = [i for i, _ in data] if len(rows) == len(data) else list(range(1, len(rows) + 1))
     above = [line for i, line in kept if i == data[0][0] - 1 and (i, line) not in data]
     title = [c.strip() for c in _split(above[0].lstrip(" #%/"), delimiter)] if above else None
-    return _table(str(path), list(zip(numbers, rows, strict=True)), decimal, title)
+    numbered = _below_titles(list(zip(numbers, rows, strict=True)), head)
+    return _table(str(path), numbered, decimal, title)
 
 
 def _decoded(path: Path) -> str:
@@ -210,6 +238,10 @@ def _decoded(path: Path) -> str:
 
 def _split(line: str, delimiter: str) -> list[str]:
     return line.split() if delimiter == r"\s+" else line.split(delimiter)
+
+
+def _width(line: str, delimiter: str) -> int:
+    return len(line.split()) if delimiter == r"\s+" else line.count(delimiter) + 1
 
 
 def _dialect(lines: Sequence[str], given: Dialect) -> tuple[str, str]:
@@ -257,6 +289,7 @@ def _table(
         names, named = [f"column {i}" for i in range(1, len(first) + 1)], False
     if named and len(rows) > 1 and _are_units([_as_text(c) for c in rows[0][1]], decimal):
         units, rows = [known_unit(_as_text(c)) for c in rows[0][1]], rows[1:]
+    check_names(where, names)
     columns = [[row[i] for _, row in rows] for i in range(len(names))]
     kept = [i for i, name in enumerate(names) if not _is_padding(name, columns[i])]
     return Table(
@@ -307,6 +340,11 @@ def _numeric(cells: Sequence[Any], decimal: str) -> Column:
         pd.to_numeric(pd.Series([_plain(cell, decimal) for cell in cells]), errors="coerce"),
         dtype=np.float64,
     )
+
+
+def counts(values: Column) -> bool:
+    """Whether a column counts rows or tells the time: it increases with every row."""
+    return bool(np.all(np.diff(values) > 0))
 
 
 def _plain(cell: Any, decimal: str) -> Any:

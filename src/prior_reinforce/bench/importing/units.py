@@ -1,7 +1,7 @@
-"""Units of recordings: read from names, converted, and guessed from what an arm can do.
+"""Units of recordings: read from names, converted, and judged by what an arm can do.
 
-A guess is never taken silently. It is a `Doubt`: what cannot be, what it looks like, and the option
-that says so.
+A guess is never taken silently. It is an `Ambiguity`: what cannot be, what it looks like, and the
+option that settles it.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ _SPELLINGS = {
     "m": ("m", "metre", "metres", "meter", "meters"),
     "cm": ("cm", "centimetre", "centimetres", "centimeter", "centimeters"),
     "mm": ("mm", "millimetre", "millimetres", "millimeter", "millimeters"),
+    "in": ("in", "inch", "inches", '"'),
     "s": ("s", "sec", "secs", "second", "seconds"),
     "ms": ("ms", "msec", "millisecond", "milliseconds"),
     "us": ("us", "µs", "μs", "usec", "microsecond", "microseconds"),
@@ -32,19 +33,27 @@ _BASE: Mapping[str, tuple[str, float]] = {
     "m": ("m", 1.0),
     "cm": ("m", 0.01),
     "mm": ("m", 0.001),
+    "in": ("m", 0.0254),
 }
 SECONDS: Mapping[str, float] = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 """Units of time, in [s]."""
-_LARGEST_DEGREES = 720.0
-"""Ours: beyond two turns it is no angle of a joint in degrees either."""
-_LARGEST_CENTIMETRES = 300.0
-"""Ours: above it millimetres are likelier than an arm that reaches three metres."""
+_SLOWEST, _FASTEST = 5.0, 5000.0
+"""Frames a second at which arms are recorded. Ours: teleoperation at 10 Hz is the slowest in use,
+libfranka's and RTDE's logs have 1000 and 500."""
+_PLAUSIBLE: Mapping[str, Mapping[str, tuple[float, float]]] = {
+    "rad": {"rad": (0.0, LARGEST_TURN), "deg": (0.0, 720.0)},
+    "m": {"m": (0.0, FARTHEST), "cm": (0.0, 300.0), "mm": (0.0, math.inf)},
+    "period": {u: (1 / (_FASTEST * scale), 1 / (_SLOWEST * scale)) for u, scale in SECONDS.items()},
+}
+"""Units that angles, lengths and periods may be in, the likeliest first, with the least and the
+greatest number: of angles and lengths the largest one, of periods the time between two frames.
+Ours: no joint turns two turns; above 300, millimetres are likelier than an arm of three metres."""
 _BRACKETS = re.compile(r"(?P<name>.+?)\s*[\[(]\s*(?P<unit>[^\[\]()]+?)\s*[\])]")
 _ENDING = re.compile(r"(?P<name>.+?)[_ ](?P<unit>[a-zµμ°]+)")
 
 
 @dataclass(frozen=True)
-class Doubt:
+class Ambiguity:
     """Something that a recording does not say, and that cannot be what it would be taken for."""
 
     what: str
@@ -53,20 +62,20 @@ class Doubt:
     """The option that says it is as it looks, for instance `--time-unit ms`."""
 
 
-def refuse_doubts(doubts: Iterable[Doubt], also: str = "") -> None:
-    """Do nothing where nothing is in doubt.
+def raise_if_ambiguous(ambiguities: Iterable[Ambiguity], also: str = "") -> None:
+    """Do nothing where nothing is ambiguous.
 
     Args:
-        doubts: What is.
-        also: What else is wrong, so that nobody has to come twice.
+        ambiguities: What is.
+        also: Other problems, so that all are reported at once.
 
     Raises:
-        UnclearUnitsError: Names all doubts, and the options that settle them.
+        UnclearUnitsError: Names all of them, and the options that settle them.
     """
-    found = list(dict.fromkeys(doubts))
+    found = list(dict.fromkeys(ambiguities))
     if found:
-        options = " ".join(dict.fromkeys(doubt.option for doubt in found))
-        what = "; ".join(doubt.what for doubt in found)
+        options = " ".join(dict.fromkeys(one.option for one in found))
+        what = "; ".join(one.what for one in found)
         raise UnclearUnitsError(what, options, also)
 
 
@@ -88,6 +97,8 @@ def split_unit(column: str, among: Collection[str]) -> tuple[str, str | None]:
     for pattern in (_BRACKETS, _ENDING):
         match = pattern.fullmatch(column.strip())
         if match is not None and known_unit(match["unit"]) in among:
+            if pattern is _ENDING and match["unit"] == "in":
+                continue  # `plug_in` is no length
             return match["name"].strip(), known_unit(match["unit"])
     return column, None
 
@@ -134,31 +145,39 @@ def conversion(recorded: str, wanted: str, name: str) -> float:
     return factor / divisor
 
 
-def guess_unit(wanted: str, reach: float) -> str | None:
-    """Return the unit that numbers look like which cannot be in the one that is wanted.
+@dataclass(frozen=True)
+class UnitGuess:
+    """What a number says of the unit that it is taken to be in."""
+
+    unit: str
+    """That unit."""
+    looks: str | None
+    """The unit it looks like: the same where it is plausible, None where no unit fits."""
+    possible: bool
+    """Whether it can be in that unit where somebody says so."""
+
+    @property
+    def plausible(self) -> bool:
+        """Whether nothing speaks against that unit."""
+        return self.looks == self.unit
+
+
+def judge_unit(unit: str, number: float, *, period: bool = False) -> UnitGuess:
+    """Judge whether a number can be in a unit.
 
     Args:
-        wanted: Unit that the numbers would be taken for.
-        reach: Largest of them, without its sign.
-
-    Returns:
-        `deg`, `cm` or `mm`; the unit itself where they can be in it; None where no unit fits.
+        unit: `rad` or `m`, or of a period a unit of time; numbers in any other are plausible.
+        number: The largest angle or length, without its sign; or a period.
+        period: Whether it is the time between two frames.
     """
-    if wanted == "rad" and reach > LARGEST_TURN:
-        return "deg" if reach <= _LARGEST_DEGREES else None
-    if wanted == "m" and reach > FARTHEST:
-        return "cm" if reach <= _LARGEST_CENTIMETRES else "mm"
-    return wanted
-
-
-def cannot_be(unit: str, reach: float) -> bool:
-    """Whether numbers reach farther than could be in a unit, even where somebody says it is theirs.
-
-    Args:
-        unit: `rad` or `m`; others may hold any number.
-        reach: Largest of them, without its sign.
-    """
-    return guess_unit(unit, reach / BEYOND_DOUBT) != unit
+    ranges = _PLAUSIBLE.get("period" if period else unit)
+    if ranges is None:
+        return UnitGuess(unit, unit, possible=True)
+    low, high = ranges[unit]
+    if low <= number <= high:
+        return UnitGuess(unit, unit, possible=True)
+    looks = next((u for u, (least, most) in ranges.items() if least <= number <= most), None)
+    return UnitGuess(unit, looks, possible=not period and number <= BEYOND_DOUBT * high)
 
 
 def say_names(names: Sequence[str]) -> str:

@@ -17,17 +17,21 @@ from typing import Any
 
 import numpy as np
 
+from prior_reinforce.bench.importing.bounds import check_bytes, check_chunks, check_numbers
 from prior_reinforce.bench.importing.clock import Stamps
+from prior_reinforce.bench.importing.options import ReadOptions
 from prior_reinforce.bench.importing.recording import (
     NO_COLUMN,
-    ReadOptions,
+    Episodes,
     Recording,
-    check_size,
     named_damage,
+    recorded,
 )
 from prior_reinforce.errors import FileFormatError
 from prior_reinforce.files import inside
 
+Arrays = Mapping[str, tuple[tuple[int, ...], tuple[int, ...]]]
+"""Shape and chunks of each array of numbers, by its name in the store."""
 _ENDS, _TIMES = "meta/episode_ends", "timestamp"
 _NUMBERS = re.compile(r"([<>|][biuf]\d+)|(bool|u?int\d+|float\d+)")
 _CODECS = frozenset(
@@ -44,7 +48,7 @@ def recognises(source: Path) -> bool:
     return source.name.lower().endswith((".zarr.zip", ".zarr"))
 
 
-def read(source: Path, options: ReadOptions) -> list[Recording]:
+def read(source: Path, options: ReadOptions) -> Episodes:
     """Read every episode of a store."""
     import zarr
 
@@ -59,7 +63,7 @@ def read(source: Path, options: ReadOptions) -> list[Recording]:
         group: Any = zarr.open_group(store, mode="r", **how)
         vectors = sorted(
             name.removeprefix("data/")
-            for name, shape in arrays.items()
+            for name, (shape, _) in arrays.items()
             if name.startswith("data/") and len(shape) == 2
         )
         key = vectors[0] if options.key is None and len(vectors) == 1 else options.key
@@ -70,12 +74,10 @@ def read(source: Path, options: ReadOptions) -> list[Recording]:
             )
         if _ENDS not in arrays:
             raise FileFormatError(f"{source} has no numbers at {_ENDS}; copy the store again")
-        for name in (_ENDS, f"data/{key}"):
-            check_size(source, name, arrays[name])
-        ends = np.asarray(group[_ENDS][:], dtype=np.int64).ravel()
+        ends = np.asarray(_numbers(source, group, arrays, _ENDS), dtype=np.int64).ravel()
         if ends.size == 0:
             raise FileFormatError(f"{source} holds no episode; copy the store again")
-        positions = np.asarray(group[f"data/{key}"][:], dtype=np.float64)
+        positions = np.asarray(_numbers(source, group, arrays, f"data/{key}"), dtype=np.float64)
         stamps = _stamps(source, group, arrays, options)
     starts = np.concatenate([[0], ends[:-1]])
     if np.any(ends <= starts) or ends[-1] != len(positions):
@@ -83,28 +85,17 @@ def read(source: Path, options: ReadOptions) -> list[Recording]:
             f"{source}: episodes end at {ends[:8].tolist()} but there are {len(positions)} frames; "
             "copy the store again"
         )
-    recordings = []
-    for episode, (start, end) in enumerate(zip(starts.tolist(), ends.tolist(), strict=True)):
-        if options.wants(str(episode)):
-            own = None if stamps is None else stamps[start:end]
-            clock = options.clock(
-                str(episode), end - start, stamps=own, name=options.time_column or _TIMES
-            )
-            recordings.append(
-                Recording(
-                    str(episode),
-                    clock.times,
-                    positions[start:end],
-                    clock=clock.source,
-                    doubts=clock.doubts,
-                )
-            )
-    return recordings
+    for number, (start, end) in enumerate(zip(starts.tolist(), ends.tolist(), strict=True)):
+
+        def one(episode: str = str(number), start: int = start, end: int = end) -> Recording:
+            own, name = None if stamps is None else stamps[start:end], options.time_column or _TIMES
+            clock = options.clock(episode, end - start, stamps=own, name=name)
+            return recorded(episode, clock, positions[start:end])
+
+        yield str(number), one
 
 
-def _stamps(
-    source: Path, group: Any, arrays: Mapping[str, tuple[int, ...]], options: ReadOptions
-) -> Stamps | None:
+def _stamps(source: Path, group: Any, arrays: Arrays, options: ReadOptions) -> Stamps | None:
     """Times of all frames, where the store has them."""
     there = sorted(name.removeprefix("data/") for name in arrays if name.startswith("data/"))
     name = options.time_column or (_TIMES if _TIMES in there else NO_COLUMN)
@@ -112,12 +103,22 @@ def _stamps(
         return None
     if name not in there:
         raise FileFormatError(f"{source} has no array {name} in data/; it has {there}")
-    check_size(source, name, arrays[f"data/{name}"])
-    return np.asarray(group[f"data/{name}"][:]).ravel()
+    return np.asarray(_numbers(source, group, arrays, f"data/{name}")).ravel()
 
 
-def _plain_arrays(source: Path) -> dict[str, tuple[int, ...]]:
-    """Shapes of the arrays of plain numbers, by name, from their metadata alone.
+def _numbers(source: Path, group: Any, arrays: Arrays, name: str) -> Stamps:
+    """The numbers of an array, unless its metadata claims more than a recording has."""
+    shape, chunks = arrays[name]
+    check_numbers(source, name, shape)
+    check_chunks(source, name, shape, chunks)
+    array = group[name]
+    # One chunk alone first: where that is damaged, it is said once, not by all readers at a time.
+    np.asarray(array[(slice(0, 1),) * len(shape)])
+    return np.asarray(array[:])
+
+
+def _plain_arrays(source: Path) -> Arrays:
+    """Shapes and chunks of the arrays of plain numbers, by name, from their metadata alone.
 
     Arrays of objects, and codecs that make objects, could run code when they are read; they are
     left out, and so are never opened.
@@ -125,7 +126,7 @@ def _plain_arrays(source: Path) -> dict[str, tuple[int, ...]]:
     Raises:
         FileFormatError: A part of the store is a link that leads out of it.
     """
-    plain = {}
+    plain: dict[str, tuple[tuple[int, ...], tuple[int, ...]]] = {}
     for name, text in _metadata(source):
         array, _, file = name.rpartition("/")
         found = json.loads(text)
@@ -138,7 +139,8 @@ def _plain_arrays(source: Path) -> dict[str, tuple[int, ...]]:
         else:
             continue
         if isinstance(numbers, str) and _NUMBERS.fullmatch(numbers) and _CODECS.issuperset(codecs):
-            plain[array] = tuple(map(int, found["shape"]))
+            chunks = found.get("chunks") or found["chunk_grid"]["configuration"]["chunk_shape"]
+            plain[array] = tuple(map(int, found["shape"])), tuple(map(int, chunks))
     return plain
 
 
@@ -147,6 +149,8 @@ def _metadata(source: Path) -> Iterator[tuple[str, bytes]]:
     names = (".zarray", "zarr.json")
     if not source.is_dir():
         with zipfile.ZipFile(source) as packed:
+            unpacked = sum(member.file_size for member in packed.infolist())
+            check_bytes(source, unpacked, "unpacks to")
             for member in packed.namelist():
                 if member.endswith(names):
                     yield member, packed.read(member)

@@ -90,6 +90,8 @@ class WorkspaceState(State):
         super().__init__()
         self.demonstrations: str | None = None
         """SHA-256 of the demonstrations in use; None before the first import."""
+        self.demonstrations_source = ""
+        """What they were imported from, and what was left out of it."""
         self.trainings: dict[str, ModelTrained] = {}
         """The latest training of every model by its hash; the last is in use."""
         self.executions: dict[int, Executing | Executed] = {}
@@ -116,6 +118,7 @@ class WorkspaceState(State):
         match event:
             case DemonstrationsImported():
                 self.demonstrations = event.sha256
+                self.demonstrations_source = event.source
             case ModelTrained():
                 self.trainings.pop(event.model, None)  # learned again, it becomes the last
                 self.trainings[event.model] = event

@@ -35,7 +35,7 @@ def describe(workspace: Workspace) -> str:
             f"{manifest.format.action_dim} numbers a frame, a frame every "
             f"{manifest.format.dt * 1000:g} ms; robot: {robot}",
         ),
-        ("demonstrations", str(n or "none yet")),
+        ("demonstrations", f"{n} from {state.demonstrations_source}" if n else "none yet"),
         ("model", _say_model(workspace)),
         *(("  note", remark) for remark in (training.remarks if training is not None else ())),
     ]

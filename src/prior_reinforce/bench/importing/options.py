@@ -1,0 +1,111 @@
+"""What may be said of recordings: one record for Python, the command line and the readers."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+from typing import Literal
+
+from prior_reinforce.bench.importing.clock import TIME_UNITS, Clock, Stamps, clock_of
+from prior_reinforce.bench.importing.tables import DELIMITERS, Dialect
+from prior_reinforce.errors import ConfigurationError
+
+
+@dataclass(frozen=True)
+class ReadOptions:
+    """How recordings are read; an option that the format has no use for is refused.
+
+    Raises:
+        ConfigurationError: A value outside its range.
+    """
+
+    format: str | None = None
+    """Format of the source: npz, csv, excel, lerobot, robomimic, droid, ros, zarr; detected if not
+    given."""
+    key: str | None = None
+    """Where the motion is within the source: array of an NPZ, feature of a LeRobot data set, path
+    of an HDF5 data set inside an episode, topic of a bag. If not given, the only candidate."""
+    rate: float | None = None
+    """Frames a second, for a source without times; where it has times, they must agree."""
+    time_unit: Literal["s", "ms", "us", "ns", "frame"] | None = None
+    """Unit of the recorded times, where their name does not say it (`t_ms`); `frame` for a column
+    that counts frames."""
+    time_column: str | None = None
+    """Column or array of the times: its name, or its number from 1; none reads no times."""
+    episode_column: str | None = None
+    """Column of a table that says which episode a row is of."""
+    delimiter: str | None = None
+    """Delimiter of a CSV: comma, semicolon, tab, space, or the character; found out if not
+    given."""
+    decimal: Literal[".", ","] | None = None
+    """Decimal sign of a CSV; found out if not given."""
+    episodes: tuple[str, ...] | None = None
+    """Episodes to keep, in order; all if not given."""
+    leave_out: tuple[str, ...] | None = None
+    """Episodes to leave out; they are not read."""
+    joints: tuple[str, ...] | None = None
+    """Recorded names of the channels to keep, in the plan's order; where the source names nothing,
+    the names of all its columns. If not given, all channels (on the command line, the manifest's
+    action names)."""
+    units: tuple[str, ...] | None = None
+    """Recorded units of those channels: rad, deg, m, cm, mm, in; a single one holds for all. If not
+    given, what the source says, and the plan's where it says nothing."""
+
+    def __post_init__(self) -> None:
+        """Check, and make tuples of what may be given as lists."""
+        for name in ("episodes", "leave_out", "joints", "units"):
+            given = getattr(self, name)
+            if given is not None:
+                object.__setattr__(self, name, tuple(map(str, given)))
+        if self.rate is not None and not (math.isfinite(self.rate) and self.rate > 0):
+            raise ConfigurationError(
+                f"rate must be a positive number of frames a second, got {self.rate}"
+            )
+        if self.time_unit not in (None, *TIME_UNITS):
+            raise ConfigurationError(
+                f"time-unit must be one of {', '.join(TIME_UNITS)}, got {self.time_unit!r}"
+            )
+        if self.delimiter not in (None, *DELIMITERS) and len(str(self.delimiter)) != 1:
+            raise ConfigurationError(
+                f"delimiter must be one of {', '.join(DELIMITERS)}, or one character, got "
+                f"{self.delimiter!r}"
+            )
+
+    @property
+    def given(self) -> dict[str, object]:
+        """The options that were given, by field."""
+        values = {field.name: getattr(self, field.name) for field in fields(self)}
+        return {name: value for name, value in values.items() if value is not None}
+
+    @property
+    def dialect(self) -> Dialect:
+        """What was said of how a CSV is written."""
+        said = self.delimiter
+        return Dialect(said if said is None else DELIMITERS.get(said, said), self.decimal)
+
+    def leaves_out(self, episode: str) -> bool:
+        """Whether an episode was not asked for."""
+        wanted = self.episodes is None or episode in self.episodes
+        return not wanted or episode in (self.leave_out or ())
+
+    def clock(
+        self,
+        episode: str,
+        count: int,
+        *,
+        stamps: Stamps | None = None,
+        name: str = "",
+        unit: str | None = None,
+        own_rate: float | None = None,
+    ) -> Clock:
+        """Return the times of an episode, as in `clock_of`, given these options."""
+        return clock_of(
+            episode,
+            count,
+            stamps=stamps,
+            name=name,
+            unit=unit,
+            own_rate=own_rate,
+            rate=self.rate,
+            time_unit=self.time_unit,
+        )
