@@ -20,7 +20,7 @@ install: $(VENV)/.core
 test: $(VENV)/.all
 	PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n 3 --dist load --maxschedchunk 4 $(ARGS)
 
-# CASES generated attacks, one table by class: a sixth as many on the way to the arm, a tenth kills.
+# CASES generated attacks, one table by class: a third as many on the way to the arm, a tenth kills.
 # and a third as many streams that shake an arm.
 CASES ?= 3000
 attack: $(VENV)/.all

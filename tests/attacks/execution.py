@@ -1,43 +1,33 @@
-"""Attacks on the way from a plan to the arm: signals, kills, hangs, doubles, edits.
+"""Attacks on the way from a plan to the arm: signals, kills, hangs, doubles, edits, copies.
 
     python -m tests.attacks.execution [CASES] [SEED]
 
 Whatever is done, no plan that is refused moves, none moves twice, two never move at once, and every
-motion stands in the journal.
+motion stands in the journal; and nobody is told of harm where there was none.
 """
 
 from __future__ import annotations
 
 import collections
 import contextlib
+import multiprocessing
 import os
 import random
 import shutil
 import signal
-import subprocess
 import sys
 import tempfile
 import time
-import warnings
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 from prior_reinforce.bench.robots.executors.lock import is_executing
 from prior_reinforce.bench.workspace.workspace import Workspace
-from prior_reinforce.errors import PriorReinforceError
 from tests.attacks.harness import HELD, wait_until
 from tests.attacks.table import prepare
 
-PROGRAM = """
-import sys
-from prior_reinforce.bench.workspace.workspace import Workspace
-with Workspace(sys.argv[1]) as workspace:
-    number = workspace.session().ask().number
-    print("ready", flush=True)
-    sys.stdin.readline()
-    workspace.execute(number, sys.argv[2], time_limit=float(sys.argv[3]))
-"""
 DRIVER = """
-import os, pathlib, signal, sys, time
+import os, pathlib, shutil, signal, sys, time
 here, kind = pathlib.Path(sys.argv[1]), sys.argv[2]
 if kind == "detaches" and os.fork():
     sys.exit(0)
@@ -51,7 +41,11 @@ if kind == "detaches":
     os.setsid()
 if kind in ("hangs", "will not stop"):
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
-if kind == "stopped":
+if kind == "continued" and os.fork() == 0:
+    time.sleep(0.1)
+    os.kill(os.getppid(), signal.SIGCONT)
+    os._exit(0)
+if kind in ("stopped", "continued"):
     os.kill(os.getpid(), signal.SIGSTOP)
 def alive(pid):
     try:
@@ -73,11 +67,22 @@ if kind == "says no":
 if kind == "lies":
     pathlib.Path(sys.argv[4], "result.json").write_text('{"outcome": "not_moved"}')
     sys.exit(1)
+if kind == "deletes":
+    shutil.rmtree(sys.argv[4])
+if kind == "changes":
+    os.unlink(sys.argv[3])
+    pathlib.Path(sys.argv[3]).write_text("another plan")
 sys.exit(3 if kind == "crashes" else 0)
 """
 KINDS = ("quick", "slow", "detaches", "double fork", "hangs", "will not stop", "stopped", "many")
-KINDS += ("crashes", "lies")
+KINDS += ("crashes", "lies", "says no", "continued", "deletes", "changes")
+WRAPPER = "import subprocess, sys; sys.exit(subprocess.run(sys.argv[1:]).returncode)"
+"""What it starts has none of the descriptors that it inherited, and so no lock."""
+ENDS = {"says no": None, "lies": "aborted", "crashes": "aborted", "changes": "aborted"}
+"""Outcome in the journal of a driver that nobody disturbs; the others are done."""
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGKILL)
+SIGNALS += (signal.SIGTSTP, signal.SIGKILL)
+FORK = multiprocessing.get_context("fork")
 _EXITING = 4
 """PF_EXITING (linux/sched.h): the kernel closes its files, and with them the lock, before it is a
 zombie."""
@@ -94,13 +99,20 @@ jerk = [1000000, 1000000]
 def attack(rng: random.Random, here: Path, asked: Path) -> str:
     """One attack; `held`, or what went wrong."""
     folder, refused = here / "planar", False
+    os.environ["PRIOR_REINFORCE_ARM"] = str(here)  # other attacks run at the same time
     shutil.copytree(asked, folder)
     (here / "driver.py").write_text(DRIVER)
     kind = rng.choice(KINDS)
-    command = f"{sys.executable} {here}/driver.py {here} '{kind}' {{plan}} {{result}}"
-    limit = "1" if kind in ("hangs", "will not stop", "stopped") else "20"
-    programs = [_start(folder, command, limit) for _ in range(rng.choice([1, 1, 2]))]
-    edit = rng.choice(["nothing", "nothing", "limit", "plan", "both lost"])
+    wrapper = f"{sys.executable} -I -S -c '{WRAPPER}' " if rng.random() < 0.4 else ""
+    driver = f"{sys.executable} -I -S {here}/driver.py {here} '{kind}' {{plan}} {{result}}"
+    limit = 0.6 if kind in ("hangs", "will not stop", "stopped") else 20.0
+    edit = rng.choice(["nothing"] * 3 + ["limit", "plan", "copy", "restore", "restore", "raises"])
+    folders = [folder] * rng.choice([1, 1, 2])
+    if edit == "copy":
+        shutil.copytree(folder, here / "copy")
+        folders = [folder, here / "copy"]
+    raises = rng.choice(["show", "alarm"]) if edit == "raises" else ""
+    programs = [Program(place, wrapper + driver, limit, raises) for place in folders]
     if edit == "limit":  # one per cent below what the plan asks for
         peak = _peak_velocity(folder)
         factor = rng.choice([0.99, 1.01])
@@ -115,52 +127,103 @@ def attack(rng: random.Random, here: Path, asked: Path) -> str:
         content = bytearray(plan.read_bytes())
         content[rng.randrange(len(content))] ^= 1 << rng.randrange(8)
         plan.write_bytes(content)
-    if edit == "both lost":
-        for path in folder.glob("*lock*"):
-            path.unlink()
     for program in programs:
-        with contextlib.suppress(OSError):
-            program.stdin.write("go\n")
-            program.stdin.flush()
-    for _ in range(rng.choice([0, 1, 1, 3])):
+        program.go()
+    signals = rng.choice([0, 0, 1, 1, 3])
+    for _ in range(signals):
         time.sleep(rng.uniform(0, 0.5))
         _signal(rng, rng.choice(programs))
     try:
-        return _judge(here, folder, programs, refused, kind)
+        verdict = _judge(here, folders, programs, refused)
+        calm = signals == 0 and len(programs) == 1 and edit in ("nothing", "restore")
+        if verdict == HELD and calm and limit > 1:
+            verdict = _ends_as_it_was(folder, kind)
+        if verdict == HELD and edit == "restore" and kind not in ("deletes", "changes", "says no"):
+            verdict = _restored(here, folder, asked, driver)
+        return verdict
     finally:
         for program in programs:
             program.kill()
-            program.communicate()
         for pid in _motions(here):
             with contextlib.suppress(OSError):
                 os.kill(pid, signal.SIGKILL)
 
 
-def _start(folder: Path, command: str, limit: str) -> subprocess.Popen[str]:
-    program = subprocess.Popen(
-        [sys.executable, "-c", PROGRAM, str(folder), command, limit],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        text=True,
-        start_new_session=True,
-    )
-    program.stdout.readline()
-    return program
+class Program:
+    """A fork of this program that executes a workspace's trial when it is told to."""
+
+    def __init__(self, folder: Path, command: str, limit: float, raises: str = "") -> None:
+        """Start it."""
+        self.status: int | None = None
+        here, self._pipe = os.pipe()
+        self.pid = os.fork()
+        if self.pid == 0:
+            try:
+                os.setsid()
+                for number in SIGNALS:
+                    if number != signal.SIGKILL:
+                        signal.signal(number, signal.SIG_DFL)
+                null = os.open(os.devnull, os.O_RDWR)
+                for descriptor in range(3):
+                    os.dup2(null, descriptor)
+                os.close(self._pipe)
+                os.read(here, 1)
+                self._execute(folder, command, limit, raises)
+            except BaseException:
+                os._exit(1)
+            os._exit(0)
+        os.close(here)
+
+    @staticmethod
+    def _execute(folder: Path, command: str, limit: float, raises: str) -> None:
+        def fail(*_: object) -> None:
+            raise ZeroDivisionError
+
+        if raises == "alarm":
+            signal.signal(signal.SIGALRM, fail)
+            signal.setitimer(signal.ITIMER_REAL, 0.3, 0.05)
+        with Workspace(folder) as workspace:
+            number = workspace.session().ask().number
+            shown = fail if raises == "show" else None
+            workspace.execute(number, command, time_limit=limit, show=shown)
+
+    def go(self) -> None:
+        """Let it execute."""
+        with contextlib.suppress(OSError):
+            os.write(self._pipe, b"x")
+
+    def ended(self) -> bool:
+        """Whether it has."""
+        if self.status is None:
+            pid, status = os.waitpid(self.pid, os.WNOHANG)
+            self.status = status if pid else None
+        return self.status is not None
+
+    def kill(self) -> None:
+        """End it."""
+        if not self.ended():
+            os.kill(self.pid, signal.SIGKILL)
+            wait_until(self.ended)
+        os.close(self._pipe)
 
 
-def _signal(rng: random.Random, program: subprocess.Popen[str]) -> None:
-    """Send some signal to a program, its group, or its supervisor."""
-    number, to = rng.choice(SIGNALS), rng.choice(["program", "group", "supervisor"])
-    with contextlib.suppress(OSError):
+def _signal(rng: random.Random, program: Program) -> None:
+    """Send some signal to a program, its group, or one or both processes of its supervisor."""
+    number, to = rng.choice(SIGNALS), rng.choice(["program", "group", "guard", "runner", "both"])
+    with contextlib.suppress(OSError, IndexError):
         if to == "group":
             os.killpg(program.pid, number)
         elif to == "program":
             os.kill(program.pid, number)
         else:
-            text = Path(f"/proc/{program.pid}/task/{program.pid}/children").read_text()
-            for child in text.split():
-                os.kill(int(child), number)
+            guard = _children(program.pid)[0]
+            runner = _children(guard)[0]
+            for pid in {"guard": [guard], "runner": [runner], "both": [guard, runner]}[to]:
+                os.kill(pid, number)
+
+
+def _children(pid: int) -> list[int]:
+    return [int(word) for word in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
 
 
 def _motions(here: Path) -> list[int]:
@@ -187,55 +250,84 @@ def _alive(pid: int) -> bool:
     return fields[0] != "Z" and not int(fields[6]) & _EXITING
 
 
-def _judge(
-    here: Path, folder: Path, programs: list[subprocess.Popen[str]], refused: bool, kind: str
-) -> str:
+def _judge(here: Path, folders: list[Path], programs: list[Program], refused: bool) -> str:
     """What became of it."""
     for program in programs:
-        try:
-            program.wait(30)
-        except subprocess.TimeoutExpired:
+        if not wait_until(program.ended, 40):
             return "a program hangs"
-    if not wait_until(lambda: not is_executing(folder), 80):
-        # Stopped, and its supervisor killed: it is there, and so is its lock.
-        return HELD if kind == "stopped" else "the lock is never given back"
+    for folder in set(folders):
+        if not wait_until(lambda folder=folder: not is_executing(folder), 80):
+            return "the lock is never given back"
     # A supervisor that was killed takes nothing with it: what goes on must hold the lock.
     if any(_alive(pid) for pid in _motions(here)):
         return "a motion goes on without the lock"
     if "AT ONCE" in ((here / "motions").read_text() if _motions(here) else ""):
         return "two motions at once"
-    with Workspace(folder) as workspace, warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        kinds = collections.Counter(event.kind for event in workspace.events)
-        moved = len(_motions(here))
-        if refused and moved:
-            return "a refused plan moved"
-        if moved > kinds["executing"]:
-            return "a motion is not recorded"
-        if moved > 1:
-            return "a plan moved twice"
-        # One of two programs may have been interrupted before it began, and the other not.
-        if moved > kinds["executing"] - kinds["not_executed"]:
-            return "a motion is recorded as none"
-        before = len(workspace.events)
-        with contextlib.suppress(PriorReinforceError):
-            workspace.recover()
-        if kinds["executing"] == 0 and len(workspace.events) != before:
-            return "something is recovered that never was"
+    moved = len(_motions(here))
+    if refused and moved:
+        return "a refused plan moved"
+    kinds: collections.Counter[str] = collections.Counter()
+    for folder in set(folders):
+        with Workspace(folder) as workspace:
+            kinds.update(entry.kind for entry in workspace.log.entries())
+    if moved > kinds["executing"]:
+        return "a motion is not recorded"
+    if moved > len(set(folders)):
+        return "a plan moved twice"
+    # One of two programs may have been interrupted before it began, and the other not.
+    if moved > kinds["executing"] - kinds["not_executed"] and not _says_no(here):
+        return "a motion is recorded as none"
     return HELD
+
+
+def _says_no(here: Path) -> bool:
+    """Whether the driver itself says that nothing moved."""
+    return any("not_moved" in path.read_text() for path in here.glob("*/executions/*/result.json"))
+
+
+def _ends_as_it_was(folder: Path, kind: str) -> str:
+    """Nobody cries wolf where nobody disturbed the driver."""
+    with Workspace(folder) as workspace:
+        last = [entry.event for entry in workspace.log.entries()][-1]
+    outcome = getattr(last, "outcome", last.kind) if last.kind != "not_executed" else None
+    return HELD if outcome == ENDS.get(kind, "done") else f"a false alarm: {kind} is {outcome}"
+
+
+def _restored(here: Path, folder: Path, asked: Path, driver: str) -> str:
+    """The journal of before is put back, and the same is asked for again."""
+    moved = len(_motions(here))
+    for path in folder.glob("journal.sqlite*"):
+        path.unlink()
+    shutil.copy(asked / "journal.sqlite", folder)
+    again = Program(folder, driver, 20.0)
+    again.go()
+    try:
+        if not wait_until(again.ended, 40):
+            return "a program hangs"
+    finally:
+        again.kill()
+    if moved and len(_motions(here)) > moved:
+        return "a restored journal moved a plan twice"
+    return HELD
+
+
+def _attack(case: int, asked: Path) -> str:
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as here:
+        return attack(random.Random(f"execution {case}"), Path(here), asked)
 
 
 def main(cases: int, seed: int) -> int:
     """Print what broke; how many."""
     counted: collections.Counter[str] = collections.Counter()
-    with tempfile.TemporaryDirectory() as place:
+    with tempfile.TemporaryDirectory() as place, ProcessPoolExecutor(12, FORK) as pool:
         asked = prepare(Path(place))
-        for case in range(cases):
-            with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as here:
-                verdict = attack(random.Random(f"execution {seed + case}"), Path(here), asked)
+        numbers = range(seed, seed + cases)
+        for case, verdict in zip(numbers, pool.map(_attack, numbers, [asked] * cases), strict=True):
             counted[verdict] += 1
             if verdict != HELD:
-                print(f"execution {seed + case}: {verdict}", flush=True)
+                print(f"execution {case}: {verdict}", flush=True)
+            if sum(counted.values()) % 100 == 0:
+                print(f"{sum(counted.values())} tried, {counted[HELD]} held", flush=True)
     held = counted.pop(HELD, 0)
     print(f"{'execution':<12} {cases:>6} {held:>6} {counted.total():>6}")
     return counted.total()
@@ -243,4 +335,4 @@ def main(cases: int, seed: int) -> int:
 
 if __name__ == "__main__":
     numbers = [int(text) for text in sys.argv[1:]]
-    sys.exit(main(*(numbers + [500, 0][len(numbers) :])) > 0)
+    sys.exit(main(*(numbers + [1000, 0][len(numbers) :])) > 0)

@@ -122,9 +122,6 @@ def call(function: Callable[[], object]) -> str:
 
 
 def _broken(error: BaseException) -> str:
-    # The tests' own check of shapes, which refuses a crafted array before numpy does.
-    if type(error).__name__ == "TypeCheckError":
-        return HELD
     return f"traceback: {type(error).__name__}: {where(error)}"
 
 

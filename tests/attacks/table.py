@@ -1,6 +1,6 @@
 """Many attacks, and one table by class: tried, held, broke.
 
-A sixth as many on the way to the arm, a tenth as many kills.
+A third as many on the way to the arm, a tenth as many kills.
 
 python -m tests.attacks.table [CASES] [SEED]
 """
@@ -57,7 +57,7 @@ def main(cases: int, seed: int) -> int:
         print(f"{name:<12} {held + counted.total():>6} {held:>6} {counted.total():>6}")
     from tests.attacks import execution, kills  # they prepare what they attack as we do
 
-    moved, lost = execution.main(cases // 6, seed), kills.main(cases // 10, seed)
+    moved, lost = execution.main(cases // 3, seed), kills.main(cases // 10, seed)
     return sum(counted.total() for counted in broke.values()) + moved + lost
 
 

@@ -37,7 +37,7 @@ def test_nothing_breaks(asked, name):
     attacked()
 
 
-@pytest.mark.parametrize("case", range(15))
+@pytest.mark.parametrize("case", range(150))
 def test_nothing_moves_that_may_not(asked, tmp_path, case):
     assert execution.attack(random.Random(f"execution {case}"), tmp_path, asked) == HELD
 
@@ -58,7 +58,11 @@ def test_the_harness_sees_what_breaks(tmp_path, monkeypatch):
         monkeypatch.setattr("tests.attacks.harness.main", main)
         return command(tmp_path, "status")
 
+    class TypeCheckError(Exception):
+        """What checks shapes in the tests only: users get what comes behind it."""
+
     assert run() == HELD
+    assert run(error=TypeCheckError()).startswith("traceback: TypeCheckError")
     assert run(error=KeyError("a")).startswith("traceback: KeyError")
     assert run(status=3) == "status 3"
     assert run(status=2) == "0 lines"
