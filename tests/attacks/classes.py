@@ -8,21 +8,24 @@ import shutil
 from collections.abc import Callable
 from functools import cache, partial
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import msgspec
 import numpy as np
+from PIL import Image
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
 from prior_reinforce.bench.workspace.workspace import Workspace
 from prior_reinforce.files import sha256, sha256_of_folder
 from prior_reinforce.generators import load_generator
+from prior_reinforce.perception.calibration import TableCalibration
 from prior_reinforce.perception.vlm_formats import FORMATS, read_box
 from tests.attacks import odd
 from tests.attacks.harness import HELD, NASTY, call, command, damage, tree
 from tests.bench.importing import recorded
 from tests.bench.workspace.planar import manifest
+from tests.perception.vision_server import Fault, VisionServer
 
 Attack = Callable[[random.Random, Path, Path], str]
 """Of a source of chance, an empty folder, and a workspace with one open trial to copy from."""
@@ -372,5 +375,45 @@ def journals(rng: random.Random, here: Path, asked: Path) -> str:
     return command(here, name, "planar", *more)
 
 
-_ALL = (flags, tells, goals, outcomes, manifests, recordings, files, models, replies, journals)
+def looks(rng: random.Random, here: Path, asked: Path) -> str:
+    """A photograph, a calibration or a server's answer that is damaged, crafted or hostile."""
+    shutil.copytree(asked, here / "planar")
+    photo, table = here / "photo.png", here / "table.json"
+    pixels = np.full((60, 80, 3), 128, np.uint8)
+    Image.fromarray(pixels).save(photo, rng.choice(["PNG", "PNG", "JPEG", "GIF", "TIFF"]))
+    points = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]])
+    TableCalibration.fit(points, 55 - 50 * points[:, ::-1]).save(table)
+    file = rng.choice([photo, table, here / "photo-seen.json", here / "photo-seen.png"])
+    how = rng.choice(["nothing", "damage", "json", "link"])
+    if how == "damage":
+        file.write_bytes(damage(rng, file.read_bytes() if file.exists() else b"x"))
+    elif how == "json" and file == table:
+        _edit_json(rng, table)
+    elif how == "link":
+        file.unlink(missing_ok=True)
+        file.symlink_to(rng.choice([asked / "workspace.toml", here / "planar", here / "none"]))
+    words = rng.choice(["the ball", *NASTY])
+    flags = ["--reached", "the ball", "--reached-size", "0.06", "--goal", words]
+    flags += ["--goal-size", rng.choice(["0.1", "0.1", "nan", "-1", "1e308"])]
+    if rng.random() < 0.3:
+        flags += ["--workspace", "planar", "--trial", rng.choice(["1", "2", "x"])]
+    with VisionServer(faults=[rng.choice(FAULTS) for _ in range(6)]) as server:
+        flags += ["--vlm.base-url", server.base_url, "--vlm.max-retries", "0"]
+        return command(here, "look", str(photo), *flags, "--vlm.timeout", "1")
+
+
+FAULTS = (None, *(fault for fault in get_args(Fault) if fault != "timeout"))
+_ALL = (
+    flags,
+    tells,
+    goals,
+    outcomes,
+    manifests,
+    recordings,
+    files,
+    models,
+    replies,
+    looks,
+    journals,
+)
 CLASSES: dict[str, Attack] = {attack.__name__: attack for attack in _ALL}
