@@ -79,11 +79,5 @@ class Learn:
         generator = make_generator(choice, device=self.device)
         _, demonstrations = open_task(source.task, source.demonstrations, self.seed)
         claim_folder(source.out)
-        learn(
-            demonstrations,
-            source.out,
-            generator=generator,
-            seed=self.seed,
-            console=console,
-        )
+        learn(demonstrations, source.out, generator, seed=self.seed, console=console)
         say(console, f"model of {demonstrations.n} demonstrations saved in {source.out}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -28,6 +29,8 @@ if TYPE_CHECKING:
     from prior_reinforce.lab.experiments.protocol import GoalTrials
     from prior_reinforce.perception.base import Perception
 
+See = Callable[["Perception", Console], Demonstrations]
+"""Sees the demonstrations of a task."""
 SEEN = "seen"
 """Folder beside the report for what a camera or a model saw and said."""
 
@@ -67,8 +70,8 @@ def open_task(task: str, demonstrations: str, seed: int) -> tuple[Task, Demonstr
 def learn(
     demonstrations: Demonstrations,
     folder: Path,
-    *,
     generator: Generator,
+    *,
     seed: int,
     console: Console,
 ) -> Generator:
@@ -123,33 +126,45 @@ class Adapt(Simulated):
 
     def run(self) -> int:
         """Adapt; exit status 1 if the goal was not reached."""
-        from prior_reinforce.lab.experiments.learned import load_learned
-
-        console = Console()
         task, demonstrations = self.open()
         if self.rounds < 1:
             raise ConfigurationError(f"--rounds must be at least 1, got {self.rounds}")
         goals = self._goals(task, demonstrations)
+        return self.reach(task, goals, lambda *_: demonstrations)
+
+    def reach(self, task: Task, goals: Points, see: See, *, outcomes: str = "exact") -> int:
+        """Learn, and work through goals.
+
+        Args:
+            task: Where they are tried.
+            goals: Each is worked through in turn, [m].
+            see: Returns the demonstrations with their outcomes as they were seen.
+            outcomes: How the report says that those are known.
+
+        Returns:
+            Exit status: 1 if a goal was not reached.
+        """
+        from prior_reinforce.lab.experiments.learned import load_learned
+
+        console = Console()
+        # Made first, so that a wrong setting is told before anything is learned.
         make_adapter(self.adapter)
         unfitted = make_generator(self.generator)
-        # Made first, so that a wrong setting is told before anything is learned.
         with make_perception(
             self.perception, scene=task.scene, config=self.vlm, seed=self.seed
         ) as perception:
             claim_folder(self.out)
+            demonstrations = see(perception, console)
             if self.model is None:
-                generator = learn(
-                    demonstrations,
-                    self.out / "model",
-                    generator=unfitted,
-                    seed=self.seed,
-                    console=console,
-                )
+                folder = self.out / "model"
+                generator = learn(demonstrations, folder, unfitted, seed=self.seed, console=console)
             else:
                 generator = load_learned(self.model, demonstrations, generator=self.generator)
-            return self.adapt(task, demonstrations, generator, perception, goals, console)
+            return self._adapt(
+                task, demonstrations, generator, perception, goals, console, outcomes
+            )
 
-    def adapt(
+    def _adapt(
         self,
         task: Task,
         demonstrations: Demonstrations,
@@ -157,19 +172,9 @@ class Adapt(Simulated):
         perception: Perception,
         goals: Points,
         console: Console,
-        *,
-        outcomes: str = "exact",
+        outcomes: str,
     ) -> int:
-        """Work through goals one after another, with a live view, and write the report.
-
-        It is one session: the trials of earlier goals serve later ones where they serve the
-        adapter.
-
-        `outcomes` says in the report how those of the demonstrations are known.
-
-        Returns:
-            Exit status: 1 if a goal was not reached.
-        """
+        """Work through goals in one session, with a live view, and write the report."""
         from prior_reinforce.lab.experiments.adaptation import (
             film_last_trial,
             recording,
@@ -259,7 +264,6 @@ class Demo:
         """See the demonstrations, learn, adapt, report."""
         from prior_reinforce.lab.experiments.protocol import unseen_goals
 
-        console = Console()
         if self.goals < 1:
             raise ConfigurationError(f"--goals must be at least 1, got {self.goals}")
         adapt = Adapt(
@@ -272,23 +276,11 @@ class Demo:
         )
         task, recorded = adapt.open()
         goals = unseen_goals(task, recorded, self.goals, np.random.default_rng([self.seed, 3]))
-        unfitted = make_generator(self.generator)
-        with make_perception(
-            self.perception, scene=task.scene, config=self.vlm, seed=self.seed
-        ) as perception:
-            claim_folder(self.out)
-            demonstrations = self._perceive(task, recorded, perception, console)
-            generator = learn(
-                demonstrations,
-                self.out / "model",
-                generator=unfitted,
-                seed=self.seed,
-                console=console,
-            )
-            seen = f"seen by {self.perception}"
-            return adapt.adapt(
-                task, demonstrations, generator, perception, goals, console, outcomes=seen
-            )
+
+        def see(perception: Perception, console: Console) -> Demonstrations:
+            return self._perceive(task, recorded, perception, console)
+
+        return adapt.reach(task, goals, see, outcomes=f"seen by {self.perception}")
 
     def _perceive(
         self, task: Task, recorded: Demonstrations, perception: Perception, console: Console

@@ -9,7 +9,6 @@ from typing import Annotated, Literal
 
 import msgspec
 import tyro
-from rich.console import Console
 
 from prior_reinforce.adapters import ADAPTERS, DEFAULT_ADAPTER
 from prior_reinforce.bench.robots import RobotLimits, robot_limits
@@ -18,7 +17,6 @@ from prior_reinforce.bench.robots.urdf import read_urdf
 from prior_reinforce.bench.workspace.manifest import filled_in
 from prior_reinforce.bench.workspace.status import describe, next_step
 from prior_reinforce.bench.workspace.workspace import Workspace
-from prior_reinforce.commands.live import drawing_progress
 from prior_reinforce.errors import (
     ConfigurationError,
     InvalidFeedbackError,
@@ -187,7 +185,10 @@ class Report:
 
     def run(self) -> None:
         """Write it."""
+        from rich.console import Console
+
         from prior_reinforce.bench.workspace.report import report_workspace
+        from prior_reinforce.commands.live import drawing_progress
 
         with Workspace(self.folder) as workspace, drawing_progress(Console()) as progress:
             page = report_workspace(workspace, self.out or self.folder / "report", progress)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import json
-from dataclasses import asdict, dataclass
 from pathlib import Path
+
+import msgspec
 
 from prior_reinforce.errors import ConfigurationError, FileFormatError
 from prior_reinforce.files import write
@@ -15,8 +15,7 @@ from prior_reinforce.registry import parse_choice
 _RECORD = "training.json"
 
 
-@dataclass(frozen=True)
-class TrainingRecord:
+class TrainingRecord(msgspec.Struct, frozen=True):
     """What a saved model was learned from; stands beside its weights."""
 
     demonstrations_sha256: str
@@ -31,7 +30,7 @@ def save_learned(
     """Save a fitted generator and the record of what it was fitted to, for `load_learned`."""
     generator.save(folder)
     record = TrainingRecord(demonstrations.sha256, seed)
-    write(folder / _RECORD, json.dumps(asdict(record), indent=2) + "\n")
+    write(folder / _RECORD, msgspec.json.encode(record))
 
 
 def load_learned(
@@ -51,8 +50,8 @@ def load_learned(
     """
     path = folder / _RECORD
     try:
-        record = TrainingRecord(**json.loads(path.read_text(encoding="utf-8")))
-    except (OSError, ValueError, TypeError) as error:
+        record = msgspec.json.decode(path.read_bytes(), type=TrainingRecord)
+    except (OSError, msgspec.DecodeError) as error:
         raise FileFormatError(
             f"no learned model in {folder} ({error}); make one with: prior-reinforce learn "
             f"--out {folder}"
