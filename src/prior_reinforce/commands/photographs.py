@@ -116,9 +116,11 @@ class Look:
             folder.mkdir(exist_ok=True)
             reading.save(folder, stem)
         if reading.error_seen is None:
-            raise PerceptionFailedError(
+            failed = PerceptionFailedError(
                 f"{reading.problem}; look at {drawn} and tell what you see yourself"
             )
+            failed.changed = True  # what was seen is kept
+            raise failed
         error = reading.error_seen
         if goal is not None and reading.reached.place is not None:
             error = reading.reached.place - goal
