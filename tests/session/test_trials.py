@@ -94,11 +94,22 @@ def test_numbers_run_over_all_goals():
         [TOLD],
         [replace(ASKED, trial=2)],
         [replace(ASKED, goal=2)],
+        [replace(ASKED, condition=[0.88])],
+        [replace(GOAL, metric=[1.0])],
         [ASKED, replace(ASKED, trial=2)],
         [ASKED, replace(TOLD, trial=0)],
         [ASKED, replace(TOLD, reading=reading(0.1))],
     ],
-    ids=["no trial", "a gap", "no goal", "two open", "number 0", "one component"],
+    ids=[
+        "no trial",
+        "a gap",
+        "no goal",
+        "half a condition",
+        "half a metric",
+        "two open",
+        "number 0",
+        "one component",
+    ],
 )
 def test_an_event_that_cannot_follow_is_named(events):
     with pytest.raises(WorkspaceError, match=rf"event {len(events) + 1} .*{events[-1].kind}.*copy"):

@@ -275,6 +275,8 @@ class State:
     def _apply(self, event: Event) -> None:
         match event:
             case GoalSet():
+                if not len(event.goal) == len(event.metric) == len(event.units):
+                    raise ValueError("goal, metric and units have different lengths")
                 self.goals.append(
                     Goal(
                         len(self.goals) + 1,
@@ -292,6 +294,8 @@ class State:
                     raise ValueError(f"trial {event.trial} after {len(self.trials)}")
                 if not 1 <= event.goal <= len(self.goals):
                     raise ValueError(f"there is no goal {event.goal}")
+                if len(event.condition) != self.goals[event.goal - 1].goal.size:
+                    raise ValueError("the condition has another length than the goal")
                 self.trials.append(
                     Trial(
                         event.trial,

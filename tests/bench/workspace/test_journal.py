@@ -7,6 +7,7 @@ import pytest
 
 from prior_reinforce.bench.workspace.workspace import Workspace
 from prior_reinforce.errors import TrialStateError, WorkspaceError
+from prior_reinforce.session.events import Voided
 from prior_reinforce.session.trials import Stage
 from tests.bench.workspace.planar import ask, tell, trials, void
 
@@ -92,7 +93,7 @@ def test_it_knows_whether_anything_became_durable(workspace):
     with Workspace(workspace.folder) as other:
         assert not other.log.journal.appended
         with pytest.raises(TypeError), other.log.journal.exclusive():
-            other.log.journal.append("goal_set", {"goal": object()})
+            other.log.journal.append(Voided(trial=1, reason=object()))
         assert not other.log.journal.appended
         ask(other)
         assert other.log.journal.appended
