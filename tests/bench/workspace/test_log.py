@@ -80,7 +80,7 @@ def test_what_a_command_did_goes_through_the_journal(event):
     ended = msgspec.convert({"trial": 1, **result.as_json()}, event)
     again = msgspec.json.decode(msgspec.json.encode(ended), type=WorkspaceEvent)
     assert type(again) is event
-    assert (again, again.command, again.exit_status) == (ended, ("arm", "plan.npz"), 3)
+    assert (again, again.outcome, again.exit_status) == (ended, "aborted", 3)
 
 
 @pytest.mark.parametrize(
