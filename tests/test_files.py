@@ -11,7 +11,9 @@ import pytest
 from prior_reinforce import files
 from prior_reinforce.errors import FileFormatError, WorkspaceError
 from prior_reinforce.files import (
+    as_cell,
     claim_folder,
+    from_cell,
     in_place,
     inside,
     open_npz,
@@ -196,3 +198,9 @@ def test_arrays_that_are_none_are_named(tmp_path, content):
         open_npz(tmp_path / "q.npz", "copy it again"),
     ):
         pass
+
+
+@pytest.mark.parametrize("text", ["=cmd|' -C calc'!A0", "+1", "-1", "@sum", "\tx", "\r", "", "'a"])
+def test_no_cell_is_a_formula_and_each_reads_back(text):
+    assert as_cell(text)[:1] not in set("=+-@\t\r")
+    assert from_cell(as_cell(text)) == text

@@ -13,7 +13,10 @@ from prior_reinforce.wording import (
     from_words,
     in_words,
     plain,
+    read_error,
+    read_numbers,
     read_place,
+    read_uncertain_place,
     say_error,
     say_length,
     say_place,
@@ -302,3 +305,68 @@ def test_a_place_that_cannot_be_meant_is_refused(text, says):
 def test_control_characters_are_shown_and_not_done(text, shown):
     assert plain(text) == shown
     assert plain(f"{text}\n", keep="\n").endswith("\n")
+
+
+@pytest.mark.parametrize(
+    ("text", "error"),
+    [
+        ("about 5cm long", [0.05, 0.0]),
+        ("ca. 5 cm long, ~2cm left", [0.05, 0.02]),
+        ("5 cm too long", [0.05, 0.0]),
+        ("5cm long, 2cm right.", [0.05, -0.02]),
+        ("5,5cm long", [0.055, 0.0]),
+        ("2in long", [0.0508, 0.0]),
+        ("hit!", [0.0, 0.0]),
+    ],
+)
+def test_words_as_people_say_them(text, error):
+    np.testing.assert_allclose(from_words(text, 2).error_seen, error, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("text", "units", "error"),
+    [
+        ("2in long", ["in"], [2.0]),
+        ("2.54 cm short", ["in"], [-1.0]),
+        ("5 deg long", ["rad"], [np.deg2rad(5)]),
+        ("0.2 short", ["turns"], [-0.2]),
+        ("3cm long, 1cm left, 20ms late", ["m", "m", "s"], [0.03, 0.01, 0.02]),
+        ("20 ms early", ["m", "s"], [0.0, -0.02]),
+    ],
+)
+def test_words_of_other_units(text, units, error):
+    seen = read_error(text, units)
+    np.testing.assert_allclose(getattr(seen, "error_seen", seen), error, atol=1e-12)
+
+
+def test_inches_are_an_interval_as_centimetres_are():
+    reading = read_error("2cm long", ["in"])
+    np.testing.assert_allclose(reading.low, 1 / 2.54)
+    np.testing.assert_allclose(reading.high, 3.5 / 2.54)
+
+
+@pytest.mark.parametrize(
+    ("text", "units", "says"),
+    [
+        ("green", ["rad"], "cannot read 'green'"),
+        ("5 cm late", ["m", "s"], "is to be in s"),
+        ("5 late", ["m", "s"], "say that unit"),
+        ("5 kg long", ["rad"], "cannot read"),
+        ("5 deg long, 2 deg short", ["rad"], "names long and short twice"),
+        ("20 ms late", ["s", "s"], "cannot read"),
+    ],
+)
+def test_other_words_of_other_units_are_refused(text, units, says):
+    with pytest.raises(InvalidFeedbackError, match=says):
+        read_error(text, units)
+
+
+def test_numbers_with_what_stands_behind_plus_minus():
+    assert read_numbers("0.05 +- 0.003, -0.02±0.001 1") == [
+        (0.05, 0.003), (-0.02, 0.001), (1.0, None),
+    ]  # fmt: skip
+    assert read_numbers("0.05 +- x") is None
+    place, sd = read_uncertain_place("80 20 cm +/- 5 cm", XY, METRES)
+    np.testing.assert_allclose([*place, sd], [0.8, 0.2, 0.05])
+    with pytest.raises(InvalidFeedbackError, match="components of one unit"):
+        read_uncertain_place("0.8 0.2 +- 0.1", XT, MIXED)

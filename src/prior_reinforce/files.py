@@ -63,15 +63,13 @@ def sha256_of_folder(folder: Path) -> str:
 
 
 @contextmanager
-def open_npz(
-    path: Path, remedy: str, largest: int = _LARGEST_NPZ
-) -> Iterator[np.lib.npyio.NpzFile]:
+def open_npz(path: Path, remedy: str, largest: int | None = None) -> Iterator[np.lib.npyio.NpzFile]:
     """Open arrays that numpy saved, as data: no pickle is read, and no flood unpacked.
 
     Args:
         path: The file.
         remedy: What to do about a file that is none, for the message.
-        largest: Bytes that it may unpack to.
+        largest: Bytes that it may unpack to; None takes those of an hour of any arm, and more.
 
     Raises:
         FileFormatError: Reading it fails, in the block as well: what can go wrong in damaged or
@@ -80,8 +78,9 @@ def open_npz(
     try:
         with path.open("rb") as file, zipfile.ZipFile(file) as packed:
             size = sum(member.file_size for member in packed.infolist())
+            largest = largest or _LARGEST_NPZ
             if size > largest:
-                raise ValueError(f"it unpacks to {size:.2g} bytes, at most {largest:.2g} are read")
+                raise ValueError(f"it unpacks to {size:.2g} bytes")
         with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
             yield archive
     except PriorReinforceError:

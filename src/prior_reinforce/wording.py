@@ -38,25 +38,38 @@ _UNPRINTED = frozenset({"Cc", "Cf", "Cs", "Zl", "Zp"})
 _Point = Float[np.ndarray, " k"]
 _LEAST_BARE_CM = 0.1
 """Ours: nobody sees a throw to a millimetre; a smaller number without a unit is in metres."""
-_CM_PER_UNIT = {"cm": 1.0, "m": 100.0, "mm": 0.1, "": 1.0}
+_METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
+"""Units of length that words may have."""
+_TIMES: tuple[str, str] = ("late", "early")
+"""The words of a component that is a time."""
+_FILLERS = re.compile(r"\b(?:about|approximately|approx\.?|around|roughly|circa|ca\.?|too)\s+|~\s*")
+"""What people say beside a length, which is an estimate anyway."""
+_DECIMAL_COMMA = re.compile(r"(?<=\d),(?=\d+\s*[a-z])")
+_PLUS_MINUS = r"(?:\+-|\+/-|±)"
 _NUMBER = r"\d{1,6}(?:\.\d*)?|\.\d+"
-_UNIT = r"cm|mm|m|"
+_UNIT = r"cm|mm|m|in|"
 _TERM = re.compile(
     rf"(?:(?P<value>{_NUMBER})\s*(?P<unit>{_UNIT})\s*"
-    rf"(?:(?:\+-|\+/-|±)\s*(?P<sd>{_NUMBER})\s*(?P<sd_unit>{_UNIT})\s*)?)?"
+    rf"(?:{_PLUS_MINUS}\s*(?P<sd>{_NUMBER})\s*(?P<sd_unit>{_UNIT})\s*)?)?"
     r"(?:to the )?(?P<word>[a-z]+)"
 )
-_BARE_TERM = re.compile(rf"(?P<value>{_NUMBER})\s*(?P<unit>cm|mm|m)")
+_BARE_TERM = re.compile(rf"(?P<value>{_NUMBER})\s*(?P<unit>cm|mm|m|in)")
 _FROM_BASE = re.compile(r"(?P<length>.*?)\s*(?:away )?from (?:the )?(?:base|robot|arm|foot)\b.*")
 _PLACE_TERM = re.compile(
-    rf"(?P<number>[+-]?(?:{_NUMBER}))\s*(?P<unit>cm|mm|m|deg|rad|)(?:\s*[,;]\s*|\s+|$)"
+    rf"(?P<number>[+-]?(?:{_NUMBER}))\s*(?P<unit>cm|mm|m|in|deg|rad|ms|s|)(?:\s*[,;]\s*|\s+|$)"
 )
 _TO_UNIT = {
     ("cm", "m"): 0.01,
     ("mm", "m"): 0.001,
+    ("in", "m"): 0.0254,
+    ("ms", "s"): 0.001,
     ("deg", "rad"): math.pi / 180,
     ("rad", "deg"): 180 / math.pi,
 }
+_WITH_WORD = re.compile(
+    rf"(?P<number>{_NUMBER})\s*(?:(?P<unit>cm|mm|m|in|deg|rad|ms|s)(?![a-z])\s*)?"
+    r"(?:to the )?(?P<word>[a-z]+)"
+)
 _SOMEWHERE = "somewhere"
 _ON_THE_GOAL = ("on the goal", "0")
 _HITS = {"hit": True, "miss": False}
@@ -219,6 +232,88 @@ def as_reading(
     return reading.with_hit(hit)
 
 
+def read_error(text: str, units: Sequence[str]) -> Reading | _Point:
+    """Read an error from words, in the outcome's units.
+
+    Args:
+        text: As in `from_words`; a component that is no length is `20ms late`, and of one component
+            alone the words are `long` and `short`, whatever its unit: `5 deg long`.
+        units: Of the k components.
+
+    Returns:
+        A reading where all components are lengths of one unit; else a number of unknown origin for
+        each component.
+
+    Raises:
+        InvalidFeedbackError: As `from_words` does.
+    """
+    k = len(units)
+    if len(set(units)) == 1 and units[0] in _METRES:
+        reading, scale = from_words(text, k), 1 / _METRES[units[0]]
+        if scale == 1:
+            return reading
+        error, low, high = (scale * n for n in (reading.error_seen, reading.low, reading.high))
+        return Reading(error, low, high, scale * reading.sd, reading.hit, reading.said)
+    words = [
+        _TIMES if unit in ("s", "ms") and k > 1 else w
+        for w, unit in zip(WORDS, units, strict=False)
+    ]
+    number = np.full(k, np.nan)
+    for part in _parts(text):
+        match = _WITH_WORD.fullmatch(part)
+        pair = next((w for w in words if match and match["word"] in w), None)
+        if match is None or pair is None or words.count(pair) > 1:
+            said = " or ".join(word for w in words for word in w)
+            raise InvalidFeedbackError(
+                f"cannot read {part!r}; write a number with its unit and {said}, or give {k} "
+                "numbers"
+            )
+        j, sign = words.index(pair), -1.0 if pair.index(match["word"]) else 1.0
+        unit = match["unit"] or units[j]
+        factor = 1.0 if unit == units[j] else _TO_UNIT.get((unit, units[j]))
+        if factor is None or (not match["unit"] and k > 1):
+            raise InvalidFeedbackError(f"{part!r} is to be in {units[j]}; say that unit")
+        if not np.isnan(number[j]):
+            raise InvalidFeedbackError(f"{text!r} names {' and '.join(pair)} twice; give each once")
+        number[j] = sign * float(match["number"]) * factor
+    return np.nan_to_num(number)
+
+
+def read_numbers(text: str) -> list[tuple[float, float | None]] | None:
+    """Read numbers, each with what stands behind its `+-`; None where the text is something else.
+
+    Args:
+        text: For instance `0.05+-0.003, -0.02 ± 0.001`.
+    """
+    parts = re.sub(rf"\s*{_PLUS_MINUS}\s*", "±", text).replace(",", " ").split()
+    try:
+        split = [part.split("±") for part in parts]
+        return [(float(number), float(*sd) if sd else None) for number, *sd in split]
+    except (ValueError, TypeError):
+        return None
+
+
+def read_uncertain_place(
+    text: str, names: Sequence[str], units: Sequence[str]
+) -> tuple[_Point, float]:
+    """Read a place as `read_place` does, and the standard deviation that may stand behind it.
+
+    Args:
+        text: For instance `92cm 10cm +- 2cm`.
+        names: Of the components.
+        units: Of the components.
+
+    Raises:
+        InvalidFeedbackError: As `read_place` does, or a `+-` for components of several units.
+    """
+    said, *spread = re.split(_PLUS_MINUS, text, maxsplit=1)
+    place = read_place(said, names, units)
+    sd = abs(float(read_place(spread[0], ("+-",), units[:1])[0])) if spread else 0.0
+    if sd and len(set(units)) > 1:
+        raise InvalidFeedbackError("+- is for components of one unit; leave it out")
+    return place, sd
+
+
 def read_place(text: str, names: Sequence[str], units: Sequence[str]) -> _Point:
     """Read a place from numbers in the outcome's units, numbers with a unit, or words.
 
@@ -301,7 +396,9 @@ class _Term:
 
 
 def _parts(text: str) -> list[str]:
-    return re.split(r"\s*(?:,|;|\band\b)\s*|(?<=[a-z])\s+(?=\.?\d)", text.strip().lower())
+    plainer = _DECIMAL_COMMA.sub(".", _FILLERS.sub("", text.strip().lower()))
+    parts = re.split(r"\s*(?:,|;|\band\b)\s*|(?<=[a-z])\s+(?=\.?\d)", plainer)
+    return [part.rstrip(".! ") for part in parts]
 
 
 def _with_units(text: str) -> str:
@@ -369,7 +466,7 @@ def _metres(number: str, unit: str, part: str) -> float:
         raise InvalidFeedbackError(
             f"{part!r} has no unit and would be {10 * value:g} mm; say m, cm or mm"
         )
-    return value * _CM_PER_UNIT[unit] / 100
+    return value * _METRES[unit or "cm"]
 
 
 def _terms(values: ArrayLike, words: Sequence[tuple[str, str]]) -> list[str]:

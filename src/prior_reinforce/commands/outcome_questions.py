@@ -6,7 +6,6 @@ the same source is imported again.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from itertools import count
 from pathlib import Path
@@ -28,7 +27,7 @@ from prior_reinforce.errors import (
     PriorReinforceError,
 )
 from prior_reinforce.files import named_disk_errors
-from prior_reinforce.wording import in_words, plain, read_place, say_length, say_place
+from prior_reinforce.wording import in_words, plain, read_uncertain_place, say_length, say_place
 
 _SKIP, _BACK = ("skip", "s"), ("back", "b")
 _SOURCE = "source"
@@ -159,12 +158,7 @@ def _ask(question: str, episode: str, table: Path, manifest: Manifest) -> tuple[
             if text.lower() in words:
                 return words[0]
         try:
-            said, *give = re.split(r"\+-|\+/-|±", text, maxsplit=1)
-            place = read_place(said, manifest.outcome_names, manifest.outcome_units)
-            unit = manifest.outcome_units[:1]
-            sd = abs(read_place(give[0], ("+-",), unit)[0]) if give else 0.0
-            if sd and len(set(manifest.outcome_units)) > 1:
-                raise InvalidFeedbackError("+- is for components of one unit; leave it out")
-            return (*place.tolist(), float(sd))
+            place, sd = read_uncertain_place(text, manifest.outcome_names, manifest.outcome_units)
+            return (*place.tolist(), sd)
         except InvalidFeedbackError as error:
             print(error)

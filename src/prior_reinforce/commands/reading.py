@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -16,7 +15,7 @@ from prior_reinforce.commands.workspace import Folder
 from prior_reinforce.errors import ConfigurationError, InvalidFeedbackError
 from prior_reinforce.readings import Reading
 from prior_reinforce.session.session import Session
-from prior_reinforce.wording import from_words, in_words
+from prior_reinforce.wording import in_words, read_error, read_numbers
 
 Number = Annotated[int, tyro.conf.Positional, tyro.conf.arg(metavar="TRIAL")]
 
@@ -90,14 +89,10 @@ def read_seen(workspace: Workspace, text: str) -> Reading | Point:
     alone = text.strip().lower()
     if alone in ("hit", "miss"):
         return Reading.only(alone == "hit", k)
-    numbers = _numbers(text)
+    numbers = read_numbers(text)
     if numbers is None or (k > 1 and text == "0"):  # a lone 0 says: on the goal
-        if in_words(units):
-            return _sayable(text, from_words(text, k))
-        raise InvalidFeedbackError(
-            f"cannot read {text!r}; this task's outcomes have no words, give {k} numbers: "
-            f"{tell_example(workspace)}"
-        )
+        error = read_error(text, units)
+        return _sayable(text, error) if in_words(units) else error
     if len(numbers) != k:
         words = ", or words" if in_words(units) else ""
         raise InvalidFeedbackError(
@@ -115,19 +110,10 @@ def read_seen(workspace: Workspace, text: str) -> Reading | Point:
     return Reading.measured(as_error(error, k), np.array(sds))
 
 
-def _numbers(text: str) -> list[tuple[float, float | None]] | None:
-    """Numbers, each with what stands behind its +-; None where the text is something else."""
-    parts = re.sub(r"\s*(\+-|\+/-|±)\s*", "±", text).replace(",", " ").split()
-    try:
-        split = [part.split("±") for part in parts]
-        return [(float(number), float(*sd) if sd else None) for number, *sd in split]
-    except (ValueError, TypeError):
-        return None
-
-
-def _sayable(text: str, reading: Reading) -> Reading:
+def _sayable(text: str, reading: Reading | Point) -> Reading | Point:
     """The reading, unless no throw is that far off."""
-    largest = np.abs(reading.error_seen).max(initial=0.0)
+    number = reading.error_seen if isinstance(reading, Reading) else reading
+    largest = np.abs(number).max(initial=0.0)
     if largest > FARTHEST:
         raise InvalidFeedbackError(
             f"{text!r} is {largest:g} m; say it again, in cm, or void the trial if that is true"

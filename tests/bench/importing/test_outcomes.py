@@ -1,6 +1,7 @@
 """Outcomes beside a recording: matched, converted, and every one that is missing is named."""
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from prior_reinforce.bench.importing import import_demonstrations
@@ -279,3 +280,34 @@ def test_how_uncertain_outcomes_are_is_in_the_unit_of_the_first(recording, tmp_p
     path = table(tmp_path, "\n".join([f"episode,{head},sd", *rows]))
     demonstrations = import_demonstrations(recording, outcomes=path).demonstrations
     np.testing.assert_allclose(demonstrations.outcome_noise, noise)
+
+
+def test_an_episode_called_like_a_formula_is_no_formula_in_the_table(tmp_path):
+    path = tmp_path / "outcomes.csv"
+    name = "=cmd|' -C calc'!A0"
+    write_outcome_table(path, {name: (0.9, 0.1)}, ["x", "y"], ["m", "m"])
+    assert path.read_text().splitlines()[1].startswith("'=cmd")
+    assert list(read_outcomes(path).frame.index) == [name]
+
+
+def test_a_workbook_with_a_title_and_text_cells_with_decimal_commas(tmp_path):
+    path = tmp_path / "outcomes.xlsx"
+    rows = [["Messung am 3.11.", "", ""], ["episode", "x [cm]", "y [cm]"], ["1", "148,8", "-3,25"]]
+    pd.DataFrame(rows).to_excel(path, index=False, header=False)
+    np.testing.assert_allclose(read_outcomes(path).frame.loc["1"], [1.488, -0.0325, 0])
+    rows[2][1] = "1,488"  # a thousand, or a decimal comma?
+    pd.DataFrame(rows).to_excel(path, index=False, header=False)
+    with pytest.raises(FileFormatError, match="'1,488', expected a finite number"):
+        read_outcomes(path)
+
+
+def test_inches_in_the_head_or_said(recording, tmp_path):
+    rows = [f"{name},{x / 0.0254},{y / 0.0254}" for name, (x, y) in OUTCOMES.items()]
+    path = table(tmp_path, "\n".join(["episode,x [in],y (inches)", *rows]))
+    kept = import_demonstrations(recording, outcomes=path).demonstrations
+    np.testing.assert_allclose(kept.outcomes_seen, list(OUTCOMES.values()))
+    bare = table(tmp_path, "\n".join(["episode,x,y", *rows]))
+    with pytest.raises(UnclearUnitsError, match=r"looks like cm \(or inches: --outcome-unit in\)"):
+        import_demonstrations(recording, outcomes=bare)
+    said = import_demonstrations(recording, outcomes=bare, outcome_unit="in").demonstrations
+    np.testing.assert_allclose(said.outcomes_seen, list(OUTCOMES.values()))

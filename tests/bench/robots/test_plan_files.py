@@ -4,6 +4,7 @@ import csv
 import hashlib
 import json
 import stat
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -73,6 +74,12 @@ def test_a_motion_at_another_rate_is_the_same_motion(plan, tmp_path, rate):
     here = interpolate(plan.actions, plan.format.dt)
     n = min(len(again.q), len(here.q))
     np.testing.assert_allclose(again.q[:n], here.q[:n], atol=1e-4)
+
+
+def test_no_head_of_an_exported_table_is_a_formula(plan, tmp_path):
+    odd = replace(plan, format=replace(plan.format, names=("=1+1", *plan.format.names[1:])))
+    write_plan(odd, tmp_path / "plan.csv")
+    assert (tmp_path / "plan.csv").read_text().startswith("t,'=1+1,")
 
 
 def test_csv_reads_back_exactly(plan, tmp_path):

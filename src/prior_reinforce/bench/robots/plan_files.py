@@ -25,7 +25,7 @@ from prior_reinforce.errors import (
     InvalidPlanError,
     WorkspaceError,
 )
-from prior_reinforce.files import open_npz, sha256, write_once
+from prior_reinforce.files import as_cell, open_npz, sha256, write_once
 from prior_reinforce.plans.motions import Plan, PlanFormat
 
 if TYPE_CHECKING:
@@ -205,7 +205,8 @@ def _as_csv(format: PlanFormat, fine: FineMotion) -> bytes:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     prefixes = ("", "d_", "dd_")
-    writer.writerow(["t", *(prefix + name for prefix in prefixes for name in format.names)])
+    names = (prefix + name for prefix in prefixes for name in format.names)
+    writer.writerow(["t", *map(as_cell, names)])
     # repr of a float is the shortest text that reads back as the same number.
     writer.writerows(
         [repr(float(value)) for value in row]
