@@ -1,19 +1,21 @@
-"""How long small commands take, beside `python -c "import numpy, scipy"` in the same run.
+"""How much processor time small commands take, beside imports of numpy and scipy in the same run.
 
     python benchmarks/start_up.py
 
 Each command is a process of its own on a small workspace; commands take turns, so that a change of
-the machine's speed meets all of them. Ratios of medians.
+the machine's speed meets all of them. Ratios of medians of user and system time. SciPy loads its
+parts when they are used: `import scipy` alone is next to nothing, and `ask` fits splines.
 """
 
 from __future__ import annotations
 
 import argparse
+import resource
 import statistics
 import subprocess
 import sys
 import tempfile
-import time
+from collections import defaultdict
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +23,10 @@ import numpy as np
 import prior_reinforce as pr
 
 CLI = (sys.executable, "-m", "prior_reinforce.cli")
-BASE = (sys.executable, "-c", "import numpy, scipy")
+BASES = {
+    code: (sys.executable, "-c", code)
+    for code in ("import numpy, scipy", "import numpy, scipy.interpolate")
+}
 
 
 def make_workspace(folder: Path) -> None:
@@ -39,33 +44,36 @@ def make_workspace(folder: Path) -> None:
 
 
 def timed(*command: str) -> float:
-    """Seconds that a process takes."""
-    start = time.perf_counter()
+    """Seconds of processor time that a process takes."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
     subprocess.run(command, check=True, capture_output=True)
-    return time.perf_counter() - start
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--repeats", type=int, default=9)
     repeats = parser.parse_args().repeats
-    taken: dict[str, list[float]] = {"import": [], "goal": [], "ask": [], "status": [], "tell": []}
+    taken: dict[str, list[float]] = defaultdict(list)
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place) / "planar"
         make_workspace(folder)
         for number in range(1, repeats + 1):
-            taken["import"].append(timed(*BASE))
-            taken["goal"].append(timed(*CLI, "goal", str(folder), "0.9", "0.05"))
-            taken["ask"].append(timed(*CLI, "ask", str(folder)))
-            taken["status"].append(timed(*CLI, "status", str(folder)))
-            taken["tell"].append(
-                timed(*CLI, "tell", str(folder), str(number), "--error", "5cm long")
-            )
-    base = statistics.median(taken["import"])
-    print(f"import numpy, scipy: {base * 1000:.0f} ms (median of {repeats})")
-    for name, seconds in list(taken.items())[1:]:
+            commands = {
+                "goal": ("0.9", "0.05"),
+                "ask": (),
+                "status": (),
+                "tell": (str(number), "--error", "5cm long"),
+            }
+            for name, base in BASES.items():
+                taken[name].append(timed(*base))
+            for name, more in commands.items():
+                taken[name].append(timed(*CLI, name, str(folder), *more))
+    for name, seconds in taken.items():
         median = statistics.median(seconds)
-        print(f"{name:7} {median * 1000:5.0f} ms, {median / base:.1f} times the import")
+        ratios = [f"{median / statistics.median(taken[base]):.1f} times {base}" for base in BASES]
+        print(f"{name:32} {median * 1000:5.0f} ms, {', '.join(ratios)}")
 
 
 if __name__ == "__main__":
