@@ -87,8 +87,8 @@ def _arrays(path: Path) -> Arrays:
     """Everything in a file; of our own demonstrations and plans also what their metadata says."""
     if path.suffix.lower() == ".npy":
         check_bytes(path, path.stat().st_size)
-        with named_damage(path, "NPY with plain numbers"):
-            return {_MOTION_KEYS[0]: np.load(path, mmap_mode="r", allow_pickle=False)}
+        with named_damage(path, "NPY with plain numbers"), path.open("rb") as file:
+            return {_MOTION_KEYS[0]: np.load(file, allow_pickle=False)}
     remedy = "it must be an NPZ with plain number arrays; copy it again, or say its format"
     with open_npz(path, remedy, MOST_BYTES) as archive:
         content = {name: archive[name] for name in archive.files}
