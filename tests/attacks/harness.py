@@ -23,8 +23,8 @@ from prior_reinforce.errors import PriorReinforceError
 
 REMEDY = re.compile(
     r"add|ask|call|check|choose|copy|correct|demonstrate|drop|expected|export|give|help|known|"
-    r"leave out|looks like|make|measure|mend|missing|must|name|need|put|record|rename|restore|run:|"
-    r"say|see|tell|unknown; |use|valid|void|wait|want|write",
+    r"leave out|looks like|make|measure|mend|missing|must|name|need|put|record|remove|rename|"
+    r"restore|run:|say|see|tell|unknown; |use|valid|void|wait|want|write",
     re.IGNORECASE,
 )
 """What a refusal says must be done, in one of these words."""

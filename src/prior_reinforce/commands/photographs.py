@@ -15,7 +15,12 @@ from jaxtyping import Float, UInt8
 
 from prior_reinforce.arrays import FARTHEST, Point
 from prior_reinforce.environment import SeenObject, TableScene
-from prior_reinforce.errors import ConfigurationError, FileFormatError, PerceptionFailedError
+from prior_reinforce.errors import (
+    ConfigurationError,
+    EndpointError,
+    FileFormatError,
+    PerceptionFailedError,
+)
 from prior_reinforce.files import named_disk_errors, refuse_foreign
 from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
 from prior_reinforce.wording import to_words
@@ -112,6 +117,8 @@ class Look:
         picture = _read_picture(self.picture)
         with VisionLanguageModel(scene, self.vlm, calibration=calibration) as model:
             reading = model.read(picture)
+        if reading.unanswered:
+            raise EndpointError(f"{reading.problem}; then call look again")
         with named_disk_errors(folder):
             folder.mkdir(exist_ok=True)
             reading.save(folder, stem)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -21,6 +21,7 @@ from prior_reinforce.report.style import (
     HIT,
     INK,
     INK_SOFT,
+    add_legend,
     calm_axes,
     drawing,
     new_figure,
@@ -35,6 +36,7 @@ _LEAST_TRIALS = 3  # that the error's axis has room for
 _LEAST_SHARE = 0.02
 """Ours: a joint that moves less than this share of what moves most is drawn as nearly at rest."""
 _SHOWN: Any = {"label": "demonstrations", "color": DEMONSTRATION, "alpha": 0.45, "linewidth": 1}
+_TIGHT: Any = {"handlelength": 1.6, "columnspacing": 1.4}
 
 _Plan = Float[np.ndarray, "_ D"]
 """A plan of any horizon, or no frames of one."""
@@ -44,7 +46,7 @@ _Plan = Float[np.ndarray, "_ D"]
 def draw_trials_by_goal(records: Sequence[AdaptationRecord]) -> Figure:
     """Draw how many trials each goal took, one goal after another.
 
-    A line joins the goals that were reached; what one took that was not is no number to compare.
+    A line joins the goals that were reached; an unreached goal has no trial count to compare.
     """
     figure = new_figure(5.4, 2.2)
     axes = figure.subplots()
@@ -77,7 +79,7 @@ def draw_trials_by_goal(records: Sequence[AdaptationRecord]) -> Figure:
     axes.set_xlabel("goal, in order")
     axes.set_ylabel("trials")
     if len(reached) < len(records):
-        _legend_above(figure, legend)
+        add_legend(figure, legend, **_TIGHT)
     return figure
 
 
@@ -167,7 +169,8 @@ def draw_plans(record: AdaptationRecord) -> Figure:
             lowest.tick_params(labelbottom=True)
             lowest.set_xlabel("time [s]", fontsize=9)
     handles, labels = panels[0, 0].get_legend_handles_labels()
-    _legend_above(figure, dict(zip(labels, handles, strict=True)), ncols=max(3, 2 * columns))
+    marks = dict(zip(labels, handles, strict=True))
+    add_legend(figure, marks, ncols=max(3, 2 * columns), **_TIGHT)
     return figure
 
 
@@ -193,20 +196,6 @@ def _trial_style(record: AdaptationRecord, i: int) -> dict[str, Any]:
         "linewidth": 1.7,
         "linestyle": "--" if trial.stage is Stage.VOIDED else "-",
     }
-
-
-def _legend_above(figure: Figure, legend: Mapping[str, Any], ncols: int = 3) -> None:
-    figure.legend(
-        list(legend.values()),
-        list(legend),
-        loc="outside upper left",
-        ncols=ncols,
-        frameon=False,
-        fontsize=9,
-        labelcolor=INK_SOFT,
-        handlelength=1.6,
-        columnspacing=1.4,
-    )
 
 
 def _widen(axes: Axes, drawn: Float[np.ndarray, "n H D"], units: Sequence[str], j: int) -> None:

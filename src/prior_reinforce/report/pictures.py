@@ -18,9 +18,9 @@ from prior_reinforce.report.style import (
     DEMONSTRATION,
     GOAL,
     HIT,
-    INK_SOFT,
     LINE,
     REGION,
+    add_legend,
     drawing,
     lay_out,
     new_figure,
@@ -131,16 +131,8 @@ def _panels(
         for axes, view in zip(figure.subplots(1, len(views), squeeze=False)[0], views, strict=True)
     ]
     if legend:
-        figure.legend(
-            list(legend.values()),
-            list(legend),
-            handler_map={tuple: HandlerTuple(ndivide=None)},
-            loc="outside upper center",
-            ncols=3,
-            frameon=False,
-            fontsize=9,
-            labelcolor=INK_SOFT,
-        )
+        side_by_side = {tuple: HandlerTuple(ndivide=None)}
+        add_legend(figure, legend, "center", handler_map=side_by_side)
     lay_out(figure)  # so that data coordinates have their place on paper
     for panel in panels:
         panel.equalise()
@@ -151,11 +143,17 @@ def _mark(colour: str, marker: str = "o", **more: Any) -> Line2D:
     return Line2D([], [], linestyle="", marker=marker, markersize=5, color=colour, **more)
 
 
-def _legend(record: AdaptationRecord) -> dict[str, Any]:
-    """Marks by what they mean; a tuple of marks stands side by side."""
+def _legend_of_goal(record: AdaptationRecord) -> dict[str, Any]:
     return {
         f"goal ± {say_tolerance(record)}": _mark(GOAL, markerfacecolor="none"),
         "demonstrations": _mark(DEMONSTRATION, "D"),
+    }
+
+
+def _legend(record: AdaptationRecord) -> dict[str, Any]:
+    """Marks by what they mean; a tuple of marks stands side by side."""
+    return {
+        **_legend_of_goal(record),
         "misses, first to last": tuple(_mark(trial_colour(i, 3)) for i in range(3)),
         "hits": _mark(HIT),
     }
@@ -164,8 +162,7 @@ def _legend(record: AdaptationRecord) -> dict[str, Any]:
 def _legend_of_aims(record: AdaptationRecord) -> dict[str, Any]:
     """The same for aims, hits and voided ones where there are any."""
     legend = {
-        f"goal ± {say_tolerance(record)}": _mark(GOAL, markerfacecolor="none"),
-        "demonstrations": _mark(DEMONSTRATION, "D"),
+        **_legend_of_goal(record),
         "aims, first to last": tuple(_mark(trial_colour(i, 3), "s") for i in range(3)),
     }
     if record.trials_to_hit is not None:

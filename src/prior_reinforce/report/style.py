@@ -7,7 +7,7 @@ nothing is said by colour alone.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -80,7 +80,7 @@ def new_figure(width: float, height: float, *, laid_out: bool = True) -> Figure:
 
 
 def calm_axes(axes: Axes, *, grid: bool = True) -> None:
-    """Take away all lines that say nothing."""
+    """Remove the upper and right spines, and draw the others, ticks and labels in grey."""
     for side in ("top", "right"):
         axes.spines[side].set_visible(False)
     for side in ("left", "bottom"):
@@ -93,8 +93,26 @@ def calm_axes(axes: Axes, *, grid: bool = True) -> None:
         axes.grid(color="#edf0f2", linewidth=0.8)
 
 
+def add_legend(
+    figure: Figure, marks: Mapping[str, Any], side: str = "left", ncols: int = 3, **more: Any
+) -> None:
+    """Add a legend above all panels.
+
+    Args:
+        figure: Not laid out yet.
+        marks: By what they mean.
+        side: `left` or `center`.
+        ncols: Columns.
+        more: Further settings of `Figure.legend`.
+    """
+    figure.legend(
+        list(marks.values()), list(marks), loc=f"outside upper {side}", ncols=ncols, frameon=False,
+        fontsize=9, labelcolor=INK_SOFT, **more,
+    )  # fmt: skip
+
+
 def lay_out(figure: Figure) -> None:
-    """Arrange panels and labels now and never again; `savefig` would draw everything twice."""
+    """Compute the layout once and freeze it; `savefig` would draw everything twice."""
     engine = figure.get_layout_engine()
     if engine is not None:
         engine.execute(figure)

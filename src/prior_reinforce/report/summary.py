@@ -152,18 +152,14 @@ def _row(record: AdaptationRecord, i: int, trial: Trial) -> TrialRow:
     result = "hit" if trial.hit else "miss"
     # The truth, once known, is admitted where it disagrees.
     disagrees = truly_off is not None and (truly_off <= record.tolerance) != trial.hit
+    seen = say_error(trial.error_seen, names, units)
+    if trial.number in record.warnings:
+        seen += f"; {record.warnings[trial.number]}"
     return TrialRow(
         trial.number,
         state=result,
         aim=aim,
-        seen="; ".join(
-            part
-            for part in (
-                say_error(trial.error_seen, names, units),
-                record.warnings.get(trial.number),
-            )
-            if part
-        ),
+        seen=seen,
         off=say_length(record.distance(trial.error_seen), units),
         truly_off="" if truly_off is None else say_length(truly_off, units),
         result=f"taken for a {result}" if disagrees else result,
