@@ -38,8 +38,10 @@ class FullStep:
     """An adapter that subtracts the whole last error."""
 
     carries_over = False
+    n_starts = 0
 
     def start(self, demonstrations):
+        self.n_starts += 1
         self.last = None
 
     def propose(self, goal_seen):

@@ -105,10 +105,9 @@ def add_legend(
         ncols: Columns.
         more: Further settings of `Figure.legend`.
     """
-    figure.legend(
-        list(marks.values()), list(marks), loc=f"outside upper {side}", ncols=ncols, frameon=False,
-        fontsize=9, labelcolor=INK_SOFT, **more,
-    )  # fmt: skip
+    place: Any = f"outside upper {side}"
+    grey: Any = {"frameon": False, "fontsize": 9, "labelcolor": INK_SOFT, "ncols": ncols}
+    figure.legend(list(marks.values()), list(marks), loc=place, **grey, **more)
 
 
 def lay_out(figure: Figure) -> None:
