@@ -38,7 +38,6 @@ METHODS = (
     "interpolation,timing=none",
     "interpolation,timing=start",
     "interpolation,timing=tempo",
-    "interpolation,timing=warp",
     "nearest",
 )
 KINDS = ("clean-6", "delayed-6", "tempo-6", "warped-8", "paused-8", "cut-6", "short-rest-8",

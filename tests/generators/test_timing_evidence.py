@@ -7,7 +7,7 @@ from prior_reinforce.generators import timing_evidence
 from prior_reinforce.generators.timing_evidence import choose_timing, outcome_error
 from prior_reinforce.lab.tasks import make_task
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
-from prior_reinforce.plans.warping import take_apart
+from prior_reinforce.plans.timeline import decompose
 
 RNG = np.random.default_rng(0)
 AIMS = RNG.uniform(-1, 1, size=(8, 2))
@@ -26,17 +26,17 @@ def demonstrations(release: int | None, n: int = 8) -> Demonstrations:
 
 def test_a_release_that_the_motion_brings_about_asks_for_starts_apart():
     choice = choose_timing(demonstrations(None))
-    assert choice.apart.timeline.kind == "start"
+    assert choice.decomposition.timeline.kind == "start"
     assert "when to start is learned apart from how to move (start)" in choice.reason
-    assert choice.errors["start"] == outcome_error(demonstrations(None), choice.apart)
+    assert choice.errors["start"] == outcome_error(demonstrations(None), choice.decomposition)
 
 
 def test_a_clocked_release_asks_for_plans_as_recorded():
     demos = demonstrations(42)
-    errors = {kind: outcome_error(demos, take_apart(demos, kind)) for kind in ("none", "start")}
+    errors = {kind: outcome_error(demos, decompose(demos, kind)) for kind in ("none", "start")}
     assert errors["none"] < 0.5 * errors["start"]
     choice = choose_timing(demos)
-    assert choice.apart.timeline.kind == "none"
+    assert choice.decomposition.timeline.kind == "none"
     assert choice.reason == (
         "timing: plans start when the demonstrations did (none), as these demonstrations ask for"
     )
@@ -51,7 +51,7 @@ def test_a_hand_that_opens_in_the_plan_needs_no_clock():
     plan_format = PlanFormat(("a", "b", "gripper"), ("rad", "rad", "m"), 0.02)
     choice = choose_timing(Demonstrations(plans, demos.outcomes_seen, plan_format))
     assert choice.errors["none"] < 0.5 * choice.errors["start"]
-    assert choice.apart.timeline.kind == "start"
+    assert choice.decomposition.timeline.kind == "start"
 
 
 def test_people_who_start_when_they_like_keep_to_no_clock():
@@ -60,19 +60,19 @@ def test_people_who_start_when_they_like_keep_to_no_clock():
     late = [np.pad(plan, ((0, 15 * (i % 4)), (0, 0)), "edge") for i, plan in enumerate(demos.plans)]
     plans = np.stack([np.pad(p, ((145 - len(p), 0), (0, 0)), "edge") for p in late])
     moved = Demonstrations(plans, demos.outcomes_seen, demos.format)
-    assert choose_timing(moved).apart.timeline.kind != "none"
+    assert choose_timing(moved).decomposition.timeline.kind != "none"
 
 
 def test_few_demonstrations_tell_nothing():
     choice = choose_timing(demonstrations(42, n=4))
-    assert choice.apart.timeline.kind == "start"
+    assert choice.decomposition.timeline.kind == "start"
     assert "as a rule; 4 demonstrations cannot tell what is better" in choice.reason
     assert not choice.errors
 
 
 def test_it_is_said_where_the_timing_does_not_matter():
     demos = demonstrations(None)
-    together = take_apart(demos, "start").shapes[:, :100]
+    together = decompose(demos, "start").shapes[:, :100]
     same = Demonstrations(together, demos.outcomes_seen, demos.format)
     assert choose_timing(same).reason.endswith("; another timing would do as well here")
 
@@ -91,14 +91,16 @@ def test_what_does_not_move_keeps_its_timing():
         np.ones((6, 20, 2)), AIMS[:6], PlanFormat(("a", "b"), ("rad",) * 2, 0.02)
     )
     choice = choose_timing(still)
-    assert choice.apart.timeline.kind == "none"
+    assert choice.decomposition.timeline.kind == "none"
     assert "does not move" in choice.reason
 
 
 @pytest.mark.parametrize("task", ["basketball-v1", "curling", "fishing"])
 @pytest.mark.parametrize("name", ["A", "B"])
 def test_our_own_demonstrations_differ_in_their_starts(task, name):
-    assert choose_timing(make_task(task).demonstrations(name)).apart.timeline.kind == "start"
+    assert (
+        choose_timing(make_task(task).demonstrations(name)).decomposition.timeline.kind == "start"
+    )
 
 
 @pytest.mark.parametrize(
@@ -116,6 +118,6 @@ def test_the_reason_is_no_better_than_the_evidence(task, name, why):
 def test_a_clock_is_looked_for_only_where_starts_apart_leave_much_untold(monkeypatch, untold, kind):
     errors = {"none": 0.5 * untold, "start": untold, "tempo": 0.9}
     monkeypatch.setattr(
-        timing_evidence, "outcome_error", lambda _, apart: errors[apart.timeline.kind]
+        timing_evidence, "outcome_error", lambda _, each: errors[each.timeline.kind]
     )
-    assert choose_timing(demonstrations(42)).apart.timeline.kind == kind
+    assert choose_timing(demonstrations(42)).decomposition.timeline.kind == kind

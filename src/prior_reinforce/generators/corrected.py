@@ -27,7 +27,6 @@ from prior_reinforce.generators.base import Generator, Report
 from prior_reinforce.generators.interpolation import SmoothInterpolation
 from prior_reinforce.generators.saving import Tensors
 from prior_reinforce.generators.wrapping import Wrapper
-from prior_reinforce.plans.channels import kinds
 from prior_reinforce.plans.motions import Demonstrations
 
 
@@ -48,8 +47,8 @@ class Corrected(Wrapper):
         self.generator.fit(demonstrations, seed=seed, progress=progress)
         missed = demonstrations.plans - self.generator.generate(demonstrations.outcomes_seen)
         # A switch has no values between its own: it is right, or at another frame.
-        of_channel = kinds(demonstrations.plans, demonstrations.format.units)
-        missed[:, :, [kind == "switch" for kind in of_channel]] = 0.0
+        switches = [kind == "switch" for kind in demonstrations.signals.kinds]
+        missed[:, :, switches] = 0.0
         without_numbers = replace(demonstrations.format, per_plan=())  # which may not be constant
         self._residual.fit(demonstrations.with_plans(missed, without_numbers), seed=seed)
 

@@ -41,7 +41,6 @@ from prior_reinforce.generators.base import Generator, Report, at_once
 from prior_reinforce.generators.saving import Tensors
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.plans.outcome_weights import smooth_weights
-from prior_reinforce.plans.timing import motion_span, speeds
 from prior_reinforce.registry import build
 from prior_reinforce.settings import Checked, Positive
 
@@ -87,7 +86,7 @@ class DynamicMovementPrimitives(Generator):
         plans, horizon = demonstrations.plans, demonstrations.horizon
         spans = np.tile([0.0, horizon - 1.0], (demonstrations.n, 1))
         if self.config.segmented:
-            spans = np.stack([motion_span(speed) for speed in speeds(demonstrations)])
+            spans = demonstrations.signals.spans
         n_weights = max(2, min(horizon, round(horizon / self.config.frames_per_weight)))
         response = _Response(n_weights)
         parameters = np.stack(

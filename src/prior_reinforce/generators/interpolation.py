@@ -35,7 +35,6 @@ from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.plans.outcome_weights import (
     Kernel,
     inverse_distance_weights,
-    kernel_for,
     smooth_weights,
 )
 from prior_reinforce.registry import build
@@ -79,9 +78,11 @@ class _Mixture(Generator):
 
     def _fit(self, demonstrations: Demonstrations, seed: int, progress: Report) -> None:
         """Keep the demonstrations; nothing is random and nothing takes time."""
-        self._plans = demonstrations.plans.copy()
-        self._outcomes = demonstrations.outcomes_seen.copy()
-        self._noise = demonstrations.outcome_noise.copy()
+        self._keep(
+            demonstrations.plans.copy(),
+            demonstrations.outcomes_seen.copy(),
+            demonstrations.outcome_noise.copy(),
+        )
         at_once(progress, loss=0.0)
 
     def _generate(self, conditions: Points) -> Plans:
@@ -104,8 +105,12 @@ class _Mixture(Generator):
             raise ValueError(f"plans {plans.shape} and outcomes {outcomes.shape} do not fit")
         if tensors["noise"].shape != outcomes.shape:
             raise ValueError(f"noise {tensors['noise'].shape} does not fit outcomes")
-        generator._plans, generator._outcomes, generator._noise = plans, outcomes, tensors["noise"]
+        generator._keep(plans, outcomes, tensors["noise"])
         return generator
+
+    def _keep(self, plans: Plans, outcomes: Points, noise: Points) -> None:
+        """Keep the demonstrations."""
+        self._plans, self._outcomes, self._noise = plans, outcomes, noise
 
 
 class NearestNeighbours(_Mixture):
@@ -134,13 +139,16 @@ class SmoothInterpolation(_Mixture):
 
     def _fit(self, demonstrations: Demonstrations, seed: int, progress: Report) -> None:
         super()._fit(demonstrations, seed, progress)
-        if self.config.kernel == "auto" and kernel_for(self._outcomes, self._noise) == "linear":
+        if self.config.kernel == "auto" and self._spline.kernel == "linear":
             self.remarks = (
                 "kernel: linear, since outcomes lie too close together for a cubic spline",
             )
 
     def _weights(self, conditions: Points) -> Float[np.ndarray, "n N"]:
         """Weigh all plans; at an outcome that was measured its own alone, to rounding."""
-        return smooth_weights(self._outcomes, kernel=self.config.kernel, noise=self._noise)(
-            conditions
-        )
+        return self._spline(conditions)
+
+    def _keep(self, plans: Plans, outcomes: Points, noise: Points) -> None:
+        """Keep the demonstrations, and fit the weights to them once."""
+        super()._keep(plans, outcomes, noise)
+        self._spline = smooth_weights(outcomes, kernel=self.config.kernel, noise=noise)

@@ -13,7 +13,7 @@ from jaxtyping import Float
 
 from prior_reinforce.errors import InvalidDemonstrationsError
 from prior_reinforce.plans.motions import Demonstrations
-from prior_reinforce.plans.warping import take_apart
+from prior_reinforce.plans.timeline import decompose
 
 _AGREE = 0.1
 """Least correlation of two motions of one pattern. Ours: on the zoo's development tasks every
@@ -36,11 +36,11 @@ def patterns(demonstrations: Demonstrations) -> tuple[tuple[int, ...], ...]:
     """
     everything = tuple(range(demonstrations.n))
     try:
-        apart = take_apart(demonstrations, "start")
+        decomposition = decompose(demonstrations, "start")
     except InvalidDemonstrationsError:
         return (everything,)
-    velocities = np.gradient(apart.shapes, axis=1)
-    units = np.array(apart.names(demonstrations.format)[1][: velocities.shape[2]])
+    velocities = np.gradient(decomposition.shapes, axis=1)
+    units = np.array(decomposition.timeline.names(demonstrations.format)[1][: velocities.shape[2]])
     for unit in set(units.tolist()):
         pooled = float(np.sqrt(np.mean(velocities[:, :, units == unit] ** 2)))
         velocities[:, :, units == unit] /= pooled or 1.0

@@ -1,15 +1,15 @@
-"""Any generator, relieved of timing: it learns shapes and warps of time, not frames.
+"""Wrapper that separates timing from shape: a generator learns shapes and warps, not frames.
 
 Demonstrations of one throw start at different times, and run at different tempos. A generator that
 is asked for something between two of them averages a swing that has begun with one that has not,
 which slows it: a throw 0.1 s too early and one 0.1 s too late average to one that lands 8 cm short
 (docs/tasks/basketball.md). Remedies, for every generator:
 
-- `start`, `tempo`, `warp`: plans are taken apart into shapes on a common phase and a few numbers
-  each (`plans.warping`), which become dimensions of the plan, constant over it, that the generator
-  learns with the shape. Nothing is lost: plans come back as recorded. Ours; start time and duration
-  are parameters of their own in movement primitives as well [Ijspeert2013].
-- `auto`: that one of them, or none, which tells left-out demonstrations best (`timing_evidence`);
+- `start`, `tempo`: plans are decomposed into shapes on a common phase and a few numbers each
+  (`plans.timeline`), which become dimensions of the plan, constant over it, that the generator
+  learns with the shape. Nothing is lost: demonstrations are reproduced. Ours; movement primitives
+  have parameters for start time and duration as well [Ijspeert2013].
+- `auto`: whichever of them, or none, best predicts left-out outcomes (`timing_evidence`);
   `remarks` says which, and why.
 - `align`: the demonstrations are aligned first (`plans.alignment`), so that all generated plans
   start together (paper, "Timeline Aligned Variants").
@@ -31,13 +31,13 @@ from prior_reinforce.generators.timing_evidence import choose_timing
 from prior_reinforce.generators.wrapping import Wrapper
 from prior_reinforce.plans.alignment import align
 from prior_reinforce.plans.motions import Demonstrations
-from prior_reinforce.plans.warping import Apart, Timeline, take_apart
+from prior_reinforce.plans.timeline import Decomposition, Timeline, decompose
 
-Timing = Literal["auto", "start", "tempo", "warp", "align"]
+Timing = Literal["auto", "start", "tempo", "align"]
 
 
 class Timed(Wrapper):
-    """A generator that learns timing apart from the motions, or learns aligned ones."""
+    """A generator that learns timing and motions separately, or learns aligned ones."""
 
     name: ClassVar[str] = "timed"
 
@@ -67,9 +67,9 @@ class Timed(Wrapper):
         if self.timing == "align":
             learned = align(demonstrations).demonstrations
         else:
-            apart = self._apart(demonstrations)
-            self._timeline = apart.timeline
-            learned = _as_plans(apart, demonstrations)
+            decomposition = self._decomposed(demonstrations)
+            self._timeline = decomposition.timeline
+            learned = _as_plans(decomposition, demonstrations)
         self.generator.fit(learned, seed=seed, progress=progress)
 
     def _generate(self, conditions: Points) -> Plans:
@@ -77,7 +77,7 @@ class Timed(Wrapper):
         if self._timeline is None:
             return plans
         n_channels = plans.shape[2] - self._timeline.n_numbers
-        return self._timeline.play(plans[:, :, :n_channels], plans[:, 0, n_channels:])
+        return self._timeline.reconstruct(plans[:, :, :n_channels], plans[:, 0, n_channels:])
 
     def state(self) -> tuple[dict[str, Any], Tensors]:
         """The common phase; see `Generator.state`."""
@@ -90,29 +90,29 @@ class Timed(Wrapper):
         if settings["timeline"] is not None:
             self._timeline = Timeline.restore(settings["timeline"])
 
-    def _apart(self, demonstrations: Demonstrations) -> Apart:
+    def _decomposed(self, demonstrations: Demonstrations) -> Decomposition:
         if self.timing == "auto":
             choice = choose_timing(demonstrations)
             self.remarks = (choice.reason,)
-            return choice.apart
+            return choice.decomposition
         assert self.timing != "align"
-        apart = take_apart(demonstrations, self.timing)
-        if apart.timeline.kind != self.timing:
+        decomposition = decompose(demonstrations, self.timing)
+        if decomposition.timeline.kind != self.timing:
             self.remarks = (
                 f"timing: as recorded, since {demonstrations.horizon} frames are too few to be "
                 "moved without a loss",
             )
-        return apart
+        return decomposition
 
 
-def _as_plans(apart: Apart, demonstrations: Demonstrations) -> Demonstrations:
+def _as_plans(decomposition: Decomposition, demonstrations: Demonstrations) -> Demonstrations:
     """Shapes, with the numbers of their warps as further dimensions, constant over each."""
-    names, units = apart.names(demonstrations.format)
-    n_channels, length = apart.shapes.shape[2], apart.shapes.shape[1]
-    shapes = apart.shapes.copy()
+    names, units = decomposition.timeline.names(demonstrations.format)
+    n_channels, length = decomposition.shapes.shape[2], decomposition.shapes.shape[1]
+    shapes = decomposition.shapes.copy()
     for name in demonstrations.format.per_plan:  # to the last digit, also where resampled
         shapes[:, :, names.index(name)] = shapes[:, :1, names.index(name)]
-    numbers = np.repeat(apart.numbers[:, None], length, axis=1)
+    numbers = np.repeat(decomposition.numbers[:, None], length, axis=1)
     return demonstrations.with_plans(
         np.concatenate([shapes, numbers], axis=2),
         replace(

@@ -1,13 +1,13 @@
-"""Which timing demonstrations ask for: the one in which their outcomes can be told from the motion.
+"""Which timing demonstrations call for: the one in which the motion best predicts the outcome.
 
-What is mixed of several plans has the outcome that is mixed of theirs only where the outcome is an
-affine function of the motion. So each demonstration is left out, and its outcome told from the
-others by an affine function of what the arm does at one phase: the decisive one, such as a release,
-which is not known and is taken where this works best. A release that is clocked is told best from
-plans as recorded; one that the motion itself brings about, from plans that start together.
+A weighted mean of plans has the weighted mean of their outcomes only if the outcome is an affine
+function of the motion. So each demonstration is left out, and its outcome predicted from the others
+by an affine function of the state at one phase: the decisive one, such as a release, which is
+unknown and taken where the prediction is best. A release by the clock is predicted best from plans
+as recorded; one that the motion itself brings about, from plans that start together.
 
-A start that is learned apart is the rule; other timings have to do clearly better, since six
-demonstrations tell little.
+A start that is learned separately is the rule; other timings have to do clearly better, since six
+demonstrations are little evidence.
 
 Notation:
     x_i  state at one phase: positions, and velocities times a time   (2 C,)  [-]
@@ -24,20 +24,20 @@ from jaxtyping import Float
 
 from prior_reinforce.errors import InvalidDemonstrationsError
 from prior_reinforce.plans.motions import Demonstrations
-from prior_reinforce.plans.timing import motion_span, speeds
-from prior_reinforce.plans.warping import Apart, WarpKind, take_apart
+from prior_reinforce.plans.registration import WarpKind
+from prior_reinforce.plans.timeline import Decomposition, decompose
 
-_WORTH: dict[WarpKind, float] = {"none": 0.9, "start": 1.0, "tempo": 0.5}
+_MAX_RELATIVE_ERROR: dict[WarpKind, float] = {"none": 0.9, "start": 1.0, "tempo": 0.5}
 """A timing's error must be below this part of `start`'s to be taken instead. Ours, chosen on the
-zoo's development tasks (docs/decisions-generator.md), where `warp` never earned its time."""
-_ON_TIME = 0.08
+zoo's development tasks (docs/decisions-generator.md)."""
+_CLOCK_SPREAD = 0.08
 """People who keep to a clock start within this part of their motion's length of each other,
 standard deviation; where they do not, `none` is out of the question. Ours: 0.01 to 0.07 on
 zoo-lob, which a clock releases; 0.17 to 0.29 on our own tasks, whose people start as they like."""
-_UNTOLD = 0.35
+_CLOCK_ERROR = 0.35
 """A clock is looked for only where `start` misses outcomes by more than this. Ours: of the zoo's
 development sets that seemed clocked, it is less in 12 of 19 that are not, in 1 of 15 that are."""
-_TELLS = 0.7
+_MAX_USEFUL_ERROR = 0.7
 """An error above this tells nothing: the mean of all outcomes is as good. Ours."""
 _FEWEST = 5
 """With fewer demonstrations than this, or than k + 3, none can be left out. Ours."""
@@ -51,14 +51,13 @@ _BEST = 3
 """Of all phases the best so many are averaged, against luck. Ours."""
 _RIDGE = 1e-3
 """Ridge of the affine function, relative to the states' mean square. Ours."""
-_MATTERS = 0.1
+_EQUALLY_GOOD = 0.1
 """Errors that differ by less than this part of the outcomes' spread are as good as each other.
 Ours: with six demonstrations they are not known better."""
 _WORDS: dict[WarpKind, str] = {
     "none": "plans start when the demonstrations did",
     "start": "when to start is learned apart from how to move",
     "tempo": "when to start and how fast to go are learned apart from how to move",
-    "warp": "when to be where is learned apart from how to move",
 }
 
 
@@ -66,7 +65,7 @@ _WORDS: dict[WarpKind, str] = {
 class TimingChoice:
     """The timing that was taken, and why."""
 
-    apart: Apart
+    decomposition: Decomposition
     reason: str
     """In one sentence, for people."""
     errors: Mapping[WarpKind, float] = field(default_factory=dict)
@@ -81,53 +80,52 @@ def choose_timing(demonstrations: Demonstrations) -> TimingChoice:
     """
     n = demonstrations.n
     try:
-        usual = take_apart(demonstrations, "start")
+        usual = decompose(demonstrations, "start")
     except InvalidDemonstrationsError as error:
-        return TimingChoice(take_apart(demonstrations, "none"), f"timing as recorded: {error}")
+        return TimingChoice(decompose(demonstrations, "none"), f"timing as recorded: {error}")
     if n < max(_FEWEST, demonstrations.outcome_dim + 3):
         return TimingChoice(
             usual,
             f"timing: {_WORDS[usual.timeline.kind]}, as a rule; {n} demonstrations cannot tell "
             "what is better",
         )
-    apart: dict[WarpKind, Apart] = {
-        kind: usual if kind == "start" else take_apart(demonstrations, kind) for kind in _WORTH
+    decompositions: dict[WarpKind, Decomposition] = {
+        kind: decompose(demonstrations, kind) for kind in _MAX_RELATIVE_ERROR
     }
-    errors = {kind: outcome_error(demonstrations, each) for kind, each in apart.items()}
-    able = [kind for kind in errors if kind == "start" or errors[kind] < _TELLS]
-    off_time = float(np.std(usual.numbers[:, 0])) > _ON_TIME * _length(demonstrations)
-    told = errors["start"] <= _UNTOLD
-    if off_time or told or usual.by_step:  # a hand that opens within the plan needs no clock
+    errors = {kind: outcome_error(demonstrations, each) for kind, each in decompositions.items()}
+    able = [kind for kind in errors if kind == "start" or errors[kind] < _MAX_USEFUL_ERROR]
+    length = float(np.median(np.ptp(demonstrations.signals.spans, axis=1)))
+    no_clock = float(np.std(usual.numbers[:, 0])) > _CLOCK_SPREAD * length
+    if (
+        no_clock or errors["start"] <= _CLOCK_ERROR or usual.by_step
+    ):  # a hand that opens within the plan needs no clock
         able = [kind for kind in able if kind != "none"]
-    best = min(able, key=lambda kind: errors[kind] / _WORTH[kind])
-    if errors[best] >= _TELLS:
+    best = min(able, key=lambda kind: errors[kind] / _MAX_RELATIVE_ERROR[kind])
+    if errors[best] >= _MAX_USEFUL_ERROR:
         why = ", as a rule; these demonstrations do not tell what is better"
-    elif min(e for kind, e in errors.items() if kind != best) - errors[best] < _MATTERS:
-        better = min(errors.values()) < errors[best] - _MATTERS
+    elif min(e for kind, e in errors.items() if kind != best) - errors[best] < _EQUALLY_GOOD:
+        better = min(errors.values()) < errors[best] - _EQUALLY_GOOD
         why = ", as a rule" if better else "; another timing would do as well here"
     else:
         why = ", as these demonstrations ask for"
     return TimingChoice(
-        apart[best], f"timing: {_WORDS[apart[best].timeline.kind]} ({best}){why}", errors
+        decompositions[best],
+        f"timing: {_WORDS[decompositions[best].timeline.kind]} ({best}){why}",
+        errors,
     )
 
 
-def _length(demonstrations: Demonstrations) -> float:
-    """Of the motions, in frames."""
-    return float(np.median([np.ptp(motion_span(speed)) for speed in speeds(demonstrations)]))
-
-
-def outcome_error(demonstrations: Demonstrations, apart: Apart) -> float:
+def outcome_error(demonstrations: Demonstrations, decomposition: Decomposition) -> float:
     """Return how far left-out outcomes are missed, relative to their spread.
 
     Args:
         demonstrations: N of them.
-        apart: The same, taken apart.
+        decomposition: Theirs.
 
     Returns:
         Root mean square at the decisive phase; 1 is what the mean of the others would do.
     """
-    states = _states(demonstrations, apart)
+    states = _states(demonstrations, decomposition)
     outcomes = demonstrations.outcomes_seen / demonstrations.outcomes_seen.std(axis=0)
     n, squares = demonstrations.n, np.zeros(len(states))
     for i in range(n):
@@ -139,19 +137,21 @@ def outcome_error(demonstrations: Demonstrations, apart: Apart) -> float:
         left_out = states[:, i] - states[:, others].mean(axis=1)
         weights = np.linalg.solve(gram + ridge, x @ left_out[:, :, None])[:, :, 0]
         mean = outcomes[others].mean(axis=0)
-        told = mean + weights @ (outcomes[others] - mean)
-        squares += np.sum((told - outcomes[i]) ** 2, axis=1)
+        predicted = mean + weights @ (outcomes[others] - mean)
+        squares += np.sum((predicted - outcomes[i]) ** 2, axis=1)
     errors = np.sqrt(squares / (n * outcomes.shape[1]))
     return float(np.mean(np.sort(errors)[:_BEST]))
 
 
-def _states(demonstrations: Demonstrations, apart: Apart) -> Float[np.ndarray, "T N F"]:
+def _states(
+    demonstrations: Demonstrations, decomposition: Decomposition
+) -> Float[np.ndarray, "T N F"]:
     """What the arm does at each phase: positions and velocities, of all units alike."""
     from scipy.ndimage import uniform_filter1d
 
     plan_format = demonstrations.format
-    shapes = apart.shapes[:, :: apart.timeline.per_frame]
-    units = np.array(apart.names(plan_format)[1][: shapes.shape[2]])
+    shapes = decomposition.shapes[:, :: decomposition.timeline.per_frame]
+    units = np.array(decomposition.timeline.names(plan_format)[1][: shapes.shape[2]])
     variances = shapes.var(axis=1).mean(axis=0)
     for unit in set(units.tolist()):
         pooled = float(np.sqrt(variances[units == unit].sum()))

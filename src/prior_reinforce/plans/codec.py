@@ -20,9 +20,7 @@ from jaxtyping import Float
 from typing_extensions import Self
 
 from prior_reinforce.arrays import Plans
-from prior_reinforce.plans.channels import HELD, MOST_LEVELS, noise
-from prior_reinforce.plans.channels import kinds as kinds_of
-from prior_reinforce.plans.timing import resting_dimensions
+from prior_reinforce.plans.signals import HELD, MAX_LEVELS, analyse
 
 Representation = Literal["splines", "frames"]
 """Splines where they fit, or frames for every dimension."""
@@ -112,22 +110,22 @@ class PlanCodec:
             length = math.ceil(horizon / length_multiple) * length_multiple
         else:
             length = max(1, round(horizon / frames_per_point / length_multiple)) * length_multiple
-        starts, ends = resting_dimensions(plans)
         units = tuple(units or ("1",) * action_dim)
-        found, trembling = kinds_of(plans, units), noise(plans)
+        signals = analyse(plans, units, dt=1.0)
+        starts, ends = signals.rest_start, signals.rest_end
         kinds: list[Kind] = []
         folds: list[int] = []
         for d in range(action_dim):
             values, kind, fold = plans[:, :, d], "frames", math.ceil(horizon / length)
             if (per_plan is not None and per_plan[d]) or (
-                found[d] == "held" and representation == "splines"
+                signals.kinds[d] == "held" and representation == "splines"
             ):
                 kind, fold = "number", 1
-            elif representation == "splines" and found[d] == "smooth":
+            elif representation == "splines" and signals.kinds[d] == "smooth":
                 largest = max(
                     _LARGEST_SPLINE_RESIDUAL * float(np.ptp(values)),
                     min(
-                        _NOISE_RESIDUAL * float(trembling[d]),
+                        _NOISE_RESIDUAL * float(signals.noise[d]),
                         _MOST_NOISE * float(np.ptp(values)),
                     ),
                     HELD if units[d] in ("rad", "m") else 0.0,
@@ -310,7 +308,7 @@ def _fits(values: _Values, n_points: int, at_start: bool, at_end: bool, largest:
 def _levels(values: _Values) -> tuple[float, ...]:
     """The values of a switch; empty where there are too many for one."""
     distinct = np.unique(values)
-    return tuple(distinct.tolist()) if distinct.size <= MOST_LEVELS else ()
+    return tuple(distinct.tolist()) if distinct.size <= MAX_LEVELS else ()
 
 
 def _as_tuples(value: Any) -> Any:

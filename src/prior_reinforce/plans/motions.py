@@ -20,6 +20,7 @@ import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -43,6 +44,7 @@ from prior_reinforce.arrays import (
 )
 from prior_reinforce.errors import FileFormatError, InvalidDemonstrationsError, InvalidPlanError
 from prior_reinforce.files import open_npz
+from prior_reinforce.plans.signals import Signals, analyse
 
 _FILE_FORMAT = "prior-reinforce demonstrations"
 _FILE_VERSION = 1
@@ -221,6 +223,11 @@ class Demonstrations:
     def outcome_dim(self) -> int:
         """k, the number of components of an outcome."""
         return self.outcomes_seen.shape[1]
+
+    @cached_property
+    def signals(self) -> Signals:
+        """Noise, kind and rest of each dimension, analysed once."""
+        return analyse(self.plans, self.format.units, self.format.dt)
 
     @property
     def sha256(self) -> str:

@@ -90,7 +90,7 @@ def smooth_weights(
     *,
     kernel: Kernel = "auto",
     noise: Float[np.ndarray, "N k"] | None = None,
-) -> Weights:
+) -> SmoothWeights:
     r"""Return the cardinal weights of a polyharmonic spline with an affine tail.
 
     The interpolant of values :math:`f_i` at :math:`r_i`,
@@ -108,12 +108,12 @@ def smooth_weights(
 
     Source: Wendland, "Scattered Data Approximation", 2005, chapter 8 (ours to use it here).
     """
-    from scipy.interpolate import RBFInterpolator
-
     if kernel == "auto":
-        kernel = kernel_for(outcomes, noise)
+        cubic = smooth_weights(outcomes, kernel="cubic", noise=noise)
+        if amplification(cubic, outcomes) <= _LARGEST_AMPLIFICATION:
+            return cubic
+        return smooth_weights(outcomes, kernel="linear", noise=noise)
     n, k = outcomes.shape
-    affine = n > k
     scale = np.ptp(outcomes, axis=0)
     spread = np.zeros(n)
     if noise is not None:
@@ -122,29 +122,36 @@ def smooth_weights(
     same = np.all(np.abs(outcomes[:, None] - outcomes[None]) <= SAME_OUTCOME * scale, axis=2)
     outcomes, times = outcomes[same.argmax(axis=1)], same.sum(axis=1)
     spread = np.where(times > 1, np.maximum(spread, _REPEATED), spread)
-    spline = RBFInterpolator(
-        outcomes / scale,
-        np.eye(n),  # one value a demonstration: what is interpolated are the weights themselves
-        kernel=_SCIPY[kernel] if affine else "linear",
-        degree=1 if affine else 0,
-        smoothing=spread,
-    )
-    return lambda conditions: np.asarray(spline(conditions / scale)).reshape(len(conditions), n)
+    return SmoothWeights(outcomes, scale, kernel if n > k else "linear", spread)
 
 
-def kernel_for(
-    outcomes: Float[np.ndarray, "N k"], noise: Float[np.ndarray, "N k"] | None = None
-) -> Kernel:
-    """Return the kernel that `auto` means: cubic, or linear where cubic weights amplify.
+class SmoothWeights:
+    """A fitted spline: conditions c to weights w."""
 
-    Args:
-        outcomes: r.
-        noise: See `smooth_weights`.
+    def __init__(
+        self,
+        outcomes: Float[np.ndarray, "N k"],
+        scale: Float[np.ndarray, " k"],
+        kernel: Kernel,
+        smoothing: Float[np.ndarray, " N"],
+    ) -> None:
+        """Fit it; see `smooth_weights`."""
+        from scipy.interpolate import RBFInterpolator
 
-    Source: ours, see docs/decisions-generator.md.
-    """
-    cubic = smooth_weights(outcomes, kernel="cubic", noise=noise)
-    return "cubic" if amplification(cubic, outcomes) <= _LARGEST_AMPLIFICATION else "linear"
+        n, k = outcomes.shape
+        self.kernel, self._scale = kernel, scale
+        self._spline = RBFInterpolator(
+            outcomes / scale,
+            np.eye(n),  # a value a demonstration: what is interpolated are the weights themselves
+            kernel="thin_plate_spline" if kernel == "thin-plate" else kernel,
+            degree=1 if n > k else 0,
+            smoothing=smoothing,
+        )
+
+    def __call__(self, conditions: Float[np.ndarray, "n k"]) -> Float[np.ndarray, "n N"]:
+        """Return w, a row a condition, a column a demonstration."""
+        weights = self._spline(conditions / self._scale)
+        return np.asarray(weights).reshape(len(conditions), -1)
 
 
 def amplification(weights: Weights, outcomes: Float[np.ndarray, "N k"]) -> float:
@@ -157,6 +164,3 @@ def amplification(weights: Weights, outcomes: Float[np.ndarray, "N k"]) -> float
     i, j = np.triu_indices(len(outcomes), k=1)
     halfway = 0.5 * (outcomes[i] + outcomes[j])
     return float(np.mean(np.sum(weights(halfway) ** 2, axis=1)))
-
-
-_SCIPY = {"cubic": "cubic", "thin-plate": "thin_plate_spline", "linear": "linear"}

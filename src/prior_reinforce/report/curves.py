@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 
-from prior_reinforce.plans.channels import largest_of_unit
+from prior_reinforce.plans.speeds import largest_of_unit
 from prior_reinforce.report.record import AdaptationRecord
 from prior_reinforce.report.style import (
     DEMONSTRATION,

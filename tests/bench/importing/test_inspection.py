@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from prior_reinforce.bench.importing import Preprocessing, import_demonstrations, inspect_recordings
-from prior_reinforce.bench.importing.inspection import say_small
+from prior_reinforce.bench.importing.inspection import acceleration_of, say_small
 from prior_reinforce.bench.robots import robot_limits
+from prior_reinforce.plans.interpolation import join_frames
 from tests.bench.importing.recorded import JOINTS, N, sampled, write_npz, write_outcomes
 
 
@@ -181,3 +182,11 @@ def test_noise_of_joints_that_are_held_is_not_remarked_on(tmp_path):
         q[:, 2] += rng.normal(0, 4e-5, len(q))
         np.savez(tmp_path / f"{i}.npz", t=t, q=q, joint_names=JOINTS)
     assert inspect_recordings(tmp_path, robot=robot_limits("panda")).remarks == ()
+
+
+def test_noise_alone_accelerates_by_as_much_as_the_spline_through_it():
+    sigma, dt = 2e-5, 0.0125
+    noise = np.random.default_rng(0).normal(0, sigma, (20_000, 1))
+    knots = join_frames(noise, dt)(np.arange(100, 19_900) * dt, 2)
+    assert knots.std() == pytest.approx(6 * sigma / dt**2, rel=0.03)
+    assert acceleration_of(np.array([sigma]), dt) == pytest.approx(2.5 * knots.std(), rel=0.03)

@@ -16,6 +16,9 @@ from prior_reinforce.errors import (
     InvalidDemonstrationsError,
     UnclearUnitsError,
 )
+from prior_reinforce.generators import make_generator
+from prior_reinforce.plans.motions import Demonstrations, PlanFormat
+from prior_reinforce.plans.signals import analyse
 from tests.bench.importing.recorded import (
     AS_IS,
     BEFORE,
@@ -171,6 +174,26 @@ def test_a_held_joint_with_encoder_noise_is_held_and_at_rest(rate):
     assert done.noise[[2, 6]] == pytest.approx(2e-5, rel=0.4)
 
 
+@pytest.mark.parametrize("rate", [50, 200, 1000])
+@pytest.mark.parametrize("sigma", [2e-5, 1e-4, 3e-4, 1e-3])
+@pytest.mark.parametrize("count", [0.0, 2e-4])
+def test_a_joint_that_is_held_is_held_in_the_plans_too(rate, sigma, count):
+    """As import calls it, so it is learned: no plan trembles with a joint that nobody moved."""
+    rng = np.random.default_rng(rate)
+    noisy = []
+    for i in range(N):
+        t, q = sampled(i, rate)
+        q = q + rng.normal(0, sigma, q.shape)
+        noisy.append(recording(t, count * np.round(q / count) if count else q, str(i)))
+    done = preprocess(noisy, UNITS, Preprocessing(dt=0.02))
+    assert done.held_channels == (2, 6)
+    form = PlanFormat(tuple(f"joint{i}" for i in range(7)), UNITS, done.dt)
+    demos = Demonstrations(done.plans, np.array(list(OUTCOMES.values())), form)
+    goals = demos.outcomes_seen[:2].mean(axis=0, keepdims=True)
+    (plan,) = make_generator("auto").fit(demos, seed=0).generate(goals)
+    assert np.ptp(plan[:, [2, 6]], axis=0).max() < 1e-9
+
+
 def test_smoothing_takes_noise_out_and_says_what_it_changed():
     rng = np.random.default_rng(0)
     noisy, clean = [], []
@@ -208,6 +231,24 @@ def test_smoothing_leaves_a_gripper_alone():
     settings = Preprocessing(dt=0.01, trim=False, smooth=10.0)
     done = preprocess([recording(t, q)] * 2, ("rad", "m"), settings)
     np.testing.assert_array_equal(done.plans[0, :, 1], q[:, 1])
+
+
+@pytest.mark.parametrize("rate", [50, 80, 200, 1000])
+@pytest.mark.parametrize("frames", range(1, 11))
+@pytest.mark.parametrize("sigma", [0.0, 2e-5])
+def test_smoothing_leaves_a_gripper_alone_however_many_frames_it_opens_in(rate, frames, sigma):
+    """As long as it opens within a quarter of the arm's motion, it is a step, and stays one."""
+    rng, recordings = np.random.default_rng(0), []
+    for i in range(N):
+        t, q = sampled(i, rate)
+        opens = 0.08 * np.clip((t - 0.9) * rate / frames, 0, 1) + sigma * rng.normal(size=t.size)
+        recordings.append(recording(t, np.column_stack([q, opens]), str(i)))
+    units = (*UNITS, "m")
+    plain = preprocess(recordings, units, Preprocessing(trim=False))
+    done = preprocess(recordings, units, Preprocessing(trim=False, smooth=20.0))
+    np.testing.assert_array_equal(done.plans[..., 7], plain.plans[..., 7])
+    assert np.any(done.plans[..., :7] != plain.plans[..., :7])
+    assert analyse(done.plans, units, done.dt).jumps.tolist() == [False] * 7 + [True]
 
 
 def test_gaps_are_remarked():

@@ -12,17 +12,11 @@ from jaxtyping import Float
 
 from prior_reinforce.arrays import Frames, Plans, Point
 from prior_reinforce.bench.importing.clock import LONGEST
-from prior_reinforce.bench.importing.noise import (
-    Channels,
-    held_channels,
-    is_step,
-    moving_ends,
-    noise_of,
-)
 from prior_reinforce.bench.importing.recording import Recording
 from prior_reinforce.bench.importing.units import say_names
 from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
-from prior_reinforce.plans.timing import moving_rows, still_bands
+from prior_reinforce.plans.signals import Signals, analyse, moving_ends, moving_rows
+from prior_reinforce.plans.speeds import Channels
 
 _ON_GRID = 0.02
 """A frame within this share of a time step of where it should be is taken as recorded. Ours: at
@@ -58,8 +52,8 @@ class Preprocessing:
     """Drop the still time before the first and after the last movement of each recording."""
     smooth: float | None = None
     """Frequency above which plans are smoothed, in [Hz]: a Butterworth filter of order 2, run
-    forwards and backwards, so that nothing is delayed. Channels that jump are left alone. None
-    keeps every frame as recorded."""
+    forwards and backwards, so that nothing is delayed. Steps and switches, such as grippers, are
+    left alone. None keeps every frame as recorded."""
     margin: float = 0.1
     """Still time that trimming keeps at either end, in [s]. Ours: enough for the plan to start
     and end at rest at 30 frames a second."""
@@ -98,7 +92,7 @@ class Preprocessed:
     held_channels: tuple[int, ...]
     """Channels that no recording moves, noise aside."""
     noise: Channels
-    """Standard deviation of each channel's noise at rest, in its unit; the median recording's."""
+    """Standard deviation of each channel's noise at rest, in its unit."""
     smoothed: Float[np.ndarray, "N 2 D"] | None
     """What smoothing changed in each plan: rms and largest change; None where nothing was."""
     remarks: tuple[str, ...]
@@ -121,22 +115,19 @@ def preprocess(
     dt = settings.dt or _common_dt(recordings)
     every, units = [r.positions for r in recordings], tuple(units)
     spans = [(0.0, recording.duration) for recording in recordings]
+    signals = analyse(every, units, float(np.median([r.period for r in recordings])))
     if settings.trim:
-        still = still_bands(every, units)
-        spans = [_moving_span(recording, still, settings.margin) for recording in recordings]
+        band = signals.trim_band
+        spans = [_moving_span(recording, band, settings.margin) for recording in recordings]
     remarks = _Remarks()
-    pieces, changes = [], []
+    pieces: list[Frames] = []
     for recording, (start, end) in zip(recordings, spans, strict=True):
         if (end - start) / dt > _MOST_FRAMES:
             raise InvalidDemonstrationsError(
                 f"episode {recording.episode} makes {(end - start) / dt:.0f} frames at dt {dt:g} s;"
                 " give a larger dt, or cut the recording"
             )
-        piece, stepwise = _resample(recording, start, end, dt, units)
-        if settings.smooth is not None:
-            smooth = _smoothed(recording, piece, dt, settings.smooth, units)
-            changes.append(_change(piece, smooth))
-            piece = smooth
+        piece, stepwise = _resample(recording, start, end, dt, signals)
         pieces.append(piece)
         remarks.gap(recording, start, end)
         if stepwise:
@@ -145,6 +136,15 @@ def preprocess(
             )
         for remark in recording.remarks:
             remarks.add(Kind.READING, recording, remark)
+    changes = []
+    if settings.smooth is not None:
+        of_plans = analyse(pieces, units, dt)
+        smooth = [
+            _smoothed(recording, piece, dt, settings.smooth, units, of_plans)
+            for recording, piece in zip(recordings, pieces, strict=True)
+        ]
+        changes = [_change(*both) for both in zip(pieces, smooth, strict=True)]
+        pieces = smooth
     longest = max(map(len, pieces))
     horizon = settings.horizon or longest
     for recording, piece, span in zip(recordings, pieces, spans, strict=True):
@@ -153,7 +153,7 @@ def preprocess(
                 f"episode {recording.episode} has {len(piece)} frames, more than the horizon "
                 f"{horizon}; give a horizon of {longest}, or a larger dt (motions are never cut)"
             )
-        remarks.ends(recording, span, units, held=len(piece) < horizon)
+        remarks.ends(recording, span, units, signals, held=len(piece) < horizon)
     longest_motion = max(end - start for start, end in spans)
     if longest_motion > LONGEST:
         remarks.add(
@@ -166,15 +166,14 @@ def preprocess(
         fewer = dt * horizon / _ENOUGH_FRAMES
         what = f"{horizon} frames are many; dt {fewer:.2g} s makes {_ENOUGH_FRAMES}"
         remarks.add(Kind.LONG, None, what)
-    held = np.all([held_channels(q, units) for q in every], axis=0)
     return Preprocessed(
         np.stack([np.pad(p, ((0, horizon - len(p)), (0, 0)), mode="edge") for p in pieces]),
         dt,
         tuple(start for start, _ in spans),
         tuple(end for _, end in spans),
         sum(len(piece) < horizon for piece in pieces),
-        tuple(np.flatnonzero(held).tolist()),
-        np.median([noise_of(q) for q in every], axis=0),
+        tuple(np.flatnonzero(signals.held).tolist()),
+        signals.noise,
         np.array(changes) if changes else None,
         remarks.lines(len(recordings)),
     )
@@ -237,14 +236,20 @@ class _Remarks:
             )
 
     def ends(
-        self, recording: Recording, span: tuple[float, float], units: tuple[str, ...], *, held: bool
+        self,
+        recording: Recording,
+        span: tuple[float, float],
+        units: tuple[str, ...],
+        signals: Signals,
+        *,
+        held: bool,
     ) -> None:
         """Channels that are not at rest where the plan starts or ends."""
         t = recording.times
         kept = (t >= span[0]) & (t <= span[1])
         if np.count_nonzero(kept) < _FEWEST_FRAMES:
             return
-        starts, ends = moving_ends(t[kept], recording.positions[kept], units)
+        starts, ends = moving_ends(t[kept], recording.positions[kept], units, signals)
         then = ", then holds its last pose" if held else ""
         for moving, what in ((starts, "starts in motion"), (ends, f"ends in motion{then}")):
             if np.any(moving):
@@ -261,9 +266,14 @@ class _Remarks:
 
 
 def _smoothed(
-    recording: Recording, frames: Frames, dt: float, frequency: float, units: tuple[str, ...]
+    recording: Recording,
+    frames: Frames,
+    dt: float,
+    frequency: float,
+    units: tuple[str, ...],
+    signals: Signals,
 ) -> Frames:
-    """Frames without what is faster than a frequency, but for channels that jump."""
+    """Frames without what is faster than a frequency, but for steps and switches."""
     from scipy.signal import butter, sosfiltfilt
 
     if frequency >= 0.5 / dt:
@@ -283,9 +293,9 @@ def _smoothed(
         np.asarray(sosfiltfilt(sections, frames, axis=0, padtype=padding, padlen=pad))
         for padding in ("even", "odd")
     )
-    starts, ends = moving_ends(np.arange(len(frames)) * dt, frames, units)
+    starts, ends = moving_ends(np.arange(len(frames)) * dt, frames, units, signals)
     smooth = np.where(starts | ends, moving, at_rest)
-    return np.where(is_step(recording.positions, units), frames, smooth)
+    return np.where(signals.jumps, frames, smooth)
 
 
 def _change(before: Frames, after: Frames) -> Float[np.ndarray, "2 D"]:
@@ -317,7 +327,7 @@ def _moving_span(recording: Recording, still: Point, margin: float) -> tuple[flo
 
 
 def _resample(
-    recording: Recording, start: float, end: float, dt: float, units: tuple[str, ...]
+    recording: Recording, start: float, end: float, dt: float, signals: Signals
 ) -> tuple[Frames, list[str]]:
     """Frames at start, start + dt, ... until the end is covered, and names of stepwise channels."""
     t, q = recording.times, recording.positions
@@ -332,8 +342,8 @@ def _resample(
     frames = CubicSpline(t, q)(at) if len(t) > 3 else PchipInterpolator(t, q)(at)
     low, high = q.min(axis=0), q.max(axis=0)
     beyond = np.maximum(low - frames.min(axis=0), frames.max(axis=0) - high)
-    stepwise = (beyond > _OVERSHOOT * (high - low)) & (beyond > _NOISE_OVERSHOOT * noise_of(q))
-    stepwise &= ~held_channels(q, units)
+    stepwise = (beyond > _OVERSHOOT * (high - low)) & (beyond > _NOISE_OVERSHOOT * signals.noise)
+    stepwise &= ~signals.held
     if np.any(stepwise):
         # PCHIP never leaves the range of its neighbours: right for grippers and switches.
         frames[:, stepwise] = PchipInterpolator(t, q[:, stepwise])(at)

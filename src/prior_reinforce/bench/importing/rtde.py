@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Bool
 
 from prior_reinforce.bench.importing.clock import Times
-from prior_reinforce.bench.importing.noise import REST_SPEED
+from prior_reinforce.plans.signals import REST_SPEED
 from prior_reinforce.bench.importing.recording import Positions
 
 _CYCLE = 0.002

@@ -15,7 +15,6 @@ from prior_reinforce.bench.importing.naming import (
     missing_channels,
     numbered_like,
 )
-from prior_reinforce.bench.importing.noise import held_channels
 from prior_reinforce.bench.importing.recording import Recording
 from prior_reinforce.bench.importing.tables import counts
 from prior_reinforce.bench.importing.units import (
@@ -27,6 +26,7 @@ from prior_reinforce.bench.importing.units import (
     say_names,
 )
 from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
+from prior_reinforce.plans.signals import held_channels
 
 _MOST_LOST = 0.1
 """Share of an episode's frames that may be lost. Ours: lost packets come in bursts of some frames;
@@ -216,7 +216,7 @@ def _left_out(recordings: Sequence[Recording], columns: Sequence[list[int]]) -> 
             values = values[np.isfinite(values)]
             if recording.names[i] not in moving or len(values) < 2 or counts(values):
                 continue
-            if not held_channels(values[:, None], (recording.units[i] or "",))[0]:
+            if not held_channels([values[:, None]], (recording.units[i] or "",))[0]:
                 span = float(values.min()), float(values.max())
                 ranges.setdefault(recording.columns[i], []).append(span)
     said = [

@@ -24,6 +24,7 @@ from prior_reinforce.bench.robots.report import Check, LimitLine, LimitReport, S
 from prior_reinforce.errors import ConfigurationError, InvalidPlanError
 from prior_reinforce.plans.interpolation import RATE, join_frames
 from prior_reinforce.plans.motions import Demonstrations, Plan
+from prior_reinforce.plans.signals import REST_SPEED
 
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
@@ -67,7 +68,7 @@ class GateSettings:
     delayed cycle makes the robot extrapolate, which costs a few per cent of acceleration."""
     position_margin: float = 0.02
     """Distance from a joint's end that warns, in [rad]. Ours: about one degree."""
-    rest_speed: float = 0.05
+    rest_speed: float = REST_SPEED["rad"]
     """Speed over the first and the last frame's interval that is no rest any more, in [rad/s].
     Ours: the makers ask for exactly 0; a smooth start recorded at 30 frames/s shows 0.02. The jerk
     of the step into the hold is stricter where frames are close: at 80 frames/s, 0.05 rad/s asks

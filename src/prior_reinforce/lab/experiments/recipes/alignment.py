@@ -25,7 +25,7 @@ from prior_reinforce.lab.experiments.recipes.base import (
 from prior_reinforce.lab.tasks import make_task
 from prior_reinforce.plans.alignment import align
 from prior_reinforce.plans.motions import Demonstrations
-from prior_reinforce.plans.timing import middle, onset, recorded_speeds
+from prior_reinforce.plans.speeds import middle, onset, recorded_speeds
 
 _TASKS = (TASK, "curling", "fishing")
 """Hardware variants have the demonstrations of the first."""
@@ -68,7 +68,8 @@ def _row(task: str, name: str) -> dict[str, Any]:
 
 def _spread(moment: Callable[[Any], float], demonstrations: Demonstrations) -> float:
     """Standard deviation over demonstrations of a moment of their motion, in [s]."""
-    moments = [moment(speed) for speed in recorded_speeds(demonstrations)]
+    speeds = recorded_speeds(demonstrations.plans, demonstrations.format.units)
+    moments = [moment(speed) for speed in speeds]
     return float(np.std(moments) * demonstrations.format.dt)
 
 

@@ -1,0 +1,135 @@
+"""What generated plans owe to each threshold whose value nothing fixes: halve it, and double it.
+
+    python benchmarks/threshold_sensitivity.py [--sets 1] [--goals 20] [--seed 0]
+        [--kinds KIND-COUNT ...] [--only NAME ...]
+
+`auto` is fitted to sets of the zoo's development tasks with one threshold changed at a time. A row
+a threshold: for its half and for its double, how many sets generate other plans than with its value
+(by more than 1e-9 of a channel's range), and the share of first throws that hit, less that with
+its value. Integers are halved upwards. Closed form only: no network is trained.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import math
+import warnings
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from prior_reinforce.generators import make_generator
+from prior_reinforce.lab.experiments.protocol import is_hit
+from prior_reinforce.lab.tasks import make_task
+from prior_reinforce.lab.tasks.zoo import DEVELOPED_ON
+from prior_reinforce.plans.timeline import decompose
+
+THRESHOLDS = (
+    "plans.registration.CONVERGED",
+    "plans.registration._NEWTON_STEPS",
+    "plans.registration._SEARCHED",
+    "plans.registration._COMPARED",
+    "plans.registration._FINE",
+    "plans.registration._TEMPO_SCALE",
+    "plans.registration._EVALUATIONS",
+    "plans.signals.MAX_LEVELS",
+    "plans.signals._ACTIVE",
+    "plans.signals._ACTIVE_NOISE",
+    "plans.signals._STEP_SHARE",
+    "plans.signals._FEWEST_FRAMES",
+    "plans.signals._POSE_NOISE",
+    "plans.signals._POSE_SHARE",
+    "plans.speeds.END_SPEED",
+    "plans.extrapolation._SLOPE_FRAMES",
+    "plans.timeline._OVERSAMPLING",
+    "plans.timeline._FEW_FRAMES",
+    "generators.patterns._TOLD",
+    "generators.timing_evidence._MAX_USEFUL_ERROR",
+    "generators.timing_evidence._FEWEST",
+    "generators.timing_evidence._BEST",
+    "generators.timing_evidence._RIDGE",
+    "generators.timing_evidence._EQUALLY_GOOD",
+)
+KINDS = ("mixed-8", "jitter-6")
+
+
+@dataclass(frozen=True)
+class Case:
+    """A set of demonstrations, and goals."""
+
+    task: Any
+    demonstrations: Any
+    goals: NDArray[np.float64]
+
+    def throw(self, seed: int) -> tuple[NDArray[np.float64], float]:
+        """Plans for the goals, in ranges of their channels, and the share of them that hit."""
+        plans = make_generator("auto").fit(self.demonstrations, seed=seed).generate(self.goals)
+        rollouts = self.task.rollout(plans, np.random.default_rng(seed))
+        hits = [
+            is_hit(r, goal, self.task.tolerance)
+            for r, goal in zip(rollouts, self.goals, strict=True)
+        ]
+        ranges = np.ptp(self.demonstrations.plans, axis=(0, 1))
+        return plans / np.where(ranges > 0, ranges, 1.0), float(np.mean(hits))
+
+
+def changed(value: Any, factor: float) -> Any:
+    """A threshold times a factor."""
+    if isinstance(value, tuple):  # ways to sample: only the coarsest, or finer ones as well
+        return value[:1] if factor < 1 else (*value, 2 * value[-1])
+    return math.ceil(value * factor) if isinstance(value, int) else value * factor
+
+
+def throws(cases: list[Case], seed: int) -> list[tuple[NDArray[np.float64], float]]:
+    """What every case gives with the thresholds as they are now."""
+    decompose.cache_clear()
+    for case in cases:
+        case.demonstrations.__dict__.pop("signals", None)
+    return [case.throw(seed) for case in cases]
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--kinds", nargs="+", default=KINDS)
+    parser.add_argument("--only", nargs="+", default=THRESHOLDS)
+    parser.add_argument("--sets", type=int, default=1)
+    parser.add_argument("--goals", type=int, default=20)
+    parser.add_argument("--seed", type=int, default=0)
+    arguments = parser.parse_args()
+    warnings.simplefilter("ignore")
+    cases = []
+    for name in DEVELOPED_ON:
+        task = make_task(name)
+        for kind in arguments.kinds:
+            for number in range(arguments.sets):
+                goals = task.sample_goals(arguments.goals, np.random.default_rng([7, number]))
+                cases.append(Case(task, task.demonstrations(f"{kind}-{number}"), goals))
+    usual = throws(cases, arguments.seed)
+    hits = np.array([hit for _, hit in usual])
+    print(f"{len(cases)} sets; first throws that hit {hits.mean():.3f}\n")
+    print("| threshold | value | half: other plans | first throws | double: other plans | |")
+    print("|---|---|---|---|---|---|")
+    for name in arguments.only:
+        module_name, _, attribute = name.rpartition(".")
+        module = importlib.import_module(f"prior_reinforce.{module_name}")
+        value = getattr(module, attribute)
+        cells = []
+        for factor in (0.5, 2.0):
+            setattr(module, attribute, changed(value, factor))
+            others = throws(cases, arguments.seed)
+            setattr(module, attribute, value)
+            differ = sum(
+                plans.shape != other.shape or not np.allclose(plans, other, rtol=0, atol=1e-9)
+                for (plans, _), (other, _) in zip(usual, others, strict=True)
+            )
+            gain = np.mean([hit for _, hit in others]) - hits.mean()
+            cells += [str(differ), f"{gain:+.3f}" if differ else ""]
+        print(f"| `{name}` | {value} | {' | '.join(cells)} |", flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,289 @@
+"""Signal analysis: noise, the kind of each channel, rest and motion, by one set of thresholds.
+
+A plan is rarely all smooth joint paths. A base is turned and then held, a gripper opens within six
+frames, a valve is on or off. Each kind is timed, coded and interpolated in its own way:
+
+- `held`: one number a plan; what changes within a plan is noise.
+- `switch`: takes a few values only, and jumps between them.
+- `step`: rests, but for short transitions: a gripper that opens.
+- `smooth`: everything else.
+
+"At rest" is measured in three ways, because mistakes cost differently:
+
+- *Speed of all channels*, smoothed and relative to its peak, where motions are compared or aligned
+  (`speeds`): an onset that is only compared may be late.
+- *Distance from the end pose* (`moving_rows`), where frames are dropped (`trim_band`) or a motion
+  is cut off (`pose_band`): a frame that is dropped is lost.
+- *Speed of one channel* at an end, relative to its fastest step where a plan is coded (`END_STEP`),
+  in its unit where an arm executes it (`REST_SPEED`).
+
+Notation:
+    A      motions             (T_i, D) each, in their units: plans (H, D), or recordings
+    sigma  noise of a channel  (D,)     in its unit
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from prior_reinforce.plans.speeds import (
+    SMOOTHING,
+    Channels,
+    Motion,
+    largest_of_unit,
+    motion_span,
+    velocity_profiles,
+)
+
+ChannelKind = Literal["held", "switch", "step", "smooth"]
+
+HELD = 1e-4
+"""A channel is held if it leaves its mean by at most this, rms, in rad or m (in other units: this
+part of the largest range of that unit). Ours: what a plan may be off by and still count as
+reproduced. It is so small because a plan may consist of increments."""
+COUNTS = {"rad": 1e-3, "m": 5e-4}
+"""Range of a few counts of an encoder, and distance from a pose that is none. Ours: below what
+moves a throw by a millimetre."""
+_NOISE_HELD = 3.0
+"""What is nothing but noise stays within so many sigma, rms. Ours: sigma is estimated from few
+frames, and of a signal that is rounded to counts."""
+MAX_LEVELS = 4
+"""A channel that takes no more values than these is a switch. Ours."""
+_STEP_SHARE = 0.25
+"""A step's transitions last at most this part of the longest motion of any channel. Ours: a gripper
+opens within six frames of a throw of 40, and joints that move together last about as long as each
+other."""
+_ACTIVE, _ACTIVE_NOISE = 0.03, 5.0
+"""A frame takes part in a transition if it changes by over this part of the channel's largest
+change, and by over so many sigma. Ours."""
+_STANDS_OUT = 0.25
+"""That noise counts only where it is less than this part of the largest change: a slow joint at
+1 kHz changes by less than its noise from frame to frame. Ours."""
+_FEWEST_FRAMES = 20
+"""Fewer frames show motion, and not its noise. Ours."""
+_QUANTILE, _NORMAL = 0.3, 0.385
+"""Noise is read off the 30 % quietest third differences: 0.385 standard deviations of a normal
+variable, in absolute value, lie below its 30 % quantile."""
+
+END_STEP = 0.01
+"""A channel rests at an end of a plan if its step there is at most this part of its largest step.
+Ours: a plan is then generated at rest there too."""
+REST_SPEED = {"rad": 0.05, "m": 0.02}
+"""A slower channel rests, in units/s, in recordings and for the gate. Ours: the makers ask for
+exactly 0; a smooth start recorded at 30 frames/s shows 0.02 rad/s."""
+_REST_SHARE = 0.05
+"""Part of a channel's largest speed that is rest in units without a `REST_SPEED`. Ours."""
+_REST_NOISE = 5.0
+"""A slope within so many of its standard deviations is noise."""
+_END_TIME = 0.04
+"""Time over which the speed at an end is measured, in [s]: a slope through several frames."""
+_TRIM_SHARE = 0.005
+"""Frames within this share of the largest range of their unit from an end pose are trimmed. Ours:
+above encoder noise, and reached by a smooth start within its first tenth."""
+_POSE_SHARE, _POSE_NOISE = 1e-4, 6.0
+"""A pose is left where a channel is off by this part of the largest range of its unit, or by so
+many sigma. Ours: a minimum-jerk motion has 0.7 % of its largest speed there, and can stop."""
+
+
+@dataclass(frozen=True, eq=False)
+class Signals:
+    """What some motions of D channels are made of; from `analyse`."""
+
+    kinds: tuple[ChannelKind, ...]
+    """Of each channel, from all motions together."""
+    noise: Channels
+    """sigma."""
+    trim_band: Channels
+    """How far each channel may stray from a recording's end pose in frames that may be dropped."""
+    pose_band: Channels
+    """How far each channel may be from a pose and still count as there."""
+    rest_start: tuple[bool, ...]
+    """Whether every motion starts at rest, for each channel."""
+    rest_end: tuple[bool, ...]
+    """Whether every motion ends at rest, for each channel."""
+    spans: Float[np.ndarray, "N 2"]
+    """Where each motion begins and ends (`motion_span`), in frames."""
+
+    @property
+    def held(self) -> Bool[np.ndarray, " D"]:
+        """Which channels no motion moves, noise aside."""
+        return np.array([kind == "held" for kind in self.kinds])
+
+    @property
+    def jumps(self) -> Bool[np.ndarray, " D"]:
+        """Which channels are steps or switches."""
+        return np.array([kind in ("step", "switch") for kind in self.kinds])
+
+
+def analyse(motions: Sequence[Motion] | np.ndarray, units: Sequence[str], dt: float) -> Signals:
+    """Analyse motions of the same channels, all together.
+
+    Args:
+        motions: A: plans of one shape, or recordings of any length.
+        units: Of the D channels.
+        dt: Time between two frames, in [s]; of recordings, their median period.
+    """
+    sigma = noise(motions)
+    ranges = np.ptp(np.concatenate(list(motions)), axis=0)
+    largest = np.max([np.ptp(motion, axis=0) for motion in motions], axis=0)
+    counts = np.array([COUNTS.get(unit, 0.0) for unit in units])
+    steps = [np.abs(np.diff(motion, axis=0)) for motion in motions]
+    slow = END_STEP * np.max([step.max(axis=0) for step in steps], axis=0)
+    profiles = velocity_profiles(motions, units, SMOOTHING / dt)
+    return Signals(
+        kinds=_kinds(motions, steps, held_channels(motions, units), sigma),
+        noise=sigma,
+        trim_band=np.maximum(_TRIM_SHARE * largest_of_unit(largest, units), counts),
+        pose_band=np.maximum(_POSE_SHARE * largest_of_unit(ranges, units), _POSE_NOISE * sigma),
+        rest_start=tuple(np.all([step[0] <= slow for step in steps], axis=0).tolist()),
+        rest_end=tuple(np.all([step[-1] <= slow for step in steps], axis=0).tolist()),
+        spans=np.array([motion_span(np.linalg.norm(each, axis=1)) for each in profiles]),
+    )
+
+
+def noise(motions: Sequence[Motion] | np.ndarray) -> Channels:
+    """Estimate each channel's measuring noise, as a standard deviation in its unit.
+
+    Third differences of a motion that rests for a third of its time are noise there; of white noise
+    they have 20 times its variance. An upper estimate where nothing rests; zero of less than 20
+    frames, which show motion rather than noise.
+
+    Source: ours, after the difference-based estimators of Gasser, Sroka and Jennen-Steinmetz
+    (Biometrika 1986).
+    """
+    long = [np.diff(each, n=3, axis=0) for each in motions if len(each) >= _FEWEST_FRAMES]
+    if not long:
+        return np.zeros(motions[0].shape[1])
+    quiet = np.quantile(np.abs(np.concatenate(long)), _QUANTILE, axis=0)
+    return np.asarray(quiet / (_NORMAL * math.sqrt(20.0)))
+
+
+def without_noise(plans: Float[np.ndarray, "N H D"], held: Bool[np.ndarray, " D"]) -> np.ndarray:
+    """Return the plans with each held channel at its mean, one number a plan."""
+    noisy = held & np.any(np.ptp(plans, axis=1), axis=0)  # a constant keeps its last digit
+    return np.where(noisy, plans.mean(axis=1, keepdims=True), plans)
+
+
+def active_runs(
+    steps: Sequence[Float[np.ndarray, " _"]], sigma: float
+) -> list[list[tuple[int, int]]]:
+    """Return the stretches in which one channel changes, of each motion: first frame, and end.
+
+    Args:
+        steps: Its absolute changes from frame to frame, in each motion.
+        sigma: Its noise.
+    """
+    peak = max(step.max() for step in steps)
+    noisy = _ACTIVE_NOISE * sigma
+    least = max(_ACTIVE * peak, noisy if noisy < _STANDS_OUT * peak else 0.0)
+    return [_runs(step > least) for step in steps]
+
+
+def _runs(active: Bool[np.ndarray, " _"]) -> list[tuple[int, int]]:
+    """Begin and end of each stretch of active frames; single quiet frames do not part them."""
+    frames = np.flatnonzero(active)
+    if not frames.size:
+        return []
+    gaps = np.flatnonzero(np.diff(frames) > 2)
+    begins = frames[np.r_[0, gaps + 1]]
+    ends = frames[np.r_[gaps, len(frames) - 1]] + 1
+    return list(zip(begins.tolist(), ends.tolist(), strict=True))
+
+
+def held_channels(
+    motions: Sequence[Motion] | np.ndarray, units: Sequence[str]
+) -> Bool[np.ndarray, " D"]:
+    """Return which channels keep to their mean in every motion, or leave it by noise only.
+
+    Noise differs from one frame to the next by more than it wanders: the sum of squared successive
+    differences is twice the variance's (von Neumann, 1941); a motion's is a hundredth or less. Only
+    angles and lengths are measured by encoders; noise in other units may be meant.
+    """
+    ranges = np.ptp(np.concatenate(list(motions)), axis=0)
+    known = np.array([unit in COUNTS for unit in units])
+    floor = HELD * np.where(known, 1.0, largest_of_unit(ranges, units))
+    counts = np.array([COUNTS.get(unit, 0.0) for unit in units])
+    live = [_without_repeats(motion) for motion in motions]
+    sigma = np.max([noise([motion]) for motion in live], axis=0)
+    held = np.ones(len(units), dtype=bool)
+    for motion, recorded in zip(motions, live, strict=True):
+        rms = np.std(recorded, axis=0)
+        rough = np.mean(np.diff(recorded, axis=0) ** 2, axis=0) >= rms**2
+        small = (np.ptp(recorded, axis=0) <= counts) | (rms <= _NOISE_HELD * sigma)
+        held &= (np.std(motion, axis=0) <= floor) | (known & rough & small)
+    return held
+
+
+def _without_repeats(motion: Motion) -> Motion:
+    """The motion without frames that repeat its last pose, to which plans are padded."""
+    changes = np.flatnonzero(np.any(np.diff(motion, axis=0) != 0.0, axis=1))
+    return motion[: changes[-1] + 2] if changes.size else motion
+
+
+def _kinds(
+    motions: Sequence[Motion] | np.ndarray,
+    steps: Sequence[Motion],
+    held: Bool[np.ndarray, " D"],
+    sigma: Channels,
+) -> tuple[ChannelKind, ...]:
+    """Tell what kind of signal each channel is, from all motions together."""
+    durations = [
+        [b - a for runs in active_runs([s[:, d] for s in steps], sigma[d]) for a, b in runs]
+        for d in np.flatnonzero(~held)
+    ]
+    longest = max((max(each, default=0) for each in durations), default=0)
+    kinds: list[ChannelKind] = ["held"] * len(held)
+    for d, each in zip(np.flatnonzero(~held), durations, strict=True):
+        if len(np.unique(np.concatenate([motion[:, d] for motion in motions]))) <= MAX_LEVELS:
+            kinds[d] = "switch"
+        else:
+            kinds[d] = "step" if max(each, default=0) <= _STEP_SHARE * longest else "smooth"
+    return tuple(kinds)
+
+
+def moving_rows(motion: Motion, band: Channels) -> tuple[int, int] | None:
+    """Return the first row away from the first pose, and the last one away from the last pose.
+
+    A motion that returns to where it began has rows of both kinds all the same. None if nothing
+    moves.
+
+    Args:
+        motion: One of A.
+        band: How far each channel may stray from a pose: `trim_band` or `pose_band`.
+    """
+    left = np.flatnonzero(np.any(np.abs(motion - motion[0]) > band, axis=1))
+    ahead = np.flatnonzero(np.any(np.abs(motion - motion[-1]) > band, axis=1))
+    if not left.size:
+        return None
+    return int(left[0]), int(ahead[-1] if ahead.size else left[-1])
+
+
+def moving_ends(
+    times: Float[np.ndarray, " T"], motion: Motion, units: Sequence[str], signals: Signals
+) -> Bool[np.ndarray, "2 D"]:
+    """Return which channels move at the first frames of a recording, and which at the last.
+
+    The speed is the slope of a line through the frames of 40 ms, at least two.
+
+    Args:
+        times: Of its frames, in [s].
+        motion: Some of a recording.
+        units: Of the D channels.
+        signals: Of all recordings.
+    """
+    count = max(2, int(np.searchsorted(times, times[0] + _END_TIME, side="right")))
+    fastest = np.abs(np.gradient(motion, times, axis=0)).max(axis=0)
+    rest = [REST_SPEED.get(u, _REST_SHARE * f) for u, f in zip(units, fastest, strict=True)]
+    moving = []
+    for at in (slice(count), slice(-count, None)):
+        t = times[at] - times[at].mean()
+        total = float(t @ t)
+        slope = np.abs(t @ (motion[at] - motion[at].mean(axis=0))) / total
+        moving.append(slope > np.maximum(rest, _REST_NOISE * signals.noise / math.sqrt(total)))
+    return np.array(moving) & ~signals.held
