@@ -1,5 +1,7 @@
 """What demonstrations ask for: said, kept, and exact at the demonstrations."""
 
+from collections import Counter
+
 import numpy as np
 import pytest
 
@@ -10,6 +12,7 @@ from prior_reinforce.generators.corrected import Corrected
 from prior_reinforce.generators.diffusion import DiffusionGenerator
 from prior_reinforce.generators.interpolation import SmoothInterpolation
 from prior_reinforce.lab.tasks import make_task
+from prior_reinforce.plans import motions, timeline
 from prior_reinforce.plans.motions import Demonstrations
 from tests.generators.test_patterns import throws
 
@@ -72,3 +75,20 @@ def test_a_large_pattern_with_outcomes_on_a_line_goes_to_diffusion_with_the_rest
 def test_what_it_chooses_itself_is_not_set(setting):
     with pytest.raises(ConfigurationError, match="auto chooses its timing itself"):
         make_generator(f"auto,{setting}")
+
+
+def test_demonstrations_are_analysed_once_and_decomposed_once_for_each_timing(monkeypatch):
+    decompose, analyse, done = timeline._decompose, motions.analyse, Counter()
+
+    def counted(demonstrations, kind):
+        done[kind] += 1
+        return decompose(demonstrations, kind)
+
+    def analysed(*arguments):
+        done["signals"] += 1
+        return analyse(*arguments)
+
+    monkeypatch.setattr(timeline, "_decompose", counted)
+    monkeypatch.setattr(motions, "analyse", analysed)
+    Auto().fit(make_task("basketball-v1").demonstrations("A"), seed=0)
+    assert done == {"signals": 1, "none": 1, "start": 1, "tempo": 1}

@@ -103,3 +103,20 @@ def test_plans_of_nearly_one_outcome_are_not_steep_where_outcomes_were_seen_coar
         near = SmoothInterpolation().fit(demos, seed=0).generate(outcomes[4:])
         steep[noise] = np.abs(near[1] - near[0]).max()
     assert steep[0.1] < 0.2 * steep[0.0]
+
+
+def test_weights_are_fitted_by_fit_and_not_by_generate(monkeypatch, throws, tmp_path):
+    demos = throws(8)
+    fitted = SmoothInterpolation().fit(demos, seed=0)
+    fitted.save(tmp_path)
+    expected = fitted.generate(demos.outcomes_seen)
+    loaded = SmoothInterpolation.load(tmp_path)
+    monkeypatch.delattr("scipy.interpolate.RBFInterpolator")
+    for generator in (fitted, loaded):
+        np.testing.assert_array_equal(generator.generate(demos.outcomes_seen), expected)
+
+
+def test_fitted_again_it_has_the_weights_of_the_new_outcomes(throws):
+    demos, others = throws(6), throws(6, seed=1)
+    generator = SmoothInterpolation().fit(demos, seed=0).fit(others, seed=0)
+    np.testing.assert_allclose(generator.generate(others.outcomes_seen), others.plans, atol=1e-9)

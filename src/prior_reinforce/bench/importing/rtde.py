@@ -10,8 +10,8 @@ import numpy as np
 from jaxtyping import Bool
 
 from prior_reinforce.bench.importing.clock import Times
-from prior_reinforce.plans.signals import REST_SPEED
 from prior_reinforce.bench.importing.recording import Positions
+from prior_reinforce.plans.signals import REST_SPEED
 
 _CYCLE = 0.002
 """Of UR's controller, in [s]."""
