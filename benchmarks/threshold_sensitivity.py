@@ -42,7 +42,7 @@ THRESHOLDS = (
     "plans.signals._FEWEST_FRAMES",
     "plans.signals._POSE_NOISE",
     "plans.signals._POSE_SHARE",
-    "plans.speeds.END_SPEED",
+    "plans.extrapolation.END_SPEED",
     "plans.extrapolation._SLOPE_FRAMES",
     "plans.timeline._OVERSAMPLING",
     "plans.timeline._FEW_FRAMES",

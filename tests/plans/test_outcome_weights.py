@@ -135,3 +135,7 @@ def test_where_outcomes_lie_close_together_plans_bend_less(outcomes, kernel):
     at = outcomes[:1] + 0.3
     expected = smooth_weights(outcomes, kernel=kernel)(at)
     np.testing.assert_array_equal(smooth_weights(outcomes)(at), expected)
+
+
+def test_no_conditions_have_no_weights():
+    assert smooth_weights(OUTCOMES)(CONDITIONS[:0]).shape == (0, len(OUTCOMES))

@@ -139,7 +139,7 @@ class SmoothWeights:
         from scipy.interpolate import RBFInterpolator
 
         n, k = outcomes.shape
-        self.kernel, self._scale = kernel, scale
+        self.kernel, self._scale, self._n = kernel, scale, n
         self._spline = RBFInterpolator(
             outcomes / scale,
             np.eye(n),  # a value a demonstration: what is interpolated are the weights themselves
@@ -151,7 +151,7 @@ class SmoothWeights:
     def __call__(self, conditions: Float[np.ndarray, "n k"]) -> Float[np.ndarray, "n N"]:
         """Return w, a row a condition, a column a demonstration."""
         weights = self._spline(conditions / self._scale)
-        return np.asarray(weights).reshape(len(conditions), -1)
+        return np.asarray(weights).reshape(len(conditions), self._n)
 
 
 def amplification(weights: Weights, outcomes: Float[np.ndarray, "N k"]) -> float:
