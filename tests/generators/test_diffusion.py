@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from prior_reinforce.errors import ConfigurationError
+from prior_reinforce.errors import ConfigurationError, NotFittedError
 from prior_reinforce.generators import make_generator
 from prior_reinforce.generators.config import DiffusionConfig, UNetSize
 from prior_reinforce.generators.corrected import Corrected
@@ -116,6 +116,18 @@ def test_a_network_sampled_otherwise_is_the_one_that_was_fitted_so(throws, other
     assert np.abs(plans - before).max() > 1e-6
     assert sampled.config == as_fitted.config
     np.testing.assert_array_equal(network.generate(demos.outcomes_seen), before)
+
+
+def test_fresh_noise_is_another_plan_of_the_same_network(throws):
+    demos = throws(3)
+    network = DiffusionGenerator(replace(FEW, shared_noise=False)).fit(demos, seed=0)
+    before = network.generate(demos.outcomes_seen)
+    one, other = (network.sampled(seed=n).generate(demos.outcomes_seen) for n in (1, 2))
+    assert np.abs(one - other).max() > 1e-6
+    assert np.array_equal(network.sampled(seed=1).generate(demos.outcomes_seen), one)
+    assert np.array_equal(network.sampled(seed=0).generate(demos.outcomes_seen), before)
+    with pytest.raises(NotFittedError):
+        DiffusionGenerator(FEW).sampled(seed=1)
 
 
 def test_presets_and_representation_are_one_word_each():

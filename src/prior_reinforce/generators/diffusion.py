@@ -17,6 +17,7 @@ shows with `exact=no,trend=zero` only, beside the control `training_steps=0`, wh
 
 from __future__ import annotations
 
+import copy
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
@@ -71,25 +72,35 @@ class DiffusionGenerator(NetworkGenerator):
         super().__init__(config, device=device, threads=threads, states=states)
 
     def sampled(
-        self, *, sampler: Sampler | None = None, shared_noise: bool | None = None
+        self,
+        *,
+        sampler: Sampler | None = None,
+        shared_noise: bool | None = None,
+        seed: int | None = None,
     ) -> DiffusionGenerator:
         """Return a generator with the same network, sampled otherwise; it needs no training.
 
         Args:
             sampler: Replaces the one of the settings.
             shared_noise: Replaces that of the settings.
+            seed: Of the noise, instead of the fit's. With another one for every trial and
+                `shared_noise=False`, plans are generated anew each time, as the paper does without
+                an adapter.
 
         Raises:
             NotFittedError: It is not fitted.
         """
-        (layer,) = self.pack()
-        other = DiffusionGenerator.unpack_layer(layer)
+        self._fitted_to()
+        other = copy.copy(self)
+        assert self._learned is not None
         other.config = replace(
             self.config,
             sampler=self.config.sampler if sampler is None else sampler,
             shared_noise=self.config.shared_noise if shared_noise is None else shared_noise,
         )
-        return other.to(self._device)
+        if seed is not None:
+            other._learned = replace(self._learned, seed=seed)
+        return other
 
     def _build(self, channels: int, length: int, outcome_dim: int) -> ConditionalUNet:
         from prior_reinforce.generators.unet import ConditionalUNet
