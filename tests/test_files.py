@@ -184,7 +184,9 @@ def test_a_small_file_that_unpacks_to_a_flood_is_refused(tmp_path, monkeypatch):
     np.savez_compressed(tmp_path / "bomb.npz", q=np.zeros(10_000))
     assert (tmp_path / "bomb.npz").stat().st_size < 1_000
     with (
-        pytest.raises(FileFormatError, match=r"unpacks to 8e\+04 bytes\); copy it again"),
+        pytest.raises(
+            FileFormatError, match=r"unpacks to 8e\+04 bytes, at most .* are read\); copy it again"
+        ),
         open_npz(tmp_path / "bomb.npz", "copy it again"),
     ):
         pass

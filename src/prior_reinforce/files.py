@@ -80,7 +80,7 @@ def open_npz(path: Path, remedy: str, largest: int | None = None) -> Iterator[np
             size = sum(member.file_size for member in packed.infolist())
             largest = largest or _LARGEST_NPZ
             if size > largest:
-                raise ValueError(f"it unpacks to {size:.2g} bytes")
+                raise ValueError(f"it unpacks to {size:.2g} bytes, at most {largest:.2g} are read")
         with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
             yield archive
     except PriorReinforceError:

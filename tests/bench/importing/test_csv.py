@@ -58,7 +58,7 @@ def test_csv_with_a_column_of_episodes_and_text_beside(tmp_path):
         ("a,b\n0,1\n1,2\n", "give the rate"),
         ("t,a\n0.1,1\n0.0,2\n", "time does not increase"),
         ("t,a,b,a\n0,1,1,1\n0.1,2,2,2\n", "repeats a channel name: a; rename"),
-        ('t,a\n0,"1\n0.1,2\n', "as a table .*EOF inside string"),
+        ('t,a\n0,"1\n0.1,2\n', "as a table .*unexpected end of data"),
         ("t\n0\n1\n", "for 0 channels"),
     ],
 )

@@ -85,7 +85,7 @@ def test_noise_is_said_and_what_smoothing_changed(folder):
     assert rows["noise"] == "none; joint3, joint7 held"
     smooth = import_demonstrations(folder, preprocessing=Preprocessing(smooth=20)).preview
     assert "smoothing changed plans by " in smooth.text
-    most = 1000 * smooth.processed.smoothed[:, 1].max()
+    most = 1000 * smooth.inspection.processed.smoothed[:, 1].max()
     assert f"at most {most:.2g} mrad" in smooth.text
 
 

@@ -148,7 +148,7 @@ def test_cells_of_a_workbook_keep_their_kinds(tmp_path):
         book.active.append(row)
     book.save(tmp_path / "a.xlsx")
     table = one(tmp_path / "a.xlsx")
-    assert table.texts(1) == ["3", "4"]
+    assert table.cells[1] == ["3", "4"]
     np.testing.assert_array_equal(table.nanoseconds(0), [0, 10**9])
     assert not table.is_number(2)
     (tmp_path / "b.xlsx").write_bytes(b"PK\x03\x04")

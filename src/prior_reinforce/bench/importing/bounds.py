@@ -1,7 +1,8 @@
 """How large recordings may be: checked from headers and counts, before anything is allocated.
 
-A recording of a throw has seconds of some ten channels. Small files can claim, or unpack to, what
-no machine holds; all limits that readers share stand here, and each is far above what arms record.
+A throw is a few seconds of about ten channels. A small file can claim, or unpack to, more than any
+machine holds; the limits of all readers stand here, each far above what arms record. Every check
+raises FileFormatError.
 """
 
 from __future__ import annotations
@@ -21,39 +22,31 @@ MOST_COLUMNS = 2_000
 MOST_CELLS = 5_000_000
 """Cells of a table, which are texts at first, some 100 bytes each: 160 columns at 500 Hz, 60 s."""
 MOST_CHUNKS = 10_000
-"""Chunks of one array; each is read for itself."""
+"""Chunks of one array; each is read separately."""
 LONGEST_NAME = 200
 """Characters of a channel's or an episode's name; patterns are matched against every name."""
 
 
 def check_numbers(path: Path, name: str, shape: Iterable[int], bytes_each: int = 8) -> None:
-    """Refuse an array that could be no recording, by the shape that its header claims.
+    """Refuse an array, or a chunk of one, whose header claims too many numbers or bytes.
 
     Args:
-        path: Of the file.
-        name: Of the array.
-        shape: Of the array, or of one of its chunks.
-        bytes_each: Of one number, as stored.
-
-    Raises:
-        FileFormatError: It has more than `MOST_NUMBERS` numbers or `MOST_BYTES` bytes.
+        path: The file.
+        name: The array.
+        shape: Its shape.
+        bytes_each: Bytes that one number takes in the file.
     """
-    sizes = [int(size) for size in shape]
+    sizes = tuple(int(size) for size in shape)
     numbers = math.prod(sizes)
     if numbers > MOST_NUMBERS or numbers * bytes_each > MOST_BYTES:
-        shown = tuple(sizes)
         raise FileFormatError(
-            f"{path}: {name} has shape {shown}, {numbers:.2g} numbers; that is no recording of "
+            f"{path}: {name} has shape {sizes}, {numbers:.2g} numbers; that is no recording of "
             "throws, copy the file again"
         )
 
 
 def check_chunks(path: Path, name: str, shape: Sequence[int], chunks: Sequence[int]) -> None:
-    """Refuse an array in chunks that are too large, or too many, to be read.
-
-    Raises:
-        FileFormatError: A chunk is larger than an array may be, or there are too many.
-    """
+    """Refuse an array whose chunks are too large, or too many."""
     check_numbers(path, f"a chunk of {name}", chunks)
     count = math.prod(
         -(-int(size) // max(int(of), 1)) for size, of in zip(shape, chunks, strict=True)
@@ -66,11 +59,7 @@ def check_chunks(path: Path, name: str, shape: Sequence[int], chunks: Sequence[i
 
 
 def check_bytes(path: Path, count: int, what: str = "is") -> None:
-    """Refuse a file that is, or unpacks to, more than `MOST_BYTES`.
-
-    Raises:
-        FileFormatError: It does.
-    """
+    """Refuse a file that is, or unpacks to, more than `MOST_BYTES`."""
     if count > MOST_BYTES:
         raise FileFormatError(
             f"{path} {what} {count:.3g} bytes, at most {MOST_BYTES:.3g} are read; that is no "
@@ -79,11 +68,7 @@ def check_bytes(path: Path, count: int, what: str = "is") -> None:
 
 
 def check_table(path: Path, rows: int, columns: int) -> None:
-    """Refuse a table that could be no recording.
-
-    Raises:
-        FileFormatError: It has more than `MOST_COLUMNS` columns or `MOST_CELLS` cells.
-    """
+    """Refuse a table of more than `MOST_COLUMNS` columns or `MOST_CELLS` cells."""
     if columns > MOST_COLUMNS or rows * columns > MOST_CELLS:
         raise FileFormatError(
             f"{path} has {rows} rows of up to {columns} columns, at most {MOST_COLUMNS} columns "
@@ -93,11 +78,7 @@ def check_table(path: Path, rows: int, columns: int) -> None:
 
 
 def check_names(where: object, names: Iterable[object]) -> None:
-    """Refuse names that are no names.
-
-    Raises:
-        FileFormatError: One is longer than `LONGEST_NAME`.
-    """
+    """Refuse names longer than `LONGEST_NAME`."""
     for name in map(str, names):
         if len(name) > LONGEST_NAME:
             raise FileFormatError(

@@ -102,16 +102,10 @@ def _of_files(paths: Sequence[Path], options: ReadOptions) -> Episodes:
                 episode = path.stem if len(tables) == 1 else sheet
                 yield episode, partial(_episode, table, episode, options)
                 continue
-            names = table.texts(column)
+            names = table.cells[column]
             for episode in sorted(set(names), key=natural_order):
-                own = [i for i, name in enumerate(names) if name == episode]
-                yield episode, partial(_rows, table, own, episode, options, column)
-
-
-def _rows(
-    table: Table, rows: list[int], episode: str, options: ReadOptions, column: int
-) -> Recording:
-    return _episode(table.rows(rows), episode, options, column)
+                own = table.rows([i for i, name in enumerate(names) if name == episode])
+                yield episode, partial(_episode, own, episode, options, column)
 
 
 def _episode_column(table: Table, options: ReadOptions) -> int | None:
@@ -143,25 +137,24 @@ def _episode(
     index = 0 if time is None and _no_name_first(table) and _could_be_time(table) else None
     others = [i for i in range(len(table.names)) if i not in (time, episode_column, index)]
     channels, named = _channels(table, others, options, log)
-    remarks: tuple[str, ...] = ()
+    remarks = []
     if log is not None:
-        remarks = (f"{log.name}: time in {log.time_unit}, motion is {log.key} (measured)",)
+        remarks.append(f"{log.name}: time in {log.time_unit}, motion is {log.key} (measured)")
     if log is not None and log.mixed and time is not None:
-        mixed = mixed_rows(
-            table.numbers(time), np.column_stack([table.numbers(i) for i in channels])
-        )
+        positions = np.column_stack([table.numbers(i) for i in channels])
+        mixed = mixed_rows(table.numbers(time), positions)
         if np.any(mixed):
             table = table.rows(np.flatnonzero(~mixed).tolist())
             why = "rows left out whose positions are of another cycle than their time"
-            remarks = (*remarks, f"{why}: {mixed.sum()}")
+            remarks.append(f"{why}: {mixed.sum()}")
     clock = _clock(table, episode, time, options, None if log is None else log.time_unit)
     if index is not None and channels == others and not options.joints:
-        remarks = (*remarks, f"column {index + 1} left out, an index without a name")
+        remarks.append(f"column {index + 1} left out, an index without a name")
     texts = [i for i in channels if table.is_text(i)] if channels == others else []
     if texts:
         channels = [i for i in channels if i not in texts]
         left_out = say_names([table.names[i] for i in texts])
-        remarks = (*remarks, f"{left_out} left out, which holds no number")
+        remarks.append(f"{left_out} left out, which holds no number")
     split = [split_unit(table.names[i], CHANNEL_UNITS) for i in channels]
     names = tuple(name or f"column {i + 1}" for (name, _), i in zip(split, channels, strict=True))
     if len(set(names)) < len(names):
@@ -171,7 +164,7 @@ def _episode(
         clock,
         np.column_stack([table.numbers(i) for i in channels] or [np.zeros((0, 0))]),
         names if named else (),
-        remarks=remarks,
+        remarks=tuple(remarks),
         units=tuple(table.units[i] or u for (_, u), i in zip(split, channels, strict=True)),
         ambiguities=(*guessed, *clock.ambiguities),
         columns=names if table.named else (),
@@ -233,11 +226,9 @@ def _clock(
 ) -> Clock:
     if time is None:
         return options.clock(episode, len(table))
-    dates = table.nanoseconds(time)
-    name = table.names[time] or f"column {time + 1}"
-    if dates is not None:
-        return options.clock(episode, len(table), stamps=dates, name=name, unit="ns")
-    stamps, unit = table.numbers(time), unit or table.units[time]
+    dates, name = table.nanoseconds(time), table.names[time] or f"column {time + 1}"
+    stamps, unit = (dates, "ns") if dates is not None else (table.numbers(time), unit)
+    unit = unit or table.units[time]
     return options.clock(episode, len(table), stamps=stamps, name=name, unit=unit)
 
 
@@ -255,8 +246,7 @@ def _channels(
         found = find_channels(options.joints, names)
         if found is not None:
             return [others[i] for i in found], True
-    groups = vectors(names)
-    key = options.key or (log.key if log is not None else None)
+    key, groups = options.key or (None if log is None else log.key), vectors(names)
     if key is None:
         return list(others), True
     if key not in groups:

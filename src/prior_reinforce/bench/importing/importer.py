@@ -1,4 +1,4 @@
-"""The way in: a recording on disk becomes `Demonstrations` and a preview.
+"""From a recording on disk to `Demonstrations` and a preview.
 
 A format is a file beside this one and a line of `FORMATS`.
 """
@@ -49,39 +49,29 @@ class Format:
     extra: str = ""
     """Extra of this package that installs it."""
     options: frozenset[str] = frozenset({"key"})
-    """Fields of `ReadOptions` that say something of this format, beside those of every format."""
+    """Fields of `ReadOptions` that apply to this format, beside those that apply to all."""
     whole: bool = False
     """A folder laid out like this is this format, whatever else lies in it."""
 
 
-_TABLE = frozenset({"key", "time_column", "episode_column"})
+def _with_suffix(suffixes: tuple[str, ...]) -> Callable[[Path], bool]:
+    return lambda source: has_files(source, suffixes)
+
+
+_ARRAYS = frozenset({"key", "time_column"})
+_TABLE = _ARRAYS | {"episode_column"}
 _OPTIONAL = _TABLE | {"delimiter", "decimal"}
 FORMATS: Mapping[str, Format] = {
-    "npz": Format(
-        npz.read,
-        lambda source: has_files(source, npz.SUFFIXES),
-        options=frozenset({"key", "time_column"}),
-    ),
-    "csv": Format(csv.read, lambda source: has_files(source, csv.SUFFIXES), options=_OPTIONAL),
+    "npz": Format(npz.read, _with_suffix(npz.SUFFIXES), options=_ARRAYS),
+    "csv": Format(csv.read, _with_suffix(csv.SUFFIXES), options=_OPTIONAL),
     "excel": Format(
-        csv.read_workbooks,
-        lambda source: has_files(source, WORKBOOKS),
-        "python_calamine",
-        "excel",
-        options=_TABLE,
+        csv.read_workbooks, _with_suffix(WORKBOOKS), "python_calamine", "excel", _TABLE
     ),
     "lerobot": Format(lerobot.read, lerobot.recognises, "pyarrow.parquet", "lerobot", whole=True),
     "robomimic": Format(hdf5.read_robomimic, hdf5.is_robomimic, "h5py", "hdf5"),
     "droid": Format(hdf5.read_droid, hdf5.is_droid, "h5py", "hdf5"),
     "ros": Format(ros.read, ros.recognises, "rosbags.highlevel", "ros"),
-    "zarr": Format(
-        zarr.read,
-        zarr.recognises,
-        "zarr",
-        "zarr",
-        options=frozenset({"key", "time_column"}),
-        whole=True,
-    ),
+    "zarr": Format(zarr.read, zarr.recognises, "zarr", "zarr", _ARRAYS, whole=True),
 }
 """What can be read. `ros` covers ROS 1 bags, ROS 2 sqlite bags and MCAP; `zarr` is the replay
 buffer of Diffusion Policy."""
@@ -117,28 +107,28 @@ def import_demonstrations(
     """Read, join with the outcomes, select joints, trim, resample, and preview.
 
     Args:
-        source: As in `read_recordings`.
+        source: A file, or the folder that holds the recording.
         outcomes: Where each demonstration's object landed: a CSV `episode,x,y[,z][,sd]`, or numbers
             by episode name. None takes `outcomes.csv` beside or inside the source.
         outcome_names: Names of the k components, in order, matched to the CSV's columns; None
             takes those as they stand.
-        outcome_units: Unit of each component; None is what the table's head says, or metres.
-        outcome_unit: Unit in which a table holds those whose columns name none (`x_cm` does); None
-            is the component's own, and an error where nothing could land there.
+        outcome_units: Unit of each component; None takes those in the table's head, or metres.
+        outcome_unit: Unit of the table's columns that name none (`x_cm` does); None takes the
+            component's own, and is an error where no arm could have reached the outcomes.
         names: What to call the joints in the plan format; None keeps the recorded names.
         plan_units: Unit of each joint in the plan; None is radians for angles, metres for lengths.
         preprocessing: Time step, horizon and trimming; None takes the defaults.
-        robot: Limits that the preview holds every demonstration against; None checks none.
-        gate: The gate's settings for that.
-        take_guesses: Take units, times and names as they look, where that would be an error.
-        options: As in `read_recordings`.
+        robot: Limits that every demonstration is checked against; None checks none.
+        gate: The gate's settings for that check.
+        take_guesses: Infer missing or implausible units, times and names instead of raising.
+        options: Fields of `ReadOptions`.
 
     Raises:
         FileFormatError: As in `read_recordings`, or a damaged `outcomes.csv`.
         InvalidDemonstrationsError: Missing outcomes or joints (named), or demonstrations that
             cannot be learned from.
-        UnclearUnitsError: Units, times or names that are missing, or cannot be what was said; the
-            message has the options that settle them.
+        UnclearUnitsError: Units, times or names that are missing or implausible; the message has
+            the options that settle them.
         ConfigurationError: Settings that contradict each other.
         MissingExtraError: The format's optional library is not installed.
     """
@@ -172,24 +162,10 @@ def inspect_recordings(
     gate: GateSettings | None = None,
     **options: Any,
 ) -> Inspection:
-    """Say what recordings hold and what an import would make of them; nothing is needed but them.
+    """Report what recordings hold, and what an import would make of them; no outcomes are needed.
 
-    Missing or implausible units, times and names are inferred, and named as ambiguous.
-
-    Args:
-        source: As in `read_recordings`.
-        names: As in `import_demonstrations`, and so are the next four.
-        plan_units: See there.
-        preprocessing: See there.
-        robot: See there.
-        gate: See there.
-        options: As in `read_recordings`.
-
-    Raises:
-        FileFormatError: As in `read_recordings`.
-        InvalidDemonstrationsError: Missing joints (named), or an episode that never moves.
-        ConfigurationError: Settings that contradict each other.
-        MissingExtraError: The format's optional library is not installed.
+    Missing or implausible units, times and names are inferred, and listed as ambiguous. Arguments
+    and errors are those of `import_demonstrations`.
     """
     recordings = read(source, ReadOptions(**options))
     selection = recordings.select(names, plan_units)
@@ -200,17 +176,17 @@ def inspect_recordings(
 def read_recordings(
     source: str | os.PathLike[str], *, take_guesses: bool = False, **options: Any
 ) -> list[Recording]:
-    """Read every episode as it was recorded, for instance to ask for each one's outcome.
+    """Read every episode as recorded, for instance to ask for each one's outcome.
 
     Args:
         source: A file, or the folder that holds the recording.
-        take_guesses: Take times as they look, where that would be an error.
+        take_guesses: Infer a missing or implausible unit of the times instead of raising.
         options: Fields of `ReadOptions`.
 
     Raises:
         ConfigurationError: An unknown format, an option that the format has no use for, or one
             that contradicts the recording.
-        UnclearUnitsError: The unit of the times is not said, and they cannot be seconds.
+        UnclearUnitsError: The times name no unit, and cannot be seconds.
         FileFormatError: Missing, truncated, too large, of another format, or ambiguous without
             `key`.
         InvalidDemonstrationsError: An episode that cannot be used, or one asked for that is not
@@ -241,10 +217,9 @@ class Recordings:
 
     @property
     def outcome_places(self) -> list[Path]:
-        """Where a table of outcomes stands beside them: the first is where to write one.
+        """Folders in which a table of outcomes may stand; a new one is written to the first.
 
-        A folder of recordings holds its own. A file, and a data set that is a folder, has it
-        beside.
+        A folder of recordings has it inside; a file, or a data set that is a folder, beside it.
         """
         if self.source.is_file():
             return [self.source.parent]
@@ -289,7 +264,7 @@ class Recordings:
         """
         selection, processed = inspection.selection, inspection.processed
         seen, sd = outcomes_of(selection.episodes, outcomes, partial=partial)
-        _refuse(inspection.copies)
+        _refuse_copies(inspection.copies)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # the preview's remarks say it, with the option to give
             demonstrations = Demonstrations(
@@ -306,23 +281,18 @@ class Recordings:
 
 
 def read(source: str | os.PathLike[str], options: ReadOptions | None = None) -> Recordings:
-    """Read a source's episodes, once; those that are left out are not read.
+    """Read the episodes of a source once; left-out episodes are not read.
 
-    Times that are ambiguous are taken as they look.
-
-    Args:
-        source: A file, or the folder that holds the recording.
-        options: How.
-
-    Raises:
-        As `read_recordings` does, but for UnclearUnitsError.
+    As `read_recordings`, but ambiguous times are inferred, and never raise UnclearUnitsError.
     """
     source, options = Path(source), options or ReadOptions()
-    kind = options.format or detect_format(source)
-    if kind not in FORMATS:
-        raise ConfigurationError(f"unknown format {kind!r}; give one of {', '.join(FORMATS)}")
+    if options.format not in (None, *FORMATS):
+        raise ConfigurationError(
+            f"unknown format {options.format!r}; give one of {', '.join(FORMATS)}"
+        )
     if not source.exists():
         raise FileFormatError(f"no recording at {source}; give the path of a file or a folder")
+    kind = options.format or detect_format(source)
     for name in sorted(_OPTIONAL & options.given.keys() - FORMATS[kind].options):
         option = name.replace("_", "-")
         raise ConfigurationError(f"--{option} {options.given[name]} has no use for {kind}; drop it")
@@ -353,7 +323,7 @@ def read(source: str | os.PathLike[str], options: ReadOptions | None = None) -> 
     return Recordings(source, kind, options, chosen)
 
 
-def _refuse(copies: str) -> None:
+def _refuse_copies(copies: str) -> None:
     if copies:
         raise InvalidDemonstrationsError(copies)
 
@@ -380,7 +350,7 @@ def appended(before: Demonstrations, more: Demonstrations) -> Demonstrations:
         for d in (before, more)
     ]
     said = [f"demonstration {i} so far" for i in range(before.n)]
-    _refuse(copies(np.concatenate(plans), [*said, *(f"new one {i}" for i in range(more.n))]))
+    _refuse_copies(copies(np.concatenate(plans), [*said, *(f"new one {i}" for i in range(more.n))]))
     return replace(
         more,
         plans=np.concatenate(plans),
@@ -394,10 +364,8 @@ def detect_format(source: Path) -> str:
     """Return the format of a file or a folder, a name of `FORMATS`.
 
     Raises:
-        FileFormatError: There is nothing there, or it is none or more than one of the formats.
+        FileFormatError: It looks like none of the formats, or more than one.
     """
-    if not source.exists():
-        raise FileFormatError(f"no recording at {source}; give the path of a file or a folder")
     found = [name for name, format in FORMATS.items() if format.recognises(source)]
     found = [name for name in found if FORMATS[name].whole] or found
     if len(found) != 1:

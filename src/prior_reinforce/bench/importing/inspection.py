@@ -1,4 +1,4 @@
-"""What recordings hold, before anything is taken in: time, channels, rests, noise, limits."""
+"""What recordings hold, before anything is imported: time, channels, rests, noise, limits."""
 
 from __future__ import annotations
 
@@ -27,42 +27,42 @@ from prior_reinforce.plans.speeds import Channels
 
 _SMOOTH_HZ = 20
 _SMOOTH = f"--smooth {_SMOOTH_HZ}"
-"""What takes out an encoder's noise: 20 Hz is above what a throw holds. Ours."""
+"""Removes an encoder's noise; a throw has nothing above 20 Hz. Ours."""
 
 _WORST = 2.5
 """Standard deviations that the worst of a plan's frames is off by. Ours: measured, 30 plans of 88
 frames, 2.3 to 2.9; what an end leaps by from rest is 1.3 to 2.4."""
 _MUCH_NOISE = 0.25
-"""Part of a limit that noise alone takes up, from which on it is said. Ours."""
+"""Share of a limit consumed by noise alone, above which it is reported. Ours."""
 
 
 @dataclass(frozen=True, eq=False)
 class Inspection:
-    """What was found in recordings, and what an import would make of them."""
+    """What recordings hold, and what an import would make of them."""
 
     selection: Selection
     """N recordings with the plan's channels, in the plan's units."""
     processed: Preprocessed
-    """What becomes of them."""
+    """The plans made of them."""
     settings: Preprocessing
-    """How."""
+    """Settings they were made with."""
     limits: RobotLimits | None = None
-    """What the demonstrations were held against."""
+    """Limits that the demonstrations were checked against."""
     gate: GateSettings | None = None
-    """The gate's settings for that."""
+    """The gate's settings for that check."""
     reports: tuple[LimitReport, ...] = ()
-    """What the gate says of each; empty where no robot is named."""
+    """The gate's verdict on each; empty if no robot is named."""
     ambiguities: tuple[Ambiguity, ...] = ()
-    """Units, times and names of channels that are only guessed."""
+    """Units, times and names of channels that are only inferred."""
 
     @property
     def robot(self) -> str | None:
-        """Whose limits the demonstrations were held against."""
+        """The robot whose limits the demonstrations were checked against."""
         return None if self.limits is None else self.limits.robot
 
     @cached_property
     def copies(self) -> str:
-        """Which two motions are one; empty where none are."""
+        """Two motions that are identical; empty if there are none."""
         return copies(self.processed.plans, self.selection.episodes)
 
     @property
@@ -72,7 +72,7 @@ class Inspection:
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """What a person should know, the most important first: limits, ends, gaps, ..."""
+        """Warnings, the most important first: limits, ends, gaps, ..."""
         left_out = self.selection.left_out
         first = (self.copies, *self.selection.remarks, *self._broken(), self._noise_warning())
         last = f"left out although it moves: {left_out} (take it with --joints)" if left_out else ""
@@ -80,7 +80,7 @@ class Inspection:
 
     @property
     def remedy(self) -> str:
-        """An option that may help where no demonstration passes the gate; else nothing."""
+        """An option that may help if no demonstration passes the gate; else empty."""
         if not self.reports or not all(report.refused for report in self.reports):
             return ""
         broken = {line.check for r in self.reports for line in r.lines if line.status == "refuse"}
@@ -90,12 +90,25 @@ class Inspection:
 
     @property
     def rows(self) -> dict[str, str]:
-        """The essential, a line each, by what it is about."""
+        """The essentials, one line each, by topic."""
+        done, selection = self.processed, self.selection
+        clocks = " and ".join(dict.fromkeys(r.clock for r in self.recordings if r.clock))
+        recorded = _span((1 / recording.period for recording in self.recordings), ".4g")
+        before, after = done.starts, self._cut_after
+        cut = f"dropped {_span(before, '.2f')} s before and {_span(after, '.2f')} s after the"
+        horizon = done.plans.shape[1]
+        lengths = [end - start for start, end in zip(done.starts, done.ends, strict=True)]
+        groups: dict[str, list[str]] = {}
+        for i, name in enumerate(selection.names):
+            groups.setdefault(self._unit(i, "recorded in"), []).append(name)
         rows = {
-            "rate": self._rate(),
-            "channels": self._units(),
-            "still ends": self._trimming(),
-            "length": self._length(),
+            "rate": f"recorded at {recorded} Hz{f' ({clocks})' if clocks else ''}, plans at "
+            f"{1 / done.dt:.4g} Hz (dt {done.dt:.4g} s)",
+            "channels": "; ".join(f"{say_names(n)} [{unit}]" for unit, n in groups.items()),
+            "still ends": f"{cut} motion" if max(*before, *after) > 0 else "nothing dropped",
+            "length": f"motions of {_span(lengths, '.2f')} s, plans of {horizon} frames "
+            f"({(horizon - 1) * done.dt:.2f} s)"
+            + (f"; {done.held} hold their last pose" if done.held else ""),
             "noise": self._noise(),
             "motion": self._motion(),
         }
@@ -109,57 +122,49 @@ class Inspection:
         parts = [in_rows(self.rows, self.remarks), *head, "", *self._episodes(), ""]
         return "\n".join([*parts, *self._channels()])
 
+    @property
+    def _cut_after(self) -> list[float]:
+        """Time dropped after each motion, in [s]."""
+        ends = zip(self.recordings, self.processed.ends, strict=True)
+        return [recording.duration - end for recording, end in ends]
+
+    def _unit(self, channel: int, recorded_in: str) -> str:
+        """Unit of a channel, and the one it was recorded in if that is another."""
+        unit, recorded = self.selection.units[channel], self.selection.recorded_units[channel]
+        return unit if unit == recorded else f"{unit}, {recorded_in} {recorded}"
+
     def _episodes(self) -> list[str]:
         rows = [["episode", "frames", "Hz", "length s", "cut before s", "cut after s"]]
-        spans = zip(self.processed.starts, self.processed.ends, strict=True)
-        for recording, (start, end) in zip(self.recordings, spans, strict=True):
-            numbers = (recording.duration, start, recording.duration - end)
+        spans = zip(self.recordings, self.processed.starts, self._cut_after, strict=True)
+        for recording, start, after in spans:
+            numbers = [f"{n:.2f}" for n in (recording.duration, start, after)]
             rate = f"{1 / recording.period:.4g}"
-            said = (f"{n:.2f}" for n in numbers)
-            rows.append([recording.episode, str(len(recording.times)), rate, *said])
+            rows.append([recording.episode, str(len(recording.times)), rate, *numbers])
         return _columns(rows)
 
     def _channels(self) -> list[str]:
         rows = [["channel", "recorded as", "unit", "least", "most", "noise", ""]]
-        selection = self.selection
         every = np.concatenate([r.positions for r in self.recordings])
-        for i, name in enumerate(selection.names):
+        for i, name in enumerate(self.selection.names):
             ranges = (f"{every[:, i].min():.4g}", f"{every[:, i].max():.4g}")
-            noise = say_small(float(self.processed.noise[i]), selection.units[i])
+            noise = say_small(float(self.processed.noise[i]), self.selection.units[i])
             held = "held" if i in self.processed.held_channels else ""
             recorded = self.recordings[0].columns[i]
-            unit = selection.units[i]
-            if selection.recorded_units[i] != unit:
-                unit = f"{unit}, from {selection.recorded_units[i]}"
-            rows.append([name, recorded, unit, *ranges, noise, held])
+            rows.append([name, recorded, self._unit(i, "from"), *ranges, noise, held])
         return _columns(rows)
 
-    def _units(self) -> str:
-        """Channels by their units."""
-        groups: dict[str, list[str]] = {}
-        selection = self.selection
-        for name, unit, recorded in zip(
-            selection.names, selection.units, selection.recorded_units, strict=True
-        ):
-            said = unit if unit == recorded else f"{unit}, recorded in {recorded}"
-            groups.setdefault(said, []).append(name)
-        return "; ".join(f"{say_names(names)} [{unit}]" for unit, names in groups.items())
-
     def _limits(self) -> str:
-        refused = [r for r in self.reports if r.refused]
         if not self.reports:
             return f"{self.robot}: not checked"
+        refused = sum(report.refused for report in self.reports)
         unchecked = {c for r in self.reports for c in r.unchecked} - {"demonstrations", "box"}
         open_ = f"; not checked: {', '.join(sorted(unchecked))}" if unchecked else ""
-        if not refused:
-            return f"{self.robot}: all {len(self.reports)} demonstrations pass{open_}"
-        return (
-            f"{self.robot}: {len(refused)} of {len(self.reports)} demonstrations break a limit"
-            f"{open_}"
-        )
+        n = len(self.reports)
+        verdict = f"{refused} of {n} demonstrations break a limit"
+        return f"{self.robot}: {verdict if refused else f'all {n} demonstrations pass'}{open_}"
 
     def _broken(self) -> list[str]:
-        """What breaks a limit: plans like it will be refused."""
+        """Limits that demonstrations break; plans like them will be refused."""
         said: dict[str, list[str]] = {}
         for recording, report in zip(self.recordings, self.reports, strict=False):
             for line in report.lines:
@@ -168,33 +173,6 @@ class Inspection:
         return [
             f"the gate refuses {check}: {', '.join(episodes)}" for check, episodes in said.items()
         ]
-
-    def _rate(self) -> str:
-        recorded = _span((1 / recording.period for recording in self.recordings), ".4g")
-        dt = self.processed.dt
-        clocks = " and ".join(dict.fromkeys(r.clock for r in self.recordings if r.clock))
-        by = f" ({clocks})" if clocks else ""
-        return f"recorded at {recorded} Hz{by}, plans at {1 / dt:.4g} Hz (dt {dt:.4g} s)"
-
-    def _trimming(self) -> str:
-        before = self.processed.starts
-        after = [
-            r.duration - end for r, end in zip(self.recordings, self.processed.ends, strict=True)
-        ]
-        if max(*before, *after) <= 0:
-            return "nothing dropped"
-        return (
-            f"dropped {_span(before, '.2f')} s before and {_span(after, '.2f')} s after the motion"
-        )
-
-    def _length(self) -> str:
-        done, horizon = self.processed, self.processed.plans.shape[1]
-        lengths = [end - start for start, end in zip(done.starts, done.ends, strict=True)]
-        held = f"; {done.held} hold their last pose" if done.held else ""
-        return (
-            f"motions of {_span(lengths, '.2f')} s, plans of {horizon} frames "
-            f"({(horizon - 1) * done.dt:.2f} s){held}"
-        )
 
     def _noise(self) -> str:
         names, units, done = self.selection.names, self.selection.units, self.processed
@@ -229,10 +207,7 @@ class Inspection:
         )
 
     def _noise_warning(self) -> str:
-        """What part of a limit noise alone takes up; nothing where that is little.
-
-        Channels that are held do not count: noise on them is not learned.
-        """
+        """Share of a limit consumed by noise, if significant; noise on held channels is ignored."""
         names, limits, processed = self.selection.names, self.limits, self.processed
         if limits is None or not self.reports or processed.smoothed is not None:
             return ""
@@ -257,10 +232,7 @@ class Inspection:
 
     @cached_property
     def _smoothing_helps(self) -> bool:
-        """Whether not all demonstrations break a limit once they are smoothed.
-
-        It is tried: what noise breaks, a motion that is too fast or starts at speed breaks as well.
-        """
+        """Whether any demonstration passes once smoothed; tried, as motion breaks limits too."""
         try:
             smooth = replace(self.settings, smooth=_SMOOTH_HZ)
             processed = preprocess(self.recordings, self.selection.units, smooth)
@@ -276,13 +248,13 @@ def inspect(
     robot: RobotLimits | None = None,
     gate: GateSettings | None = None,
 ) -> Inspection:
-    """Make plans of recordings, and hold each against the robot's limits, once.
+    """Make plans of recordings, and check each against the robot's limits, once.
 
     Args:
         selection: Recordings with the plan's channels.
         preprocessing: Time step, horizon and trimming; None takes the defaults.
-        robot: Limits that every demonstration is held against; None checks none.
-        gate: The gate's settings for that.
+        robot: Limits that every demonstration is checked against; None checks none.
+        gate: The gate's settings for that check.
 
     Raises:
         InvalidDemonstrationsError: An episode that never moves, or is longer than the horizon.
@@ -300,10 +272,7 @@ def _check(
     robot: RobotLimits | None,
     gate: GateSettings | None,
 ) -> tuple[LimitReport, ...]:
-    """What the gate says of every plan; nothing where no robot is named.
-
-    Demonstrations that the gate cannot judge, such as those in degrees, give no reports.
-    """
+    """The gate's verdict on every plan; none without a robot, or for units it cannot judge."""
     if robot is None:
         return ()
     try:
@@ -326,7 +295,7 @@ def acceleration_of(noise: Channels, dt: float) -> Channels:
 
 
 def in_rows(rows: Mapping[str, str], remarks: Sequence[str]) -> str:
-    """Name what each line is about, and list the remarks below."""
+    """Put the topic before each line, and list the remarks below."""
     every = {**rows, "remarks": str(len(remarks)) if remarks else "none"}
     lines = [f"{name:<11} {text}" for name, text in every.items()]
     return "\n".join([*lines, *(f"  - {remark}" for remark in remarks)])
@@ -345,7 +314,7 @@ def _columns(rows: Sequence[Sequence[str]]) -> list[str]:
 
 
 def say_small(value: float, unit: str) -> str:
-    """Say a small number: in mrad or mm where it is an angle or a length."""
+    """Format a small number: angles in mrad, lengths in mm."""
     thousandth = {"rad": "mrad", "m": "mm"}.get(unit)
     return f"{1000 * value:.2g} {thousandth}" if thousandth else f"{value:.2g} {unit}"
 

@@ -1,19 +1,19 @@
-"""What may be said of recordings: one record for Python, the command line and the readers."""
+"""Options for reading recordings: one record for Python, the command line and the readers."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields
-from typing import Literal
+from typing import Any, Literal
 
-from prior_reinforce.bench.importing.clock import TIME_UNITS, Clock, Stamps, clock_of
+from prior_reinforce.bench.importing.clock import TIME_UNITS, Clock, clock_of
 from prior_reinforce.bench.importing.tables import DELIMITERS, Dialect
 from prior_reinforce.errors import ConfigurationError
 
 
 @dataclass(frozen=True)
 class ReadOptions:
-    """How recordings are read; an option that the format has no use for is refused.
+    """How recordings are read; an option that the format does not use is refused.
 
     Raises:
         ConfigurationError: A value outside its range.
@@ -52,7 +52,7 @@ class ReadOptions:
     given, what the source says, and the plan's where it says nothing."""
 
     def __post_init__(self) -> None:
-        """Check, and make tuples of what may be given as lists."""
+        """Check, and turn lists into tuples."""
         for name in ("episodes", "leave_out", "joints", "units"):
             given = getattr(self, name)
             if given is not None:
@@ -79,7 +79,7 @@ class ReadOptions:
 
     @property
     def dialect(self) -> Dialect:
-        """What was said of how a CSV is written."""
+        """Dialect of a CSV, as far as it was given."""
         said = self.delimiter
         return Dialect(said if said is None else DELIMITERS.get(said, said), self.decimal)
 
@@ -88,24 +88,6 @@ class ReadOptions:
         wanted = self.episodes is None or episode in self.episodes
         return not wanted or episode in (self.leave_out or ())
 
-    def clock(
-        self,
-        episode: str,
-        count: int,
-        *,
-        stamps: Stamps | None = None,
-        name: str = "",
-        unit: str | None = None,
-        own_rate: float | None = None,
-    ) -> Clock:
-        """Return the times of an episode, as in `clock_of`, given these options."""
-        return clock_of(
-            episode,
-            count,
-            stamps=stamps,
-            name=name,
-            unit=unit,
-            own_rate=own_rate,
-            rate=self.rate,
-            time_unit=self.time_unit,
-        )
+    def clock(self, episode: str, count: int, **of_file: Any) -> Clock:
+        """Return an episode's times from these options and what the file says (`clock_of`)."""
+        return clock_of(episode, count, rate=self.rate, time_unit=self.time_unit, **of_file)

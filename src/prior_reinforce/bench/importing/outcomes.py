@@ -1,8 +1,8 @@
-"""Where each demonstration's object landed: no recording format says, so a table beside it does.
+"""Where each demonstration's object landed: from a table, since no recording format holds it.
 
 `outcomes.csv` has a line of column names, `episode` among them; every other column is a component
-of the outcome, except `source`, `note` and `comment`, and `sd`, by which the row's components are
-uncertain. A column `x_cm` or `x [mm]` is converted to `x` in metres, an angle likewise to radians,
+of the outcome, except `source`, `note`, `comment`, and `sd`, the standard deviation of the row's
+components. A column `x_cm` or `x [mm]` is converted to `x` in metres, an angle likewise to radians,
 and a time to seconds; any other unit in brackets is kept: `volume [ml]`.
 """
 
@@ -51,19 +51,19 @@ _NOT_COMPONENTS = (SD, "source", "note", "notes", "comment", "comments")
 
 @dataclass(frozen=True, eq=False)
 class Outcomes:
-    """What a table says of outcomes, by episode or by trial."""
+    """Outcomes by episode or by trial."""
 
     where: str
-    """Where they are from, for messages."""
+    """Their source, for messages."""
     frame: DataFrame
-    """Indexed by name: a column a component, `sd` (0 where it was measured), and columns of texts
-    that were asked for. nan in all components of a row that says none."""
+    """Indexed by name: a column for each component, `sd` (0 if not given), and the text columns
+    asked for. In a row without an outcome all components are nan."""
     names: tuple[str, ...]
-    """Of the k components, which are the frame's first columns."""
+    """Names of the k components, which are the frame's first columns."""
     units: tuple[str | None, ...]
-    """Unit of each component; None where the source says none."""
+    """Unit of each component; None if the source names none."""
     sd_unit: str | None = None
-    """Unit of `sd`; None is the first component's."""
+    """Unit of `sd`; None for that of the first component."""
     named: bool = True
     """Whether the source names the components."""
 
@@ -73,7 +73,17 @@ class Outcomes:
         return np.asarray(self.frame[list(self.names)], dtype=np.float64)
 
     def only(self, names: Sequence[str]) -> Outcomes:
-        """Return some of the components, in that order, all of which must be there."""
+        """Return some of the components, in that order.
+
+        Raises:
+            InvalidDemonstrationsError: One is missing.
+        """
+        missing = [name for name in names if name not in self.names]
+        if missing:
+            raise InvalidDemonstrationsError(
+                f"{self.where} has no column {', '.join(missing)}; it has "
+                f"{', '.join(self.names)}: rename or add it"
+            )
         units = tuple(self.units[self.names.index(name)] for name in names)
         other = [name for name in self.frame if name not in self.names]
         return replace(self, frame=self.frame[[*names, *other]], names=tuple(names), units=units)
@@ -114,17 +124,17 @@ def find_outcomes(
     given: str | os.PathLike[str] | Mapping[str, Sequence[float]] | None = None,
     names: Sequence[str] | None = None,
 ) -> Outcomes:
-    """Find outcomes: those given, a table beside the recordings, the recordings' own.
+    """Find outcomes: those given, a table beside the recordings, or the recordings' own.
 
     Args:
         places: Folders beside the recordings.
-        recordings: Some hold their outcomes.
+        recordings: Their episodes, some of which may hold outcomes.
         given: A table, or numbers by episode.
-        names: Of the components that are wanted, in order; None takes them as they stand.
+        names: Components wanted, in order; None takes them as they stand.
 
     Raises:
-        ConfigurationError: What was given are no numbers.
-        InvalidDemonstrationsError: There are none (all episodes are named), or a component lacks.
+        ConfigurationError: The given outcomes are not numbers.
+        InvalidDemonstrationsError: There are no outcomes, or a component is missing.
         FileFormatError: The table is missing or damaged.
     """
     if isinstance(given, Mapping):
@@ -137,7 +147,8 @@ def find_outcomes(
         return Outcomes.of_numbers("the given outcomes", numbers)
     path = Path(given) if given is not None else table_beside(places)
     if path is not None:
-        return _in_order(read_outcomes(path, names), names)
+        found = read_outcomes(path, names)
+        return found if names is None else found.only(names)
     own = {r.episode: tuple(r.outcome.tolist()) for r in recordings if r.outcome is not None}
     if own:
         return Outcomes.of_numbers("the recording itself", own)
@@ -154,13 +165,13 @@ def find_outcomes(
 
 
 def table_beside(places: Sequence[Path]) -> Path | None:
-    """Return the table of outcomes that stands in one of the folders; None where there is none."""
+    """Return the table of outcomes in one of the folders; None if there is none."""
     names = (OUTCOMES_FILE, "outcomes.xlsx")
     return next((f / n for f in places for n in names if (f / n).is_file()), None)
 
 
 def headed(names: Sequence[str], units: Sequence[str]) -> list[str]:
-    """Return what a table calls its components: with their units, where those are known here."""
+    """Return a table's column names of components, with their units if those are known here."""
     return [f"{n} [{u}]" if u in CHANNEL_UNITS else n for n, u in zip(names, units, strict=True)]
 
 
@@ -174,14 +185,11 @@ def write_outcome_table(
     """Write a table of outcomes.
 
     Args:
-        path: Of the CSV.
-        rows: Cells by episode: of the components, and of the last column.
-        names: Of the components.
-        units: Of the components.
+        path: The CSV.
+        rows: Cells by episode: components, then the last column; missing ones stay empty.
+        names: Names of the components.
+        units: Units of the components.
         beside: Name of the last column.
-
-    Raises:
-        OSError: It cannot be written.
     """
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
@@ -199,16 +207,16 @@ def read_outcomes(
     index: Sequence[str] = EPISODE_COLUMNS,
     texts: Sequence[str] = (),
 ) -> Outcomes:
-    """Read a table of outcomes; rows whose cells are empty are left out.
+    """Read a table of outcomes; rows with empty cells are skipped.
 
     Args:
-        path: A CSV of any dialect, or a workbook; rows of titles may stand above its head.
-        names: Of the components that are wanted; None takes all columns but the index and notes.
-        index: Names of the column that says whose outcome a row is.
-        texts: Further columns to keep, as texts, where they are there.
+        path: A CSV of any dialect, or a workbook; titles may stand above the line of names.
+        names: Components wanted; None takes all columns but the index and notes.
+        index: Possible names of the column with the episode or trial.
+        texts: Further columns to keep as text, if present.
 
     Raises:
-        FileFormatError: Missing, not such a table, or a cell that is no number.
+        FileFormatError: Missing, not such a table, or a cell that is not a number.
     """
     import pandas as pd
 
@@ -233,7 +241,7 @@ def read_outcomes(
     units = [table.units[i] or split[i][1] for i in columns]
     scale = [base_of(unit)[1] if unit else 1.0 for unit in units]
     sd = lower.index(SD) if SD in lower else None
-    every = {i: table.texts(i) for i in (key, *columns, *there.values(), *([sd] if sd else []))}
+    every = {i: table.cells[i] for i in (key, *columns, *there.values(), *([sd] if sd else []))}
     rows: dict[str, list[object]] = {}
     for row, name in enumerate(map(from_cell, every[key])):
         if name in rows:
@@ -254,53 +262,37 @@ def read_outcomes(
 
 
 def _finite(path: Path, table: Table, row: int, column: int) -> float:
-    one = table.rows([row])
-    value = float(one.numbers(column)[0]) if one.is_number(column) else math.nan
+    value = table.number(row, column)
     if not math.isfinite(value):
         raise FileFormatError(
             f"{path}, line {table.lines[row]}: {table.names[column]} is "
-            f"{one.texts(column)[0][:40]!r}, expected a finite number; measure that outcome, or "
-            "empty the whole row's numbers"
+            f"{table.cells[column][row][:40]!r}, expected a finite number; measure that outcome, "
+            "or empty the whole row's numbers"
         )
     return value
-
-
-def _in_order(outcomes: Outcomes, names: Sequence[str] | None) -> Outcomes:
-    """The outcomes with their components in the order of the names."""
-    if names is None:
-        return outcomes
-    missing = [name for name in names if name not in outcomes.names]
-    if missing:
-        raise InvalidDemonstrationsError(
-            f"{outcomes.where} has no column {', '.join(missing)}; it has "
-            f"{', '.join(outcomes.names)}: rename or add it"
-        )
-    return outcomes.only(names)
 
 
 def in_units(
     outcomes: Outcomes, wanted: Sequence[str] | None, given: str | None
 ) -> tuple[Outcomes, tuple[Ambiguity, ...]]:
-    """Return the outcomes in the units that are wanted, and what is only guessed of them.
+    """Convert outcomes to the wanted units; also return what is only inferred of their units.
 
     Args:
         outcomes: Their components in order.
-        wanted: Unit of each, as the task has it; None takes what is said, or metres.
-        given: Unit of the components whose source says none, or that of all, said again where
-            it is ambiguous; None takes the wanted one, or where nothing could land there, the one
-            it looks like.
+        wanted: Unit of each component in the task; None takes the stated ones, or metres.
+        given: Unit of the components whose source states none, or of all to confirm an ambiguous
+            one; None takes the wanted unit, or if no arm reaches that far, a plausible one.
 
     Raises:
-        ConfigurationError: A component is in a unit that cannot be converted, `given` has no use,
-            or one `sd` stands for components of several units.
-        InvalidDemonstrationsError: What is said of a unit cannot be.
+        ConfigurationError: A unit that cannot be converted, `given` has no use, or one `sd` for
+            components of several units.
+        InvalidDemonstrationsError: A stated unit is impossible.
     """
-    said, where, k = outcomes.units, outcomes.where, len(outcomes.names)
-    chosen = wanted is not None
+    said, where, chosen = outcomes.units, outcomes.where, wanted is not None
     if wanted is None:
         wanted = [base_of(unit or given or "m")[0] for unit in said]
-    if len(wanted) != k:
-        return outcomes, ()  # another number of components: said when they are joined
+    if len(wanted) != len(said):
+        return outcomes, ()  # refused when they are joined with the demonstrations
     if given is not None and None not in said and given not in said:
         raise ConfigurationError(
             f"--outcome-unit {given} has no use, since {where} says its units; drop it"
@@ -351,7 +343,7 @@ def in_units(
 
 
 def missing_outcomes(episodes: Sequence[str], outcomes: Outcomes) -> list[str]:
-    """Return the episodes that a table says nothing of, by the rule of `outcomes_of`."""
+    """Return the episodes that a table lacks, by the rule of `outcomes_of`."""
     picked = _matched(episodes, list(outcomes.frame.index))
     return [episode for episode in episodes if episode not in picked]
 
@@ -359,18 +351,18 @@ def missing_outcomes(episodes: Sequence[str], outcomes: Outcomes) -> list[str]:
 def outcomes_of(
     episodes: Sequence[str], outcomes: Outcomes, *, partial: bool
 ) -> tuple[Points, Points]:
-    """Return the outcome of each episode in order, and its standard deviation, each (N, k).
+    """Return each episode's outcome in order, and its standard deviation, each (N, k).
 
-    Episodes are matched by name, else by the number their names end in (`3` is `demo_003`).
+    Episodes are matched by name, else by the number at the end of their names (`3` is `demo_003`).
 
     Args:
         episodes: N names.
-        outcomes: By episode, in the wanted units.
+        outcomes: Outcomes by episode, in the wanted units.
         partial: Only some episodes were asked for, so outcomes of others are no mistake.
 
     Raises:
-        InvalidDemonstrationsError: Outcomes that are missing, not finite, or of episodes that do
-            not exist; each is named.
+        InvalidDemonstrationsError: Outcomes that are missing, not finite, or of unknown episodes;
+            each is named.
     """
     there = list(outcomes.frame.index)
     picked = _matched(episodes, there)
@@ -399,7 +391,7 @@ def outcomes_of(
 
 
 def _matched(episodes: Sequence[str], names: Sequence[str]) -> dict[str, str]:
-    """Name in the table by episode; a number that two names end in matches none."""
+    """Name in the table by episode; a number at the end of two names matches none."""
     numbers, there = list(map(_digits_at_end, episodes)), list(map(_digits_at_end, names))
     picked: dict[str, str] = {}
     for episode, number in zip(episodes, numbers, strict=True):
@@ -411,7 +403,7 @@ def _matched(episodes: Sequence[str], names: Sequence[str]) -> dict[str, str]:
 
 
 def _digits_at_end(name: str) -> str:
-    """The number a name ends in, without zeros before it; empty if in none."""
+    """The number at the end of a name, without leading zeros; empty if there is none."""
     match = re.search(r"([0-9]+)$", name)
     return (match[1].lstrip("0") or "0") if match else ""
 

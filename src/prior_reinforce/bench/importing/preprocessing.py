@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from enum import Enum, auto
+from enum import IntEnum, auto
 
 import numpy as np
 from jaxtyping import Float
@@ -114,58 +114,48 @@ def preprocess(
     """
     dt = settings.dt or _common_dt(recordings)
     every, units = [r.positions for r in recordings], tuple(units)
-    spans = [(0.0, recording.duration) for recording in recordings]
     signals = analyse(every, units, float(np.median([r.period for r in recordings])))
-    if settings.trim:
-        band = signals.trim_band
-        spans = [_moving_span(recording, band, settings.margin) for recording in recordings]
-    remarks = _Remarks()
-    pieces: list[Frames] = []
-    for recording, (start, end) in zip(recordings, spans, strict=True):
-        if (end - start) / dt > _MOST_FRAMES:
-            raise InvalidDemonstrationsError(
-                f"episode {recording.episode} makes {(end - start) / dt:.0f} frames at dt {dt:g} s;"
-                " give a larger dt, or cut the recording"
-            )
-        piece, stepwise = _resample(recording, start, end, dt, signals)
-        pieces.append(piece)
-        remarks.gap(recording, start, end)
-        if stepwise:
-            remarks.add(
-                Kind.STEP, recording, f"{', '.join(stepwise)} jumps; no spline goes through it"
-            )
-        for remark in recording.remarks:
-            remarks.add(Kind.READING, recording, remark)
-    changes = []
+    spans = [
+        _moving_span(r, signals.trim_band, settings.margin) if settings.trim else (0.0, r.duration)
+        for r in recordings
+    ]
+    sampled = [
+        _resample(recording, *span, dt, signals)
+        for recording, span in zip(recordings, spans, strict=True)
+    ]
+    pieces, changes = [piece for piece, _ in sampled], None
     if settings.smooth is not None:
         of_plans = analyse(pieces, units, dt)
         smooth = [
             _smoothed(recording, piece, dt, settings.smooth, units, of_plans)
             for recording, piece in zip(recordings, pieces, strict=True)
         ]
-        changes = [_change(*both) for both in zip(pieces, smooth, strict=True)]
+        off = [after - before for before, after in zip(pieces, smooth, strict=True)]
+        changes = np.array([[np.sqrt(np.mean(o**2, axis=0)), np.abs(o).max(axis=0)] for o in off])
         pieces = smooth
     longest = max(map(len, pieces))
     horizon = settings.horizon or longest
-    for recording, piece, span in zip(recordings, pieces, spans, strict=True):
+    remarks: dict[tuple[_Kind, str], list[str]] = {}
+    for recording, (piece, jumping), span in zip(recordings, sampled, spans, strict=True):
         if len(piece) > horizon:
             raise InvalidDemonstrationsError(
                 f"episode {recording.episode} has {len(piece)} frames, more than the horizon "
                 f"{horizon}; give a horizon of {longest}, or a larger dt (motions are never cut)"
             )
-        remarks.ends(recording, span, units, signals, held=len(piece) < horizon)
+        own = _remarks(recording, span, units, signals, jumping, held=len(piece) < horizon)
+        for remark in own:
+            remarks.setdefault(remark, []).append(recording.episode)
     longest_motion = max(end - start for start, end in spans)
     if longest_motion > LONGEST:
-        remarks.add(
-            Kind.SLOW,
-            None,
+        what = (
             f"motions take up to {longest_motion:.3g} s, and throws take seconds: cut the "
-            "recordings, or say in which unit their times are (--time-unit)",
+            "recordings, or say in which unit their times are (--time-unit)"
         )
+        remarks[_Kind.SLOW, what] = []
     elif horizon > _MANY_FRAMES:
         fewer = dt * horizon / _ENOUGH_FRAMES
         what = f"{horizon} frames are many; dt {fewer:.2g} s makes {_ENOUGH_FRAMES}"
-        remarks.add(Kind.LONG, None, what)
+        remarks[_Kind.LONG, what] = []
     return Preprocessed(
         np.stack([np.pad(p, ((0, horizon - len(p)), (0, 0)), mode="edge") for p in pieces]),
         dt,
@@ -174,20 +164,22 @@ def preprocess(
         sum(len(piece) < horizon for piece in pieces),
         tuple(np.flatnonzero(signals.held).tolist()),
         signals.noise,
-        np.array(changes) if changes else None,
-        remarks.lines(len(recordings)),
+        changes,
+        tuple(
+            f"{'all' if len(e) in (0, len(every)) and len(every) > 1 else ', '.join(e)}: {what}"
+            for (_, what), e in sorted(remarks.items(), key=lambda item: item[0][0])
+        ),
     )
 
 
 def copies(plans: Plans, names: Sequence[str]) -> str:
-    """Say which two motions are one to the last number, as no two recordings are; else nothing.
+    """Name two motions that are identical to the last bit, as no two recordings are; else "".
 
-    A file was copied, or one plan was executed twice: what lies between its outcomes would be asked
-    of the same motion.
+    Either a file was copied, or one plan was executed twice and its outcomes differ by noise alone.
 
     Args:
         plans: N of them.
-        names: What to call each.
+        names: A name for each.
     """
     first: dict[bytes, str] = {}
     for plan, name in zip(plans, names, strict=True):
@@ -201,7 +193,7 @@ def copies(plans: Plans, names: Sequence[str]) -> str:
     return ""
 
 
-class Kind(Enum):
+class _Kind(IntEnum):
     """What a remark is about, the most important first."""
 
     SLOW = auto()
@@ -212,57 +204,34 @@ class Kind(Enum):
     LONG = auto()
 
 
-class _Remarks:
-    """What there is to say, each once for all episodes that it is true of."""
-
-    def __init__(self) -> None:
-        self._said: dict[tuple[Kind, str], list[str]] = {}
-
-    def add(self, kind: Kind, recording: Recording | None, what: str) -> None:
-        """Note something of an episode, or of all."""
-        episodes = self._said.setdefault((kind, what), [])
-        if recording is not None:
-            episodes.append(recording.episode)
-
-    def gap(self, recording: Recording, start: float, end: float) -> None:
-        """The longest time within the motion without a frame, where that is no jitter."""
-        steps = np.diff(recording.times)
-        inside = (recording.times[1:] > start) & (recording.times[:-1] < end)
-        worst = int(np.argmax(np.where(inside, steps, 0.0)))
-        if steps[worst] > _GAP * recording.period:
-            at = recording.times[worst]
-            self.add(
-                Kind.GAP, recording, f"nothing recorded for {steps[worst]:.3f} s at {at:.2f} s"
-            )
-
-    def ends(
-        self,
-        recording: Recording,
-        span: tuple[float, float],
-        units: tuple[str, ...],
-        signals: Signals,
-        *,
-        held: bool,
-    ) -> None:
-        """Channels that are not at rest where the plan starts or ends."""
-        t = recording.times
-        kept = (t >= span[0]) & (t <= span[1])
-        if np.count_nonzero(kept) < _FEWEST_FRAMES:
-            return
-        starts, ends = moving_ends(t[kept], recording.positions[kept], units, signals)
-        then = ", then holds its last pose" if held else ""
-        for moving, what in ((starts, "starts in motion"), (ends, f"ends in motion{then}")):
-            if np.any(moving):
-                names = [recording.names[i] for i in np.flatnonzero(moving)]
-                self.add(Kind.ENDS, recording, f"{what} ({say_names(names)})")
-
-    def lines(self, n: int) -> tuple[str, ...]:
-        """One line each: which episodes, and what."""
-        ordered = sorted(self._said.items(), key=lambda item: item[0][0].value)
-        return tuple(
-            f"{'all' if len(e) in (0, n) and n > 1 else ', '.join(e)}: {what}"
-            for (_, what), e in ordered
-        )
+def _remarks(
+    recording: Recording,
+    span: tuple[float, float],
+    units: tuple[str, ...],
+    signals: Signals,
+    jumping: Sequence[str],
+    *,
+    held: bool,
+) -> Iterator[tuple[_Kind, str]]:
+    """What a person should know of one episode: gaps, jumps, and ends in mid-swing."""
+    t, steps = recording.times, np.diff(recording.times)
+    within = (t[1:] > span[0]) & (t[:-1] < span[1])
+    worst = int(np.argmax(np.where(within, steps, 0.0)))
+    if steps[worst] > _GAP * recording.period:
+        yield _Kind.GAP, f"nothing recorded for {steps[worst]:.3f} s at {t[worst]:.2f} s"
+    if jumping:
+        yield _Kind.STEP, f"{', '.join(jumping)} jumps; no spline goes through it"
+    for remark in recording.remarks:
+        yield _Kind.READING, remark
+    kept = (t >= span[0]) & (t <= span[1])
+    if np.count_nonzero(kept) < _FEWEST_FRAMES:
+        return
+    starts, ends = moving_ends(t[kept], recording.positions[kept], units, signals)
+    then = ", then holds its last pose" if held else ""
+    for moving, what in ((starts, "starts in motion"), (ends, f"ends in motion{then}")):
+        if np.any(moving):
+            names = [recording.names[i] for i in np.flatnonzero(moving)]
+            yield _Kind.ENDS, f"{what} ({say_names(names)})"
 
 
 def _smoothed(
@@ -298,12 +267,6 @@ def _smoothed(
     return np.where(signals.jumps, frames, smooth)
 
 
-def _change(before: Frames, after: Frames) -> Float[np.ndarray, "2 D"]:
-    """Rms and largest change of each channel."""
-    off = after - before
-    return np.stack([np.sqrt(np.mean(off**2, axis=0)), np.abs(off).max(axis=0)])
-
-
 def _common_dt(recordings: Sequence[Recording]) -> float:
     """Median period, snapped to a whole rate that is within half a per cent of it."""
     period = float(np.median([recording.period for recording in recordings]))
@@ -332,6 +295,11 @@ def _resample(
     """Frames at start, start + dt, ... until the end is covered, and names of stepwise channels."""
     t, q = recording.times, recording.positions
     count = max(2, math.ceil((end - start) / dt - _ON_GRID) + 1)
+    if count > _MOST_FRAMES:
+        raise InvalidDemonstrationsError(
+            f"episode {recording.episode} makes {count} frames at dt {dt:g} s; give a larger dt, "
+            "or cut the recording"
+        )
     grid = start + np.arange(count) * dt
     nearest = np.clip(np.searchsorted(t, grid - dt / 2), 0, len(t) - 1)
     if np.all(np.abs(t[nearest] - grid) <= _ON_GRID * dt):

@@ -1,4 +1,4 @@
-"""What an import found, in about ten lines and one picture, for a person to agree with."""
+"""The result of an import, in about ten lines and one picture, for a person to check."""
 
 from __future__ import annotations
 
@@ -11,8 +11,6 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from prior_reinforce.bench.importing.inspection import Inspection, in_rows, say_small
-from prior_reinforce.bench.importing.preprocessing import Preprocessed
-from prior_reinforce.bench.importing.recording import Recording
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.wording import plain
 
@@ -40,23 +38,13 @@ class Preview:
     """Where the outcomes are from."""
 
     @property
-    def recordings(self) -> tuple[Recording, ...]:
-        """N recordings with the plan's channels."""
-        return self.inspection.recordings
-
-    @property
     def episodes(self) -> tuple[str, ...]:
         """Names of the recordings."""
-        return tuple(recording.episode for recording in self.recordings)
-
-    @property
-    def processed(self) -> Preprocessed:
-        """How the recordings became plans."""
-        return self.inspection.processed
+        return self.inspection.selection.episodes
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """What a person should look at: gaps, ends in mid-swing, outcomes that come twice."""
+        """Warnings: those of the inspection, and outcomes that occur twice."""
         alike = tuple(
             f"{self.episodes[i]} and {self.episodes[j]} have the same outcome: the mean of both "
             "motions stands for it; if that is a slip of the pen, correct it"
@@ -83,13 +71,7 @@ class Preview:
 
     def draw(self, path: str | os.PathLike[str]) -> None:
         """Write the picture (PNG): every joint over time, and the outcomes with their hull."""
-        from matplotlib import rc_context
-
-        with rc_context({"text.parse_math": False}):  # a name may hold dollar signs
-            self._draw(path)
-
-    def _draw(self, path: str | os.PathLike[str]) -> None:
-        from matplotlib import colormaps
+        from matplotlib import colormaps, rc_context
         from matplotlib.figure import Figure
 
         from prior_reinforce.report.panels import views_of
@@ -99,29 +81,24 @@ class Preview:
         rows = math.ceil((demos.action_dim + len(views)) / _COLUMNS)
         width, height = 3.4 * _COLUMNS, 2.6 * rows + 0.5
         figure = Figure(figsize=(width, height), dpi=110)
-        # Panels are all alike, so their margins are known; to measure them took half of the time.
-        panels = figure.subplots(
-            rows,
-            _COLUMNS,
-            squeeze=False,
-            gridspec_kw={
-                "left": 0.7 / width, "right": 1 - 0.15 / width, "bottom": 0.5 / height,
-                "top": 1 - 0.75 / height, "wspace": 0.34, "hspace": 0.45,
-            },
-        )  # fmt: skip
-        axes = panels.ravel()
         colours = [colormaps["tab10"](i % 10) for i in range(demos.n)]
-        for channel in range(demos.action_dim):
-            self._draw_channel(axes[channel], channel, colours)
-        for at, view in enumerate(views, start=demos.action_dim):
-            self._draw_outcomes(axes[at], view, colours)
-        for spare in axes[demos.action_dim + len(views) :]:
-            spare.set_axis_off()
-        figure.suptitle(
-            f"{demos.n} demonstrations as they will be learned (colour, dot where the motion ends) "
-            "and as recorded (grey)"
-        )
-        figure.savefig(path, format="png")
+        with rc_context({"text.parse_math": False}):  # a name may hold dollar signs
+            axes = figure.subplots(rows, _COLUMNS, squeeze=False).ravel()
+            # All panels are alike, so their margins are known; measuring them took half the time.
+            figure.subplots_adjust(
+                0.7 / width, 0.5 / height, 1 - 0.15 / width, 1 - 0.75 / height, 0.34, 0.45
+            )
+            for channel in range(demos.action_dim):
+                self._draw_channel(axes[channel], channel, colours)
+            for at, view in enumerate(views, start=demos.action_dim):
+                self._draw_outcomes(axes[at], view, colours)
+            for spare in axes[demos.action_dim + len(views) :]:
+                spare.set_axis_off()
+            figure.suptitle(
+                f"{demos.n} demonstrations as they will be learned (colour, dot where the motion "
+                "ends) and as recorded (grey)"
+            )
+            figure.savefig(path, format="png")
 
     def _coverage(self) -> str:
         demos, points = self.demonstrations, self.demonstrations.outcomes_seen
@@ -144,7 +121,8 @@ class Preview:
     def _draw_channel(self, axes: Any, channel: int, colours: list[Any]) -> None:
         demos, form = self.demonstrations, self.demonstrations.format
         times = np.arange(demos.horizon) * form.dt
-        for recording, start in zip(self.recordings, self.processed.starts, strict=True):
+        starts = self.inspection.processed.starts
+        for recording, start in zip(self.inspection.recordings, starts, strict=True):
             recorded = recording.positions[:, channel]
             axes.plot(recording.times - start, recorded, color="0.8", linewidth=2.5, zorder=1)
         for plan, colour in zip(demos.plans, colours, strict=True):
@@ -190,7 +168,7 @@ class Preview:
 
 
 def hull_corners(points: PlanePoints) -> Corners:
-    """Return indices of the corners of the points' convex hull, in order; none where it is flat."""
+    """Return indices of the corners of the convex hull, in order; none if it is flat."""
     from scipy.spatial import ConvexHull, QhullError
 
     try:

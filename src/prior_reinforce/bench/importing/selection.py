@@ -1,4 +1,4 @@
-"""Which recorded channels are the plan's, in which units, and what moves and is left out."""
+"""Match recorded channels to the plan's, with their units, and note what moves and is left out."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from prior_reinforce.bench.importing.recording import Recording
 from prior_reinforce.bench.importing.tables import counts
 from prior_reinforce.bench.importing.units import (
     Ambiguity,
+    UnitGuess,
     base_of,
     conversion,
     judge_unit,
@@ -40,18 +41,18 @@ class Selection:
     recordings: tuple[Recording, ...]
     names: tuple[str, ...]
     units: tuple[str, ...]
-    """Of the plan's channels."""
+    """Units of the plan's channels."""
     recorded_units: tuple[str, ...]
-    """In which they were recorded."""
+    """Units in which they were recorded."""
     ambiguities: tuple[Ambiguity, ...] = ()
-    """Which of names and units are only guessed."""
+    """Names and units that are only inferred."""
     remarks: tuple[str, ...] = ()
-    """What a person should know of them."""
+    """Warnings for a person."""
     other_unit: str = ""
-    """The option that says the unit they look like instead; empty where that is the one taken, or
-    one option cannot say it."""
+    """The option for the unit that the numbers look like, where that is not the one used and one
+    option can give it; else empty."""
     left_out: str = ""
-    """Channels that move and are not the plan's, with their ranges; empty where there are none."""
+    """Channels that move and are not part of the plan, with their ranges; else empty."""
 
     @property
     def episodes(self) -> tuple[str, ...]:
@@ -73,18 +74,18 @@ def select(
 ) -> Selection:
     """Pick, order, convert and rename the channels of every recording.
 
-    Frames in which one of them is not finite are left out, as lost packets are.
+    Frames with a value that is not finite are dropped, as lost packets are.
 
     Args:
         recordings: At least one.
-        joints: Recorded names to keep, in order; None keeps those of the first recording. They
-            name the columns, in order, of recordings that name nothing.
-        names: What to call them; None keeps the recorded names. Where they are the joints, and no
-            column is called like them, numbered columns of which there are as many are a guess.
+        joints: Recorded names to keep, in order; None keeps those of the first recording. If the
+            recordings name no columns, these name all columns in order.
+        names: Their names in the plan; None keeps the recorded names. If they equal `joints` and
+            no column has these names, as many numbered columns are a guess.
         units: Recorded units; a single one holds for all. None takes those that the recordings
-            say, and for others the plan's; where an arm could not be in that unit, it is guessed.
-        plan_units: Units of the plan; None takes radians for angles and metres for lengths, and
-            radians for what has no unit.
+            state, else the plan's; if no arm reaches such values, the unit is guessed.
+        plan_units: Units of the plan; None takes radians for angles, metres for lengths, and
+            radians for channels without a unit.
 
     Raises:
         InvalidDemonstrationsError: A joint that a recording lacks, or too many lost frames.
@@ -117,20 +118,20 @@ def select(
     picked = tuple(
         _without_lost_frames(_only(r, c, joints)) for r, c in zip(recordings, columns, strict=True)
     )
-    # No option may contradict a unit that the file says.
+    # No option may contradict a unit that the file states.
     open_ = all(r.units[i] is None for r, c in zip(recordings, columns, strict=True) for i in c)
-    units_found = _judge_units(picked, names, said, wanted, units is not None, open_)
-    scale = [
-        conversion(r, w, n) for r, w, n in zip(units_found.recorded, wanted, names, strict=True)
-    ]
+    recorded, unclear, remarks, other = _judge_units(
+        picked, names, said, wanted, units is not None, open_
+    )
+    scale = [conversion(*one) for one in zip(recorded, wanted, names, strict=True)]
     return Selection(
         tuple(replace(r, positions=r.positions * scale, units=tuple(wanted)) for r in picked),
         names,
         tuple(wanted),
-        tuple(units_found.recorded),
-        (*guessed, *units_found.ambiguities),
-        tuple(units_found.remarks),
-        units_found.other,
+        tuple(recorded),
+        (*guessed, *unclear),
+        tuple(remarks),
+        other,
         _left_out(recordings, columns),
     )
 
@@ -138,7 +139,7 @@ def select(
 def _guess_names(
     recording: Recording, joints: tuple[str, ...]
 ) -> tuple[tuple[str, ...], tuple[Ambiguity, ...]]:
-    """The joints by their recorded names, where these can only be guessed: `q0`, `q1`, ..."""
+    """The recorded names of the joints, if they can only be guessed: `q0`, `q1`, ..."""
     if not recording.named or find_channels(joints, recording.names) is not None:
         return joints, ()
     found = numbered_like(joints, recording.names)
@@ -171,7 +172,7 @@ def _columns(recording: Recording, joints: tuple[str, ...]) -> list[int]:
 
 
 def _only(recording: Recording, columns: list[int], joints: tuple[str, ...]) -> Recording:
-    """The recording with some of its channels."""
+    """Return the recording with some of its channels."""
     return replace(
         recording,
         positions=recording.positions[:, columns],
@@ -182,7 +183,7 @@ def _only(recording: Recording, columns: list[int], joints: tuple[str, ...]) -> 
 
 
 def _without_lost_frames(recording: Recording) -> Recording:
-    """The recording without frames in which a channel is not finite, where these are few."""
+    """Drop the few frames in which a channel is not finite."""
     bad = ~np.isfinite(recording.positions)
     lost = np.any(bad, axis=1)
     if not np.any(lost):
@@ -204,7 +205,7 @@ def _without_lost_frames(recording: Recording) -> Recording:
 
 
 def _left_out(recordings: Sequence[Recording], columns: Sequence[list[int]]) -> str:
-    """What moves and is not taken, with its range over all recordings."""
+    """Channels that move and are not selected, with their ranges over all recordings."""
     ranges: dict[str, list[tuple[float, float]]] = {}
     for recording, taken in zip(recordings, columns, strict=True):
         for name, span in recording.left_out.items():
@@ -230,7 +231,7 @@ def _left_out(recordings: Sequence[Recording], columns: Sequence[list[int]]) -> 
 def _said_unit(
     recordings: Sequence[Recording], columns: list[list[int]], index: int, given: str | None
 ) -> str | None:
-    """Unit of a channel that was given or that its file says; None where neither does."""
+    """Unit of a channel as given or as its file states it; None if neither does."""
     given = given if given is None else known_unit(given) or given
     for recording, column in zip(recordings, columns, strict=True):
         own = recording.units[column[index]]
@@ -243,14 +244,6 @@ def _said_unit(
     return given
 
 
-@dataclass(frozen=True)
-class _UnitsFound:
-    recorded: list[str]
-    ambiguities: list[Ambiguity]
-    remarks: list[str]
-    other: str
-
-
 def _judge_units(
     recordings: Sequence[Recording],
     names: Sequence[str],
@@ -258,62 +251,65 @@ def _judge_units(
     wanted: Sequence[str],
     given: bool,
     open_: bool,
-) -> _UnitsFound:
-    """Unit of every channel: as said if possible, as wanted if nobody says, else as it looks.
+) -> tuple[list[str], list[Ambiguity], list[str], str]:
+    """Infer the unit of every channel: as stated if possible, else as wanted, else as it looks.
 
     Args:
         recordings: With these channels alone.
         names: Of the channels in the plan.
-        said: Their units, given or from the file; None where nobody says.
+        said: Their units, given or from the file; None where neither states one.
         wanted: Units of the plan.
         given: Whether units were given.
-        open_: Whether the files say none of them.
+        open_: Whether the files state none of them.
+
+    Returns:
+        Units, what is ambiguous of them, remarks, and the option that gives the unit they look
+        like, as in `Selection`.
     """
     reach = np.array([np.abs(r.positions).max(axis=0) for r in recordings])
+    recorded = [unit or w for unit, w in zip(said, wanted, strict=True)]
+    every, unsaid = range(len(names)), [i for i, unit in enumerate(said) if unit is None]
 
-    def farthest(among: list[int]) -> tuple[float, str]:
+    def judge(among: Sequence[int]) -> tuple[float, str, UnitGuess]:
+        """The largest number of channels of one unit, where it stands, and what it suggests."""
         episode, channel = divmod(int(np.argmax(reach[:, among])), len(among))
-        where = f"{names[among[channel]]} of {recordings[episode].episode}"
-        return float(reach[episode, among[channel]]), where
+        most, index = float(reach[episode, among[channel]]), among[channel]
+        where = f"{names[index]} of {recordings[episode].episode}"
+        return most, where, judge_unit(recorded[index], most)
 
-    def channels(units: Sequence[str | None], unit: str) -> list[int]:
-        return [i for i, own in enumerate(units) if own == unit]
+    def by_unit(channels: Sequence[int]) -> list[list[int]]:
+        units = dict.fromkeys(recorded[i] for i in channels)
+        return [[i for i in channels if recorded[i] == unit] for unit in units]
 
-    recorded = [unit or "" for unit in said]
-    unclear = []
-    unsaid = [w if unit is None else None for w, unit in zip(wanted, said, strict=True)]
-    for unit in dict.fromkeys(filter(None, unsaid)):
-        among = channels(unsaid, unit)
-        most, where = farthest(among)
-        judged = judge_unit(unit, most)
+    unclear, remarks, other = [], [], ""
+    for among in by_unit(unsaid):
+        most, where, judged = judge(among)
         if not judged.plausible:
             seen = f"it looks like {judged.looks}" if judged.looks else "and as degrees neither"
             unclear.append(
-                f"{say_names([names[i] for i in among])} in {unit} would reach {most:.4g} "
+                f"{say_names([names[i] for i in among])} in {judged.unit} would reach {most:.4g} "
                 f"({where}), which no arm does: {seen}"
             )
-        for i in among:
-            recorded[i] = judged.looks or unit
-    one = recorded[0] if len(set(recorded)) == 1 else None
-    ambiguities = [Ambiguity(w, f"--units {one or ' '.join(recorded)}") for w in unclear]
-    if one is not None and open_:
-        most, where = farthest(list(range(len(names))))
-        judged = judge_unit(one, most)
-        if given and not judged.possible and judged.looks is not None:
+            for i in among:
+                recorded[i] = judged.looks or judged.unit
+    single = len(set(recorded)) == 1
+    option = f"--units {recorded[0] if single else ' '.join(recorded)}"
+    ambiguities = [Ambiguity(what, option) for what in unclear]
+    if single and open_ and given:
+        most, where, judged = judge(every)
+        if not judged.possible and judged.looks is not None:
             what = (
-                f"{say_names(names)} in {one}, as --units says, would reach {most:.4g} ({where}), "
-                f"which no arm does: it looks like {judged.looks}"
+                f"{say_names(names)} in {judged.unit}, as --units says, would reach {most:.4g} "
+                f"({where}), which no arm does: it looks like {judged.looks}"
             )
             ambiguities.append(Ambiguity(what, f"--units {judged.looks}"))
             recorded = [judged.looks] * len(names)
-    remarks, other = [], ""
-    for unit in dict.fromkeys(recorded):
-        most, where = farthest(channels(recorded, unit))
-        judged = judge_unit(unit, most)
+    for among in by_unit(every):
+        most, where, judged = judge(among)
         if not judged.plausible and judged.looks is not None:
             advice = "check its unit"
-            if open_ and len(set(recorded)) == 1:
+            if open_ and single:
                 other = f"--units {judged.looks}"
                 advice = f"if it was recorded in {judged.looks}, say {other}"
-            remarks.append(f"{where} reaches {most:.4g} {unit}, and arms do not: {advice}")
-    return _UnitsFound(recorded, ambiguities, remarks, other)
+            remarks.append(f"{where} reaches {most:.4g} {judged.unit}, and arms do not: {advice}")
+    return recorded, ambiguities, remarks, other

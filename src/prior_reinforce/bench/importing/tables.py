@@ -1,17 +1,19 @@
-"""Tables as people export them, read with pandas: CSV of any dialect, and sheets of a workbook.
+"""Tables as people export them: CSV of any dialect, and the sheets of a workbook.
 
-Of a CSV, encoding, delimiter and decimal sign are found out from its own lines: the pair that makes
-most cells numbers in rows of one width. Comment lines (`#`, `%`, `//`) are left out, but for one
-that names the columns right above the first row, as `numpy.savetxt` writes it.
+Encoding, delimiter and decimal sign of a CSV are inferred from its lines: the pair that makes most
+cells numbers, in rows of one width. (`csv.Sniffer` knows no decimal comma.) Comment lines (`#`,
+`%`, `//`) are dropped, except one right above the first row that names the columns, as
+`numpy.savetxt` writes it.
 """
 
 from __future__ import annotations
 
-import io
+import csv
+import math
 import re
 from collections import Counter
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -29,16 +31,17 @@ DELIMITERS = {"comma": ",", "semicolon": ";", "tab": "\t", "space": r"\s+"}
 """How the command line names what stands between two cells."""
 _COMMENTS = ("#", "%", "//")
 _SAMPLE = 40
-"""Lines that a dialect is found out from."""
+"""Lines from which a dialect is inferred."""
 _WESTERN = set("°µ²³äöüÄÖÜßàâçéèêëîïôùûñÀÉÈáíóúãõåæøÅÆØ")
-"""What stands beside ASCII in tables that a Western Excel saves in its own code page."""
+"""Non-ASCII characters in tables that a Western Excel saves in its own code page."""
 _COMMA = re.compile(r"[+-]?(0,\d{3}|\d+,(\d{1,2}|\d{4,}))")
+_DATE = re.compile(r"\d{4}-\d\d-\d\d|\d{1,2}:\d\d")
 _SECOND_ROW_OF_UNITS = re.compile(r"[\[(]?[A-Za-zµμ°/^*·0-9.%-]{0,12}[\])]?")
 
 
 @dataclass(frozen=True)
 class Dialect:
-    """How a CSV is written; None is found out."""
+    """How a CSV is written; None is inferred."""
 
     delimiter: str | None = None
     """`,`, `;`, a tab, or `\\s+` for any white space."""
@@ -58,8 +61,8 @@ class Table:
     """Whether the file names them."""
     units: tuple[str | None, ...]
     """From a row of units under the names; None where it says none."""
-    cells: tuple[Sequence[Any], ...]
-    """By column: texts, or numbers and dates of a workbook."""
+    cells: tuple[Sequence[str], ...]
+    """Texts by column; whole numbers of a workbook without `.0`."""
     lines: tuple[int, ...]
     """Line or row of the file that each row stands in, from 1."""
     decimal: str = "."
@@ -69,14 +72,9 @@ class Table:
         return len(self.lines)
 
     def rows(self, kept: Sequence[int]) -> Table:
-        """Return the same with some rows only."""
+        """Return the table with some of its rows."""
         cells = tuple([column[i] for i in kept] for column in self.cells)
-        lines = tuple(self.lines[i] for i in kept)
-        return Table(self.where, self.names, self.named, self.units, cells, lines, self.decimal)
-
-    def texts(self, column: int) -> list[str]:
-        """Return a column as texts; whole numbers of a workbook without `.0`."""
-        return [_as_text(cell) for cell in self.cells[column]]
+        return replace(self, cells=cells, lines=tuple(self.lines[i] for i in kept))
 
     def numbers(self, column: int) -> Column:
         """Return a column as numbers.
@@ -84,10 +82,9 @@ class Table:
         Raises:
             FileFormatError: A cell that is none, with its line.
         """
-        values = _numeric(self.cells[column], self.decimal)
-        wrong = [i for i, value in enumerate(values) if np.isnan(value)]
-        for i in wrong:
-            text = _as_text(self.cells[column][i])
+        values = self._parsed(column)
+        for i in np.flatnonzero(np.isnan(values)).tolist():
+            text = self.cells[column][i]
             if text.lower() not in ("nan", "+nan", "-nan"):
                 raise FileFormatError(
                     f"{self.where}, line {self.lines[i]}: {self.names[column]} is {text[:40]!r}, "
@@ -95,13 +92,21 @@ class Table:
                 )
         return values
 
+    def number(self, row: int, column: int) -> float:
+        """Return a cell as a number; nan if it is none."""
+        return _number(self.cells[column][row], self.decimal)
+
     def is_number(self, column: int) -> bool:
         """Whether every cell of a column is a number."""
-        return not np.any(np.isnan(_numeric(self.cells[column], self.decimal)))
+        return not np.any(np.isnan(self._parsed(column)))
 
     def is_text(self, column: int) -> bool:
         """Whether no cell of a column is a number."""
-        return bool(np.all(np.isnan(_numeric(self.cells[column], self.decimal))))
+        return bool(np.all(np.isnan(self._parsed(column))))
+
+    def _parsed(self, column: int) -> Column:
+        """Numbers; nan where a cell is none."""
+        return np.array([_number(cell, self.decimal) for cell in self.cells[column]], dtype=float)
 
     def nanoseconds(self, column: int) -> Int[np.ndarray, " T"] | None:
         """Return dates or times of day from the first on, in [ns]; None where it holds others."""
@@ -109,7 +114,7 @@ class Table:
             return None
         import pandas as pd
 
-        cells = pd.Series([str(cell) for cell in self.cells[column]])
+        cells = pd.Series(self.cells[column], dtype=object)
         try:
             times = pd.to_datetime(cells, format="ISO8601", utc=True)
         except (ValueError, TypeError, OverflowError):
@@ -157,9 +162,8 @@ def _read_workbook(path: Path, head: Collection[str]) -> list[Table]:
     sheets = pd.read_excel(path, sheet_name=None, header=None, engine="calamine", dtype=object)
     tables = []
     for name, frame in sheets.items():
-        cells = frame.values.tolist()
-        rows = [["" if pd.isna(cell) else _cell(cell) for cell in row] for row in cells]
-        numbered = [(i, row) for i, row in enumerate(rows, 1) if any(_as_text(c) for c in row)]
+        rows = [[_as_text(cell) for cell in row] for row in frame.values.tolist()]
+        numbered = [(i, row) for i, row in enumerate(rows, 1) if any(row)]
         if numbered:
             where = f"{path}" if len(sheets) == 1 else f"{path} [{name}]"
             tables.append(_table(where, _below_titles(numbered, head), ".", None))
@@ -168,27 +172,30 @@ def _read_workbook(path: Path, head: Collection[str]) -> list[Table]:
     return tables
 
 
-def _cell(cell: Any) -> Any:
+def _as_text(cell: Any) -> str:
     """A cell of a workbook; a text such as `148,8` is a number, `1,488` may be a thousand."""
-    return cell.replace(",", ".") if isinstance(cell, str) and _COMMA.fullmatch(cell) else cell
+    import pandas as pd
+
+    if isinstance(cell, str):
+        return (cell.replace(",", ".") if _COMMA.fullmatch(cell) else cell).strip()
+    if isinstance(cell, bool) or (isinstance(cell, float) and cell.is_integer()):
+        return str(int(cell))
+    return "" if pd.isna(cell) else str(cell)
 
 
 def _below_titles(
-    rows: list[tuple[int, list[Any]]], head: Collection[str]
-) -> list[tuple[int, list[Any]]]:
+    rows: list[tuple[int, list[str]]], head: Collection[str]
+) -> list[tuple[int, list[str]]]:
     """The rows from the line of names on, where one of the first has one of its names."""
     for i, (_, row) in enumerate(rows[:_SAMPLE]):
-        if any(_as_text(cell).lower() in head for cell in row):
+        if any(cell.lower() in head for cell in row):
             return rows[i:]
     return rows
 
 
 def _read_csv(path: Path, dialect: Dialect, head: Collection[str]) -> Table:
-    import pandas as pd
-
     check_bytes(path, path.stat().st_size)
-    lines = _decoded(path).splitlines()
-    kept = [(i, line) for i, line in enumerate(lines, 1) if line.strip()]
+    kept = [(i, line) for i, line in enumerate(_decoded(path).splitlines(), 1) if line.strip()]
     data = [(i, line) for i, line in kept if not line.lstrip().startswith(_COMMENTS)]
     if not data:
         return Table(str(path), (), False, (), (), ())
@@ -199,24 +206,19 @@ def _read_csv(path: Path, dialect: Dialect, head: Collection[str]) -> Table:
     sample = [line for _, line in data[:_SAMPLE]]
     check_table(path, 1, 1 + max(line.count(mark) for line in sample for mark in ",;\t"))
     delimiter, decimal = _dialect(sample, dialect)
-    width = max(_width(line, delimiter) for _, line in data)
-    check_table(path, len(data), width)
-    frame = pd.read_csv(
-        io.StringIO("\n".join(line for _, line in data)),
-        sep=delimiter,
-        header=None,
-        names=list(range(width)),
-        dtype=str,
-        keep_default_na=False,
-        skipinitialspace=True,
-        index_col=False,
+    check_table(path, len(data), max(len(_split(line, delimiter)) for _, line in data))
+    mark, lines = delimiter, [line for _, line in data]
+    if delimiter == DELIMITERS["space"]:
+        mark, lines = " ", [line.strip().replace("\t", " ") for line in lines]
+    cells = csv.reader(
+        (f"{line}\n" for line in lines), delimiter=mark, skipinitialspace=True, strict=True
     )
-    rows = [[cell.strip() for cell in row] for row in frame.values.tolist()]
-    numbers = [i for i, _ in data] if len(rows) == len(data) else list(range(1, len(rows) + 1))
+    rows = [(data[cells.line_num - 1][0], [cell.strip() for cell in row]) for row in cells]
+    width = max(len(row) for _, row in rows)
+    rows = [(i, row + [""] * (width - len(row))) for i, row in rows]
     above = [line for i, line in kept if i == data[0][0] - 1 and (i, line) not in data]
     title = [c.strip() for c in _split(above[0].lstrip(" #%/"), delimiter)] if above else None
-    numbered = _below_titles(list(zip(numbers, rows, strict=True)), head)
-    return _table(str(path), numbered, decimal, title)
+    return _table(str(path), _below_titles(rows, head), decimal, title)
 
 
 def _decoded(path: Path) -> str:
@@ -240,10 +242,6 @@ def _split(line: str, delimiter: str) -> list[str]:
     return line.split() if delimiter == r"\s+" else line.split(delimiter)
 
 
-def _width(line: str, delimiter: str) -> int:
-    return len(line.split()) if delimiter == r"\s+" else line.count(delimiter) + 1
-
-
 def _dialect(lines: Sequence[str], given: Dialect) -> tuple[str, str]:
     """Delimiter and decimal sign under which the lines are rows of one width and mostly numbers."""
     best, chosen = (-1.0, -1.0), (",", ".")
@@ -254,7 +252,7 @@ def _dialect(lines: Sequence[str], given: Dialect) -> tuple[str, str]:
                 continue
             rows = [_split(line.rstrip(";,"), delimiter) for line in body]
             cells = [cell for row in rows for cell in row if cell.strip()]
-            numeric = sum(_is_numeric(cell, decimal) for cell in cells) / max(len(cells), 1)
+            numeric = sum(_is_number(cell, decimal) for cell in cells) / max(len(cells), 1)
             width, often = Counter(map(len, rows)).most_common(1)[0]
             score = (round(numeric * often / len(rows), 2), float(width))
             if score > best:
@@ -262,33 +260,38 @@ def _dialect(lines: Sequence[str], given: Dialect) -> tuple[str, str]:
     return chosen
 
 
-def _is_numeric(text: str, decimal: str) -> bool:
-    text = text.strip().strip('"')
-    if decimal == ",":
-        if "." in text:
-            return False
-        text = text.replace(",", ".")
+def _number(text: str, decimal: str = ".") -> float:
+    """The number that a text is; nan if it is none.
+
+    A point beside a decimal comma would separate thousands: no number, rather than another one.
+    """
+    if "_" in text or (decimal == "," and "." in text):
+        return math.nan
     try:
-        float(text)
+        return float(text.replace(decimal, "."))
     except ValueError:
-        return False
-    return True
+        return math.nan
+
+
+def _is_number(text: str, decimal: str) -> bool:
+    text = text.strip().strip('"')
+    return text.lower() == "nan" or not math.isnan(_number(text, decimal))
 
 
 def _table(
-    where: str, rows: list[tuple[int, list[Any]]], decimal: str, title: list[str] | None
+    where: str, rows: list[tuple[int, list[str]]], decimal: str, title: list[str] | None
 ) -> Table:
     """Names, units and cells of rows with the numbers of their lines."""
     first = rows[0][1]
     units: list[str | None] = [None] * len(first)
-    if not any(_is_numeric(_as_text(c), decimal) or _is_date(c) for c in first):
-        names, named, rows = [_as_text(c) for c in first], True, rows[1:]
+    if not any(_is_number(c, decimal) or _DATE.match(c) for c in first):
+        names, named, rows = first, True, rows[1:]
     elif title is not None and len(title) == len(first):
         names, named = title, True
     else:
         names, named = [f"column {i}" for i in range(1, len(first) + 1)], False
-    if named and len(rows) > 1 and _are_units([_as_text(c) for c in rows[0][1]], decimal):
-        units, rows = [known_unit(_as_text(c)) for c in rows[0][1]], rows[1:]
+    if named and len(rows) > 1 and _are_units(rows[0][1], decimal):
+        units, rows = [known_unit(c) for c in rows[0][1]], rows[1:]
     check_names(where, names)
     columns = [[row[i] for _, row in rows] for i in range(len(names))]
     kept = [i for i, name in enumerate(names) if not _is_padding(name, columns[i])]
@@ -307,51 +310,19 @@ def _are_units(cells: list[str], decimal: str) -> bool:
     return (
         any(known_unit(cell) for cell in cells)
         and all(_SECOND_ROW_OF_UNITS.fullmatch(cell) for cell in cells)
-        and not any(_is_numeric(cell, decimal) for cell in cells)
+        and not any(_is_number(cell, decimal) for cell in cells)
     )
 
 
-def _is_padding(name: str, column: Sequence[Any]) -> bool:
+def _is_padding(name: str, column: Sequence[str]) -> bool:
     """Whether a column is what a trailing delimiter leaves, or the running count of pandas."""
     numbered = name.startswith("column ")
     unnamed = not name or name.startswith("Unnamed:") or name == "index"
     if not (numbered or unnamed):
         return False
-    texts = [_as_text(cell) for cell in column]
-    return not any(texts) or (unnamed and texts == [str(i) for i in range(len(texts))])
-
-
-def _is_date(cell: Any) -> bool:
-    text = str(cell).strip()
-    return bool(re.match(r"\d{4}-\d\d-\d\d|\d{1,2}:\d\d", text))
-
-
-def _as_text(cell: Any) -> str:
-    if isinstance(cell, float) and cell.is_integer() and abs(cell) < 1e15:
-        cell = int(cell)
-    return str(cell).strip()
-
-
-def _numeric(cells: Sequence[Any], decimal: str) -> Column:
-    """Numbers; nan where a cell is none."""
-    import pandas as pd
-
-    return np.asarray(
-        pd.to_numeric(pd.Series([_plain(cell, decimal) for cell in cells]), errors="coerce"),
-        dtype=np.float64,
-    )
+    return not any(column) or (unnamed and list(column) == [str(i) for i in range(len(column))])
 
 
 def counts(values: Column) -> bool:
     """Whether a column counts rows or tells the time: it increases with every row."""
     return bool(np.all(np.diff(values) > 0))
-
-
-def _plain(cell: Any, decimal: str) -> Any:
-    """A cell for pandas: with a decimal point, and None where it can be no number."""
-    if not isinstance(cell, str):
-        return cell if isinstance(cell, (int, float)) else None
-    if decimal == ",":
-        # A point would be between thousands: no number, rather than another one.
-        return None if "." in cell else cell.replace(",", ".")
-    return cell
