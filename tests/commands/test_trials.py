@@ -250,6 +250,24 @@ def test_the_arm_is_held_against_the_plans_first_pose(
     assert (tmp_path / "motions").exists() == (status == 0)
 
 
+def test_where_the_arm_stands_is_asked_after_the_person(run, folder, driver, tmp_path, monkeypatch):
+    run("goal", folder, "0.9", "0.05")
+    (tmp_path / "say.json").write_text('{"outcome": "done"}')
+    (tmp_path / "pose.json").write_text("[0, 0]")
+
+    def pushed_meanwhile(question):
+        (tmp_path / "pose.json").write_text("[0, 0.3]")
+        return "yes"
+
+    monkeypatch.setattr("sys.stdin.isatty", lambda: True)
+    monkeypatch.setattr("builtins.input", pushed_meanwhile)
+    where = f"cat {tmp_path}/pose.json"
+    status, _, err = run("ask", folder, "--run", driver, "--where", where)
+    assert status == 1
+    assert "off it by up to 0.3 rad (joint2)" in err
+    assert not (tmp_path / "motions").exists()
+
+
 def cut_off(folder):
     with Workspace(folder) as workspace, workspace.log.journal.exclusive():
         # What is written before the program dies.

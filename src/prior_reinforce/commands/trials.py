@@ -75,14 +75,16 @@ class Ask:
             trial = session.ask(arm_did_not_move=did_not_move)
             self._show(workspace, session, trial, reached_before)
             may_move = trial.stage is not Stage.EXECUTED
+            moves = may_move and self.run_command is not None and not self.check
+            if moves and not self.yes and not _may_move():
+                print("nothing moved; ask again when it may")
+                return 1
+            # Last: the arm may be moved by hand while a person is asked.
             if may_move and self.where is not None and not self._is_there(workspace, trial):
                 return 1
             if self.check and may_move:
                 print("checked; nothing moved")
             elif self.run_command is not None:
-                if may_move and not self.yes and not _may_move():
-                    print("nothing moved; ask again when it may")
-                    return 1
                 return self._execute(workspace, trial.number, self.run_command)
             elif may_move:
                 print("execute it, then say where the object went:")

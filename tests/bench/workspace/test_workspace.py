@@ -1,5 +1,6 @@
 """A workspace: what happened is kept, whatever happens in between."""
 
+import errno
 import os
 import shutil
 import signal
@@ -13,6 +14,8 @@ import pytest
 
 from prior_reinforce.adapters.bayesian import BayesianAdapter
 from prior_reinforce.adapters.proportional import ProportionalAdapter
+from prior_reinforce.bench.robots.executors import supervision
+from prior_reinforce.bench.robots.executors.lock import executing_lock
 from prior_reinforce.bench.workspace.log import Executing
 from prior_reinforce.bench.workspace.status import describe
 from prior_reinforce.bench.workspace.workspace import Workspace
@@ -487,6 +490,64 @@ def test_nothing_moves_where_an_interruption_came_first(workspace, tmp_path, mon
         workspace.execute(number, f"touch {tmp_path}/ran {{plan}}", time_limit=20)
     assert not (tmp_path / "ran").exists()
     assert trials(workspace)[0].stage is Stage.ASKED
+
+
+def test_a_disk_that_fails_after_the_motion_is_no_sign_that_it_was_none(workspace, monkeypatch):
+    """Network file systems say only when a file is closed that it did not fit."""
+    number = ask(workspace).number
+    leave = supervision._Shown.__exit__
+
+    def full(*args):
+        leave(*args)
+        raise OSError(errno.EDQUOT, "quota exceeded")
+
+    monkeypatch.setattr(supervision._Shown, "__exit__", full)
+    with pytest.raises(OSError, match="quota"):
+        workspace.execute(number, "cat {plan}", time_limit=60)
+    assert trials(workspace)[0].stage is Stage.EXECUTING
+    recovered = workspace.recover()
+    assert recovered is not None
+    assert recovered.stage is Stage.EXECUTED
+
+
+def test_the_arm_is_the_one_that_the_manifest_names_by_now(workspace, monkeypatch):
+    number = ask(workspace).number
+    path, ran = workspace.folder / "workspace.toml", workspace.folder / "ran"
+    unnamed = path.read_text()
+    assert unnamed.count("# arm = ") == 1
+    named = unnamed.replace("# arm = ", "arm = ", 1)
+    path.write_text(named)
+    arm = Workspace(workspace.folder).manifest.arm
+    with executing_lock(arm=arm), pytest.raises(TrialStateError, match="right now"):
+        workspace.execute(number, f"touch {ran} {{plan}}", time_limit=20)
+    check = Workspace._to_execute
+
+    def renamed(*args):
+        path.write_text(unnamed)  # while the lock of the other is held
+        return check(*args)
+
+    monkeypatch.setattr(Workspace, "_to_execute", renamed)
+    with pytest.raises(ConfigurationError, match="names another arm"):
+        workspace.execute(number, f"touch {ran} {{plan}}", time_limit=20)
+    assert not ran.exists()
+    assert trials(workspace)[0].stage is Stage.ASKED
+
+
+@pytest.mark.parametrize("deed", ["true", "rm -r $1", "rm -f $0", "chmod u+w $0; echo >> $0"])
+def test_a_restored_journal_finds_what_ran_whatever_a_driver_did_to_its_files(workspace, deed):
+    number, journal = ask(workspace).number, workspace.folder / "journal.sqlite"
+    workspace.close()
+    before, ran = journal.read_bytes(), workspace.folder / "ran"
+    with Workspace(workspace.folder) as first:
+        first.execute(number, f"sh -c '{deed}' {{plan}} {{result}}", time_limit=60)
+    for path in workspace.folder.glob("journal.sqlite-*"):
+        path.unlink()
+    journal.write_bytes(before)
+    with Workspace(workspace.folder) as restored:
+        with pytest.raises(TrialStateError):
+            restored.execute(number, f"touch {ran} {{plan}}", time_limit=60)
+        assert trials(restored)[0].stage is Stage.EXECUTING
+    assert not ran.exists()
 
 
 def test_limits_that_were_narrowed_while_the_program_waited_are_the_ones_that_count(workspace):

@@ -149,8 +149,8 @@ class Store:
         """
         return read_plan(self.plan_path(kept.file), sha256=kept.sha256)
 
-    def make_execution_folder(self, number: int) -> Path:
-        """Make an empty folder for what a command writes while it executes a trial.
+    def make_execution_folder(self, plan: str) -> Path:
+        """Make an empty folder for what a command writes while it executes the plan of a file.
 
         Raises:
             WorkspaceError: The disk is full, or the folder read-only.
@@ -158,7 +158,7 @@ class Store:
         with named_disk_errors(self._folder):
             attempt = 1
             while True:
-                folder = self.execution_folder(f"trial-{number:03d}-{attempt}")
+                folder = self.execution_folder(f"{Path(plan).stem}-{attempt}")
                 try:
                     folder.mkdir(parents=True)
                 except FileExistsError:
@@ -166,9 +166,9 @@ class Store:
                 else:
                     return folder
 
-    def execution_folders(self, number: int) -> list[Path]:
-        """Such folders that are there, of a trial."""
-        return sorted((self._folder / "executions").glob(f"trial-{number:03d}-*"))
+    def execution_folders(self, plan: str) -> list[Path]:
+        """Such folders that are there: a plan's name says which trial and which plan."""
+        return sorted((self._folder / "executions").glob(f"{Path(plan).stem}-*"))
 
     def execution_folder(self, name: str) -> Path:
         """Where such a folder lies."""

@@ -374,8 +374,10 @@ class Workspace:
         from prior_reinforce.bench.robots.executors.supervision import Interruptions
 
         check_command(command, time_limit=time_limit)
+        self._read_manifest()
+        arm = self.manifest.arm
         with (
-            executing_lock(self.folder, self.manifest.arm) as lock,
+            executing_lock(self.folder, arm) as lock,
             Interruptions() as interruptions,
         ):
             self._note_unknown_execution(self.state.trial(number))
@@ -383,7 +385,11 @@ class Workspace:
             verdict = self.gate(self.plan(trial).actions)
             if verdict is not None:
                 verdict.require()
-            folder = self.store.make_execution_folder(number)
+            if self.manifest.arm != arm:  # the gate has read it again
+                raise ConfigurationError(
+                    f"{self.folder / MANIFEST_FILE} names another arm since; ask again"
+                )
+            folder = self.store.make_execution_folder(_kept(trial).file)
             self._begin_execution(number, without_arguments(command), folder.name)
             try:
                 result, raised = execute_command(
@@ -463,10 +469,10 @@ class Workspace:
         from prior_reinforce.bench.robots.executors.command import was_executed
 
         if trial.stage is Stage.ASKED:
-            folders = self.store.execution_folders(trial.number)
+            folders = self.store.execution_folders(_kept(trial).file)
             known = {e.event.folder for e in self.log.entries() if isinstance(e.event, Executing)}
             for folder in folders:
-                if folder.name not in known and was_executed(folder, self._plan_file(trial)):
+                if folder.name not in known and was_executed(folder):
                     self._begin_execution(trial.number, "", folder.name)
                     return
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 import json
 import tempfile
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -31,7 +32,7 @@ from prior_reinforce.bench.robots.executors.supervision import (
 )
 from prior_reinforce.bench.robots.plan_files import PlanFile
 from prior_reinforce.errors import ConfigurationError, FileFormatError
-from prior_reinforce.files import sha256, write_once
+from prior_reinforce.files import write_once
 from prior_reinforce.wording import plain
 
 
@@ -152,6 +153,9 @@ def execute_command(
         lock=lock,
         show=show,
     )
+    with suppress(OSError):  # a driver may delete its folder; that it ran must stay to be found
+        folder.mkdir(exist_ok=True)
+        (folder / OUTPUT_FILE).touch()
     if ended is not None and not ended["started"]:
         raise ConfigurationError(
             f"cannot start {arguments[0]!r} ({ended['error']}); give the path of a program that "
@@ -171,14 +175,13 @@ def read_ended(folder: Path, command: str, plan: PlanFile) -> CommandResult | No
     return None
 
 
-def was_executed(folder: Path, plan: PlanFile) -> bool:
-    """Whether a folder's command was given this plan, and may have moved the arm."""
-    copy = _copy_in(folder, plan.path.suffix)
+def was_executed(folder: Path) -> bool:
+    """Whether a folder's command may have moved the arm."""
     try:
-        begun = (folder / OUTPUT_FILE).exists() and sha256(copy.read_bytes()) == plan.sha256
+        begun = (folder / OUTPUT_FILE).exists()
         return begun and not (folder / ENDED_FILE).read_bytes().startswith(b'{"started": false')
     except OSError:
-        return False
+        return begun
 
 
 def _copy_in(folder: Path, suffix: str) -> Path:

@@ -79,7 +79,7 @@ def supervise(
     descriptors, names = ((), ()) if lock is None else (lock.descriptors, lock.names)
     run, raised, supervisor, asked = f"run-{uuid.uuid4().hex}", None, None, False
     with (
-        _named_refusal(),
+        _named_refusal(lambda: supervisor is None),
         (folder / OUTPUT_FILE).open("wb+", buffering=0) as output,
         (folder / ENDED_FILE).open("wb+", buffering=0) as ended,
     ):
@@ -124,11 +124,13 @@ def supervise(
 
 
 @contextmanager
-def _named_refusal() -> Iterator[None]:
+def _named_refusal(nothing_ran: Callable[[], bool]) -> Iterator[None]:
     """Turn what the system refuses before anything is started into one line."""
     try:
         yield
     except OSError as error:
+        if not nothing_ran():  # a disk that fails later says nothing of the arm
+            raise
         raise ConfigurationError(
             f"nothing can be started ({error.strerror}); close other programs, or make room"
         ) from error
