@@ -15,6 +15,11 @@ from prior_reinforce.session.session import Session
 from prior_reinforce.session.trials import Stage
 from tests.bench.workspace.planar import events_in, trials_in
 
+NARROW = (
+    'model = "given"\njoint_names = ["joint1", "joint2"]\nlower = [-3, -3]\nupper = [3, 3]\n'
+    "velocity = [0.1, 0.1]\nacceleration = [1000, 1000]\njerk = [1000000, 1000000]"
+)
+
 
 @pytest.mark.parametrize(
     ("flags", "remedy"),
@@ -318,14 +323,10 @@ def test_a_plan_that_is_refused_while_it_is_shown_leaves_nothing(
     """The limits are narrowed between opening the workspace and the trial."""
     run("goal", folder, "0.9", "0.05")
     path = tmp_path / folder / "workspace.toml"
-    narrow = (
-        'model = "given"\njoint_names = ["joint1", "joint2"]\nlower = [-3, -3]\nupper = [3, 3]\n'
-        "velocity = [0.1, 0.1]\nacceleration = [1000, 1000]\njerk = [1000000, 1000000]"
-    )
     ask = Session.ask
 
     def narrowed(session, **how):
-        path.write_text(path.read_text().replace('model = "none"', narrow, 1))
+        path.write_text(path.read_text().replace('model = "none"', NARROW, 1))
         return ask(session, **how)
 
     monkeypatch.setattr(Session, "ask", narrowed)
@@ -334,6 +335,26 @@ def test_a_plan_that_is_refused_while_it_is_shown_leaves_nothing(
     assert "velocity" in err
     assert "written" not in out
     assert not (tmp_path / "plan.npz").exists()
+
+
+def test_limits_that_change_after_the_verdict_give_out_no_refused_plan(
+    run, folder, tmp_path, monkeypatch
+):
+    """What is written is what the report above it speaks of."""
+    run("goal", folder, "0.9", "0.05")
+    path = tmp_path / folder / "workspace.toml"
+    ask = Session.ask
+
+    def narrowed(session, **how):
+        trial = ask(session, **how)
+        path.write_text(path.read_text().replace('model = "none"', NARROW, 1))
+        return trial
+
+    monkeypatch.setattr(Session, "ask", narrowed)
+    _, out, _ = run("ask", folder, "--out", "plan.npz")
+    assert "no limits checked" in out
+    assert "refused" not in out
+    assert (tmp_path / "plan.npz").exists()
 
 
 def test_a_restored_journal_asks_whether_that_was_this_trial(run, folder, driver, tmp_path):

@@ -129,6 +129,9 @@ def test_an_fr3_near_its_stop_is_slower():
     assert (found.status, found.joint) == ("refuse", "joint1")
     assert found.value > found.limit
     assert found.limit < 1.911
+    # Between two instants the arm comes nearer to its stop: the later bound counts.
+    here = limits.velocity_bounds(join_frames(plan, DT)(np.array([found.time])))[1][0, 0]
+    assert 0.9 * here < found.limit < here - 1e-6
     centre = plan.copy()
     centre[:, 0] -= 2.0
     assert lines(check_plan(Plan(centre, FORMAT), limits))["velocity"].status == "pass"
@@ -196,6 +199,14 @@ def test_acceleration_is_exact_between_two_cycles():
     found = lines(check_plan(Plan(plan, form), PANDA))["acceleration"]
     exact = np.abs(join_frames(plan, 0.0015)(np.arange(41) * 0.0015, 2)).max()
     assert found.value == pytest.approx(exact, rel=1e-12)
+
+
+def test_jerk_of_the_step_out_of_the_hold_counts_in_full():
+    """The acceleration jumps with the first frame, and falls within the same millisecond."""
+    plan = np.tile(HOME, (41, 1))
+    plan[1:, 3] += 1e-5
+    found = lines(check_plan(Plan(plan, FORMAT), PANDA))["jerk"]
+    assert found.value == pytest.approx(join_frames(plan, DT)(0.0, 2)[3] * 1000, rel=1e-6)
 
 
 def test_a_box_that_cannot_be_checked_refuses():

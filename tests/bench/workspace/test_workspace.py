@@ -533,7 +533,7 @@ def test_the_arm_is_the_one_that_the_manifest_names_by_now(workspace, monkeypatc
     assert trials(workspace)[0].stage is Stage.ASKED
 
 
-@pytest.mark.parametrize("deed", ["true", "rm -r $1", "rm -f $0", "chmod u+w $0; echo >> $0"])
+@pytest.mark.parametrize("deed", ["true", "rm -r $1", "rm -f $1/*", "chmod u+w $0; echo >> $0"])
 def test_a_restored_journal_finds_what_ran_whatever_a_driver_did_to_its_files(workspace, deed):
     number, journal = ask(workspace).number, workspace.folder / "journal.sqlite"
     workspace.close()

@@ -39,8 +39,11 @@ _LENGTH_OF_AXIS = 0.01
 """By how much an axis may differ from length 1: two written digits."""
 _LONGEST_NAME = 200
 _ENDLESS = 4 * math.pi
-"""What a joint without ends may turn either way, in [rad]. Ours: two turns, since a throw that
-needs more is a wrong unit."""
+"""What any joint may turn either way, in [rad]. Ours: two turns, since a throw that needs more is a
+wrong unit, and a range beyond it a lost decimal point."""
+_FASTEST, _FARTHEST = 30.0, 10.0
+"""What no joint does, in [rad/s], and how long no link is, in [m]. Ours: several times what is on
+the market; a lost decimal point is mostly more."""
 _TIPS = ("tool0", "flange", "link_eef")
 """Links that are the flange by ROS's conventions (REP 199) and UFACTORY's; the first there is."""
 
@@ -140,6 +143,8 @@ class _Joint:
         pose = np.eye(4)
         roll, pitch, yaw = self.vector("origin", "rpy")
         pose[:3, :3], pose[:3, 3] = rotation(roll, pitch, yaw), self.vector("origin", "xyz")
+        if np.abs(pose[:3, 3]).max() > _FARTHEST or max(map(abs, (roll, pitch, yaw))) > 7:
+            raise self.error(f"has an <origin> beyond {_FARTHEST:g} m or a turn; look for its dots")
         return pose
 
     def axis(self) -> tuple[float, float, float]:
@@ -155,8 +160,9 @@ class _Joint:
         if "mimic" in self.parts:
             raise self.error("follows another (<mimic>), and so is no joint of its own; say --tip")
         velocity = self.number("limit", "velocity")
-        if not velocity or velocity <= 0:
-            raise self.error("has no velocity limit; write the maker's into its <limit>")
+        if not velocity or not 0 < velocity <= _FASTEST:
+            says = "no velocity limit" if not velocity else f"a velocity limit of {velocity:g}"
+            raise self.error(f"has {says}; write the maker's, in [rad/s], into its <limit>")
         low, high = self.number("limit", "lower"), self.number("limit", "upper")
         if self.type == "continuous":
             low, high = -_ENDLESS, _ENDLESS
@@ -164,8 +170,10 @@ class _Joint:
         if low is not None and high is not None:
             low = low if soft[0] is None else max(low, soft[0])
             high = high if soft[1] is None else min(high, soft[1])
-        if low is None or high is None or not low < high:
-            raise self.error("has no range; write lower and upper into its <limit>")
+        if low is None or high is None or not -_ENDLESS <= low < high <= _ENDLESS:
+            raise self.error(
+                f"has no range within {_ENDLESS:.4g} rad; write lower and upper into its <limit>"
+            )
         return low, high, velocity
 
 

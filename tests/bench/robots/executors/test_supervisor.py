@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from prior_reinforce.bench.robots.executors import supervisor
 from prior_reinforce.bench.robots.executors.command import run_command
 from prior_reinforce.bench.robots.executors.lock import executing_lock, is_executing
 from prior_reinforce.bench.robots.plan_files import write_plan
@@ -309,6 +310,21 @@ def test_endless_output_fills_no_disk(tmp_path, plan_file):
     result = run_command(f"sh -c '{text}; {size}' {{result}} {{plan}}", plan_file, time_limit=60)
     assert result.output_tail.endswith("end\n")
     assert int((tmp_path / "size").read_text()) < 17_000_000
+
+
+def test_a_full_disk_lets_nobody_say_how_it_ended_and_raises_nothing(tmp_path):
+    with (tmp_path / "output").open("wb") as output, Path("/dev/full").open("wb") as full:
+        request = {
+            "arguments": ["true"], "output": output.fileno(), "ended": full.fileno(),
+            "keep_open": [], "time_limit": 30.0, "grace": 1.0,
+        }  # fmt: skip
+        done = subprocess.run(
+            [sys.executable, "-I", "-S", supervisor.__file__, json.dumps(request)],
+            pass_fds=[output.fileno(), full.fileno()],
+            capture_output=True,
+            text=True,
+        )
+    assert (done.returncode, done.stderr) == (0, "")
 
 
 def test_a_command_that_fails_before_anybody_looks_has_failed(tmp_path):

@@ -153,9 +153,10 @@ def execute_command(
         lock=lock,
         show=show,
     )
-    with suppress(OSError):  # a driver may delete its folder; that it ran must stay to be found
+    with suppress(OSError):  # a driver may delete its files; that it ran must stay to be found
         folder.mkdir(exist_ok=True)
-        (folder / OUTPUT_FILE).touch()
+        if not folder.is_symlink():
+            (folder / OUTPUT_FILE).touch()
     if ended is not None and not ended["started"]:
         raise ConfigurationError(
             f"cannot start {arguments[0]!r} ({ended['error']}); give the path of a program that "
@@ -194,7 +195,7 @@ def _result(
 ) -> CommandResult:
     """What became of a motion, from how its command ended and what the driver says."""
     if ended is None:
-        why = "what watched over the command was killed"
+        why = "what watched over the command was killed, or found no room on the disk"
         return CommandResult(arguments, 0, False, 0.0, "", outcome="unknown", reason=why)
     status = int(ended["exit_status"])
     try:

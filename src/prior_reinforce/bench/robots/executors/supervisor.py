@@ -89,8 +89,9 @@ def _run(request: dict[str, Any], output: _Output, slave: int) -> None:
         report = _see_out(output, request, process.pid, stop_asked)
     except (OSError, ValueError, subprocess.SubprocessError) as error:
         report = {"started": False, "error": str(error)}
-    os.write(request["ended"], json.dumps(report).encode())
-    os.fsync(request["ended"])
+    with contextlib.suppress(OSError):  # on a full disk, a person has to say how it ended
+        os.write(request["ended"], json.dumps(report).encode())
+        os.fsync(request["ended"])
 
 
 def _adopt_and_hear(hear: Callable[[int, Any], object]) -> ctypes.CDLL:
