@@ -7,7 +7,7 @@ import pytest
 
 from prior_reinforce.errors import ConfigurationError, NotFittedError
 from prior_reinforce.generators import make_generator
-from prior_reinforce.generators.config import DiffusionConfig, UNetSize
+from prior_reinforce.generators.config import DiffusionConfig, PerceptronSize, UNetSize
 from prior_reinforce.generators.corrected import Corrected
 from prior_reinforce.generators.diffusion import DiffusionGenerator
 from prior_reinforce.generators.timed import Timed
@@ -128,6 +128,27 @@ def test_fresh_noise_is_another_plan_of_the_same_network(throws):
     assert np.array_equal(network.sampled(seed=0).generate(demos.outcomes_seen), before)
     with pytest.raises(NotFittedError):
         DiffusionGenerator(FEW).sampled(seed=1)
+
+
+def test_in_the_demonstrations_span_plans_are_mixtures_and_nearest_at_their_own_outcomes(throws):
+    demos = throws(4)
+    config = DiffusionConfig.preset("span")
+    config = replace(config, perceptron=PerceptronSize(width=64), training_steps=300)
+    own = {
+        steps: DiffusionGenerator(replace(config, training_steps=steps)).fit(demos, seed=0)
+        for steps in (0, 300)
+    }
+    span = np.ptp(demos.plans, axis=(0, 1))
+    errors = {
+        steps: np.abs((network.generate(demos.outcomes_seen) - demos.plans) / span).max()
+        for steps, network in own.items()
+    }
+    assert errors[300] < 0.05
+    assert errors[0] > 0.3
+    flat = demos.plans.reshape(4, -1)
+    plan = own[300].generate([[0.95, 0.1]]).reshape(-1)
+    weights = np.linalg.lstsq((flat[1:] - flat[0]).T, plan - flat[0], rcond=None)[0]
+    np.testing.assert_allclose(flat[0] + weights @ (flat[1:] - flat[0]), plan, atol=2e-3)
 
 
 def test_presets_and_representation_are_one_word_each():

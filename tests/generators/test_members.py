@@ -10,6 +10,7 @@ from prior_reinforce.errors import ConfigurationError, FileFormatError
 from prior_reinforce.generators import GENERATORS, load_generator, make_generator
 from prior_reinforce.generators.auto import Auto
 from prior_reinforce.generators.config import DiffusionConfig
+from prior_reinforce.generators.diffusion import DiffusionGenerator
 from prior_reinforce.generators.interpolation import NearestNeighbours
 from prior_reinforce.generators.timed import Timed
 from prior_reinforce.generators.wrapping import Wrapper
@@ -27,7 +28,9 @@ OWN = f"{__name__}:Own"
 @pytest.mark.parametrize("name", GENERATORS.members)
 def test_a_name_is_that_of_its_class(name):
     kind = GENERATORS.kind(name)
-    assert kind.name == {"diffusion-paper": "diffusion"}.get(name, name)
+    assert kind.name == {"diffusion-paper": "diffusion", "diffusion-span": "diffusion"}.get(
+        name, name
+    )
 
 
 @pytest.mark.parametrize(
@@ -36,6 +39,7 @@ def test_a_name_is_that_of_its_class(name):
         ("diffusion", "auto"),
         ("regression", "auto"),
         ("auto", None),
+        ("diffusion-span", "auto"),
         ("diffusion-paper", None),
         ("dmp", None),
         ("nearest", None),
@@ -61,6 +65,9 @@ def test_settings_of_a_choice():
     config = make_generator("diffusion,training_steps=7,sampler=ddim,timing=none,exact=no").config
     assert config == DiffusionConfig(training_steps=7, sampler="ddim")
     assert make_generator("dmp,segmented=false,exact=no").config.segmented is False
+    alone = make_generator("diffusion-span")
+    assert isinstance(alone.generator, DiffusionGenerator)  # with no correction between
+    assert (alone.generator.config.coordinates, alone.generator.config.trend) == ("span", "zero")
     assert make_generator("diffusion-paper").config == DiffusionConfig.preset("paper")
     assert make_generator("regression", threads=2, device="cpu").generator.generator._threads == 2
 
@@ -68,7 +75,7 @@ def test_settings_of_a_choice():
 @pytest.mark.parametrize(
     ("choice", "named"),
     [
-        ("difusion", "known are auto, diffusion, diffusion-paper"),
+        ("difusion", "known are auto, diffusion, diffusion-span"),
         ("nearest,timing=late", "late"),
         ("nearest,exact=perhaps", "exact must be yes or no"),
         ("nearest,speed=3", "speed"),

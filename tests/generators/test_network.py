@@ -9,17 +9,27 @@ import torch
 
 from prior_reinforce.errors import ConfigurationError, FileFormatError
 from prior_reinforce.generators import load_generator, training
-from prior_reinforce.generators.config import DiffusionConfig, UNetRegressionConfig, UNetSize
+from prior_reinforce.generators.config import (
+    DiffusionConfig,
+    PerceptronSize,
+    UNetRegressionConfig,
+    UNetSize,
+)
 from prior_reinforce.generators.diffusion import DiffusionGenerator
+from prior_reinforce.generators.perceptron import ConditionalPerceptron
 from prior_reinforce.generators.regression import UNetRegression
 from prior_reinforce.generators.unet import ConditionalUNet
 
 TINY = UNetSize(widths=(8, 16), groups=2, step_width=8, condition_width=16)
+THIN = PerceptronSize(width=16, depth=1, step_width=8)
 MEMBERS = [
     lambda **how: DiffusionGenerator(DiffusionConfig(network=TINY, training_steps=2), **how),
+    lambda **how: DiffusionGenerator(
+        DiffusionConfig(coordinates="span", trend="zero", perceptron=THIN, training_steps=2), **how
+    ),
     lambda **how: UNetRegression(UNetRegressionConfig(network=TINY, training_steps=2), **how),
 ]
-each = pytest.mark.parametrize("make", MEMBERS, ids=["diffusion", "regression"])
+each = pytest.mark.parametrize("make", MEMBERS, ids=["diffusion", "span", "regression"])
 
 
 @each
@@ -27,13 +37,13 @@ def test_training_and_generating_use_one_thread_whatever_torch_was_set_to(
     make, throws, monkeypatch
 ):
     used = set()
-    forward = ConditionalUNet.forward
+    for kind in (ConditionalUNet, ConditionalPerceptron):
 
-    def listen(self, *inputs):
-        used.add(torch.get_num_threads())
-        return forward(self, *inputs)
+        def listen(self, *inputs, forward=kind.forward):
+            used.add(torch.get_num_threads())
+            return forward(self, *inputs)
 
-    monkeypatch.setattr(ConditionalUNet, "forward", listen)
+        monkeypatch.setattr(kind, "forward", listen)
     before = torch.get_num_threads()
     torch.set_num_threads(2)
     try:
@@ -68,9 +78,11 @@ def test_weights_of_another_network_are_a_damaged_model(make, throws):
     (layer,) = make().fit(throws(2, 20), seed=0).pack()
     settings = copy.deepcopy(layer.settings)
     settings["config"]["network"]["widths"] = (8, 32)
+    if "perceptron" in settings["config"]:
+        settings["config"]["perceptron"]["width"] = 32
     with pytest.raises(FileFormatError, match="learn it again"):
         make().unpack_layer(replace(layer, settings=settings))
-    fewer = {k: v for k, v in layer.tensors.items() if not k.endswith("head.1.bias")}
+    fewer = {k: v for k, v in layer.tensors.items() if not k.endswith(("head.1.bias", "last.bias"))}
     with pytest.raises(FileFormatError, match="learn it again"):
         make().unpack_layer(replace(layer, tensors=fewer))
 

@@ -14,7 +14,7 @@ from prior_reinforce.registry import build
 from prior_reinforce.settings import Checked, Count, NonNegative, Positive
 
 Activation = Literal["mish", "silu"]
-Preset = Literal["laptop", "paper"]
+Preset = Literal["laptop", "span", "paper"]
 Prediction = Literal["epsilon", "v", "sample"]
 """What the network predicts from x_t: the noise, the velocity of Salimans and Ho (2022,
 "Progressive Distillation for Fast Sampling of Diffusion Models"), or the clean sample."""
@@ -58,6 +58,18 @@ class UNetSize(Checked):
         return int(2 ** (len(self.widths) - 1))
 
 
+@dataclass(frozen=True)
+class PerceptronSize(Checked):
+    """Everything that sets the size of a `ConditionalPerceptron`."""
+
+    width: Count = 256
+    """Of every layer."""
+    depth: Count = 3
+    """Residual layers."""
+    step_width: Annotated[int, msgspec.Meta(ge=4, multiple_of=2)] = 64
+    """Size of the embedding of the noise level; even, at least 4."""
+
+
 def _laptop() -> UNetSize:
     return UNetSize(widths=(64, 128, 128), step_width=64, condition_width=64, activation="silu")
 
@@ -86,6 +98,13 @@ class UNetConfig(Checked):
     """Of AdamW."""
 
 
+SPAN: dict[str, Any] = {
+    "coordinates": "span",
+    "trend": "zero",
+    "training_steps": 1500,
+    "batch_size": 48,
+}
+"""A network on its own feet, `diffusion-span`: with no trend, and a correction only if chosen."""
 PAPER: dict[str, Any] = {
     "representation": "frames",
     "margin": 0.0,
@@ -118,6 +137,11 @@ class DiffusionConfig(UNetConfig):
     docs/decisions-generator.md tells what was tried for each, with figures.
     """
 
+    coordinates: Literal["span", "time"] = "time"
+    """What is denoised: coordinates of plans in the space that the demonstrations span (`span`), by
+    a perceptron; or their codes over time, by the U-Net, as in the paper."""
+    perceptron: PerceptronSize = field(default_factory=PerceptronSize)
+    """Size of the perceptron."""
     prediction: Prediction = "v"
     """What the network predicts."""
     noise_levels: Count = 100
@@ -159,14 +183,15 @@ class DiffusionConfig(UNetConfig):
 
     @classmethod
     def preset(cls, name: Preset) -> Self:
-        """Return the settings of that name: `laptop`, the default, or `paper`, see `PAPER`.
+        """Return the settings of that name: `laptop`, the default, `span` or `paper`.
 
         Raises:
             ConfigurationError: There is no such preset.
         """
-        if name not in ("laptop", "paper"):
-            raise ConfigurationError(f"no preset {name!r}; use 'laptop' or 'paper'")
-        made: Self = build(cls, PAPER if name == "paper" else {})
+        presets: dict[str, dict[str, Any]] = {"laptop": {}, "span": SPAN, "paper": PAPER}
+        if name not in presets:
+            raise ConfigurationError(f"no preset {name!r}; use one of {', '.join(presets)}")
+        made: Self = build(cls, presets[name])
         return made
 
 

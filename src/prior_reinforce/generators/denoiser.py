@@ -31,6 +31,11 @@ from prior_reinforce.generators.training import Network, optimise
 # Diffusion Policy's optimiser (real-stanford/diffusion_policy, commit 5ba07ac).
 _BETAS = (0.95, 0.999)
 
+_SLACK = 0.5
+"""How far coordinates in the demonstrations' span may leave their range, as a fraction of half of
+it; plans keep to the margin besides. Ours: at the ends of the region a straight line leaves it by a
+third."""
+
 Denoise = Callable[[torch.Tensor, torch.Tensor, torch.Tensor], torch.Tensor]
 """A trained network: noisy codes (B, C, T), levels (B,) and conditions (B, k) to a prediction."""
 
@@ -175,7 +180,7 @@ class _Denoiser:
         conditions = self.conditions.repeat_interleave(len(noisy) // len(self.conditions), dim=0)
         levels = torch.full((len(noisy),), level, device=noisy.device)
         predicted = self.network(noisy, levels, conditions)
-        bound = 1 + self.config.margin
+        bound = 1 + (_SLACK if self.config.coordinates == "span" else self.config.margin)
         estimate = self.schedule.clean_estimate(noisy, predicted, level, self.config.prediction)
         return estimate.clamp(-bound, bound)
 

@@ -31,8 +31,6 @@ from prior_reinforce.plans.codec import Representation
 if TYPE_CHECKING:
     from torch import Tensor, nn
 
-    from prior_reinforce.generators.unet import ConditionalUNet
-
 
 class DiffusionGenerator(NetworkGenerator):
     """Conditional diffusion over whole plans (paper, Stage 1)."""
@@ -102,9 +100,16 @@ class DiffusionGenerator(NetworkGenerator):
             other._learned = replace(self._learned, seed=seed)
         return other
 
-    def _build(self, channels: int, length: int, outcome_dim: int) -> ConditionalUNet:
+    @property
+    def _in_span(self) -> bool:
+        return self.config.coordinates == "span"
+
+    def _build(self, channels: int, length: int, outcome_dim: int) -> nn.Module:
+        from prior_reinforce.generators.perceptron import ConditionalPerceptron
         from prior_reinforce.generators.unet import ConditionalUNet
 
+        if self._in_span:
+            return ConditionalPerceptron(channels, outcome_dim, self.config.perceptron)
         return ConditionalUNet(channels, outcome_dim, self.config.network)
 
     def _train(
@@ -124,4 +129,6 @@ class DiffusionGenerator(NetworkGenerator):
         from prior_reinforce.generators.denoiser import sample
 
         shape = learned.codec.channels, learned.codec.length
+        if learned.span is not None:
+            shape = len(learned.span.directions), 1
         return sample(learned.network, conditions, shape, self.config, seed=learned.seed)

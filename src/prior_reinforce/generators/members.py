@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 from prior_reinforce.errors import ConfigurationError, FileFormatError
-from prior_reinforce.generators.config import PAPER
+from prior_reinforce.generators.config import PAPER, SPAN
 from prior_reinforce.generators.saving import SavedLayer, read_model
 from prior_reinforce.registry import Member, Registry, parse_choice
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 _HERE = "prior_reinforce.generators"
 _BASE = f"{_HERE}.base:Generator"
-_TIMED_BY_DEFAULT = ("diffusion", "regression", "interpolation")
+_TIMED_BY_DEFAULT = ("diffusion", "diffusion-span", "regression", "interpolation")
 _EXACT_BY_DEFAULT = ("diffusion", "regression", "dmp")
 
 
@@ -95,6 +95,11 @@ GENERATORS = GeneratorRegistry(
         ),
         "diffusion": Member(
             f"{_HERE}.diffusion:DiffusionGenerator", "the paper's method, sized for a laptop"
+        ),
+        "diffusion-span": Member(
+            f"{_HERE}.diffusion:DiffusionGenerator",
+            "mixtures of demonstrations, by a network alone",
+            SPAN,
         ),
         "diffusion-paper": Member(
             f"{_HERE}.diffusion:DiffusionGenerator", "with the paper's settings", PAPER

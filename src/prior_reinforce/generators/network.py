@@ -24,6 +24,7 @@ from prior_reinforce.files import sha256
 from prior_reinforce.generators.base import ConditionScale, Generator, Report
 from prior_reinforce.generators.config import UNetConfig
 from prior_reinforce.generators.saving import Tensors
+from prior_reinforce.generators.span import Span
 from prior_reinforce.generators.trend import AffineTrend
 from prior_reinforce.plans.codec import PlanCodec
 from prior_reinforce.plans.motions import Demonstrations
@@ -44,6 +45,8 @@ class Learned:
     codec: PlanCodec
     scale: ConditionScale
     trend: AffineTrend
+    span: Span | None
+    """The space in which what the trend leaves has coordinates; None: the network makes codes."""
     network: nn.Module
     """In evaluation mode, on the device to compute on."""
     seed: int
@@ -87,6 +90,11 @@ class NetworkGenerator(Generator):
         self._threads, self._states = threads, states
         self._learned: Learned | None = None
 
+    @property
+    def _in_span(self) -> bool:
+        """Whether the network makes coordinates in the demonstrations' span (`Span`)."""
+        return False
+
     @abstractmethod
     def _build(self, channels: int, length: int, outcome_dim: int) -> nn.Module:
         """Make the network, of any weights, for codes (C, T) of conditions (k,)."""
@@ -129,6 +137,10 @@ class NetworkGenerator(Generator):
         else:
             trend = AffineTrend.zero(outcomes.shape[1], codec.channels, codec.length)
         residuals = trend.remove(scaled, codes)
+        span = Span.fit(residuals) if self._in_span else None
+        if span is not None:
+            residuals = span.encode(residuals)
+            shape = residuals.shape[1], 1, shape[2]
         state = None
         if self._states is not None:
             told = json.dumps([self.name, asdict(self.config), seed]).encode()
@@ -146,7 +158,7 @@ class NetworkGenerator(Generator):
             )
         if state is not None:
             state.unlink(missing_ok=True)
-        self._learned = Learned(codec, scale, trend, network, seed)
+        self._learned = Learned(codec, scale, trend, span, network, seed)
 
     def _generate(self, conditions: Points) -> Plans:
         from prior_reinforce.generators.threads import torch, torch_threads
@@ -160,6 +172,8 @@ class NetworkGenerator(Generator):
             for first in range(0, len(scaled), _CHUNK):
                 chunk = scaled[first : first + _CHUNK]
                 residuals = self._codes(learned, self._tensor(chunk)).double().cpu().numpy()
+                if learned.span is not None:
+                    residuals = learned.span.decode(residuals)
                 plans.append(codec.decode(learned.trend.restore(chunk, residuals)))
         return np.concatenate(plans)
 
@@ -181,6 +195,7 @@ class NetworkGenerator(Generator):
                 "condition_range": learned.scale.range,
                 "trend": learned.trend.coefficients,
                 "trend_scale": learned.trend.scale,
+                **({} if learned.span is None else vars(learned.span)),
             },
         )
 
@@ -195,6 +210,10 @@ class NetworkGenerator(Generator):
         scale = ConditionScale(tensors["condition_range"])
         trend = AffineTrend(tensors["trend"], tensors["trend_scale"])
         shape = codec.channels, codec.length, scale.range.shape[1]
+        span = None
+        if generator._in_span:
+            span = Span(tensors["origin"], tensors["directions"])
+            shape = len(span.directions), 1, shape[2]
         network = build_network(lambda: generator._build(*shape), seed=0)
         weights = {
             name.removeprefix(_PREFIX): torch.from_numpy(value)
@@ -203,7 +222,7 @@ class NetworkGenerator(Generator):
         }
         network.load_state_dict(weights)  # refuses missing, unknown and misshapen tensors
         network.eval().requires_grad_(False)
-        generator._learned = Learned(codec, scale, trend, network, int(settings["seed"]))
+        generator._learned = Learned(codec, scale, trend, span, network, int(settings["seed"]))
         return generator
 
     def to(self, device: str) -> Self:

@@ -28,7 +28,7 @@ class ConditionalUNet(nn.Module):
             size: Widths and so on.
         """
         super().__init__()
-        self.step_embedding = _StepEmbedding(size)
+        self.step_embedding = StepEmbedding(size.step_width, type(_activation(size)))
         self.condition_embedding = nn.Sequential(
             nn.Linear(condition_dim, size.condition_width),
             _activation(size),
@@ -101,21 +101,21 @@ class RegressionNetwork(nn.Module):
         return codes
 
 
-class _StepEmbedding(nn.Module):
+class StepEmbedding(nn.Module):
     """Sines and cosines of the noise level, then a two-layer MLP."""
 
-    def __init__(self, size: UNetSize) -> None:
+    def __init__(self, width: int, activation: type[nn.Module]) -> None:
         super().__init__()
-        width = size.step_width
         # Frequencies fall geometrically from 1 to 1/10000 (Vaswani et al. 2017, section 3.5).
         exponents = torch.arange(width // 2) / (width // 2 - 1)
         self.register_buffer("frequencies", torch.exp(-math.log(1e4) * exponents), persistent=False)
         self.frequencies: torch.Tensor
         self.mlp = nn.Sequential(
-            nn.Linear(width, 4 * width), _activation(size), nn.Linear(4 * width, width)
+            nn.Linear(width, 4 * width), activation(), nn.Linear(4 * width, width)
         )
 
     def forward(self, steps: torch.Tensor) -> torch.Tensor:
+        """Embed noise levels, shape (B,), as (B, width)."""
         angles = steps[:, None] * self.frequencies
         embedded: torch.Tensor = self.mlp(torch.cat([angles.sin(), angles.cos()], dim=-1))
         return embedded

@@ -15,6 +15,10 @@ TINY: Mapping[str, Mapping[str, Any]] = {
     "diffusion": {
         "network": _NETWORK, "training_steps": 8, "warmup_steps": 2, "sampling_steps": 3,
     },
+    "diffusion-span": {
+        "perceptron": {"width": 16, "depth": 1, "step_width": 8}, "training_steps": 8,
+        "warmup_steps": 2, "sampling_steps": 3,
+    },
     "diffusion-paper": {
         "network": _NETWORK, "training_steps": 8, "warmup_steps": 2, "noise_levels": 6,
         "sampling_steps": 6,
