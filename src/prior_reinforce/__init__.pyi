@@ -41,6 +41,7 @@ from .generators.auto import Auto as Auto
 from .generators.base import FitProgress as FitProgress
 from .generators.base import Generator as Generator
 from .generators.config import DiffusionConfig as DiffusionConfig
+from .generators.config import PerceptronSize as PerceptronSize
 from .generators.config import UNetRegressionConfig as UNetRegressionConfig
 from .generators.config import UNetSize as UNetSize
 from .generators.corrected import Corrected as Corrected
