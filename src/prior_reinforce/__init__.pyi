@@ -74,7 +74,6 @@ from .perception.eye import Eye as Eye
 from .perception.vlm import VisionLanguageModel as VisionLanguageModel
 from .perception.vlm_client import VisionLanguageModelConfig as VisionLanguageModelConfig
 from .plans.alignment import Alignment as Alignment
-from .plans.alignment import AlignmentConfig as AlignmentConfig
 from .plans.alignment import align as align
 from .plans.motions import Demonstrations as Demonstrations
 from .plans.motions import Plan as Plan

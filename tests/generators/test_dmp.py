@@ -7,6 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from prior_reinforce.errors import ConfigurationError, MissingExtraError
+from prior_reinforce.generators import dmp
 from prior_reinforce.generators.dmp import (
     DynamicMovementPrimitives,
     DynamicMovementPrimitivesConfig,
@@ -122,3 +123,18 @@ def test_without_the_library_the_extra_to_install_is_named(monkeypatch: pytest.M
 def test_senseless_settings_are_refused(setting: str, value: float):
     with pytest.raises(ConfigurationError, match=setting):
         DynamicMovementPrimitivesConfig(**{setting: value})
+
+
+def test_weights_are_fitted_once_and_not_for_every_plan(monkeypatch: pytest.MonkeyPatch):
+    demos = family(np.linspace(0.1, 0.4, 6), np.full(6, 0.9), np.linspace(0.8, 1.1, 6))
+    fitted, smooth_weights = [], dmp.smooth_weights
+
+    def counted(*arguments, **settings):
+        fitted.append(1)
+        return smooth_weights(*arguments, **settings)
+
+    monkeypatch.setattr(dmp, "smooth_weights", counted)
+    made = DynamicMovementPrimitives().fit(demos, seed=0)
+    made.generate(demos.outcomes_seen)
+    made.generate(demos.outcomes_seen)
+    assert len(fitted) == 1

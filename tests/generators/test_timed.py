@@ -38,10 +38,8 @@ class Recall(NearestNeighbours):
     def _fit(self, demonstrations, seed, progress):
         super()._fit(demonstrations, seed, progress)
         self.learned = demonstrations
-        plan_format = demonstrations.format
         self.codec = PlanCodec.fit(
-            demonstrations.plans,
-            per_plan=[name in plan_format.per_plan for name in plan_format.names],
+            demonstrations,
             representation="splines",
             frames_per_point=4,
             length_multiple=4,

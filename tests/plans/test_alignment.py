@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from prior_reinforce.errors import ConfigurationError
-from prior_reinforce.plans.alignment import AlignmentConfig, align
+from prior_reinforce.plans.alignment import align
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 
 DT = 0.02  # [s]
@@ -142,4 +142,4 @@ def test_a_demonstration_that_ends_in_mid_swing_goes_on():
 @pytest.mark.parametrize("smoothing", [-0.01, float("nan")])
 def test_a_senseless_smoothing_is_refused(smoothing: float):
     with pytest.raises(ConfigurationError, match="smoothing"):
-        AlignmentConfig(smoothing=smoothing)
+        align(misaligned(), smoothing=smoothing)

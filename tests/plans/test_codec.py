@@ -5,6 +5,7 @@ import pytest
 from scipy.interpolate import BSpline
 
 from prior_reinforce.plans.codec import PlanCodec
+from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 
 
 def swing(times, start, duration):
@@ -23,9 +24,12 @@ def throws(n, horizon=140):
     return np.stack([reach * paths - 1, 2 - 0.8 * reach * paths, side], axis=-1)
 
 
-def codec_of(plans, representation="splines", margin=0.05, multiple=4):
+def codec_of(plans, representation="splines", margin=0.05, multiple=4, per_plan=()):
+    names = tuple(f"d{d}" for d in range(plans.shape[2]))
+    plan_format = PlanFormat(names, ("1",) * len(names), 0.0125, per_plan)
+    outcomes = np.linspace(0.0, 1.0, len(plans))[:, None]
     return PlanCodec.fit(
-        plans,
+        Demonstrations(plans, outcomes, plan_format),
         representation=representation,
         frames_per_point=4,
         length_multiple=multiple,
@@ -134,9 +138,7 @@ def test_ripple_between_control_points_hardly_accelerates_the_plan():
     horizon, points = 93, 24
     t = np.linspace(0, 1, horizon)[None, :, None]
     swings = np.array([0.8, 1.0, 1.2])[:, None, None] * (t**3 * (10 - 15 * t + 6 * t**2))
-    codec = PlanCodec.fit(
-        swings, representation="splines", frames_per_point=4, length_multiple=4, margin=0.5
-    )
+    codec = codec_of(swings, margin=0.5)
     assert codec.length == points
     codes = codec.encode(swings)
     np.testing.assert_allclose(codec.decode(codes), swings, atol=1e-4)
@@ -154,14 +156,7 @@ def test_ripple_between_control_points_hardly_accelerates_the_plan():
 def test_one_number_a_plan_is_coded_by_its_value_and_decoded_by_the_mean(representation):
     plans = throws(3)
     plans[:, :, 1] = np.array([4.0, 31.0, 12.0])[:, None]
-    codec = PlanCodec.fit(
-        plans,
-        per_plan=(False, True, False),
-        representation=representation,
-        frames_per_point=4,
-        length_multiple=4,
-        margin=0.1,
-    )
+    codec = codec_of(plans, representation, margin=0.1, per_plan=("d1",))
     assert codec.kinds[1] == "number"
     codes = codec.encode(plans)
     channel = 1 if representation == "splines" else int(np.ceil(140 / codec.length))
@@ -171,3 +166,12 @@ def test_one_number_a_plan_is_coded_by_its_value_and_decoded_by_the_mean(represe
     np.testing.assert_allclose(codec.decode(codes)[:, :, 1], plans[:, :, 1])
     codes[:, channel] = 9.0
     np.testing.assert_allclose(codec.decode(codes)[:, :, 1], 31 + 0.1 * 27)  # the margin
+
+
+def test_an_angle_that_each_plan_holds_is_no_switch_however_few_plans_there_are():
+    plans = throws(3)
+    codec = codec_of(plans, "frames")
+    assert codec.levels == ((), (), ())
+    codes = codec.encode(plans)
+    halfway = codec.decode(0.5 * (codes[:1] + codes[1:2]))
+    np.testing.assert_allclose(halfway, 0.5 * (plans[:1] + plans[1:2]), atol=1e-12)

@@ -54,39 +54,42 @@ class Auto(Wrapper):
             threads: See `NetworkGenerator`.
             states: See `NetworkGenerator`.
         """
-        super().__init__(generator or Timed(SmoothInterpolation()))
+        if generator is not None:
+            super().__init__(generator)
         self._network: dict[str, Any] = {"device": device, "threads": threads, "states": states}
 
     def _fit(self, demonstrations: Demonstrations, seed: int, progress: Report) -> None:
         groups = patterns(demonstrations)
-        largest, rest = groups[0], [i + 1 for group in groups[1:] for i in group]
-        learned, remarks = demonstrations, []
-        alone = None
-        if len(largest) >= demonstrations.outcome_dim + 1 + _MORE_THAN_AFFINE:
+        largest, *others = groups
+        learned = demonstrations if not others else None
+        if others and len(largest) >= demonstrations.outcome_dim + 1 + _MORE_THAN_AFFINE:
             with suppress(InvalidDemonstrationsError):  # its outcomes may lie on a line
-                alone = demonstrations.only(largest)
-        if len(groups) == 1:
-            self.generator = Timed(SmoothInterpolation())
-            remarks.append("generator: closed form, since the demonstrations show one pattern")
-        elif alone is not None:
-            self.generator = Timed(SmoothInterpolation())
-            learned = alone
-            remarks.append(
-                f"generator: closed form, of {len(largest)} demonstrations of one pattern; "
-                f"demonstrations {_listed(rest)} move in another way, which does not mix with it, "
-                "and are left out: demonstrate those outcomes again, or learn all with diffusion"
+                learned = demonstrations.only(largest)
+        if learned is None:
+            self.generator = Timed(Corrected(DiffusionGenerator(**self._network)))
+            learned = demonstrations
+            remark = (
+                f"generator: diffusion, since the demonstrations show {len(groups)} patterns that "
+                f"do not mix: {'; '.join(map(_listed, groups))}"
             )
         else:
-            self.generator = Timed(Corrected(DiffusionGenerator(**self._network)))
-            remarks.append(
-                f"generator: diffusion, since the demonstrations show {len(groups)} patterns that "
-                "do not mix: " + "; ".join(_listed([i + 1 for i in group]) for group in groups)
-            )
+            self.generator = Timed(SmoothInterpolation())
+            remark = "generator: closed form, since the demonstrations show one pattern"
+            if others:
+                remark = (
+                    f"generator: closed form, of {len(largest)} demonstrations of one pattern; "
+                    f"demonstrations {_listed(sum(others, ()))} move in another way, which does "
+                    "not mix with it, and are left out: demonstrate those outcomes again, or "
+                    "learn all with diffusion"
+                )
         self.generator.fit(learned, seed=seed, progress=progress)
-        self.remarks = tuple(remarks)
+        self.remarks = (remark,)
 
     def _generate(self, conditions: Points) -> Plans:
         return self.generator.generate(conditions)
+
+    def check_savable(self) -> None:
+        """Do nothing: whatever is chosen can be saved; see `Generator.check_savable`."""
 
     def state(self) -> tuple[dict[str, Any], Tensors]:
         """Nothing of its own; see `Generator.state`."""
@@ -96,5 +99,6 @@ class Auto(Wrapper):
         """Nothing to take up; see `Wrapper.restore`."""
 
 
-def _listed(numbers: list[int]) -> str:
-    return ", ".join(map(str, numbers))
+def _listed(indices: tuple[int, ...]) -> str:
+    """Numbers of demonstrations, counted from 1."""
+    return ", ".join(str(i + 1) for i in indices)

@@ -96,13 +96,12 @@ class DynamicMovementPrimitives(Generator):
             ]
         )
         outcomes = demonstrations.outcomes_seen.copy()
-        self._primitives = _Primitives(response, parameters, spans, outcomes, horizon)
+        self._keep(_Primitives(response, parameters, spans, outcomes, horizon))
         at_once(progress, loss=float(np.mean((self._generate(outcomes) - plans) ** 2)))
 
     def _generate(self, conditions: Points) -> Plans:
         """Interpolate the primitives and roll each out."""
-        known = self._primitives
-        weights = smooth_weights(known.outcomes, kernel="thin-plate")(conditions)
+        known, weights = self._primitives, self._weights(conditions)
         parameters = np.tensordot(weights, known.parameters, axes=1)
         # Far outside the demonstrations an extrapolated motion could end before it begins.
         least = known.spans[:, 1] - known.spans[:, 0]
@@ -129,11 +128,14 @@ class DynamicMovementPrimitives(Generator):
         parameters, spans, outcomes = (tensors[n] for n in ("parameters", "spans", "outcomes"))
         if not len(parameters) == len(spans) == len(outcomes):
             raise ValueError("parameters, spans and outcomes do not fit")
-        response = _Response(parameters.shape[1] - 2)
-        generator._primitives = _Primitives(
-            response, parameters, spans, outcomes, int(settings["horizon"])
-        )
+        response, horizon = _Response(parameters.shape[1] - 2), int(settings["horizon"])
+        generator._keep(_Primitives(response, parameters, spans, outcomes, horizon))
         return generator
+
+    def _keep(self, primitives: _Primitives) -> None:
+        """Keep the primitives, and fit the weights to their outcomes once."""
+        self._primitives = primitives
+        self._weights = smooth_weights(primitives.outcomes, kernel="thin-plate")
 
 
 def _phases(horizon: int, span: Float[np.ndarray, 2]) -> _Phases:

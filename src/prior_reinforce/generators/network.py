@@ -119,11 +119,9 @@ class NetworkGenerator(Generator):
         from prior_reinforce.generators.threads import torch_threads
         from prior_reinforce.generators.training import build
 
-        plan_format, outcomes = demonstrations.format, demonstrations.outcomes_seen
+        outcomes = demonstrations.outcomes_seen
         codec = PlanCodec.fit(
-            demonstrations.plans,
-            units=plan_format.units,
-            per_plan=[name in plan_format.per_plan for name in plan_format.names],
+            demonstrations,
             representation=self.config.representation,
             frames_per_point=self.config.frames_per_point,
             length_multiple=self.config.network.length_multiple,

@@ -73,10 +73,10 @@ class TimingChoice:
 
 
 def choose_timing(demonstrations: Demonstrations) -> TimingChoice:
-    """Take the timing in which outcomes can best be told from the motion.
+    """Take the timing in which the motion best predicts left-out outcomes.
 
     Args:
-        demonstrations: N of them; with few, starts are learned apart, as a rule.
+        demonstrations: N of them; with few, starts are learned separately, as a rule.
     """
     n = demonstrations.n
     try:
@@ -96,9 +96,8 @@ def choose_timing(demonstrations: Demonstrations) -> TimingChoice:
     able = [kind for kind in errors if kind == "start" or errors[kind] < _MAX_USEFUL_ERROR]
     length = float(np.median(np.ptp(demonstrations.signals.spans, axis=1)))
     no_clock = float(np.std(usual.numbers[:, 0])) > _CLOCK_SPREAD * length
-    if (
-        no_clock or errors["start"] <= _CLOCK_ERROR or usual.by_step
-    ):  # a hand that opens within the plan needs no clock
+    # A hand that opens within the plan needs no clock.
+    if no_clock or errors["start"] <= _CLOCK_ERROR or usual.by_step:
         able = [kind for kind in able if kind != "none"]
     best = min(able, key=lambda kind: errors[kind] / _MAX_RELATIVE_ERROR[kind])
     if errors[best] >= _MAX_USEFUL_ERROR:

@@ -18,20 +18,11 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.plans.extrapolation import ExtrapolatedPlans
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.plans.registration import CONVERGED, correlation_lags
 from prior_reinforce.plans.speeds import SMOOTHING, frames_at_rest, velocity_profiles
-from prior_reinforce.settings import Checked, NonNegative
-
-
-@dataclass(frozen=True)
-class AlignmentConfig(Checked):
-    """How demonstrations are aligned."""
-
-    smoothing: NonNegative = SMOOTHING
-    """Standard deviation of the Gaussian that smooths velocities before they are compared, in [s].
-    The plans stay unsmoothed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +36,7 @@ class Alignment:
     """s_i, in [s]; positive where a demonstration was moved later."""
 
 
-def align(demonstrations: Demonstrations, config: AlignmentConfig | None = None) -> Alignment:
+def align(demonstrations: Demonstrations, *, smoothing: float = SMOOTHING) -> Alignment:
     """Move every demonstration in time until their velocity profiles agree best.
 
     Each velocity profile (all action dimensions; those of one unit divided by their pooled root
@@ -56,17 +47,22 @@ def align(demonstrations: Demonstrations, config: AlignmentConfig | None = None)
 
     Args:
         demonstrations: N plans.
-        config: Settings; the defaults if None.
+        smoothing: Standard deviation of the Gaussian that smooths velocities before they are
+            compared, in [s]; plans stay unsmoothed.
 
     Returns:
         Aligned demonstrations, and the shifts.
 
+    Raises:
+        ConfigurationError: `smoothing` is not 0 or more.
+
     Source: ours; the paper aligns by hand.
     """
-    config = config or AlignmentConfig()
+    if not smoothing >= 0:
+        raise ConfigurationError(f"smoothing must be 0 s or more, got {smoothing}")
     plans, dt = demonstrations.plans, demonstrations.format.dt
     units = demonstrations.format.units
-    profiles = np.stack(velocity_profiles(plans, units, config.smoothing / dt))
+    profiles = np.stack(velocity_profiles(plans, units, smoothing / dt))
     lags = correlation_lags(profiles)
     speeds = np.linalg.norm(profiles, axis=2)
     rest = np.array([frames_at_rest(speed) for speed in speeds])  # (N, 2) start, end

@@ -11,16 +11,17 @@ held but for noise, is coded by that number at every position, and decoded by th
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Literal, cast
+from typing import Any, Literal
 
 import numpy as np
 from jaxtyping import Float
 from typing_extensions import Self
 
 from prior_reinforce.arrays import Plans
-from prior_reinforce.plans.signals import HELD, MAX_LEVELS, analyse
+from prior_reinforce.plans.motions import Demonstrations
+from prior_reinforce.plans.signals import HELD
 
 Representation = Literal["splines", "frames"]
 """Splines where they fit, or frames for every dimension."""
@@ -30,7 +31,6 @@ Codes = Float[np.ndarray, "n C T"]
 """Coded plans: C numbers at each of T positions in time, those of demonstrations in [-1, 1]."""
 _Values = Float[np.ndarray, "n H"]
 """One dimension of some plans."""
-_Matrix = Float[np.ndarray, "_ _"]
 
 _DEGREE = 3
 _LARGEST_SPLINE_RESIDUAL = 2e-3
@@ -47,11 +47,11 @@ _MOST_NOISE = 0.02
 _TIED = 3
 """Equal control points at a resting end: velocity and acceleration vanish there."""
 _STIFFNESS = 0.3
-"""Weight of the control points' third differences (see `_smoother`). Ours: the throws' points come
+"""Weight of the control points' third differences (see `_Spline`). Ours: the throws' points come
 back to 1e-5, and an error of the network that alternates from point to point moves the plan's
 acceleration by a third or less of what it did."""
 _CONSTANT = 1e-9
-"""A dimension whose range is below this, relative to its values, is constant."""
+"""A code whose range is below this, relative to its values, is constant."""
 
 _SETTINGS = ("horizon", "length", "kinds", "folds", "rest_start", "rest_end", "levels")
 """What a codec is beside its two arrays."""
@@ -84,79 +84,51 @@ class PlanCodec:
     @classmethod
     def fit(
         cls,
-        plans: Plans,
+        demonstrations: Demonstrations,
         *,
-        units: Sequence[str] | None = None,
-        per_plan: Sequence[bool] | None = None,
         representation: Representation,
         frames_per_point: int,
         length_multiple: int,
         margin: float,
     ) -> Self:
-        """Choose a code for plans like these.
+        """Choose a code for plans like the demonstrated ones.
 
         Args:
-            plans: Of the demonstrations.
-            units: Of the D dimensions; pure numbers by default.
-            per_plan: Which of the D dimensions are one number a plan; none by default.
+            demonstrations: Their plans, and what these are made of.
             representation: `splines` where they fit, or `frames` for every dimension.
             frames_per_point: Frames for each control point.
             length_multiple: T will be a multiple of this.
             margin: How far generated plans may leave the demonstrated range of a dimension, as a
                 fraction of that range.
         """
-        _, horizon, action_dim = plans.shape
+        plans, signals = demonstrations.plans, demonstrations.signals
+        horizon, action_dim = demonstrations.horizon, demonstrations.action_dim
         if representation == "frames":
             length = math.ceil(horizon / length_multiple) * length_multiple
         else:
             length = max(1, round(horizon / frames_per_point / length_multiple)) * length_multiple
-        units = tuple(units or ("1",) * action_dim)
-        signals = analyse(plans, units, dt=1.0)
-        starts, ends = signals.rest_start, signals.rest_end
-        kinds: list[Kind] = []
-        folds: list[int] = []
-        for d in range(action_dim):
-            values, kind, fold = plans[:, :, d], "frames", math.ceil(horizon / length)
-            if (per_plan is not None and per_plan[d]) or (
-                signals.kinds[d] == "held" and representation == "splines"
-            ):
-                kind, fold = "number", 1
-            elif representation == "splines" and signals.kinds[d] == "smooth":
-                largest = max(
-                    _LARGEST_SPLINE_RESIDUAL * float(np.ptp(values)),
-                    min(
-                        _NOISE_RESIDUAL * float(signals.noise[d]),
-                        _MOST_NOISE * float(np.ptp(values)),
-                    ),
-                    HELD if units[d] in ("rad", "m") else 0.0,
-                )
-                for more in _SPLINE_FOLDS:
-                    if _DEGREE < more * length < horizon and _fits(
-                        values, more * length, starts[d], ends[d], largest
-                    ):
-                        kind, fold = "spline", more
-                        break
-            kinds.append(cast(Kind, kind))
-            folds.append(fold)
         low, high = plans.min(axis=(0, 1)), plans.max(axis=(0, 1))
         slack = margin * (high - low)
+        coded = [
+            _choose(demonstrations, d, length, representation == "splines")
+            for d in range(action_dim)
+        ]
         raw = cls(
             horizon=horizon,
             length=length,
-            kinds=tuple(kinds),
-            folds=tuple(folds),
-            rest_start=starts,
-            rest_end=ends,
+            kinds=tuple(kind for kind, _ in coded),
+            folds=tuple(fold for _, fold in coded),
+            rest_start=signals.rest_start,
+            rest_end=signals.rest_end,
             levels=tuple(
-                _levels(plans[:, :, d]) if kind == "frames" else () for d, kind in enumerate(kinds)
+                tuple(np.unique(plans[:, :, d]).tolist()) if kind == "switch" else ()
+                for d, kind in enumerate(signals.kinds)
             ),
             plan_range=np.stack([low - slack, high + slack]),
             code_range=np.array([[-1.0], [1.0]]),
         )
-        per_dimension = [raw._code(plans[:, :, d], d) for d in range(action_dim)]
-        ranges = [
-            np.repeat([[code.min()], [code.max()]], code.shape[1], axis=1) for code in per_dimension
-        ]
+        codes = [raw._code(plans[:, :, d], d) for d in range(action_dim)]
+        ranges = [np.repeat([[c.min()], [c.max()]], c.shape[1], axis=1) for c in codes]
         return replace(raw, code_range=np.concatenate(ranges, axis=1))
 
     @property
@@ -166,37 +138,32 @@ class PlanCodec:
 
     def encode(self, plans: Plans) -> Codes:
         """Code plans; demonstrations land in [-1, 1]."""
-        codes = np.concatenate(
-            [self._code(plans[:, :, d], d) for d in range(plans.shape[2])], axis=1
-        )
+        codes = [self._code(plans[:, :, d], d) for d in range(plans.shape[2])]
         centre, half = self._scale()
-        scaled: np.ndarray = (codes - centre) / half
-        return scaled
+        return np.asarray((np.concatenate(codes, axis=1) - centre) / half)
 
     def decode(self, codes: Codes) -> Plans:
         """Turn codes into plans, at rest and in range as demonstrated."""
         centre, half = self._scale()
-        raw = codes * half + centre
+        raw = np.split(codes * half + centre, np.cumsum(self.folds)[:-1], axis=1)
         plans = np.empty((len(codes), self.horizon, len(self.kinds)))
-        channel = 0
-        for d, (kind, fold) in enumerate(zip(self.kinds, self.folds, strict=True)):
-            unfolded = raw[:, channel : channel + fold].transpose(0, 2, 1).reshape(len(codes), -1)
-            if kind == "spline":
-                ends = _ends(fold * self.length, self.rest_start[d], self.rest_end[d])
-                free = unfolded @ np.linalg.pinv(ends).T
-                plans[:, :, d] = free @ _synthesis(self.horizon, ends).T
-            elif kind == "number":
-                number = codes[:, channel].mean(axis=1) * half[channel] + centre[channel]
-                plans[:, :, d] = number[:, None]
+        for d, (kind, code) in enumerate(zip(self.kinds, raw, strict=True)):
+            values = code.transpose(0, 2, 1).reshape(len(codes), -1)
+            if kind == "number":
+                values = values.mean(axis=1, keepdims=True)
+            elif kind == "spline":
+                values = self._spline(d).frames(values)
             else:
-                frames = unfolded[:, : self.horizon].copy()
+                values = values[:, : self.horizon].copy()
                 # Two equal frames are no velocity at that end.
-                plans[:, :, d] = _tie(frames, 2, self.rest_start[d], self.rest_end[d])
-            channel += fold
+                if self.rest_start[d]:
+                    values[:, :2] = values[:, :2].mean(axis=1, keepdims=True)
+                if self.rest_end[d]:
+                    values[:, -2:] = values[:, -2:].mean(axis=1, keepdims=True)
             if self.levels[d]:
                 levels = np.array(self.levels[d])
-                nearest = np.abs(plans[:, :, d, None] - levels).argmin(axis=-1)
-                plans[:, :, d] = levels[nearest]
+                values = levels[np.abs(values[:, :, None] - levels).argmin(axis=-1)]
+            plans[:, :, d] = values
         return np.clip(plans, self.plan_range[0], self.plan_range[1])
 
     def settings(self) -> dict[str, Any]:
@@ -219,6 +186,7 @@ class PlanCodec:
         return cls(**known, plan_range=plan_range, code_range=code_range)
 
     def _scale(self) -> tuple[Float[np.ndarray, "C 1"], Float[np.ndarray, "C 1"]]:
+        """Centre and half width of the range of each number of a code."""
         low, high = self.code_range
         half = (high - low) / 2
         centre = (high + low) / 2
@@ -227,88 +195,79 @@ class PlanCodec:
 
     def _code(self, values: _Values, d: int) -> Float[np.ndarray, "n c T"]:
         """Unscaled code of one dimension; c = 1, or the fold."""
-        if self.kinds[d] == "number":
+        kind, fold = self.kinds[d], self.folds[d]
+        if kind == "number":
             return np.repeat(values.mean(axis=1)[:, None, None], self.length, axis=2)
-        fold = self.folds[d]
-        if self.kinds[d] == "spline":
-            flat = _fit_spline(values, fold * self.length, self.rest_start[d], self.rest_end[d])
+        if kind == "spline":
+            flat = self._spline(d).points(values)
         else:
             missing = self.length * fold - self.horizon
             flat = np.pad(values, ((0, 0), (0, missing)), mode="edge")
         return flat.reshape(len(values), self.length, fold).transpose(0, 2, 1)
 
-
-def _basis(horizon: int, n_points: int) -> _Matrix:
-    """Value of every basis function (columns) at every frame; clamped, uniform knots."""
-    from scipy.interpolate import BSpline
-
-    inner = np.linspace(0, horizon - 1, n_points - _DEGREE + 1)
-    knots = np.concatenate([[inner[0]] * _DEGREE, inner, [inner[-1]] * _DEGREE])
-    matrix: np.ndarray = BSpline.design_matrix(
-        np.arange(horizon, dtype=float), knots, _DEGREE
-    ).toarray()
-    return matrix
+    def _spline(self, d: int) -> _Spline:
+        n_points = self.folds[d] * self.length
+        return _Spline(self.horizon, n_points, self.rest_start[d], self.rest_end[d])
 
 
-def _fit_spline(
-    values: _Values, n_points: int, at_start: bool, at_end: bool
-) -> Float[np.ndarray, "n p"]:
-    """Least-squares control points, equal at a resting end."""
-    ends = _ends(n_points, at_start, at_end)
-    free = np.linalg.lstsq(_synthesis(values.shape[1], ends), values.T, rcond=None)[0]
-    points: np.ndarray = (ends @ free).T
-    return points
+def _choose(demonstrations: Demonstrations, d: int, length: int, splines: bool) -> tuple[Kind, int]:
+    """How one dimension is coded, and its fold."""
+    form, signals, horizon = demonstrations.format, demonstrations.signals, demonstrations.horizon
+    if form.names[d] in form.per_plan or (splines and signals.kinds[d] == "held"):
+        return "number", 1
+    if splines and signals.kinds[d] == "smooth":
+        values = demonstrations.plans[:, :, d]
+        extent = float(np.ptp(values))
+        largest = max(
+            _LARGEST_SPLINE_RESIDUAL * extent,
+            min(_NOISE_RESIDUAL * float(signals.noise[d]), _MOST_NOISE * extent),
+            HELD if form.units[d] in ("rad", "m") else 0.0,
+        )
+        for fold in _SPLINE_FOLDS:
+            if _DEGREE < fold * length < horizon:
+                ends = signals.rest_start[d], signals.rest_end[d]
+                spline = _Spline(horizon, fold * length, *ends)
+                missed = spline.frames(spline.points(values)) - values
+                if np.sqrt(np.mean(missed**2, axis=1)).max() <= largest:
+                    return "spline", fold
+    return "frames", math.ceil(horizon / length)
 
 
-def _ends(n_points: int, at_start: bool, at_end: bool) -> _Matrix:
-    """Which free point (columns) each control point is: one for all at a resting end."""
-    free = np.arange(n_points)
-    if at_start:
-        free = np.maximum(free - (_TIED - 1), 0)
-    if at_end:
-        free = np.minimum(free, free[-_TIED])
-    return np.eye(free[-1] + 1)[free]
+class _Spline:
+    """A cubic B-spline with clamped, uniform knots, and equal control points at a resting end.
 
-
-def _synthesis(horizon: int, ends: _Matrix) -> _Matrix:
-    """Frames of a plan (rows) from its free control points."""
-    matrix: np.ndarray = _basis(horizon, len(ends)) @ ends @ _smoother(ends.shape[1])
-    return matrix
-
-
-def _smoother(n: int) -> _Matrix:
-    """Whittaker's smoother: what alternates between control points hardly reaches a plan.
-
-    An arm's acceleration limits are met by motions and broken by ripple: a milliradian from point
-    to point is several rad/s^2. Codes are fitted through the smoother, so that what demonstrations
-    show of it comes back.
+    What alternates between control points hardly reaches the frames, by Whittaker's smoother: an
+    arm's acceleration limits are met by motions and broken by ripple, of which a milliradian from
+    point to point is several rad/s^2. Points are fitted through the smoother, so that what
+    demonstrations show of it comes back.
     """
-    differences = np.diff(np.eye(n), 3, axis=0) if n > 3 else np.zeros((1, n))
-    matrix: np.ndarray = np.linalg.inv(np.eye(n) + _STIFFNESS * differences.T @ differences)
-    return matrix
 
+    def __init__(self, horizon: int, n_points: int, at_start: bool, at_end: bool) -> None:
+        """Build it for plans of H frames that all rest at their start, or at their end."""
+        from scipy.interpolate import BSpline
 
-def _tie(values: _Values, n_tied: int, at_start: bool, at_end: bool) -> _Values:
-    if at_start:
-        values[:, :n_tied] = values[:, :n_tied].mean(axis=1, keepdims=True)
-    if at_end:
-        values[:, -n_tied:] = values[:, -n_tied:].mean(axis=1, keepdims=True)
-    return values
+        free = np.arange(n_points)
+        if at_start:
+            free = np.maximum(free - (_TIED - 1), 0)
+        if at_end:
+            free = np.minimum(free, free[-_TIED])
+        n = int(free[-1]) + 1
+        self._ends = np.eye(n)[free]  # which free point (columns) each control point is
+        inner = np.linspace(0, horizon - 1, n_points - _DEGREE + 1)
+        knots = np.concatenate([[inner[0]] * _DEGREE, inner, [inner[-1]] * _DEGREE])
+        basis = BSpline.design_matrix(np.arange(horizon, dtype=float), knots, _DEGREE).toarray()
+        rough = np.diff(np.eye(n), 3, axis=0) if n > 3 else np.zeros((1, n))
+        smoother = np.linalg.inv(np.eye(n) + _STIFFNESS * rough.T @ rough)
+        self._frames = basis @ self._ends @ smoother  # (H, n)
 
+    def points(self, values: _Values) -> Float[np.ndarray, "n p"]:
+        """Least-squares control points."""
+        free = np.linalg.lstsq(self._frames, values.T, rcond=None)[0]
+        return np.asarray((self._ends @ free).T)
 
-def _fits(values: _Values, n_points: int, at_start: bool, at_end: bool, largest: float) -> bool:
-    """Whether a spline misses no plan by more than that, rms."""
-    matrix = _synthesis(values.shape[1], _ends(n_points, at_start, at_end))
-    residual = matrix @ np.linalg.lstsq(matrix, values.T, rcond=None)[0] - values.T
-    rms = np.sqrt(np.mean(residual**2, axis=0)).max()
-    constant = np.ptp(values) <= _CONSTANT * max(1.0, float(np.abs(values).max()))
-    return bool(constant or rms <= largest)
-
-
-def _levels(values: _Values) -> tuple[float, ...]:
-    """The values of a switch; empty where there are too many for one."""
-    distinct = np.unique(values)
-    return tuple(distinct.tolist()) if distinct.size <= MAX_LEVELS else ()
+    def frames(self, points: Float[np.ndarray, "n p"]) -> _Values:
+        """Frames of control points; those that are to be equal are averaged."""
+        return np.asarray(points @ np.linalg.pinv(self._ends).T @ self._frames.T)
 
 
 def _as_tuples(value: Any) -> Any:

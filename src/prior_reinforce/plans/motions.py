@@ -167,41 +167,35 @@ class Demonstrations:
         outcomes = as_outcomes(self.outcomes_seen, plans.shape[0])
         k = outcomes.shape[1]
         names = tuple(self.outcome_names) or tuple("xyz"[:k] if k <= 3 else map(str, range(k)))
-        said = bool(self.outcome_units)
+        stated = bool(self.outcome_units)
         units = tuple(self.outcome_units) or ("m",) * k
         if len(names) != k or len(units) != k:
             raise InvalidDemonstrationsError(
                 f"outcomes have {k} components; got names {names} and units {units}"
             )
-        noise = np.array(self.outcome_noise, dtype=np.float64)
-        noise = noise if noise.any() else np.zeros_like(outcomes)
-        if noise.shape == outcomes.shape and np.any(np.isposinf(noise)):
-            row = int(np.argmax(np.isposinf(noise).any(axis=1)))
-            raise InvalidDemonstrationsError(
-                f"nobody said how far demonstration {row} went, only where to; a demonstration "
-                "needs a place: measure or estimate it, or leave it out"
-            )
-        if noise.shape != outcomes.shape or not np.all(np.isfinite(noise) & (noise >= 0)):
-            raise InvalidDemonstrationsError(
-                f"outcome_noise must be one finite number of at least 0 for each of the outcomes "
-                f"{outcomes.shape}, got shape {noise.shape}"
-            )
-        noise.flags.writeable = False
-        object.__setattr__(self, "outcome_noise", noise)
-        correction = np.array(self.outcome_correction, dtype=np.float64)
-        correction = correction if correction.any() else np.zeros_like(outcomes)
-        if correction.shape != outcomes.shape or not np.all(np.isfinite(correction)):
-            raise InvalidDemonstrationsError(
-                f"outcome_correction must be one finite number for each of the outcomes "
-                f"{outcomes.shape}, got shape {correction.shape}"
-            )
-        correction.flags.writeable = False
-        object.__setattr__(self, "outcome_correction", correction)
+        for name in ("outcome_noise", "outcome_correction"):
+            values = np.array(getattr(self, name), dtype=np.float64)
+            values = values if values.any() else np.zeros_like(outcomes)
+            signed = name == "outcome_correction"
+            far = np.argwhere(np.isposinf(values))
+            if far.size and not signed:
+                raise InvalidDemonstrationsError(
+                    f"demonstration {far[0, 0]} has a direction but no distance, and a "
+                    "demonstration needs a place: measure or estimate it, or leave it out"
+                )
+            possible = np.isfinite(values) & (signed | (values >= 0))
+            if values.shape != outcomes.shape or not np.all(possible):
+                raise InvalidDemonstrationsError(
+                    f"{name} must be one finite number{'' if signed else ' of at least 0'} for "
+                    f"each of the outcomes {outcomes.shape}, got shape {values.shape}"
+                )
+            values.flags.writeable = False
+            object.__setattr__(self, name, values)
         object.__setattr__(self, "plans", plans)
         object.__setattr__(self, "outcomes_seen", outcomes)
         object.__setattr__(self, "outcome_names", names)
         object.__setattr__(self, "outcome_units", units)
-        self._warn_about_units(said=said)
+        self._warn_about_units(stated=stated)
         self._warn_about_repeated_outcomes()
 
     @property
@@ -284,14 +278,15 @@ class Demonstrations:
         beyond = self.far_outside(goal)
         if np.any(beyond):
             low, high = self.outcomes_seen.min(axis=0), self.outcomes_seen.max(axis=0)
-            said = ", ".join(
+            asked = ", ".join(f"{value:.4g}" for value in goal)
+            where = ", ".join(
                 f"{beyond[j]:.4g} {self.outcome_units[j]} outside the demonstrated {name} "
                 f"({low[j]:.4g} to {high[j]:.4g})"
                 for j, name in enumerate(self.outcome_names)
                 if beyond[j] > 0
             )
             warnings.warn(
-                f"goal {_say(goal)} lies {said}; check its unit, or demonstrate nearer to it",
+                f"goal [{asked}] lies {where}; check its unit, or demonstrate nearer to it",
                 stacklevel=2,
             )
         return goal
@@ -357,17 +352,17 @@ class Demonstrations:
             i, j = pairs[0]
             warnings.warn(
                 f"demonstrations {i} and {j} have the same outcome "
-                f"{self.outcomes_seen[i].tolist()}: the mean of both motions stands for it; if "
-                "that is a slip of the pen, correct it, or drop one",
+                f"{self.outcomes_seen[i].tolist()}: the mean of both motions is learned; if "
+                "that is a mistake, correct it, or drop one",
                 stacklevel=4,
             )
 
-    def _warn_about_units(self, *, said: bool) -> None:
+    def _warn_about_units(self, *, stated: bool) -> None:
         metres = np.array([unit == "m" for unit in self.outcome_units])
-        largest = np.abs(self.outcomes_seen[:, metres]).max(initial=0.0)
-        if largest > FARTHEST * (BEYOND_DOUBT if said else 1.0):
+        farthest = np.abs(self.outcomes_seen[:, metres]).max(initial=0.0)
+        if farthest > FARTHEST * (BEYOND_DOUBT if stated else 1.0):
             warnings.warn(
-                f"an outcome of {largest:g} m looks like centimetres; outcomes are in metres: "
+                f"an outcome of {farthest:g} m looks like centimetres; outcomes are in metres: "
                 "divide by 100",
                 stacklevel=4,
             )
@@ -387,8 +382,3 @@ def _warned_before() -> Iterator[None]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         yield
-
-
-def _say(values: Point) -> str:
-    """Numbers in four digits, however large."""
-    return "[" + ", ".join(f"{value:.4g}" for value in values) + "]"

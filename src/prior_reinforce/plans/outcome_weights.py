@@ -1,8 +1,8 @@
 """How much each demonstration counts for a wished-for outcome: weights that sum to one.
 
-Two schemes, shared by the interpolating generators; the Bayesian adapter knows by them how labels
-that are off are mixed. Distances are taken after dividing every
-outcome component by its demonstrated range, so that components may differ in unit.
+Two schemes, shared by the interpolating generators and the Bayesian adapter, whose prior mixes the
+errors of outcomes as plans are mixed. Distances are taken after dividing every outcome component by
+its demonstrated range, so that components may differ in unit.
 
 Notation (docs/notation.md):
     c  conditions                       in the outcomes' units
@@ -108,21 +108,12 @@ def smooth_weights(
 
     Source: Wendland, "Scattered Data Approximation", 2005, chapter 8 (ours to use it here).
     """
-    if kernel == "auto":
-        cubic = smooth_weights(outcomes, kernel="cubic", noise=noise)
-        if amplification(cubic, outcomes) <= _LARGEST_AMPLIFICATION:
-            return cubic
-        return smooth_weights(outcomes, kernel="linear", noise=noise)
-    n, k = outcomes.shape
-    scale = np.ptp(outcomes, axis=0)
-    spread = np.zeros(n)
-    if noise is not None:
-        relative = np.where(noise > _MEASURED * scale, noise / scale, 0.0)
-        spread = _SMOOTHING * np.mean(relative**2, axis=1)
-    same = np.all(np.abs(outcomes[:, None] - outcomes[None]) <= SAME_OUTCOME * scale, axis=2)
-    outcomes, times = outcomes[same.argmax(axis=1)], same.sum(axis=1)
-    spread = np.where(times > 1, np.maximum(spread, _REPEATED), spread)
-    return SmoothWeights(outcomes, scale, kernel if n > k else "linear", spread)
+    if kernel != "auto":
+        return SmoothWeights(outcomes, kernel, noise)
+    cubic = SmoothWeights(outcomes, "cubic", noise)
+    if amplification(cubic, outcomes) <= _LARGEST_AMPLIFICATION:
+        return cubic
+    return SmoothWeights(outcomes, "linear", noise)
 
 
 class SmoothWeights:
@@ -131,21 +122,28 @@ class SmoothWeights:
     def __init__(
         self,
         outcomes: Float[np.ndarray, "N k"],
-        scale: Float[np.ndarray, " k"],
         kernel: Kernel,
-        smoothing: Float[np.ndarray, " N"],
+        noise: Float[np.ndarray, "N k"] | None,
     ) -> None:
         """Fit it; see `smooth_weights`."""
         from scipy.interpolate import RBFInterpolator
 
         n, k = outcomes.shape
-        self.kernel, self._scale, self._n = kernel, scale, n
+        self.kernel: Kernel = kernel if n > k else "linear"
+        self._scale, self._n = np.ptp(outcomes, axis=0), n
+        smoothing = np.zeros(n)
+        if noise is not None:
+            relative = np.where(noise > _MEASURED * self._scale, noise / self._scale, 0.0)
+            smoothing = _SMOOTHING * np.mean(relative**2, axis=1)
+        apart = np.abs(outcomes[:, None] - outcomes[None])
+        same = np.all(apart <= SAME_OUTCOME * self._scale, axis=2)
+        repeated = same.sum(axis=1) > 1
         self._spline = RBFInterpolator(
-            outcomes / scale,
+            outcomes[same.argmax(axis=1)] / self._scale,
             np.eye(n),  # a value a demonstration: what is interpolated are the weights themselves
-            kernel="thin_plate_spline" if kernel == "thin-plate" else kernel,
+            kernel="thin_plate_spline" if self.kernel == "thin-plate" else self.kernel,
             degree=1 if n > k else 0,
-            smoothing=smoothing,
+            smoothing=np.where(repeated, np.maximum(smoothing, _REPEATED), smoothing),
         )
 
     def __call__(self, conditions: Float[np.ndarray, "n k"]) -> Float[np.ndarray, "n N"]:

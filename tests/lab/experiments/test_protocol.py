@@ -204,6 +204,6 @@ def test_a_demonstration_of_which_only_the_direction_is_said_is_refused_in_one_l
         return replace(from_words("long, left", 2), error_seen=rng.normal(size=2))
 
     with pytest.raises(
-        InvalidDemonstrationsError, match="nobody said how far demonstration 0 went"
+        InvalidDemonstrationsError, match="demonstration 0 has a direction but no distance"
     ):
         seen(Blind(), on_failed_reading=point)
