@@ -188,7 +188,7 @@ def remember_registrations() -> dict[Any, Any]:
             known[key] = registration.register(profiles, kind, decisive)
         return known[key]
 
-    timeline.register = register  # type: ignore[assignment]
+    vars(timeline)["register"] = register
     return known
 
 
