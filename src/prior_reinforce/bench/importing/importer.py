@@ -5,7 +5,6 @@ A format is a file beside this one and a line of `FORMATS`.
 
 from __future__ import annotations
 
-import importlib
 import os
 import warnings
 from collections import Counter
@@ -32,8 +31,8 @@ from prior_reinforce.errors import (
     ConfigurationError,
     FileFormatError,
     InvalidDemonstrationsError,
-    MissingExtraError,
 )
+from prior_reinforce.extras import check_installed
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 
 
@@ -45,9 +44,7 @@ class Format:
     recognises: Callable[[Path], bool]
     """From names and layout alone; nothing large is opened."""
     library: str = ""
-    """Optional library that reading needs, by the name of its module."""
-    extra: str = ""
-    """Extra of this package that installs it."""
+    """Optional library that reading needs, one of `extras.EXTRA_OF`."""
     options: frozenset[str] = frozenset({"key"})
     """Fields of `ReadOptions` that apply to this format, beside those that apply to all."""
     whole: bool = False
@@ -64,14 +61,12 @@ _OPTIONAL = _TABLE | {"delimiter", "decimal"}
 FORMATS: Mapping[str, Format] = {
     "npz": Format(npz.read, _with_suffix(npz.SUFFIXES), options=_ARRAYS),
     "csv": Format(csv.read, _with_suffix(csv.SUFFIXES), options=_OPTIONAL),
-    "excel": Format(
-        csv.read_workbooks, _with_suffix(WORKBOOKS), "python_calamine", "excel", _TABLE
-    ),
-    "lerobot": Format(lerobot.read, lerobot.recognises, "pyarrow.parquet", "lerobot", whole=True),
-    "robomimic": Format(hdf5.read_robomimic, hdf5.is_robomimic, "h5py", "hdf5"),
-    "droid": Format(hdf5.read_droid, hdf5.is_droid, "h5py", "hdf5"),
-    "ros": Format(ros.read, ros.recognises, "rosbags.highlevel", "ros"),
-    "zarr": Format(zarr.read, zarr.recognises, "zarr", "zarr", _ARRAYS, whole=True),
+    "excel": Format(csv.read_workbooks, _with_suffix(WORKBOOKS), "python_calamine", _TABLE),
+    "lerobot": Format(lerobot.read, lerobot.recognises, "pyarrow", whole=True),
+    "robomimic": Format(hdf5.read_robomimic, hdf5.is_robomimic, "h5py"),
+    "droid": Format(hdf5.read_droid, hdf5.is_droid, "h5py"),
+    "ros": Format(ros.read, ros.recognises, "rosbags"),
+    "zarr": Format(zarr.read, zarr.recognises, "zarr", _ARRAYS, whole=True),
 }
 """What can be read. `ros` covers ROS 1 bags, ROS 2 sqlite bags and MCAP; `zarr` is the replay
 buffer of Diffusion Policy."""
@@ -296,7 +291,8 @@ def read(source: str | os.PathLike[str], options: ReadOptions | None = None) -> 
     for name in sorted(_OPTIONAL & options.given.keys() - FORMATS[kind].options):
         option = name.replace("_", "-")
         raise ConfigurationError(f"--{option} {options.given[name]} has no use for {kind}; drop it")
-    _need(FORMATS[kind])
+    if FORMATS[kind].library:
+        check_installed(FORMATS[kind].library)
     there: list[str] = []
     read_ones: dict[str, Recording] = {}
     numbers = 0
@@ -374,15 +370,3 @@ def detect_format(source: Path) -> str:
             f"format, one of {', '.join(FORMATS)}"
         )
     return found[0]
-
-
-def _need(format: Format) -> None:
-    """Raise MissingExtraError, with how to install it, where a library of the format is missing."""
-    try:
-        if format.library:
-            importlib.import_module(format.library)
-    except ImportError as error:
-        raise MissingExtraError(
-            f"{format.library.split('.')[0]} is not installed, which this format needs; run: "
-            f'pip install "prior-reinforce[{format.extra}]"'
-        ) from error
