@@ -1,15 +1,15 @@
-"""What perception says of one trial: by how much it missed, and how far that can be trusted.
+"""What perception reports of one trial: the error, and its uncertainty.
 
-    e = r - g, the true error  lies in [low, high], give or take sd, in each component
-    e tilde  `error_seen`      the one number a component that stands for it (the paper's)
+    e = r - g, the true error  lies in [low, high] +- sd, in each component
+    e tilde  `error_seen`      one number for each component (the paper's)
 
-"5 cm long" by eye means anything from 3.5 to 7.5 cm; a tape measure's 5 cm means 5.0 give or take
-0.2; "long" alone has no upper end. Who wants numbers takes `error_seen`; who knows what to do with
-intervals takes those. That a trial hit is known for itself, where it is seen directly.
+"5 cm long" by eye means anything from 3.5 to 7.5 cm; 5 cm by tape measure means 5.0 +- 0.2 cm;
+"long" alone has no upper end. Adapters use either `error_seen` or the intervals. Whether a trial
+hit is recorded separately, if it was seen directly.
 
 Source: paper, Section IV and V-A, "Perception Process", for e tilde and the words by eye. Intervals
-are ours, because words are intervals: taken as numbers, repeated words count as independent
-evidence, and an adapter stands still.
+are ours, because words are intervals: treated as exact numbers, repeated words would count as
+independent evidence, and an adapter would stop moving.
 """
 
 from __future__ import annotations
@@ -30,22 +30,21 @@ EYE_NEAR = np.array([0.0, 0.02, 0.05, 0.10])
 """Distances an observer distinguishes near the goal, in [m] (paper: 0 cm, 2 cm, 5 cm, multiples of
 10 cm)."""
 EYE_BETWEEN = (0.01, 0.035, 0.075)
-"""Half-way between them; written out, since the float (5 cm + 10 cm) / 2 is not 7.5 cm."""
+"""Half-way between them; as literals, since the float (5 cm + 10 cm) / 2 is not 7.5 cm."""
 EYE_STEP = 0.10
 """Distances beyond are multiples of this, in [m]."""
 LEAST_SD = 0.01
 """Least sd of a length of unknown origin, in [m] (ours): half of an observer's finest step."""
 _SHARE_SD = 0.25
-"""What a number of unknown origin is off by, as a share of its size (ours): people misjudge
-lengths by 15 to 25 %, and the paper's amplified noise by 20 %."""
+"""Relative sd of a number of unknown origin (ours): people misjudge lengths by 15 to 25 %, and the
+paper's amplified noise is 20 %."""
 OPEN_ERROR = 0.05
-"""What stands for a length of which only the direction is said, in [m] (ours): an observer's middle
-word."""
+"""Number used for a length of which only the direction is known, in [m] (ours): an observer's
+middle word."""
 _SAME = 1e-9
 """Numbers are compared to the nanometre."""
 _MEASURED = 0.5
-"""A number whose sd is below this share of the tolerance says more of a hit than that it hit
-(ours)."""
+"""A number with an sd below this share of the tolerance is more informative than a hit (ours)."""
 
 
 class ReadingRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -61,7 +60,7 @@ class ReadingRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 @dataclass(frozen=True, eq=False)
 class Reading:
-    """What was perceived of one trial's error, outcome minus goal; in the outcomes' units.
+    """One trial's perceived error, outcome minus goal, in the outcomes' units.
 
     Raises:
         InvalidFeedbackError: Shapes that differ, an interval from high to low, a negative sd, or a
@@ -69,20 +68,20 @@ class Reading:
     """
 
     error_seen: Point
-    """e tilde, one finite number a component; 0 where nothing is known of it."""
+    """e tilde, one finite number for each component; 0 if unknown."""
     low: Point
-    """Least value of the true error, but for sd; -inf where it has no lower end."""
+    """Lower end of the true error, up to sd; -inf if open."""
     high: Point
-    """Greatest value; inf where it has no upper end, equal to `low` where a number was read."""
+    """Upper end; inf if open, equal to `low` for a number."""
     sd: Point
-    """Standard deviation by which the interval's ends are blurred; 0 where they are sharp."""
+    """Standard deviation of the interval's ends; 0 if they are sharp."""
     hit: bool | None = None
-    """Whether the goal was reached, where that was seen directly; None where it was not."""
+    """Whether the goal was reached; None if that was not seen directly."""
     said: str = ""
-    """The words, where words were said."""
+    """The words, if it was given in words."""
     missed_by_at_least: Point | None = None
-    """Half-axes of an ellipsoid that the true error is known to lie outside of, since the trial
-    missed; None where nothing is known of it. `within` finds them."""
+    """Half-axes of an ellipsoid that the true error lies outside of, after a miss; None if unknown.
+    Set by `within`."""
 
     @property
     def spread(self) -> Point:
@@ -92,7 +91,7 @@ class Reading:
 
     @property
     def expected(self) -> Point:
-        """Mean of the error given this reading: its middle; `error_seen` where an end is open."""
+        """Mean of the error given this reading: its middle; `error_seen` if an end is open."""
         is_open = np.isinf(self.low) | np.isinf(self.high)
         low, high = (np.where(is_open, self.error_seen, end) for end in (self.low, self.high))
         return np.asarray(0.5 * (low + high))
@@ -109,11 +108,7 @@ class Reading:
                     f"{array.tolist()}"
                 )
             object.__setattr__(self, name, array)
-        if (
-            np.any(self.low > self.high)
-            or np.any(self.low == np.inf)
-            or np.any(-self.high == np.inf)
-        ):
+        if np.any((self.low > self.high) | (self.low == np.inf) | (self.high == -np.inf)):
             raise InvalidFeedbackError(
                 f"the error cannot lie in [{self.low.tolist()}, {self.high.tolist()}]; give the "
                 "lower end first"
@@ -127,7 +122,7 @@ class Reading:
 
     @classmethod
     def measured(cls, error: ArrayLike, sd: ArrayLike = 0.0, hit: bool | None = None) -> Self:
-        """A number that was measured, with the standard deviation of such a measurement.
+        """A measured number, with the standard deviation of the measurement.
 
         Args:
             error: Outcome minus goal, shape (k,), in the outcomes' units.
@@ -135,9 +130,7 @@ class Reading:
             hit: See `Reading`.
         """
         number = np.array(error, dtype=np.float64)
-        return cls(
-            number, number, number, np.broadcast_to(np.asarray(sd, float), number.shape), hit
-        )
+        return cls(number, number, number, np.broadcast_to(sd, number.shape), hit)
 
     @classmethod
     def estimated(
@@ -155,11 +148,11 @@ class Reading:
 
     @classmethod
     def by_eye(cls, words: ArrayLike, hit: bool | None = None) -> Self:
-        """What an observer's words stand for (see `perception.eye`): intervals with sharp ends.
+        """An observer's words as intervals with sharp ends (see `perception.eye`).
 
         0 cm is anything within 1 cm, 2 cm from 1 to 3.5, 5 cm from 3.5 to 7.5, 10 cm from 7.5 to
-        15, 20 cm from 15 to 25, ... A 2 beside nothing but zeros may be a miss of 1 cm shared among
-        the components. A component that is none of these words is `estimated`.
+        15, 20 cm from 15 to 25, ... If 2 cm is the only component that is not zero, it may be a
+        miss of 1 cm shared among all. A component that is none of these words is `estimated`.
 
         Args:
             words: Outcome minus goal, shape (k,), in [m].
@@ -188,27 +181,27 @@ class Reading:
 
     @classmethod
     def only(cls, hit: bool, outcome_dim: int) -> Self:
-        """That it hit, or missed, and nothing else; `error_seen` is 0."""
+        """Only that it hit or missed; `error_seen` is 0."""
         everywhere = np.full(outcome_dim, np.inf)
         return cls(np.zeros(outcome_dim), -everywhere, everywhere, np.zeros(outcome_dim), hit)
 
     @property
     def has_number(self) -> bool:
-        """Whether `error_seen` says something: some bound is known, or that it hit."""
+        """Whether `error_seen` is informative: some bound is known, or that it hit."""
         return bool(self.hit or np.any(np.isfinite(self.low) | np.isfinite(self.high)))
 
     def with_hit(self, hit: bool | None) -> Self:
-        """The same, where it was seen that the trial hit or missed; None changes nothing."""
+        """Return the reading with `hit` set; None changes nothing."""
         return self if hit is None else replace(self, hit=hit)
 
     def within(self, radius: Point) -> Self:
-        """What is left of the intervals once it counts whether the trial hit.
+        """Condition the intervals on hit or miss.
 
-        After a hit every component lies within the radius; where that contradicts what was seen,
-        the hit is believed. After a miss, what the other components cannot make up for must be
-        this one's: "2 cm long" that missed by more than 1.5 cm, and at most 1 cm to the side, was
-        1.1 cm long at least. The box around the ellipsoid stands for it: components stay
-        independent. What no box can say is kept in `missed_by_at_least`.
+        After a hit every component lies within the radius; if that contradicts the intervals, the
+        hit is believed. After a miss, a component must make up for what the others cannot: "2 cm
+        long" that missed by more than 1.5 cm, and at most 1 cm to the side, was at least 1.1 cm
+        long. Components stay independent: intervals describe a box, and the ellipsoid itself is
+        kept in `missed_by_at_least`.
 
         Args:
             radius: Tolerance in each component, shape (k,), in the outcomes' units.
@@ -236,28 +229,17 @@ class Reading:
 
     def record(self) -> ReadingRecord:
         """Plain data for a log."""
-        return ReadingRecord(
-            error_seen=self.error_seen.tolist(),
-            low=_ends(self.low),
-            high=_ends(self.high),
-            sd=self.sd.tolist(),
-            hit=None if self.hit is None else bool(self.hit),
-            said=self.said,
-        )
+        hit = None if self.hit is None else bool(self.hit)
+        low, high = _ends(self.low), _ends(self.high)
+        return ReadingRecord(self.error_seen.tolist(), low, high, self.sd.tolist(), hit, self.said)
 
     @classmethod
     def from_record(cls, record: ReadingRecord) -> Self:
         """Read what `record` returned."""
-        low = [-math.inf if end is None else end for end in record.low]
-        high = [math.inf if end is None else end for end in record.high]
-        return cls(
-            np.array(record.error_seen),
-            np.array(low),
-            np.array(high),
-            np.array(record.sd),
-            record.hit,
-            record.said,
-        )
+        low = np.array([-math.inf if end is None else end for end in record.low])
+        high = np.array([math.inf if end is None else end for end in record.high])
+        seen, sd = np.array(record.error_seen), np.array(record.sd)
+        return cls(seen, low, high, sd, record.hit, record.said)
 
 
 def _ends(ends: Float[np.ndarray, " k"]) -> list[float | None]:

@@ -1,4 +1,4 @@
-"""Numbers said in words, and words read as numbers: the one place that does either.
+"""Errors and places in words, and back: the one place that converts either way.
 
 An operator stands behind the robot and looks along x, from the robot's base over the table:
 
@@ -7,8 +7,8 @@ An operator stands behind the robot and looks along x, from the robot's base ove
     component 1 (y)   left or right                   left or right
     component 2 (z)   high or low                     up or down
 
-An error is outcome minus goal. Words go with lengths and at most three components, and are in
-centimetres; anything else is said by its names and units.
+An error is outcome minus goal. Words are for lengths, of at most three components, in centimetres;
+anything else is given by its names and units.
 Source: paper, Section IV, "Perception Process" (coarse human feedback); the words are ours.
 """
 
@@ -34,12 +34,15 @@ PLACE_WORDS: tuple[tuple[str, str], ...] = (("ahead", "behind"), ("left", "right
 """The same for a place."""
 
 _UNPRINTED = frozenset({"Cc", "Cf", "Cs", "Zl", "Zp"})
-"""Unicode's control and format characters, halves of pairs, and separators of lines."""
+"""Unicode's control and format characters, lone surrogates, and line separators."""
 _Point = Float[np.ndarray, " k"]
 _LEAST_BARE_CM = 0.1
 """Ours: nobody sees a throw to a millimetre; a smaller number without a unit is in metres."""
 _METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
-"""Units of length that words may have."""
+_TO_UNIT = {(unit, "m"): factor for unit, factor in _METRES.items()} | {
+    ("ms", "s"): 0.001, ("deg", "rad"): math.pi / 180, ("rad", "deg"): 180 / math.pi
+}  # fmt: skip
+"""What to multiply with, from the unit that was said to the outcome's."""
 _TIMES: tuple[str, str] = ("late", "early")
 """The words of a component that is a time."""
 _FILLERS = re.compile(r"\b(?:about|approximately|approx\.?|around|roughly|circa|ca\.?|too)\s+|~\s*")
@@ -58,14 +61,6 @@ _FROM_BASE = re.compile(r"(?P<length>.*?)\s*(?:away )?from (?:the )?(?:base|robo
 _PLACE_TERM = re.compile(
     rf"(?P<number>[+-]?(?:{_NUMBER}))\s*(?P<unit>cm|mm|m|in|deg|rad|ms|s|)(?:\s*[,;]\s*|\s+|$)"
 )
-_TO_UNIT = {
-    ("cm", "m"): 0.01,
-    ("mm", "m"): 0.001,
-    ("in", "m"): 0.0254,
-    ("ms", "s"): 0.001,
-    ("deg", "rad"): math.pi / 180,
-    ("rad", "deg"): 180 / math.pi,
-}
 _WITH_WORD = re.compile(
     rf"(?P<number>{_NUMBER})\s*(?:(?P<unit>cm|mm|m|in|deg|rad|ms|s)(?![a-z])\s*)?"
     r"(?:to the )?(?P<word>[a-z]+)"
@@ -76,20 +71,18 @@ _HITS = {"hit": True, "miss": False}
 
 
 def plain(text: str, keep: str = "") -> str:
-    """Somebody else's text for a terminal: what would move its cursor or forge a line is shown.
+    """Escape control characters in untrusted text, such as a name, before it is printed.
 
     Args:
-        text: A name, a reason, a message that holds one.
+        text: The text.
         keep: Control characters that stay.
     """
     return "".join(
-        char if char in keep or unicodedata.category(char) not in _UNPRINTED else _shown(char)
+        char.encode("unicode_escape").decode()
+        if char not in keep and unicodedata.category(char) in _UNPRINTED
+        else char
         for char in text
     )
-
-
-def _shown(char: str) -> str:
-    return char.encode("unicode_escape").decode()
 
 
 def in_words(units: Sequence[str]) -> bool:
@@ -98,25 +91,22 @@ def in_words(units: Sequence[str]) -> bool:
 
 
 def to_words(error: ArrayLike) -> str:
-    """Say an error as an operator would.
+    """Describe an error as an operator would: `5 cm long, 2 cm left`, or `on the goal`.
 
     Args:
         error: Outcome minus goal, at most three numbers, in [m].
-
-    Returns:
-        For instance `5 cm long, 2 cm left`; `on the goal` where it rounds to nothing.
     """
     said = _terms(error, WORDS)
     return ", ".join(term for term in said if not term.startswith("0 ")) or "on the goal"
 
 
 def say_error(error: ArrayLike, names: Sequence[str], units: Sequence[str]) -> str:
-    """Say an error: `5 cm long, 2 cm left`, or `x +0.05 m, t -0.1 s`."""
+    """Describe an error: `5 cm long, 2 cm left`, or `x +0.05 m, t -0.1 s`."""
     return to_words(error) if in_words(units) else _components(error, names, units, sign="+")
 
 
 def say_reading(reading: Reading, names: Sequence[str], units: Sequence[str]) -> str:
-    """Say what was seen: in its own words where it has some, with all units, else as its number."""
+    """Describe what was seen: in its own words, with all units, else as its number."""
     if reading.said:
         return _with_units(reading.said)
     if not np.any(np.isfinite(reading.low) | np.isfinite(reading.high)):
@@ -125,14 +115,14 @@ def say_reading(reading: Reading, names: Sequence[str], units: Sequence[str]) ->
 
 
 def say_place(place: ArrayLike, names: Sequence[str], units: Sequence[str]) -> str:
-    """Say a goal, a condition or an outcome: `92 cm ahead, 10 cm left`, or `x 0.92 m, t 0.3 s`."""
+    """Describe a goal, condition or outcome: `92 cm ahead, 10 cm left`, or `x 0.92 m, t 0.3 s`."""
     if in_words(units):
         return ", ".join(_terms(place, PLACE_WORDS))
     return _components(place, names, units)
 
 
 def say_length(length: float, units: Sequence[str]) -> str:
-    """Say a distance between outcomes: `1.5 cm`, `0.2 rad`; `0.25` where units are mixed."""
+    """Format a distance between outcomes: `1.5 cm`, `0.2 rad`; `0.25` if units are mixed."""
     if set(units) == {"m"}:
         return f"{_centimetres(length)} cm"
     unit = units[0] if len(set(units)) == 1 else ""
@@ -146,15 +136,15 @@ def from_words(text: str, outcome_dim: int) -> Reading:
         text: For instance `5cm long, 2 cm left`; numbers without a unit are centimetres, and a
             component that is not named is zero. 0, 2, 5 cm and tens are an observer's words
             (`Reading.by_eye`), other numbers estimates (`Reading.estimated`), `5 +- 0.5 cm long` is
-            a measurement. `long` is long by 1 cm or more, and says nothing of what is not named;
-            nor does `5 cm long, somewhere`. `hit` and `miss` stand alone or beside other terms.
+            a measurement. `long` means by 1 cm or more, and leaves components that are not named
+            unknown; so does `5 cm long, somewhere`. `hit` and `miss` stand alone or beside terms.
         outcome_dim: k, at most 3.
 
     Returns:
-        What was said, in [m].
+        The reading, in [m].
 
     Raises:
-        InvalidFeedbackError: Words that are not understood, or one direction named twice.
+        InvalidFeedbackError: Unknown words, or one direction named twice.
     """
     if outcome_dim > len(WORDS):
         raise InvalidFeedbackError(
@@ -203,8 +193,8 @@ def as_reading(
 
     Args:
         seen: A reading, words, or outcome minus goal as numbers of unknown origin, shape (k,); None
-            where nothing but `hit` is known.
-        hit: Whether the goal was reached, where that was seen directly.
+            if only `hit` is known.
+        hit: Whether the goal was reached, if that was seen directly.
         units: Units of the k components.
         least_sd: Least standard deviation of numbers of unknown origin, shape (k,), in `units`.
 
@@ -236,12 +226,12 @@ def read_error(text: str, units: Sequence[str]) -> Reading | _Point:
     """Read an error from words, in the outcome's units.
 
     Args:
-        text: As in `from_words`; a component that is no length is `20ms late`, and of one component
-            alone the words are `long` and `short`, whatever its unit: `5 deg long`.
-        units: Of the k components.
+        text: As in `from_words`; a time is `20ms late`, and for a single component the words are
+            `long` and `short`, whatever its unit: `5 deg long`.
+        units: Units of the k components.
 
     Returns:
-        A reading where all components are lengths of one unit; else a number of unknown origin for
+        A reading if all components are lengths of one unit; else a number of unknown origin for
         each component.
 
     Raises:
@@ -280,7 +270,7 @@ def read_error(text: str, units: Sequence[str]) -> Reading | _Point:
 
 
 def read_numbers(text: str) -> list[tuple[float, float | None]] | None:
-    """Read numbers, each with what stands behind its `+-`; None where the text is something else.
+    """Read numbers, each with the number after its `+-`; None if the text is anything else.
 
     Args:
         text: For instance `0.05+-0.003, -0.02 ± 0.001`.
@@ -296,12 +286,12 @@ def read_numbers(text: str) -> list[tuple[float, float | None]] | None:
 def read_uncertain_place(
     text: str, names: Sequence[str], units: Sequence[str]
 ) -> tuple[_Point, float]:
-    """Read a place as `read_place` does, and the standard deviation that may stand behind it.
+    """Read a place as `read_place` does, and the standard deviation that may follow it.
 
     Args:
         text: For instance `92cm 10cm +- 2cm`.
-        names: Of the components.
-        units: Of the components.
+        names: Names of the components.
+        units: Units of the components.
 
     Raises:
         InvalidFeedbackError: As `read_place` does, or a `+-` for components of several units.
@@ -318,13 +308,13 @@ def read_place(text: str, names: Sequence[str], units: Sequence[str]) -> _Point:
     """Read a place from numbers in the outcome's units, numbers with a unit, or words.
 
     Args:
-        text: For instance `0.92 0.10`, `92cm 10cm`, `92 10 cm`, or `92cm ahead, 10cm left`; with
-            words, a length without one is the component whose turn it is: `92cm, 10cm left`.
-        names: Of the components.
-        units: Of the components.
+        text: For instance `0.92 0.10`, `92cm 10cm`, `92 10 cm`, or `92cm ahead, 10cm left`; beside
+            words, a length without one is the component in that position: `92cm, 10cm left`.
+        names: Names of the components.
+        units: Units of the components.
 
     Raises:
-        InvalidFeedbackError: It is none of these, or metres that are farther than a table's.
+        InvalidFeedbackError: It is none of these, or farther than any arm throws.
     """
     expected = f"{len(names)} finite numbers: {', '.join(names)}"
     numbers = _numbers_with_units(text, units)
@@ -336,7 +326,7 @@ def read_place(text: str, names: Sequence[str], units: Sequence[str]) -> _Point:
         raise InvalidFeedbackError(f"cannot read {text!r}; give {expected}")
     if len(numbers) != len(names) or not all(map(math.isfinite, numbers)):
         raise InvalidFeedbackError(f"{text!r} is not {expected}; give those")
-    has_units = _bare_numbers(text) is None
+    has_units = read_numbers(text) is None
     for number, unit in zip(numbers, units, strict=True):
         possible = abs(number) <= FARTHEST * BEYOND_DOUBT
         if unit == "m" and abs(number) > FARTHEST and not (has_units and possible):
@@ -347,22 +337,14 @@ def read_place(text: str, names: Sequence[str], units: Sequence[str]) -> _Point:
     return np.array(numbers)
 
 
-def _bare_numbers(text: str) -> list[float] | None:
-    """Numbers without units, such as `0.92, 0.1`; None where it is anything else."""
-    try:
-        return [float(part) for part in text.replace(",", " ").split()]
-    except ValueError:
-        return None
-
-
 def _numbers_with_units(text: str, units: Sequence[str]) -> list[float] | None:
-    """Numbers in the outcome's units, such as `0.92 0.1` or `92cm, 10 cm`; None where it is none.
+    """Numbers in the outcome's units, such as `0.92 0.1` or `92cm, 10 cm`; None if it is none.
 
     A unit after the last number only is that of all.
     """
-    bare = _bare_numbers(text)
+    bare = read_numbers(text)
     if bare is not None:
-        return bare
+        return [number for number, _ in bare]
     terms = list(_PLACE_TERM.finditer(text.strip()))
     if "".join(term[0] for term in terms) != text.strip():
         return None

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shlex
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -56,23 +57,23 @@ class Import:
     ROS 1, ROS 2 or MCAP, or a replay buffer in zarr."""
     outcomes: Path | None = None
     """CSV `episode,x,y` with where each object landed; if not given, `outcomes.csv` beside the
-    source, and missing outcomes are asked for on a terminal."""
+    source; on a terminal, missing entries are prompted for."""
     outcome_unit: Literal["m", "cm", "mm", "in", "rad", "deg"] | None = None
-    """Unit of the outcomes in that table, where its columns do not say it (`x_cm`), or say what
-    is implausible."""
+    """Unit of the outcomes in that table, if its columns do not name one (`x_cm`), or an
+    implausible one."""
     options: Annotated[ReadOptions, tyro.conf.arg(name="")] = field(default_factory=ReadOptions)
     horizon: int | None = None
     """Frames of every plan; the longest recording's if not given."""
     trim: bool = True
     """Drop the still ends of each recording."""
     smooth: float | None = None
-    """Take out what is faster than so many Hz, such as an encoder's noise; says what it changed."""
+    """Low-pass frequency in Hz, against encoder noise; the preview reports what it changed."""
 
     append: bool = False
     """Keep the demonstrations in use and add these to them."""
     inspect: bool = False
-    """Only say what is in the recordings and what an import would make of it; write a table of
-    outcomes to fill in where there is none."""
+    """Only report what the recordings hold and what an import would make of them; write a table of
+    outcomes to fill in if there is none."""
 
     def run(self) -> None:
         """Read, show, take in."""
@@ -171,14 +172,16 @@ class Import:
         print(f"nothing was taken in; next: {self._command(options, found.remedy)}")
 
     def _command(self, *options: str) -> str:
-        """The whole command with what was given, and options instead of or beside that."""
+        """The whole command as given, with further options that replace or join those given."""
         more = " ".join(filter(None, options))
-        said = ["prior-reinforce import", shlex.quote(str(self.folder))]
-        said.append(shlex.quote(str(self.source)))
-        own = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in _NOT_REPEATED}
-        changed = {f.name for f in fields(self) if own.get(f.name) != f.default} & own.keys()
-        given: dict[str, Any] = {name: own[name] for name in own if name in changed}
-        for name, value in (self.options.given | given).items():
+        places = (shlex.quote(str(path)) for path in (self.folder, self.source))
+        said = ["prior-reinforce import", *places]
+        own: dict[str, Any] = {
+            f.name: getattr(self, f.name)
+            for f in fields(self)
+            if f.name not in _NOT_REPEATED and getattr(self, f.name) != f.default
+        }
+        for name, value in (self.options.given | own).items():
             option = f"--{name.replace('_', '-')}"
             if isinstance(value, bool):
                 said.append(option if value else option.replace("--", "--no-"))
@@ -198,7 +201,7 @@ class Import:
         *,
         may_lack: bool,
     ) -> tuple[Outcomes, tuple[Ambiguity, ...]]:
-        """The outcomes that a table or the recordings have, in the manifest's units."""
+        """The outcomes of a table or the recordings, in the manifest's units."""
         names = manifest.outcome_names
         try:
             found = recordings.outcomes(self.outcomes, names)
@@ -211,25 +214,21 @@ class Import:
 
 
 _NOT_REPEATED = ("folder", "source", "inspect", "options")
-"""Fields of `Import` that stand elsewhere in its command, or not."""
+"""Fields of `Import` that are not options of the command to repeat."""
 
 
 def _settle(ambiguities: Sequence[Ambiguity], *, at_terminal: bool) -> None:
-    """Do nothing where nothing is ambiguous, or a person at the terminal agrees with the guesses.
+    """Let a person at the terminal confirm the guesses.
 
     Raises:
-        UnclearUnitsError: The person does not, or there is none.
+        UnclearUnitsError: Not confirmed, or there is no terminal.
     """
     try:
         raise_if_ambiguous(ambiguities)
     except UnclearUnitsError as unclear:
-        if not (at_terminal and _agrees(unclear)):
-            raise
-
-
-def _agrees(unclear: UnclearUnitsError) -> bool:
-    print(plain(unclear.what))
-    try:
-        return input("is it so? (yes/no) ").strip().lower() in {"y", "yes"}
-    except EOFError:
-        return False
+        if at_terminal:
+            print(plain(unclear.what))
+            with suppress(EOFError):
+                if input("is it so? (yes/no) ").strip().lower() in {"y", "yes"}:
+                    return
+        raise

@@ -1,7 +1,7 @@
-"""Asking a person where each recorded object landed, since no recording format says.
+"""Prompt for where each recorded object landed, since no recording format holds it.
 
-Every answer is on disk before the next question: what was typed for a source is taken again when
-the same source is imported again.
+Every answer is on disk before the next question, and used again when the same source is imported
+again.
 """
 
 from __future__ import annotations
@@ -32,26 +32,26 @@ from prior_reinforce.wording import in_words, plain, read_uncertain_place, say_l
 _SKIP, _BACK = ("skip", "s"), ("back", "b")
 _SOURCE = "source"
 Place = tuple[float, ...]
-"""The components of an outcome, and how uncertain they are."""
+"""The components of an outcome, and their standard deviation."""
 
 
 def ask_for_outcomes(
     folder: Path, source: Path, known: Outcomes, selection: Selection, manifest: Manifest
 ) -> Outcomes | None:
-    """Ask for the outcomes that no table has.
+    """Prompt for the outcomes that no table has.
 
     Args:
-        folder: Of the workspace, where what is typed is kept.
-        source: What the recordings were read from.
+        folder: The workspace, where answers are kept.
+        source: The source of the recordings.
         known: Outcomes of a table, in the manifest's units.
         selection: The episodes in question.
-        manifest: What an outcome is.
+        manifest: Names and units of an outcome.
 
     Returns:
-        All that is known now, without episodes that were skipped; None where nothing was missing.
+        All outcomes known now, without skipped episodes; None if nothing was missing.
 
     Raises:
-        InvalidDemonstrationsError: The person stopped typing; the answers so far are kept.
+        InvalidDemonstrationsError: The input ended; the answers so far are kept.
         WorkspaceError: The disk is full, or the folder read-only.
     """
     outcomes: dict[str, Place] = {}
@@ -95,7 +95,7 @@ def ask_for_outcomes(
 
 
 def _typed_before(folder: Path, source: Path, manifest: Manifest) -> tuple[Path, dict[str, Place]]:
-    """Where what is typed of a source is kept, a table of its own, and what is in it already."""
+    """The table of a source's answers, and what it already holds."""
     for number in count(1):
         table = folder / (OUTCOMES_FILE if number == 1 else f"outcomes-{number}.csv")
         if not table.is_file():
@@ -103,7 +103,7 @@ def _typed_before(folder: Path, source: Path, manifest: Manifest) -> tuple[Path,
         try:
             kept = _read(table, manifest)
         except PriorReinforceError:
-            continue  # changed by hand, or of another task: asked for again, in another table
+            continue  # edited by hand, or of another task: prompt again, for another table
         if set(kept.frame[_SOURCE]) == {str(source.resolve())}:
             rows = kept.frame[[*kept.names, SD]].itertuples()
             return table, {name: tuple(map(float, values)) for name, *values in rows}
@@ -114,12 +114,12 @@ def _read(table: Path, manifest: Manifest) -> Outcomes:
     found = read_outcomes(table, manifest.outcome_names, texts=(_SOURCE,))
     if found.names != manifest.outcome_names or _SOURCE not in found.frame:
         raise InvalidDemonstrationsError(f"{table} has other columns; name it with --outcomes")
-    # A place that was typed was judged then.
+    # Answers were checked when they were typed.
     return in_units(found, manifest.outcome_units, None)[0]
 
 
 def _keep(table: Path, source: Path, outcomes: Mapping[str, Place], manifest: Manifest) -> None:
-    """Write all that is known of a source to the table in the workspace."""
+    """Write all answers for a source to its table in the workspace."""
     units = manifest.outcome_units
     rows = {episode: (*map(repr, v), source.resolve()) for episode, v in outcomes.items()}
     with named_disk_errors(table.parent):
@@ -128,15 +128,13 @@ def _keep(table: Path, source: Path, outcomes: Mapping[str, Place], manifest: Ma
 
 
 def _explanation(manifest: Manifest, missing: Sequence[str]) -> str:
-    names = " ".join(manifest.outcome_names)
+    names, k = " ".join(manifest.outcome_names), len(manifest.outcome_names)
     units = ", ".join(dict.fromkeys(manifest.outcome_units))
-    unit = "cm" if units == "m" else ""
-    words = ""
+    unit, words = "cm" if units == "m" else "", ""
     if in_words(manifest.outcome_units):
-        k = len(manifest.outcome_names)
         example = ("92cm ahead", "10cm left", "5cm up")[:k]
-        words = f', "{" ".join(("92cm", "10cm", "5cm")[:k])}", or words such as '
-        words += f'"{", ".join(example)}"'
+        numbers = " ".join(term.split()[0] for term in example)
+        words = f', "{numbers}", or words such as "{", ".join(example)}"'
     return (
         f"{len(missing)} episodes have no outcome: where did the object land, in the table frame?\n"
         f"type {names} [{units}]{words}; +- 2{unit} behind it says how "
@@ -145,7 +143,7 @@ def _explanation(manifest: Manifest, missing: Sequence[str]) -> str:
 
 
 def _ask(question: str, episode: str, table: Path, manifest: Manifest) -> tuple[float, ...] | str:
-    """A place and how uncertain it is, `skip` or `back`."""
+    """A place and its standard deviation, `skip` or `back`."""
     while True:
         try:
             text = input(question).strip()

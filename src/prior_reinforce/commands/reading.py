@@ -1,4 +1,4 @@
-"""What a person says of a trial on the command line: words, numbers, or that it hit."""
+"""A trial's result on the command line: words, numbers, or that it hit."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from prior_reinforce.wording import in_words, read_error, read_numbers
 Number = Annotated[int, tyro.conf.Positional, tyro.conf.arg(metavar="TRIAL")]
 
 _LARGEST_PLAUSIBLE_METRES = 1.0
-"""Ours: a bare number beyond it is centimetres far more often than a throw a metre off."""
+"""Ours: larger bare numbers are centimetres far more often than a miss by a metre."""
 
 
 @dataclass(frozen=True)
 class Seen:
-    """Of which trial, and what was seen."""
+    """A trial and its result."""
 
     folder: Folder
     """Workspace."""
@@ -35,7 +35,7 @@ class Seen:
     """What was seen, outcome minus goal: "5cm long, 2cm left", "5.2 +- 0.3 cm long", "long", "hit",
     "miss"; or a number for each component, in its own unit: 0.05 -0.02, 0.05+-0.003 0.02+-0.003."""
     error: tuple[str, ...] | None = None
-    """The same, behind its name."""
+    """The same, as a named option."""
     outcome: tuple[float, ...] | None = None
     """Or where the object ended, in the table frame, in the outcome's units."""
     hit: bool = False
@@ -57,7 +57,7 @@ class Seen:
     def read(
         self, workspace: Workspace, session: Session
     ) -> tuple[Reading | Point | None, bool | None]:
-        """What was seen, as `Session.tell` takes it, and whether it was a hit if that was said."""
+        """Return what was seen, as `Session.tell` takes it, and whether it hit, if given."""
         given = [bool(self.seen), self.error is not None, self.outcome is not None]
         said = any(given) or self.hit or self.miss
         if sum(given) > 1 or not said or (self.hit and self.miss):
@@ -111,7 +111,7 @@ def read_seen(workspace: Workspace, text: str) -> Reading | Point:
 
 
 def _sayable(text: str, reading: Reading | Point) -> Reading | Point:
-    """The reading, unless no throw is that far off."""
+    """Return the reading, unless it is too large for any throw."""
     number = reading.error_seen if isinstance(reading, Reading) else reading
     largest = np.abs(number).max(initial=0.0)
     if largest > FARTHEST:
@@ -122,7 +122,7 @@ def _sayable(text: str, reading: Reading | Point) -> Reading | Point:
 
 
 def plausible(workspace: Workspace, error: Point) -> Point:
-    """The error, unless it looks like centimetres where words could say it as well."""
+    """Return the error, unless it looks like centimetres."""
     largest = np.abs(error).max(initial=0.0)
     words = in_words(workspace.manifest.outcome_units)
     if words and _LARGEST_PLAUSIBLE_METRES <= largest < np.inf:

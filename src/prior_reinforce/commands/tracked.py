@@ -1,4 +1,4 @@
-"""Trials told from a table, such as a tracker writes: a row a trial, where the object ended."""
+"""Results of trials from a table, such as a tracker writes: one row for each trial."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _SAME = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class Row:
-    """What a table says of one trial."""
+    """One trial's row in a table."""
 
     number: int
     seen: Reading | Point | None
@@ -36,20 +36,20 @@ class Row:
 
 
 def rows_to_tell(path: Path, workspace: Workspace, session: Session) -> list[Row]:
-    """Return what is to be told of a table: rows of trials that wait for it.
+    """Return the rows of a table whose trials still wait for a result.
 
-    Rows of trials that were told so already, or voided, and rows without a number, are passed over.
+    Rows of voided trials, and of trials with this very result, are skipped.
 
     Args:
-        path: A CSV of any dialect or a workbook: `trial`, a column a component with where the
-            object ended in the table frame (`x_cm`, `y [mm]`), or `said` in words; `hit` if that
-            was seen.
-        workspace: What the components are.
-        session: Its trials.
+        path: A CSV of any dialect or a workbook: `trial`, a column for each component with where
+            the object ended in the table frame (`x_cm`, `y [mm]`), or `said` in words; `hit` if
+            that was seen.
+        workspace: Names and units of the components.
+        session: The trials.
 
     Raises:
         FileFormatError: No such table, or a cell that cannot be read.
-        InvalidFeedbackError: A row of a trial that was told otherwise, or that cannot be meant.
+        InvalidFeedbackError: An implausible row, or a trial that has another result already.
         TrialStateError: A row of a trial that was never asked for.
     """
     names, units = workspace.manifest.outcome_names, workspace.manifest.outcome_units
@@ -63,7 +63,11 @@ def rows_to_tell(path: Path, workspace: Workspace, session: Session) -> list[Row
     found = []
     for name, row in table.frame.iterrows():
         where = f"{path}, trial {name}"
-        number = _number(where, str(name))
+        text = str(name)
+        try:
+            number = int(text)
+        except ValueError:
+            raise FileFormatError(f"{where}: trial is {text[:40]}, expected its number") from None
         seen, hit = _seen(where, row, table, workspace, session, number)
         told = session.trial(number)
         if told.stage is Stage.VOIDED:
@@ -78,17 +82,10 @@ def rows_to_tell(path: Path, workspace: Workspace, session: Session) -> list[Row
     return found
 
 
-def _number(where: str, text: str) -> int:
-    try:
-        return int(text)
-    except ValueError:
-        raise FileFormatError(f"{where}: trial is {text[:40]}, expected its number") from None
-
-
 def _seen(
     where: str, row: Any, table: Outcomes, workspace: Workspace, session: Session, number: int
 ) -> tuple[Reading | Point | None, bool | None]:
-    """What one row says."""
+    """The error in one row, and whether it hit."""
     names, hit = workspace.manifest.outcome_names, None
     if text := str(row.get(_HIT, "")).lower():
         if text not in _ANSWERS:
@@ -109,7 +106,7 @@ def _seen(
 
 
 def _is_said(error: Point | None, seen: Reading | Point | None) -> bool:
-    """Whether a trial was told what a row says."""
+    """Whether a trial already has the result in a row."""
     if error is None or seen is None:
         return True
     numbers = seen.error_seen if isinstance(seen, Reading) else seen

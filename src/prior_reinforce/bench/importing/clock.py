@@ -1,4 +1,4 @@
-"""When each frame was recorded: from the file's own times, its rate, or the rate that is given."""
+"""Times of the frames: from the file's own times, its rate, or the rate that is given."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ _HIGHEST_RATE = 1e6
 
 @dataclass(frozen=True, eq=False)
 class Clock:
-    """Times of an episode's frames, and where they are from."""
+    """Times of an episode's frames, and their source."""
 
     times: Times
     """From any origin."""
     source: str
     """For a person: `t in ms`, `the given rate`."""
     ambiguities: tuple[Ambiguity, ...] = ()
-    """What is only guessed of them."""
+    """What is only inferred of them."""
 
     @property
     def period(self) -> float:
@@ -60,16 +60,16 @@ def clock_of(
         episode: For messages.
         count: T.
         stamps: The file's own times; None where it has none.
-        name: Of their column or array, or of what declares the rate.
-        unit: Unit that the format fixes for them; None reads it from the name, or guesses.
-        own_rate: Frames a second that the file declares.
-        rate: The rate that was given. It overrides a declared one, and must agree with stamps.
-        time_unit: The unit that was given, one of `TIME_UNITS`.
+        name: Name of their column or array, or of the declared rate.
+        unit: Unit that the format fixes for them; None reads it from the name, or infers it.
+        own_rate: Rate that the file declares, in [Hz].
+        rate: Rate that the user gave. It overrides a declared one, and must agree with stamps.
+        time_unit: Unit that the user gave, one of `TIME_UNITS`.
 
     Raises:
-        ConfigurationError: What was given contradicts the file, or has no use.
-        InvalidDemonstrationsError: Stamps that are no numbers, or of another length.
-        FileFormatError: No times, no rate, and none given; or a declared rate that is none.
+        ConfigurationError: An option contradicts the file, or has no use.
+        InvalidDemonstrationsError: Stamps that are not numbers, or of another length.
+        FileFormatError: Neither times nor a rate, or an implausible declared rate.
     """
     if stamps is None:
         if time_unit is not None:
@@ -106,6 +106,7 @@ def clock_of(
 
 
 def _numbers(episode: str, count: int, stamps: Stamps, name: str) -> Times:
+    """The stamps as T numbers."""
     try:
         numbers = np.asarray(stamps, dtype=np.float64)
     except (TypeError, ValueError) as error:
@@ -121,6 +122,7 @@ def _numbers(episode: str, count: int, stamps: Stamps, name: str) -> Times:
 
 
 def _even(episode: str, count: int, name: str, own_rate: float | None, rate: float | None) -> Clock:
+    """Times at the given rate, else at the declared one."""
     if own_rate is not None and not 0 < own_rate < _HIGHEST_RATE:
         raise FileFormatError(
             f"episode {episode}: {name} says {own_rate:g} frames a second; mend it, or leave it out"
@@ -142,13 +144,13 @@ def _even(episode: str, count: int, name: str, own_rate: float | None, rate: flo
 def _judge(
     name: str, period: float, length: float, said: str | None
 ) -> tuple[str, tuple[Ambiguity, ...]]:
-    """Unit of the times, and what is ambiguous of it.
+    """Infer the unit of the times, and say if it is ambiguous.
 
     Args:
-        name: Of their column.
-        period: Between two frames, in the unit in question.
-        length: Of the recording, likewise.
-        said: The unit that was given; None where nobody said one.
+        name: Name of their column.
+        period: Time between two frames, in that unit.
+        length: Time of the recording, in that unit.
+        said: The unit that the user gave, if any.
     """
     judged = judge_unit(said or "s", period, period=True)
     looks = judged.looks or "s"

@@ -68,7 +68,8 @@ def read_robomimic(source: Path, options: ReadOptions) -> Episodes:
                 "its format"
             )
         data = _own(path, file, "data")
-        rate = _control_rate(data)
+        made_by = json.loads(data.attrs.get("env_args", "{}"))
+        rate = made_by.get("env_kwargs", {}).get("control_freq")
         for episode in sorted(data, key=natural_order):
             yield episode, partial(_demo, path, data, episode, rate, options)
 
@@ -79,12 +80,13 @@ def _demo(
     key = options.key or _ROBOMIMIC_KEY
     with named_damage(path, "robomimic HDF5"):
         group = _own(path, data, episode)
-        positions = _array(path, group, key, f"data/{episode}")
-        declared = group.attrs.get("num_samples")
-    if declared is not None and int(declared) != len(positions):
+        positions = _motion(path, group, key, f"data/{episode}")
+        declared = int(group.attrs.get("num_samples", len(positions)))
+        rate = float(rate) if rate else None
+    if declared != len(positions):
         raise FileFormatError(
-            f"{path}: {episode} declares {int(declared)} samples but {key} holds "
-            f"{len(positions)}; copy the file again, or leave that episode out"
+            f"{path}: {episode} declares {declared} samples but {key} holds {len(positions)}; "
+            "copy the file again, or leave that episode out"
         )
     clock = options.clock(episode, len(positions), name="control_freq", own_rate=rate)
     return recorded(episode, clock, positions)
@@ -104,20 +106,19 @@ def _trajectory(path: Path, episode: str, options: ReadOptions) -> Recording:
     import h5py
 
     with named_damage(path, "DROID HDF5"), h5py.File(path, "r") as file:
-        positions = _array(path, file, options.key or _DROID_KEY, "the file")
-        name = next((name for name in _DROID_TIMES_MS if name in file), None)
-        stamps = None if name is None else _numbers(path, name, _own(path, file, name))
-        clock = options.clock(episode, len(positions), stamps=stamps, name=name or "", unit="ms")
+        positions = _motion(path, file, options.key or _DROID_KEY, "the file")
+        name = next((name for name in _DROID_TIMES_MS if name in file), "")
+        stamps = _numbers(path, name, _own(path, file, name)) if name else None
+        clock = options.clock(episode, len(positions), stamps=stamps, name=name, unit="ms")
         return recorded(episode, clock, positions)
 
 
-def _array(path: Path, group: Any, key: str, where: str) -> Positions:
-    """The motion under a key, or an error that lists what could be meant."""
+def _motion(path: Path, group: Any, key: str, where: str) -> Positions:
+    """The motion under a key, or an error that lists the candidates."""
     candidates: list[str] = []
 
     def collect(name: str, item: Any) -> None:
-        shape = getattr(item, "shape", None)
-        if shape is not None and len(shape) == 2 and item.dtype.kind in "fiu":
+        if len(getattr(item, "shape", None) or ()) == 2 and item.dtype.kind in "fiu":
             candidates.append(name)
 
     found = _own(path, group, key)
@@ -134,17 +135,16 @@ def _array(path: Path, group: Any, key: str, where: str) -> Positions:
 
 def _numbers(path: Path, name: str, found: Any) -> Stamps:
     """The numbers of an array, unless its header claims more than a recording has."""
-    check_numbers(path, name, found.shape, found.dtype.itemsize)
-    if found.chunks is not None:
-        check_numbers(path, f"a chunk of {name}", found.chunks, found.dtype.itemsize)
+    for what, shape in ((name, found.shape), (f"a chunk of {name}", found.chunks or ())):
+        check_numbers(path, what, shape, found.dtype.itemsize)
     return np.asarray(found[()])
 
 
 def _own(path: Path, group: Any, key: str, depth: int = 8) -> Any:
-    """What stands under a key, None where nothing does; never anything of another file.
+    """The item under a key, None if there is none; never anything of another file.
 
-    A file can name others (external links, external storage, virtual data sets), and reading it
-    would copy whatever they hold into the workspace.
+    A file can refer to others (external links, external storage, virtual data sets), and reading
+    it would copy whatever they hold into the workspace.
     """
     import h5py
 
@@ -166,10 +166,3 @@ def _own(path: Path, group: Any, key: str, depth: int = 8) -> Any:
             "into one file"
         )
     return group
-
-
-def _control_rate(data: Any) -> float | None:
-    """Control frequency of robosuite, where the file has it."""
-    text = data.attrs.get("env_args")
-    rate = None if text is None else json.loads(text).get("env_kwargs", {}).get("control_freq")
-    return float(rate) if rate else None

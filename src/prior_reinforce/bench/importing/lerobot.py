@@ -10,6 +10,7 @@ of a recorder (0.4.4) that ended without `finalize()` has no footer, and cannot 
 from __future__ import annotations
 
 import json
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -48,27 +49,22 @@ def read(source: Path, options: ReadOptions) -> Episodes:
     if options.key is None and key == _MEASURED and _COMMANDED in features:
         remarks = (f"motion is {_MEASURED} (measured); key {_COMMANDED} has the commanded one",)
     lengths, frames = _listed_lengths(source), _frames(source, key)
-    nothing = np.zeros(0), np.zeros((0, 0))
+
+    def episode_of(number: int) -> Recording:
+        index, positions = frames.get(number, (np.zeros(0), np.zeros((0, 0))))
+        listed = lengths.get(number, len(index))
+        if len(index) != listed or listed == 0:
+            raise FileFormatError(
+                f"{source}: episode {number} has {len(index)} of {listed} listed frames under "
+                "data/; copy the data set again, or name only the other episodes"
+            )
+        names = _names(features[key], positions.shape[1])
+        clock = options.clock(str(number), len(index), name="fps", own_rate=rate)
+        times = index * clock.period  # by their own numbers, since frames may be missing
+        return Recording(str(number), times, positions, names, None, remarks, clock=clock.source)
+
     for number in sorted(lengths.keys() | frames.keys()):
-        index, positions = frames.get(number, nothing)
-
-        def one(
-            episode: str = str(number),
-            index: FrameNumbers = index,
-            positions: Positions = positions,
-            listed: int = lengths.get(number, len(index)),
-        ) -> Recording:
-            if len(index) != listed or len(index) == 0:
-                raise FileFormatError(
-                    f"{source}: episode {episode} has {len(index)} of {listed} listed frames under "
-                    "data/; copy the data set again, or name only the other episodes"
-                )
-            names = _names(features[key], positions.shape[1])
-            clock = options.clock(episode, len(index), name="fps", own_rate=rate)
-            times = index * clock.period  # by their own numbers, since frames may be missing
-            return Recording(episode, times, positions, names, None, remarks, clock=clock.source)
-
-        yield str(number), one
+        yield str(number), partial(episode_of, number)
 
 
 def _column(source: Path, features: dict[str, Any], key: str | None) -> str:

@@ -10,23 +10,23 @@ from prior_reinforce.bench.robots.limits import is_joint
 from prior_reinforce.errors import InvalidDemonstrationsError
 
 _POSITIONS = re.compile(r"(^|[^a-z])(q|j|joints?|pos|positions?|angles?)$", re.IGNORECASE)
-"""How the positions of joints are called."""
+"""Names of joint positions."""
 _ELSE = re.compile(
     r"vel|speed|accel|jerk|torque|tau|effort|force|wrench|current|temperature|cartesian|tcp|pose"
     r"|(^|[^a-z])(acc|d+q|qd+|q_?dot|temp|tool|ee|eef)($|[^a-z])",
     re.IGNORECASE,
 )
-"""How what is no position of a joint is called. Ours, and rather too much than too little: what is
-not offered can still be said."""
+"""Names of anything but joint positions. Ours, and broad on purpose: a channel that is not offered
+can still be named by the user."""
 _NUMBERED = re.compile(r"(?P<stem>.*?)[_.\[ ]*(?P<number>\d+)\]?")
 
 
 def find_channels(wanted: Sequence[str], there: Sequence[str]) -> list[int] | None:
-    """Return which channel is each joint that is wanted; None where one is not there.
+    """Return the channel of each wanted joint; None if one is missing.
 
     Args:
-        wanted: Names of joints, as recorded or as the plan calls them: `joint4` is also
-            `panda_joint4` and `joint4.pos`, and the other way round (`robots.limits.is_joint`).
+        wanted: Names of joints, as recorded or as in the plan: `joint4` is also `panda_joint4` and
+            `joint4.pos`, and vice versa (`robots.limits.is_joint`).
         there: Names of the channels.
 
     Raises:
@@ -38,12 +38,12 @@ def find_channels(wanted: Sequence[str], there: Sequence[str]) -> list[int] | No
 
 
 def missing_channels(wanted: Sequence[str], there: Sequence[str]) -> list[str]:
-    """Return the joints that are wanted and not there, by the rule of `find_channels`."""
+    """Return the wanted joints that are missing, by the rule of `find_channels`."""
     return [name for name in wanted if _find(name, there) is None]
 
 
 def vectors(names: Sequence[str]) -> dict[str, list[int]]:
-    """Return groups of channels that are numbered on, by the name before the number.
+    """Return groups of consecutively numbered channels, by the name before the number.
 
     Args:
         names: For instance `q[0]`, `q[1]`, `actual_q_0`, `actual_q_1`, `t`.
@@ -60,9 +60,9 @@ def vectors(names: Sequence[str]) -> dict[str, list[int]]:
 
 
 def joint_vectors(names: Sequence[str], count: int) -> dict[str, list[int]]:
-    """Return the groups of `vectors` that have a size and could be positions of joints.
+    """Return the groups of `vectors` of this size that could be joint positions.
 
-    Groups whose name says something else, such as velocities, torques or a pose, could not.
+    Groups named after velocities, torques, poses and the like could not.
     """
     return {
         stem: group
@@ -72,24 +72,24 @@ def joint_vectors(names: Sequence[str], count: int) -> dict[str, list[int]]:
 
 
 def could_be_forgotten(names: Sequence[str], count: int) -> set[str]:
-    """Return which channels that are not joints may belong to the motion, such as a gripper's.
+    """Return which of the channels left out may belong to the motion, such as a gripper's.
 
-    Those whose name says something else do not, and nor does a numbered group of the joints' size
-    or more, such as their commands.
+    Velocities, torques and the like do not, nor does a numbered group of at least as many channels
+    as joints, such as their commands.
 
     Args:
-        names: Of all channels that are left out.
-        count: Of joints.
+        names: Names of the channels left out.
+        count: Number of joints.
     """
     groups = {i for group in vectors(names).values() if len(group) >= max(count, 2) for i in group}
     return {name for i, name in enumerate(names) if i not in groups and _ELSE.search(name) is None}
 
 
 def numbered_like(joints: Sequence[str], there: Sequence[str]) -> tuple[str, ...] | None:
-    """Return numbered channels of which there are as many as joints; None where nothing is clear.
+    """Return the group of as many numbered channels as joints; None if it is not clear which.
 
-    Where several groups are as many, one that is called like positions is taken: `q` beside `a`.
-    Groups that say they are something else never are: `dq`, `tau`.
+    Of several groups of that size, one named like positions is taken: `q` beside `a`; `dq` or `tau`
+    never.
     """
     fitting = joint_vectors(there, len(joints))
     called = [stem for stem in fitting if _POSITIONS.search(stem) is not None]

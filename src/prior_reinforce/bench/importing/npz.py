@@ -1,16 +1,15 @@
 """Recordings in NPZ or NPY: a file an episode, or one file whose motion has shape (N, T, D).
 
 An NPY holds the motion alone. Arrays of an NPZ: the motion (`key`, or `q`, `plans`, `positions`,
-`actions`), `t` or `dt` or `rate`, and where wanted `joint_names` or `names`, `outcome` or
+`actions`), `t` or `dt` or `rate`, and optionally `joint_names` or `names`, and `outcome`,
 `outcomes` or `outcomes_seen`.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -20,6 +19,7 @@ from prior_reinforce.bench.importing.options import ReadOptions
 from prior_reinforce.bench.importing.recording import (
     NO_COLUMN,
     Episodes,
+    Positions,
     Recording,
     files_at,
     named_damage,
@@ -34,6 +34,7 @@ Arrays = Mapping[str, np.ndarray]
 SUFFIXES = (".npz", ".npy")
 _TIMES = ("t", "time", "timestamp", "timestamps")
 _MOTION_KEYS = ("q", "plans", "positions", "actions")
+_OUTCOME_KEYS = ("outcome", "outcomes", "outcomes_seen")
 
 
 def read(source: Path, options: ReadOptions) -> Episodes:
@@ -54,37 +55,42 @@ def _episodes(path: Path, options: ReadOptions) -> Episodes:
             f"{path} has no array {key or ' or '.join(_MOTION_KEYS)}; it holds "
             f"{sorted(arrays)}: say which with the key"
         )
-    motion = arrays[key]
-    if motion.ndim not in (2, 3) or motion.dtype.kind not in "fiu":
+    motions = arrays[key]
+    if motions.ndim not in (2, 3) or motions.dtype.kind not in "fiu":
         raise FileFormatError(
-            f"{path}: {key} has shape {motion.shape} and type {motion.dtype}, expected numbers of "
-            "shape (T, D) or (N, T, D)"
+            f"{path}: {key} has shape {motions.shape} and type {motions.dtype}, expected numbers "
+            "of shape (T, D) or (N, T, D)"
         )
-    outcomes = _first(arrays, ("outcome", "outcomes", "outcomes_seen"))
-    single = motion.ndim == 2
-    motions = motion[None] if single else motion
-    if outcomes is not None:
-        outcomes = np.reshape(outcomes, (1, -1)) if single else outcomes
-        if outcomes.ndim != 2 or len(outcomes) != len(motions) or outcomes.dtype.kind not in "fiu":
-            raise FileFormatError(
-                f"{path}: outcomes have shape {outcomes.shape}, expected numbers of shape "
-                f"({len(motions)}, k)"
-            )
-    named = _first(arrays, ("joint_names", "names"))
-    names = () if named is None else tuple(map(str, np.ravel(named)))
-    for index in range(len(motions)):
+    outcomes = next((arrays[name] for name in _OUTCOME_KEYS if name in arrays), None)
+    single = motions.ndim == 2
+    if single:
+        motions, outcomes = motions[None], None if outcomes is None else outcomes.reshape(1, -1)
+    if outcomes is not None and (
+        outcomes.ndim != 2 or len(outcomes) != len(motions) or outcomes.dtype.kind not in "fiu"
+    ):
+        raise FileFormatError(
+            f"{path}: outcomes have shape {outcomes.shape}, expected numbers of shape "
+            f"({len(motions)}, k)"
+        )
+    names = tuple(map(str, np.ravel(arrays.get("joint_names", arrays.get("names", ())))))
+    for index, motion in enumerate(motions):
         episode = path.stem if single else str(index)
         outcome = None if outcomes is None else outcomes[index]
 
-        def one(index: int = index, episode: str = episode, outcome: Any = outcome) -> Recording:
-            clock = _clock(path, arrays, motions.shape[1], index, episode, options)
-            return recorded(episode, clock, motions[index], names, outcome=outcome)
+        def one(
+            index: int = index,
+            motion: Positions = motion,
+            episode: str = episode,
+            outcome: np.ndarray | None = outcome,
+        ) -> Recording:
+            clock = _clock(path, arrays, len(motion), index, episode, options)
+            return recorded(episode, clock, motion, names, outcome=outcome)
 
         yield episode, one
 
 
 def _arrays(path: Path) -> Arrays:
-    """Everything in a file; of our own demonstrations and plans also what their metadata says."""
+    """Everything in a file; of our own demonstrations and plans also their metadata."""
     if path.suffix.lower() == ".npy":
         check_bytes(path, path.stat().st_size)
         with named_damage(path, "NPY with plain numbers"), path.open("rb") as file:
@@ -100,10 +106,6 @@ def _arrays(path: Path) -> Arrays:
         return content
 
 
-def _first(arrays: Arrays, keys: Sequence[str]) -> np.ndarray | None:
-    return next((arrays[key] for key in keys if key in arrays), None)
-
-
 def _clock(
     path: Path, arrays: Arrays, count: int, index: int, episode: str, options: ReadOptions
 ) -> Clock:
@@ -113,17 +115,15 @@ def _clock(
             name = next((n for n in arrays if split_unit(n, SECONDS)[0] in _TIMES), None)
         elif name not in (*arrays, NO_COLUMN):
             raise FileFormatError(f"{path} has no array {name}; it holds {sorted(arrays)}")
-        if name == NO_COLUMN:
-            return options.clock(episode, count)
-        if name is not None:
+        if name is not None and name in arrays:
             stamps = arrays[name]
             if stamps.size == count:
                 stamps = stamps.ravel()  # a column, as panda_py's `get_log` has it
             elif stamps.ndim == 2:
                 stamps = stamps[index]
             return options.clock(episode, count, stamps=stamps, name=name)
-        if "dt" in arrays:
+        if name is None and "dt" in arrays:
             return options.clock(episode, count, name="dt", own_rate=1 / float(arrays["dt"]))
-        if "rate" in arrays:
+        if name is None and "rate" in arrays:
             return options.clock(episode, count, name="rate", own_rate=float(arrays["rate"]))
     return options.clock(episode, count)

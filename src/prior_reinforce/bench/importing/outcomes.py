@@ -31,6 +31,7 @@ from prior_reinforce.bench.importing.units import (
     conversion,
     judge_unit,
     known_unit,
+    listed,
     split_any_unit,
 )
 from prior_reinforce.errors import (
@@ -157,7 +158,7 @@ def find_outcomes(
         f" ({above} is not beside them: name it with --outcomes if it is theirs)" if above else ""
     )
     raise InvalidDemonstrationsError(
-        f"no outcomes for episodes {_listed([r.episode for r in recordings])}, and no recording "
+        f"no outcomes for episodes {listed([r.episode for r in recordings])}, and no recording "
         f"format says where the object landed; write {places[0] / OUTCOMES_FILE} with the columns "
         "episode,x,y (import --inspect writes one to fill in), or name a table with "
         f"--outcomes{hint}"
@@ -369,14 +370,14 @@ def outcomes_of(
     missing = [episode for episode in episodes if episode not in picked]
     if missing:
         raise InvalidDemonstrationsError(
-            f"no outcome for episodes {_listed(missing)} in {outcomes.where} (it has "
-            f"{_listed(there)}); measure and add them, or leave those episodes out"
+            f"no outcome for episodes {listed(missing)} in {outcomes.where} (it has "
+            f"{listed(there) or 'none'}); measure and add them, or leave those episodes out"
         )
     unknown = [name for name in there if name not in picked.values()]
     if unknown and not partial:
         raise InvalidDemonstrationsError(
-            f"{outcomes.where} names episodes {_listed(unknown)} that were not found (there are "
-            f"{_listed(episodes)}); correct the names, or record them again"
+            f"{outcomes.where} names episodes {listed(unknown)} that were not found (there are "
+            f"{listed(episodes)}); correct the names, or record them again"
         )
     rows = outcomes.frame.loc[[picked[episode] for episode in episodes]]
     values = np.array(rows[list(outcomes.names)], dtype=np.float64)
@@ -406,8 +407,3 @@ def _digits_at_end(name: str) -> str:
     """The number at the end of a name, without leading zeros; empty if there is none."""
     match = re.search(r"([0-9]+)$", name)
     return (match[1].lstrip("0") or "0") if match else ""
-
-
-def _listed(names: Sequence[str]) -> str:
-    shown = ", ".join(names[:12])
-    return f"{shown} and {len(names) - 12} more" if len(names) > 12 else shown or "none"

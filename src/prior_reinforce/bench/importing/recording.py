@@ -1,4 +1,4 @@
-"""One episode as it was recorded, and what the readers of all formats share."""
+"""One episode as recorded, and what the readers of all formats share."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
 from prior_reinforce.arrays import Point
 from prior_reinforce.bench.importing.bounds import check_names
@@ -27,9 +27,9 @@ from prior_reinforce.files import without_advice
 Positions = Float[np.ndarray, "T D"]
 """D channels at T times, in their units."""
 Episodes = Iterable[tuple[str, Callable[[], "Recording"]]]
-"""What a format's reader finds: names, and how to read each; what is left out is never read."""
+"""What a format's reader yields: names, and how to read each; left-out episodes are never read."""
 NO_COLUMN = "none"
-"""What is said for the column of times where none shall be read."""
+"""Value of `time_column` by which no times are read."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,26 +41,25 @@ class Recording:
     times: Times
     """Time of each frame from the first, strictly increasing."""
     positions: Positions
-    """What was recorded, in the recorder's units."""
+    """Positions in the recorder's units."""
     names: tuple[str, ...] = ()
-    """Names of the D channels, as recorded but without a unit that stands in them (`x_cm` is `x`);
-    `joint1`, `joint2`, ... where the file names none."""
+    """Names of the D channels as recorded, without units (`x_cm` is `x`); `joint1`, `joint2`, ...
+    if the file names none."""
     outcome: Point | None = None
-    """Where the object landed, for the rare file that says so."""
+    """Where the object landed, for the rare file that holds it."""
     remarks: tuple[str, ...] = ()
-    """What a person should know about how it was read."""
+    """Notes for a person on how it was read."""
     units: tuple[str | None, ...] = ()
-    """Unit of each channel that the file says; None where it says none. Empty takes those that
-    stand in the names."""
+    """Unit of each channel in the file; None if it states none. Empty takes those in the names."""
     clock: str = ""
-    """Where the times are from, for a person: `t in ms`."""
+    """Source of the times, for a person: `t in ms`."""
     ambiguities: tuple[Ambiguity, ...] = ()
-    """What is only guessed of the times."""
+    """What is only inferred of the times."""
     columns: tuple[str, ...] = ()
-    """What the file calls the D channels, where that is not their `names`: numbered columns that
-    are taken as the joints in order."""
+    """The file's own names of the D channels, if not `names`: numbered columns that are taken as
+    the joints in order."""
     left_out: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    """Least and greatest value of channels that move and are not among these, by name."""
+    """Least and greatest value of other channels that move, by name."""
     named: bool = field(init=False)
     """Whether the file names the channels."""
 
@@ -102,30 +101,31 @@ class Recording:
                 f"{episode}: time is {times[bad[0]]} at frame {bad[0]}, expected a finite number; "
                 "mend or drop that episode"
             )
-        again = _repeated(times, positions)
+        # A frame that repeats the one before, time and all; another at the same time is an error.
+        same = (np.diff(times) == 0) & np.all(np.diff(positions, axis=0) == 0, axis=1)
+        again = np.concatenate([[False], same])
         if np.any(again) and not np.all(again[1:]):
             times, positions = times[~again], positions[~again]
             remark = f"{again.sum()} frames were recorded twice; once is kept"
             object.__setattr__(self, "remarks", (*self.remarks, remark))
-        backward = np.flatnonzero(np.diff(times) <= 0)
-        if backward.size:
-            frame = int(backward[0]) + 1
+        if np.any(np.diff(times) <= 0):
+            frame = int(np.argmax(np.diff(times) <= 0)) + 1
             raise InvalidDemonstrationsError(
                 f"{episode}: time does not increase at frame {frame} ({times[frame - 1]:g} s, then "
                 f"{times[frame]:g} s); sort or drop those frames"
             )
-        if self.outcome is not None:
-            outcome = np.atleast_1d(np.array(self.outcome, dtype=np.float64))
-            object.__setattr__(self, "outcome", outcome)
+        outcome = self.outcome
+        if outcome is not None:
+            outcome = np.atleast_1d(np.array(outcome, dtype=np.float64))
         times -= times[0]
         times.setflags(write=False)
         positions.setflags(write=False)
-        object.__setattr__(self, "named", bool(self.names))
-        object.__setattr__(self, "units", units)
-        object.__setattr__(self, "times", times)
-        object.__setattr__(self, "positions", positions)
-        object.__setattr__(self, "names", names)
-        object.__setattr__(self, "columns", tuple(self.columns) or names)
+        checked = {
+            "times": times, "positions": positions, "outcome": outcome, "named": bool(self.names),
+            "names": names, "units": units, "columns": tuple(self.columns) or names,
+        }  # fmt: skip
+        for name, value in checked.items():
+            object.__setattr__(self, name, value)
 
     @property
     def duration(self) -> float:
@@ -147,21 +147,12 @@ def recorded(
 
 
 def unread() -> Recording:
-    """Stand for an episode that was left out before anything of it was read."""
-    raise AssertionError("what is left out is never read")
-
-
-def _repeated(times: Times, positions: Positions) -> Bool[np.ndarray, " T"]:
-    """Which frames repeat the one before, time and all.
-
-    A second, different frame at one time is not among them: it is an error.
-    """
-    same = (np.diff(times) == 0) & np.all(np.diff(positions, axis=0) == 0, axis=1)
-    return np.concatenate([[False], same])
+    """Stand for an episode that was left out before any of it was read."""
+    raise AssertionError("left-out episodes are never read")
 
 
 def _without_units(names: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[str | None, ...]]:
-    """Names and the units that stood in them; where two would be one, all stay as they are."""
+    """Names without units, and the units; if two names would coincide, all stay as they are."""
     split = [split_unit(name, CHANNEL_UNITS) for name in names]
     stripped = tuple(name for name, _ in split)
     units = tuple(unit for _, unit in split)
@@ -172,8 +163,8 @@ def _without_units(names: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[str |
 def named_damage(path: Path, what: str) -> Iterator[None]:
     """Turn whatever a format's library raises on a damaged file into one named error.
 
-    Wide on purpose: parsers of foreign formats raise anything on damaged bytes (struct.error,
-    UnicodeDecodeError, RuntimeError, KeyError, their own trees). Keep only parsing inside.
+    Broad on purpose: parsers raise anything on damaged bytes (struct.error, UnicodeDecodeError,
+    RuntimeError, KeyError, their own classes). Keep only parsing inside.
 
     Raises:
         FileFormatError: With the library's first words.

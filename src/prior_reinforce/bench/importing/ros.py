@@ -112,16 +112,14 @@ def _topic(bag: Path, reader: Any, key: str | None) -> tuple[list[Any], str]:
 def _states(
     bag: Path, name: str, messages: list[tuple[int, Any]], options: ReadOptions
 ) -> Recording:
-    """One episode of JointStates; messages that lack a wanted joint are another publisher's."""
+    """One episode of JointStates; messages that lack a wanted joint are from other publishers."""
     check_names(bag, {joint for _, message in messages for joint in message.name})
-    kinds = Counter(tuple(sorted(message.name)) for _, message in messages)
     every = list(dict.fromkeys(joint for _, message in messages for joint in message.name))
-    # Only their recorded names are looked for in each message.
+    # Messages are matched by recorded names only.
     found = None if options.joints is None else find_channels(options.joints, every)
     wanted = options.joints if found is None else tuple(every[i] for i in found)
     if wanted is None:
-        common = kinds.most_common(1)[0][0]
-        wanted = next(tuple(m.name) for _, m in messages if tuple(sorted(m.name)) == common)
+        wanted = Counter(tuple(sorted(m.name)) for _, m in messages).most_common(1)[0][0]
     kept = [(stamp, m) for stamp, m in messages if set(wanted) <= set(m.name)]
     if not kept:
         raise FileFormatError(
@@ -131,7 +129,7 @@ def _states(
     remarks = []
     if len(kept) < len(messages):
         remarks.append(f"{len(messages) - len(kept)} messages without all joints skipped")
-    # Everything else a message holds, such as fingers, stays available by name.
+    # Other channels of these messages, such as fingers, stay available by name.
     names = tuple(n for n in kept[0][1].name if all(n in m.name for _, m in kept))
     with named_damage(bag, "a ROS bag"):
         rows = [[dict(zip(m.name, m.position, strict=True))[n] for n in names] for _, m in kept]

@@ -24,6 +24,7 @@ from prior_reinforce.bench.importing.units import (
     conversion,
     judge_unit,
     known_unit,
+    listed,
     say_names,
 )
 from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
@@ -224,8 +225,7 @@ def _left_out(recordings: Sequence[Recording], columns: Sequence[list[int]]) -> 
         f"{name}, {min(low for low, _ in spans):.4g} to {max(high for _, high in spans):.4g}"
         for name, spans in ranges.items()
     ]
-    more = f" and {len(said) - 12} more" if len(said) > 12 else ""
-    return "; ".join(said[:12]) + more
+    return listed(said, "; ")
 
 
 def _said_unit(

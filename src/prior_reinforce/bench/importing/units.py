@@ -1,7 +1,7 @@
 """Units of recordings: read from names, converted, and judged by what an arm can do.
 
-A guess is never taken silently. It is an `Ambiguity`: what cannot be, what it looks like, and the
-option that settles it.
+No guess is silent. Each is an `Ambiguity`: what is implausible, what it looks like, and the option
+that settles it.
 """
 
 from __future__ import annotations
@@ -54,19 +54,19 @@ _ENDING = re.compile(r"(?P<name>.+?)[_ ](?P<unit>[a-zµμ°]+)")
 
 @dataclass(frozen=True)
 class Ambiguity:
-    """Something that a recording does not say, and that cannot be what it would be taken for."""
+    """Something that a recording does not state, and whose default is implausible."""
 
     what: str
-    """What cannot be, and what it looks like: a clause."""
+    """What is implausible, and what it looks like: a clause."""
     option: str
-    """The option that says it is as it looks, for instance `--time-unit ms`."""
+    """The option that confirms what it looks like, for instance `--time-unit ms`."""
 
 
 def raise_if_ambiguous(ambiguities: Iterable[Ambiguity], also: str = "") -> None:
-    """Do nothing where nothing is ambiguous.
+    """Raise if anything is ambiguous.
 
     Args:
-        ambiguities: What is.
+        ambiguities: What is ambiguous.
         also: Other problems, so that all are reported at once.
 
     Raises:
@@ -80,7 +80,7 @@ def raise_if_ambiguous(ambiguities: Iterable[Ambiguity], also: str = "") -> None
 
 
 def known_unit(text: str) -> str | None:
-    """Return the unit that a text spells, for instance `deg` for `°`; None where it spells none."""
+    """Return the unit that a text spells, for instance `deg` for `°`; None if it spells none."""
     return _UNITS.get(text.strip().strip("[]()").strip().lower())
 
 
@@ -92,7 +92,7 @@ def split_unit(column: str, among: Collection[str]) -> tuple[str, str | None]:
         among: Units that may stand there.
 
     Returns:
-        For instance `("x", "cm")`; the whole name and None where there is no such unit.
+        For instance `("x", "cm")`; the whole name and None if there is no such unit.
     """
     for pattern in (_BRACKETS, _ENDING):
         match = pattern.fullmatch(column.strip())
@@ -121,20 +121,17 @@ CHANNEL_UNITS = tuple(_BASE)
 
 
 def base_of(unit: str) -> tuple[str, float]:
-    """Return a recorded unit's own, and what to multiply with: rad and pi/180 for deg.
-
-    Units of neither angle, length nor time stay as they are.
-    """
+    """Return the base unit and the factor to it, rad and pi/180 for deg; other units stay."""
     if unit in SECONDS:
         return "s", SECONDS[unit]
     return _BASE.get(unit, (unit, 1.0))
 
 
 def conversion(recorded: str, wanted: str, name: str) -> float:
-    """Return what to multiply numbers of one unit with to get another.
+    """Return the factor from one unit to another.
 
     Raises:
-        ConfigurationError: An angle is wanted in metres, or the like.
+        ConfigurationError: One cannot be converted to the other.
     """
     (here, factor), (there, divisor) = base_of(recorded), base_of(wanted)
     if here != there:
@@ -147,18 +144,18 @@ def conversion(recorded: str, wanted: str, name: str) -> float:
 
 @dataclass(frozen=True)
 class UnitGuess:
-    """What a number says of the unit that it is taken to be in."""
+    """Whether a number can be in a unit."""
 
     unit: str
     """That unit."""
     looks: str | None
-    """The unit it looks like: the same where it is plausible, None where no unit fits."""
+    """The unit it looks like: the same if that is plausible, None if no unit fits."""
     possible: bool
-    """Whether it can be in that unit where somebody says so."""
+    """Whether it can be in that unit if that is stated explicitly."""
 
     @property
     def plausible(self) -> bool:
-        """Whether nothing speaks against that unit."""
+        """Whether it is plausible in that unit."""
         return self.looks == self.unit
 
 
@@ -166,37 +163,40 @@ def judge_unit(unit: str, number: float, *, period: bool = False) -> UnitGuess:
     """Judge whether a number can be in a unit.
 
     Args:
-        unit: `rad` or `m`, or of a period a unit of time; numbers in any other are plausible.
-        number: The largest angle or length, without its sign; or a period.
+        unit: `rad` or `m`, or for a period a unit of time; any other unit is plausible.
+        number: The largest absolute angle or length, or a period.
         period: Whether it is the time between two frames.
     """
-    ranges = _PLAUSIBLE.get("period" if period else unit)
-    if ranges is None:
+    ranges = _PLAUSIBLE.get("period" if period else unit, {unit: (0.0, math.inf)})
+    fitting = [u for u, (low, high) in ranges.items() if low <= number <= high]
+    if unit in fitting:
         return UnitGuess(unit, unit, possible=True)
-    low, high = ranges[unit]
-    if low <= number <= high:
-        return UnitGuess(unit, unit, possible=True)
-    looks = next((u for u, (least, most) in ranges.items() if least <= number <= most), None)
-    return UnitGuess(unit, looks, possible=not period and number <= BEYOND_DOUBT * high)
+    possible = not period and number <= BEYOND_DOUBT * ranges[unit][1]
+    return UnitGuess(unit, fitting[0] if fitting else None, possible)
 
 
 def say_names(names: Sequence[str]) -> str:
-    """Say many names in few words: `q[0] to q[6], t`; names that are numbered on are one group."""
+    """Abbreviate a list of names: `q[0] to q[6], t`; consecutive numbers are one group."""
     groups: list[list[str]] = []
     for name in names:
         if groups and _follows(groups[-1][-1], name):
             groups[-1].append(name)
         else:
             groups.append([name])
-    said = [g[0] if len(g) == 1 else f"{g[0]} to {g[-1]}" for g in groups]
-    return ", ".join(said[:12]) + (f" and {len(said) - 12} more" if len(said) > 12 else "")
+    return listed([g[0] if len(g) == 1 else f"{g[0]} to {g[-1]}" for g in groups])
+
+
+def listed(items: Sequence[str], separator: str = ", ") -> str:
+    """Join up to twelve items, and count the rest."""
+    more = f" and {len(items) - 12} more" if len(items) > 12 else ""
+    return separator.join(items[:12]) + more
 
 
 def _follows(before: str, name: str) -> bool:
-    """Whether one name is the other but for a number that is one higher."""
+    """Whether the names differ in one number only, which is one higher in the second."""
     one, two = re.split(r"(\d+)", before), re.split(r"(\d+)", name)
-    differ = [i for i, (a, b) in enumerate(zip(one, two, strict=False)) if a != b]
+    differ = [(a, b) for a, b in zip(one, two, strict=False) if a != b]
     if len(one) != len(two) or len(differ) != 1:
         return False
-    a, b = one[differ[0]], two[differ[0]]
+    ((a, b),) = differ
     return a.isdigit() and b.isdigit() and int(b) == int(a) + 1

@@ -61,11 +61,8 @@ def read(source: Path, options: ReadOptions) -> Episodes:
         # Consolidated metadata would say it all a second time, and could say something else.
         how: Any = {"use_consolidated": False} if newer else {}
         group: Any = zarr.open_group(store, mode="r", **how)
-        vectors = sorted(
-            name.removeprefix("data/")
-            for name, (shape, _) in arrays.items()
-            if name.startswith("data/") and len(shape) == 2
-        )
+        there = sorted(name.removeprefix("data/") for name in arrays if name.startswith("data/"))
+        vectors = [name for name in there if len(arrays[f"data/{name}"][0]) == 2]
         key = vectors[0] if options.key is None and len(vectors) == 1 else options.key
         if key not in vectors:
             raise FileFormatError(
@@ -75,10 +72,14 @@ def read(source: Path, options: ReadOptions) -> Episodes:
         if _ENDS not in arrays:
             raise FileFormatError(f"{source} has no numbers at {_ENDS}; copy the store again")
         ends = np.asarray(_numbers(source, group, arrays, _ENDS), dtype=np.int64).ravel()
-        if ends.size == 0:
-            raise FileFormatError(f"{source} holds no episode; copy the store again")
         positions = np.asarray(_numbers(source, group, arrays, f"data/{key}"), dtype=np.float64)
-        stamps = _stamps(source, group, arrays, options)
+        times, stamps = options.time_column or (_TIMES if _TIMES in there else NO_COLUMN), None
+        if times in there:
+            stamps = _numbers(source, group, arrays, f"data/{times}").ravel()
+        elif times != NO_COLUMN:
+            raise FileFormatError(f"{source} has no array {times} in data/; it has {there}")
+    if ends.size == 0:
+        raise FileFormatError(f"{source} holds no episode; copy the store again")
     starts = np.concatenate([[0], ends[:-1]])
     if np.any(ends <= starts) or ends[-1] != len(positions):
         raise FileFormatError(
@@ -88,22 +89,11 @@ def read(source: Path, options: ReadOptions) -> Episodes:
     for number, (start, end) in enumerate(zip(starts.tolist(), ends.tolist(), strict=True)):
 
         def one(episode: str = str(number), start: int = start, end: int = end) -> Recording:
-            own, name = None if stamps is None else stamps[start:end], options.time_column or _TIMES
-            clock = options.clock(episode, end - start, stamps=own, name=name)
+            own = None if stamps is None else stamps[start:end]
+            clock = options.clock(episode, end - start, stamps=own, name=times)
             return recorded(episode, clock, positions[start:end])
 
         yield str(number), one
-
-
-def _stamps(source: Path, group: Any, arrays: Arrays, options: ReadOptions) -> Stamps | None:
-    """Times of all frames, where the store has them."""
-    there = sorted(name.removeprefix("data/") for name in arrays if name.startswith("data/"))
-    name = options.time_column or (_TIMES if _TIMES in there else NO_COLUMN)
-    if name == NO_COLUMN:
-        return None
-    if name not in there:
-        raise FileFormatError(f"{source} has no array {name} in data/; it has {there}")
-    return np.asarray(_numbers(source, group, arrays, f"data/{name}")).ravel()
 
 
 def _numbers(source: Path, group: Any, arrays: Arrays, name: str) -> Stamps:
@@ -112,7 +102,7 @@ def _numbers(source: Path, group: Any, arrays: Arrays, name: str) -> Stamps:
     check_numbers(source, name, shape)
     check_chunks(source, name, shape, chunks)
     array = group[name]
-    # One chunk alone first: where that is damaged, it is said once, not by all readers at a time.
+    # One chunk first: damage is then reported once, not by all reading threads.
     np.asarray(array[(slice(0, 1),) * len(shape)])
     return np.asarray(array[:])
 
