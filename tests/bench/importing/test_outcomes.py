@@ -197,6 +197,12 @@ def test_a_table_may_say_how_uncertain_outcomes_are(recording, tmp_path, head, u
     assert f"uncertain by up to {1000 * noise:.2g} mm" in result.preview.text
 
 
+def test_the_uncertainty_may_be_the_first_column(tmp_path):
+    found = read_outcomes(table(tmp_path, "sd,episode,x,y\n0.02,a,1,2\n,b,3,4\n"))
+    np.testing.assert_allclose(found.frame.loc["a"], (1, 2, 0.02))
+    np.testing.assert_allclose(found.frame.loc["b"], (3, 4, 0))
+
+
 def test_one_uncertainty_is_of_one_unit(recording, tmp_path):
     path = table(
         tmp_path, "episode,x,turn,sd\n" + "".join(f"{i},{i},{int(i) % 2},1\n" for i in OUTCOMES)

@@ -242,19 +242,19 @@ def read_outcomes(
     units = [table.units[i] or split[i][1] for i in columns]
     scale = [base_of(unit)[1] if unit else 1.0 for unit in units]
     sd = lower.index(SD) if SD in lower else None
-    every = {i: table.cells[i] for i in (key, *columns, *there.values(), *([sd] if sd else []))}
+    cells = table.cells
     rows: dict[str, list[object]] = {}
-    for row, name in enumerate(map(from_cell, every[key])):
+    for row, name in enumerate(map(from_cell, cells[key])):
         if name in rows:
             line = table.lines[row]
             raise FileFormatError(f"{path}, line {line}: {index[0]} {name} again; drop one of them")
-        said = [every[i][row] for i in there.values()]
+        said = [cells[i][row] for i in there.values()]
         place = [math.nan] * len(columns)
-        if any(every[i][row] for i in columns):
+        if any(cells[i][row] for i in columns):
             place = [_finite(path, table, row, i) * s for i, s in zip(columns, scale, strict=True)]
         elif not any(said):
             continue
-        uncertain = 0.0 if sd is None or not every[sd][row] else _finite(path, table, row, sd)
+        uncertain = 0.0 if sd is None or not cells[sd][row] else _finite(path, table, row, sd)
         rows[name] = [*place, uncertain, *said]
     frame = pd.DataFrame.from_dict(rows, orient="index", columns=[*kept, SD, *there])
     sd_unit = None if sd is None else table.units[sd] or split[sd][1] or (units or [None])[0]
