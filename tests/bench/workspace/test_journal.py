@@ -51,6 +51,26 @@ def test_a_damaged_journal_is_named(workspace):
         Workspace(workspace.folder)
 
 
+@pytest.mark.parametrize("column", ["time", "event"])
+def test_an_event_that_is_no_text_is_named(workspace, column):
+    """SQLite itself would not write it: a damaged page holds it."""
+    ask(workspace)
+    workspace.close()
+    path = workspace.folder / "journal.sqlite"
+    for statement in (
+        "UPDATE sqlite_master SET sql = replace(sql, 'NOT NULL', '') WHERE type = 'table'",
+        "DELETE FROM sqlite_master WHERE type = 'trigger'",
+        f"UPDATE events SET {column} = NULL WHERE id = 2",
+    ):
+        connection = sqlite3.connect(path)
+        connection.execute("PRAGMA writable_schema = ON")
+        assert connection.execute(statement).rowcount > 0
+        connection.commit()
+        connection.close()
+    with pytest.raises(WorkspaceError, match="event 2 is not what was written"):
+        Workspace(workspace.folder).state.trials  # noqa: B018
+
+
 def test_a_reading_that_was_damaged_on_the_disk_is_never_believed(workspace):
     tell(workspace, ask(workspace).number, [0.0512, 0.0])
     workspace.close()

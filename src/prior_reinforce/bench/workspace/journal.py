@@ -110,8 +110,9 @@ class Journal:
             (self._entries[-1].id if self._entries else 0,),
         )
         for id_, time, text, written in rows:
-            digest = _digest(self._last_digest, time, text)
-            if digest != written:
+            texts = isinstance(time, str) and isinstance(text, str)  # damaged, they may be none
+            digest = _digest(self._last_digest, time, text) if texts else None
+            if digest is None or digest != written:
                 raise WorkspaceError(
                     f"{self._path}: event {id_} is not what was written; restore the journal "
                     "from a copy"
