@@ -23,33 +23,33 @@ class ReadOptions:
     """Format of the source: npz, csv, excel, lerobot, robomimic, droid, ros, zarr; detected if not
     given."""
     key: str | None = None
-    """Where the motion is within the source: array of an NPZ, feature of a LeRobot data set, path
+    """Place of the motion in the source: array of an NPZ, feature of a LeRobot data set, path
     of an HDF5 data set inside an episode, topic of a bag. If not given, the only candidate."""
     rate: float | None = None
-    """Frames a second, for a source without times; where it has times, they must agree."""
+    """Frames per second, for a source without times; if it has times, they must agree."""
     time_unit: Literal["s", "ms", "us", "ns", "frame"] | None = None
-    """Unit of the recorded times, where their name does not say it (`t_ms`); `frame` for a column
+    """Unit of the recorded times, if their name does not give it (`t_ms`); `frame` for a column
     that counts frames."""
     time_column: str | None = None
     """Column or array of the times: its name, or its number from 1; none reads no times."""
     episode_column: str | None = None
-    """Column of a table that says which episode a row is of."""
+    """Column of a table that names the episode of each row."""
     delimiter: str | None = None
-    """Delimiter of a CSV: comma, semicolon, tab, space, or the character; found out if not
+    """Delimiter of a CSV: comma, semicolon, tab, space, or the character; inferred if not
     given."""
     decimal: Literal[".", ","] | None = None
-    """Decimal sign of a CSV; found out if not given."""
+    """Decimal sign of a CSV; inferred if not given."""
     episodes: tuple[str, ...] | None = None
     """Episodes to keep, in order; all if not given."""
     leave_out: tuple[str, ...] | None = None
     """Episodes to leave out; they are not read."""
     joints: tuple[str, ...] | None = None
-    """Recorded names of the channels to keep, in the plan's order; where the source names nothing,
-    the names of all its columns. If not given, all channels (on the command line, the manifest's
+    """Recorded names of the channels to keep, in the plan's order; if the source names no columns,
+    names for all of them. If not given, all channels (on the command line, the manifest's
     action names)."""
     units: tuple[str, ...] | None = None
     """Recorded units of those channels: rad, deg, m, cm, mm, in; a single one holds for all. If not
-    given, what the source says, and the plan's where it says nothing."""
+    given, those that the source states, else the plan's."""
 
     def __post_init__(self) -> None:
         """Check, and turn lists into tuples."""

@@ -78,7 +78,7 @@ class Preprocessing:
 
 @dataclass(frozen=True, eq=False)
 class Preprocessed:
-    """Plans, and what was done to get them."""
+    """Plans, and how they were made."""
 
     plans: Plans
     dt: float
@@ -96,7 +96,7 @@ class Preprocessed:
     smoothed: Float[np.ndarray, "N 2 D"] | None
     """What smoothing changed in each plan: rms and largest change; None where nothing was."""
     remarks: tuple[str, ...]
-    """What a person should know, the most important first: `episodes: what`."""
+    """Warnings, the most important first: `episodes: what`."""
 
 
 def preprocess(
@@ -107,7 +107,7 @@ def preprocess(
     Args:
         recordings: N of them, each with the same D channels.
         units: Of the D channels.
-        settings: How.
+        settings: How to trim, resample and smooth them.
 
     Raises:
         InvalidDemonstrationsError: An episode that never moves, or is longer than the horizon.
@@ -213,7 +213,7 @@ def _remarks(
     *,
     held: bool,
 ) -> Iterator[tuple[_Kind, str]]:
-    """What a person should know of one episode: gaps, jumps, and ends in mid-swing."""
+    """Warnings about one episode: gaps, jumps, and ends in mid-swing."""
     t, steps = recording.times, np.diff(recording.times)
     within = (t[1:] > span[0]) & (t[:-1] < span[1])
     worst = int(np.argmax(np.where(within, steps, 0.0)))

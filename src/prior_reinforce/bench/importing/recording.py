@@ -48,7 +48,7 @@ class Recording:
     outcome: Point | None = None
     """Where the object landed, for the rare file that holds it."""
     remarks: tuple[str, ...] = ()
-    """Notes for a person on how it was read."""
+    """Notes on how it was read."""
     units: tuple[str | None, ...] = ()
     """Unit of each channel in the file; None if it states none. Empty takes those in the names."""
     clock: str = ""

@@ -1,4 +1,4 @@
-"""How large the sheets of a workbook are, found out before they are laid out in memory.
+"""Size of a workbook's sheets, checked before they are allocated.
 
 A reader of workbooks allocates all cells up to the last that is not empty, so one stray cell at
 XFD1048576 asks for 512 GB. Here the packed XML is passed through once, and nothing of it is kept.
@@ -16,11 +16,11 @@ from prior_reinforce.bench.importing.bounds import check_bytes, check_table
 _REFERENCE = re.compile(r"([A-Z]{1,3})(\d{1,7})")
 """Of a cell in an .xlsx, such as `XFD1048576`."""
 _CHUNK = 1 << 20
-"""Bytes that are passed to the parser at a time."""
+"""Bytes passed to the parser at a time."""
 
 
 def check_workbook(path: Path) -> None:
-    """Refuse a workbook with a sheet that could be no recording.
+    """Refuse a workbook with a sheet too large for a recording.
 
     Raises:
         FileFormatError: It unpacks to too much, or a sheet has too many rows or columns.
