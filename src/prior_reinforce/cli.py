@@ -9,6 +9,7 @@ from __future__ import annotations
 import io
 import os
 import pkgutil
+import re
 import select
 import sys
 import unicodedata
@@ -125,7 +126,7 @@ def _parse(args: list[str]) -> Command:
 
 @contextmanager
 def _in_one_line() -> Iterator[None]:
-    """Say in a line what is wrong with a command line, for which tyro draws a box.
+    """Say in one line what is wrong with a command line; tyro draws a box.
 
     Raises:
         ConfigurationError: It is wrong.
@@ -137,27 +138,14 @@ def _in_one_line() -> Iterator[None]:
     except SystemExit as end:
         if end.code != 2:
             raise
-        raise ConfigurationError(_without_box(box.getvalue())) from None
+        words = re.sub(r"\u256d.*|[\u2502\u2570\u256f\s]+", " ", box.getvalue())
+        parts = [" ".join(part.split()) for part in re.split("\u2500+", words)]
+        said = [part for part in parts if part and "helptext:" not in part]
+        raise ConfigurationError("; ".join(said) or "wrong; see --help") from None
     except (ValueError, OverflowError) as error:  # numbers of hundreds of digits
         raise ConfigurationError(f"cannot read the command line ({error}); see --help") from error
-    finally:
-        if sys.exc_info()[0] is not ConfigurationError:
-            sys.stderr.write(box.getvalue() if "\u256d" not in box.getvalue() else "")
-
-
-def _without_box(text: str) -> str:
-    """The words of a box: what is wrong, what may have been meant, and where more is said."""
-    lines = [line.strip("\u2502 ") for line in text.splitlines()]
-    parts: list[list[str]] = [[]]
-    for line in lines:
-        if line.startswith("\u256d"):
-            continue
-        if set(line) <= set("\u2500\u2570\u256f"):
-            parts.append([])
-        else:
-            parts[-1].append(line)
-    said = [" ".join(part) for part in parts if part and "helptext:" not in part[0]]
-    return "; ".join(" ".join(part.split()) for part in said) or "wrong; see --help"
+    else:
+        sys.stderr.write(box.getvalue())
 
 
 def _check_values(given: object, name: str = "") -> None:

@@ -274,9 +274,9 @@ def test_where_the_arm_stands_is_asked_after_the_person(run, folder, driver, tmp
 
 
 def cut_off(folder):
-    with Workspace(folder) as workspace, workspace.log.journal.exclusive():
+    with Workspace(folder) as workspace, workspace.log.exclusive():
         # What is written before the program dies.
-        workspace.log.journal.append(Executing(trial=1, command="arm {plan}", folder=""))
+        workspace.log.append(Executing(trial=1, command="arm {plan}", folder=""))
 
 
 @pytest.mark.parametrize(("answer", "stage"), [("no", "asked"), ("yes", "executing")])

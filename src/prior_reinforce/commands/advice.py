@@ -12,7 +12,7 @@ from jaxtyping import Float
 
 from prior_reinforce.arrays import Points
 from prior_reinforce.bench.workspace.workspace import Workspace
-from prior_reinforce.commands.workspace import Folder
+from prior_reinforce.commands.workspace import OnWorkspace
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.wording import say_place
 
@@ -27,74 +27,61 @@ _MARGIN = 0.1
 
 
 @dataclass(frozen=True)
-class Advise:
-    """Say where first throws would hit, and where one more throw or demonstration teaches most."""
+class Advise(OnWorkspace):
+    """Say where first throws would hit, and where one more throw or demonstration teaches most.
 
-    folder: Folder
-    """Workspace whose goal was set with the adapter bayes."""
+    For a goal that was set with the adapter bayes.
+    """
+
     adapter: Annotated[str | None, tyro.conf.arg(metavar="module:Class")] = None
     """The adapter that the goal was set with, where it is your own: module:Class."""
     out: Path | None = None
     """Picture, a .png; advice.png in the workspace if not given."""
 
-    def run(self) -> None:
+    def run_on(self, workspace: Workspace) -> None:
         """Look over the region, print, and draw."""
         out = self.out or self.folder / "advice.png"
         if out.suffix != ".png":
             raise ConfigurationError(f"--out must name a .png file, got {out}")
-        with Workspace(self.folder) as workspace:
-            session = workspace.session(own_adapter=self.adapter)
-            adapter = session.informed_adapter()
-            p_hit, gain = getattr(adapter, "p_hit", None), getattr(adapter, "gain", None)
-            if p_hit is None or gain is None:
-                raise ConfigurationError(
-                    f"the adapter {session.goals[-1].adapter} knows no probabilities; set the "
-                    "goal with --adapter bayes"
-                )
-            outcomes = session.demonstrations.outcomes_seen
-            goals = _region(outcomes)
-            conditions = np.array([adapter.propose(goal) for goal in goals])
-            p = p_hit(conditions, goals, session.tolerance)
-            throws = gain(conditions, conditions)
-            coarse = np.arange(0, len(goals), _DEMONSTRATED_EVERY)
-            shown = gain(goals[coarse], conditions, demonstrations=True)
-            names, units = workspace.manifest.outcome_names, workspace.manifest.outcome_units
-
-            def at(place: int) -> str:
-                return say_place(goals[place], names, units)
-
-            best, throw, most = (int(np.argmax(of)) for of in (p, throws, shown))
-            demonstration = int(coarse[most])
-            worst = int(np.argmin(p))
-            print(
-                f"first throws hit with probability {p.mean():.2f} on average over the "
-                f"demonstrated region: {p[best]:.2f} at {at(best)}, {p[worst]:.2f} at {at(worst)}"
+        session = workspace.session(own_adapter=self.adapter)
+        adapter = session.informed_adapter()
+        p_hit, gain = getattr(adapter, "p_hit", None), getattr(adapter, "gain", None)
+        if p_hit is None or gain is None:
+            raise ConfigurationError(
+                f"the adapter {session.goals[-1].adapter} knows no probabilities; set the "
+                "goal with --adapter bayes"
             )
+        outcomes = session.demonstrations.outcomes_seen
+        goals = _region(outcomes)
+        conditions = np.array([adapter.propose(goal) for goal in goals])
+        p = p_hit(conditions, goals, session.tolerance)
+        throws = gain(conditions, conditions)
+        tried = np.arange(0, len(goals), _DEMONSTRATED_EVERY)
+        shown = gain(goals[tried], conditions, demonstrations=True)
+        names, units = workspace.manifest.outcome_names, workspace.manifest.outcome_units
+        places = [say_place(goal, names, units) for goal in goals]
+        best, worst, throw = np.argmax(p), np.argmin(p), np.argmax(throws)
+        demonstration = tried[np.argmax(shown)]
+        print(
+            f"first throws hit with probability {p.mean():.2f} on average over the "
+            f"demonstrated region: {p[best]:.2f} at {places[best]}, {p[worst]:.2f} at "
+            f"{places[worst]}\n"
+            f"the throw that teaches most: {places[throw]} ({throws[throw]:.0%} of what is "
+            f"unknown; half of all places teach less than {np.median(throws):.0%})"
+        )
+        if teaches := bool(shown.max() > 0):
             print(
-                f"the throw that teaches most: {at(throw)} "
-                f"({throws[throw]:.0%} of what is unknown; half of all places teach less than "
-                f"{np.median(throws):.0%})"
+                "the demonstration that teaches most: one that ends at "
+                f"{places[demonstration]} ({shown.max():.0%} of what is unknown)"
             )
-            shows = bool(shown[most] > 0)
-            print(
-                f"the demonstration that teaches most: one that ends at {at(demonstration)} "
-                f"({shown[most]:.0%} of what is unknown)"
-                if shows
-                else "one more demonstration here would teach nothing that trials do not"
-            )
-            if goals.shape[1] == 2:
-                from prior_reinforce.report.advice import draw_advice
+        else:
+            print("one more demonstration here would teach nothing that trials do not")
+        if goals.shape[1] == 2:
+            from prior_reinforce.report.advice import draw_advice
 
-                picture = draw_advice(
-                    out,
-                    goals,
-                    p,
-                    outcomes,
-                    goals[throw],
-                    goals[demonstration] if shows else None,
-                    (names, units),
-                )
-                print(f"picture: {picture}")
+            shows = goals[demonstration] if teaches else None
+            picture = draw_advice(out, goals, p, outcomes, goals[throw], shows, (names, units))
+            print(f"picture: {picture}")
 
 
 def _region(outcomes: Points) -> Float[np.ndarray, "m k"]:

@@ -10,19 +10,16 @@ import tyro
 from rich.console import Console
 
 from prior_reinforce.commands.live import fit_progress, say
-from prior_reinforce.commands.simulated import GeneratorChoice, TaskChoice, learn, open_task
+from prior_reinforce.commands.simulated import GeneratorChoice, OnTask, learn
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.files import claim_folder
 from prior_reinforce.generators import make_generator
 
 
 @dataclass(frozen=True)
-class FromTask:
+class FromTask(OnTask):
     """What is learned from where there is no workspace, and where to."""
 
-    task: TaskChoice = "basketball-v1"
-    demonstrations: str = "A"
-    """Prior set: A, B, or the path of a demonstrations file of the same plan format."""
     out: Path = Path("runs/model")
     """Folder for the model."""
 
@@ -49,6 +46,7 @@ class Learn:
         choice = self.generator
         if self.align:  # what auto takes for one pattern, aligned
             choice = f"{'interpolation' if choice == 'auto' else choice},timing=align"
+        make_generator(choice, device=self.device)  # a wrong setting is reported first
         if self.folder is None:
             self._learn_from_task(choice)
         elif self.simulated == FromTask():
@@ -63,7 +61,6 @@ class Learn:
         from prior_reinforce.bench.workspace.workspace import Workspace
         from prior_reinforce.commands.workspace import print_next
 
-        make_generator(choice, device=self.device)
         with Workspace(folder) as workspace:
             with fit_progress(Console()) as progress:
                 learned = workspace.learn(
@@ -76,8 +73,8 @@ class Learn:
 
     def _learn_from_task(self, choice: str) -> None:
         source, console = self.simulated, Console()
-        generator = make_generator(choice, device=self.device)
-        _, demonstrations = open_task(source.task, source.demonstrations, self.seed)
+        _, demonstrations = source.open()
         claim_folder(source.out)
+        generator = make_generator(choice, device=self.device)
         learn(demonstrations, source.out, generator, seed=self.seed, console=console)
         say(console, f"model of {demonstrations.n} demonstrations saved in {source.out}")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,7 +21,7 @@ from prior_reinforce.wording import from_words, plain, say_place, to_words
 if TYPE_CHECKING:
     from prior_reinforce.environment import Rollout, Task
     from prior_reinforce.generators.base import FitProgress
-    from prior_reinforce.lab.experiments.protocol import GoalTrials
+    from prior_reinforce.lab.experiments.protocol import FailedReading, GoalTrials
     from prior_reinforce.perception.base import Perception
 
 
@@ -41,14 +42,13 @@ class LiveView:
 
     def __init__(self, console: Console, task: Task, n_demonstrations: int) -> None:
         """Remember where to print, and how many demonstrations count into N."""
-        self._console = console
-        self._task = task
-        self._n = n_demonstrations
+        self._say = partial(say, console)
+        self._task, self._n = task, n_demonstrations
 
     def goal(self, number: int, n_goals: int, goal: Point) -> None:
         """Announce a goal."""
         of_all = f" {number} of {n_goals}" if n_goals > 1 else ""
-        say(self._console, (f"\ngoal{of_all}", "bold"), f": {place(self._task, goal)}")
+        self._say((f"\ngoal{of_all}", "bold"), f": {place(self._task, goal)}")
 
     def trial(self, result: GoalTrials) -> None:
         """Print the latest trial: how the condition moved, what was seen, solved or not."""
@@ -63,20 +63,15 @@ class LiveView:
         if trial.hit:
             seen = ("HIT", "bold green")
         chance = "" if trial.p_hit is None else f"chance {trial.p_hit:4.0%}  "
-        say(self._console, f"  trial {len(result.trials)}  {aim:<36} {chance}seen: ", seen)
+        self._say(f"  trial {len(result.trials)}  {aim:<36} {chance}seen: ", seen)
 
     def end(self, result: GoalTrials) -> None:
         """Print the paper's count for this goal."""
-        solved_at = result.solved_at
-        if solved_at is None:
-            trials = f" in {len(result.trials)} trials"
-            say(self._console, "  ", ("not reached", "bold red"), trials)
-            return
-        say(
-            self._console,
-            f"  reached: N = {self._n} demonstrations + {solved_at} "
-            f"trial{'s' if solved_at > 1 else ''} = {self._n + solved_at}",
-        )
+        if (n := result.solved_at) is None:
+            self._say("  ", ("not reached", "bold red"), f" in {len(result.trials)} trials")
+        else:
+            trials = f"{n} trial{'s' if n > 1 else ''}"
+            self._say(f"  reached: N = {self._n} demonstrations + {trials} = {self._n + n}")
 
     def summary(self, results: Sequence[GoalTrials]) -> None:
         """Print the count over all goals."""
@@ -84,12 +79,11 @@ class LiveView:
         if len(results) < 2 or not solved:
             return
         mean = np.mean(solved)
-        say(
-            self._console,
+        self._say(
             (f"\n{len(solved)} of {len(results)} goals reached", "bold"),
             f", on average N = {self._n} + {mean:.1f} = {self._n + mean:.1f} trials",
         )
-        say(self._console, f"trials by goal: {trials_by_goal(results)}")
+        self._say(f"trials by goal: {trials_by_goal(results)}")
 
 
 def trials_by_goal(results: Sequence[GoalTrials]) -> str:
@@ -102,52 +96,40 @@ def place(task: Task, point: Point) -> str:
     return say_place(point, task.outcome_names, ("m",) * len(point))
 
 
-class Operator:
-    """The person at the terminal; nobody and nothing else may make up a number."""
+def asking(console: Console, task: Task, perception: Perception) -> FailedReading:
+    """Who looks where perception gives up: the person at the terminal, and nobody else.
 
-    def __init__(self, console: Console, task: Task, perception: Perception) -> None:
-        """Remember where to talk, and whose pictures to show."""
-        self._console = console
-        self._task = task
-        self._perception = perception
+    Args:
+        console: Where to ask.
+        task: What an error is of.
+        perception: Whose latest picture to show, if it has one.
 
-    def look(
-        self, failure: PerceptionFailedError, rollout: Rollout, goal: Point, rng: object
-    ) -> Reading:
-        """Ask for the error of an execution that perception could not see.
+    Returns:
+        Asks for the error, in [m]; a PerceptionFailedError where there is no terminal or no answer.
+    """
 
-        Args:
-            failure: Why not.
-            rollout: What came of it; not looked at.
-            goal: g, in [m].
-            rng: Not used.
-
-        Returns:
-            What is seen of the error, in [m].
-
-        Raises:
-            PerceptionFailedError: There is no terminal to ask at, or no answer.
-        """
+    def ask(failure: PerceptionFailedError, _: Rollout, goal: Point, __: object) -> Reading:
         if not sys.stdin.isatty():
             raise PerceptionFailedError(
                 f"{failure}; there is no terminal to ask at: run in one, or choose another "
                 "--perception"
             ) from failure
-        say(self._console, f"  not seen: {failure}")
-        latest = getattr(self._perception, "latest", None)
-        if latest is not None:
-            say(self._console, f"  picture: {latest}")
+        say(console, f"  not seen: {failure}")
+        if (latest := getattr(perception, "latest", None)) is not None:
+            say(console, f"  picture: {latest}")
         while True:
             try:
                 text = input(
-                    f"  what was the error, seen from {place(self._task, goal)}? for instance "
+                    f"  what was the error, seen from {place(task, goal)}? for instance "
                     '"5cm long, 2cm left", or hit: '
                 )
                 return from_words(text, len(goal))
             except EOFError as error:
                 raise PerceptionFailedError(f"{failure}; no answer came") from error
             except InvalidFeedbackError as error:
-                say(self._console, f"  {error}")
+                say(console, f"  {error}")
+
+    return ask
 
 
 @contextmanager

@@ -154,13 +154,13 @@ class Look:
         from prior_reinforce.bench.workspace.workspace import Workspace
 
         with Workspace(self.workspace) as workspace:
-            session, units = workspace.session(), workspace.manifest.outcome_units
+            state, units = workspace.state, workspace.manifest.outcome_units
             if tuple(units) != ("m", "m"):
                 raise ConfigurationError(
                     f"a photograph from above shows two lengths, but outcomes are in {list(units)};"
                     " leave --workspace out, and tell what you see"
                 )
-            goal = session.goals[session.trial(self.trial).goal_number - 1].goal
+            goal = state.goal_of(state.trial(self.trial)).goal
         return goal, self.workspace / "pictures", f"trial-{self.trial:03d}-seen"
 
 

@@ -11,10 +11,9 @@ import tyro
 from prior_reinforce.arrays import FARTHEST, Point, as_error
 from prior_reinforce.bench.workspace.status import tell_example
 from prior_reinforce.bench.workspace.workspace import Workspace
-from prior_reinforce.commands.workspace import Folder
+from prior_reinforce.commands.workspace import OnWorkspace
 from prior_reinforce.errors import ConfigurationError, InvalidFeedbackError
 from prior_reinforce.readings import Reading
-from prior_reinforce.session.session import Session
 from prior_reinforce.wording import in_words, read_error, read_numbers
 
 Number = Annotated[int, tyro.conf.Positional, tyro.conf.arg(metavar="TRIAL")]
@@ -24,11 +23,9 @@ _LARGEST_PLAUSIBLE_METRES = 1.0
 
 
 @dataclass(frozen=True)
-class Seen:
+class Seen(OnWorkspace):
     """A trial and its result."""
 
-    folder: Folder
-    """Workspace."""
     number: Annotated[int | None, tyro.conf.Positional, tyro.conf.arg(metavar="[TRIAL]")] = None
     """Number of the trial."""
     seen: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="[SEEN]")] = ()
@@ -54,9 +51,7 @@ class Seen:
             raise ConfigurationError("say which trial: its number comes after the workspace")
         return self.number
 
-    def read(
-        self, workspace: Workspace, session: Session
-    ) -> tuple[Reading | Point | None, bool | None]:
+    def read(self, workspace: Workspace) -> tuple[Reading | Point | None, bool | None]:
         """Return what was seen, as `Session.tell` takes it, and whether it hit, if given."""
         given = [bool(self.seen), self.error is not None, self.outcome is not None]
         said = any(given) or self.hit or self.miss
@@ -66,7 +61,7 @@ class Seen:
                 "--miss if that was seen as well, or one of those alone"
             )
         hit = True if self.hit else False if self.miss else None
-        goal = session.goals[session.trial(self.trial).goal_number - 1].goal
+        goal = workspace.state.goal_of(workspace.state.trial(self.trial)).goal
         if self.outcome is not None:
             if len(self.outcome) != goal.size:
                 raise InvalidFeedbackError(

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -13,7 +12,7 @@ from rich.console import Console
 
 from prior_reinforce.adapters import ADAPTERS, DEFAULT_ADAPTER, make_adapter
 from prior_reinforce.arrays import Frames, Point, Points
-from prior_reinforce.commands.live import LiveView, Operator, fit_progress, say, trials_by_goal
+from prior_reinforce.commands.live import LiveView, asking, fit_progress, say, trials_by_goal
 from prior_reinforce.errors import ConfigurationError, FileFormatError, InvalidGoalError
 from prior_reinforce.files import claim_folder
 from prior_reinforce.generators import GENERATORS, make_generator
@@ -28,9 +27,8 @@ if TYPE_CHECKING:
     from prior_reinforce.lab.experiments.adaptation import FilmOrWhyNot
     from prior_reinforce.lab.experiments.protocol import GoalTrials
     from prior_reinforce.perception.base import Perception
+    from prior_reinforce.session.session import Session
 
-See = Callable[["Perception", Console], Demonstrations]
-"""Sees the demonstrations of a task."""
 SEEN = "seen"
 """Folder beside the report for what a camera or a model saw and said."""
 
@@ -46,25 +44,32 @@ PerceptionChoice = Annotated[
 ]
 
 
-def open_task(task: str, demonstrations: str, seed: int) -> tuple[Task, Demonstrations]:
-    """Make a task and load demonstrations for it, a prior set by its name or an `.npz` file.
+@dataclass(frozen=True)
+class OnTask:
+    """A simulated task, and demonstrations for it."""
 
-    Raises:
-        ConfigurationError: An unknown task or prior set, a negative seed, or another plan format.
-        FileFormatError: No such file.
-    """
-    if seed < 0:
-        raise ConfigurationError(f"--seed must be 0 or more, got {seed}")
-    made = make_task(task)
-    if not (demonstrations.endswith(".npz") or Path(demonstrations).is_file()):
-        return made, made.demonstrations(demonstrations)
-    loaded = Demonstrations.load(demonstrations)
-    if loaded.format.names != made.format.names:
-        raise ConfigurationError(
-            f"{demonstrations} moves {loaded.format.names}, but {made.name} needs "
-            f"{made.format.names}; choose the task that it was recorded on"
-        )
-    return made, loaded
+    task: TaskChoice = "basketball-v1"
+    demonstrations: str = "A"
+    """Prior set of the task (A or B; in the zoo KIND-COUNT-SEED, as clean-6-0), or the path of a
+    demonstrations file of the same plan format."""
+
+    def open(self) -> tuple[Task, Demonstrations]:
+        """Make the task and load the demonstrations.
+
+        Raises:
+            ConfigurationError: An unknown task or prior set, or another plan format.
+            FileFormatError: No such file.
+        """
+        task, given = make_task(self.task), self.demonstrations
+        if not (given.endswith(".npz") or Path(given).is_file()):
+            return task, task.demonstrations(given)
+        loaded = Demonstrations.load(given)
+        if loaded.format.names != task.format.names:
+            raise ConfigurationError(
+                f"{given} moves {loaded.format.names}, but {task.name} needs "
+                f"{task.format.names}; choose the task that it was recorded on"
+            )
+        return task, loaded
 
 
 def learn(
@@ -87,23 +92,7 @@ def learn(
 
 
 @dataclass(frozen=True)
-class Simulated:
-    """What every command on a simulated task is told."""
-
-    task: TaskChoice = "basketball-v1"
-    demonstrations: str = "A"
-    """Prior set of the task (A or B; in the zoo KIND-COUNT-SEED, as clean-6-0), or the path of a
-    demonstrations file of the same plan format."""
-    seed: int = 0
-    """Seed of training, goals, disturbances and perception."""
-
-    def open(self) -> tuple[Task, Demonstrations]:
-        """Make the task and load the demonstrations; see `open_task`."""
-        return open_task(self.task, self.demonstrations, self.seed)
-
-
-@dataclass(frozen=True)
-class Adapt(Simulated):
+class Adapt(OnTask):
     """Reach new goals on a simulated task, trial by trial (Stage 2), and write the report."""
 
     goal: tuple[str, ...] = ("random",)
@@ -118,61 +107,90 @@ class Adapt(Simulated):
     """Endpoint and model for --perception vlm (docs/perception.md)."""
     adapter: AdapterChoice = DEFAULT_ADAPTER
     rounds: int = 10
-    """Trials at most."""
+    """Largest number of trials per goal."""
     out: Path = Path("runs/adapt")
     """Folder for the report."""
     film: bool = True
     """Draw the last trial as a film."""
+    seed: int = 0
+    """Seed of training, goals, disturbances and perception."""
 
     def run(self) -> int:
         """Adapt; exit status 1 if the goal was not reached."""
         task, demonstrations = self.open()
         if self.rounds < 1:
             raise ConfigurationError(f"--rounds must be at least 1, got {self.rounds}")
-        goals = self._goals(task, demonstrations)
-        return self.reach(task, goals, lambda *_: demonstrations)
+        return self.reach(task, demonstrations, self._goals(task, demonstrations))
 
-    def reach(self, task: Task, goals: Points, see: See, *, outcomes: str = "exact") -> int:
+    def reach(
+        self, task: Task, demonstrations: Demonstrations, goals: Points, *, perceive: bool = False
+    ) -> int:
         """Learn, and work through goals.
 
         Args:
             task: Where they are tried.
+            demonstrations: D_prior.
             goals: Each is worked through in turn, [m].
-            see: Returns the demonstrations with their outcomes as they were seen.
-            outcomes: How the report says that those are known.
+            perceive: Whether the demonstrations are executed first, for their outcomes to be seen.
 
         Returns:
             Exit status: 1 if a goal was not reached.
         """
         from prior_reinforce.lab.experiments.learned import load_learned
+        from prior_reinforce.session.session import Session
 
         console = Console()
-        # Made first, so that a wrong setting is told before anything is learned.
-        make_adapter(self.adapter)
-        unfitted = make_generator(self.generator)
+        # Made first, so that a wrong setting is reported before anything is learned.
+        adapter, unfitted = make_adapter(self.adapter), make_generator(self.generator)
         with make_perception(
             self.perception, scene=task.scene, config=self.vlm, seed=self.seed
         ) as perception:
             claim_folder(self.out)
-            demonstrations = see(perception, console)
+            if perceive:
+                demonstrations = self._perceive(task, demonstrations, perception, console)
             if self.model is None:
                 folder = self.out / "model"
                 generator = learn(demonstrations, folder, unfitted, seed=self.seed, console=console)
             else:
                 generator = load_learned(self.model, demonstrations, generator=self.generator)
-            return self._adapt(
-                task, demonstrations, generator, perception, goals, console, outcomes
-            )
+            outcomes = f"seen by {self.perception}" if perceive else "exact"
+            facts = {
+                "Demonstrations": f"{demonstrations.n}, {self.demonstrations}, outcomes {outcomes}",
+                "Generator": self.generator if self.model is None else f"the model in {self.model}",
+                "Adapter": self.adapter,
+                "Perception": self._seen_by(),
+                "Seed": str(self.seed),
+            }
+            session = Session(generator, adapter, demonstrations)
+            return self._adapt(task, session, perception, goals, facts, console)
+
+    def _perceive(
+        self, task: Task, recorded: Demonstrations, perception: Perception, console: Console
+    ) -> Demonstrations:
+        """Execute the demonstrations once, see where they go, and keep that for `adapt`."""
+        from prior_reinforce.lab.experiments.adaptation import recording
+        from prior_reinforce.lab.experiments.protocol import perceive_demonstrations
+
+        say(console, f"executing {recorded.n} demonstrations once, seen by {self.perception}")
+        eyes = recording(perception, self.out / SEEN, "demonstration")
+        ask = asking(console, task, eyes)
+        demonstrations = perceive_demonstrations(
+            task, recorded, eyes, seed=self.seed, on_failed_reading=ask
+        )
+        path = self.out / "demonstrations.npz"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        demonstrations.save(path)
+        say(console, f"their outcomes, as seen: {path}")
+        return demonstrations
 
     def _adapt(
         self,
         task: Task,
-        demonstrations: Demonstrations,
-        generator: Generator,
+        session: Session,
         perception: Perception,
         goals: Points,
+        facts: dict[str, str],
         console: Console,
-        outcomes: str,
     ) -> int:
         """Work through goals in one session, with a live view, and write the report."""
         from prior_reinforce.lab.experiments.adaptation import (
@@ -181,10 +199,8 @@ class Adapt(Simulated):
             report_adaptation,
         )
         from prior_reinforce.lab.experiments.protocol import reach_goals
-        from prior_reinforce.session.session import Session
 
-        view = LiveView(console, task, demonstrations.n)
-        session = Session(generator, make_adapter(self.adapter), demonstrations)
+        view = LiveView(console, task, session.demonstrations.n)
         results: list[GoalTrials] = []
         films: list[FilmOrWhyNot] = []
         for i, goal in enumerate(goals, start=1):
@@ -199,7 +215,7 @@ class Adapt(Simulated):
                 rounds=self.rounds,
                 seed=seed,
                 on_round=lambda _, so_far: view.trial(so_far[0]),
-                on_failed_reading=Operator(console, task, recorded).look,
+                on_failed_reading=asking(console, task, recorded),
             )
             view.end(result)
             results.append(result)
@@ -211,15 +227,11 @@ class Adapt(Simulated):
             films.append(film)
         view.summary(results)
         facts = {
-            "Demonstrations": f"{demonstrations.n}, {self.demonstrations}, outcomes {outcomes}",
-            "Generator": self.generator if self.model is None else f"the model in {self.model}",
-            "Adapter": self.adapter,
-            "Perception": self._seen_by(),
-            "Seed": str(self.seed),
+            **facts,
             "Trials by goal": trials_by_goal(results),
             "Earlier goals' trials used": "yes" if session.goals[-1].carry_over else "no",
         }
-        page = report_adaptation(self.out, task, demonstrations, results, films, facts)
+        page = report_adaptation(self.out, task, session.demonstrations, results, films, facts)
         say(console, f"report: {page}")
         if (self.out / SEEN).is_dir() and recorded is not perception:
             say(console, f"what was seen, with boxes and all answers: {self.out / SEEN}")
@@ -266,44 +278,16 @@ class Demo:
 
         if self.goals < 1:
             raise ConfigurationError(f"--goals must be at least 1, got {self.goals}")
-        adapt = Adapt(
-            seed=self.seed,
-            generator=self.generator,
-            perception=self.perception,
-            vlm=self.vlm,
-            out=self.out,
-            film=self.film,
-        )
+        settings = {each.name: getattr(self, each.name) for each in fields(self)}
+        del settings["goals"]
+        adapt = Adapt(**settings)
         task, recorded = adapt.open()
         goals = unseen_goals(task, recorded, self.goals, np.random.default_rng([self.seed, 3]))
-
-        def see(perception: Perception, console: Console) -> Demonstrations:
-            return self._perceive(task, recorded, perception, console)
-
-        return adapt.reach(task, goals, see, outcomes=f"seen by {self.perception}")
-
-    def _perceive(
-        self, task: Task, recorded: Demonstrations, perception: Perception, console: Console
-    ) -> Demonstrations:
-        """Execute the demonstrations once, see where they go, and keep that for `adapt`."""
-        from prior_reinforce.lab.experiments.adaptation import recording
-        from prior_reinforce.lab.experiments.protocol import perceive_demonstrations
-
-        say(console, f"executing {recorded.n} demonstrations once, seen by {self.perception}")
-        eyes = recording(perception, self.out / SEEN, "demonstration")
-        ask = Operator(console, task, eyes).look
-        demonstrations = perceive_demonstrations(
-            task, recorded, eyes, seed=self.seed, on_failed_reading=ask
-        )
-        path = self.out / "demonstrations.npz"
-        path.parent.mkdir(parents=True, exist_ok=True)
-        demonstrations.save(path)
-        say(console, f"their outcomes, as seen: {path}")
-        return demonstrations
+        return adapt.reach(task, recorded, goals, perceive=True)
 
 
 @dataclass(frozen=True)
-class Rollout(Simulated):
+class Rollout(OnTask):
     """Execute one plan on a simulated task: a demonstration's, or one generated for a condition."""
 
     demonstration: int | None = None
@@ -316,6 +300,8 @@ class Rollout(Simulated):
     """How often to execute the plan."""
     film: Path | None = None
     """Write the first execution as a film to this .mp4 file."""
+    seed: int = 0
+    """Seed of the disturbances."""
 
     def run(self) -> None:
         """Execute and print where it went."""
@@ -334,12 +320,8 @@ class Rollout(Simulated):
         rollouts = task.rollout(plans, np.random.default_rng(self.seed))
         units = task.outcome_units or ("m",) * len(task.outcome_names)
         for number, rollout in enumerate(rollouts, start=1):
-            place = ", ".join(
-                f"{name} {value:.3f} {unit}"
-                for name, value, unit in zip(
-                    task.outcome_names, rollout.outcome, units, strict=True
-                )
-            )
+            components = zip(task.outcome_names, rollout.outcome, units, strict=True)
+            place = ", ".join(f"{name} {value:.3f} {unit}" for name, value, unit in components)
             hit = "  within the tolerance" if is_hit(rollout, aim, task.tolerance) else ""
             lost = "" if rollout.valid else "  (lost: it has no place on the table)"
             say(console, f"rollout {number}: {place}{lost}{hit}")

@@ -14,8 +14,7 @@ from prior_reinforce.bench.workspace.workspace import Workspace
 from prior_reinforce.commands.reading import plausible, read_seen
 from prior_reinforce.errors import FileFormatError, InvalidFeedbackError
 from prior_reinforce.readings import Reading
-from prior_reinforce.session.session import Session
-from prior_reinforce.session.trials import Stage
+from prior_reinforce.session.trials import Stage, Trial
 
 _TRIAL, _SAID, _HIT = ("trial", "trial_id", "number"), "said", "hit"
 _ANSWERS = {"yes": True, "y": True, "true": True, "1": True, "hit": True} | {
@@ -35,7 +34,7 @@ class Row:
     hit: bool | None
 
 
-def rows_to_tell(path: Path, workspace: Workspace, session: Session) -> list[Row]:
+def rows_to_tell(path: Path, workspace: Workspace) -> list[Row]:
     """Return the rows of a table whose trials still wait for a result.
 
     Rows of voided trials, and of trials with this very result, are skipped.
@@ -44,8 +43,7 @@ def rows_to_tell(path: Path, workspace: Workspace, session: Session) -> list[Row
         path: A CSV of any dialect or a workbook: `trial`, a column for each component with where
             the object ended in the table frame (`x_cm`, `y [mm]`), or `said` in words; `hit` if
             that was seen.
-        workspace: Names and units of the components.
-        session: The trials.
+        workspace: Names and units of the components, and the trials.
 
     Raises:
         FileFormatError: No such table, or a cell that cannot be read.
@@ -68,12 +66,12 @@ def rows_to_tell(path: Path, workspace: Workspace, session: Session) -> list[Row
             number = int(text)
         except ValueError:
             raise FileFormatError(f"{where}: trial is {text[:40]}, expected its number") from None
-        seen, hit = _seen(where, row, table, workspace, session, number)
-        told = session.trial(number)
+        told = workspace.state.trial(number)
+        seen, hit = _seen(where, row, table, workspace, told)
         if told.stage is Stage.VOIDED:
             continue
         if told.stage is not Stage.TOLD:
-            found.append(Row(number, seen, hit))
+            found.append(Row(told.number, seen, hit))
         elif not _is_said(told.error_seen, seen):
             raise InvalidFeedbackError(
                 f"{where} was told otherwise; correct it with: prior-reinforce amend "
@@ -83,7 +81,7 @@ def rows_to_tell(path: Path, workspace: Workspace, session: Session) -> list[Row
 
 
 def _seen(
-    where: str, row: Any, table: Outcomes, workspace: Workspace, session: Session, number: int
+    where: str, row: Any, table: Outcomes, workspace: Workspace, trial: Trial
 ) -> tuple[Reading | Point | None, bool | None]:
     """The error in one row, and whether it hit."""
     names, hit = workspace.manifest.outcome_names, None
@@ -101,8 +99,7 @@ def _seen(
             f"{where}: it has {', '.join(table.names)}, and no column for each of "
             f"{', '.join(names)}, nor one called said; add or rename one"
         )
-    goal = session.goals[session.trial(number).goal_number - 1].goal
-    return plausible(workspace, place - goal), hit
+    return plausible(workspace, place - workspace.state.goal_of(trial).goal), hit
 
 
 def _is_said(error: Point | None, seen: Reading | Point | None) -> bool:

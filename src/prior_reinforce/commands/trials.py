@@ -18,20 +18,17 @@ from prior_reinforce.bench.workspace.status import (
 )
 from prior_reinforce.bench.workspace.workspace import Workspace
 from prior_reinforce.commands.reading import Number, Seen
-from prior_reinforce.commands.workspace import Folder, print_next
+from prior_reinforce.commands.workspace import OnWorkspace, print_next
 from prior_reinforce.errors import ConfigurationError, FileFormatError
 from prior_reinforce.plans.motions import Plan
-from prior_reinforce.session.session import Session
-from prior_reinforce.session.trials import Stage, Trial
+from prior_reinforce.session.trials import Stage, State, Trial
 from prior_reinforce.wording import say_place
 
 
 @dataclass(frozen=True)
-class Ask:
+class Ask(OnWorkspace):
     """Get the plan of the next trial; asking again gives the same one until it is told."""
 
-    folder: Folder
-    """Workspace."""
     out: Path | None = None
     """Write the plan to this file as well: .npz (t, q, dq, ddq), .csv or .json. {trial} in its
     name stands for the trial's number; a folder takes trial-{trial}.npz."""
@@ -56,42 +53,49 @@ class Ask:
     adapter: str | None = None
     """The adapter that the goal was set with, where it is your own: module:Class."""
 
-    def run(self) -> int:
-        """Show the plan, write it, execute it."""
+    def run(self) -> int | None:
+        """Check the flags before anything is opened."""
         self._check_flags()
-        with Workspace(self.folder) as workspace:
-            session = workspace.session(self.generator, self.adapter)
-            self._check_out(session)
-            recovered = workspace.recover()
-            if recovered is not None:
-                print(f"trial {recovered.number}: {say_trial(workspace, recovered)}")
-            did_not_move = self.arm_did_not_move
-            if not did_not_move and _was_cut_off(workspace, session) and sys.stdin.isatty():
-                if _ask_whether_it_moved(workspace, session):
-                    print_next(workspace)
-                    return 1
-                did_not_move = True
-            reached_before = session.solved
-            trial = session.ask(arm_did_not_move=did_not_move)
-            self._show(workspace, session, trial, reached_before)
-            may_move = trial.stage is not Stage.EXECUTED
-            moves = may_move and self.run_command is not None and not self.check
-            if moves and not self.yes and not _may_move():
+        return super().run()
+
+    def run_on(self, workspace: Workspace) -> int:
+        """Show the plan, write it, execute it."""
+        session = workspace.session(self.generator, self.adapter)
+        self._check_out(workspace.state)
+        recovered = workspace.recover()
+        if recovered is not None:
+            print(f"trial {recovered.number}: {say_trial(workspace, recovered)}")
+        did_not_move = self.arm_did_not_move
+        if not did_not_move and sys.stdin.isatty() and (trial := _cut_off(workspace)) is not None:
+            print(f"trial {trial.number}: {say_trial(workspace, trial)}")
+            if _ask_whether_it_moved():
+                print_next(workspace)
+                return 1
+            did_not_move = True
+        reached_before = session.solved
+        trial = session.ask(arm_did_not_move=did_not_move)
+        self._show(workspace, trial, reached_before)
+        if trial.stage is not Stage.EXECUTED:
+            command = None if self.check else self.run_command
+            if command is not None and not self.yes and not _may_move():
                 print("nothing moved; ask again when it may")
                 return 1
             # Last: the arm may be moved by hand while a person is asked.
-            if may_move and self.where is not None and not self._is_there(workspace, trial):
+            if self.where is not None and not self._is_there(workspace, trial):
                 return 1
-            if self.check and may_move:
-                print("checked; nothing moved")
-            elif self.run_command is not None:
-                return self._execute(workspace, trial.number, self.run_command)
-            elif may_move:
-                print("execute it, then say where the object went:")
-            else:
-                print("it was executed already")
-            print_next(workspace)
-            return 0
+            if command is not None:
+                return self._execute(workspace, trial.number, command)
+            print(
+                "checked; nothing moved"
+                if self.check
+                else "execute it, then say where the object went:"
+            )
+        elif self.run_command is not None:
+            return self._execute(workspace, trial.number, self.run_command)
+        else:
+            print("it was executed already")
+        print_next(workspace)
+        return 0
 
     def _check_flags(self) -> None:
         """Say what cannot be before anything is changed."""
@@ -133,32 +137,27 @@ class Ask:
         )
         return False
 
-    def _show(
-        self, workspace: Workspace, session: Session, trial: Trial, reached_before: bool
-    ) -> None:
+    def _show(self, workspace: Workspace, trial: Trial, reached_before: bool) -> None:
         """Print where the trial aims and what the gate says, and write --out."""
         manifest = workspace.manifest
         place = say_place(trial.condition, manifest.outcome_names, manifest.outcome_units)
         print(f"trial {trial.number}: aimed at {place}")
         for line in say_expectation(workspace.state, trial):
             print(line)
-        _print_outdated(session)
+        _print_outdated(workspace)
         if reached_before:
             print("the goal is reached already: this trial repeats it")
         assert trial.plan is not None
         verdict = trial.verdict
         print("no robot in the manifest, no limits checked" if verdict is None else verdict.text())
         print(f"plan: {workspace.plan_path(trial)}")
-        begins = ", ".join(
-            f"{name} {q + 0.0:.4g} {unit}"
-            for name, q, unit in zip(
-                manifest.format.names, trial.plan[0].round(4), manifest.format.units, strict=True
-            )
-        )
+        form = manifest.format
+        first = zip(form.names, trial.plan[0].round(4) + 0.0, form.units, strict=True)
+        begins = ", ".join(f"{name} {q:.4g} {unit}" for name, q, unit in first)
         print(f"it begins at {begins}: move the arm there slowly first")
         out = self._out_of(trial.number)
         if out is not None:
-            plan = Plan(trial.plan, manifest.format)
+            plan = Plan(trial.plan, form)
             print(f"written: {write_plan(plan, out, rate=self.rate).path}")
 
     def _out_of(self, number: int) -> Path | None:
@@ -168,10 +167,10 @@ class Ask:
         out = self.out / "trial-{trial}.npz" if self.out.is_dir() else self.out
         return Path(str(out).replace("{trial}", str(number)))
 
-    def _check_out(self, session: Session) -> None:
+    def _check_out(self, state: State) -> None:
         """Say what --out cannot do before a trial is made."""
-        trial = session.open_trial
-        number = len(session.state.trials) + 1 if trial is None else trial.number
+        trial = state.open_trial
+        number = len(state.trials) + 1 if trial is None else trial.number
         out = self._out_of(number)
         if out is None:
             return
@@ -220,28 +219,26 @@ class Tell(Seen):
     """Or a table with a row a trial, such as a tracker writes: trial, x, y (where the object ended,
     units as in x_cm) or said (words), and hit. Rows that were told already are passed over."""
 
-    def run(self) -> None:
+    def run_on(self, workspace: Workspace) -> None:
         """Write it down."""
-        with Workspace(self.folder) as workspace:
-            session = workspace.session()
-            if self.table is not None:
-                self._tell_table(workspace, session, self.table)
-            else:
-                seen, hit = self.read(workspace, session)
-                _warn_of_its_execution(workspace, session, self.trial)
-                trial = session.tell(self.trial, seen, hit=hit)
-                print(f"trial {trial.number}: {_say_told(workspace, trial)}")
-            print_next(workspace)
+        if self.table is not None:
+            self._tell_table(workspace, self.table)
+        else:
+            seen, hit = self.read(workspace)
+            _warn_of_its_execution(workspace, self.trial)
+            trial = workspace.session().tell(self.trial, seen, hit=hit)
+            print(f"trial {trial.number}: {_say_told(workspace, trial)}")
+        print_next(workspace)
 
-    def _tell_table(self, workspace: Workspace, session: Session, path: Path) -> None:
+    def _tell_table(self, workspace: Workspace, path: Path) -> None:
         given = (self.number, self.seen, self.error, self.outcome, self.hit, self.miss)
         if given != (None, (), None, None, False, False):
             raise ConfigurationError("--from tells what its table says; drop what else was given")
         from prior_reinforce.commands.tracked import rows_to_tell
 
-        rows = rows_to_tell(path, workspace, session)
+        rows, session = rows_to_tell(path, workspace), workspace.session()
         for row in rows:
-            _warn_of_its_execution(workspace, session, row.number)
+            _warn_of_its_execution(workspace, row.number)
             trial = session.tell(row.number, row.seen, hit=row.hit)
             print(f"trial {trial.number}: {say_trial(workspace, trial)}")
         if not rows:
@@ -252,46 +249,36 @@ class Tell(Seen):
 class Amend(Seen):
     """Correct what was told of a trial."""
 
-    def run(self) -> None:
+    def run_on(self, workspace: Workspace) -> None:
         """Write it down."""
-        with Workspace(self.folder) as workspace:
-            session = workspace.session()
-            seen, hit = self.read(workspace, session)
-            trial = session.amend(self.trial, seen, hit=hit)
-            print(f"trial {trial.number}, corrected: {_say_told(workspace, trial)}")
-            _print_outdated(session)
-            print_next(workspace)
+        seen, hit = self.read(workspace)
+        trial = workspace.session().amend(self.trial, seen, hit=hit)
+        print(f"trial {trial.number}, corrected: {_say_told(workspace, trial)}")
+        _print_outdated(workspace)
+        print_next(workspace)
 
 
 @dataclass(frozen=True)
-class Void:
+class Void(OnWorkspace):
     """Declare that a trial is not data: the ball slipped, the arm stopped."""
 
-    folder: Folder
-    """Workspace."""
     number: Number
     """Number of the trial."""
     reason: str = ""
     """Why, for the log and the report."""
 
-    def run(self) -> None:
+    def run_on(self, workspace: Workspace) -> None:
         """Write it down."""
-        with Workspace(self.folder) as workspace:
-            session = workspace.session()
-            trial = session.void(self.number, self.reason)
-            print(
-                f"trial {trial.number}: {say_trial(workspace, trial)}; nothing is learned from it"
-            )
-            _print_outdated(session)
-            print_next(workspace)
+        trial = workspace.session().void(self.number, self.reason)
+        print(f"trial {trial.number}: {say_trial(workspace, trial)}; nothing is learned from it")
+        _print_outdated(workspace)
+        print_next(workspace)
 
 
 @dataclass(frozen=True)
-class Export:
+class Export(OnWorkspace):
     """Write a trial's plan in another form: NPZ, CSV, or JSON in ROS 2's JointTrajectory order."""
 
-    folder: Folder
-    """Workspace."""
     number: Number
     """Number of the trial."""
     out: Annotated[Path, tyro.conf.Positional]
@@ -299,21 +286,22 @@ class Export:
     rate: float | None = None
     """Samples a second; the plan's own frames if not given."""
 
-    def run(self) -> None:
+    def run_on(self, workspace: Workspace) -> None:
         """Write it, if it may still be executed."""
-        with Workspace(self.folder) as workspace:
-            plan = workspace.plan(workspace.state.trial(self.number))
-            verdict = workspace.gate(plan.actions)
-            if verdict is not None:
-                verdict.require()
-            written = write_plan(plan, self.out, rate=self.rate)
+        plan = workspace.plan(workspace.state.trial(self.number))
+        verdict = workspace.gate(plan.actions)
+        if verdict is not None:
+            verdict.require()
+        written = write_plan(plan, self.out, rate=self.rate)
         print(f"written: {written.path}  sha256 {written.sha256}")
 
 
-def _was_cut_off(workspace: Workspace, session: Session) -> bool:
-    trial = session.open_trial
-    executing = trial is not None and trial.stage is Stage.EXECUTING
-    return executing and not workspace.log.is_executing()
+def _cut_off(workspace: Workspace) -> Trial | None:
+    """The trial that was executing when the program stopped, if any."""
+    trial = workspace.state.open_trial
+    if trial is None or trial.stage is not Stage.EXECUTING or workspace.log.is_executing():
+        return None
+    return trial
 
 
 def _say_told(workspace: Workspace, trial: Trial) -> str:
@@ -324,9 +312,9 @@ def _say_told(workspace: Workspace, trial: Trial) -> str:
     return f"{said}; numbers without a unit are centimetres" if no_unit else said
 
 
-def _warn_of_its_execution(workspace: Workspace, session: Session, number: int) -> None:
+def _warn_of_its_execution(workspace: Workspace, number: int) -> None:
     """Say before a reading is taken what could make it mislead."""
-    trial = session.trial(number)
+    trial = workspace.state.trial(number)
     warning = execution_warning(workspace, trial) if trial.open else ""
     if warning:
         print(
@@ -336,9 +324,9 @@ def _warn_of_its_execution(workspace: Workspace, session: Session, number: int) 
         )
 
 
-def _print_outdated(session: Session) -> None:
+def _print_outdated(workspace: Workspace) -> None:
     """Say so where the trial that waits was planned before a correction."""
-    trial = session.open_trial
+    trial = workspace.state.open_trial
     if trial is not None and trial.stage is Stage.ASKED and trial.outdated:
         print(f"trial {trial.number} was {OUTDATED}")
 
@@ -351,9 +339,7 @@ def _may_move() -> bool:
         return False
 
 
-def _ask_whether_it_moved(workspace: Workspace, session: Session) -> bool:
-    assert session.open_trial is not None
-    print(f"trial {session.open_trial.number}: {say_trial(workspace, session.open_trial)}")
+def _ask_whether_it_moved() -> bool:
     while True:
         try:
             answer = input("did the arm move? (yes/no) ").strip().lower()

@@ -33,6 +33,23 @@ def print_next(workspace: Workspace) -> None:
 
 
 @dataclass(frozen=True)
+class OnWorkspace:
+    """A command on a workspace."""
+
+    folder: Folder
+    """Workspace."""
+
+    def run(self) -> int | None:
+        """Open the workspace and do it there; the exit status, None for 0."""
+        with Workspace(self.folder) as workspace:
+            return self.run_on(workspace)
+
+    def run_on(self, workspace: Workspace) -> int | None:
+        """What the command does."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True)
 class New:
     """Make a workspace: a folder with a commented manifest."""
 
@@ -97,22 +114,20 @@ class New:
 
 
 def _say_robot(robot: RobotLimits) -> str:
-    unknown = [key for key in ("acceleration", "jerk") if getattr(robot, key) is None]
     said = f"robot {robot.robot}: {', '.join(robot.joint_names)}; limits from {robot.source}"
-    if unknown:
-        said += (
-            f"; no limits of {' and '.join(unknown)} are known: plans are compared with the "
-            "demonstrations in these"
-        )
-    return said
+    unknown = [key for key in ("acceleration", "jerk") if getattr(robot, key) is None]
+    if not unknown:
+        return said
+    return (
+        f"{said}; no limits of {' and '.join(unknown)} are known: plans are compared with the "
+        "demonstrations in these"
+    )
 
 
 @dataclass(frozen=True)
-class Goal:
+class Goal(OnWorkspace):
     """Set the goal that the next trials are for."""
 
-    folder: Folder
-    """Workspace."""
     goal: Annotated[tuple[str, ...], tyro.conf.Positional]
     """Its place: 0.92 0.10 (metres ahead, metres left, or the outcome's units), 92cm 10cm, or
     "92cm ahead, 10cm left"."""
@@ -126,71 +141,59 @@ class Goal:
     """What was changed on the hardware since the last trial, a note: another ball, a new gripper.
     What had changed before is then unknown anew, and all else stays known."""
 
-    def run(self) -> None:
+    def run_on(self, workspace: Workspace) -> None:
         """Set it."""
-        with Workspace(self.folder) as workspace:
-            manifest = workspace.manifest
-            names, units = manifest.outcome_names, manifest.outcome_units
-            try:
-                place = read_place(" ".join(self.goal), names, units)
-            except InvalidFeedbackError as error:
-                raise InvalidGoalError(f"goal: {error}") from error
-            goal = workspace.set_goal(
-                place,
-                carry_over=None if self.memory is None else self.memory == "workspace",
-                adapter=self.adapter,
-                new_hardware=self.new_hardware,
-            )
-            print(f"goal {goal.number}: {say_place(goal.goal, names, units)}")
-            print_next(workspace)
+        manifest = workspace.manifest
+        names, units = manifest.outcome_names, manifest.outcome_units
+        try:
+            place = read_place(" ".join(self.goal), names, units)
+        except InvalidFeedbackError as error:
+            raise InvalidGoalError(f"goal: {error}") from error
+        goal = workspace.set_goal(
+            place,
+            carry_over=None if self.memory is None else self.memory == "workspace",
+            adapter=self.adapter,
+            new_hardware=self.new_hardware,
+        )
+        print(f"goal {goal.number}: {say_place(goal.goal, names, units)}")
+        print_next(workspace)
 
 
 @dataclass(frozen=True)
-class Status:
+class Status(OnWorkspace):
     """Say where a workspace stands and what to do next."""
 
-    folder: Folder
-    """Workspace."""
-
-    def run(self) -> None:
+    def run_on(self, workspace: Workspace) -> None:
         """Print ten lines."""
-        with Workspace(self.folder) as workspace:
-            print(describe(workspace))
+        print(describe(workspace))
 
 
 @dataclass(frozen=True)
-class Log:
+class Log(OnWorkspace):
     """Print the journal, one JSON object a line."""
 
-    folder: Folder
-    """Workspace."""
-
-    def run(self) -> None:
+    def run_on(self, workspace: Workspace) -> None:
         """Print it."""
-        with Workspace(self.folder) as workspace:
-            entries = workspace.events
-        for entry in entries:
+        for entry in workspace.events:
             event = msgspec.to_builtins(entry.event)
             print(json.dumps({"id": entry.id, "time": entry.time, **event}))
 
 
 @dataclass(frozen=True)
-class Report:
+class Report(OnWorkspace):
     """Write a page with every goal, its trials, and the plans that were executed."""
 
-    folder: Folder
-    """Workspace."""
     out: Path | None = None
     """Folder for the page and its pictures; `report` in the workspace if not given."""
 
-    def run(self) -> None:
+    def run_on(self, workspace: Workspace) -> None:
         """Write it."""
         from rich.console import Console
 
         from prior_reinforce.bench.workspace.report import report_workspace
         from prior_reinforce.commands.live import drawing_progress
 
-        with Workspace(self.folder) as workspace, drawing_progress(Console()) as progress:
+        with drawing_progress(Console()) as progress:
             page = report_workspace(workspace, self.out or self.folder / "report", progress)
         print(f"report: {page}")
 

@@ -351,7 +351,7 @@ class Session:
         seen: Reading | ArrayLike | None,
         hit: bool | None,
     ) -> None:
-        goal = self.state.goals[trial.goal_number - 1]
+        goal = self.state.goal_of(trial)
         reading = as_reading(seen, hit, goal.units, goal.least_sd)
         reached = reading.hit
         if reached is None:
@@ -385,7 +385,7 @@ class Session:
             self.adapter.start(self.demonstrations)
             seen, self._start, self._on_hardware_of = [], self.adapter.n_starts, 0
         for trial in readings[len(seen) :]:
-            goal = self.state.goals[trial.goal_number - 1]
+            goal = self.state.goal_of(trial)
             assert trial.reading is not None
             self._change_hardware_until(goal.number)
             reading = trial.reading.within(goal.radius)

@@ -227,6 +227,10 @@ class State:
             raise TrialStateError(f"there is no trial {number}; {known}")
         return self.trials[number - 1]
 
+    def goal_of(self, trial: Trial) -> Goal:
+        """The goal that a trial was asked for."""
+        return self.goals[trial.goal_number - 1]
+
     def trials_of(self, goal_number: int) -> tuple[Trial, ...]:
         """Trials of one goal, in order."""
         return tuple(trial for trial in self.trials if trial.goal_number == goal_number)
@@ -328,7 +332,7 @@ class State:
     def _told(self, event: Told) -> Trial:
         trial = self.trial(event.trial)
         reading = Reading.from_record(event.reading)
-        if reading.error_seen.size != self.goals[trial.goal_number - 1].goal.size:
+        if reading.error_seen.size != self.goal_of(trial).goal.size:
             raise InvalidFeedbackError("the reading has another number of components than the goal")
         return replace(trial, stage=Stage.TOLD, reading=reading, hit=event.hit)
 
@@ -337,7 +341,7 @@ class State:
         before, waiting = self.trial(corrected.number), self.open_trial
         if waiting is None or before.open or _meaning(before) == _meaning(corrected):
             return
-        used = self.readings_for(self.goals[waiting.goal_number - 1], waiting.model)
+        used = self.readings_for(self.goal_of(waiting), waiting.model)
         if before.number in {reading.number for reading in used}:
             self.trials[waiting.number - 1] = replace(waiting, outdated=True)
 

@@ -24,7 +24,7 @@ def test_the_journal_is_append_only(workspace):
 def test_two_programs_exclude_each_other(workspace, monkeypatch):
     monkeypatch.setattr("prior_reinforce.bench.workspace.journal._LOCK_TIMEOUT_S", 0.1)
     other = Workspace(workspace.folder)
-    with workspace.log.journal.exclusive(), pytest.raises(WorkspaceError, match="another command"):
+    with workspace.log.exclusive(), pytest.raises(WorkspaceError, match="another command"):
         ask(other)
     ask(other)
     other.close()
@@ -34,7 +34,7 @@ def test_two_programs_exclude_each_other(workspace, monkeypatch):
 def test_a_refused_disk_is_named_and_the_journal_stays_good(workspace):
     """A page limit stands for the full disk: SQLite then says `database or disk is full`."""
     number = ask(workspace).number
-    connection = workspace.log.journal._connection
+    connection = workspace.log._connection
     pages = connection.execute("PRAGMA page_count").fetchone()[0]
     connection.execute(f"PRAGMA max_page_count = {pages}")
     with pytest.raises(WorkspaceError, match="free some disk space"):
@@ -84,7 +84,7 @@ def test_a_reading_that_was_damaged_on_the_disk_is_never_believed(workspace):
 
 def test_a_commit_waits_for_the_disk(workspace):
     """EXTRA (3): the rollback journal's folder is synced too; a power cut cannot be tested here."""
-    connection = workspace.log.journal._connection
+    connection = workspace.log._connection
     assert connection.execute("PRAGMA synchronous").fetchone() == (3,)
 
 
@@ -111,9 +111,9 @@ def test_threads_may_share_a_workspace(workspace):
 
 def test_it_knows_whether_anything_became_durable(workspace):
     with Workspace(workspace.folder) as other:
-        assert not other.log.journal.appended
-        with pytest.raises(TypeError), other.log.journal.exclusive():
-            other.log.journal.append(Voided(trial=1, reason=object()))
-        assert not other.log.journal.appended
+        assert not other.log.appended
+        with pytest.raises(TypeError), other.log.exclusive():
+            other.log.append(Voided(trial=1, reason=object()))
+        assert not other.log.appended
         ask(other)
-        assert other.log.journal.appended
+        assert other.log.appended

@@ -76,8 +76,8 @@ def test_demonstrations_that_changed_ask_for_learning_anew(workspace):
 
 @pytest.mark.parametrize("event", [Executed, NotExecuted])
 def test_what_a_command_did_goes_through_the_journal(event):
-    result = CommandResult(("arm", "plan.npz"), 3, False, 1.5, "moved", outcome="aborted")
-    ended = msgspec.convert({"trial": 1, **result.as_json()}, event)
+    result = CommandResult(command=("arm",), exit_status=3, seconds=1.5, outcome="aborted")
+    ended = event(trial=1, **result.as_json())
     again = msgspec.json.decode(msgspec.json.encode(ended), type=WorkspaceEvent)
     assert type(again) is event
     assert (again, again.outcome, again.exit_status) == (ended, "aborted", 3)

@@ -320,8 +320,8 @@ def test_a_program_that_is_not_there_leaves_the_trial_to_be_executed(workspace):
 
 def test_an_execution_that_was_cut_off_is_never_repeated_by_itself(workspace):
     number = ask(workspace).number
-    with workspace.log.journal.exclusive():  # what execute writes before the program dies
-        workspace.log.journal.append(Executing(trial=number, command="arm {plan}", folder=""))
+    with workspace.log.exclusive():  # what execute writes before the program dies
+        workspace.log.append(Executing(trial=number, command="arm {plan}", folder=""))
     again = reopened(workspace)
     with pytest.raises(TrialStateError, match="did the arm move"):
         ask(again)

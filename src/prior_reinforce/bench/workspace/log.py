@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import AbstractContextManager
 from dataclasses import replace
 from pathlib import Path
 
 from prior_reinforce.arrays import Frames
-from prior_reinforce.bench.robots.executors.result import Outcome
+from prior_reinforce.bench.robots.executors.result import MotionResult, Outcome
 from prior_reinforce.bench.workspace.journal import JOURNAL_FILE, Journal
 from prior_reinforce.bench.workspace.store import Store
 from prior_reinforce.errors import TrialStateError, WorkspaceError
 from prior_reinforce.plans.motions import Plan, PlanFormat
 from prior_reinforce.registry import parse_choice
-from prior_reinforce.session.events import Entry, Event, KeptPlan, SessionEvent
+from prior_reinforce.session.events import Event, KeptPlan, SessionEvent
 from prior_reinforce.session.trials import Stage, State, Trial
 
 
@@ -56,19 +55,10 @@ class Executing(Event, frozen=True):
     """Name of the folder for what it writes; empty if it was never made."""
 
 
-class Executed(Event, frozen=True):
-    """The command ended, and all that it started. Fields as in `CommandResult`."""
+class Executed(Event, MotionResult, frozen=True):
+    """The command ended, and all that it started."""
 
     trial: int
-    outcome: Outcome
-    reason: str = ""
-    start_error: float | None = None
-    tracking_rms: float | None = None
-    exit_status: int | None = None
-    timed_out: bool = False
-    interrupted: bool = False
-    seconds: float = 0.0
-    output_tail: str = ""
 
 
 class NotExecuted(Executed, frozen=True):
@@ -137,7 +127,7 @@ class WorkspaceState(State):
         self.executions[event.trial] = event
 
 
-class WorkspaceLog:
+class WorkspaceLog(Journal):
     """The `Log` of a workspace's session (see `session.trials.Log`)."""
 
     def __init__(self, folder: Path, store: Store, format: PlanFormat) -> None:
@@ -153,12 +143,12 @@ class WorkspaceLog:
         # A new workspace's journal is empty until the first import has ended.
         if not path.exists() or path.stat().st_size == 0:
             self._refuse_files(("demonstrations", "models", "plans"))
-        self.journal = Journal(path, WorkspaceEvent)
+        super().__init__(path, WorkspaceEvent)
         try:
-            if not self.journal.entries():
+            if not self.entries():
                 self._refuse_files(("models", "plans"))
         except WorkspaceError:
-            self.journal.close()
+            self.close()
             raise
 
     def _refuse_files(self, parts: Sequence[str]) -> None:
@@ -171,28 +161,16 @@ class WorkspaceLog:
                     "that it named; restore the journal from a copy, or make another workspace"
                 )
 
-    def entries(self) -> Sequence[Entry]:
-        """See `Journal.entries`."""
-        return self.journal.entries()
-
     def state(self) -> WorkspaceState:
         """What happened so far, in any program.
 
         Raises:
             WorkspaceError: The journal is damaged, or another version wrote it.
         """
-        for entry in self.journal.entries()[self._n_added :]:
+        for entry in self.entries()[self._n_added :]:
             self._state.add(entry)
             self._n_added += 1
         return self._state
-
-    def exclusive(self) -> AbstractContextManager[None]:
-        """See `Journal.exclusive`."""
-        return self.journal.exclusive()
-
-    def append(self, event: Event) -> None:
-        """See `Journal.append`."""
-        self.journal.append(event)
 
     def keep_plan(self, number: int, plan: Frames) -> KeptPlan:
         """Write the plan's file, before the event that names it."""

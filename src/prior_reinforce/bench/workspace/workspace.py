@@ -17,11 +17,10 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from msgspec import convert
+from msgspec.structs import replace
 from numpy.typing import ArrayLike
 from typing_extensions import Self
 
@@ -128,7 +127,7 @@ class Workspace:
 
     def close(self) -> None:
         """Close the journal."""
-        self.log.journal.close()
+        self.log.close()
 
     def __enter__(self) -> Self:
         """Use it for the length of a block."""
@@ -136,9 +135,9 @@ class Workspace:
 
     def __exit__(self, _: object, error: BaseException | None, __: object) -> None:
         """Close the journal; an error that ends the block says whether something was recorded."""
-        if self.log.journal.appended and isinstance(error, (PriorReinforceError, OSError)):
+        if self.log.appended and isinstance(error, (PriorReinforceError, OSError)):
             error.changed = True  # type: ignore[union-attr]
-        elif self.log.journal.appended and isinstance(error, KeyboardInterrupt):
+        elif self.log.appended and isinstance(error, KeyboardInterrupt):
             error.args = error.args or ("what was recorded before stays",)
         self.close()
 
@@ -562,4 +561,4 @@ def _kept(trial: Trial) -> KeptPlan:
 def _ended(number: int, result: CommandResult) -> Executed:
     """The event of a command that ended."""
     event = NotExecuted if result.outcome == "not_moved" else Executed
-    return convert({"trial": number, **result.as_json()}, event)
+    return event(trial=number, **result.as_json())

@@ -12,15 +12,18 @@ import json
 import tempfile
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import asdict, dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
+
+from msgspec import structs
 
 from prior_reinforce.bench.robots.executors.arguments import check_command, split, split_command
 from prior_reinforce.bench.robots.executors.lock import ExecutingLock, executing_lock
 from prior_reinforce.bench.robots.executors.result import (
     NOT_MOVED_STATUS,
     DriverResult,
+    MotionResult,
     Outcome,
     read_driver_result,
 )
@@ -36,30 +39,11 @@ from prior_reinforce.files import write_once
 from prior_reinforce.wording import plain
 
 
-@dataclass(frozen=True)
-class CommandResult:
+class CommandResult(MotionResult, frozen=True, kw_only=True):
     """How a command that was given a plan ended."""
 
     command: tuple[str, ...]
     """Program and arguments as they were started."""
-    exit_status: int
-    """Status the command ended with; minus the signal's number if a signal ended it."""
-    timed_out: bool
-    """Whether it was stopped at its time limit. The arm may have moved."""
-    seconds: float
-    """How long it ran."""
-    output_tail: str
-    """The end of what it wrote to its output and error streams, in order."""
-    interrupted: bool = False
-    """Whether it was stopped by a signal (Ctrl-C). The arm may have moved."""
-    outcome: Outcome = "done"
-    """What became of the motion: what the driver says, unless how it ended says otherwise."""
-    reason: str = ""
-    """Why it was not done."""
-    start_error: float | None = None
-    """What the driver says of its distance from the plan's first frame, in [rad]."""
-    tracking_rms: float | None = None
-    """What the driver says of its distance from the plan, root mean square, in [rad]."""
 
     @property
     def succeeded(self) -> bool:
@@ -68,7 +52,7 @@ class CommandResult:
 
     def as_json(self) -> dict[str, Any]:
         """The same as plain data for the journal, without the command: it may hold passwords."""
-        return {key: value for key, value in asdict(self).items() if key != "command"}
+        return {key: value for key, value in structs.asdict(self).items() if key != "command"}
 
 
 def run_command(
@@ -196,7 +180,7 @@ def _result(
     """What became of a motion, from how its command ended and what the driver says."""
     if ended is None:
         why = "what watched over the command was killed, or found no room on the disk"
-        return CommandResult(arguments, 0, False, 0.0, "", outcome="unknown", reason=why)
+        return CommandResult(command=arguments, outcome="unknown", reason=why)
     status = int(ended["exit_status"])
     try:
         said = read_driver_result(folder)

@@ -6,9 +6,8 @@ that writes none speaks by its exit status alone.
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 import msgspec
 import numpy as np
@@ -28,16 +27,43 @@ _LARGEST_RESULT = 100_000
 """Of `result.json`, in bytes; ours: a reason is a sentence."""
 
 
+_Distance = Annotated[float, msgspec.Meta(ge=0)]
+
+
 class DriverResult(msgspec.Struct, frozen=True):
     """`result.json`."""
 
     outcome: Literal["done", "not_moved", "aborted"]
     reason: str = ""
     """Why it was not done."""
-    start_error: float | None = None
+    start_error: _Distance | None = None
     """Largest distance of a joint from the plan's first frame when the motion began, in [rad]."""
-    tracking_rms: float | None = None
+    tracking_rms: _Distance | None = None
     """Root mean square of the joints' distances from the plan, in [rad]."""
+
+
+class MotionResult(msgspec.Struct, frozen=True, kw_only=True):
+    """What became of a motion that a command was to make."""
+
+    outcome: Outcome
+    """What the driver says, unless how the command ended says otherwise."""
+    reason: str = ""
+    """Why it was not done."""
+    start_error: float | None = None
+    """The driver's distance from the plan's first frame, in [rad]."""
+    tracking_rms: float | None = None
+    """The driver's distance from the plan, root mean square, in [rad]."""
+    exit_status: int | None = None
+    """Status the command ended with; minus the signal's number if a signal ended it; None where
+    nobody knows."""
+    timed_out: bool = False
+    """Whether it was stopped at its time limit. The arm may have moved."""
+    interrupted: bool = False
+    """Whether it was stopped by a signal (Ctrl-C). The arm may have moved."""
+    seconds: float = 0.0
+    """How long it ran."""
+    output_tail: str = ""
+    """The end of what it wrote to its output and error streams, in order."""
 
 
 def read_driver_result(folder: Path) -> DriverResult | None:
@@ -51,16 +77,12 @@ def read_driver_result(folder: Path) -> DriverResult | None:
         return None
     try:
         with path.open("rb") as file:
-            said = msgspec.json.decode(file.read(_LARGEST_RESULT), type=DriverResult)
-        for number in (said.start_error, said.tracking_rms):
-            if number is not None and not (math.isfinite(number) and number >= 0):
-                raise ValueError(f"{number} is no distance")
+            return msgspec.json.decode(file.read(_LARGEST_RESULT), type=DriverResult)
     except (OSError, ValueError, RecursionError) as error:
         raise FileFormatError(
             f"{path} cannot be read ({error}); it must be JSON with outcome = done, not_moved or "
             "aborted"
         ) from error
-    return said
 
 
 def measure_tracking(folder: Path, plan: Plan) -> float | None:
