@@ -151,6 +151,12 @@ def parse_choice(choice: str) -> tuple[str, dict[str, str]]:
     return name.strip(), settings
 
 
+def own_class(choice: str) -> str | None:
+    """`module:Class` where a choice names a class of one's own; None where it is ours."""
+    name, _ = parse_choice(choice)
+    return name if ":" in name else None
+
+
 def build(config: type[Any], settings: Mapping[str, Any], choice: str = "") -> Any:
     """Make a dataclass of settings from plain values: numbers as text, lists for tuples.
 

@@ -281,18 +281,10 @@ class State:
             case GoalSet():
                 if not len(event.goal) == len(event.metric) == len(event.units):
                     raise ValueError("goal, metric and units have different lengths")
-                self.goals.append(
-                    Goal(
-                        len(self.goals) + 1,
-                        _read_only(event.goal),
-                        event.tolerance,
-                        _read_only(event.metric),
-                        event.carry_over,
-                        event.adapter,
-                        event.new_hardware,
-                        tuple(event.units),
-                    )
-                )
+                place, metric = _read_only(event.goal), _read_only(event.metric)
+                rest = (event.carry_over, event.adapter, event.new_hardware, tuple(event.units))
+                number = len(self.goals) + 1
+                self.goals.append(Goal(number, place, event.tolerance, metric, *rest))
             case Asked():
                 if event.trial != len(self.trials) + 1 or self.open_trial is not None:
                     raise ValueError(f"trial {event.trial} after {len(self.trials)}")

@@ -12,7 +12,7 @@ from prior_reinforce.bench.workspace.journal import JOURNAL_FILE, Journal
 from prior_reinforce.bench.workspace.store import Store
 from prior_reinforce.errors import TrialStateError, WorkspaceError
 from prior_reinforce.plans.motions import Plan, PlanFormat
-from prior_reinforce.registry import parse_choice
+from prior_reinforce.registry import own_class
 from prior_reinforce.session.events import Event, KeptPlan, SessionEvent
 from prior_reinforce.session.trials import Stage, State, Trial
 
@@ -41,8 +41,7 @@ class ModelTrained(Event, frozen=True):
     @property
     def own(self) -> str | None:
         """`module:Class` where the generator is one's own; None where it is ours."""
-        name, _ = parse_choice(self.generator)
-        return name if ":" in name else None
+        return own_class(self.generator)
 
 
 class Executing(Event, frozen=True):
@@ -55,13 +54,13 @@ class Executing(Event, frozen=True):
     """Name of the folder for what it writes; empty if it was never made."""
 
 
-class Executed(Event, MotionResult, frozen=True):
+class Executed(Event, MotionResult, frozen=True, kw_only=True):
     """The command ended, and all that it started."""
 
     trial: int
 
 
-class NotExecuted(Executed, frozen=True):
+class NotExecuted(Executed, frozen=True, kw_only=True):
     """Nothing moved: the trial may be executed after all."""
 
     outcome: Outcome = "not_moved"

@@ -8,7 +8,7 @@ import numpy as np
 
 from prior_reinforce.bench.workspace.log import Executed, Executing, WorkspaceState
 from prior_reinforce.bench.workspace.workspace import Workspace
-from prior_reinforce.registry import parse_choice
+from prior_reinforce.registry import own_class
 from prior_reinforce.session.trials import Goal, Stage, Trial
 from prior_reinforce.wording import in_words, plain, say_place, say_reading
 
@@ -137,13 +137,10 @@ def next_step(workspace: Workspace) -> str:
     if state.solved:
         return f"{new_goal}, or prior-reinforce report {folder}"
     training = state.training
-    own = training.own if training is not None else None
-    adapter, _ = parse_choice(state.goals[-1].adapter)
-    return (
-        f"prior-reinforce ask {folder}"
-        + (f" --generator {shlex.quote(own)}" if own else "")
-        + (f" --adapter {shlex.quote(adapter)}" if ":" in adapter else "")
-    )
+    own = {"generator": training.own if training is not None else None}
+    own["adapter"] = own_class(state.goals[-1].adapter)
+    flags = (f" --{family} {shlex.quote(name)}" for family, name in own.items() if name)
+    return f"prior-reinforce ask {folder}" + "".join(flags)
 
 
 def _say_nearer(workspace: Workspace) -> str:

@@ -54,7 +54,7 @@ from prior_reinforce.errors import (
 )
 from prior_reinforce.files import inside, named_disk_errors, sweep, write
 from prior_reinforce.plans.motions import Demonstrations, Plan
-from prior_reinforce.registry import parse_choice
+from prior_reinforce.registry import own_class
 from prior_reinforce.session.events import Entry, KeptPlan
 from prior_reinforce.session.session import Session
 from prior_reinforce.session.trials import Goal, Stage, Trial
@@ -435,11 +435,7 @@ class Workspace:
         return self.state.trial(trial.number)
 
     def _to_execute(self, number: int) -> Trial:
-        """A trial whose plan was not executed yet.
-
-        Raises:
-            TrialStateError: There is no such trial, or it was executed already.
-        """
+        """A trial whose plan was not executed yet; TrialStateError if there is no such."""
         trial = self.state.trial(number)
         if trial.stage is not Stage.ASKED:
             raise TrialStateError(
@@ -508,11 +504,8 @@ class Workspace:
                 "other demonstrations were imported since the model was learned; run: "
                 f"prior-reinforce learn {self.folder}"
             )
-        if own != training.own:
-            remedy = "drop --generator, or learn again"
-            if training.own:
-                remedy = f"name it, for the journal starts no code: --generator {training.own}"
-            raise ConfigurationError(f"the model was learned by {training.generator}; {remedy}")
+        said = "the model was learned by"
+        _require_own(own, training.generator, "generator", said, "learn again")
         return self.store.model(training.model, own)
 
     def _adapter(self, choice: str, own: str | None) -> Adapter:
@@ -520,12 +513,7 @@ class Workspace:
         from prior_reinforce.adapters import make_adapter
 
         choice = choice or DEFAULT_ADAPTER
-        name, _ = parse_choice(choice)
-        if (name if ":" in name else None) != own:
-            remedy = "drop --adapter, or set the goal again"
-            if ":" in name:
-                remedy = f"name it, for the journal starts no code: --adapter {name}"
-            raise ConfigurationError(f"the goal was set with the adapter {choice}; {remedy}")
+        _require_own(own, choice, "adapter", "the goal was set with", "set the goal again")
         return make_adapter(choice)
 
     def _demonstrations(self, sha256: str) -> Demonstrations:
@@ -536,20 +524,30 @@ class Workspace:
 
     def _check_fit(self, demonstrations: Demonstrations, source: str) -> None:
         manifest = self.manifest
-        pairs = [
-            ("action names", demonstrations.format.names, manifest.format.names),
-            ("action units", demonstrations.format.units, manifest.format.units),
+        form, expected = demonstrations.format, manifest.format
+        for what, given, wanted in (
+            ("action names", form.names, expected.names),
+            ("action units", form.units, expected.units),
             ("outcome names", demonstrations.outcome_names, manifest.outcome_names),
             ("outcome units", demonstrations.outcome_units, manifest.outcome_units),
             # A picosecond is rounding; anything more is another tempo.
-            ("dt", round(demonstrations.format.dt, 12), round(manifest.format.dt, 12)),
-        ]
-        for what, given, expected in pairs:
-            if given != expected:
+            ("dt", round(form.dt, 12), round(expected.dt, 12)),
+        ):
+            if given != wanted:
                 raise InvalidDemonstrationsError(
                     f"{source} has {what} {given}, but {self.folder / MANIFEST_FILE} says "
-                    f"{expected}; change the manifest, or import again"
+                    f"{wanted}; change the manifest, or import again"
                 )
+
+
+def _require_own(given: str | None, choice: str, family: str, said: str, again: str) -> None:
+    """Refuse to start code that only the journal names, and a class that it does not name."""
+    own = own_class(choice)
+    if given != own:
+        remedy = f"drop --{family}, or {again}"
+        if own is not None:
+            remedy = f"name it, for the journal starts no code: --{family} {own}"
+        raise ConfigurationError(f"{said} {choice}; {remedy}")
 
 
 def _kept(trial: Trial) -> KeptPlan:
