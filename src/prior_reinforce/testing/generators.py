@@ -18,6 +18,7 @@ from prior_reinforce.errors import FileFormatError, InvalidGoalError, NotFittedE
 from prior_reinforce.generators import GENERATORS, load_generator
 from prior_reinforce.generators.base import FitProgress, Generator
 from prior_reinforce.plans.motions import Demonstrations
+from prior_reinforce.registry import own_class
 from prior_reinforce.testing.synthetic import synthetic_demonstrations
 
 _ELSEWHERE = """
@@ -180,8 +181,7 @@ def _inside(demos: Demonstrations, n: int) -> Points:
 
 def _own_name(generator: Generator) -> str | None:
     """`module:Class` of a generator that a model does not name; None for one of ours."""
-    name = GENERATORS.name_of(generator)
-    return name if ":" in name else None
+    return own_class(GENERATORS.name_of(generator))
 
 
 def _global_numpy_state() -> Any:

@@ -404,8 +404,7 @@ class Workspace:
                 self._end_execution(NotExecuted(trial=number))  # never started: nothing moved
                 raise
             if result.outcome != "unknown":
-                result = self._measured(result, trial, folder)
-                self._end_execution(_ended(number, result))
+                result = self._record(result, trial, folder)
         if raised is not None:
             raise raised
         if interruptions.came:
@@ -431,7 +430,7 @@ class Workspace:
         result = read_ended(folder, began.command, self._plan_file(trial))
         if result is None:
             return None
-        self._end_execution(_ended(trial.number, self._measured(result, trial, folder)))
+        self._record(result, trial, folder)
         return self.state.trial(trial.number)
 
     def _to_execute(self, number: int) -> Trial:
@@ -474,15 +473,23 @@ class Workspace:
     def _plan_file(self, trial: Trial) -> PlanFile:
         return PlanFile(self.plan_path(trial), _kept(trial).sha256)
 
-    def _measured(self, result: CommandResult, trial: Trial, folder: Path) -> CommandResult:
-        """A result with the distance from the plan, where the driver measured its path."""
+    def _record(self, result: CommandResult, trial: Trial, folder: Path) -> CommandResult:
+        """Record how a command ended, with its tracking error where the driver measured its path.
+
+        Returns:
+            The result with that error.
+        """
         from prior_reinforce.bench.robots.executors.result import measure_tracking
 
         try:
-            rms = measure_tracking(folder, self.plan(trial))
+            if (rms := measure_tracking(folder, self.plan(trial))) is not None:
+                result = replace(result, tracking_rms=rms)
         except FileFormatError as error:
-            return replace(result, reason="; ".join(filter(None, [result.reason, str(error)])))
-        return result if rms is None else replace(result, tracking_rms=rms)
+            reasons = filter(None, [result.reason, str(error)])
+            result = replace(result, reason="; ".join(reasons))
+        event = NotExecuted if result.outcome == "not_moved" else Executed
+        self._end_execution(event(trial=trial.number, **result.as_json()))
+        return result
 
     def _names_of_plans(self) -> tuple[str, ...] | None:
         """Names of the columns of earlier trials' plans; None where none can be read."""
@@ -554,9 +561,3 @@ def _kept(trial: Trial) -> KeptPlan:
     """A trial's plan, which every trial of a workspace has."""
     assert trial.kept is not None
     return trial.kept
-
-
-def _ended(number: int, result: CommandResult) -> Executed:
-    """The event of a command that ended."""
-    event = NotExecuted if result.outcome == "not_moved" else Executed
-    return event(trial=number, **result.as_json())

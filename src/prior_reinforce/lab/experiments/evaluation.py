@@ -16,7 +16,6 @@ from prior_reinforce.arrays import Points
 from prior_reinforce.errors import FileFormatError
 from prior_reinforce.files import in_place
 from prior_reinforce.generators import Generator, load_generator, make_generator
-from prior_reinforce.lab.experiments.learned import own_class
 from prior_reinforce.lab.experiments.protocol import (
     GoalTrials,
     estimate_by_eye,
@@ -30,7 +29,7 @@ from prior_reinforce.perception import make_perception
 from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
 from prior_reinforce.plans.alignment import align
 from prior_reinforce.plans.motions import Demonstrations
-from prior_reinforce.registry import parse_choice, source_digest
+from prior_reinforce.registry import own_class, parse_choice, source_digest
 
 GOAL_SEED = 100
 """Seed of the reported goals; what was decided looking at them is in docs/decisions.md."""

@@ -8,9 +8,9 @@ import msgspec
 
 from prior_reinforce.errors import ConfigurationError, FileFormatError
 from prior_reinforce.files import write
-from prior_reinforce.generators import GENERATORS, Generator, load_generator
+from prior_reinforce.generators import Generator, load_generator
 from prior_reinforce.plans.motions import Demonstrations
-from prior_reinforce.registry import parse_choice
+from prior_reinforce.registry import own_class
 
 _RECORD = "training.json"
 
@@ -62,8 +62,3 @@ def load_learned(
             "prior-reinforce learn, or name what it was learned from with --demonstrations"
         )
     return load_generator(folder, own=own_class(generator))
-
-
-def own_class(choice: str) -> str | None:
-    """`module:Class` where a choice of a generator names a class of your own, else None."""
-    return None if GENERATORS.owns(choice) else parse_choice(choice)[0]
