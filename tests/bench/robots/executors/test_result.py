@@ -37,7 +37,7 @@ sys.exit(int(status))
         ('{"outcome": "not_moved"}', 1, "aborted", "status 1"),
         ('{"outcome": "done"}', 1, "aborted", "status 1"),
         ('{"outcome": "fine"}', 0, "aborted", "cannot be read"),
-        ('{"outcome": "done", "start_error": -1}', 0, "aborted", "no distance"),
+        ('{"outcome": "done", "start_error": -1}', 0, "aborted", ">= 0.0"),
         ('{"outcome": "done", "tracking_rms": 1e999}', 0, "aborted", "cannot be read"),
         ("[" * 50_000, 0, "aborted", "cannot be read"),
         ('{"outcome": "done", "reason": "' + "x" * 100_000, 0, "aborted", "cannot be read"),
