@@ -21,7 +21,7 @@ from typing_extensions import Self
 
 from prior_reinforce.arrays import Plans
 from prior_reinforce.plans.motions import Demonstrations
-from prior_reinforce.plans.signals import HELD
+from prior_reinforce.plans.signals import HELD, NOISE_RMS
 
 Representation = Literal["splines", "frames"]
 """Splines where they fit, or frames for every dimension."""
@@ -40,10 +40,9 @@ Ours: minimum-jerk throws are missed by 1e-5 to 1e-4, a step by 3e-2 or more; 2e
 1.2 rad is 2.4 mrad, about what moves a landing point by its measuring noise."""
 _SPLINE_FOLDS = (1, 2, 3)
 """Control points for each position of the code: more where fewer do not follow the motion. Ours."""
-_NOISE_RESIDUAL = 3.0
-"""A spline may miss a dimension by so many standard deviations of its noise, rms. Ours."""
 _MOST_NOISE = 0.02
-"""But by no more than this part of its range: what is nothing but noise comes back too. Ours."""
+"""A spline may also miss what noise makes of a dimension (`NOISE_RMS`), up to this part of its
+range: what is nothing but noise comes back too. Ours."""
 _TIED = 3
 """Equal control points at a resting end: velocity and acceleration vanish there."""
 _STIFFNESS = 0.3
@@ -220,7 +219,7 @@ def _choose(demonstrations: Demonstrations, d: int, length: int, splines: bool) 
         extent = float(np.ptp(values))
         largest = max(
             _LARGEST_SPLINE_RESIDUAL * extent,
-            min(_NOISE_RESIDUAL * float(signals.noise[d]), _MOST_NOISE * extent),
+            min(NOISE_RMS * float(signals.noise[d]), _MOST_NOISE * extent),
             HELD if form.units[d] in ("rad", "m") else 0.0,
         )
         for fold in _SPLINE_FOLDS:

@@ -50,23 +50,28 @@ reproduced. It is so small because a plan may consist of increments."""
 COUNTS = {"rad": 1e-3, "m": 5e-4}
 """Range of a few counts of an encoder, and distance from a pose that is none. Ours: below what
 moves a throw by a millimetre."""
-_NOISE_HELD = 3.0
+NOISE_RMS = 3.0
 """What is nothing but noise stays within so many sigma, rms. Ours: sigma is estimated from few
 frames, and of a signal that is rounded to counts."""
-MAX_LEVELS = 4
-"""A channel that takes no more values than these is a switch. Ours."""
+_NOISE_PEAK = 5.0
+"""A single frame, or a slope, is off by more than so many sigma for another reason than noise.
+Ours: noise exceeds it in one frame of 1.7 million."""
+_MAX_LEVELS = 4
+"""A channel that takes no more values than these is a switch. Ours: 2 and 8 change no plan of the
+zoo's, whose triggers have two."""
 _STEP_SHARE = 0.25
 """A step's transitions last at most this part of the longest motion of any channel. Ours: a gripper
 opens within six frames of a throw of 40, and joints that move together last about as long as each
 other."""
-_ACTIVE, _ACTIVE_NOISE = 0.03, 5.0
+_ACTIVE = 0.03
 """A frame takes part in a transition if it changes by over this part of the channel's largest
-change, and by over so many sigma. Ours."""
+change. Ours: a trembling hand is below; half and double move a gripper by 6e-4 of its range."""
 _STANDS_OUT = 0.25
 """That noise counts only where it is less than this part of the largest change: a slow joint at
 1 kHz changes by less than its noise from frame to frame. Ours."""
-_FEWEST_FRAMES = 20
-"""Fewer frames show motion, and not its noise. Ours."""
+FEWEST_FRAMES = 20
+"""Fewer frames show motion, and not its noise; nor are they moved by parts of one without a loss.
+Ours: noise is then read off five differences."""
 _QUANTILE, _NORMAL = 0.3, 0.385
 """Noise is read off the 30 % quietest third differences: 0.385 standard deviations of a normal
 variable, in absolute value, lie below its 30 % quantile."""
@@ -79,16 +84,14 @@ REST_SPEED = {"rad": 0.05, "m": 0.02}
 exactly 0; a smooth start recorded at 30 frames/s shows 0.02 rad/s."""
 _REST_SHARE = 0.05
 """Part of a channel's largest speed that is rest in units without a `REST_SPEED`. Ours."""
-_REST_NOISE = 5.0
-"""A slope within so many of its standard deviations is noise."""
 _END_TIME = 0.04
 """Time over which the speed at an end is measured, in [s]: a slope through several frames."""
 _TRIM_SHARE = 0.005
 """Frames within this share of the largest range of their unit from an end pose are trimmed. Ours:
 above encoder noise, and reached by a smooth start within its first tenth."""
-_POSE_SHARE, _POSE_NOISE = 1e-4, 6.0
-"""A pose is left where a channel is off by this part of the largest range of its unit, or by so
-many sigma. Ours: a minimum-jerk motion has 0.7 % of its largest speed there, and can stop."""
+_POSE_SHARE = 1e-4
+"""A pose is left where a channel is off by this part of the largest range of its unit. Ours: a
+minimum-jerk motion has 0.7 % of its largest speed there, and can stop."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,7 +143,7 @@ def analyse(motions: Sequence[Motion] | np.ndarray, units: Sequence[str], dt: fl
         kinds=_kinds(motions, steps, held_channels(motions, units), sigma),
         noise=sigma,
         trim_band=np.maximum(_TRIM_SHARE * largest_of_unit(largest, units), counts),
-        pose_band=np.maximum(_POSE_SHARE * largest_of_unit(ranges, units), _POSE_NOISE * sigma),
+        pose_band=np.maximum(_POSE_SHARE * largest_of_unit(ranges, units), _NOISE_PEAK * sigma),
         rest_start=tuple(np.all([step[0] <= slow for step in steps], axis=0).tolist()),
         rest_end=tuple(np.all([step[-1] <= slow for step in steps], axis=0).tolist()),
         spans=np.array([motion_span(np.linalg.norm(each, axis=1)) for each in profiles]),
@@ -157,7 +160,7 @@ def noise(motions: Sequence[Motion] | np.ndarray) -> Channels:
     Source: ours, after the difference-based estimators of Gasser, Sroka and Jennen-Steinmetz
     (Biometrika 1986).
     """
-    long = [np.diff(each, n=3, axis=0) for each in motions if len(each) >= _FEWEST_FRAMES]
+    long = [np.diff(each, n=3, axis=0) for each in motions if len(each) >= FEWEST_FRAMES]
     if not long:
         return np.zeros(motions[0].shape[1])
     quiet = np.quantile(np.abs(np.concatenate(long)), _QUANTILE, axis=0)
@@ -180,7 +183,7 @@ def active_runs(
         sigma: Its noise.
     """
     peak = max(step.max() for step in steps)
-    noisy = _ACTIVE_NOISE * sigma
+    noisy = _NOISE_PEAK * sigma
     least = max(_ACTIVE * peak, noisy if noisy < _STANDS_OUT * peak else 0.0)
     return [_runs(step > least) for step in steps]
 
@@ -215,7 +218,7 @@ def held_channels(
     for motion, recorded in zip(motions, live, strict=True):
         rms = np.std(recorded, axis=0)
         rough = np.mean(np.diff(recorded, axis=0) ** 2, axis=0) >= rms**2
-        small = (np.ptp(recorded, axis=0) <= counts) | (rms <= _NOISE_HELD * sigma)
+        small = (np.ptp(recorded, axis=0) <= counts) | (rms <= NOISE_RMS * sigma)
         held &= (np.std(motion, axis=0) <= floor) | (known & rough & small)
     return held
 
@@ -240,7 +243,7 @@ def _kinds(
     longest = max((max(each, default=0) for each in durations), default=0)
     kinds: list[ChannelKind] = ["held"] * len(held)
     for d, each in zip(np.flatnonzero(~held), durations, strict=True):
-        if len(np.unique(np.concatenate([motion[:, d] for motion in motions]))) <= MAX_LEVELS:
+        if len(np.unique(np.concatenate([motion[:, d] for motion in motions]))) <= _MAX_LEVELS:
             kinds[d] = "switch"
         else:
             kinds[d] = "step" if max(each, default=0) <= _STEP_SHARE * longest else "smooth"
@@ -285,5 +288,5 @@ def moving_ends(
         t = times[at] - times[at].mean()
         total = float(t @ t)
         slope = np.abs(t @ (motion[at] - motion[at].mean(axis=0))) / total
-        moving.append(slope > np.maximum(rest, _REST_NOISE * signals.noise / math.sqrt(total)))
+        moving.append(slope > np.maximum(rest, _NOISE_PEAK * signals.noise / math.sqrt(total)))
     return np.array(moving) & ~signals.held
