@@ -121,3 +121,14 @@ def test_a_clock_is_looked_for_only_where_starts_apart_leave_much_untold(monkeyp
         timing_evidence, "outcome_error", lambda _, each: errors[each.timeline.kind]
     )
     assert choose_timing(demonstrations(42)).decomposition.timeline.kind == kind
+
+
+def test_too_few_frames_to_be_moved_are_timed_as_recorded():
+    """Swings of 16 frames, that start within less than a frame of each other."""
+    s = np.clip((np.arange(16) - 0.2 * STARTS[:, None]) / 8, 0, 1)
+    swing = (1 + 0.3 * AIMS[:, :1]) * (10 * s**3 - 15 * s**4 + 6 * s**5)
+    plans = np.stack([swing, (1 + 0.3 * AIMS[:, 1:]) * swing], axis=-1)
+    few = Demonstrations(plans, AIMS, PlanFormat(("a", "b"), ("rad",) * 2, 0.1))
+    choice = choose_timing(few)
+    assert choice.decomposition.timeline.kind == "none"
+    assert choice.reason.endswith("since 16 frames are too few to be moved without a loss")

@@ -27,7 +27,7 @@ from prior_reinforce.arrays import Plans, Points
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.generators.base import Generator, Report
 from prior_reinforce.generators.saving import Tensors
-from prior_reinforce.generators.timing_evidence import choose_timing
+from prior_reinforce.generators.timing_evidence import TOO_FEW_FRAMES, choose_timing
 from prior_reinforce.generators.wrapping import Wrapper
 from prior_reinforce.plans.alignment import align
 from prior_reinforce.plans.motions import Demonstrations
@@ -98,10 +98,7 @@ class Timed(Wrapper):
         assert self.timing != "align"
         decomposition = decompose(demonstrations, self.timing)
         if decomposition.timeline.kind != self.timing:
-            self.remarks = (
-                f"timing: as recorded, since {demonstrations.horizon} frames are too few to be "
-                "moved without a loss",
-            )
+            self.remarks = (TOO_FEW_FRAMES.format(demonstrations.horizon),)
         return decomposition
 
 

@@ -14,7 +14,7 @@ from prior_reinforce.plans.speeds import END_SPEED
 
 _SLOPE_FRAMES = 3
 """Steps at an end over which its velocity is averaged. Ours: 2 and 6 move plans that are cut in
-mid-swing by 0.2 and 0.5 % of a range, and hit as often."""
+mid-swing by 0.4 and 1 % of a range, and hit as often."""
 
 
 class ExtrapolatedPlans:

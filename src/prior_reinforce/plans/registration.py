@@ -42,7 +42,7 @@ CONVERGED = 1e-4
 _LAGS_PER_FRAME = 8
 """Lags are scanned on a grid this fine, which lies in the basin of Newton's method. Ours."""
 _NEWTON_STEPS = 4
-"""Ours: two give the same plans, to 1e-9 of a range."""
+"""Ours: two give the same plans, to 2e-9 of a range."""
 _LARGEST_TEMPO = 0.7
 """Bound of |rho|: tempos differ by a factor of two at most. Ours."""
 _TEMPO_SCALE = 0.05
