@@ -1,5 +1,8 @@
 """Bags of ROS 1 and ROS 2, and MCAP files, written by rosbags."""
 
+import contextlib
+import sqlite3
+
 import numpy as np
 import pytest
 
@@ -104,4 +107,13 @@ def test_a_bag_that_claims_more_messages_than_a_day_has_is_not_read(tmp_path):
     )
     (bag / "metadata.yaml").write_text(claims)
     with pytest.raises(FileFormatError, match="1e\\+12 numbers; that is no recording"):
+        read_recordings(bag)
+
+
+def test_a_topic_without_messages_is_named_with_a_remedy(tmp_path):
+    bag = write_bag(tmp_path / "throw0", 0, kind="sqlite", rate=20)
+    (file,) = bag.glob("*.db3")
+    with contextlib.closing(sqlite3.connect(file)) as data, data:
+        data.execute("DELETE FROM messages")
+    with pytest.raises(FileFormatError, match=r"topic /\w+ has no messages; drop .*--leave-out"):
         read_recordings(bag)

@@ -72,7 +72,8 @@ def read(source: Path, options: ReadOptions) -> Episodes:
                 ]
         if not messages:
             raise FileFormatError(
-                f"{bag}: topic {connections[0].topic} has no messages; leave it out"
+                f"{bag}: topic {connections[0].topic} has no messages; drop that bag, or leave it "
+                "out with --leave-out"
             )
         if kind == _STATE:
             yield name, partial(_states, bag, name, messages, options)
