@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
@@ -26,6 +25,7 @@ from prior_reinforce.generators import make_generator
 from prior_reinforce.lab.experiments.evidence import claims_table, write_evidence
 from prior_reinforce.lab.experiments.recipes import QUICK, RECIPES, Recipe, Run, Scale, Table
 from prior_reinforce.lab.experiments.recipes.base import Progress as OnProgress
+from prior_reinforce.lab.experiments.recipes.base import to_json
 from prior_reinforce.lab.experiments.recipes.trials import TrialsTable
 from prior_reinforce.lab.experiments.units import Workers
 from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
@@ -123,8 +123,8 @@ class Reproduce:
 
     def _keep(self, recipe: Recipe, run: Run, figures: Mapping[str, Any], console: Console) -> None:
         """Write a recipe's figures down and print them."""
-        text = json.dumps({**run.made_by(self._command(recipe, run)), **figures}, indent=1)
-        write(self.out / f"{recipe.name}.json", text + "\n")
+        made_by = run.made_by(self._command(recipe, run))
+        write(self.out / f"{recipe.name}.json", to_json({**made_by, **figures}))
         for part in _terminal(recipe.table(figures), recipe.title, console.width):
             console.print(part)
         if claims := recipe.claims(figures):

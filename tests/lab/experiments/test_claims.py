@@ -38,12 +38,12 @@ def test_a_claim_of_parts_is_as_good_as_its_worst_part():
 
 
 def point(value, half=0.01):
-    return {"value": value, "low": value - half, "high": value + half}
+    return Interval(value, value - half, value + half)
 
 
 def test_by_round_leaves_out_rounds_before_the_claim_and_rounds_that_both_have_won():
-    won = {"value": 1.0, "low": 1.0, "high": 1.0}
-    none = {"value": 0.0, "low": 0.0, "high": 0.0}
+    won = Interval(1.0, 1.0, 1.0)
+    none = Interval(0.0, 0.0, 0.0)
     ours, other = [point(0.2), point(0.9), won], [point(0.3), point(0.5), won]
     difference = [point(-0.1), point(0.4), none]
     assert above_by_round(ours, other, difference, 2, trainings=6) is CONFIRMED

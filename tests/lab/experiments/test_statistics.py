@@ -6,6 +6,7 @@ import pytest
 from prior_reinforce.lab.experiments.claims import Verdict, above
 from prior_reinforce.lab.experiments.statistics import (
     SHARE,
+    Interval,
     bootstrap_difference,
     bootstrap_mean,
     difference_curve,
@@ -80,16 +81,16 @@ def test_goals_that_were_never_reached_count_as_missed():
 
 def test_curves_of_a_worked_example():
     solved = np.array([[1, 2, 0, 3]])
-    assert [point["value"] for point in success_curve(solved, 3)] == [0.25, 0.5, 0.75]
+    assert [point.value for point in success_curve(solved, 3)] == [0.25, 0.5, 0.75]
     other = np.array([[1, 0, 0, 1]])
-    assert [point["value"] for point in difference_curve(solved, other, 3)] == [-0.25, 0.0, 0.25]
+    assert [point.value for point in difference_curve(solved, other, 3)] == [-0.25, 0.0, 0.25]
     assert mean_success_difference(solved, other, 3).value == pytest.approx(0.0)
 
 
 def test_a_difference_of_curves_is_paired():
     solved = np.tile([1, 0], (3, 20))
     (point,) = difference_curve(solved, solved, 1)
-    assert point == {"value": 0.0, "low": 0.0, "high": 0.0}
+    assert point == Interval(0.0, 0.0, 0.0)
 
 
 def test_tasks_weigh_alike_however_many_trainings_they_have():

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 
-from prior_reinforce.lab.experiments.statistics import Curve, Interval, interval_of
+from prior_reinforce.lab.experiments.statistics import Curve, Interval
 
 LEAST_TRAININGS = 3
 """Ours: an interval over fewer trainings knows nothing of how trainings differ, and decides no
@@ -89,8 +89,8 @@ def above_by_round(
     """
     return all_of(
         [
-            above(interval_of(difference[i]), 0.0, trainings)
+            above(difference[i], 0.0, trainings)
             for i in range(first - 1, len(difference))
-            if not curve[i]["value"] == other[i]["value"] == 1.0
+            if not curve[i].value == other[i].value == 1.0
         ]
     )

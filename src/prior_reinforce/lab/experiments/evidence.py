@@ -6,7 +6,6 @@ with the scale, seeds, version and commit of its own run.
 
 from __future__ import annotations
 
-import json
 import re
 from collections import Counter
 from collections.abc import Sequence
@@ -17,7 +16,7 @@ from prior_reinforce.errors import ConfigurationError, FileFormatError, Renderin
 from prior_reinforce.files import write
 from prior_reinforce.lab.experiments.claims import Claim, Verdict
 from prior_reinforce.lab.experiments.recipes import RECIPES, Picture, Recipe, Table
-from prior_reinforce.lab.experiments.recipes.base import Figures
+from prior_reinforce.lab.experiments.recipes.base import Figures, from_json
 from prior_reinforce.report.html import data_uri, render
 
 _PACKAGE = "prior_reinforce.lab.experiments"
@@ -29,9 +28,7 @@ _NO_BREAK = "\N{NO-BREAK SPACE}"
 class Section:
     """All that is shown of one recipe."""
 
-    name: str
-    title: str
-    paper: str
+    recipe: Recipe
     made_by: str
     """The command with its scale, the code that ran it, and its version, in one line."""
     table: Table
@@ -87,16 +84,14 @@ def claims_table(claims: Sequence[Claim]) -> Table:
 
 def _section(recipe: Recipe, path: Path, pictures: Path) -> Section:
     try:
-        figures = json.loads(path.read_text(encoding="utf-8"))
+        figures = from_json(path.read_text(encoding="utf-8"))
         remarks = recipe.remarks(figures)
         try:
             drawn = recipe.draw(figures, pictures)
         except RenderingUnavailableError as error:
             drawn, remarks = [], [*remarks, f"{recipe.title}: {error}."]
         return Section(
-            name=recipe.name,
-            title=recipe.title,
-            paper=recipe.paper,
+            recipe=recipe,
             made_by=_made_by(figures),
             table=recipe.table(figures),
             claims=recipe.claims(figures),
@@ -136,10 +131,10 @@ def _markdown(sections: Sequence[Section], summary: str, folder: Path) -> str:
     for section in sections:
         lines += [remark for text in section.remarks for remark in (text, "")]
     for section in sections:
-        lines += [f"## {section.title}", "", f"Paper: {section.paper}.", ""]
+        lines += [f"## {section.recipe.title}", "", f"Paper: {section.recipe.paper}.", ""]
         for picture in section.pictures:
             place = picture.path.relative_to(folder).as_posix()
-            lines += [f"![{section.title}]({place})", "", picture.caption, ""]
+            lines += [f"![{section.recipe.title}]({place})", "", picture.caption, ""]
         lines += [*_rows(section.table), f"`{section.made_by}`", ""]
     return "\n".join(lines)
 

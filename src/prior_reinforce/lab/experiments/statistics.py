@@ -11,9 +11,8 @@ are trainings (prior set and seed), its columns goals.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, Shaped
@@ -28,8 +27,6 @@ Values = Shaped[np.ndarray, "trainings goals"]
 """One number for each training and goal."""
 ValuesByTask = Sequence[Shaped[np.ndarray, "_ _"]]
 """Such numbers of each task; tasks may have different numbers of trainings."""
-Curve = list[dict[str, float]]
-"""An interval for each round, from round 1, as it goes into JSON."""
 
 
 @dataclass(frozen=True)
@@ -50,9 +47,8 @@ class Interval:
         return f"{self.value:{spec}} [{self.low:{spec}}, {self.high:{spec}}]"
 
 
-def interval_of(values: Mapping[str, Any]) -> Interval:
-    """An interval as it was before it became JSON."""
-    return Interval(**values)
+Curve = Sequence[Interval]
+"""An interval for each round, from round 1."""
 
 
 def bootstrap_mean(
@@ -113,15 +109,13 @@ def reached_by(
 
 def success_curve(solved_at: Values, rounds: int) -> Curve:
     """Share of goals reached within 1, 2, ... rounds, with its interval."""
-    return [
-        asdict(bootstrap_mean(reached_by(solved_at, r), within=SHARE)) for r in range(1, rounds + 1)
-    ]
+    return [bootstrap_mean(reached_by(solved_at, r), within=SHARE) for r in range(1, rounds + 1)]
 
 
 def difference_curve(solved_at: Values, other: Values, rounds: int) -> Curve:
     """Share reached minus the other's, paired by training and goal, with its interval."""
     return [
-        asdict(bootstrap_difference(reached_by(solved_at, r), reached_by(other, r), within=SHARE))
+        bootstrap_difference(reached_by(solved_at, r), reached_by(other, r), within=SHARE)
         for r in range(1, rounds + 1)
     ]
 

@@ -1,7 +1,5 @@
 """Afternoons in the mean, and what was said of P(hit)."""
 
-import json
-
 import numpy as np
 import pytest
 
@@ -12,6 +10,7 @@ from prior_reinforce.lab.experiments.recipes.adaptation import (
     reliability,
     said_and_came,
 )
+from prior_reinforce.lab.experiments.recipes.base import from_json, to_json
 
 SMALL = Scale(goals=8, seeds=(0,), sets=("A",), rounds=2)
 
@@ -37,22 +36,22 @@ def test_trials_to_go_of_a_goal_that_was_reached_and_of_one_that_was_not():
 @pytest.mark.slow
 def test_one_afternoon_of_every_rule_gives_table_picture_and_remark(tmp_path):
     measurement = Adaptation(tasks=("basketball-v3",), seed=3001)
-    figures = json.loads(json.dumps(measurement.run(Run(tmp_path, SMALL, include=("gp",)))))
+    figures = from_json(to_json(measurement.run(Run(tmp_path, SMALL, include=("gp",)))))
     table = RECIPE.table(figures)
     assert table.rows[0][0] == "Bayesian, earlier goals too"
     assert table.rows[-1][0] == "gp"  # the one that was included
     assert table.rows[0][-1] == ""
-    frozen = figures["trials"]["no adapter"]["mean"]["value"]
-    assert figures["trials"]["Bayesian, earlier goals too"]["mean"]["value"] < frozen
+    frozen = figures["trials"]["no adapter"]["mean"].value
+    assert figures["trials"]["Bayesian, earlier goals too"]["mean"].value < frozen
     (picture,) = RECIPE.draw(figures, tmp_path)
     assert picture.path.is_file()
     alone, said = RECIPE.remarks(figures)
     assert "Brier" in said
     assert "no adapter -" in alone  # fewer trials than without
     assert "earlier goals" not in alone
-    minus = figures["alone_minus"]["GP, m = 2, each goal alone"]["value"]
+    minus = figures["alone_minus"]["GP, m = 2, each goal alone"].value
     ours, theirs = (
-        figures["trials"][f"{name}, each goal alone"]["mean"]["value"]
+        figures["trials"][f"{name}, each goal alone"]["mean"].value
         for name in ("Bayesian", "GP, m = 2")
     )
     assert minus == pytest.approx(ours - theirs)

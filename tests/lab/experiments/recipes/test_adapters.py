@@ -1,12 +1,12 @@
 """The comparison of adapters, on few goals and with a generator that learns at once."""
 
-import json
-
 import pytest
 
 from prior_reinforce.lab.experiments.claims import Verdict
 from prior_reinforce.lab.experiments.recipes import Run, Scale
 from prior_reinforce.lab.experiments.recipes.adapters import RECIPE, Adapters
+from prior_reinforce.lab.experiments.recipes.base import from_json, to_json
+from prior_reinforce.lab.experiments.statistics import Interval
 
 SMALL = Scale(goals=5, seeds=(0,), sets=("A",), rounds=3)
 
@@ -15,14 +15,14 @@ SMALL = Scale(goals=5, seeds=(0,), sets=("A",), rounds=3)
 def test_adapters_that_move_nothing_share_the_first_throw_and_differ_after(tmp_path):
     run = Run(tmp_path, SMALL, include=("proportional,gain=0.8", "gp"))
     # Of outcomes seen by eye: something is left to adapt.
-    figures = json.loads(json.dumps(Adapters(generator="dmp").run(run)))
+    figures = from_json(to_json(Adapters(generator="dmp").run(run)))
     success = figures["success"]
     assert success["proportional,gain=0.8"] == success["proportional"]  # ours, set by hand
-    frozen = [point["value"] for point in figures["success"]["frozen"]]
-    adapted = [point["value"] for point in figures["success"]["gp"]]
-    assert figures["proportional_minus_frozen"][0] == {"value": 0.0, "low": 0.0, "high": 0.0}
+    frozen = [point.value for point in figures["success"]["frozen"]]
+    adapted = [point.value for point in figures["success"]["gp"]]
+    assert figures["proportional_minus_frozen"][0] == Interval(0.0, 0.0, 0.0)
     assert adapted[-1] > frozen[-1]
-    assert figures["gp_minus"]["frozen"][-1]["value"] == pytest.approx(adapted[-1] - frozen[-1])
+    assert figures["gp_minus"]["frozen"][-1].value == pytest.approx(adapted[-1] - frozen[-1])
     table = RECIPE.table(figures)
     assert [row[0] for row in table.rows][-2:] == ["no adapter", "proportional,gain=0.8"]
     assert {claim.verdict for claim in RECIPE.claims(figures)} == {Verdict.OPEN}
@@ -35,8 +35,8 @@ def test_adapters_work_behind_what_was_learned_from_an_eyes_estimates():
 
 
 def test_in_the_end_is_judged_only_where_something_is_left_to_reach():
-    certain, none = ({"value": v, "low": v, "high": v} for v in (1.0, 0.0))
-    half = {"value": 0.5, "low": 0.4, "high": 0.6}
+    certain, none = (Interval(v, v, v) for v in (1.0, 0.0))
+    half = Interval(0.5, 0.4, 0.6)
     names = ("gp", "gp-all", "proportional", "frozen")
     figures = {
         "trainings": 6,

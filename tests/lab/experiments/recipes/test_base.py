@@ -4,7 +4,13 @@ import pytest
 
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.lab.experiments.recipes import RECIPES, Run, Scale
-from prior_reinforce.lab.experiments.recipes.base import family_of
+from prior_reinforce.lab.experiments.recipes.base import (
+    family_of,
+    from_json,
+    table_by_round,
+    to_json,
+)
+from prior_reinforce.lab.experiments.statistics import Interval
 
 GENERATOR = "prior_reinforce.generators.interpolation:SmoothInterpolation"
 ADAPTER = "prior_reinforce.adapters.frozen:FrozenAdapter"
@@ -55,3 +61,20 @@ def test_figures_tell_what_made_them(tmp_path):
     assert made_by["commit"] == "a, b"
     assert made_by["scale"]["goals"] == 7
     assert made_by["goal_seed"] == 100
+
+
+def test_figures_come_back_from_json_with_their_intervals():
+    interval = Interval(0.1 + 0.2, 1 / 3, 1.0)
+    figures = {"rows": [{"label": "gp", "success": [interval]}], "p_hit": {"n": 3, "brier": 0.2}}
+    assert from_json(to_json(figures)) == figures
+
+
+def test_a_table_by_round_shows_some_rounds_and_how_far_ours_is_above():
+    success = {name: [Interval(r / 10, 0.0, 1.0) for r in range(1, 6)] for name in ("ours", "it")}
+    minus = {"it": [Interval(r / 10, -0.1, 0.9) for r in range(5)]}
+    table = table_by_round("adapter", success, "ours", minus)
+    assert table.header == (
+        "adapter", "by round 1", "by round 2", "by round 4", "ours minus it, round 4",
+    )  # fmt: skip
+    assert table.rows[0][1:] == ("0.10 [0.00, 1.00]", "0.20 [0.00, 1.00]", "0.40 [0.00, 1.00]", "")
+    assert table.rows[1][-1] == "+0.30 [-0.10, +0.90]"

@@ -6,10 +6,10 @@ from matplotlib.axes import Axes
 
 from prior_reinforce.lab.experiments.recipes.charts import (
     Line,
+    Mark,
     Panel,
-    TrialsRow,
+    draw_rows,
     draw_success,
-    draw_trials,
 )
 from prior_reinforce.lab.experiments.statistics import Interval
 
@@ -29,7 +29,7 @@ def bars(monkeypatch):
 
 
 def test_a_line_a_method_with_its_interval_at_every_round(tmp_path, bars):
-    curve = [{"value": 0.5, "low": 0.4, "high": 0.7}, {"value": 0.8, "low": 0.7, "high": 0.9}]
+    curve = [Interval(0.5, 0.4, 0.7), Interval(0.8, 0.7, 0.9)]
     panels = [Panel("shares", [Line("ours", curve, 0), Line("theirs", curve, 3, dashed=True)])]
     draw_success(panels, tmp_path / "success.png")
     (x, y, ours), (other_x, _, theirs) = bars
@@ -41,14 +41,19 @@ def test_a_line_a_method_with_its_interval_at_every_round(tmp_path, bars):
     assert ours["color"] != theirs["color"]
 
 
-def test_a_row_of_trials_shows_the_papers_mean_and_both_of_ours(tmp_path, bars):
-    rows = [TrialsRow(name, Interval(3, 2, 5), Interval(2, 1.5, 2.25), 2.9, 0.9) for name in "ab"]
-    draw_trials(rows, tmp_path / "trials.png")
-    (paper, _, theirs), (many, places, ours), (unseen, _, few) = bars
+def test_a_row_shows_every_method_that_was_tried_with_its_interval(tmp_path, bars):
+    marks = {
+        "paper": Mark("D", "red", [Interval(2.9, 2.0, 3.8)] * 2),
+        "ours": Mark("o", "blue", [Interval(2, 1.5, 2.25), None]),
+        "nobody": Mark("s", "green", [None, None]),
+    }
+    draw_rows(["a", "b"], marks, "trials", tmp_path / "rows.png")
+    (paper, above, theirs), (ours, below, mine) = bars
     np.testing.assert_array_equal(paper, [2.9, 2.9])
-    np.testing.assert_array_equal(theirs["xerr"], [0.9, 0.9])
-    np.testing.assert_array_equal(many, [2, 2])
-    np.testing.assert_array_equal(places, [0, 1])
-    np.testing.assert_allclose(ours["xerr"], [[0.5, 0.5], [0.25, 0.25]])
-    np.testing.assert_array_equal(unseen, [3, 3])
-    np.testing.assert_allclose(few["xerr"], [[1, 1], [2, 2]])
+    np.testing.assert_allclose(theirs["xerr"], [[0.9, 0.9], [0.9, 0.9]])
+    np.testing.assert_array_equal(ours, [2])
+    np.testing.assert_allclose(mine["xerr"], [[0.5], [0.25]])
+    np.testing.assert_array_equal(np.round(above), [0, 1])
+    assert above[0] < below[0]  # one below another, and both nearer to their row than to the next
+    assert abs(below[0]) < 0.5
+    assert (theirs["fmt"], mine["fmt"]) == ("D", "o")

@@ -1,12 +1,11 @@
 """Measures of a displacement field, on fields whose measures are known."""
 
-import json
-
 import numpy as np
 import pytest
 
 from prior_reinforce.lab.experiments.claims import Verdict
 from prior_reinforce.lab.experiments.recipes import Run, Scale
+from prior_reinforce.lab.experiments.recipes.base import from_json, to_json
 from prior_reinforce.lab.experiments.recipes.displacement import (
     RECIPE,
     DisplacementFields,
@@ -63,12 +62,12 @@ def test_the_recipe_runs_from_throws_to_claims_and_picture(tmp_path):
     figures = DisplacementFields(generator="dmp", spacing=0.06).run(
         Run(tmp_path, Scale(seeds=(0,), sets=("A",)))
     )
-    figures = json.loads(json.dumps(figures))
+    figures = from_json(to_json(figures))
     assert [row["demonstrations"] for row in figures["rows"]] == [6, 3]
     assert figures["fields"][1]["training"]["subset"] is not None
     # Six throws of one pattern pin a segmented DMP down to less than half a centimetre or so.
-    assert figures["rows"][0]["inside_m"]["value"] < 0.01
-    assert figures["three_minus_six"]["mean_m"]["value"] > 0
+    assert figures["rows"][0]["inside_m"].value < 0.01
+    assert figures["three_minus_six"]["mean_m"].value > 0
     assert all(claim.verdict is Verdict.OPEN for claim in RECIPE.claims(figures))
     table = RECIPE.table(figures)
     assert {len(row) for row in table.rows} == {len(table.header)}

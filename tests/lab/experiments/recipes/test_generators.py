@@ -1,12 +1,12 @@
 """The comparison of generators, on few goals and with ones that learn at once."""
 
-import json
-
 import pytest
 
 from prior_reinforce.lab.experiments.claims import Verdict
 from prior_reinforce.lab.experiments.recipes import Run, Scale
+from prior_reinforce.lab.experiments.recipes.base import from_json, to_json
 from prior_reinforce.lab.experiments.recipes.generators import METHODS, RECIPE, Generators, Method
+from prior_reinforce.lab.experiments.statistics import Interval
 
 SMALL = Scale(goals=5, seeds=(0,), sets=("A",), rounds=3)
 OWN = "prior_reinforce.generators.interpolation:NearestNeighbours"
@@ -19,7 +19,7 @@ def test_generators_with_an_own_one(tmp_path):
         *(m for m in METHODS if m.generator.startswith(("nearest", "interpolation"))),
     )
     figures = Generators(methods).run(Run(tmp_path, SMALL, include=(OWN,)))
-    figures = json.loads(json.dumps(figures))
+    figures = from_json(to_json(figures))
     rows = {row["generator"]: row for row in figures["rows"]}
     aligned = {name for name, row in rows.items() if row["aligned"]}
     assert aligned == {"nearest,timing=align", "interpolation,timing=align"}
@@ -27,7 +27,7 @@ def test_generators_with_an_own_one(tmp_path):
     # The same class under its own name gives the same trials, to the last digit.
     assert rows[OWN]["success"] == rows["nearest"]["success"]
     # A DMP with its own clock is at the goal where neighbours out of time are nowhere.
-    assert rows["nearest"]["ours_minus"][0]["value"] > 0.3
+    assert rows["nearest"]["ours_minus"][0].value > 0.3
     assert [len(row["success"]) for row in rows.values()] == [3] * 5
     claims = RECIPE.claims(figures)
     assert {claim.verdict for claim in claims} == {Verdict.OPEN}
@@ -55,7 +55,7 @@ def generators_figures(**minus):
     share = [0.5, 0.96, 0.96, 0.96]
 
     def interval(value):
-        return {"value": value, "low": value - 0.01, "high": value + 0.01}
+        return Interval(value, value - 0.01, value + 0.01)
 
     def told(method):
         return {**vars(method), "aligned": method.aligned}

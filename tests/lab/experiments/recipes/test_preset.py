@@ -1,14 +1,12 @@
 """The paper's preset beside ours; brief networks stand for it, since it learns for hours."""
 
-import json
-
 import numpy as np
 import pytest
 
 from prior_reinforce.commands.reproduce import Reproduce
 from prior_reinforce.lab.experiments.evaluation import Training, Trials
 from prior_reinforce.lab.experiments.recipes import Run, Scale
-from prior_reinforce.lab.experiments.recipes.base import TASK
+from prior_reinforce.lab.experiments.recipes.base import TASK, from_json, to_json
 from prior_reinforce.lab.experiments.recipes.preset import (
     RECIPE,
     IndependentNoiseTrials,
@@ -23,7 +21,7 @@ SMALL = Scale(goals=3, seeds=(0,), sets=("A",), rounds=1)
 def test_one_network_is_sampled_twice_and_stands_beside_ours(tmp_path):
     methods = (("ours", "nearest", False), ("shared", BRIEF, False), ("own", BRIEF, True))
     measurement = PaperPreset(methods)
-    figures = json.loads(json.dumps(measurement.run(Run(tmp_path, SMALL))))
+    figures = from_json(to_json(measurement.run(Run(tmp_path, SMALL))))
     assert len(list(tmp_path.glob("models/*"))) == 2  # not a network for each way of sampling
     table = RECIPE.table(figures)
     assert [row[0] for row in table.rows] == ["ours", "shared", "own"]

@@ -8,6 +8,7 @@ import pytest
 from prior_reinforce.lab.experiments import fields
 from prior_reinforce.lab.experiments.fields import Change, Field, MeasuredField
 from prior_reinforce.lab.experiments.recipes import Run, Scale
+from prior_reinforce.lab.experiments.recipes.base import from_json, to_json
 from prior_reinforce.lab.experiments.recipes.robustness import (
     CONDITIONS,
     RECIPE,
@@ -16,6 +17,7 @@ from prior_reinforce.lab.experiments.recipes.robustness import (
     Robustness,
     draws,
 )
+from prior_reinforce.lab.experiments.statistics import Interval
 
 FIELDS = [[MeasuredField("basketball-v1", "basketball-v1", name, 0) for name in "A"]]
 OBSERVERS = "prior_reinforce.lab.experiments.observers"
@@ -47,16 +49,16 @@ def by_hand(monkeypatch):
 
 def test_conditions_give_table_picture_and_remarks(by_hand, tmp_path):
     run = Run(tmp_path, Scale(rounds=4), include=("frozen",))
-    figures = json.loads(json.dumps(SMALL.run(run)))
+    figures = from_json(to_json(SMALL.run(run)))
     table = RECIPE.table(figures)
     assert table.header[2] == "Bayesian, earlier goals too"
     assert table.header[-1] == "frozen"  # the one that was included
     assert "CMA-ES" not in table.header  # which searches, and these conditions ask for none
     assert [row[:2] for row in table.rows] == [("by eye", "7"), ("turned away", "7")]
     for condition in figures["conditions"]:
-        of = {label: rule["mean"]["value"] for label, rule in condition["rules"].items()}
+        of = {label: rule["mean"].value for label, rule in condition["rules"].items()}
         assert of["Bayesian, earlier goals too"] < of["frozen"] == 5.0  # 3 cm off is never a hit
-        assert condition["rules"]["Bayesian, earlier goals too"]["ours_minus"]["value"] == 0.0
+        assert condition["rules"]["Bayesian, earlier goals too"]["ours_minus"].value == 0.0
     (picture,) = RECIPE.draw(figures, tmp_path)
     assert picture.path.is_file()
     assert "Brier" in RECIPE.remarks(figures)[-1]
@@ -65,7 +67,7 @@ def test_conditions_give_table_picture_and_remarks(by_hand, tmp_path):
 def test_where_goals_are_tried_alone_nothing_is_remembered_and_ours_is_alone_too(by_hand, tmp_path):
     alone = Robustness(conditions=(Condition("by eye, alone", FIELDS, goals=2, alone=True),))
     run = Run(tmp_path, Scale(rounds=4), include=("frozen",))
-    figures = json.loads(json.dumps(alone.run(run)))
+    figures = from_json(to_json(alone.run(run)))
     table = RECIPE.table(figures)
     assert table.header[2] == "Bayesian, each goal alone"
     assert not any("earlier goals too" in label for label in table.header)
@@ -74,13 +76,13 @@ def test_where_goals_are_tried_alone_nothing_is_remembered_and_ours_is_alone_too
     kept = [json.loads(path.read_text())["unit"] for path in tmp_path.glob("units/*")]
     assert not any(unit["carry_over"] for unit in kept if "carry_over" in unit)
     rules = figures["conditions"][0]["rules"]
-    assert rules["Bayesian, each goal alone"]["ours_minus"]["value"] == 0.0
-    assert rules["frozen"]["ours_minus"]["value"] < 0.0
+    assert rules["Bayesian, each goal alone"]["ours_minus"].value == 0.0
+    assert rules["frozen"]["ours_minus"].value < 0.0
 
 
 def test_who_is_ahead_of_ours_is_named(by_hand, tmp_path):
     figures = SMALL.run(Run(tmp_path, Scale(rounds=2)))
-    figures["conditions"][0]["rules"]["mean offset"]["ours_minus"]["value"] = 0.5
+    figures["conditions"][0]["rules"]["mean offset"]["ours_minus"] = Interval(0.5, 0.4, 0.6)
     assert "mean offset in 'by eye'" in RECIPE.remarks(figures)[0]
 
 

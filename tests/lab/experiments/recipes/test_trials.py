@@ -17,6 +17,7 @@ from prior_reinforce.lab.experiments.recipes.trials import (
     TrialsTable,
     first_throws_that_hit,
 )
+from prior_reinforce.lab.experiments.statistics import Interval
 from prior_reinforce.lab.tasks import make_task
 from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
 
@@ -43,7 +44,7 @@ def test_a_row_counts_what_was_not_reached_as_one_trial_more(tmp_path):
             )
             needed = [at or 3 for at in unit]
             assert len(needed) == row[name]["goals"] == n
-            assert row[name]["trials"]["value"] == pytest.approx(np.mean(needed))
+            assert row[name]["trials"].value == pytest.approx(np.mean(needed))
             assert row[name]["sd"] == pytest.approx(np.std(needed, ddof=1))
             assert row[name]["not_reached"] == unit.count(0)
     assert len(RECIPE.table(figures).rows) == 2
@@ -104,13 +105,13 @@ def test_claims_are_judged_by_the_interval():
         first_throws: float = 0.49,
     ) -> dict:
         def summary(low: float, high: float) -> dict:
-            return {"goals": 60, "trials": {"value": 3.0, "low": low, "high": high}, "sd": 1.0}
+            return {"goals": 60, "trials": Interval(3.0, low, high), "sd": 1.0}
 
         return {
             "title": "T", "task": "curling", "by_model": False, "prior": 6, "trials": 2.9,
             "sd": 0.9, "adapter": "gp", "trainings": 6, "unseen": summary(*unseen),
             "many": summary(*many),
-            "first_throws": {"value": 0.4, "low": 0.3, "high": first_throws},
+            "first_throws": Interval(0.4, 0.3, first_throws),
         }  # fmt: skip
 
     figures = {
@@ -122,8 +123,8 @@ def test_claims_are_judged_by_the_interval():
             row((2.0, 2.5), unseen=(2.0, 3.0), first_throws=0.6),
         ],
         "eye_minus_model": {
-            "curling": {"value": 0.2, "low": 0.1, "high": 0.3},
-            "basketball-v1": {"value": 0.0, "low": -0.1, "high": 0.1},
+            "curling": Interval(0.2, 0.1, 0.3),
+            "basketball-v1": Interval(0.0, -0.1, 0.1),
         },
     }
     verdicts = [claim.verdict for claim in RECIPE.claims(figures)]

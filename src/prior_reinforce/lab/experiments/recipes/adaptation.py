@@ -7,7 +7,7 @@ contact physics. Goals 2 to 8 count: before the first there is nothing to rememb
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +28,6 @@ from prior_reinforce.lab.experiments.sequences import Afternoons
 from prior_reinforce.lab.experiments.statistics import (
     bootstrap_difference,
     bootstrap_mean,
-    interval_of,
     trials_counted,
 )
 
@@ -118,20 +117,20 @@ class Adaptation(Measurement):
             "trials": {
                 name: {
                     **{
-                        task: asdict(bootstrap_mean(flat[i, j], within=(1, scale.rounds + 1)))
+                        task: bootstrap_mean(flat[i, j], within=(1, scale.rounds + 1))
                         for j, task in enumerate(self.tasks)
                     },
-                    "mean": asdict(bootstrap_mean(overall[i], within=(1, scale.rounds + 1))),
+                    "mean": bootstrap_mean(overall[i], within=(1, scale.rounds + 1)),
                 }
                 for i, name in enumerate(names)
             },
             "ours_minus": {
-                name: asdict(bootstrap_difference(overall[ours], overall[i]))
+                name: bootstrap_difference(overall[ours], overall[i])
                 for i, name in enumerate(names)
                 if i != ours
             },
             "alone_minus": {
-                name: asdict(bootstrap_difference(overall[alone], overall[i]))
+                name: bootstrap_difference(overall[alone], overall[i])
                 for i, (_, carried, name) in enumerate(rules)
                 if i != alone and not carried
             },
@@ -197,10 +196,8 @@ def table(figures: Figures) -> Table:
         tuple(
             (
                 name,
-                *(str(interval_of(of_task[task])) for task in tasks),
-                f"{interval_of(figures['ours_minus'][name]):+.2f}"
-                if name in figures["ours_minus"]
-                else "",
+                *(str(of_task[task]) for task in tasks),
+                f"{figures['ours_minus'][name]:+.2f}" if name in figures["ours_minus"] else "",
             )
             for name, of_task in figures["trials"].items()
         ),
@@ -216,7 +213,7 @@ def draw(figures: Figures, folder: Path) -> list[Picture]:
         figure = new_figure(10.5, 4.4)
         left, right = figure.subplots(1, 2, width_ratios=(1.4, 1.0))
         carried = {label: remembers for _, remembers, label in RULES}
-        shown = {n: interval_of(of["mean"]) for n, of in figures["trials"].items()}
+        shown = {n: of["mean"] for n, of in figures["trials"].items()}
         for axes in (left, right):
             calm_axes(axes)
         for place, (name, mean) in enumerate(shown.items()):
@@ -256,7 +253,7 @@ def draw(figures: Figures, folder: Path) -> list[Picture]:
 def remarks(figures: Figures) -> list[str]:
     """Who is ahead where nothing is remembered, and how far what is said can be trusted."""
     alone = "; ".join(
-        f"{name.removesuffix(', each goal alone')} {interval_of(of):+.2f}"
+        f"{name.removesuffix(', each goal alone')} {of:+.2f}"
         for name, of in figures["alone_minus"].items()
     )
     return [

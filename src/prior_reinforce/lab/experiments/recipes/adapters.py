@@ -8,7 +8,7 @@ axis, and there is something to adapt.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -22,13 +22,13 @@ from prior_reinforce.lab.experiments.recipes.base import (
     Run,
     Scale,
     Table,
-    rounds_shown,
+    table_by_round,
     trainings_of,
 )
 from prior_reinforce.lab.experiments.statistics import (
     Curve,
+    Interval,
     difference_curve,
-    interval_of,
     mean_success_difference,
     success_curve,
 )
@@ -78,8 +78,8 @@ class Adapters(Measurement):
         def minus(one: str, other: str) -> Curve:
             return difference_curve(solved[one], solved[other], rounds)
 
-        def mean_minus(one: str, other: str) -> dict[str, float]:
-            return asdict(mean_success_difference(solved[one], solved[other], rounds))
+        def mean_minus(one: str, other: str) -> Interval:
+            return mean_success_difference(solved[one], solved[other], rounds)
 
         return {
             "trainings": scale.trainings,
@@ -101,28 +101,18 @@ class Adapters(Measurement):
 
 def table(figures: Figures) -> Table:
     """One row an adapter."""
-    shown = rounds_shown(len(figures["success"]["gp"]))
-    at = 4 if 4 in shown else shown[-1]
-    return Table(
-        ("adapter", *(f"by round {r}" for r in shown), f"GP minus it, round {at}"),
-        tuple(
-            (
-                LABELS.get(name, name),
-                *(str(interval_of(curve[r - 1])) for r in shown),
-                f"{interval_of(figures['gp_minus'][name][at - 1]):+.2f}"
-                if name in figures["gp_minus"]
-                else "",
-            )
-            for name, curve in figures["success"].items()
-        ),
+    success, minus = (
+        {LABELS.get(name, name): curve for name, curve in figures[of].items()}
+        for of in ("success", "gp_minus")
     )
+    return table_by_round("adapter", success, "GP", minus)
 
 
 def draw(figures: Figures, folder: Path) -> list[Picture]:
     """Shares reached, and how far the Gaussian process is above the others."""
     from prior_reinforce.lab.experiments.recipes.charts import Line, Panel, draw_success
 
-    def lines(curves: Mapping[str, Curve]) -> list[Line]:
+    def lines(curves: Mapping[str, Sequence[Interval]]) -> list[Line]:
         return [
             Line(LABELS.get(name, name), curves[name], place=i, dashed=name not in LABELS)
             for i, name in enumerate(figures["success"])
@@ -146,9 +136,9 @@ def claims(figures: Figures) -> list[Claim]:
     """Over 90 % within 4 rounds; above proportional above none; forgetting helps."""
     trainings, success = figures["trainings"], figures["success"]
     last = len(success["gp"])
-    by_four = interval_of(success["gp"][min(4, last) - 1])
-    better = interval_of(figures["proportional_mean_minus_frozen"])
-    marginal = interval_of(figures["proportional_minus_frozen"][-1])
+    by_four = success["gp"][min(4, last) - 1]
+    better = figures["proportional_mean_minus_frozen"]
+    marginal = figures["proportional_minus_frozen"][-1]
     return [
         Claim(
             "The Gaussian process reaches more than 90 % of the goals within 4 rounds.",
@@ -173,13 +163,13 @@ def _claims_of_form(form: str, figures: Figures) -> list[Claim]:
     """Hold one form of the Gaussian process against the proportional rule and no forgetting."""
     label, trainings, differences = LABELS[form], figures["trainings"], figures["forms"][form]
     success, last = figures["success"], len(figures["success"][form])
-    sooner = interval_of(differences["mean_minus_proportional"])
+    sooner = differences["mean_minus_proportional"]
 
     def in_the_end(says: str, it_minus: str, other: str, difference: Curve) -> Claim:
         # By round, because where both reach every goal nothing is left to be above in.
         return Claim(
             f"{label}: {says}",
-            f"it minus {it_minus}, round {last}: {interval_of(difference[-1]):+.3f}",
+            f"it minus {it_minus}, round {last}: {difference[-1]:+.3f}",
             above_by_round(success[form], success[other], difference, last, trainings),
         )
 

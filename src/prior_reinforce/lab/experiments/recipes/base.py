@@ -1,11 +1,13 @@
 """What a recipe is: a measurement that gives figures, and what is made of the figures.
 
-Figures are one JSON-able dict. Table, pictures and claims are functions of the figures alone, so a
-page can be drawn again from the files of a run that took an hour.
+Figures are one dict of plain values and intervals, kept as JSON. Table, pictures and claims are
+functions of the figures alone, so a page can be drawn again from the files of a run that took an
+hour.
 """
 
 from __future__ import annotations
 
+import json
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
@@ -21,6 +23,7 @@ from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.generators import GENERATORS, make_generator
 from prior_reinforce.lab.experiments.claims import Claim
 from prior_reinforce.lab.experiments.evaluation import GOAL_SEED, Training, Trials
+from prior_reinforce.lab.experiments.statistics import Curve, Interval
 from prior_reinforce.lab.experiments.units import Unit, Workers, commit, run_units
 
 TASK = "basketball-v1"
@@ -146,7 +149,7 @@ class Measurement(ABC):
 
     @abstractmethod
     def run(self, run: Run) -> dict[str, Any]:
-        """Run what is not done yet, and return the figures, JSON-able."""
+        """Run what is not done yet, and return the figures."""
 
 
 @dataclass(frozen=True)
@@ -212,6 +215,42 @@ def trainings_of(scale: Scale, generator: str, *, perception: str | None = None)
     ]
 
 
-def rounds_shown(rounds: int) -> list[int]:
-    """Rounds that a table shows."""
-    return [r for r in _ROUNDS_SHOWN if r <= rounds]
+def table_by_round(
+    head: str, success: Mapping[str, Curve], ours: str, ours_minus: Mapping[str, Curve]
+) -> Table:
+    """One row a method: shares reached by some rounds, and how far ours is above it.
+
+    Args:
+        head: Of the first column.
+        success: By what each method is called.
+        ours: What ours is called in the head of the last column.
+        ours_minus: Ours minus each other method.
+    """
+    rounds = len(next(iter(success.values())))
+    shown = [r for r in _ROUNDS_SHOWN if r <= rounds]
+    at = 4 if 4 in shown else shown[-1]
+    rows = (
+        (
+            name,
+            *(str(curve[r - 1]) for r in shown),
+            f"{ours_minus[name][at - 1]:+.2f}" if name in ours_minus else "",
+        )
+        for name, curve in success.items()
+    )
+    header = (head, *(f"by round {r}" for r in shown), f"{ours} minus it, round {at}")
+    return Table(header, tuple(rows))
+
+
+def to_json(figures: Figures) -> str:
+    """Figures as they are kept."""
+    return json.dumps(figures, indent=1, default=asdict) + "\n"
+
+
+def from_json(text: str) -> Figures:
+    """Figures as they were before they became JSON."""
+
+    def revived(values: dict[str, Any]) -> Any:
+        return Interval(**values) if values.keys() == {"value", "low", "high"} else values
+
+    figures: Figures = json.loads(text, object_hook=revived)
+    return figures

@@ -17,11 +17,9 @@ from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.patches import Rectangle
-from matplotlib.ticker import MaxNLocator
 
 from prior_reinforce.lab.experiments.statistics import Curve, Interval
 from prior_reinforce.report.style import (
-    GOAL,
     INK,
     INK_SOFT,
     calm_axes,
@@ -31,13 +29,11 @@ from prior_reinforce.report.style import (
     trial_colour,
 )
 
-_COLOURS = ("#0072b2", "#d55e00", "#e69f00", "#cc79a7", "#009e73", "#56b4e9", "#000000", "#999999")
+COLOURS = ("#0072b2", "#d55e00", "#e69f00", "#cc79a7", "#009e73", "#56b4e9", "#000000", "#999999")
 _MARKERS = ("o", "s", "D", "^", "v", "P", "X", "*")
 _SPREAD = 0.34
 """Part of a round over which the methods' markers are spread, so that their bars do not hide one
 another."""
-_APART = 0.24
-"""Between the three marks of a row of trials, of the distance between rows."""
 _LARGEST_SHOWN = 10.0
 """Errors from here on have one colour, in [cm]: else a few far misses would hide all else."""
 # The light part of matplotlib's Blues, on which dark arrows can be seen.
@@ -89,14 +85,12 @@ def _draw_panel(axes: Axes, panel: Panel) -> None:
     n_rounds = len(lines[0].curve)
     offsets = np.linspace(-_SPREAD / 2, _SPREAD / 2, len(lines)) if len(lines) > 1 else [0.0]
     for i, (line, offset) in enumerate(zip(lines, offsets, strict=True)):
-        value, low, high = (
-            np.array([point[key] for point in line.curve]) for key in ("value", "low", "high")
-        )
+        value, low, high = np.array([(of.value, of.low, of.high) for of in line.curve]).T
         axes.errorbar(
             np.arange(1, n_rounds + 1) + offset,
             value,
             yerr=[value - low, high - value],
-            color=_COLOURS[line.place % len(_COLOURS)],
+            color=COLOURS[line.place % len(COLOURS)],
             marker=_MARKERS[line.place % len(_MARKERS)],
             markersize=5.5,
             linewidth=2.6 if shares and i == 0 else 1.5,
@@ -131,10 +125,10 @@ def draw_kinds(kinds: Sequence[str], panels: Mapping[str, Sequence[Line]], path:
     for axes, (label, lines) in zip(subplots, panels.items(), strict=True):
         calm_axes(axes)
         for line, offset in zip(lines, np.linspace(-0.3, 0.3, len(lines)), strict=True):
-            colour = _COLOURS[line.place % len(_COLOURS)]
+            colour = COLOURS[line.place % len(COLOURS)]
             marker = _MARKERS[line.place % len(_MARKERS)]
             at = np.arange(len(kinds)) + offset
-            means = [point["value"] for point in line.curve]
+            means = [point.value for point in line.curve]
             axes.plot(at, means, marker, color=colour, markersize=9, label=line.label)
             for x, cells in zip(at, line.each, strict=True):
                 axes.plot([x] * len(cells), cells, marker, color=colour, markersize=4, alpha=0.45)
@@ -147,63 +141,6 @@ def draw_kinds(kinds: Sequence[str], panels: Mapping[str, Sequence[Line]], path:
         handles, labels, loc="outside lower center", ncols=len(labels),
         frameon=False, fontsize=9.5, labelcolor=INK,
     )  # fmt: skip
-    return save_png(figure, path)
-
-
-@dataclass(frozen=True)
-class TrialsRow:
-    """One line of the table of trials."""
-
-    label: str
-    unseen: Interval
-    """Mean trials on the paper's number of goals."""
-    many: Interval
-    """Mean trials on many goals."""
-    paper: float
-    """The paper's mean."""
-    paper_sd: float
-    """The paper's standard deviation."""
-
-
-@drawing()
-def draw_trials(rows: Sequence[TrialsRow], path: Path) -> Path:
-    """Draw the mean trials of all rows, the first on top, the paper's mean beside ours."""
-    figure = new_figure(8.2, 1.5 + 0.62 * len(rows))
-    axes = figure.subplots()
-    calm_axes(axes)
-    axes.grid(visible=False, axis="y")
-    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    places = np.arange(len(rows))
-    axes.errorbar(
-        [row.paper for row in rows],
-        places - _APART,
-        xerr=[row.paper_sd for row in rows],
-        fmt="D",
-        color=GOAL,
-        elinewidth=1,
-        markersize=6,
-        label="paper, real arm (standard deviation)",
-    )
-    for intervals, offset, place, label in (
-        ([row.many for row in rows], 0.0, 0, "ours, many goals (95 % interval)"),
-        ([row.unseen for row in rows], _APART, 5, "ours, five unseen goals a set (95 % interval)"),
-    ):
-        value, low, high = np.array([(i.value, i.low, i.high) for i in intervals]).T
-        axes.errorbar(
-            value,
-            places + offset,
-            xerr=[value - low, high - value],
-            fmt="os"[bool(offset)],
-            color=_COLOURS[place],
-            markersize=6.5,
-            capsize=3,
-            label=label,
-        )
-    axes.set_yticks(places, [row.label for row in rows], color=INK, fontsize=10.5)
-    axes.set_ylim(len(rows) - 0.4, -0.6)
-    axes.set_xlim(left=0.8)
-    axes.set_xlabel("Stage-2 trials to the first hit")
-    figure.legend(loc="outside lower center", frameon=False, fontsize=9.5, labelcolor=INK)
     return save_png(figure, path)
 
 
@@ -315,29 +252,52 @@ def draw_alignment(
     return save_png(figure, path)
 
 
+@dataclass(frozen=True)
+class Mark:
+    """One method of a chart of rows."""
+
+    shape: str
+    """Of its marks, as matplotlib names it."""
+    colour: str
+    """Of marks and intervals."""
+    intervals: Sequence[Interval | None]
+    """One a row; None where it was not tried."""
+
+
 @drawing()
 def draw_rows(
-    rows: Mapping[str, Mapping[str, Interval]], marks: Mapping[str, str], label: str, path: Path
+    labels: Sequence[str], marks: Mapping[str, Mark], axis_label: str, path: Path
 ) -> Path:
-    """Draw intervals, a row a condition and a mark a method; the first method is ours."""
-    figure = new_figure(7.5, 0.55 * len(rows) + 1.3)
+    """Draw intervals, a row each, the first on top, and a mark a method, one below another.
+
+    Args:
+        labels: What stands beside each row.
+        marks: By what the legend calls them.
+        axis_label: Below the horizontal axis.
+        path: PNG to write.
+    """
+    figure = new_figure(8.2, 1.3 + 0.2 * len(marks) + (0.3 + 0.05 * len(marks)) * len(labels))
     axes = figure.subplots()
     calm_axes(axes)
     axes.grid(visible=False, axis="y")
-    others = [colour for colour in _COLOURS if colour != GOAL]
-    for place, of_method in enumerate(rows.values()):
-        for i, (method, mark) in enumerate(marks.items()):
-            if method not in of_method:
-                continue
-            y, of = place + 0.17 * (i - (len(marks) - 1) / 2), of_method[method]
-            colour = GOAL if i == 0 else others[i - 1]
-            axes.plot([of.low, of.high], [y, y], color=colour, linewidth=1.5)
-            name = method if place == 0 else None
-            axes.plot(of.value, y, mark, color=colour, markersize=6, label=name)
-    axes.set_yticks(range(len(rows)), list(rows))
-    axes.invert_yaxis()
-    axes.set_xlabel(label)
-    figure.legend(
-        loc="outside upper center", ncols=2, frameon=False, fontsize=9, labelcolor=INK_SOFT
-    )
+    for i, (name, mark) in enumerate(marks.items()):
+        offset = 0.8 * ((i + 0.5) / len(marks) - 0.5)
+        shown = [(row, of) for row, of in enumerate(mark.intervals) if of is not None]
+        if not shown:
+            continue
+        row, value, low, high = np.array([(row, of.value, of.low, of.high) for row, of in shown]).T
+        axes.errorbar(
+            value,
+            row + offset,
+            xerr=[value - low, high - value],
+            fmt=mark.shape,
+            color=mark.colour,
+            markersize=6,
+            elinewidth=1.5,
+            label=name,
+        )
+    axes.set_yticks(range(len(labels)), labels, color=INK)
+    axes.set_ylim(len(labels) - 0.4, -0.6)
+    axes.set_xlabel(axis_label)
+    figure.legend(loc="outside lower center", frameon=False, fontsize=9.5, labelcolor=INK)
     return save_png(figure, path)

@@ -35,7 +35,6 @@ from prior_reinforce.lab.experiments.statistics import (
     Interval,
     bootstrap_difference,
     bootstrap_mean,
-    interval_of,
 )
 from prior_reinforce.lab.experiments.units import Unit
 from prior_reinforce.lab.tasks import make_task
@@ -114,18 +113,18 @@ class DisplacementFields(Measurement):
                 {
                     "demonstrations": len(outcomes[i * n]),
                     **{
-                        name: asdict(bootstrap_mean(v[i], within=_within(name)))
+                        name: bootstrap_mean(v[i], within=_within(name))
                         for name, v in by_name.items()
                     },
                 }
                 for i in range(2)
             ],
             "three_minus_six": {
-                name: asdict(bootstrap_difference(v[1], v[0], within=_within(name)))
+                name: bootstrap_difference(v[1], v[0], within=_within(name))
                 for name, v in by_name.items()
             },
-            "outside_minus_inside_m": asdict(
-                bootstrap_difference(by_name["outside_m"][0], by_name["inside_m"][0])
+            "outside_minus_inside_m": bootstrap_difference(
+                by_name["outside_m"][0], by_name["inside_m"][0]
             ),
             "fields": [
                 {**results[i], "outcomes_m": outcomes[i].tolist(), "training": asdict(trainings[i])}
@@ -198,13 +197,11 @@ def table(figures: Figures) -> Table:
     rows.append(("difference", figures["three_minus_six"], "+.2f"))
     columns = {
         "learned from": lambda row: row[0],
-        off: lambda row: format(interval_of(row[1]["high_error_area"]), row[2]),
+        off: lambda row: format(row[1]["high_error_area"], row[2]),
         "mean error [cm]": lambda row: format(_cm(row[1]["mean_m"]), row[2]),
         "inside the demonstrations' hull [cm]": lambda row: format(_cm(row[1]["inside_m"]), row[2]),
         "outside it [cm]": lambda row: format(_cm(row[1]["outside_m"]), row[2]),
-        "steepness of the field [cm/cm]": lambda row: format(
-            interval_of(row[1]["steepness"]), row[2]
-        ),
+        "steepness of the field [cm/cm]": lambda row: format(row[1]["steepness"], row[2]),
     }
     return Table.of(rows, columns)
 
@@ -230,8 +227,8 @@ def claims(figures: Figures) -> list[Claim]:
     """Small inside, larger outside; three demonstrations widen and disorder it."""
     trainings, difference = figures["trainings"], figures["three_minus_six"]
     outside = _cm(figures["outside_minus_inside_m"])
-    area = interval_of(difference["high_error_area"])
-    steepness = interval_of(difference["steepness"])
+    area = difference["high_error_area"]
+    steepness = difference["steepness"]
     six, three = figures["rows"]
     return [
         Claim(
@@ -244,22 +241,22 @@ def claims(figures: Figures) -> list[Claim]:
         Claim(
             "With three demonstrations high-error regions expand.",
             f"share of the region off by over {figures['high_error_m'] * 100:.0f} cm: "
-            f"{interval_of(three['high_error_area'])} against "
-            f"{interval_of(six['high_error_area'])}; difference {area:+.2f}",
+            f"{three['high_error_area']} against "
+            f"{six['high_error_area']}; difference {area:+.2f}",
             above(area, 0.0, trainings),
         ),
         Claim(
             "With three demonstrations the field becomes less structured.",
-            f"neighbouring displacements differ by {interval_of(three['steepness'])} cm a cm "
-            f"against {interval_of(six['steepness'])}; difference {steepness:+.2f}",
+            f"neighbouring displacements differ by {three['steepness']} cm a cm "
+            f"against {six['steepness']}; difference {steepness:+.2f}",
             above(steepness, 0.0, trainings),
         ),
     ]
 
 
-def _cm(values: Mapping[str, Any]) -> Interval:
+def _cm(metres: Interval) -> Interval:
     """An interval in [m], in [cm]."""
-    return interval_of({key: 100 * value for key, value in values.items()})
+    return Interval(100 * metres.value, 100 * metres.low, 100 * metres.high)
 
 
 RECIPE = Recipe(

@@ -29,12 +29,11 @@ from prior_reinforce.lab.experiments.recipes.base import (
     Run,
     Scale,
     Table,
-    rounds_shown,
+    table_by_round,
     trainings_of,
 )
 from prior_reinforce.lab.experiments.statistics import (
     difference_curve,
-    interval_of,
     mean_success_difference,
     success_curve,
 )
@@ -110,7 +109,7 @@ class Generators(Measurement):
                 "aligned": method.aligned,
                 "success": success_curve(mine, rounds),
                 "mean_minus": {
-                    other.label: asdict(mean_success_difference(solved[other.label], mine, rounds))
+                    other.label: mean_success_difference(solved[other.label], mine, rounds)
                     for other in methods
                     if other.kind == "method" and other is not method
                 },
@@ -119,7 +118,7 @@ class Generators(Measurement):
                 row["ours_minus"] = difference_curve(at[0], mine, rounds)
             recorded = solved.get(_unaligned(method.label))
             if method.aligned and recorded is not None:
-                row["alignment_gain"] = asdict(mean_success_difference(mine, recorded, rounds))
+                row["alignment_gain"] = mean_success_difference(mine, recorded, rounds)
             rows.append(row)
         return {"trainings": scale.trainings, "rows": rows}
 
@@ -132,21 +131,13 @@ class Generators(Measurement):
 
 def table(figures: Figures) -> Table:
     """One row a method."""
-    rows = figures["rows"]
-    shown = rounds_shown(len(rows[0]["success"]))
-    at = 4 if 4 in shown else shown[-1]
-    ours = rows[0]["label"]
-    return Table(
-        ("generator", *(f"by round {r}" for r in shown), f"{ours} minus it, round {at}"),
-        tuple(
-            (
-                row["label"] + (" (not in the paper)" if row["kind"] == "other" else ""),
-                *(str(interval_of(row["success"][r - 1])) for r in shown),
-                f"{interval_of(row['ours_minus'][at - 1]):+.2f}" if "ours_minus" in row else "",
-            )
-            for row in rows
-        ),
-    )
+    rows = {
+        row["label"] + (" (not in the paper)" if row["kind"] == "other" else ""): row
+        for row in figures["rows"]
+    }
+    success = {label: row["success"] for label, row in rows.items()}
+    minus = {label: row["ours_minus"] for label, row in rows.items() if "ours_minus" in row}
+    return table_by_round("generator", success, figures["rows"][0]["label"], minus)
 
 
 def draw(figures: Figures, folder: Path) -> list[Picture]:
@@ -183,13 +174,13 @@ def claims(figures: Figures) -> list[Claim]:
     baselines = [row for row in figures["rows"] if row["kind"] == "baseline"]
     recorded = [row for row in baselines if not row["aligned"]]
     aligned = [row for row in baselines if row["aligned"]]
-    by_four = interval_of(ours["success"][min(4, len(ours["success"])) - 1])
-    gains = {_unaligned(row["label"]): interval_of(row["alignment_gain"]) for row in aligned}
+    by_four = ours["success"][min(4, len(ours["success"])) - 1]
+    gains = {_unaligned(row["label"]): row["alignment_gain"] for row in aligned}
 
     def by_round(row: Figures, says: str) -> Claim:
         curves = ours["success"], row["success"], row["ours_minus"]
         rounds = [r for r in (2, 4, 10) if r <= len(row["ours_minus"])]
-        measured = [f"round {r} {interval_of(row['ours_minus'][r - 1]):+.2f}" for r in rounds]
+        measured = [f"round {r} {row['ours_minus'][r - 1]:+.2f}" for r in rounds]
         return Claim(
             f"{says} at every round from {_FIRST_CLAIMED} on.",
             f"{ours['label']} minus it: {'; '.join(measured)}",
@@ -228,7 +219,7 @@ def remarks(figures: Figures) -> list[str]:
     if figures["trainings"] < LEAST_TRAININGS:
         return []
     ours, *others = figures["rows"]
-    minus = {row["label"]: interval_of(row["mean_minus"][ours["label"]]) for row in others}
+    minus = {row["label"]: row["mean_minus"][ours["label"]] for row in others}
     better = [f"{label} ({value:+.2f})" for label, value in minus.items() if value.high < 0]
     if not better:
         return []
@@ -249,7 +240,7 @@ def _forms_above(baselines: Sequence[Figures], says: str, trainings: int) -> lis
     forms = list(baselines[0]["mean_minus"])[1:] if baselines else []
     claims = []
     for form in forms:
-        minus = {row["label"]: interval_of(row["mean_minus"][form]) for row in baselines}
+        minus = {row["label"]: row["mean_minus"][form] for row in baselines}
         measured = "; ".join(f"{name} {value:+.2f}" for name, value in minus.items())
         claims.append(
             Claim(

@@ -9,7 +9,7 @@ at random. Adapter, noise and goals are those of the generators' comparison.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +31,6 @@ from prior_reinforce.lab.experiments.statistics import (
     SHARE,
     bootstrap_difference,
     bootstrap_mean,
-    interval_of,
     trials_counted,
 )
 
@@ -97,11 +96,11 @@ class PaperPreset(Measurement):
             "rows": [
                 {
                     "label": label,
-                    "first": asdict(bootstrap_mean((solved[i] == 1).astype(float), within=SHARE)),
+                    "first": bootstrap_mean((solved[i] == 1).astype(float), within=SHARE),
                     "first_error_m": np.median(error[i], axis=1).tolist(),
-                    "trials": asdict(bootstrap_mean(took[i], within=(1, rounds + 1))),
+                    "trials": bootstrap_mean(took[i], within=(1, rounds + 1)),
                     "trials_of_each": took[i].mean(axis=1).tolist(),
-                    "ours_minus": asdict(bootstrap_difference(took[0], took[i])),
+                    "ours_minus": bootstrap_difference(took[0], took[i]),
                 }
                 for i, (label, _, _) in enumerate(self.methods)
             ],
@@ -119,11 +118,11 @@ def table(figures: Figures) -> Table:
         tuple(
             (
                 row["label"],
-                str(interval_of(row["first"])),
+                str(row["first"]),
                 *(f"{100 * error:.1f}" for error in row["first_error_m"]),
-                str(interval_of(row["trials"])),
+                str(row["trials"]),
                 *(f"{trials:.2f}" for trials in row["trials_of_each"]),
-                f"{interval_of(row['ours_minus']):+.2f}" if i else "",
+                f"{row['ours_minus']:+.2f}" if i else "",
             )
             for i, row in enumerate(figures["rows"])
         ),

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import string
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -35,7 +35,6 @@ from prior_reinforce.lab.experiments.recipes.base import (
 from prior_reinforce.lab.experiments.sequences import FieldAfternoons
 from prior_reinforce.lab.experiments.statistics import (
     difference_of_tasks,
-    interval_of,
     mean_of_tasks,
     trials_counted,
 )
@@ -242,8 +241,8 @@ class Robustness(Measurement):
             "rules": {
                 label: {
                     "each": [float(row.mean()) for row in rows],
-                    "mean": asdict(mean_of_tasks(rows, within=bounds)),
-                    "ours_minus": asdict(difference_of_tasks(ours, rows)),
+                    "mean": mean_of_tasks(rows, within=bounds),
+                    "ours_minus": difference_of_tasks(ours, rows),
                 }
                 for label, rows in trials.items()
             },
@@ -264,10 +263,10 @@ def table(figures: Figures) -> Table:
         if label not in condition["rules"]:
             return ""
         of = condition["rules"][label]
-        mean = interval_of(of["mean"])
+        mean = of["mean"]
         if label == next(iter(condition["rules"])):
             return str(mean)
-        return f"{mean.value:.2f} ({interval_of(of['ours_minus']):+.2f})"
+        return f"{mean.value:.2f} ({of['ours_minus']:+.2f})"
 
     return Table(
         ("condition", "goals", *labels),
@@ -290,16 +289,21 @@ _DRAWN = {
 
 def draw(figures: Figures, folder: Path) -> list[Picture]:
     """Trials a goal by condition, a row each, with intervals."""
-    from prior_reinforce.lab.experiments.recipes.charts import draw_rows
+    from prior_reinforce.lab.experiments.recipes.charts import COLOURS, Mark, draw_rows
+    from prior_reinforce.report.style import GOAL
 
-    rows = {
-        c["label"]: {
-            label: interval_of(c["rules"][label]["mean"]) for label in _DRAWN if label in c["rules"]
-        }
-        for c in figures["conditions"]
+    of = {c["label"]: c["rules"] for c in figures["conditions"]}
+    colours = [GOAL, *(colour for colour in COLOURS if colour != GOAL)]
+    marks = {
+        label: Mark(
+            shape,
+            colour,
+            [rules[label]["mean"] if label in rules else None for rules in of.values()],
+        )
+        for (label, shape), colour in zip(_DRAWN.items(), colours, strict=False)
     }
     label = "trials a goal, with 95 % intervals over sets of demonstrations and goals"
-    path = draw_rows(rows, _DRAWN, label, folder / "robustness.png")
+    path = draw_rows(list(of), marks, label, folder / "robustness.png")
     caption = (
         "Trials a goal on goals 2 to the last of an afternoon, a row a condition, on displacement "
         "fields measured in physics; the lines are 95 % intervals over sets and goals. Alone: "
@@ -311,10 +315,10 @@ def draw(figures: Figures, folder: Path) -> list[Picture]:
 def remarks(figures: Figures) -> list[str]:
     """Which rules took fewer trials than ours, and how far what ours says can be trusted."""
     behind = [
-        f"{label} in {condition['label']!r} ({interval_of(of['ours_minus']):+.2f})"
+        f"{label} in {condition['label']!r} ({of['ours_minus']:+.2f})"
         for condition in figures["conditions"]
         for label, of in condition["rules"].items()
-        if of["ours_minus"]["value"] > 0
+        if of["ours_minus"].value > 0
     ]
     first = figures["conditions"][0]
     said = f"On fields, {first['label']}: {reliability_in_words(first['p_hit'])}"

@@ -34,7 +34,6 @@ from prior_reinforce.lab.experiments.statistics import (
     Values,
     bootstrap_difference,
     bootstrap_mean,
-    interval_of,
     reached_by,
     trials_counted,
 )
@@ -131,12 +130,12 @@ class TrialsTable(Measurement):
                     "trainings": len(many),
                     "unseen": _summary(unseen, scale.rounds),
                     "many": _summary(many, scale.rounds),
-                    "first_throws": asdict(first_throws_that_hit(many)),
+                    "first_throws": first_throws_that_hit(many),
                 }
                 for (row, adapter), (unseen, many) in solved.items()
             ],
             "eye_minus_model": {
-                row.task: asdict(self._eye_minus_model(by_eye[row.task], row, solved, scale))
+                row.task: self._eye_minus_model(by_eye[row.task], row, solved, scale)
                 for row in rows
                 if row.by_model and row.task in by_eye
             },
@@ -210,7 +209,7 @@ def _summary(solved_at: Values, rounds: int) -> dict[str, Any]:
     trials = trials_counted(solved_at, rounds)
     return {
         "goals": int(solved_at.size),
-        "trials": asdict(bootstrap_mean(trials, within=(1, rounds + 1))),
+        "trials": bootstrap_mean(trials, within=(1, rounds + 1)),
         "sd": float(trials.std(ddof=1)),
         "not_reached": int(np.sum(solved_at == 0)),
     }
@@ -239,9 +238,9 @@ def table(figures: Figures) -> Table:
         "prior": lambda row: row["prior"],
         "trials, unseen goals": lambda row: _trials(row["unseen"]),
         "trials, many goals": lambda row: _trials(row["many"]),
-        "total": lambda row: f"{row['prior'] + row['many']['trials']['value']:.1f}",
+        "total": lambda row: f"{row['prior'] + row['many']['trials'].value:.1f}",
         "not reached": missed,
-        "first throws that hit, many goals": lambda row: interval_of(row["first_throws"]),
+        "first throws that hit, many goals": lambda row: row["first_throws"],
         "paper: trials (total)": lambda row: (
             f"{row['trials']:.1f} ± {row['sd']:.1f} ({row['prior'] + row['trials']:.1f})"
         ),
@@ -250,25 +249,28 @@ def table(figures: Figures) -> Table:
 
 
 def _trials(summary: Figures) -> str:
-    interval = interval_of(summary["trials"])
+    interval = summary["trials"]
     return f"{interval.value:.1f} ± {summary['sd']:.1f} [{interval.low:.2f}, {interval.high:.2f}]"
 
 
 def draw(figures: Figures, folder: Path) -> list[Picture]:
     """All rows beside the paper's."""
-    from prior_reinforce.lab.experiments.recipes.charts import TrialsRow, draw_trials
+    from prior_reinforce.lab.experiments.recipes.charts import COLOURS, Mark, draw_rows
+    from prior_reinforce.report.style import GOAL
 
-    rows = [
-        TrialsRow(
-            f"{row['title']}, {_sense(row, figures)}",
-            interval_of(row["unseen"]["trials"]),
-            interval_of(row["many"]["trials"]),
-            row["trials"],
-            row["sd"],
-        )
-        for row in figures["rows"]
-        if row["adapter"] == "gp"
-    ]
+    rows = [row for row in figures["rows"] if row["adapter"] == "gp"]
+    paper = [(row["trials"], row["sd"]) for row in rows]
+    many, unseen = ([row[goals]["trials"] for row in rows] for goals in ("many", "unseen"))
+    marks = {
+        "paper, real arm (standard deviation)": Mark(
+            "D", GOAL, [Interval(mean, mean - sd, mean + sd) for mean, sd in paper]
+        ),
+        "ours, many goals (95 % interval)": Mark("o", COLOURS[0], many),
+        "ours, five unseen goals a set (95 % interval)": Mark("s", COLOURS[5], unseen),
+    }
+    labels = [f"{row['title']}, {_sense(row, figures)}" for row in rows]
+    label = "Stage-2 trials to the first hit"
+    path = draw_rows(labels, marks, label, folder / "trials.png")
     caption = (
         "Mean Stage-2 trials to the first hit, with 95 % intervals over trainings and goals, "
         "beside the paper's mean and standard deviation on a real arm."
@@ -278,7 +280,7 @@ def draw(figures: Figures, folder: Path) -> list[Picture]:
             " The camera's rows find objects by colour in the very pictures that a model would be "
             "sent."
         )
-    return [Picture(draw_trials(rows, folder / "trials.png"), caption)]
+    return [Picture(path, caption)]
 
 
 def claims(figures: Figures) -> list[Claim]:
@@ -293,7 +295,7 @@ def claims(figures: Figures) -> list[Claim]:
 
 def _claim_of_mean(row: Figures, figures: Figures) -> Claim:
     # The paper's goals lie far from the demonstrations; a mean has to hold there and everywhere.
-    unseen, many = (interval_of(row[goals]["trials"]) for goals in ("unseen", "many"))
+    unseen, many = (row[goals]["trials"] for goals in ("unseen", "many"))
     n = _speaking(row, figures)
     return Claim(
         f"{row['title']}, {_sense(row, figures)}: {row['trials']:.1f} trials on average (here: at "
@@ -305,7 +307,7 @@ def _claim_of_mean(row: Figures, figures: Figures) -> Claim:
 
 
 def _claim_of_first_throws(row: Figures, figures: Figures) -> Claim:
-    hit = interval_of(row["first_throws"])
+    hit = row["first_throws"]
     return Claim(
         "The goal itself as the condition often leads to inaccurate outcomes (here: the first "
         f"trial, in more than half of the cases; {row['title']}, {_sense(row, figures)}).",
@@ -315,7 +317,7 @@ def _claim_of_first_throws(row: Figures, figures: Figures) -> Claim:
 
 
 def _claim_of_model(figures: Figures) -> list[Claim]:
-    fewer = {task: interval_of(value) for task, value in figures["eye_minus_model"].items()}
+    fewer = {task: value for task, value in figures["eye_minus_model"].items()}
     if not fewer:
         return []
     n = min(_speaking(row, figures) for row in figures["rows"] if row["task"] in fewer)

@@ -8,7 +8,7 @@ makes of the demonstrations.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +23,7 @@ from prior_reinforce.lab.experiments.recipes.base import (
     Table,
 )
 from prior_reinforce.lab.experiments.recipes.generators import WHOLE_PLANS
-from prior_reinforce.lab.experiments.statistics import bootstrap_mean, interval_of, trials_counted
+from prior_reinforce.lab.experiments.statistics import bootstrap_mean, trials_counted
 
 GENERATORS = (
     ("auto", "auto"),
@@ -79,12 +79,11 @@ class Variation(Measurement):
                 {
                     "label": label,
                     "first": [
-                        asdict(bootstrap_mean((of_set == 1).astype(float), within=(0, 1)))
+                        bootstrap_mean((of_set == 1).astype(float), within=(0, 1))
                         for of_set in solved[i]
                     ],
                     "trials": [
-                        asdict(bootstrap_mean(of_set, within=(1, scale.rounds + 1)))
-                        for of_set in took[i]
+                        bootstrap_mean(of_set, within=(1, scale.rounds + 1)) for of_set in took[i]
                     ],
                     "first_of_each": (solved[i] == 1).mean(axis=2).tolist(),
                     "trials_of_each": took[i].mean(axis=2).tolist(),
@@ -111,7 +110,7 @@ def table(figures: Figures) -> Table:
     by_set = [
         (
             name,
-            *(f"{interval_of(r['first'][i])}; {interval_of(r['trials'][i])}" for r in rows),
+            *(f"{r['first'][i]}; {r['trials'][i]}" for r in rows),
         )
         for i, name in enumerate(figures["sets"])
     ]
