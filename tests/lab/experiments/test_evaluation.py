@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from prior_reinforce.errors import EndpointError, FileFormatError, PerceptionFailedError
+from prior_reinforce.errors import EndpointError, PerceptionFailedError
 from prior_reinforce.lab.experiments.evaluation import (
     GOAL_SEED,
     PerceivedDemonstrations,
@@ -17,7 +16,7 @@ from prior_reinforce.lab.experiments.evaluation import (
     ZeroShot,
 )
 from prior_reinforce.lab.experiments.protocol import perceive_demonstrations
-from prior_reinforce.lab.experiments.units import result_of, result_path
+from prior_reinforce.lab.experiments.units import result_of
 from prior_reinforce.lab.tasks import make_task
 from prior_reinforce.perception.base import Perception
 from prior_reinforce.perception.eye import Eye
@@ -113,18 +112,11 @@ def test_an_endpoint_that_does_not_answer_is_no_eye(tmp_path):
         unit.run(tmp_path)
 
 
-def test_what_was_perceived_is_kept_and_that_of_an_earlier_version_refused(tmp_path):
+def test_what_was_perceived_is_kept_with_the_model(tmp_path):
     training = Training("basketball-v1", "A", "nearest", 0, perception="eye")
     prior = training.learned(tmp_path).prior
     assert prior.outcome_noise.any()
     assert prior.outcome_correction.any()
-    (model,) = tmp_path.glob("models/*/demonstrations.npz")
-    replace(prior, outcome_correction=np.zeros_like(prior.outcomes_seen)).save(model)
-    again = training.learned(tmp_path).prior  # a model that says nothing of it
-    np.testing.assert_array_equal(again.outcome_correction, prior.outcome_correction)
-    path = result_path(tmp_path, training.perceived)
-    kept = json.loads(path.read_text())
-    del kept["result"]["outcome_correction"]
-    path.write_text(json.dumps(kept))
-    with pytest.raises(FileFormatError, match=r"is of an earlier version.*fresh --out"):
-        training.learned(tmp_path)
+    again = training.learned(tmp_path).prior
+    for name in ("outcomes_seen", "outcome_noise", "outcome_correction"):
+        np.testing.assert_array_equal(getattr(again, name), getattr(prior, name))

@@ -13,7 +13,6 @@ from jaxtyping import Float
 
 from prior_reinforce.adapters import make_adapter
 from prior_reinforce.arrays import Points
-from prior_reinforce.errors import FileFormatError
 from prior_reinforce.files import in_place
 from prior_reinforce.generators import Generator, load_generator, make_generator
 from prior_reinforce.lab.experiments.protocol import (
@@ -23,7 +22,7 @@ from prior_reinforce.lab.experiments.protocol import (
     run_goals,
     unseen_goals,
 )
-from prior_reinforce.lab.experiments.units import Unit, digest_of, result_of, result_path
+from prior_reinforce.lab.experiments.units import Unit, digest_of, result_of
 from prior_reinforce.lab.tasks import make_task
 from prior_reinforce.perception import make_perception
 from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
@@ -153,11 +152,7 @@ class Training(Unit):
         return make_task(self.task).demonstrations(self.demonstrations)
 
     def learned(self, folder: Path) -> Learned:
-        """What was learned: from the folder's models, or now, and put there.
-
-        Raises:
-            FileFormatError: What was perceived is of an earlier version, which kept less of it.
-        """
+        """What was learned: from the folder's models, or now, and put there."""
         home = self._home(folder)
         if not home.is_dir():
             prior = self._prior(folder)
@@ -168,10 +163,7 @@ class Training(Unit):
                 generator.save(unfinished / "generator")
                 prior.save(unfinished / "demonstrations.npz")
         generator = load_generator(home / "generator", own=own_class(self.generator))
-        prior = Demonstrations.load(home / "demonstrations.npz")
-        if self.perceived is not None:  # a model of an earlier version does not say it
-            prior = replace(prior, outcome_correction=self._prior(folder).outcome_correction)
-        return Learned(generator, prior)
+        return Learned(generator, Demonstrations.load(home / "demonstrations.npz"))
 
     def _home(self, folder: Path) -> Path:
         return folder / "models" / digest_of(self)
@@ -181,11 +173,6 @@ class Training(Unit):
         demonstrations = self.recorded()
         if self.perceived is not None:
             seen = result_of(folder, self.perceived)
-            if "outcome_correction" not in seen:
-                raise FileFormatError(
-                    f"{result_path(folder, self.perceived)} is of an earlier version, which did "
-                    "not keep how far outcomes are off; delete it, or choose a fresh --out"
-                )
             demonstrations = replace(
                 demonstrations,
                 outcomes_seen=np.array(seen["outcomes_seen"]),
