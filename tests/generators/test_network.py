@@ -21,7 +21,7 @@ from prior_reinforce.generators.regression import UNetRegression
 from prior_reinforce.generators.unet import ConditionalUNet
 
 TINY = UNetSize(widths=(8, 16), groups=2, step_width=8, condition_width=16)
-THIN = PerceptronSize(width=16, depth=1, step_width=8)
+THIN = PerceptronSize(members=2, width=16, depth=1, step_width=8)
 MEMBERS = [
     lambda **how: DiffusionGenerator(DiffusionConfig(network=TINY, training_steps=2), **how),
     lambda **how: DiffusionGenerator(

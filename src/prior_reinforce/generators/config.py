@@ -62,6 +62,8 @@ class UNetSize(Checked):
 class PerceptronSize(Checked):
     """Everything that sets the size of a `ConditionalPerceptron`."""
 
+    members: Count = 4
+    """E, networks that are averaged."""
     width: Count = 256
     """Of every layer."""
     depth: Count = 3
@@ -103,6 +105,7 @@ SPAN: dict[str, Any] = {
     "trend": "zero",
     "training_steps": 1500,
     "batch_size": 48,
+    "sampling_steps": 3,
 }
 """A network on its own feet, `diffusion-span`: with no trend, and a correction only if chosen."""
 PAPER: dict[str, Any] = {

@@ -74,7 +74,8 @@ def train(
         clean = codes[rows]
         noisy = schedule.add_noise(clean, noise, levels)
         target = schedule.target(clean, noise, levels, config.prediction)
-        return torch.nn.functional.mse_loss(network(noisy, levels, conditions[rows]), target)
+        errors = network(noisy, levels, conditions[rows]) - target  # of each member, if several
+        return errors.square().mean()
 
     return optimise(
         network,

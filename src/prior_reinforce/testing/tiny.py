@@ -16,7 +16,7 @@ TINY: Mapping[str, Mapping[str, Any]] = {
         "network": _NETWORK, "training_steps": 8, "warmup_steps": 2, "sampling_steps": 3,
     },
     "diffusion-span": {
-        "perceptron": {"width": 16, "depth": 1, "step_width": 8}, "training_steps": 8,
+        "perceptron": {"members": 2, "width": 16, "depth": 1, "step_width": 8}, "training_steps": 8,
         "warmup_steps": 2, "sampling_steps": 3,
     },
     "diffusion-paper": {
