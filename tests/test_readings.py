@@ -46,9 +46,9 @@ def test_an_error_is_expected_in_the_middle_of_its_interval():
 
 def test_what_is_no_word_of_an_observer_is_an_estimate_by_hand():
     reading = Reading.by_eye([0.04, 0.05])
-    np.testing.assert_allclose(reading.sd, [np.sqrt(0.01**2 + 0.01**2), 0])
+    np.testing.assert_allclose(reading.sd, [np.sqrt(0.008**2 + 0.01**2), 0])
     assert reading.low[0] == reading.high[0] == 0.04
-    np.testing.assert_allclose(Reading.estimated([0.0, -0.08]).sd, [0.01, np.sqrt(0.0005)])
+    np.testing.assert_allclose(Reading.estimated([0.0, -0.08]).sd, [0.01, np.hypot(0.01, 0.016)])
 
 
 def test_a_hit_is_within_the_tolerance_whatever_was_seen():

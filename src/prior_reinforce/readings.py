@@ -35,7 +35,7 @@ EYE_STEP = 0.10
 """Distances beyond are multiples of this, in [m]."""
 LEAST_SD = 0.01
 """Least sd of a length of unknown origin, in [m] (ours): half of an observer's finest step."""
-_SHARE_SD = 0.25
+_SHARE_SD = 0.2
 """Relative sd of a number of unknown origin (ours): people misjudge lengths by 15 to 25 %, and the
 paper's amplified noise is 20 %."""
 OPEN_ERROR = 0.05
@@ -136,7 +136,7 @@ class Reading:
     def estimated(
         cls, error: ArrayLike, least_sd: ArrayLike = LEAST_SD, hit: bool | None = None
     ) -> Self:
-        """A number of unknown origin: sd^2 = (a quarter of it)^2 + least_sd^2 (ours, see above).
+        """A number of unknown origin: sd^2 = (a fifth of it)^2 + least_sd^2 (ours, see above).
 
         Args:
             error: Outcome minus goal, shape (k,), in the outcomes' units.

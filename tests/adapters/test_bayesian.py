@@ -69,7 +69,7 @@ def test_a_correction_is_in_each_components_own_unit(units):
     np.testing.assert_allclose(adapter.propose(goal), goal - off, atol=1e-4 * spread[-1])
 
 
-@pytest.mark.parametrize("trials", [0, 6, 40])
+@pytest.mark.parametrize("trials", [0, 6, 12])
 @pytest.mark.parametrize("hit_or_miss", [False, True])
 def test_beyond_what_labels_say_everything_is_learned_as_without(trials, hit_or_miss):
     """Goals that lie as much farther, and the same readings, give as much more displacement."""
@@ -83,7 +83,6 @@ def test_beyond_what_labels_say_everything_is_learned_as_without(trials, hit_or_
             reading = Reading.only(False, 2).within(np.full(2, TOLERANCE))
         plain.observe(condition, condition, reading)
         known.observe(condition, condition + condition @ slope + shift, reading)
-    assert len(known._memory.changes) <= 24
     places = rng.uniform([0.8, -0.2], [1.0, 0.2], size=(10, 2))
     more = places @ slope + shift
     np.testing.assert_allclose(
@@ -111,37 +110,76 @@ def test_what_was_learned_for_one_goal_serves_another():
     assert np.linalg.norm(adapter.propose(other) + shift - other) < 0.02
 
 
-def test_a_lost_ball_is_shrugged_off():
-    adapter, shift = started(), np.array([0.03, 0.0])
-    for _ in range(3):
-        throw(adapter, GOAL, shift, Reading.measured, words=False)
-    before = adapter.propose(GOAL)
-    adapter.observe(before, GOAL, Reading.by_eye([-0.7, 0.5]))
-    np.testing.assert_allclose(adapter.propose(GOAL), before, atol=0.005)
+def after_two_hits(seen=Reading.measured) -> BayesianAdapter:
+    adapter = started()
+    for goal in (GOAL, np.array([0.85, -0.1])):
+        adapter.observe(goal, goal, seen([0.0, 0.0]))
+    return adapter
 
 
-def test_new_hardware_keeps_what_the_generator_gets_wrong_and_forgets_the_shift():
+@pytest.mark.parametrize("size", [0.05, 0.1, 0.2, 0.3])
+@pytest.mark.parametrize("seen", [Reading.by_eye, partial(Reading.measured, sd=0.002)])
+def test_a_table_that_is_bumped_unsaid_is_hit_again_in_a_few_throws(size, seen):
+    """One reading may be obeyed or not, a second that agrees is; P(hit) does not rise meanwhile."""
+    adapter, shift = after_two_hits(), np.array([0.8, -0.6]) * size
+    said, off = [], []
+    for _ in range(5):
+        condition = adapter.propose(GOAL)
+        said.append(adapter.expect(condition, GOAL, TOLERANCE).p_hit)
+        off.append(np.linalg.norm(condition + shift - GOAL))
+        throw(adapter, GOAL, shift, seen, words=seen is Reading.by_eye)
+    assert off[2] < 0.4 * off[0] + TOLERANCE
+    assert min(off) < TOLERANCE
+    assert said[1] < said[0]
+    other = np.array([0.95, 0.15])
+    assert np.linalg.norm(adapter.propose(other) + shift - other) < 0.15 * size + TOLERANCE
+
+
+def test_a_reading_that_the_next_ones_contradict_was_told_wrongly():
+    adapter, seen = after_two_hits(), partial(Reading.measured, sd=0.002)
+    adapter.observe(adapter.propose(GOAL), GOAL, Reading.measured([0.3, -0.1], 0.002))
+    throw(adapter, GOAL, np.zeros(2), seen, words=False)
+    assert np.linalg.norm(adapter.propose(GOAL) - GOAL) < TOLERANCE
+    assert 2 in adapter._histories[0].mistaken
+    assert adapter.expect(GOAL, GOAL, TOLERANCE).surprise is None
+    assert adapter.expect(adapter.propose(GOAL), GOAL, TOLERANCE).p_hit > 0.5
+
+
+def test_a_reading_far_from_what_was_believed_is_news_until_the_next_one():
+    adapter, seen = after_two_hits(), partial(Reading.measured, sd=0.002)
+    assert adapter.expect(GOAL, GOAL, TOLERANCE).surprise is None
+    throw(adapter, GOAL, np.array([0.16, -0.12]), seen, words=False)
+    surprise = adapter.expect(GOAL, GOAL, TOLERANCE).surprise
+    assert surprise.sds > 5
+    assert surprise.p_mistaken + surprise.p_changed > 0.9
+    assert min(surprise.p_mistaken, surprise.p_changed) > 0.02
+    throw(adapter, GOAL, np.array([0.16, -0.12]), seen, words=False)
+    assert adapter.expect(GOAL, GOAL, TOLERANCE).surprise is None
+
+
+def test_a_goal_that_was_moved_is_told_from_a_table_that_was():
+    adapter, moved = after_two_hits(), np.array([0.1, 0.1])
+    seen = partial(Reading.measured, sd=0.002)
+    for _ in range(2):
+        throw(adapter, GOAL, moved, seen, words=False)
+    other = np.array([0.85, -0.1])
+    throw(adapter, other, np.zeros(2), seen, words=False)
+    assert np.linalg.norm(adapter.propose(other) - other) < TOLERANCE
+    assert np.linalg.norm(adapter.propose(GOAL) + moved - GOAL) < TOLERANCE
+
+
+def test_after_a_change_that_is_said_less_is_sure():
     adapter, shift = started(), np.array([-0.07, 0.03])
-    rng = np.random.default_rng(1)
-    bump = np.array([0.02, -0.02])
-
-    def moved(condition):
-        near = np.exp(-0.5 * np.sum((condition - GOAL) ** 2) / 0.1**2)
-        return shift + bump * near
-
-    for condition in rng.uniform(CORNERS.min(axis=0), CORNERS.max(axis=0), size=(25, 2)):
-        outcome = condition + moved(condition)
-        adapter.observe(condition, outcome, Reading.measured([0.0, 0.0], 0.001))
-    known = adapter.propose(GOAL) - GOAL
-    assert np.linalg.norm(known + shift + bump) < 0.01
-    adapter.change_hardware()
-    forgotten = adapter.propose(GOAL) - GOAL
-    far = np.array([0.8, -0.2])
-    assert np.linalg.norm(adapter.propose(far) - far) < 0.5 * np.linalg.norm(shift)
-    assert np.linalg.norm(forgotten) < np.linalg.norm(known)
-    unsure, sure = (adapter.expect(GOAL + m, GOAL, TOLERANCE) for m in (forgotten, known))
-    assert unsure.p_hit < 0.5
+    for condition in np.random.default_rng(1).uniform([0.8, -0.2], [1.0, 0.2], size=(12, 2)):
+        adapter.observe(condition, condition, Reading.measured(shift, 0.001))
+    condition = adapter.propose(GOAL)
+    assert np.linalg.norm(condition + shift - GOAL) < 0.01
+    sure = adapter.expect(condition, GOAL, TOLERANCE)
+    assert sure.p_hit > 0.7
     assert sure.trials == pytest.approx(1 + 1.24 * (1 - sure.p_hit))
+    adapter.change_hardware()
+    assert adapter.expect(condition, GOAL, TOLERANCE).p_hit < 0.3
+    np.testing.assert_allclose(adapter.propose(GOAL), condition, atol=0.005)
 
 
 @pytest.mark.parametrize("before", [0, 20])
@@ -161,13 +199,13 @@ def test_what_a_demonstration_would_teach_is_what_adding_it_takes_off():
     new = np.array([[0.9, 0.1], [1.05, 0.25], [0.801, 0.2]])  # the last beside another
     adapter = started()
     gains = adapter.gain(new, places, demonstrations=True)
-    before = adapter._unknown(adapter._normalisation.apply(places))
+    before = adapter._unknown(adapter._places(*[adapter._normalisation.apply(places)] * 2))
     for one, gain in zip(new, gains, strict=True):
         more = started(np.vstack([CORNERS, one]))
         same = adapter._normalisation  # a seventh changes the spread a little
         more._prior.normalisation = more._normalisation = same
         more._prior._mix(same.apply(np.vstack([CORNERS, one])), np.zeros((7, 2)), np.zeros((7, 2)))
-        after = more._unknown(same.apply(places))
+        after = more._unknown(more._places(*[same.apply(places)] * 2))
         assert gain == pytest.approx(1 - after / before, abs=1e-9)
 
 
@@ -188,17 +226,37 @@ def test_labels_that_are_off_are_found_as_the_mixture_that_they_make():
 
 
 def test_a_generator_that_is_wrong_in_its_own_ways_is_not_taken_for_labels():
-    """A wave that no mixture of six labels makes: trials next to the goal count."""
+    """A wave that no mixture of six labels makes: models of greater size are left."""
     adapter = started()
-    rng = np.random.default_rng(4)
 
     def moved(c):
         return 0.05 * np.array([np.sin(40 * c[1]), np.cos(40 * c[0])])
 
+    rng = np.random.default_rng(4)
     for condition in rng.uniform(CORNERS.min(axis=0), CORNERS.max(axis=0), size=(20, 2)):
         adapter.observe(condition, condition, Reading.measured(moved(condition), 0.002))
-    own = np.flatnonzero(adapter._prior._generator)
-    assert adapter._known().model_weights[own].sum() > 0.99
+    greater = adapter._prior._square > 0.1**2
+    weights = adapter._histories[0].posterior.model_weights
+    assert np.all(weights[greater].sum(axis=0) > 0.99)
+
+
+def test_one_component_may_be_far_off_where_the_other_is_not():
+    adapter = started()
+    for condition in np.random.default_rng(0).uniform([0.8, -0.2], [1.0, 0.2], size=(8, 2)):
+        off = 0.15 * (condition[1] / 0.2) ** 2
+        adapter.observe(condition, condition, Reading.measured([off, 0.0], 0.001))
+    weights = adapter._histories[0].posterior.model_weights
+    of_greater = weights[adapter._prior._square > 0.1**2].sum(axis=0)
+    assert of_greater[0] > 0.99
+    assert of_greater[1] < 0.2
+
+
+def predicted(adapter, conditions):
+    """Weights of models, and variances of displacements there, most probably."""
+    at = adapter._normalisation.apply(conditions)
+    best, places = adapter._histories[0], adapter._places(at, at)
+    _, variance = best.predict(adapter._prior, places, adapter._memory)
+    return best.posterior.model_weights, variance
 
 
 def test_what_the_demonstrations_hardware_did_is_no_shift():
@@ -215,12 +273,11 @@ def test_what_the_demonstrations_hardware_did_is_no_shift():
 def test_p_hit_of_one_component_by_hand():
     adapter = started(np.array([[0.0], [2.0], [1.0], [3.0]]))
     condition, goal = np.array([1.4]), np.array([1.5])
-    mean, variance = adapter._predict(adapter._normalisation.apply(condition[None]))
-    scale = adapter._normalisation.scale[0]
-    sd = scale * np.sqrt(variance[:, 0, 0] + 0.02**2)
-    middle = condition[0] + scale * mean[:, 0, 0]
-    inside = norm.cdf(1.6, middle, sd) - norm.cdf(1.4, middle, sd)
-    expected = inside @ np.tile(np.kron([0.9, 0.1], [0.8, 0.2]), 2) / 2  # two sd of the labels
+    _, variance = predicted(adapter, condition[None])
+    sd = adapter._normalisation.scale[0] * np.sqrt(variance[:, 0, 0])
+    inside = norm.cdf(1.6, condition[0], sd) - norm.cdf(1.4, condition[0], sd)
+    less = np.array([1.0, 2 / 3, 4 / 9]) / (1 + 2 / 3 + 4 / 9)
+    expected = inside @ np.kron(less, np.kron([0.8, 0.2], less))  # size, hardware, noise
     assert adapter.expect(condition, goal, 0.1).p_hit == pytest.approx(expected, abs=1e-3)
 
 
@@ -232,12 +289,18 @@ def test_p_hit_is_the_share_of_sampled_outcomes_within_the_tolerance(k):
     for _ in range(3):
         throw(adapter, goal, 0.05 * np.ones(k))
     condition = adapter.propose(goal) + 0.03
-    mean, variance = adapter._predict(adapter._normalisation.apply(condition[None]))
-    models = rng.choice(len(mean), p=adapter._known().model_weights, size=200_000)
-    sd = np.sqrt(variance[models, :, 0] + 0.02**2)
-    moved = adapter._normalisation.scale * (mean[models, :, 0] + sd * rng.normal(size=sd.shape))
-    inside = np.linalg.norm(condition + moved - goal, axis=1) <= 0.05
-    assert adapter.expect(condition, goal, 0.05).p_hit == pytest.approx(inside.mean(), abs=0.01)
+    inside = []
+    for share, history in zip(adapter._probabilities, adapter._histories, strict=True):
+        at = adapter._places(adapter._normalisation.apply(condition[None]), goal)
+        mean, variance = history.predict(adapter._prior, at, adapter._memory)
+        weights = history.posterior.model_weights
+        moved = np.empty((200_000, k))
+        for j in range(k):
+            model = rng.choice(len(mean), p=weights[:, j], size=len(moved))
+            moved[:, j] = rng.normal(mean[model, j, 0], np.sqrt(variance[model, j, 0]))
+        landed = condition + adapter._normalisation.scale * moved
+        inside.append(share * np.mean(np.linalg.norm(landed - goal, axis=1) <= 0.05))
+    assert adapter.expect(condition, goal, 0.05).p_hit == pytest.approx(sum(inside), abs=0.01)
 
 
 def test_p_hit_grows_with_the_tolerance_and_with_what_is_known():
@@ -253,16 +316,15 @@ def test_p_hit_grows_with_the_tolerance_and_with_what_is_known():
 
 
 def test_what_a_reading_would_teach_is_what_it_takes_off_the_variance():
-    adapter = started(label_sd=(0.2,), generator_sd=1e-6, hardware_sd=(0.3, 0.3))
+    adapter = started(label_sd=0.2, generator_sd=(1e-6,), hardware_sd=(0.3, 0.3))
     throw(adapter, GOAL, np.array([0.03, 0.0]))
     region = np.random.default_rng(0).uniform([0.8, -0.2], [1.0, 0.2], size=(40, 2))
     at = np.array([0.85, -0.12])
     (gain,) = adapter.gain(at[None], region)
-    known = adapter._normalisation.apply(region)
-    before = adapter._predict(known)[1].mean()
+    before = adapter._unknown(adapter._places(*[adapter._normalisation.apply(region)] * 2))
     sd = 0.1 * adapter._normalisation.scale
     adapter.observe(at, at, Reading.measured([0.0, 0.0], sd))
-    after = adapter._predict(known)[1].mean()
+    after = adapter._unknown(adapter._places(*[adapter._normalisation.apply(region)] * 2))
     assert gain == pytest.approx(1 - after / before, abs=0.02)
 
 
@@ -398,7 +460,7 @@ def test_misses_before_a_change_are_judged_by_the_hardware_of_then():
         if proposes:
             adapter.propose(GOAL)
         adapter.change_hardware()
-        assert len(adapter._misses().changes) == 0
+        assert len(adapter._misses().numbers) == 0
         conditions.append(adapter.propose(GOAL))
     np.testing.assert_array_equal(*conditions)
 

@@ -1,48 +1,38 @@
 import numpy as np
 
 from prior_reinforce.adapters import memory
+from prior_reinforce.adapters.memory import Memory
 from prior_reinforce.readings import Reading
-from tests.adapters.test_bayesian import CORNERS, GOAL, started
+from tests.adapters.test_bayesian import CORNERS, started
 
 
-def many(adapter, n):
+def remembering(conditions) -> Memory:
+    known = Memory.empty(2)
+    for number, condition in enumerate(conditions):
+        known = known.with_one(condition, number, condition, *np.zeros((3, 2)), 0.0)
+    return known
+
+
+def test_the_older_of_the_two_closest_together_is_forgotten_and_none_of_the_latest():
+    places = np.random.default_rng(0).uniform(size=(memory._KEPT + 1, 2))
+    places[7] = places[30] + 1e-3
+    places[-2] = places[-1] + 1e-4
+    assert np.flatnonzero(~remembering(places).worth_keeping()).tolist() == [7]
+    assert remembering(places[:-1]).worth_keeping().all()
+
+
+def test_two_hundred_trials_are_made_fewer_and_hardly_missed():
     """Trials at random places of a smooth field, seen to 1 cm."""
-    rng = np.random.default_rng(3)
-    for condition in rng.uniform(CORNERS.min(axis=0), CORNERS.max(axis=0), size=(n, 2)):
-        moved = 0.03 * np.array([np.sin(9 * condition[1]), np.cos(9 * condition[0])])
-        low = np.floor(100 * moved) / 100
-        reading = Reading(moved, low, low + 0.01, np.zeros(2))
+    adapter, rng = started(), np.random.default_rng(3)
+
+    def moved(condition):
+        return 0.03 * np.array([np.sin(9 * condition[1]), np.cos(9 * condition[0])])
+
+    for condition in rng.uniform(CORNERS.min(axis=0), CORNERS.max(axis=0), size=(90, 2)):
+        low = np.floor(100 * moved(condition)) / 100
+        reading = Reading(moved(condition), low, low + 0.01, np.zeros(2))
         adapter.observe(condition, condition, reading)
-    return adapter
-
-
-def test_two_hundred_trials_are_merged_and_hardly_missed(monkeypatch):
-    merged = many(started(), 200)
-    assert len(merged._memory.changes) <= 24
-    monkeypatch.setattr(memory, "_KEPT", 10**6)
-    whole = many(started(), 60)
-    goals = np.random.default_rng(0).uniform([0.83, -0.17], [0.97, 0.17], size=(20, 2))
-    off, off_whole = (
-        [np.linalg.norm(c + 0.03 * np.array([np.sin(9 * c[1]), np.cos(9 * c[0])]) - goal)
-         for goal in goals for c in [adapter.propose(goal)]]
-        for adapter in (merged, whole)
-    )  # fmt: skip
+    assert len(adapter._memory.numbers) == memory._KEPT
+    goals = rng.uniform([0.83, -0.17], [0.97, 0.17], size=(20, 2))
+    off = [np.linalg.norm(c + moved(c) - goal) for goal in goals for c in [adapter.propose(goal)]]
     assert np.median(off) < 0.004
-    assert np.median(off) < 2 * np.median(off_whole) + 0.001
-
-
-def test_trials_that_cannot_be_merged_are_kept_apart():
-    adapter = started()
-    for _ in range(30):
-        adapter.observe(GOAL, GOAL, Reading.measured([0.01, 0.0]))
-        adapter.change_hardware()
-    assert len(adapter._memory.changes) == 30
-
-
-def test_trials_of_different_hardware_are_never_merged():
-    adapter = many(started(), 20)
-    adapter.change_hardware()
-    many(adapter, 40)
-    counts = np.bincount(adapter._memory.changes)
-    assert np.all(counts > 0)
-    assert len(counts) == 2

@@ -6,7 +6,7 @@ import warnings
 import numpy as np
 import pytest
 
-from prior_reinforce.adapters.base import Adapter, Expectation
+from prior_reinforce.adapters.base import Adapter, Expectation, Surprise
 from prior_reinforce.adapters.bayesian import BayesianAdapter
 from prior_reinforce.errors import (
     ConfigurationError,
@@ -141,9 +141,9 @@ def test_words_and_readings_reach_the_adapter_as_they_were_said(listening):
     assert [trial.reading.said for trial in listening.trials[:2]] == ["5 cm long, 2 cm left", ""]
 
 
-def test_numbers_are_of_unknown_origin_to_two_thirds_of_the_tolerance(listening):
+def test_numbers_are_of_unknown_origin_to_a_third_of_the_tolerance(listening):
     listening.tell(listening.ask().number, [0.0, -0.08])
-    np.testing.assert_allclose(listening.trials[0].reading.sd, [0.01, np.hypot(0.01, 0.02)])
+    np.testing.assert_allclose(listening.trials[0].reading.sd, [0.005, np.hypot(0.005, 0.016)])
 
 
 def test_a_hit_alone_is_a_reading_within_the_tolerance(listening):
@@ -324,6 +324,19 @@ def test_trials_are_carried_over_where_they_serve_the_adapter():
     assert session.adapter.events == [0.85]
     session.void(2, "")
     assert not session.set_goal(GOAL, carry_over=False).carry_over
+
+
+def test_a_surprise_is_said_with_what_to_do_about_it():
+    session = carrying()
+    session.tell(session.ask().number, [0.05, 0.0])
+    assert session.ask().surprise == ""
+    odd = Expectation(0.1, 2.1, Surprise(12.3, 0.2, 0.75))
+    session.adapter._expect = lambda *of: odd
+    session.tell(2, [0.3, 0.0])
+    said = session.ask().surprise
+    assert said.startswith("trial 2 is 12 sd from what the trials before it made likely")
+    assert "told wrongly 20%, changed 75%" in said
+    assert "mistyped: amend 2; changed: goal --new-hardware" in said
 
 
 def test_the_adapter_hears_of_new_hardware_between_the_trials_before_and_after():

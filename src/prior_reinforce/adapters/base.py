@@ -15,6 +15,18 @@ from prior_reinforce.readings import Reading
 
 
 @dataclass(frozen=True)
+class Surprise:
+    """The latest reading, if chance hardly explains it."""
+
+    sds: float
+    """How many standard deviations it lies from what the readings before it made likely."""
+    p_mistaken: float
+    """Probability that it was told wrongly."""
+    p_changed: float
+    """Probability that something has changed since the trial before it."""
+
+
+@dataclass(frozen=True)
 class Expectation:
     """What is expected of a trial before it is executed."""
 
@@ -22,6 +34,8 @@ class Expectation:
     """Probability that it reaches the goal."""
     trials: float
     """Trials until the goal is reached, this one included."""
+    surprise: Surprise | None = None
+    """What the reading before it was, where that was far from what was believed."""
 
 
 class Adapter(ABC):

@@ -7,15 +7,17 @@ from __future__ import annotations
 
 import copy
 import math
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float
 
-from prior_reinforce.adapters.base import Adapter, Expectation
+from prior_reinforce.adapters.base import Adapter, Expectation, Surprise
+from prior_reinforce.adapters.change_points import Change, History, split
 from prior_reinforce.adapters.displacement import BayesianConfig, DisplacementPrior
-from prior_reinforce.adapters.expectation_propagation import Posterior, Readings, infer
-from prior_reinforce.adapters.memory import LATEST, Memory
+from prior_reinforce.adapters.expectation_propagation import Readings, infer
+from prior_reinforce.adapters.memory import LATEST, Memory, Places
 from prior_reinforce.adapters.p_hit import (
     Belief,
     Targets,
@@ -31,10 +33,18 @@ _STEPS = 12
 """Steps to the fixed point of the proposal, each 0.7 of the way (ours). They need not end there:
 where landing hardly depends on the condition, as with demonstrations in a line, they go on."""
 _RELAXATION = 0.7
-_FARTHEST = 20.0
-"""A correction is this many sd of changed hardware at most, 6 spreads (ours). Where weights are
+_ARRIVED = 1e-5
+"""A step that is shorter, in spreads, is the last (ours)."""
+_FARTHEST = 6.0
+"""A correction is so many spreads at most (ours). Where weights are
 steep, an outcome may lie a hundred spreads away. Three demonstrations nearly in a line need 2 to 4:
 bounded at 2 spreads, goals took 2.3 instead of 2.2 trials (24 draws; docs/decisions-adapter.md)."""
+_WORTH_A_THROW = 0.02
+"""Less probable histories are asked for no condition (ours)."""
+_NOMINAL = 0.1
+"""Tolerance where no trial told one, in spreads (ours): theirs is 0.02 to 0.3."""
+_NOTHING = 0.1
+"""Probability that nothing has changed although it was said (ours)."""
 _TRIALS_AFTER_A_MISS = 1.24
 """Fitted to 1623 trials of tuning material (ours; docs/decisions-adapter.md)."""
 _LEAST_P_HIT = 0.01
@@ -43,13 +53,17 @@ such a trial teaches little. That is still too few: 8 to 13 where 14 were needed
 _TEACHING_SD = 0.1
 """How finely a trial that is made to learn from is read, in spreads (ours): "5 cm" by eye is an
 interval of 4 cm, whose standard deviation is 1.2 cm of 12 to 18."""
-_NOT_EXCLUDED = 0.05
-"""A miss counts where its reading leaves a hit more than this share as probable as it would be on
-target (ours): where words are coarse, or numbers noisy, or not believed."""
+_BLUR = 2.0
+"""Standard deviations of a reading within which it leaves a hit possible (ours): only then a miss
+says more than its reading, where words are coarse, or numbers noisy."""
 _REPEATABLE = 0.3
-"""Executions of one plan are taken to lie no farther apart than this share of the tolerance, as a
-standard deviation (ours): nobody asks for what a good plan would miss. On our own tasks it is 0.13
-to 0.30 by `execution_sd` alone."""
+"""What missed would miss again: executions of one plan are then taken to lie no farther apart than
+this share of the tolerance, as a standard deviation (ours). On our own tasks it is 0.13 to 0.30."""
+_NEWS = 0.5
+"""A reading is a surprise where it was told wrongly, or something changed, with more than this
+probability (ours)."""
+_SHARPEST = 1e-3
+"""Least sd of a reading, in spreads (ours)."""
 _AGAIN = 0.5
 """A condition closer than this share of the tolerance to one that missed the same goal would be
 tried again (ours)."""
@@ -59,51 +73,54 @@ class BayesianAdapter(Adapter):
     """What is believed of the displacement between condition and outcome, and the best next try.
 
     In normalised units, where S, the root mean square deviation of the demonstrated outcomes, is 1
-    (one S for each unit), a plan generated for c comes down at
+    (one S for each unit), a plan generated for c comes down at r = c + d(c), in each component
 
-        r = c + d(c) + noise,    d_j(c) = sum_i w_i(c) e_ij + f_j(c) + u_j(c) + h_j(c)    j = 1..k
+        d(c) = sum_i w_i(c) e_i + F(c) - sum_i w_i(c) F(r_i) + h(c) + noise
 
     with independent Gaussian terms, all but e of prior mean 0:
 
         e   mean m_i, sd s_i    by how much the outcome of demonstration i is off: m_i as its label
                                 says (`Demonstrations.outcome_correction`), give or take the noise
-                                that it states (mean over components), and 0.03 or 0.1 more
-        f   sd a, reach 0.5     what the generator itself gets wrong: 0, or with probability 0.1 0.3
-        u   sd 0.025, reach 0.32    what lies between the demonstrations
-        h   sd b, reach 2.5     what is different from their day: 0.03, or with probability 0.2 0.3;
-                                0.3, anew, whenever a change of hardware is said
-        noise  sd 0.02          execution; for P(hit) 0.3 of the tolerance at most
+                                that it states, and 0.02 more
+        F   sd 0.05, 0.2 or 0.8, reach 1.4    where landing bends between demonstrations; a
+                                demonstration that was measured is a reading of it
+        h   sd 0.01, or with probability 0.2 0.3, reach 2.5    what is different from their day
+        noise  sd 0.005, 0.02 or 0.05    execution
 
-    f, u and h are Gaussian processes with squared-exponential kernels. w are the weights of a
-    spline over the demonstrated outcomes (`plans.outcome_weights`): as far as landing is linear in
-    the plan, a mixture of plans comes down where the same mixture of the demonstrations' outcomes
-    is, so labels that are off move it by their mixture. Of six labels by eye that is little more
-    than its affine part, which few trials tell.
+    w are the weights of a spline over the demonstrated outcomes (`plans.outcome_weights`), by which
+    generators mix plans. Each combination of sizes is a model, and the evidence weighs them, for
+    each component by itself. The prior stands in `adapters.displacement`.
+
+    Between two trials something may happen (`adapters.change_points`): with probability 0.02
+    something changes for all trials from then on, by a shift of sd 0.8 or as h with 0.3; with 0.002
+    one goal is moved; with 0.01 the trial is told wrongly. What may have happened is kept as
+    histories, each with its probability, and later readings decide. Where a change is announced,
+    its probability is 0.9.
 
     A reading (`readings.Reading`) says that the blurred error r - g lies in an interval, or, with
-    probability 0.01, nothing at all. The posterior is found by expectation propagation for each of
-    eight models; their evidence weighs them.
+    probability 0.002, nothing at all. The posterior of each model and history is found by
+    expectation propagation.
 
-    The next condition is the fixed point c = g - E d(c): the posterior mean, which is as good as
-    the greatest probability of a hit on our tasks, and knows no tolerance
-    (docs/decisions-adapter.md). With nothing but demonstrations it is the goal, less what their
-    labels say to be off: nothing, where they were measured. Where the fixed
-    point has just missed the same goal, since its reading did not say what to change (a word
-    coarser than the tolerance, or "a miss" and nothing else), the condition beside it that most
-    probably hits is next, given all that missed (`adapters.p_hit`).
+    The next condition is the fixed point c = g - E d(c) of a history, of several the one that most
+    probably hits, all histories considered. With nothing but demonstrations it is the goal, less
+    what their labels say to be off: nothing, where they were measured. Where the fixed point has
+    just missed the same goal, since its reading did not say what to change (a word coarser than the
+    tolerance, or "a miss" and nothing else), the condition beside it that most probably hits is
+    next, given all that missed (`adapters.p_hit`).
 
-    The prior stands in `adapters.displacement`. Old trials are merged where there are many
-    (`adapters.memory`): those closest together become one number with the precision of both.
-    Proposals depend on what was observed alone, never on what was proposed before.
+    64 trials are remembered; then the older of the two closest together is forgotten
+    (`adapters.memory`). Proposals depend on what was observed alone, never on what was proposed
+    before.
 
     Source: ours, because words are intervals, and taken as numbers an adapter stands still.
-    Constants: measured fields of all our tasks, and the figures of docs/decisions-adapter.md.
+    Constants: fields of our own tasks, of the zoo and of other people's arms; figures in
+    docs/decisions-adapter.md.
     """
 
     config_type: ClassVar[type[BayesianConfig]] = BayesianConfig
     carries_over: ClassVar[bool] = True
-    _posterior: Posterior | None
     _missed: Memory | None
+    _surprise: Surprise | None
 
     def __init__(self, config: BayesianConfig | None = None) -> None:
         """Take the settings, or the defaults."""
@@ -113,72 +130,151 @@ class BayesianAdapter(Adapter):
         self._prior = DisplacementPrior(self.config, demonstrations)
         self._normalisation = self._prior.normalisation
         self._memory, self._now = Memory.empty(demonstrations.outcome_dim), 0
-        self._posterior = self._missed = None
+        self._histories = [self._from_the_beginning()]
+        self._missed = self._surprise = None
+
+    def _from_the_beginning(self) -> History:
+        """What follows from demonstrations alone, where nothing happened."""
+        k = len(self._normalisation.scale)
+        none, m = np.empty((k, 0)), len(self._prior.log_share)
+        nothing = infer(np.empty((m, 0, 0)), Readings(none, none, none), self._prior.log_share)
+        return History((), frozenset(), 0.0, nothing)
 
     def change_hardware(self) -> None:
-        """What has changed since the demonstrations is unknown anew; the rest stays known."""
-        self._now += 1
+        """Something may be different from now on; what is known of it stays as known."""
+        unchanged = [
+            replace(h, log_prior=h.log_prior + math.log(_NOTHING)) for h in self._histories
+        ]
+        changed = [
+            replace(
+                h,
+                changes=(*h.changes, Change(self._now, shift_sd, announced=True)),
+                log_prior=h.log_prior + math.log(0.5 * (1.0 - _NOTHING)),
+            )
+            for h in self._histories
+            for shift_sd in (0.0, self.config.shift_sd)
+        ]
+        self._histories = sorted(unchanged + changed, key=lambda h: -h.log_weight)
+        self._missed = None
 
     def _observe_reading(self, condition: Point, goal: Point, reading: Reading) -> None:
         scale, moved = self._normalisation.scale, goal - condition
         radius = reading.missed_by_at_least
-        missed_by = 0.0 if radius is None else float((radius / scale).min())
-        self._memory = self._memory.with_one(
+        memory = self._memory.with_one(
             self._normalisation.apply(condition),
             self._now,
+            self._normalisation.apply(goal),
             (reading.low + moved) / scale,
             (reading.high + moved) / scale,
-            (reading.sd / scale) ** 2 + self.config.execution_sd**2,
-            moved / scale,
-            missed_by,
+            (reading.sd / scale) ** 2 + _SHARPEST**2,
+            0.0 if radius is None else float((radius / scale).min()),
         )
-        self._posterior = self._missed = None
-        if self._memory.is_full:
-            self._memory = self._memory.merged(self._known(), self._prior)
-            self._posterior = self._missed = None
+        new = memory.only(slice(-1, None))
+        sds = self._far_from_expected(new)
+        may_be = split(self._histories, self._prior, self._memory, new)
+        keep = memory.worth_keeping()
+        memory = memory.only(keep)
+        base = self._prior.covariance(memory.conditions, memory.conditions)
+        told = [history.told(self._prior, memory, base, keep[:-1]) for history in may_be]
+        self._histories = sorted(told, key=lambda history: -history.log_weight)
+        mistaken = np.array([self._now in h.mistaken for h in self._histories])
+        changed = np.array(
+            [
+                any(change.since == self._now and not change.announced for change in h.changes)
+                for h in self._histories
+            ]
+        )
+        p_mistaken, p_changed = (float(self._probabilities @ of) for of in (mistaken, changed))
+        is_news = p_mistaken + p_changed > _NEWS
+        self._surprise = Surprise(sds, p_mistaken, p_changed) if is_news else None
+        self._memory, self._now, self._missed = memory, self._now + 1, None
+
+    def _far_from_expected(self, new: Memory) -> float:
+        """How many standard deviations a reading lies from what is most probable before it."""
+        best = self._histories[0]
+        mean, variance = (of[..., 0] for of in best.predict(self._prior, new, self._memory))
+        share = best.posterior.model_weights
+        expected = np.sum(share * mean, axis=0)
+        spread = np.sum(share * (variance + (mean - expected) ** 2), axis=0) + new.variance[0]
+        off = np.maximum(np.maximum(new.low[0] - expected, expected - new.high[0]), 0.0)
+        return float(np.linalg.norm(off / np.sqrt(spread)))
 
     def _propose(self, goal_seen: Point) -> Point:
         goal = self._normalisation.apply(goal_seen)
-        condition = self._expected_to_land_on(goal)
+        condition = self._best_of_histories(goal)
         missed = self._misses()
-        off = np.linalg.norm(missed.conditions - condition, axis=1)
-        off += np.linalg.norm(missed.aims - (goal - condition), axis=1)
-        if np.any((missed.changes == self._now) & (off < _AGAIN * missed.missed_by)):
-            condition = self._likeliest_beside(condition, goal, missed)
+        same = self._as_now(missed, goal) & np.all(missed.goals == goal, axis=1)
+        if np.any(_tried(condition[None], missed.only(same))):
+            condition = self._likeliest_beside(condition, goal, missed, missed.only(same))
         return self._normalisation.undo(condition)
 
-    def _expected_to_land_on(self, goal: Point) -> Point:
-        """Return the fixed point c = g - E d(c), in normalised units."""
-        condition, farthest = goal, _FARTHEST * self.config.hardware_sd[1]
+    def _best_of_histories(self, goal: Point) -> Point:
+        """Of the fixed points of all histories the one that most probably hits.
+
+        Not the fixed point of their mean: half-way between what happened and what did not, nothing
+        is hit.
+        """
+        likely = self._probabilities > _WORTH_A_THROW
+        histories = [h for h, worth in zip(self._histories, likely, strict=True) if worth]
+        conditions = np.array([self._expected_to_land_on(goal, history) for history in histories])
+        if len(conditions) == 1:
+            return np.asarray(conditions[0])
+        missed, places = self._misses(), self._places(conditions, goal)
+        told = self._memory.missed_by[self._memory.missed_by > 0.0]
+        radius = float(told[-1]) if len(told) else _NOMINAL
+        if len(missed.numbers) > 0:
+            p_hit = self._p_hit_after(missed, places, radius)
+        else:
+            p_hit = self._p_hit(places, goal - conditions, radius)
+        return np.asarray(conditions[np.argmax(p_hit)])
+
+    def _expected_to_land_on(self, goal: Point, history: History) -> Point:
+        """Return the fixed point c = g - E d(c) of a history, in normalised units."""
+        condition, share = goal, history.posterior.model_weights
         for _ in range(_STEPS):
-            mean, _ = self._predict(condition[None])
-            step = _RELAXATION * (goal - self._mixed(mean)[0] - condition)
-            condition = goal + _clipped(condition + step - goal, farthest)
+            at = self._places(condition[None], goal)
+            mean, _ = history.predict(self._prior, at, self._memory)
+            step = _RELAXATION * (goal - np.einsum("mk,mkp->k", share, mean) - condition)
+            condition = goal + _clipped(condition + step - goal, _FARTHEST)
+            if np.linalg.norm(step) < _ARRIVED:
+                break
         return condition
 
-    def _likeliest_beside(self, condition: Point, goal: Point, missed: Memory) -> Point:
+    def _as_now(self, trials: Memory, goal: Point) -> Bool[np.ndarray, " n"]:
+        """Which trials were made with all as it is now, for that goal, most probably."""
+        changes, now = self._histories[0].changes, self._places(goal[None], goal)
+        same = [change.concerns(trials) for change in changes if change.concerns(now)[0]]
+        return np.all(same, axis=0) if same else np.ones(len(trials.numbers), dtype=bool)
+
+    def _likeliest_beside(
+        self, condition: Point, goal: Point, missed: Memory, same: Memory
+    ) -> Point:
         """Return the condition around another that most probably hits, within the last tolerance.
 
         No farther away than changed hardware takes it: where weights are steep, the sd means
         nothing.
         """
-        _, variance = self._predict(condition[None])
-        share = self._known().model_weights
-        sd = math.sqrt(float(np.einsum("m,mkp->k", share, variance).max()))
+        best = self._histories[0]
+        at = self._places(condition[None], goal)
+        _, variance = best.predict(self._prior, at, self._memory)
+        share = best.posterior.model_weights
+        sd = math.sqrt(float(np.einsum("mk,mkp->k", share, variance).max()))
         radius = float(missed.missed_by[-1])
         reach = radius + 2.0 * min(sd, self.config.hardware_sd[1])
         cube = 2.0 * evenly_spread(len(goal)) - 1.0
         ball = cube[np.linalg.norm(cube, axis=1) <= 1.0]
         candidates = condition + reach * ball
-        p_hit = self._p_hit_after(missed, candidates, goal - candidates, radius)
+        candidates = candidates[~_tried(candidates, same)]
+        p_hit = self._p_hit_after(missed, self._places(candidates, goal), radius)
         return np.asarray(candidates[np.argmax(p_hit)])
 
     def _expect(self, condition: Point, goal: Point, tolerance: float) -> Expectation:
         p_hit = float(self.p_hit(condition[None], goal[None], tolerance)[0])
         last = self._memory.only(slice(-1, None))
         if np.any(last.missed_by > 0.0) and np.all(np.isinf(last.high - last.low)):
-            return Expectation(p_hit, 1.0 / max(p_hit, _LEAST_P_HIT))
-        return Expectation(p_hit, 1.0 + _TRIALS_AFTER_A_MISS * (1.0 - p_hit))
+            return Expectation(p_hit, 1.0 / max(p_hit, _LEAST_P_HIT), self._surprise)
+        trials = 1.0 + _TRIALS_AFTER_A_MISS * (1.0 - p_hit)
+        return Expectation(p_hit, trials, self._surprise)
 
     def p_hit(self, conditions: Points, goals: Points, tolerance: float) -> Float[np.ndarray, " n"]:
         """Return the probability that each condition's outcome is within the tolerance of its goal.
@@ -188,74 +284,93 @@ class BayesianAdapter(Adapter):
             goals: Shape (n, k).
             tolerance: In the first component's unit (`Normalisation.metric`).
         """
-        scale = self._normalisation.scale
-        at, aims, radius = (
-            self._normalisation.apply(conditions),
-            (goals - conditions) / scale,
-            tolerance / scale[0],
-        )
+        radius = tolerance / self._normalisation.scale[0]
+        at, targets = (self._normalisation.apply(values) for values in (conditions, goals))
+        places = self._places(at, targets)
         missed = self._misses()
-        if len(missed.changes) > 0:
-            return self._p_hit_after(missed, at, aims, radius, seed=1)
-        return self._p_hit(at, self._now, aims, radius)
+        if len(missed.numbers) > 0:
+            return self._p_hit_after(missed, places, radius, seed=1)
+        return self._p_hit(places, places.goals - places.conditions, radius)
+
+    def _places(
+        self, conditions: Points, goal: Point | Points, number: int | None = None
+    ) -> Places:
+        """Of trials of now, if not said when."""
+        numbers = np.full(len(conditions), self._now if number is None else number)
+        return Places(conditions, numbers, np.broadcast_to(goal, conditions.shape))
+
+    @property
+    def _probabilities(self) -> Float[np.ndarray, " h"]:
+        """Of each history."""
+        logs = np.array([history.log_weight for history in self._histories])
+        shares = np.exp(logs - logs.max())
+        return np.asarray(shares / shares.sum())
 
     def _p_hit(
-        self,
-        at: Points,
-        changes: Int[np.ndarray, " n"] | int,
-        aims: Points,
-        radius: float | Float[np.ndarray, " n"],
+        self, at: Places, aims: Points, radius: float | Float[np.ndarray, " n"]
     ) -> Float[np.ndarray, " n"]:
         """Probability that the displacement at each condition is within a radius of its aim."""
-        mean, variance = self._predict(at, changes)
-        sd = np.sqrt(variance + self._execution_sd(radius) ** 2)
-        inside = share_within(radius, mean - aims.T, sd)
-        return np.asarray(np.clip(self._known().model_weights @ inside, 0.0, 1.0))
+        total = np.zeros(len(at.numbers))
+        for probability, history in zip(self._probabilities, self._histories, strict=True):
+            mean, variance = history.predict(self._prior, at, self._memory)
+            share = history.posterior.model_weights
+            total += probability * share_within(radius, mean - aims.T, np.sqrt(variance), share)
+        return total
 
     def _misses(self) -> Memory:
         """The latest trials that missed and of which their readings do not say so."""
         if self._missed is None:
             missed = self._memory.only(slice(-LATEST, None))
             missed = missed.only(missed.missed_by > 0.0)
-            if len(missed.changes) > 0:
-                at, radius = (missed.conditions, missed.changes), missed.missed_by
-                on_target = self._p_hit(*at, self._mixed(self._predict(*at)[0]), radius)
-                p_hit = self._p_hit(*at, missed.aims, radius)
-                missed = missed.only(p_hit > _NOT_EXCLUDED * on_target)
+            blur = _BLUR * np.sqrt(missed.variance)
+            beyond = np.maximum(missed.low - missed.aims, missed.aims - missed.high) - blur
+            least = np.linalg.norm(np.maximum(beyond, 0.0), axis=1)
+            missed = missed.only(least < missed.missed_by)
             self._missed = missed
         return self._missed
 
+    def _expected(self, at: Places) -> Points:
+        """Mean displacements over all that may be."""
+        total = np.zeros(at.conditions.shape)
+        for probability, history in zip(self._probabilities, self._histories, strict=True):
+            mean, _ = history.predict(self._prior, at, self._memory)
+            total += probability * np.einsum("mk,mkp->pk", history.posterior.model_weights, mean)
+        return total
+
     def _p_hit_after(
-        self, missed: Memory, at: Points, aims: Points, radius: float, *, seed: int = 0
+        self, missed: Memory, at: Places, radius: float, *, seed: int = 0
     ) -> Float[np.ndarray, " n"]:
-        """`_p_hit` of now, given that those missed; what was chosen is judged by other draws."""
-        known, memory = self._known(), self._memory
-        then, told = (missed.conditions, missed.changes), (memory.conditions, memory.changes)
-        to_missed = self._prior.covariance(*then, *told)[:, None]
-        to_here = self._prior.covariance(at, self._now, *told)[:, None]
-        from_missed = known.precision @ np.swapaxes(to_missed, 2, 3)
-        mean, variance = self._predict(at)
-        belief = Belief(
-            share=known.model_weights,
-            at_missed=self._prior.mean(missed.conditions)
-            + (to_missed @ known.weights[..., None])[..., 0],
-            among_missed=self._prior.covariance(*then, *then)[:, None] - to_missed @ from_missed,
-            mean=mean,
-            variance=variance,
-            cross=self._prior.covariance(at, self._now, *then)[:, None] - to_here @ from_missed,
-        )
-        size = np.full(len(at), radius)
+        """`_p_hit`, given that those missed; what was chosen is judged by other draws."""
+        prior, memory, beliefs = self._prior, self._memory, []
+        for probability, history in zip(self._probabilities, self._histories, strict=True):
+            known = history.posterior
+            to_missed = history.covariance(prior, missed, memory)[:, None]
+            to_here = history.covariance(prior, at, memory)[:, None]
+            from_missed = known.precision @ np.swapaxes(to_missed, 2, 3)
+            at_missed, _ = history.predict(prior, missed, memory)
+            mean, variance = history.predict(prior, at, memory)
+            noise = np.minimum(prior.noise, (_REPEATABLE * radius) ** 2)
+            among = history.covariance(prior, missed, missed)[:, None]
+            among += (noise[:, None, None] * np.eye(len(missed.numbers)))[:, None]
+            beliefs.append(
+                Belief(
+                    probability=probability,
+                    share=known.model_weights,
+                    at_missed=at_missed,
+                    among_missed=among - to_missed @ from_missed,
+                    mean=mean,
+                    variance=variance - (prior.noise - noise)[:, None, None],
+                    cross=history.covariance(prior, at, missed)[:, None] - to_here @ from_missed,
+                )
+            )
+        size = np.full(len(at.numbers), radius)
         return p_hit_after(
-            belief,
-            Targets(missed.aims, missed.missed_by, self._execution_sd(missed.missed_by)),
-            Targets(aims, size, self._execution_sd(size)),
+            beliefs,
+            Targets(missed.aims, missed.missed_by),
+            Targets(at.goals - at.conditions, size),
             self.config.outlier,
             seed,
         )
-
-    def _execution_sd(self, radius: float | Float[np.ndarray, " n"]) -> Float[np.ndarray, "*n"]:
-        """How far apart outcomes of one plan lie, where so small a radius is asked for."""
-        return np.asarray(np.minimum(self.config.execution_sd, _REPEATABLE * np.asarray(radius)))
 
     def displacement(self, conditions: Points, *, hardware: bool = True) -> Points:
         """Return where outcomes are expected to lie, seen from these conditions.
@@ -268,8 +383,10 @@ class BayesianAdapter(Adapter):
         Returns:
             Outcome minus condition, shape (n, k), in the outcomes' units.
         """
-        mean, _ = self._predict(self._normalisation.apply(conditions), None if hardware else -1)
-        return self._mixed(mean) * self._normalisation.scale
+        at = self._normalisation.apply(conditions)
+        return self._expected(self._places(at, at, None if hardware else -1)) * (
+            self._normalisation.scale
+        )
 
     def gain(
         self, candidates: Points, over: Float[np.ndarray, "m k"], *, demonstrations: bool = False
@@ -287,63 +404,42 @@ class BayesianAdapter(Adapter):
             Share of the mean variance over those places that is gone afterwards; of a trial exact
             for a number read to 0.1 spreads, which is about a word by eye.
         """
-        at, places = self._normalisation.apply(candidates), self._normalisation.apply(over)
+        candidates, over = self._normalisation.apply(candidates), self._normalisation.apply(over)
+        places, at = self._places(over, over), self._places(candidates, candidates)
         left = self._unknown(places)
         if demonstrations:
-            told = [self._with_demonstration(at[[i]])._unknown(places) for i in range(len(at))]
+            told = [self._with_demonstration(one[None])._unknown(places) for one in candidates]
             return 1.0 - np.array(told) / left
-        known, share = self._known(), self._known().model_weights
-        memory, noise = self._memory, self.config.execution_sd**2 + _TEACHING_SD**2
-        cross = self._prior.covariance(at, self._now, memory.conditions, memory.changes)
-        to = self._prior.covariance(places, self._now, memory.conditions, memory.changes)
-        between = self._prior.covariance(at, self._now, places, self._now)
-        gone = np.zeros(len(at))
-        for precision in np.moveaxis(known.precision, 1, 0):  # for each component
-            explained = cross @ precision
-            covariance = between - explained @ np.swapaxes(to, 1, 2)
-            variance = self._prior.variance(at, self._now) - np.sum(explained * cross, axis=-1)
-            gone += share @ (np.square(covariance).mean(axis=-1) / (variance + noise))
-        return np.asarray(gone / left)
+        best, prior, memory = self._histories[0], self._prior, self._memory
+        _, variance = best.predict(prior, at, memory)
+        explained = best.covariance(prior, at, memory)[:, None] @ best.posterior.precision
+        to = best.covariance(prior, places, memory)[:, None]
+        between = best.covariance(prior, at, places)[:, None]
+        covariance = between - explained @ np.swapaxes(to, 2, 3)
+        gone = np.square(covariance).mean(axis=-1) / (variance + _TEACHING_SD**2)
+        return np.asarray(np.einsum("mk,mkn->n", best.posterior.model_weights, gone) / left)
 
-    def _unknown(self, places: Float[np.ndarray, "p k"]) -> float:
+    def _unknown(self, places: Places) -> float:
         """Mean variance of a trial's displacement there, summed over components."""
-        _, variance = self._predict(places)
-        return float(self._known().model_weights @ variance.sum(axis=1).mean(axis=1))
+        best = self._histories[0]
+        _, variance = best.predict(self._prior, places, self._memory)
+        return float(np.sum(best.posterior.model_weights * variance.mean(axis=-1)))
 
     def _with_demonstration(self, outcome: Float[np.ndarray, "1 k"]) -> BayesianAdapter:
-        """The same with one demonstration more."""
+        """The same with one demonstration more, as far as is most probable."""
         other = copy.copy(self)
         other._prior = self._prior.with_demonstration(outcome)
-        other._posterior = other._missed = None
+        at = self._memory.conditions
+        base, known = other._prior.covariance(at, at), np.ones(len(at), dtype=bool)
+        other._histories = [self._histories[0].told(other._prior, self._memory, base, known)]
+        other._missed = None
         return other
 
-    def _known(self) -> Posterior:
-        """The posterior of now."""
-        if self._posterior is None:
-            memory, outlier = self._memory, self.config.outlier
-            at = memory.conditions, memory.changes
-            mean = self._prior.mean(memory.conditions)
-            low, high = memory.low.T - mean, memory.high.T - mean
-            readings = Readings(low, high, memory.variance.T, outlier)
-            covariance = self._prior.covariance(*at, *at)
-            self._posterior = infer(covariance, readings, self._prior.log_share)
-        return self._posterior
 
-    def _predict(
-        self, at: Float[np.ndarray, "p k"], changes: Int[np.ndarray, " p"] | int | None = None
-    ) -> tuple[Float[np.ndarray, "m k p"], Float[np.ndarray, "m k p"]]:
-        """Mean and variance of a trial's displacement under each model; now, if not said when."""
-        posterior, memory = self._known(), self._memory
-        after = self._now if changes is None else changes
-        cross = self._prior.covariance(at, after, memory.conditions, memory.changes)[:, None]
-        mean = self._prior.mean(at) + (cross @ posterior.weights[..., None])[..., 0]
-        explained = np.sum((cross @ posterior.precision) * cross, axis=-1)
-        variance = self._prior.variance(at, after)[:, None] - explained
-        return mean, np.maximum(variance, 1e-10)
-
-    def _mixed(self, means: Float[np.ndarray, "m k p"]) -> Float[np.ndarray, "p k"]:
-        """Mean over all models."""
-        return np.asarray(np.einsum("m,mkp->pk", self._known().model_weights, means))
+def _tried(conditions: Points, missed: Memory) -> Bool[np.ndarray, " n"]:
+    """Which conditions are next to one that missed."""
+    apart = np.linalg.norm(conditions[:, None] - missed.conditions, axis=2)
+    return np.asarray(np.any(apart < _AGAIN * missed.missed_by, axis=1))
 
 
 def _clipped(vector: Point, longest: float) -> Point:

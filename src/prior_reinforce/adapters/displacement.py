@@ -1,16 +1,20 @@
-"""What is believed, before any trial, of the displacement between condition and outcome.
+r"""What is believed, before any trial, of the displacement between condition and outcome.
 
-The model is told in `bayesian.BayesianAdapter`. Displacements at a and b, in normalised units, have
-under each of m models the prior covariance
+A plan for c mixes the demonstrated plans by weights w(c) (`plans.outcome_weights`). Where it lands
+is some function F of the outcome that was asked for, F(r_i) for demonstration i, and a mixture is
+off by what its weights do not carry over:
 
-    w(a)' S w(b) + rough^2 K(a, b; .32) + g^2 K(a, b; .5) + h^2 K(a, b; 2.5)
+    d(c) = sum_i w_i(c) e_i + F(c) - sum_i w_i(c) F(r_i) + h(c) + noise,    F ~ GP(0, a^2 K)
 
-with w the weights of a spline over the demonstrated outcomes, S the variances of their labels, K
-the squared-exponential kernel of a reach, and the last term between trials of one hardware alone.
-Their prior mean is w(a)' m, with m what the labels say to be off: "10 cm" by eye is 11.25 on
-average.
+e_i is by how much the outcome of demonstration i is off, h what is different from their day, and
+the noise what differs from one execution to the next. F less its mixture is zero at demonstrations,
+grows away from them, and has no affine part, which the weights reproduce.
 
-Source: ours; the figures are in docs/decisions-adapter.md.
+Of no arm are the size a, the size of h and that of the noise known beforehand. All combinations are
+models, for each component by itself: range may be far off where direction is not.
+
+Source: ours; K is Matern's kernel of order 5/2 (Rasmussen and Williams, Gaussian Processes for
+Machine Learning, 2006, eq. 4.17). The figures are in docs/decisions-adapter.md.
 """
 
 from __future__ import annotations
@@ -19,48 +23,64 @@ import copy
 import itertools
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
-from prior_reinforce.arrays import Point, Points
+from prior_reinforce.arrays import Points
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.plans.normalisation import Normalisation
 from prior_reinforce.plans.outcome_weights import smooth_weights
+
+_LESS = 2 / 3
+"""How probable a size is beforehand, relative to the next smaller one (ours): equal odds say too
+little of a hit before there are readings, half as probable too much."""
+_STEEPEST = 10.0
+"""Length of the weights beyond which displacements are not believed to grow (ours): two
+demonstrations a tenth of a millimetre apart have weights of 500 beside them, and rounding is all
+that is left then. Inside a hull it is about 1."""
+_REMEMBERED = 8
+"""Sets of places whose weights are remembered (ours): trials in memory are asked about again and
+again."""
 
 
 @dataclass(frozen=True)
 class BayesianConfig:
     """Settings of `BayesianAdapter`, in units of S, the demonstrations' spread (`Normalisation`).
 
-    Where there are several values, all combinations are models, and their evidence weighs them.
+    Where there are several values, all combinations are models, and their evidence weighs them; of
+    sizes each is beforehand two thirds as probable as the one before.
     """
 
-    label_sd: tuple[float, ...] = (0.03, 0.1)
+    label_sd: float = 0.02
     """How far demonstrated outcomes are off, beside the noise that they state."""
-    generator_sd: float = 0.3
-    """a, what the generator itself gets wrong, whatever the labels."""
-    generator_reach: float = 0.5
+    generator_sd: tuple[float, ...] = (0.05, 0.2, 0.8)
+    """a, by how much landing bends between demonstrations."""
+    generator_reach: float = 1.4
     """How far that reaches."""
-    p_generator: float = 0.1
-    """Beforehand, the probability that it does."""
-    rough_sd: float = 0.025
-    """What lies between demonstrations."""
-    rough_reach: float = 0.32
-    """How far that reaches."""
-    hardware_sd: tuple[float, float] = (0.03, 0.3)
-    """b, what is different from the demonstrations' day: where nothing was changed, and where
+    hardware_sd: tuple[float, float] = (0.01, 0.3)
+    """What is different from the demonstrations' day: where nothing was changed, and where
     something was."""
     hardware_reach: float = 2.5
     """How far that reaches: shift and stretch."""
     p_changed: float = 0.2
     """Beforehand, the probability that something was changed."""
-    execution_sd: float = 0.02
-    """How far apart outcomes of one plan lie: 3 to 4 mm where the spread is 12 to 18 cm, as for
-    repeated executions on our tasks."""
-    outlier: float = 0.01
-    """Probability that a reading says nothing: a lost ball, a wrong word."""
+    shift_sd: float = 0.8
+    """By how much everything may be shifted when table, object or camera move."""
+    p_change: float = 0.02
+    """Probability that something changes between two trials, unsaid: a shift of everything, or as
+    `hardware_sd` says, with equal odds."""
+    p_misplaced: float = 0.002
+    """Probability that one goal's place changes between two trials, unsaid."""
+    p_mistaken: float = 0.01
+    """Probability that a trial is told wrongly: a mistyped number, a lost ball."""
+    execution_sd: tuple[float, ...] = (0.005, 0.02, 0.05)
+    """How far apart outcomes of one plan, or of plans next to each other, lie: 3 to 4 mm where the
+    spread is 12 to 18 cm, on our tasks."""
+    outlier: float = 0.002
+    """Probability that one component of a reading says nothing."""
 
     def __post_init__(self) -> None:
         """Check the settings.
@@ -69,15 +89,14 @@ class BayesianConfig:
             ConfigurationError: A setting is not positive, a probability is 1 or more, or
                 `hardware_sd` has not two values.
         """
-        for name in ("label_sd", "hardware_sd"):
+        for name in ("generator_sd", "execution_sd", "hardware_sd"):
             if not isinstance(getattr(self, name), tuple):
                 raise ConfigurationError(f"{name} must be a tuple, got {getattr(self, name)}")
         for name, value in vars(self).items():
             values = value if isinstance(value, tuple) else (value,)
             if not (values and all(math.isfinite(v) and v > 0 for v in values)):
                 raise ConfigurationError(f"{name} must be positive, got {value}")
-        for name in ("outlier", "p_generator", "p_changed"):
-            if (value := getattr(self, name)) >= 1.0:
+            if (name.startswith("p_") and value >= 1.0) or (name == "outlier" and value >= 1.0):
                 raise ConfigurationError(f"{name} must be below 1, got {value}")
         if len(self.hardware_sd) != 2:
             raise ConfigurationError(
@@ -86,20 +105,22 @@ class BayesianConfig:
 
 
 class DisplacementPrior:
-    """The prior covariance of displacements under each of m models; demonstrations fix it."""
+    """Means and covariances of displacements under each of m models; demonstrations fix them."""
 
     def __init__(self, config: BayesianConfig, demonstrations: Demonstrations) -> None:
         """Take the settings, and what was demonstrated."""
         self.config = config
         self.normalisation = Normalisation.of(demonstrations)
-        generator = ((0.0, 1.0 - config.p_generator), (config.generator_sd, config.p_generator))
         same, changed = config.hardware_sd
         hardware = ((same, 1.0 - config.p_changed), (changed, config.p_changed))
-        grid = itertools.product(config.label_sd, generator, hardware)
-        models = [(e, a, b, p * q) for e, (a, p), (b, q) in grid]
-        e, a, b, share = np.array(models).T
-        self._label, self._generator, self._hardware = e**2, a**2, b**2
-        self.log_share: Float[np.ndarray, " m"] = np.log(share)
+        sizes = enumerate(config.generator_sd), hardware, enumerate(config.execution_sd)
+        grid = [
+            (a, b, noise, p * _LESS ** (i + j))
+            for (i, a), (b, p), (j, noise) in itertools.product(*sizes)
+        ]
+        a, b, noise, share = np.array(grid).T
+        self._square, self._hardware, self.noise = a**2, b**2, noise**2
+        self.log_share: Float[np.ndarray, " m"] = np.log(share / share.sum())
         """Log probability of each model."""
         self._mix(
             self.normalisation.apply(demonstrations.outcomes_seen),
@@ -122,59 +143,65 @@ class DisplacementPrior:
         self._demonstrated, self._noise, self._correction = demonstrated, noise, correction
         outcomes = self.normalisation.undo(demonstrated)
         self._weights = smooth_weights(outcomes, noise=noise * self.normalisation.scale)
-        self._stated = np.mean(noise**2, axis=1)
+        self._label = np.mean(noise**2, axis=1) + self.config.label_sd**2
+        self._asked: dict[bytes, Any] = {}
 
     def mean(self, at: Float[np.ndarray, "p k"]) -> Float[np.ndarray, "k p"]:
         """Displacements that are expected there, before any trial and under each model."""
-        return np.asarray((self._mixed_by(at) @ self._correction).T)
-
-    def of_difference(
-        self, conditions: Points, other: Point, changes: int
-    ) -> Float[np.ndarray, "m n"]:
-        """Variance of the difference between displacements here and there."""
-        there = other[None]
-        cross = self.covariance(conditions, changes, there, changes)[..., 0]
-        variance = self.variance(conditions, changes) + self.variance(there, changes)
-        return np.asarray(variance - 2.0 * cross)
+        return self._at(at)[3]
 
     def covariance(
-        self,
-        a: Float[np.ndarray, "p k"],
-        after_a: Int[np.ndarray, " p"] | int,
-        b: Points,
-        after_b: Int[np.ndarray, " n"] | int,
+        self, a: Float[np.ndarray, "p k"], b: Points, *, hardware: bool = True
     ) -> Float[np.ndarray, "m p n"]:
-        """Between displacements at a and b, each after so many changes of hardware."""
-        config = self.config
-        square = np.square(a[:, None] - b[None]).sum(axis=-1)
-        w_a, w_b = self._mixed_by(a), self._mixed_by(b)
-        stated = (w_a * self._stated) @ w_b.T
-        rough = config.rough_sd**2 * np.exp(-0.5 * square / config.rough_reach**2)
-        generator = np.exp(-0.5 * square / config.generator_reach**2)
-        of_a, of_b = np.broadcast_to(after_a, len(a)), np.broadcast_to(after_b, len(b))
-        shared = np.where(of_a[:, None] == of_b, self._hardware_of(of_b)[:, None], 0.0)
-        return np.asarray(
-            stated
-            + rough
-            + self._label[:, None, None] * (w_a @ w_b.T)
-            + self._generator[:, None, None] * generator
-            + shared * np.exp(-0.5 * square / config.hardware_reach**2)
-        )
-
-    def _hardware_of(self, changes: Int[np.ndarray, " n"]) -> Float[np.ndarray, "m n"]:
-        """b^2: before anything is said to be changed it is one of two, afterwards the greater."""
-        return np.where(changes == 0, self._hardware[:, None], self.config.hardware_sd[1] ** 2)
+        """Between displacements at a and b; with what is different from the demonstrations' day."""
+        (w_a, of_a, s_a, _), (w_b, of_b, s_b, _) = self._at(a), self._at(b)
+        bent = self._matern(a, b) * np.outer(s_a, s_b) - of_a @ w_b.T - w_a @ of_b.T
+        covariance = self._square[:, None, None] * bent + (w_a * self._label) @ w_b.T
+        if hardware:
+            covariance += self._hardware[:, None, None] * self._shared(a, b)
+        return np.asarray(covariance)
 
     def variance(
-        self, at: Float[np.ndarray, "p k"], changes: Int[np.ndarray, " p"] | int
+        self, at: Float[np.ndarray, "p k"], *, hardware: bool = True
     ) -> Float[np.ndarray, "m p"]:
-        """Of the displacement of a trial."""
-        squares = np.square(self._mixed_by(at))
-        of_all = self.config.rough_sd**2 + squares @ self._stated
-        of_each = self._label[:, None] * squares.sum(axis=1)
-        hardware = self._hardware_of(np.broadcast_to(changes, len(at)))
-        return np.asarray(of_all + of_each + self._generator[:, None] + hardware)
+        """Of the displacement of an execution at each place."""
+        w, left, scaled, _ = self._at(at)
+        bent = np.maximum(scaled**2 - 2.0 * np.sum(w * left, axis=1), 0.0)
+        of_each = self._square[:, None] * bent + np.square(w) @ self._label
+        return np.asarray(of_each + (hardware * self._hardware + self.noise)[:, None])
 
-    def _mixed_by(self, at: Float[np.ndarray, "p k"]) -> Float[np.ndarray, "p N"]:
-        """w, how much each demonstration counts."""
-        return self._weights(self.normalisation.undo(at))
+    def of_change(self, a: Float[np.ndarray, "p k"], b: Points) -> Float[np.ndarray, "p n"]:
+        """Covariance of what changed hardware adds: shift and stretch."""
+        return self.config.hardware_sd[1] ** 2 * self._shared(a, b)
+
+    def _shared(self, a: Float[np.ndarray, "p k"], b: Points) -> Float[np.ndarray, "p n"]:
+        square = np.square(a[:, None] - b[None]).sum(axis=-1)
+        return np.asarray(np.exp(-0.5 * square / self.config.hardware_reach**2))
+
+    def _at(
+        self, at: Float[np.ndarray, "p k"]
+    ) -> tuple[
+        Float[np.ndarray, "p N"],
+        Float[np.ndarray, "p N"],
+        Float[np.ndarray, " p"],
+        Float[np.ndarray, "k p"],
+    ]:
+        """S w, how much each demonstration counts, s (K(at, r) - w K(r, r) / 2), s, and the mean.
+
+        s is 1 but where weights are steep: all that is unknown there is scaled down by it.
+        """
+        key = at.tobytes()
+        if key not in self._asked:
+            if len(self._asked) >= _REMEMBERED:
+                self._asked.pop(next(iter(self._asked)))
+            known, w = self._demonstrated, self._weights(self.normalisation.undo(at))
+            left = self._matern(at, known) - 0.5 * w @ self._matern(known, known)
+            scaled = np.minimum(1.0, _STEEPEST / np.linalg.norm(w, axis=1))
+            expected = (w @ self._correction).T
+            self._asked[key] = scaled[:, None] * w, scaled[:, None] * left, scaled, expected
+        return self._asked[key]
+
+    def _matern(self, a: Float[np.ndarray, "p k"], b: Points) -> Float[np.ndarray, "p n"]:
+        square = 5.0 * np.square(a[:, None] - b[None]).sum(axis=-1) / self.config.generator_reach**2
+        root = np.sqrt(square)
+        return np.asarray((1.0 + root + square / 3.0) * np.exp(-root))

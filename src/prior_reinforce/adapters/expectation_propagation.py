@@ -21,7 +21,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 _SWEEPS = 15
 """Updates of all sites at most (ours): means are then settled to a tenth of a millimetre."""
@@ -34,6 +34,10 @@ _LEAST_PRECISION = 1e-8
 _FARTHEST = 37.0
 """Standard deviations beyond which the normal distribution is 0 in floating point."""
 _TINY = 1e-290
+
+
+Sites = tuple[Float[np.ndarray, "m k s"], Float[np.ndarray, "m k s"]]
+"""Precision, and precision times mean."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,20 +68,25 @@ class Posterior:
     """What multiplies prior covariances to give a mean: E d(x) = k(x)' weights."""
     precision: Float[np.ndarray, "m k n n"]
     """(K + diag(1 / tau))^-1: Var d(x) = k(x, x) - k(x)' precision k(x)."""
-    log_evidence: Float[np.ndarray, " m"]
-    """log p(readings, model), summed over outputs, up to a constant that all models share."""
+    log_evidence: Float[np.ndarray, "m k"]
+    """log p(readings, model), for each output."""
+
+    def sites(self, which: Bool[np.ndarray, " n"]) -> Sites:
+        """Tau and nu of some of the readings."""
+        return self.tau[..., which], self.nu[..., which]
 
     @property
-    def model_weights(self) -> Float[np.ndarray, " m"]:
-        """Posterior probability of each model."""
-        share = np.exp(self.log_evidence - self.log_evidence.max())
-        return np.asarray(share / share.sum())
+    def model_weights(self) -> Float[np.ndarray, "m k"]:
+        """Posterior probability of each model, for each output."""
+        share = np.exp(self.log_evidence - self.log_evidence.max(axis=0))
+        return np.asarray(share / share.sum(axis=0))
 
 
 def infer(
     covariance: Float[np.ndarray, "m n n"],
     readings: Readings,
     log_prior: Float[np.ndarray, " m"] | float = 0.0,
+    start: Sites | None = None,
 ) -> Posterior:
     """Return the latent's posterior under each of m prior covariances.
 
@@ -87,11 +96,15 @@ def infer(
         covariance: K of each model.
         readings: Of k outputs, n each; n may be 0.
         log_prior: Of each model, beforehand; all equal where it is not said.
+        start: Where the sites of the first readings begin.
     """
     m, n, _ = covariance.shape
     k = len(readings.low)
     prior = covariance[:, None]
-    tau = nu = before = np.zeros((m, k, n))
+    tau, nu, before = np.zeros((3, m, k, n))
+    if start is not None:
+        known = start[0].shape[-1]
+        tau[..., :known], nu[..., :known] = start
     for sweep in range(_SWEEPS):
         mean, variance, precision = _latent(prior, tau, nu)
         if sweep and np.all(np.abs(mean - before) < _SETTLED * np.sqrt(variance)):
@@ -104,7 +117,7 @@ def infer(
         new_tau = np.clip(1.0 / tilted_variance - rest_tau, _LEAST_PRECISION, 1e10)
         new_nu = (rest_tau + new_tau) * tilted_mean - rest_tau * rest_mean
         new_nu = np.where(new_tau > _LEAST_PRECISION, new_nu, 0.0)
-        share = 1.0 if sweep == 0 else _DAMPING
+        share = 1.0 if sweep == 0 and start is None else _DAMPING
         tau, nu = tau + share * (new_tau - tau), nu + share * (new_nu - nu)
     mean, variance, precision = _latent(prior, tau, nu)
     rest_tau = np.maximum(1.0 / variance - tau, _LEAST_PRECISION)
@@ -118,7 +131,8 @@ def infer(
         + rest_mean * rest_tau / both * (tau * rest_mean - 2.0 * nu)
     )
     log_determinant = np.linalg.slogdet(_whitened(prior, tau))[1]
-    evidence = of_sites.sum(axis=(-2, -1)) - 0.5 * log_determinant.sum(axis=-1) + log_prior
+    evidence = of_sites.sum(axis=-1) - 0.5 * log_determinant
+    evidence += np.reshape(log_prior, (-1, 1))
     weights = nu - (precision @ (prior @ nu[..., None]))[..., 0]
     return Posterior(tau, nu, weights, precision, evidence)
 

@@ -1,7 +1,8 @@
 """The probability of a hit, and what trials that missed tell of it.
 
-Displacements are Gaussian, so that the probability of a hit is the share of a normal distribution
-that lies in a ball (`share_within`).
+Under each history displacements are, in each component by itself, a mixture of normal
+distributions; the probability of a hit is the share of their product that lies in a ball
+(`share_within`).
 
 A miss says that an error lies outside of a ball, which no interval and no Gaussian says. So the
 displacements at the conditions that missed are drawn, each draw is weighed by the probability that
@@ -21,30 +22,38 @@ from __future__ import annotations
 
 import functools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
-_POINTS = 192
-"""Where the share within a ball is evaluated (ours): right to 0.002, for k up to 3."""
-_DRAWS = 1024
-"""Of all models together (ours). After six misses the standard error of P(hit) is then 0.02 with
-two components, at most 0.03, and 0.07 with one, at most 0.09 (twelve sets, twenty seeds)."""
-_FEWEST = 16
-"""Draws of an improbable model, which may be the one that explains the misses (ours)."""
-_LEAST_SHARE = 1e-3
-"""Models less probable than this are left out (ours)."""
+_CELLS = 64
+"""Into which a ball is cut along all components but the last, at most (ours)."""
+_ALL_CELLS = 32768
+"""of all those components together (ours): right to 0.006 for k up to 4."""
+_DRAWS = (1024, 8192)
+"""Of all histories together, where many candidates are compared, and of one or two (ours). After
+six misses the standard error of P(hit) is 0.02 with two components, 0.07 with one, at 1,024 (twelve
+sets, twenty seeds)."""
+_EVALUATED = 200_000
+"""Draws times candidates, between those two (ours)."""
+_FEWEST = 64
+"""Draws of an improbable history, which may be the one that explains the misses (ours)."""
+_EDGE = 0.1
+"""Blur of a ball's edge, in radii (ours): so that few draws tell small differences."""
 _SINGULAR = 1e-9
 """Eigenvalues of a covariance are this share of the greatest at least."""
 
 
 @dataclass(frozen=True, eq=False)
 class Belief:
-    """Gaussian displacements at n candidates and M missed conditions, under each of m models."""
+    """Displacements at n candidates and M missed conditions, under each of m models."""
 
-    share: Float[np.ndarray, " m"]
-    """Probability of each model."""
+    probability: float
+    """Of the history that it follows from."""
+    share: Float[np.ndarray, "m k"]
+    """Probability of each model, for each component."""
     at_missed: Float[np.ndarray, "m k M"]
     """Means there."""
     among_missed: Float[np.ndarray, "m k M M"]
@@ -65,51 +74,51 @@ class Targets:
     """Middles: goal minus condition."""
     radii: Float[np.ndarray, " p"]
     """Tolerances."""
-    execution_sd: Float[np.ndarray, " p"]
-    """Standard deviations of an execution, which blur the radii."""
 
     def share_within(self, drawn: Float[np.ndarray, "k q p"]) -> Float[np.ndarray, "q p"]:
-        """Probability that an execution of each draw hits.
-
-        Of the noise across the way to the middle its mean square is taken, and along it all.
-        """
+        """Probability that each draw hits: 0 or 1, but for a blurred edge."""
         from scipy.special import ndtr  # as in `expectation_propagation`
 
-        across = (len(drawn) - 1) * self.execution_sd**2
-        distance = np.sqrt(np.square(drawn - self.aims.T[:, None]).sum(axis=0) + across)
-        return np.asarray(ndtr((self.radii - distance) / self.execution_sd))
+        distance = np.sqrt(np.square(drawn - self.aims.T[:, None]).sum(axis=0))
+        return np.asarray(ndtr((self.radii - distance) / (_EDGE * self.radii)))
 
 
 def p_hit_after(
-    belief: Belief, missed: Targets, candidates: Targets, outlier: float, seed: int = 0
+    beliefs: Sequence[Belief], missed: Targets, candidates: Targets, outlier: float, seed: int = 0
 ) -> Float[np.ndarray, " n"]:
     """Return each candidate's probability of a hit, given that the trials before it missed.
 
     Args:
-        belief: Of displacements, before it is known that they missed.
+        beliefs: Of displacements, before it is known that they missed.
         missed: What M trials missed.
         candidates: What n candidates are to hit.
         outlier: Probability that a miss says nothing.
         seed: Of the draws.
     """
-    _, k, n = belief.mean.shape
-    normal = _normal(k, len(missed.aims) + 1, seed)
+    _, k, n = beliefs[0].mean.shape
     hits, total = np.zeros(n), 0.0
-    for model in np.flatnonzero(belief.share > _LEAST_SHARE):
-        draws = max(_FEWEST, math.ceil(_DRAWS * belief.share[model]))
-        share, drawn = belief.share[model] / draws, normal[:, :draws]
-        # Conditions that are the same have a singular covariance: a root by eigenvectors.
-        values, vectors = np.linalg.eigh(belief.among_missed[model])
-        root = np.sqrt(np.maximum(values, _SINGULAR * values[:, -1:]))[:, None]
-        onto = np.swapaxes(belief.cross[model] @ (vectors / root), 1, 2)
-        left = np.maximum(belief.variance[model] - np.square(onto).sum(axis=1), 0.0)
-        of_missed = drawn[..., :-1] @ np.swapaxes(vectors * root, 1, 2)
-        of_candidates = drawn[..., :-1] @ onto + np.sqrt(left)[:, None] * drawn[..., -1:]
-        would_hit = missed.share_within(belief.at_missed[model][:, None] + of_missed)
-        weight = np.prod(1.0 - (1.0 - outlier) * would_hit, axis=1)
-        hits += share * (
-            weight @ candidates.share_within(belief.mean[model][:, None] + of_candidates)
-        )
+    most = int(np.clip(_EVALUATED // n, *_DRAWS))
+    for belief in beliefs:
+        draws = max(_FEWEST, math.ceil(most * belief.probability))
+        normal = _normal(k, len(missed.aims) + 1, seed)[:, :draws]
+        of_missed = np.empty((k, draws, len(missed.aims)))
+        of_candidates = np.empty((k, draws, n))
+        for j in range(k):
+            models = _shared_out(belief.share[:, j], draws, seed + j)
+            for m in np.unique(models):
+                at, drawn = models == m, normal[j, models == m]
+                # Conditions that are the same have a singular covariance: a root by eigenvectors.
+                values, vectors = np.linalg.eigh(belief.among_missed[m, j])
+                root = np.sqrt(np.maximum(values, _SINGULAR * values[-1]))
+                onto = (belief.cross[m, j] @ (vectors / root)).T
+                left = np.maximum(belief.variance[m, j] - np.square(onto).sum(axis=0), 0.0)
+                of_missed[j, at] = belief.at_missed[m, j] + drawn[:, :-1] @ (vectors * root).T
+                of_candidates[j, at] = (
+                    belief.mean[m, j] + drawn[:, :-1] @ onto + drawn[:, -1:] * np.sqrt(left)
+                )
+        weight = np.prod(1.0 - (1.0 - outlier) * missed.share_within(of_missed), axis=1)
+        share = belief.probability / draws
+        hits += share * (weight @ candidates.share_within(of_candidates))
         total += share * weight.sum()
     return np.asarray(hits / total)
 
@@ -118,28 +127,34 @@ def share_within(
     radius: float | Float[np.ndarray, " n"],
     mean: Float[np.ndarray, "m k n"],
     sd: Float[np.ndarray, "m k n"],
-) -> Float[np.ndarray, "m n"]:
-    """Probability that independent normal numbers lie in the ball around 0, or in one each.
+    share: Float[np.ndarray, "m k"],
+) -> Float[np.ndarray, " n"]:
+    """Probability that independent numbers lie in the ball around 0, or in one each.
 
-    One component after another, each between what the ones before leave of the ball: exact for k =
-    1, and smooth in everything. Source: Genz, Numerical computation of multivariate normal
-    probabilities, 1992, for a box; the ball is ours.
+    Each number has a distribution that is a mixture of m normal ones. The ball is cut into cells
+    along one component after another; the last is exact.
     """
-    from scipy.special import ndtr, ndtri
+    from scipy.special import ndtr
 
     k = mean.shape[1]
-    points = evenly_spread(k - 1)
-    square = np.square(radius)[..., None]
-    left = np.broadcast_to(square, (*mean[:, 0].shape, len(points)))
-    inside = np.ones_like(left)
-    for j in range(k):
-        reach, middle, spread = np.sqrt(left), mean[:, j, :, None], sd[:, j, :, None]
-        low, high = ndtr((-reach - middle) / spread), ndtr((reach - middle) / spread)
-        inside = inside * (high - low)
-        if j < k - 1:
-            at = middle + spread * ndtri(np.clip(low + (high - low) * points[:, j], 1e-300, 1.0))
-            left = np.maximum(left - np.square(np.clip(at, -reach, reach)), 0.0)
-    return np.asarray(inside.mean(axis=-1))
+    cells = max(4, min(_CELLS, round(_ALL_CELLS ** (1.0 / max(k - 1, 1)))))
+    edges = np.sin(np.linspace(-0.5 * np.pi, 0.5 * np.pi, cells + 1))
+    middles = np.sin(0.5 * np.pi * (np.arange(cells) + 0.5) / cells * 2.0 - 0.5 * np.pi)
+
+    def below(values: Float[np.ndarray, "..."], j: int) -> Float[np.ndarray, "..."]:
+        column = (-1, len(values), *(1,) * (values.ndim - 1))
+        middle, spread = mean[:, j].reshape(column), sd[:, j].reshape(column)
+        return np.asarray(np.tensordot(share[:, j], ndtr((values - middle) / spread), axes=1))
+
+    def inside(left: Float[np.ndarray, "..."], j: int) -> Float[np.ndarray, "..."]:
+        if j == k - 1:
+            return below(left, j) - below(-left, j)
+        in_cell = np.diff(below(left[..., None] * edges, j), axis=-1)
+        rest = left[..., None] * np.sqrt(1.0 - middles**2)
+        return np.asarray(np.sum(in_cell * inside(rest, j + 1), axis=-1))
+
+    radii = np.broadcast_to(np.asarray(radius, float), mean.shape[2:])
+    return np.clip(inside(radii, 0), 0.0, 1.0)
 
 
 @functools.lru_cache
@@ -151,12 +166,16 @@ def evenly_spread(k: int) -> Float[np.ndarray, "q k"]:
     root = 2.0
     for _ in range(50):
         root = (1.0 + root) ** (1.0 / (k + 1))
-    return np.asarray(
-        (0.5 + np.arange(1, _POINTS + 1)[:, None] * root ** -np.arange(1.0, k + 1)) % 1
-    )
+    return np.asarray((0.5 + np.arange(1, 193)[:, None] * root ** -np.arange(1.0, k + 1)) % 1)
 
 
 @functools.lru_cache
 def _normal(k: int, size: int, seed: int) -> Float[np.ndarray, "k q s"]:
     """The same draws for every call, so that a proposal depends on what was observed alone."""
-    return np.random.default_rng(seed).standard_normal((k, _DRAWS, size))
+    return np.random.default_rng(seed).standard_normal((k, _DRAWS[1] + 1, size))
+
+
+def _shared_out(share: Float[np.ndarray, " m"], draws: int, seed: int) -> Int[np.ndarray, " q"]:
+    """A model for each draw, in proportion, and in an order of its own for each component."""
+    evenly = (np.random.default_rng(seed).permutation(draws) + 0.5) / draws
+    return np.minimum(np.searchsorted(np.cumsum(share), evenly), len(share) - 1)

@@ -75,6 +75,7 @@ class Asked(Event, frozen=True):
     """The gate's verdict as plain data (`Verdict.as_json`)."""
     p_hit: float | None = None
     expected_trials: float | None = None
+    surprise: str = ""
     plan: KeptPlan | None = None
     """None where the log keeps plans in memory."""
 

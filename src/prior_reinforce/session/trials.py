@@ -63,9 +63,10 @@ class Stage(Enum):
     """Not data: the ball slipped, the arm stopped, nothing was seen."""
 
 
-_LEAST_SD = 2 / 3
-"""Least sd of a number of unknown origin, in tolerances (ours): 1 cm of 1.5 cm, as for lengths in
-`readings`."""
+_LEAST_SD = 1 / 3
+"""Least sd of a number of unknown origin, in tolerances (ours): half a centimetre of 1.5 cm. Who
+gives numbers for words means to; with twice as much, P(hit) is said too low and adapters lag
+(docs/decisions-adapter.md)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,6 +131,8 @@ class Trial:
     """Probability that it hits, as its adapter saw it; None from one that expects nothing."""
     expected_trials: float | None = None
     """Trials until the goal is reached, this one included, likewise."""
+    surprise: str = ""
+    """What was odd about the reading before it, and what to do about that; empty where nothing."""
     model: str = ""
     """Which model planned it: the name of its folder in a workspace, else empty."""
     kept: KeptPlan | None = None
@@ -300,6 +303,7 @@ class State:
                         self.plans.get(event.trial),
                         p_hit=event.p_hit,
                         expected_trials=event.expected_trials,
+                        surprise=event.surprise,
                         model=event.model,
                         kept=event.plan,
                         gate=event.gate,

@@ -84,6 +84,7 @@ def say_expectation(state: WorkspaceState, trial: Trial) -> list[str]:
     if trial.p_hit is None or trial.expected_trials is None:
         return []
     lines = [f"hits with probability {trial.p_hit:.2f}; {trial.expected_trials:.1f} trials to go"]
+    lines += [trial.surprise] if trial.surprise else []
     missed = sum(told.stage is Stage.TOLD for told in state.current)
     if missed >= _POOR_TRIALS and not state.solved and trial.p_hit < _POOR_CHANCE:
         lines.append(

@@ -1,0 +1,179 @@
+"""What may have happened between trials: changes that nobody announced, and trials told wrongly.
+
+A history says after which trials something changed, for all that come or for one goal alone, and
+which trials were told wrongly. A reading that is far from what was believed splits a history: it
+was told wrongly; something changed for good; this goal lies elsewhere; or it was chance after all.
+Prior odds and densities weigh them, and later readings decide: they contradict what was told
+wrongly, and agree with what changed.
+
+Histories are kept as long as they are not a thousand times less probable than the best one.
+
+Source: Adams and MacKay, Bayesian online changepoint detection, 2007, for the recursion; that
+changes add to a field, and concern one goal or all, is ours.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from prior_reinforce.adapters.displacement import DisplacementPrior
+from prior_reinforce.adapters.expectation_propagation import Posterior, Readings, infer, tilted
+from prior_reinforce.adapters.memory import Memory, Places
+from prior_reinforce.arrays import Point
+
+_LEAST_ODDS = 1e-3
+"""Histories less probable than this part of the most probable one are dropped (ours)."""
+_MOST = 6
+"""Histories that are kept at most (ours)."""
+_WIDTH = 8.0
+"""W of `expectation_propagation`: a trial that was told wrongly may be told anywhere in that."""
+
+
+@dataclass(frozen=True, eq=False)
+class Change:
+    """Something is different from one trial on."""
+
+    since: int
+    """Number of the first trial that it concerns."""
+    shift_sd: float
+    """By how much all that it concerns may be shifted; 0 where hardware was changed, which does not
+    shift all by the same."""
+    goal: Point | None = None
+    """The only goal that it concerns, which was moved; None where it concerns all."""
+    announced: bool = False
+    """Whether somebody said so."""
+
+    def concerns(self, places: Places) -> Bool[np.ndarray, " p"]:
+        """Which of them it concerns."""
+        after = places.numbers >= self.since
+        return after if self.goal is None else after & np.all(places.goals == self.goal, axis=1)
+
+    def covariance(
+        self, prior: DisplacementPrior, a: Places, b: Places
+    ) -> Float[np.ndarray, "p n"]:
+        """Of what it adds to displacements."""
+        both = np.outer(self.concerns(a), self.concerns(b))
+        if self.shift_sd:
+            return np.asarray(both * self.shift_sd**2)
+        return np.asarray(both * prior.of_change(a.conditions, b.conditions))
+
+
+@dataclass(frozen=True, eq=False)
+class History:
+    """What is taken to have happened so far, and what follows for displacements."""
+
+    changes: tuple[Change, ...]
+    mistaken: frozenset[int]
+    """Numbers of trials that were told wrongly."""
+    log_prior: float
+    posterior: Posterior
+
+    @property
+    def log_weight(self) -> float:
+        """Log probability of the readings and of this history, up to a constant."""
+        evidence = np.logaddexp.reduce(self.posterior.log_evidence, axis=0)
+        return self.log_prior + float(evidence.sum())
+
+    def covariance(
+        self, prior: DisplacementPrior, a: Places, b: Places
+    ) -> Float[np.ndarray, "m p n"]:
+        """Between displacements of trials."""
+        hardware = bool(np.all(a.numbers >= 0) and np.all(b.numbers >= 0))
+        base = prior.covariance(a.conditions, b.conditions, hardware=hardware)
+        return base + self._changed(prior, a, b)
+
+    def predict(
+        self, prior: DisplacementPrior, at: Places, memory: Memory
+    ) -> tuple[Float[np.ndarray, "m k p"], Float[np.ndarray, "m k p"]]:
+        """Mean and variance of displacements under each model."""
+        posterior = self.posterior
+        cross = self.covariance(prior, at, memory)[:, None]
+        mean = prior.mean(at.conditions) + (cross @ posterior.weights[..., None])[..., 0]
+        explained = np.sum((cross @ posterior.precision) * cross, axis=-1)
+        variance = prior.variance(at.conditions, hardware=bool(np.all(at.numbers >= 0)))
+        for change in self.changes:
+            variance = variance + np.diag(change.covariance(prior, at, at))
+        return mean, np.maximum(variance[:, None] - explained, 1e-10)
+
+    def _changed(self, prior: DisplacementPrior, a: Places, b: Places) -> Float[np.ndarray, "p n"]:
+        nothing = np.zeros((len(a.numbers), len(b.numbers)))
+        return sum((change.covariance(prior, a, b) for change in self.changes), nothing)
+
+    def told(
+        self,
+        prior: DisplacementPrior,
+        memory: Memory,
+        base: Float[np.ndarray, "m n n"],
+        known: Bool[np.ndarray, " N"],
+    ) -> History:
+        """The same after the readings in memory.
+
+        Args:
+            prior: Of displacements.
+            memory: What was read.
+            base: Its covariance, had nothing changed.
+            known: Which of the readings so far are still in it; its first ones.
+        """
+        readings = _readings(prior, memory, self.mistaken)
+        noise = prior.noise[:, None, None] * np.eye(len(memory.numbers))
+        covariance = base + noise + self._changed(prior, memory, memory)
+        posterior = infer(covariance, readings, prior.log_share, self.posterior.sites(known))
+        return replace(self, posterior=posterior)
+
+
+def _readings(prior: DisplacementPrior, memory: Memory, mistaken: Iterable[int] = ()) -> Readings:
+    """What was read, beside what was expected before any trial."""
+    mean = prior.mean(memory.conditions)
+    wrong = np.isin(memory.numbers, list(mistaken))
+    low = np.where(wrong, -np.inf, memory.low.T - mean)
+    high = np.where(wrong, np.inf, memory.high.T - mean)
+    return Readings(low, high, memory.variance.T, prior.config.outlier, _WIDTH)
+
+
+def split(
+    histories: Iterable[History], prior: DisplacementPrior, memory: Memory, new: Memory
+) -> list[History]:
+    """Return histories that may explain one more trial, before its reading is taken in.
+
+    Args:
+        histories: Of the trials in memory.
+        prior: Of displacements.
+        memory: Without the new one.
+        new: The new trial alone.
+    """
+    config, number, goal = prior.config, int(new.numbers[0]), new.goals[0]
+    size = new.high - new.low
+    flat = np.log(np.where(size > 0, np.minimum(size, _WIDTH), 1.0) / _WIDTH).sum()
+    happened: list[tuple[float, Change | None]] = [
+        (config.p_change / 2, Change(number, 0.0)),
+        (config.p_change / 2, Change(number, config.shift_sd)),
+        (config.p_misplaced, Change(number, config.shift_sd, goal)),
+    ]
+    nothing = 1.0 - config.p_mistaken - sum(p for p, _ in happened)
+    scored = []
+    for history in histories:
+        mean, variance = history.predict(prior, new, memory)
+        before = prior.mean(new.conditions)
+        for p, change in [(nothing, None), *happened]:
+            more = 0.0 if change is None else change.covariance(prior, new, new)[0, 0]
+            log_z, _, _ = tilted(mean - before, variance + more, _readings(prior, new))
+            with np.errstate(divide="ignore"):
+                share = np.log(history.posterior.model_weights)
+            told = float(np.logaddexp.reduce(log_z[..., 0] + share, axis=0).sum())
+            changes = history.changes if change is None else (*history.changes, change)
+            after = replace(history, changes=changes, log_prior=history.log_prior + np.log(p))
+            scored.append((history.log_weight + np.log(p) + told, after))
+        wrong = float(np.log(config.p_mistaken) + flat)
+        after = replace(
+            history,
+            mistaken=history.mistaken | {number},
+            log_prior=history.log_prior + wrong,
+        )
+        scored.append((history.log_weight + wrong, after))
+    scored.sort(key=lambda pair: -pair[0])
+    least = scored[0][0] + np.log(_LEAST_ODDS)
+    return [history for score, history in scored[:_MOST] if score > least]
