@@ -53,7 +53,7 @@ THRESHOLDS = (
     "plans.signals._MAX_LEVELS",
     "plans.signals._ACTIVE",
     "plans.signals._STEP_SHARE",
-    "plans.signals.FEWEST_FRAMES",
+    "plans.signals._FEWEST_FRAMES",
     "plans.signals._STANDS_OUT",
     "plans.signals._NOISE_PEAK",
     "plans.signals._POSE_SHARE",

@@ -78,17 +78,17 @@ def test_what_it_chooses_itself_is_not_set(setting):
 
 
 def test_demonstrations_are_analysed_once_and_decomposed_once_for_each_timing(monkeypatch):
-    decompose, analyse, done = timeline._decompose, motions.analyse, Counter()
+    register, analyse, done = timeline.register, motions.analyse, Counter()
 
-    def counted(demonstrations, kind):
+    def counted(profiles, kind, decisive):
         done[kind] += 1
-        return decompose(demonstrations, kind)
+        return register(profiles, kind, decisive)
 
     def analysed(*arguments):
         done["signals"] += 1
         return analyse(*arguments)
 
-    monkeypatch.setattr(timeline, "_decompose", counted)
+    monkeypatch.setattr(timeline, "register", counted)
     monkeypatch.setattr(motions, "analyse", analysed)
     Auto().fit(make_task("basketball-v1").demonstrations("A"), seed=0)
     assert done == {"signals": 1, "none": 1, "start": 1, "tempo": 1}

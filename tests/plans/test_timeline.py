@@ -124,9 +124,13 @@ def test_a_step_that_has_just_changed_does_not_go_on():
     np.testing.assert_allclose(back[:, :, 2], valve[:, :, 0], atol=1e-9)
 
 
-def test_a_few_frames_are_kept_as_recorded():
-    demos = demonstrations(swings(horizon=90)[:, ::18])
-    assert decompose(demos, "start").timeline.kind == "none"
+@pytest.mark.parametrize(("every", "share"), [(18, 2e-2), (10, 4e-3), (6, 5e-4)])
+def test_a_few_frames_are_moved_too_and_come_back_as_nearly_as_a_spline_can(every, share):
+    demos = demonstrations(swings(horizon=90)[:, ::every])
+    found, back = played(demos, "start")
+    assert found.timeline.kind == "start"
+    rms = np.sqrt(np.mean((back - demos.plans) ** 2, axis=1))
+    assert rms.max() <= share * np.ptp(demos.plans)
 
 
 def test_a_switch_takes_no_values_but_its_own():

@@ -69,9 +69,8 @@ change. Ours: a trembling hand is below; half and double move a gripper by 6e-4 
 _STANDS_OUT = 0.25
 """That noise counts only where it is less than this part of the largest change: a slow joint at
 1 kHz changes by less than its noise from frame to frame. Ours."""
-FEWEST_FRAMES = 20
-"""Fewer frames show motion, and not its noise; nor are they moved by parts of one without a loss.
-Ours: noise is then read off five differences."""
+_FEWEST_FRAMES = 20
+"""Fewer frames show motion, and not its noise. Ours: noise is then read off five differences."""
 _QUANTILE, _NORMAL = 0.3, 0.385
 """Noise is read off the 30 % quietest third differences: 0.385 standard deviations of a normal
 variable, in absolute value, lie below its 30 % quantile."""
@@ -160,7 +159,7 @@ def noise(motions: Sequence[Motion] | np.ndarray) -> Channels:
     Source: ours, after the difference-based estimators of Gasser, Sroka and Jennen-Steinmetz
     (Biometrika 1986).
     """
-    long = [np.diff(each, n=3, axis=0) for each in motions if len(each) >= FEWEST_FRAMES]
+    long = [np.diff(each, n=3, axis=0) for each in motions if len(each) >= _FEWEST_FRAMES]
     if not long:
         return np.zeros(motions[0].shape[1])
     quiet = np.quantile(np.abs(np.concatenate(long)), _QUANTILE, axis=0)

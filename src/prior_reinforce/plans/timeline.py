@@ -32,7 +32,7 @@ from prior_reinforce.plans.events import Step, at_samples, find_transitions
 from prior_reinforce.plans.extrapolation import ExtrapolatedPlans
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 from prior_reinforce.plans.registration import WarpKind, phases_at, register, times_at
-from prior_reinforce.plans.signals import FEWEST_FRAMES, moving_rows, without_noise
+from prior_reinforce.plans.signals import moving_rows, without_noise
 from prior_reinforce.plans.speeds import SMOOTHING, largest_of_unit, velocity_profiles
 
 Numbers = Float[np.ndarray, "n P"]
@@ -41,7 +41,8 @@ Shapes = Float[np.ndarray, "n L C"]
 
 _EXACT = 2e-5
 """Demonstrations are reconstructed to this part of the largest range of their unit, rms, or the
-shapes are sampled more finely. Ours: a tenth of a milliradian of 5 rad."""
+shapes are sampled more finely. Ours: a tenth of a milliradian of 5 rad. Plans of 16 frames come
+back to 2e-3: too few to be moved by parts of one without a loss (docs/decisions-generator.md)."""
 _OVERSAMPLING = (1, 2, 4)
 """Samples of a shape for each frame that are tried. Ours: with one alone, plans that are cut in
 mid-swing and noisy ones come back to 0.5 % of a range."""
@@ -201,13 +202,6 @@ def decompose(demonstrations: Demonstrations, kind: WarpKind) -> Decomposition:
     Raises:
         InvalidDemonstrationsError: Nothing moves, so nothing can be timed.
     """
-    found = _decompose(demonstrations, kind)
-    if found.exact or kind == "none" or demonstrations.horizon >= FEWEST_FRAMES:
-        return found
-    return _decompose(demonstrations, "none")  # so few frames are not moved without a loss
-
-
-def _decompose(demonstrations: Demonstrations, kind: WarpKind) -> Decomposition:
     signals, horizon = demonstrations.signals, demonstrations.horizon
     plans = without_noise(demonstrations.plans, signals.held)
     came = find_transitions(plans, signals)
