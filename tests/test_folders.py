@@ -300,6 +300,95 @@ MANY = {libfranka: 40, ros1: 40}
 """Of which so many plans are asked for: a Panda, and a UR5e known by its URDF alone."""
 
 
+def opened(t, i):
+    """A gripper in percent: closed at 8, open at 70, from 0.62 s into the throw on."""
+    return np.round(8 + 62 * np.clip((t - 0.92 - 0.004 * i) / 0.15, 0, 1), 1)
+
+
+def so101(folder):
+    """LeRobot v3 of an SO-101: degrees by an encoder of 4096 steps, the gripper in percent."""
+    names = ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll", "gripper")
+    motions = []
+    for i in range(N):
+        t = np.arange(round(1.7 * 30) + 1) / 30
+        s = np.clip((t - 0.3) / 0.9, 0, 1)
+        swing = (10 * s**3 - 15 * s**4 + 6 * s**5) * (1 + 0.05 * i)
+        pan = 4 * (-1) ** i * swing
+        q = np.column_stack([pan, -60 + 70 * swing, 60 - 50 * swing, -20 + 40 * swing, 1 + 0 * t])
+        motions.append(np.column_stack([np.round(q / 360 * 4096) * 360 / 4096, opened(t, i)]))
+    lerobot_set(folder / "hoop", 30, motions, [f"{name}.pos" for name in names])
+    outcomes(folder)
+
+
+def ur5e_gripper(folder, column="gripper"):
+    """An RTDE log with a gripper in percent."""
+    for i in range(N):
+        t, q = throw(i, 500, 6)
+        names = ["timestamp", *(f"{kind}_q_{j}" for kind in ("target", "actual") for j in range(6))]
+        rows = np.column_stack([t + 8123.4, q, q, opened(t, i)])
+        with (folder / f"{i}.csv").open("w") as file:
+            writer = csv.writer(file, delimiter=" ")
+            writer.writerow([*names, column])
+            writer.writerows(rows.tolist())
+    outcomes(folder)
+
+
+def ur5e_register(folder):
+    """The same, with the gripper in a register of the controller, as RTDE has no gripper."""
+    ur5e_gripper(folder, "output_double_register_24")
+
+
+REGISTER = "--joints " + " ".join(f"actual_q_{j}" for j in range(6)) + " output_double_register_24"
+GALLERY = {
+    so101: ("--robot so101", "lab/hoop --units deg"),
+    ur5e_gripper: ("--robot ur5e --gripper percent", "lab"),
+    ur5e_register: ("--robot ur5e --gripper percent", f"lab {REGISTER}"),
+}
+"""What `new` and `import` are told, as docs/demonstrations.md has it."""
+
+
+@pytest.mark.parametrize("write", GALLERY, ids=lambda write: write.__name__)
+def test_an_arm_with_a_gripper_has_a_plan_in_four_commands(run, tmp_path, monkeypatch, write):
+    robot, how = GALLERY[write]
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "lab").mkdir()
+    write(tmp_path / "lab")
+    assert run("new", "hoop", *robot.split())[0] == 0
+    status, out, err = run("import", "hoop", *how.split())
+    assert status == 0, err
+    assert f"all {N} demonstrations pass" in out
+    assert "left out" not in out
+    assert run("learn", "hoop")[0] == 0
+    status, out, err = run("ask", "hoop", "--goal", "90cm", "2cm", "--out", "plan.npz")
+    assert status == 0, err
+    assert "REFUSE" not in out
+    assert "  ok     range          gripper" in out
+    assert "  ok     speed          gripper" in out
+    plan = np.load("plan.npz")["q"][:, -1]
+    assert plan.min() == pytest.approx(8, abs=2)
+    assert plan.max() == pytest.approx(70, abs=2)
+    assert plan[0] < 10 < 60 < plan[-1]
+    first = run("ask", "hoop", "--goal", "90cm", "2cm")[1]  # the goal stands, and so does the trial
+    assert first.startswith("goal 1: 90 cm ahead, 2 cm left\ntrial 1:")
+    status, _, err = run("ask", "hoop", "--goal", "95cm", "2cm")
+    assert status == 2
+    assert "trial 1 waits to be told" in err
+
+
+@pytest.mark.parametrize("write", [so101, ur5e_gripper], ids=lambda write: write.__name__)
+def test_a_gripper_that_is_left_out_is_named_with_its_range(run, tmp_path, monkeypatch, write):
+    robot, how = GALLERY[write]
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "lab").mkdir()
+    write(tmp_path / "lab")
+    assert run("new", "hoop", "--robot", robot.split()[1], "--gripper", "none")[0] == 0
+    name = "gripper.pos" if write is so101 else "gripper"
+    for more in (["--inspect"], []):
+        out = run("import", "hoop", *how.split(), *more)[1]
+        assert f"left out although it moves: {name}, 8 to 70 (take a gripper in: new" in out
+    assert f"without what moves as well: {name}, 8 to 70" in run("status", "hoop")[1]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("write", FOLDERS, ids=lambda write: write.__name__)
 def test_a_folder_becomes_a_plan_that_passes(run, tmp_path, monkeypatch, write):

@@ -271,7 +271,7 @@ def test_a_channel_that_moves_and_is_left_out_is_named_with_its_range(run, folde
         q = np.column_stack([plan, gripper, gripper, still, index])
         names = ["joint1", "joint2", "gripper.pos", "gripper_velocity", "lamp", "index"]
         np.savez(tmp_path / "some" / f"throw_{i}.npz", t=T, q=q, joint_names=names)
-    said = "left out although it moves: gripper.pos, 8 to 73 (take it with --joints)"
+    said = "left out although it moves: gripper.pos, 8 to 73 (take a gripper in: "
     assert said in run("import", folder, "some", "--inspect")[1]
     assert said in run("import", folder, "some", "--no-trim")[1]
     assert "without what moves as well: gripper.pos, 8 to 73" in run("status", folder)[1]
@@ -285,4 +285,4 @@ def test_one_in_a_csv_is_named_too_although_it_is_not_read(run, folder, tmp_path
         lines = [head, *(",".join(map(str, row)) for row in rows)]
         (tmp_path / "some" / f"throw_{i}.csv").write_text("\n".join(lines))
     out = run("import", folder, "some", "--inspect")[1]
-    assert "left out although it moves: gripper, 8 to 70 (take it with --joints)" in out
+    assert "left out although it moves: gripper, 8 to 70 (take a gripper in: new" in out

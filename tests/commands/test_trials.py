@@ -1,5 +1,6 @@
 """`ask` and `export`: where plans go, and what runs them."""
 
+import json
 import shutil
 import sqlite3
 import sys
@@ -197,6 +198,44 @@ def test_bad_tracking_is_warned_of_before_a_reading_is_taken(run, folder, driver
     assert "went 0.09 rad rms off the plan, more than 0.01" in err
     _, _, err = run("tell", folder, 1, "--hit")
     assert "warning: trial 1 was executed, but went 0.09 rad rms off the plan" in err
+
+
+def test_units_of_tracking_are_never_mixed(run, folder, driver, tmp_path):
+    run("goal", folder, "0.9", "0.05")
+    said = {"rad": 0.009, "percent": 4.4, "steps": 60.0}
+    (tmp_path / "say.json").write_text(json.dumps({"outcome": "done", "tracking_rms": said}))
+    status, out, err = run("ask", folder, "--yes", "--run", driver)
+    assert (status, err) == (0, "")
+    assert "next: prior-reinforce tell planar 1" in out
+    manifest = tmp_path / folder / "workspace.toml"
+    own = 'errors = [["percent", 5.0, 4.0], ["steps", 40.0, 40.0]]'
+    manifest.write_text(manifest.read_text().replace("[gate]", f"[gate]\n{own}", 1))
+    err = run("tell", folder, 1, "--hit")[2]
+    assert "went 4.4 percent rms off the plan, more than 4" in err
+    assert "went 60 steps rms off the plan, more than 40" in err
+    assert "rad" not in err
+
+
+def test_a_command_that_failed_before_the_arm_moved_costs_no_trial(run, folder, driver, tmp_path):
+    run("goal", folder, "0.9", "0.05")
+    broken = tmp_path / "broken.py"
+    broken.write_text("import no_such_driver_of_mine")
+    status, out, _ = run("ask", folder, "--yes", "--run", f"{sys.executable} {broken} {{plan}}")
+    assert status == 1
+    assert out.rstrip().endswith(
+        "if it failed before the arm moved: prior-reinforce ask planar --arm-did-not-move"
+    )
+    again = ("ask", folder, "--arm-did-not-move")
+    status, out, _ = run(*again)
+    assert status == 0
+    assert 'next: prior-reinforce ask planar --run "COMMAND {plan}"' in out
+    assert trials_in(folder)[0].stage is Stage.ASKED
+    (tmp_path / "say.json").write_text('{"outcome": "done"}')
+    assert run("ask", folder, "--yes", "--run", driver)[0] == 0
+    status, _, err = run(*again)  # whose command says that it was executed
+    assert status == 2
+    assert "trial 1 was executed to its end" in err
+    assert trials_in(folder)[0].stage is Stage.EXECUTED
 
 
 def test_an_aborted_trial_is_proposed_to_be_voided(run, folder, driver, tmp_path):

@@ -64,11 +64,29 @@ def test_any_arm_gives_a_workspace_its_joints_and_limits(run, tmp_path, monkeypa
         assert workspace.manifest.robot.chain is not None
 
 
+@pytest.mark.parametrize(
+    ("said", "names", "units"),
+    [
+        (("--robot", "so101"), ("gripper.pos",), ("percent",)),
+        (("--robot", "so101", "--gripper", "none"), (), ()),
+        (("--robot", "ur5e"), (), ()),
+        (("--robot", "ur5e", "--gripper", "m"), ("gripper",), ("m",)),
+    ],
+)
+def test_a_gripper_is_one_more_dimension(run, tmp_path, monkeypatch, said, names, units):
+    monkeypatch.chdir(tmp_path)
+    assert run("new", "hoop", *said)[0] == 0
+    with Workspace("hoop") as workspace:
+        form, robot = workspace.manifest.format, workspace.manifest.robot
+    assert form.names == (*robot.joint_names, *names)
+    assert form.units == (*("rad" for _ in robot.joint_names), *units)
+
+
 def test_an_arm_that_is_not_known_names_the_ways_to_give_it(run, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     status, _, err = run("new", "hoop", "--robot", "ur3")
     assert status == 2
-    assert "known are panda, fr3, ur5e, ur10e, xarm6, xarm7" in err
+    assert "known are panda, fr3, ur5e, ur10e, xarm6, xarm7, so101" in err
     assert "--robot path/to/arm.urdf" in err
     assert run("new", "hoop", "--robot", "gone.urdf")[0] == 2
     assert "--tip is a link of a URDF" in run("new", "hoop", "--tip", "tool0")[2]

@@ -18,7 +18,7 @@ from prior_reinforce.bench.workspace.status import (
 )
 from prior_reinforce.bench.workspace.workspace import Workspace
 from prior_reinforce.commands.reading import Number, Seen
-from prior_reinforce.commands.workspace import OnWorkspace, print_next
+from prior_reinforce.commands.workspace import OnWorkspace, print_goal, print_next, read_goal
 from prior_reinforce.errors import ConfigurationError, FileFormatError
 from prior_reinforce.plans.motions import Plan
 from prior_reinforce.session.trials import Stage, State, Trial
@@ -29,6 +29,8 @@ from prior_reinforce.wording import say_place
 class Ask(OnWorkspace):
     """Get the plan of the next trial; asking again gives the same one until it is told."""
 
+    goal: tuple[str, ...] | None = None
+    """Set this goal first, as `goal` does, unless it is the present one: 0.92 0.10, 92cm 10cm."""
     out: Path | None = None
     """Write the plan to this file as well: .npz (t, q, dq, ddq), .csv or .json. {trial} in its
     name stands for the trial's number; a folder takes trial-{trial}.npz."""
@@ -47,7 +49,7 @@ class Ask(OnWorkspace):
     time_limit: float = 120.0
     """Seconds that the command may take."""
     arm_did_not_move: bool = False
-    """After a crash while executing: a person saw that nothing moved."""
+    """After a crash while executing, or a command that failed: a person saw that nothing moved."""
     generator: str | None = None
     """The generator that the model was learned by, where it is your own: module:Class."""
     adapter: str | None = None
@@ -62,6 +64,12 @@ class Ask(OnWorkspace):
         """Show the plan, write it, execute it."""
         session = workspace.session(self.generator, self.adapter)
         self._check_out(workspace.state)
+        if self.goal is not None:
+            place, goals = read_goal(workspace, self.goal), workspace.state.goals
+            if not goals or goals[-1].goal.tolist() != [*place]:
+                workspace.set_goal(place)
+                session = workspace.session(self.generator, self.adapter)
+            print_goal(workspace)
         recovered = workspace.recover()
         if recovered is not None:
             print(f"trial {recovered.number}: {say_trial(workspace, recovered)}")
@@ -114,28 +122,22 @@ class Ask(OnWorkspace):
 
     def _is_there(self, workspace: Workspace, trial: Trial) -> bool:
         """Whether the arm stands where the plan begins, as far as it says."""
-        from prior_reinforce.bench.robots.executors.pose import read_pose
+        from prior_reinforce.bench.robots.executors.pose import compare_pose, read_pose
 
         assert trial.plan is not None
         assert self.where is not None
-        form, limit = workspace.manifest.format, workspace.manifest.gate.start_error
+        form, gate = workspace.manifest.format, workspace.manifest.gate
         try:
             pose = read_pose(self.where, form)
         except ConfigurationError as error:
             print(f"prior-reinforce: {error}; nothing moved", file=sys.stderr)
             return False
-        off = {n: pose[n] - q for n, q in zip(form.names, trial.plan[0], strict=True) if n in pose}
-        name = max(off, key=lambda n: abs(off[n]))
-        unit = form.units[form.names.index(name)]
-        said = f"the arm is off it by up to {abs(off[name]):.3g} {unit} ({name})"
-        if abs(off[name]) <= limit:
+        said, there = compare_pose(pose, trial.plan[0], form, gate)
+        if there:
             print(said)
-            return True
-        print(
-            f"prior-reinforce: {said}, more than {limit:g}; move it there, then ask again",
-            file=sys.stderr,
-        )
-        return False
+        else:
+            print(f"prior-reinforce: {said}; move it there, then ask again", file=sys.stderr)
+        return there
 
     def _show(self, workspace: Workspace, trial: Trial, reached_before: bool) -> None:
         """Print where the trial aims and what the gate says, and write --out."""

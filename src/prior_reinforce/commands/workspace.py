@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
@@ -11,8 +12,9 @@ import msgspec
 import tyro
 
 from prior_reinforce.adapters import ADAPTERS, DEFAULT_ADAPTER
+from prior_reinforce.arrays import Point
 from prior_reinforce.bench.robots import RobotLimits, robot_limits
-from prior_reinforce.bench.robots.presets import PRESETS
+from prior_reinforce.bench.robots.presets import GRIPPERS, PRESETS
 from prior_reinforce.bench.robots.urdf import read_urdf
 from prior_reinforce.bench.workspace.manifest import filled_in
 from prior_reinforce.bench.workspace.status import describe, next_step
@@ -61,6 +63,9 @@ class New:
     """Names of the action dimensions; the robot's joints if not given."""
     action_units: tuple[str, ...] = ("rad",)
     """Unit of each action dimension; a single one holds for all."""
+    gripper: str | None = None
+    """Unit of a gripper's opening, one more dimension: percent, m, steps, ..., or none; an SO-101
+    has one in percent if not given."""
     dt: float = 0.0125
     """Time between two frames of a plan, in seconds."""
     outcome_names: tuple[str, ...] = ("x", "y")
@@ -84,11 +89,16 @@ class New:
         names = self.action_names
         if names is None:
             names = tuple(f"joint{i}" for i in range(1, 8)) if robot is None else robot.joint_names
+        units = _spread(self.action_units, len(names))
+        gripper, unit = GRIPPERS.get(self.robot.lower(), ("gripper", "none"))
+        unit = self.gripper or (unit if self.action_names is None else "none")
+        if unit != "none":
+            names, units = (*names, gripper), (*units, unit)
         is_given = robot is not None and self.robot.lower() not in (*PRESETS, "fer")
         manifest = filled_in(
             name=self.name or self.folder.resolve().name,
             names=names,
-            units=_spread(self.action_units, len(names)),
+            units=units,
             dt=self.dt,
             outcome_names=self.outcome_names,
             outcome_units=_spread(self.outcome_units, len(self.outcome_names)),
@@ -124,6 +134,26 @@ def _say_robot(robot: RobotLimits) -> str:
     )
 
 
+def read_goal(workspace: Workspace, words: Sequence[str]) -> Point:
+    """Read a goal as a person says it, in the outcome's units.
+
+    Raises:
+        InvalidGoalError: It is none.
+    """
+    manifest = workspace.manifest
+    try:
+        return read_place(" ".join(words), manifest.outcome_names, manifest.outcome_units)
+    except InvalidFeedbackError as error:
+        raise InvalidGoalError(f"goal: {error}") from error
+
+
+def print_goal(workspace: Workspace) -> None:
+    """Say which goal the next trials are for."""
+    goal, manifest = workspace.state.goals[-1], workspace.manifest
+    place = say_place(goal.goal, manifest.outcome_names, manifest.outcome_units)
+    print(f"goal {goal.number}: {place}")
+
+
 @dataclass(frozen=True)
 class Goal(OnWorkspace):
     """Set the goal that the next trials are for."""
@@ -143,19 +173,13 @@ class Goal(OnWorkspace):
 
     def run_on(self, workspace: Workspace) -> None:
         """Set it."""
-        manifest = workspace.manifest
-        names, units = manifest.outcome_names, manifest.outcome_units
-        try:
-            place = read_place(" ".join(self.goal), names, units)
-        except InvalidFeedbackError as error:
-            raise InvalidGoalError(f"goal: {error}") from error
-        goal = workspace.set_goal(
-            place,
+        workspace.set_goal(
+            read_goal(workspace, self.goal),
             carry_over=None if self.memory is None else self.memory == "workspace",
             adapter=self.adapter,
             new_hardware=self.new_hardware,
         )
-        print(f"goal {goal.number}: {say_place(goal.goal, names, units)}")
+        print_goal(workspace)
         print_next(workspace)
 
 

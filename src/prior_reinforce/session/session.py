@@ -229,8 +229,8 @@ class Session:
         is not returned, whatever the gate said before.
 
         Args:
-            arm_did_not_move: What a person saw of a trial that was executing when the program died:
-                nothing moved, it may be executed after all.
+            arm_did_not_move: What a person saw of a trial whose command failed, or that was
+                executing when the program died: nothing moved, it may be executed after all.
 
         Returns:
             The trial, with its plan and the gate's verdict on it.
@@ -491,7 +491,10 @@ def ask_all(sessions: Sequence[Session], *, arm_did_not_move: bool = False) -> l
         for session in sessions:
             logs.enter_context(session._exclusive())
             trial = session.open_trial
-            if trial is not None and trial.stage is Stage.EXECUTING:
+            stage = None if trial is None else trial.stage
+            if trial is not None and (
+                stage is Stage.EXECUTING or (stage is Stage.EXECUTED and arm_did_not_move)
+            ):
                 session.log.settle(trial, arm_did_not_move=arm_did_not_move)
             numbers.append(len(session.state.trials) + 1 if trial is None else trial.number)
         new = [session for session in sessions if session.open_trial is None]

@@ -172,10 +172,11 @@ class Log(Protocol):
         """Return a plan that was kept."""
 
     def settle(self, trial: Trial, *, arm_did_not_move: bool) -> None:
-        """Note that an executing trial may be executed after all; called within `exclusive`.
+        """Note that a trial may be executed after all; called within `exclusive`.
 
         Raises:
-            TrialStateError: It is executing now, or nobody has said whether the arm moved.
+            TrialStateError: It is executing now, was executed to its end, or nobody has said
+                whether the arm moved.
         """
 
 

@@ -306,6 +306,10 @@ def test_degrees_are_refused():
         {"box_low": (0, 0, 0)},
         {"box_low": (0, 0, 0), "box_high": (1, 1, 0)},
         {"tool_tip": (0.0, np.nan, 0.0)},
+        {"ranges": (("gripper", 1.0, 1.0),)},
+        {"ranges": (("gripper", 0.0, np.nan),)},
+        {"errors": (("percent", 0.0, 5.0),)},
+        {"errors": (("percent", 5.0, np.nan),)},
     ],
 )
 def test_settings_are_checked(values):
@@ -475,11 +479,75 @@ def test_a_box_without_a_tool_tip_speaks_of_the_flange():
     assert again.text.startswith("tool tip at ")
 
 
+GRIPPER = PlanFormat((*FORMAT.names, "gripper"), (*FORMAT.units, "percent"), DT)
+
+
+def opening(low, high, frames=5):
+    """A gentle swing with a gripper that goes from low to high in so many frames, [percent]."""
+    s = np.clip((np.arange(101) - 60) / frames, 0, 1)
+    return np.column_stack([swing(4, 0.5, 1.0), low + (high - low) * s])
+
+
 def test_columns_that_are_no_joints_are_named():
-    form = PlanFormat((*FORMAT.names, "gripper"), (*FORMAT.units, "percent"), DT)
-    frames = np.column_stack([swing(4, 0.5, 1.0), np.zeros(101)])
-    line = lines(check_plan(Plan(frames, form), PANDA))["joints"]
-    assert line.text == "all 7 are in the plan; gripper: held against the demonstrations only"
+    report = lines(check_plan(Plan(opening(0, 62), GRIPPER), PANDA))
+    assert report["joints"].text == "all 7 are in the plan; gripper: by range and speed"
+    assert (report["range"].status, report["speed"].status) == ("unchecked", "unchecked")
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "frames", "refused"),
+    [
+        (0.0, 62.0, 5, set()),
+        (-1.0, 63.0, 5, set()),  # 4 % of 62 is 2.48; the spline goes 0.6 beyond the frames
+        (-3.0, 62.0, 5, {"range"}),
+        (0.0, 65.0, 5, {"range"}),
+        (0.0, 62.0, 1, {"speed"}),  # five times as fast, though within the range at every frame
+    ],
+)
+def test_a_gripper_is_held_against_what_was_shown(low, high, frames, refused):
+    shown = np.stack([opening(0, 62, 5), opening(0, 62, 6)])
+    outcomes = np.array([[0.5, 0.0], [0.6, 0.1]])
+    demos = Demonstrations(shown, outcomes, GRIPPER, ("x", "y"), ("m", "m"))
+    # However the band and the ringing of a step are judged, the others say what they say.
+    wide = GateSettings(beyond_refuse=10.0, ranges=() if frames > 1 else (("gripper", -50, 150),))
+    report = lines(check_plan(Plan(opening(low, high, frames), GRIPPER), PANDA, demos, wide))
+    assert {name for name, line in report.items() if line.status == "refuse"} == refused
+    for name in refused:
+        assert report[name].joint == "gripper"
+        assert report[name].unit == {"range": "percent", "speed": "percent/s"}[name]
+
+
+def test_ranges_that_are_given_hold_instead_of_what_was_shown():
+    shown = np.stack([opening(8, 70), opening(8, 70)])
+    demos = Demonstrations(shown, [[0.5, 0.0], [0.6, 0.1]], GRIPPER, ("x", "y"), ("m", "m"))
+    closed = np.column_stack([opening(8, 70)[:, :7], np.zeros(101)])
+    assert lines(check_plan(Plan(closed, GRIPPER), PANDA, demos))["range"].status == "refuse"
+    given = GateSettings(ranges=(("gripper", 0.0, 100.0),))
+    at_its_end = lines(check_plan(Plan(closed, GRIPPER), PANDA, demos, given))["range"]
+    assert (at_its_end.status, at_its_end.limit) == ("pass", pytest.approx(0.0, abs=1e-6))
+    beyond = lines(check_plan(Plan(closed - np.eye(8)[7] * 0.01, GRIPPER), PANDA, None, given))
+    assert beyond["range"].status == "refuse"
+    assert "gripper at -0.01 percent, 0.01 beyond its end" in beyond["range"].text
+    with pytest.raises(ConfigurationError, match="ranges names jaw, and columns are joint1"):
+        check_plan(Plan(closed, GRIPPER), PANDA, settings=GateSettings(ranges=(("jaw", 0.0, 1.0),)))
+
+
+def test_a_joint_may_be_given_a_narrower_range():
+    narrow = GateSettings(ranges=(("joint4", -2.1, -1.6),))
+    report = check_plan(Plan(swing(4, 0.5, 1.0), FORMAT), PANDA, settings=narrow)
+    line = lines(report)["range"]
+    assert (line.status, line.joint, line.unit) == ("refuse", "joint4", "rad")
+    assert line.value == pytest.approx(-1.5)
+
+
+def test_noise_of_a_gripper_that_is_held_is_no_speed():
+    held = opening(8, 8)
+    noise = np.zeros_like(held)
+    noise[::2, 7] = 1e-12
+    demos = Demonstrations(
+        np.stack([held, held]), [[0.5, 0.0], [0.6, 0.1]], GRIPPER, ("x", "y"), ("m", "m")
+    )
+    assert not check_plan(Plan(held + noise, GRIPPER), PANDA, demos).refused
 
 
 def test_a_box_is_kept_by_any_arm_whose_kinematics_are_known():

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from prior_reinforce.bench.robots import robot_limits
+from prior_reinforce.bench.robots import match_joints, robot_limits
 from prior_reinforce.bench.robots.kinematics import tool_tip
 from prior_reinforce.errors import ConfigurationError
+from prior_reinforce.plans.motions import PlanFormat
 
 FIRMWARES = [("panda", "any"), ("fr3", ">=5.9"), ("fr3", "<5.9"), ("fr3", "any")]
 
@@ -53,6 +54,17 @@ def test_arms_without_published_accelerations_say_so(robot):
     assert limits.jerk is None
     assert "not published" in limits.source
     assert limits.chain is not None
+
+
+def test_an_so101_is_known_by_the_names_of_lerobot():
+    limits = robot_limits("so101")
+    form = PlanFormat((*limits.joint_names, "gripper.pos"), ("rad",) * 5 + ("percent",), 0.01)
+    assert match_joints(form, limits) == {i: i for i in range(5)}
+    # 110, 100, 95, 95 and 160 degrees either way; 42 turns a minute.
+    assert np.rad2deg(limits.upper) == pytest.approx([110, 100, 95, 95, 160])
+    assert np.rad2deg(limits.velocity) == pytest.approx(42 * 6)
+    assert "STS3215" in limits.source
+    assert limits.chain is None
 
 
 @pytest.mark.parametrize(

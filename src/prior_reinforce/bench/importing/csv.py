@@ -168,17 +168,18 @@ def _episode(
         units=tuple(table.units[i] or u for (_, u), i in zip(split, channels, strict=True)),
         ambiguities=(*guessed, *clock.ambiguities),
         columns=names if table.named else (),
-        left_out=_unread_motion(table, [i for i in others if i not in channels], len(channels)),
+        left_out=_unread_motion(table, others, channels),
     )
 
 
 def _unread_motion(
-    table: Table, columns: Sequence[int], count: int
+    table: Table, others: Sequence[int], channels: Sequence[int]
 ) -> dict[str, tuple[float, float]]:
     """Range of each column of numbers that moves and is not read, such as a gripper's."""
-    there = [table.names[i] for i in columns]
+    columns = [i for i in others if i not in channels]
+    there, taken = ([table.names[i] for i in of] for of in (columns, channels))
     numbers = {i: table.numbers(i) for i in columns if table.is_number(i)}
-    moving = could_be_forgotten(there, count)
+    moving = could_be_forgotten(there, taken)
     return {
         table.names[i]: (float(values.min()), float(values.max()))
         for i, values in numbers.items()
@@ -254,4 +255,13 @@ def _channels(
             f"{table.where} has no columns {key}_0, {key}_1, ...; numbered columns are "
             f"{', '.join(groups) or 'none'}: say which with the key"
         )
-    return [others[i] for i in groups[key]], False
+    columns = [others[i] for i in groups[key]]
+    by_name = {name: others[i] for name in options.joints or () for i in _called(name, names)}
+    if len(columns) + len(by_name) == len(options.joints or ()):  # a gripper beside a log's joints
+        rest = iter(columns)
+        columns = [by_name[j] if j in by_name else next(rest) for j in options.joints or ()]
+    return columns, False
+
+
+def _called(name: str, there: Sequence[str]) -> list[int]:
+    return find_channels((name,), there) or []

@@ -32,6 +32,9 @@ _SMOOTH = f"--smooth {_SMOOTH_HZ}"
 _WORST = 2.5
 """Standard deviations that the worst of a plan's frames is off by. Ours: measured, 30 plans of 88
 frames, 2.3 to 2.9; what an end leaps by from rest is 1.3 to 2.4."""
+_TAKE_IT = "take a gripper in: new --gripper percent, or any column by its name in [plan]"
+"""What to do about a channel that the plan lacks."""
+
 _MUCH_NOISE = 0.25
 """Share of a limit consumed by noise alone, above which it is reported. Ours."""
 
@@ -75,7 +78,7 @@ class Inspection:
         """Warnings, the most important first: limits, ends, gaps, ..."""
         left_out = self.selection.left_out
         first = (self.copies, *self.selection.remarks, *self._broken(), self._noise_warning())
-        last = f"left out although it moves: {left_out} (take it with --joints)" if left_out else ""
+        last = f"left out although it moves: {left_out} ({_TAKE_IT})" if left_out else ""
         return tuple(filter(None, (*first, last, *self.processed.remarks)))
 
     @property
@@ -157,7 +160,8 @@ class Inspection:
         if not self.reports:
             return f"{self.robot}: not checked"
         refused = sum(report.refused for report in self.reports)
-        unchecked = {c for r in self.reports for c in r.unchecked} - {"demonstrations", "box"}
+        of_themselves = {"demonstrations", "range", "speed", "box"}
+        unchecked = {c for r in self.reports for c in r.unchecked} - of_themselves
         open_ = f"; not checked: {', '.join(sorted(unchecked))}" if unchecked else ""
         n = len(self.reports)
         verdict = f"{refused} of {n} demonstrations break a limit"

@@ -71,7 +71,7 @@ def joint_vectors(names: Sequence[str], count: int) -> dict[str, list[int]]:
     }
 
 
-def could_be_forgotten(names: Sequence[str], count: int) -> set[str]:
+def could_be_forgotten(names: Sequence[str], taken: Sequence[str]) -> set[str]:
     """Return which of the channels left out may belong to the motion, such as a gripper's.
 
     Velocities, torques and the like do not, nor does a numbered group of at least as many channels
@@ -79,8 +79,9 @@ def could_be_forgotten(names: Sequence[str], count: int) -> set[str]:
 
     Args:
         names: Names of the channels left out.
-        count: Number of joints.
+        taken: Names of the others; their largest numbered group are the joints.
     """
+    count = max(map(len, vectors(taken).values()), default=len(taken))
     groups = {i for group in vectors(names).values() if len(group) >= max(count, 2) for i in group}
     return {name for i, name in enumerate(names) if i not in groups and _ELSE.search(name) is None}
 

@@ -83,8 +83,9 @@ def select(
             recordings name no columns, these name all columns in order.
         names: Their names in the plan; None keeps the recorded names. If they equal `joints` and
             no column has these names, as many numbered columns are a guess.
-        units: Recorded units; a single one holds for all. None takes those that the recordings
-            state, else the plan's; if no arm reaches such values, the unit is guessed.
+        units: Recorded units; a single one holds for all channels that can be in it: degrees for
+            joints, not for a gripper in percent. None takes those that the recordings state, else
+            the plan's; if no arm reaches such values, the unit is guessed.
         plan_units: Units of the plan; None takes radians for angles, metres for lengths, and
             radians for channels without a unit.
 
@@ -99,7 +100,7 @@ def select(
     if not joints or len(set(joints)) != len(joints):
         raise ConfigurationError(f"joints must be names that differ, got {list(joints)}")
     if units is not None and len(units) == 1:
-        units = (units[0],) * len(joints)
+        units = _spread(units[0], plan_units or (units[0],) * len(joints))
     n_units = len(joints) if units is None else len(units)
     if len(names) != len(joints) or n_units != len(joints):
         raise ConfigurationError(
@@ -135,6 +136,13 @@ def select(
         other,
         _left_out(recordings, columns),
     )
+
+
+def _spread(unit: str, plan_units: Sequence[str]) -> tuple[str, ...]:
+    """One unit for all channels that can be in it; the plan's for others, unless none can."""
+    fits = [base_of(own)[0] == base_of(unit)[0] for own in plan_units]
+    fits = fits if any(fits) else [True] * len(fits)
+    return tuple(unit if fit else own for own, fit in zip(plan_units, fits, strict=True))
 
 
 def _guess_names(
@@ -212,7 +220,8 @@ def _left_out(recordings: Sequence[Recording], columns: Sequence[list[int]]) -> 
         for name, span in recording.left_out.items():
             ranges.setdefault(name, []).append(span)
         others = [i for i in range(len(recording.names)) if i not in taken]
-        moving = could_be_forgotten([recording.names[i] for i in others], len(taken))
+        names = recording.names
+        moving = could_be_forgotten([names[i] for i in others], [names[i] for i in taken])
         for i in others:
             values = recording.positions[:, i]
             values = values[np.isfinite(values)]

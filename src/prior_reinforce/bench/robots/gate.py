@@ -45,6 +45,13 @@ _FLOOR = 0.05
 """Share of the largest allowed acceleration or jerk up to which a joint counts as held in the
 demonstrations: theirs is then its encoder's noise. Ours: 3 rad/s^2 of a joint that does 3.14 rad/s;
 noise of 2e-5 rad makes 2 rad/s^2 in frames 12.5 ms apart."""
+_RANGE_MARGIN = 0.04
+"""Share of its demonstrated range by which a column that is no joint may go beyond it. Ours: plans
+with a step from 0 to 62 percent, recorded at 30 frames/s, go up to 3.3 % of it beyond where the
+step takes one frame, and 1.3 % where it takes more, at goals up to 1.3 times as far out."""
+_ERRORS = {"m": (0.01, 0.005), "percent": (5.0, 5.0)}
+"""As `GateSettings.start_error` and `tracking_error`, in other units. Ours: for lengths what those
+do at half a metre; a gripper that holds something stands some per cent off what it was told."""
 _NO_BOX = (
     "no box given, so the table is not looked at: set tool_tip, workspace_low and workspace_high "
     "in [gate]"
@@ -82,6 +89,9 @@ class GateSettings:
     absent_joints: tuple[str, ...] = ()
     """Joints that plans leave out on purpose, because they stay where they are: nothing of them is
     checked. Any other joint without a column warns."""
+    ranges: tuple[tuple[str, float, float], ...] = ()
+    """Name, lowest and highest value of columns of plans, in their units, such as a gripper's.
+    Others that are no joints are held against the demonstrations' range."""
     box_low: tuple[float, float, float] | None = None
     """Lowest corner that the tool tip may reach, [m], base frame; None leaves the box unchecked."""
     box_high: tuple[float, float, float] | None = None
@@ -92,9 +102,16 @@ class GateSettings:
     tracking_error: float = 0.01
     """Distance of the executed from the planned motion, root mean square, [rad], from which on a
     reading is warned of. Ours: good servos stay below 4 mrad, one that lags 100 ms is at 90."""
+    errors: tuple[tuple[str, float, float], ...] = ()
+    """The same two for columns in other units: unit, at the start, on the way; see `errors_of`."""
     tool_tip: tuple[float, float, float] | None = None
     """Tool tip in the flange's frame of the maker's kinematics, [m]; the Franka hand's frame is
     turned by -45 degrees about its z axis. None keeps the flange in the box instead, and warns."""
+
+    def errors_of(self, unit: str) -> tuple[float, float] | None:
+        """How far columns of a unit may be off at the start, and on the way; None if not known."""
+        given = {name: (start, way) for name, start, way in self.errors}
+        return (_ERRORS | {"rad": (self.start_error, self.tracking_error)} | given).get(unit)
 
     def __post_init__(self) -> None:
         """Check the settings.
@@ -112,11 +129,19 @@ class GateSettings:
                 "start_error and tracking_error must be more than 0, got "
                 f"{self.start_error} and {self.tracking_error}"
             )
+        for unit, *both in self.errors:
+            if not all(0 < error < math.inf for error in both):
+                raise ConfigurationError(f"errors must be more than 0, got {both} for {unit}")
         if not (self.position_margin >= 0 and self.rest_speed >= 0):
             raise ConfigurationError(
                 "position_margin and rest_speed must be 0 or more, got "
                 f"{self.position_margin} and {self.rest_speed}"
             )
+        for name, low, high in self.ranges:
+            if not (math.isfinite(low) and math.isfinite(high) and low < high):
+                raise ConfigurationError(
+                    f"ranges must be [name, low, high] with low < high, got {name}, {low}, {high}"
+                )
         tip = (0.0, 0.0, 0.0) if self.tool_tip is None else self.tool_tip
         if len(tip) != 3 or not np.all(np.isfinite(tip)):
             raise ConfigurationError(f"tool_tip must be three numbers in [m], got {self.tool_tip}")
@@ -142,8 +167,8 @@ def check_plan(
     Args:
         plan: What is to be executed. Its columns are matched to the robot's joints by name
             (`joint4` also matches `panda_joint4`); columns that are no joint of it, such as a
-            gripper, are only held against the demonstrations. A joint without a column cannot be
-            checked, which warns unless `settings.absent_joints` names it.
+            gripper, are held against `settings.ranges` and the demonstrations. A joint without a
+            column cannot be checked, which warns unless `settings.absent_joints` names it.
         limits: Of the robot. Where they have no acceleration or jerk, three times the
             demonstrations' largest refuses, and in any case what no published arm comes near.
         demonstrations: What was shown; None leaves the distance from them unchecked.
@@ -151,12 +176,14 @@ def check_plan(
 
     Returns:
         Nine lines: joints in the plan, position, velocity, acceleration, jerk, rest at either end,
-        distance from the demonstrations, box for the tool tip.
+        distance from the demonstrations, box for the tool tip. Two more where columns are no
+        joints: their range and their speed.
 
     Raises:
         InvalidPlanError: A joint in another unit than [rad], two columns that look like one joint,
             frames closer than the arm's cycles, or demonstrations of another format.
-        ConfigurationError: `absent_joints` names no joint of the robot, or one that the plan moves.
+        ConfigurationError: `absent_joints` names no joint of the robot, or one that the plan moves;
+            `ranges` names no column.
     """
     settings = settings or GateSettings()
     if plan.format.dt < (1 - 1e-9) / RATE:
@@ -180,6 +207,7 @@ def check_plan(
             why = f"the plan has no column named like {limits.joint_names[0]}"
             names = ("position", "velocity", "acceleration", "jerk", *_RESTS)
             lines += [_unchecked(name, why) for name in names]
+        lines += _channels(plan, columns, demonstrations, settings)
         if demonstrations is None:
             lines.append(_unchecked("demonstrations", "no demonstrations given"))
         else:
@@ -200,7 +228,7 @@ def _joints(
         text = f"not in the plan, so not checked: {', '.join(missing)}"
     others = [n for i, n in enumerate(plan.format.names) if i not in columns.values()]
     if others and columns:
-        text += f"; {', '.join(others)}: held against the demonstrations only"
+        text += f"; {', '.join(others)}: by range and speed"
     return LimitLine(
         check="joints",
         status="warn" if missing else "pass",
@@ -270,9 +298,67 @@ def _motion(
     ]
 
 
+def _channels(
+    plan: Plan, columns: dict[int, int], shown: Demonstrations | None, settings: GateSettings
+) -> list[LimitLine]:
+    """Range and speed of columns that are no joints, each in its unit.
+
+    Ranges are those of the settings, else the demonstrations' with a margin; speeds are held
+    against the demonstrations' largest as unpublished accelerations are.
+    """
+    form = plan.format
+    given = {name: (low, high) for name, low, high in settings.ranges}
+    if unknown := given.keys() - {*form.names}:
+        raise ConfigurationError(
+            f"ranges names {', '.join(sorted(unknown))}, and columns are {', '.join(form.names)}"
+        )
+    others = [i for i in range(len(form.names)) if i not in columns.values()]
+    ranged = [
+        i
+        for i, name in enumerate(form.names)
+        if name in given or (shown is not None and i in others)
+    ]
+    spline = join_frames(plan.actions, form.dt)
+    t, lines = _instants(spline), list[LimitLine]()
+    low, high = np.zeros((2, len(form.names)))
+    if shown is not None:
+        low, high = shown.plans.min(axis=(0, 1)), shown.plans.max(axis=(0, 1))
+        margin = _RANGE_MARGIN * _span(low, high)
+        low, high = low - margin, high + margin
+    for name, ends in given.items():
+        low[form.names.index(name)], high[form.names.index(name)] = ends
+    if ranged:
+        says = "{joint} at {value:.4g} {unit}, {margin:.3g} {within} its end {limit:.4g} ("
+        says += f"of [gate] ranges, or as demonstrated and {_RANGE_MARGIN:.0%} more)"
+        names, units = ([of[i] for i in ranged] for of in (form.names, form.units))
+        slack = 1e-9 * (high - low)  # a gripper that is closed stands at its end
+        low, high, q = (low - slack)[ranged], (high + slack)[ranged], spline(t)[:, ranged]
+        lines.append(_range("range", units, names, t, q, low, high, says=says).line())
+    elif others:
+        lines.append(_unchecked("range", "no demonstrations given"))
+    if shown is not None and others:
+        splines = [join_frames(each, shown.format.dt) for each in shown.plans]
+        most = np.max([np.abs(each(_instants(each), 1)).max(axis=0) for each in splines], axis=0)
+        limit = np.maximum(_REFUSED_BEYOND_SHOWN * most, margin / form.dt)[others]  # or noise
+        says = f"{_RATE}, {_REFUSED_BEYOND_SHOWN:g} times what was demonstrated{_AT}"
+        names = [form.names[i] for i in others]
+        units = [f"{form.units[i]}/s" for i in others]
+        warn = _WARNED_BEYOND_SHOWN / _REFUSED_BEYOND_SHOWN
+        speed = np.abs(spline(t, 1))[:, others]
+        lines.append(Check("speed", units, says, names, t, speed, limit, warn).line())
+    elif others:
+        lines.append(_unchecked("speed", "no demonstrations given"))
+    return lines
+
+
+def _span(low: Ends, high: Ends) -> Ends:
+    """Demonstrated range; of a constant channel little: any visible departure counts fully."""
+    return np.maximum(high - low, 1e-3)
+
+
 def _range(
     name: str,
-    unit: str,
+    unit: str | Sequence[str],
     joints: Sequence[str],
     t: Times,
     values: Samples,
@@ -339,8 +425,7 @@ def _distance(plan: Plan, demonstrations: Demonstrations, settings: GateSettings
     """
     form, shown = demonstrations.format, demonstrations.plans
     low, high = shown.min(axis=(0, 1)), shown.max(axis=(0, 1))
-    # A channel that was shown constant has no range; any visible departure from it counts fully.
-    span = np.maximum(high - low, 1e-3)
+    span = _span(low, high)
     if demonstrations.horizon == plan.horizon and math.isclose(form.dt, plan.format.dt):
         low, high = shown.min(axis=0), shown.max(axis=0)
     beyond = np.maximum(np.maximum(low - plan.actions, plan.actions - high), 0.0) / span

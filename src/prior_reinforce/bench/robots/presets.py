@@ -201,7 +201,30 @@ XARM7 = _xarm(
 )
 """UFACTORY xArm 7."""
 
-_KNOWN = (PANDA, FR3, FR3_BEFORE_5_9, FR3_ANY, UR5E, UR10E, XARM6, XARM7)
+_SO101_TURNS = np.deg2rad([110.0, 100.0, 95.0, 95.0, 160.0])
+"""Half of what each joint can turn, since LeRobot's zero is the middle of the calibrated range."""
+SO101 = RobotLimits(
+    robot="so101",
+    firmware="any",
+    source=(
+        "positions: SO-ARM101-USD.urdf of isaaclab-so101 0.1.0, half of each range either way; "
+        "velocity: servo STS3215, 42 rpm at 6 V, the slowest that is published (45 rpm at 12 V, "
+        "52 rpm at 7.4 V); read 23 Nov 2026. Accelerations are not published"
+    ),
+    joint_names=tuple(
+        f"{name}.pos"
+        for name in ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll")
+    ),
+    lower=-_SO101_TURNS,
+    upper=_SO101_TURNS,
+    velocity=np.full(5, 42 * 2 * pi / 60),
+)
+"""SO-101, joints as LeRobot calls them. No kinematics: an arm's own calibration sets its zeros."""
+
+GRIPPERS = {"so101": ("gripper.pos", "percent")}
+"""Name and unit of the gripper that an arm comes with, as LeRobot records it: 0 is closed."""
+
+_KNOWN = (PANDA, FR3, FR3_BEFORE_5_9, FR3_ANY, UR5E, UR10E, XARM6, XARM7, SO101)
 PRESETS = tuple(dict.fromkeys(limits.robot for limits in _KNOWN))
 """Names of the robots that are known here."""
 
@@ -210,7 +233,8 @@ def robot_limits(robot: str, firmware: str = "any") -> RobotLimits:
     """Return the limits of a robot that is known here.
 
     Args:
-        robot: A name of `PRESETS`: `panda` (or `fer`), `fr3`, `ur5e`, `ur10e`, `xarm6`, `xarm7`.
+        robot: A name of `PRESETS`: `panda` (or `fer`), `fr3`, `ur5e`, `ur10e`, `xarm6`, `xarm7`,
+            `so101`.
         firmware: System image of an FR3: `>=5.9`, `<5.9`, or `any` for the narrower of both.
 
     Raises:

@@ -31,7 +31,7 @@ class LimitLine:
 
     check: str
     """`joints`, `position`, `velocity`, `acceleration`, `jerk`, `rest at start`, `rest at end`,
-    `demonstrations` or `box`."""
+    `range`, `speed` (of columns that are no joints), `demonstrations` or `box`."""
     status: Status
     """`unchecked` where the plan, the robot or the settings lack what the check needs."""
     value: float | None = None
@@ -56,8 +56,8 @@ class Check:
 
     name: str
     """As in `LimitLine.check`."""
-    unit: str
-    """Of `value` and `limit`."""
+    unit: str | Sequence[str]
+    """Of `value` and `limit`: of all, or of each joint."""
     says: str
     """The line's text; `{joint}`, `{value}`, `{unit}`, `{limit}`, `{margin}`, `{percent}`, `{time}`
     and `{within}` stand for those of the worst place."""
@@ -89,9 +89,10 @@ class Check:
         value, limit = float(self.value[sample, joint]), float(limits[sample, joint])
         beyond = bool(refuses[sample, joint])
         margin = abs(limit - value) * (-1 if beyond else 1)
-        place = {"joint": self.joints[joint], "time": float(self.t[sample]), "unit": self.unit}
+        unit = self.unit if isinstance(self.unit, str) else self.unit[joint]
+        place = {"joint": self.joints[joint], "time": float(self.t[sample]), "unit": unit}
         said = {"within": "beyond" if beyond else "within", "margin": abs(margin)}
-        percent = 100 * (value if self.unit == "1" else float(used[sample, joint]))
+        percent = 100 * (value if unit == "1" else float(used[sample, joint]))
         text = self.says.format(value=value, limit=limit, percent=percent, **said, **place)
         return LimitLine(
             check=self.name,
@@ -99,7 +100,7 @@ class Check:
             value=value,
             limit=limit,
             margin=margin,
-            unit=self.unit,
+            unit=unit,
             joint=self.joints[joint],
             time=float(self.t[sample]),
             text=text,
@@ -117,7 +118,7 @@ class LimitReport:
     source: str
     """Where the limits are published."""
     lines: tuple[LimitLine, ...]
-    """The checks, always all of them and in the same order."""
+    """The checks, always in the same order."""
 
     @property
     def refused(self) -> bool:

@@ -192,6 +192,12 @@ class WorkspaceLog(Journal):
         """See `Log.settle`."""
         if self.is_executing():
             raise TrialStateError(f"trial {trial.number} is executing now; wait for it")
+        began = self._state.executions[trial.number]
+        if isinstance(began, Executed) and began.outcome != "aborted":
+            raise TrialStateError(
+                f"trial {trial.number} was executed to its end, as its command says: tell or void "
+                "it"
+            )
         if not arm_did_not_move:
             raise TrialStateError(
                 f"trial {trial.number} was executing when the program stopped; did the arm move? "

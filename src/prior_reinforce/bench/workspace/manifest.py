@@ -273,6 +273,9 @@ class _Reader:
             limits = self.limits(robot, task)
         with self.named("gate"):
             gate = GateSettings(**structs.asdict(file.gate))
+        if unknown := {name for name, *_ in gate.ranges} - {*form.names}:
+            named = f"names {', '.join(sorted(unknown))}, and plans have {', '.join(form.names)}"
+            raise self.error("gate", "ranges", f"{named}; correct it")
         if limits is not None:
             self.check_joints(form, limits, gate)
         elif gate.box_low is not None:

@@ -6,7 +6,7 @@ import shlex
 
 import numpy as np
 
-from prior_reinforce.bench.workspace.log import Executed, Executing, WorkspaceState
+from prior_reinforce.bench.workspace.log import Executed, Executing, NotExecuted, WorkspaceState
 from prior_reinforce.bench.workspace.workspace import Workspace
 from prior_reinforce.registry import own_class
 from prior_reinforce.session.trials import Goal, Stage, Trial
@@ -102,16 +102,14 @@ def execution_warning(workspace: Workspace, trial: Trial) -> str:
     warnings = []
     if ended.outcome == "aborted":
         warnings.append(f"but aborted: {ended.reason or 'no reason was given'}")
-    if (ended.start_error or 0.0) > gate.start_error:
-        warnings.append(
-            f"but began {ended.start_error:.3g} rad from the plan's first frame, more than "
-            f"{gate.start_error:g}"
-        )
-    if (ended.tracking_rms or 0.0) > gate.tracking_error:
-        warnings.append(
-            f"but went {ended.tracking_rms:.3g} rad rms off the plan, more than "
-            f"{gate.tracking_error:g}"
-        )
+    for which, distances, says in (
+        (0, ended.start_error, "but began {} from the plan's first frame, more than {:g}"),
+        (1, ended.tracking_rms, "but went {} rms off the plan, more than {:g}"),
+    ):
+        for unit, distance in distances.items():
+            allowed = gate.errors_of(unit)
+            if allowed is not None and distance > allowed[which]:
+                warnings.append(says.format(f"{distance:.3g} {unit}", allowed[which]))
     return plain("; ".join(warnings))
 
 
@@ -133,7 +131,12 @@ def next_step(workspace: Workspace) -> str:
             return f"if it moved: {tell}; if not: prior-reinforce ask {folder} --arm-did-not-move"
         ended = state.executions.get(trial.number)
         if isinstance(ended, Executed) and ended.outcome == "aborted":
-            return f"prior-reinforce void {folder} {trial.number} --reason WHY"
+            return (
+                f"prior-reinforce void {folder} {trial.number} --reason WHY; if it failed before "
+                f"the arm moved: prior-reinforce ask {folder} --arm-did-not-move"
+            )
+        if isinstance(ended, NotExecuted):
+            return f'prior-reinforce ask {folder} --run "COMMAND {{plan}}"'
         return f"{tell} (or --hit)"
     if state.solved:
         return f"{new_goal}, or prior-reinforce report {folder}"

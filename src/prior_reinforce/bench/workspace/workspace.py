@@ -482,8 +482,8 @@ class Workspace:
         from prior_reinforce.bench.robots.executors.result import measure_tracking
 
         try:
-            if (rms := measure_tracking(folder, self.plan(trial))) is not None:
-                result = replace(result, tracking_rms=rms)
+            if measured := measure_tracking(folder, self.plan(trial)):
+                result = replace(result, tracking_rms=measured)
         except FileFormatError as error:
             reasons = filter(None, [result.reason, str(error)])
             result = replace(result, reason="; ".join(reasons))

@@ -4,7 +4,8 @@ import sys
 
 import pytest
 
-from prior_reinforce.bench.robots.executors.pose import read_pose
+from prior_reinforce.bench.robots.executors.pose import compare_pose, read_pose
+from prior_reinforce.bench.robots.gate import GateSettings
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.plans.motions import PlanFormat
 
@@ -36,3 +37,31 @@ def test_a_joint_that_is_left_out_is_refused(pose):
 def test_a_command_that_fails_says_nothing(command):
     with pytest.raises(ConfigurationError, match="did not say where the arm stands"):
         read_pose(command, FORM, time_limit=0.5)
+
+
+UNITS = ("rad", "m", "percent", "steps")
+OF_UNITS = PlanFormat(("joint1", "rail", "gripper", "valve"), UNITS, 0.01)
+
+
+@pytest.mark.parametrize(
+    ("off", "said", "there"),
+    [
+        ((0.01, 0.005, 0.1, 0), "0.01 rad (joint1); 0.005 m (rail); 0.1 percent (gripper)", True),
+        ((0.01, 0.005, -12.0, 0), "12 percent (gripper), more than 5; 0 steps", False),
+        ((0.03, 0.005, 0.1, 0), "0.03 rad (joint1), more than 0.02; 0.005 m", False),
+        ((0.01, -0.02, 0.1, 0), "0.02 m (rail), more than 0.01; ", False),
+        ((0.01, 0.005, 0.1, 90), "90 steps (valve), which is held against nothing", True),
+    ],
+)
+def test_units_are_never_compared_with_each_other(off, said, there):
+    pose = dict(zip(OF_UNITS.names, off, strict=True))
+    text, near = compare_pose(pose, [0.0] * 4, OF_UNITS, GateSettings())
+    assert said in text
+    assert near == there
+
+
+def test_a_unit_may_be_given_its_own_error():
+    own = GateSettings(errors=(("steps", 40.0, 40.0),), start_error=0.1)
+    for steps, near in ((39, True), (41, False)):
+        pose = {"joint1": 0.09, "valve": steps}
+        assert compare_pose(pose, [0.0] * 4, OF_UNITS, own)[1] == near

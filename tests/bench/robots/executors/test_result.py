@@ -39,6 +39,7 @@ sys.exit(int(status))
         ('{"outcome": "fine"}', 0, "aborted", "cannot be read"),
         ('{"outcome": "done", "start_error": -1}', 0, "aborted", ">= 0.0"),
         ('{"outcome": "done", "tracking_rms": 1e999}', 0, "aborted", "cannot be read"),
+        ('{"outcome": "done", "tracking_rms": {"percent": -1}}', 0, "aborted", ">= 0.0"),
         ("[" * 50_000, 0, "aborted", "cannot be read"),
         ('{"outcome": "done", "reason": "' + "x" * 100_000, 0, "aborted", "cannot be read"),
     ],
@@ -68,12 +69,15 @@ def test_a_command_that_was_stopped_may_have_moved(tmp_path):
 
 
 def test_tracking_is_the_measured_distance_from_the_plan(tmp_path):
-    assert measure_tracking(tmp_path, PLAN) is None
+    assert measure_tracking(tmp_path, PLAN) == {}
     plan = write_plan(PLAN, tmp_path / "plan.npz", rate=1000)
     fine = np.load(plan.path)
     np.savez(tmp_path / "executed.npz", t=fine["t"], q=fine["q"] + [0.03, 0.04], dq=fine["dq"])
     # sqrt((0.03^2 + 0.04^2) / 2)
-    assert measure_tracking(tmp_path, PLAN) == pytest.approx(0.05 / np.sqrt(2))
+    assert measure_tracking(tmp_path, PLAN) == {"rad": pytest.approx(0.05 / np.sqrt(2))}
+    percent = Plan(PLAN.actions, PlanFormat(("a", "b"), ("rad", "percent"), 0.1))
+    apart = {"rad": pytest.approx(0.03), "percent": pytest.approx(0.04)}
+    assert measure_tracking(tmp_path, percent) == apart
 
 
 @pytest.mark.parametrize(

@@ -25,6 +25,7 @@ from prior_reinforce.bench.robots.executors.result import (
     DriverResult,
     MotionResult,
     Outcome,
+    by_unit,
     read_driver_result,
 )
 from prior_reinforce.bench.robots.executors.supervision import (
@@ -216,6 +217,6 @@ def _result(
         interrupted=bool(ended["interrupted"]),
         outcome=outcome,
         reason=plain(reason),
-        start_error=None if said is None else said.start_error,
-        tracking_rms=None if said is None else said.tracking_rms,
+        start_error={} if said is None else by_unit(said.start_error),
+        tracking_rms={} if said is None else by_unit(said.tracking_rms),
     )

@@ -5,10 +5,12 @@ from __future__ import annotations
 import json
 import math
 import tempfile
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from prior_reinforce.bench.robots.executors.arguments import check_program, split
 from prior_reinforce.bench.robots.executors.supervision import Interruptions, supervise
+from prior_reinforce.bench.robots.gate import GateSettings
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.plans.motions import PlanFormat
 
@@ -63,3 +65,33 @@ def read_pose(command: str, form: PlanFormat, *, time_limit: float = 10.0) -> di
             "joint as the plan does, in the plan's units"
         )
     return pose
+
+
+def compare_pose(
+    pose: Mapping[str, float], first: Sequence[float], form: PlanFormat, settings: GateSettings
+) -> tuple[str, bool]:
+    """Hold where the arm stands against a plan's first frame, unit by unit.
+
+    Args:
+        pose: As `read_pose` returns it.
+        first: The frame, shape (D,), in the plan's units.
+        form: Of the plan.
+        settings: How far it may be off (`errors_of`); a unit of which they say nothing is named.
+
+    Returns:
+        What is off most in each unit, in words; and whether all is near enough.
+    """
+    worst: dict[str, tuple[float, str]] = {}
+    for name, unit, q in zip(form.names, form.units, first, strict=True):
+        if name in pose:
+            worst[unit] = max((abs(pose[name] - q), name), worst.get(unit, (0.0, name)))
+    said, there = [], True
+    for unit, (distance, name) in worst.items():
+        allowed = settings.errors_of(unit)
+        text = f"{distance:.3g} {unit} ({name})"
+        if allowed is None:
+            text += f", which is held against nothing: add {unit} to errors in [gate]"
+        elif distance > allowed[0]:
+            text, there = f"{text}, more than {allowed[0]:g}", False
+        said.append(text)
+    return f"the arm is off it by up to {'; '.join(said)}", there

@@ -36,10 +36,11 @@ class DriverResult(msgspec.Struct, frozen=True):
     outcome: Literal["done", "not_moved", "aborted"]
     reason: str = ""
     """Why it was not done."""
-    start_error: _Distance | None = None
-    """Largest distance of a joint from the plan's first frame when the motion began, in [rad]."""
-    tracking_rms: _Distance | None = None
-    """Root mean square of the joints' distances from the plan, in [rad]."""
+    start_error: dict[str, _Distance] | _Distance = {}
+    """Largest distance of a column from the plan's first frame when the motion began, by unit; a
+    number is that of the joints, in [rad]."""
+    tracking_rms: dict[str, _Distance] | _Distance = {}
+    """Root mean square of the columns' distances from the plan, likewise."""
 
 
 class MotionResult(msgspec.Struct, frozen=True, kw_only=True):
@@ -49,10 +50,10 @@ class MotionResult(msgspec.Struct, frozen=True, kw_only=True):
     """What the driver says, unless how the command ended says otherwise."""
     reason: str = ""
     """Why it was not done."""
-    start_error: float | None = None
-    """The driver's distance from the plan's first frame, in [rad]."""
-    tracking_rms: float | None = None
-    """The driver's distance from the plan, root mean square, in [rad]."""
+    start_error: dict[str, float] = {}
+    """The driver's distance from the plan's first frame, by unit."""
+    tracking_rms: dict[str, float] = {}
+    """The driver's distance from the plan, root mean square, by unit."""
     exit_status: int | None = None
     """Status the command ended with; minus the signal's number if a signal ended it; None where
     nobody knows."""
@@ -85,7 +86,12 @@ def read_driver_result(folder: Path) -> DriverResult | None:
         ) from error
 
 
-def measure_tracking(folder: Path, plan: Plan) -> float | None:
+def by_unit(distance: dict[str, float] | float) -> dict[str, float]:
+    """Distances by unit; a number is one in [rad]."""
+    return distance if isinstance(distance, dict) else {"rad": distance}
+
+
+def measure_tracking(folder: Path, plan: Plan) -> dict[str, float]:
     """How far the measured path was from the plan, root mean square over samples and columns.
 
     Args:
@@ -94,14 +100,14 @@ def measure_tracking(folder: Path, plan: Plan) -> float | None:
         plan: What was to be executed.
 
     Returns:
-        In the plan's unit; None where there is no such file.
+        By unit, over the columns in it; empty where there is no such file.
 
     Raises:
         FileFormatError: It is no such file.
     """
     path = folder / PATH_FILE
     if not path.is_file() or path.is_symlink():
-        return None
+        return {}
     with open_npz(path, "write t (T,) and q (T, D) with numpy.savez") as archive:
         t, q = np.asarray(archive["t"], float), np.asarray(archive["q"], float)
         if not (
@@ -112,4 +118,5 @@ def measure_tracking(folder: Path, plan: Plan) -> float | None:
         ):
             raise ValueError(f"t {t.shape} and q {q.shape} are not one finite row a sample")
     planned = join_frames(plan.actions, plan.format.dt)(np.clip(t, 0.0, plan.times[-1]))
-    return float(np.sqrt(np.mean((q - planned) ** 2)))
+    squares, units = np.mean((q - planned) ** 2, axis=0), np.array(plan.format.units)
+    return {unit: float(np.sqrt(squares[units == unit].mean())) for unit in plan.format.units}
