@@ -1,4 +1,4 @@
-"""Hit a goal a robot arm has never hit, in about ten real trials (Prior Reinforce).
+"""Hit a goal a robot arm has never hit, in about ten trials, simulated so far (Prior Reinforce).
 
 Everything that examples and docs need stands here: `import prior_reinforce as pr`. The list of
 names is `__init__.pyi`; each is imported when it is first used, so that a command that needs no

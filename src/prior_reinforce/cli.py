@@ -117,7 +117,8 @@ def _parse(args: list[str]) -> Command:
             command = tyro.extras.subcommand_cli_from_dict(
                 kinds,
                 prog="prior-reinforce",
-                description="Hit a goal a robot arm has never hit, in about ten real trials.",
+                description="Hit a goal a robot arm has never hit, in about ten trials "
+                "(simulated so far).",
                 args=args,
             )
     _check_values(command)

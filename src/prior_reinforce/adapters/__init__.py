@@ -18,7 +18,7 @@ ADAPTERS: Registry[Adapter] = Registry(
     {
         "bayes": Member(
             "prior_reinforce.adapters.bayesian:BayesianAdapter",
-            "readings as intervals, every trial remembered, P(hit) known",
+            "readings as intervals, up to 64 trials remembered, P(hit) known",
         ),
         "gp": Member(_GP, "Gaussian process, m = 2 trials remembered"),
         "gp-all": Member(_GP, "every trial remembered", {"memory_size": None}),

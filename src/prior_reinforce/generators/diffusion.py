@@ -1,4 +1,4 @@
-"""The paper's generator: a diffusion model of plans, conditioned on the outcome (Stage 1).
+"""Diffusion models of plans, conditioned on the outcome (paper, Stage 1).
 
 A U-Net denoises codes of plans (`denoiser`), given the outcome that is wished for. What it
 generates is a function of the condition, which the adapter needs. Around the network:

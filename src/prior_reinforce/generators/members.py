@@ -33,7 +33,7 @@ class GeneratorRegistry(Registry["Generator"]):
     def help(self) -> str:
         """The choices in one sentence, for help texts."""
         return (
-            f"{super().help}; each but auto also with timing=start, tempo or warp (learn when and "
+            f"{super().help}; each but auto also with timing=start or tempo (learn when and "
             "how fast a motion runs apart from its shape), timing=auto (what the demonstrations "
             "ask for), timing=align (align the demonstrations first) or timing=none, and with "
             "exact=yes (demonstrations come back as recorded) or exact=no; default: timing=auto "
@@ -94,7 +94,8 @@ GENERATORS = GeneratorRegistry(
             f"{_HERE}.auto:Auto", "what the demonstrations ask for: closed form, or diffusion"
         ),
         "diffusion": Member(
-            f"{_HERE}.diffusion:DiffusionGenerator", "the paper's method, sized for a laptop"
+            f"{_HERE}.diffusion:DiffusionGenerator",
+            "a spline, plus a diffusion network's deviation from it",
         ),
         "diffusion-span": Member(
             f"{_HERE}.diffusion:DiffusionGenerator",
@@ -102,7 +103,9 @@ GENERATORS = GeneratorRegistry(
             SPAN,
         ),
         "diffusion-paper": Member(
-            f"{_HERE}.diffusion:DiffusionGenerator", "with the paper's settings", PAPER
+            f"{_HERE}.diffusion:DiffusionGenerator",
+            "a network alone, our reading of the paper's",
+            PAPER,
         ),
         "regression": Member(f"{_HERE}.regression:UNetRegression", "the same network, supervised"),
         "dmp": Member(f"{_HERE}.dmp:DynamicMovementPrimitives", "dynamic movement primitives"),

@@ -53,7 +53,7 @@ _ERRORS = {"m": (0.01, 0.005), "percent": (5.0, 5.0)}
 """As `GateSettings.start_error` and `tracking_error`, in other units. Ours: for lengths what those
 do at half a metre; a gripper that holds something stands some per cent off what it was told."""
 _NO_BOX = (
-    "no box given, so the table is not looked at: set tool_tip, workspace_low and workspace_high "
+    "no box given, so the tool tip is not checked: set tool_tip, workspace_low and workspace_high "
     "in [gate]"
 )
 _RATE = "{joint} at {value:.4g} {unit}, {percent:.0f} % of {limit:.4g}"

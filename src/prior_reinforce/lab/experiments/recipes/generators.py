@@ -40,6 +40,8 @@ from prior_reinforce.lab.experiments.statistics import (
 
 _FIRST_CLAIMED = 2
 """The round from which on one generator is to be above another: before it nothing was adapted."""
+_IN_FULL = {"diffusion": "our default (spline, timing and network)"}
+"""What a label stands for, where a verdict rests on it."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +76,7 @@ METHODS = (
     Method("smooth interpolation, aligned", "interpolation,timing=align", "other"),
     Method("U-Net regression with timing, trend and correction", "regression", "other"),
 )
-"""Our default, and the same network on whole plans; the paper's baselines, without what we added to
+"""Our default, and a network alone on whole plans; the paper's baselines, without what we added to
 diffusion; and, so that nothing is gained by these additions alone, others with them."""
 
 
@@ -171,6 +173,7 @@ def draw(figures: Figures, folder: Path) -> list[Picture]:
 def claims(figures: Figures) -> list[Claim]:
     """Above the baselines as recorded; alignment lifts them; still above."""
     trainings, ours = figures["trainings"], figures["rows"][0]
+    named = _IN_FULL.get(ours["label"], ours["label"])
     baselines = [row for row in figures["rows"] if row["kind"] == "baseline"]
     recorded = [row for row in baselines if not row["aligned"]]
     aligned = [row for row in baselines if row["aligned"]]
@@ -183,7 +186,7 @@ def claims(figures: Figures) -> list[Claim]:
         measured = [f"round {r} {row['ours_minus'][r - 1]:+.2f}" for r in rounds]
         return Claim(
             f"{says} at every round from {_FIRST_CLAIMED} on.",
-            f"{ours['label']} minus it: {'; '.join(measured)}",
+            f"{named} minus it: {'; '.join(measured)}",
             above_by_round(*curves, _FIRST_CLAIMED, trainings),
         )
 
@@ -191,7 +194,7 @@ def claims(figures: Figures) -> list[Claim]:
         Claim(
             "Over 90 % of the goals are reached within 4 rounds, demonstrations misaligned and "
             "noise amplified.",
-            f"{ours['label']}: {by_four}",
+            f"{named}: {by_four}",
             above(by_four, 0.9, trainings),
         ),
         *(by_round(row, f"Misaligned: diffusion is above {row['label']}") for row in recorded),
@@ -219,13 +222,14 @@ def remarks(figures: Figures) -> list[str]:
     if figures["trainings"] < LEAST_TRAININGS:
         return []
     ours, *others = figures["rows"]
+    named = _IN_FULL.get(ours["label"], ours["label"])
     minus = {row["label"]: row["mean_minus"][ours["label"]] for row in others}
     better = [f"{label} ({value:+.2f})" for label, value in minus.items() if value.high < 0]
     if not better:
         return []
     return [
-        f"Measured above {ours['label']} on this task ({ours['label']} minus it, mean of all "
-        f"rounds): {', '.join(better)}. Simpler generators are enough here; "
+        f"Measured above {named} on this task (it minus them, mean of all rounds): "
+        f"{', '.join(better)}. Simpler generators are enough here; "
         "docs/baselines.md says why."
     ]
 
@@ -236,7 +240,7 @@ def _unaligned(label: str) -> str:
 
 
 def _forms_above(baselines: Sequence[Figures], says: str, trainings: int) -> list[Claim]:
-    """Hold our network on whole plans against its baselines, on the mean of all rounds."""
+    """Hold a network on whole plans against its baselines, on the mean of all rounds."""
     forms = list(baselines[0]["mean_minus"])[1:] if baselines else []
     claims = []
     for form in forms:
@@ -244,7 +248,8 @@ def _forms_above(baselines: Sequence[Figures], says: str, trainings: int) -> lis
         measured = "; ".join(f"{name} {value:+.2f}" for name, value in minus.items())
         claims.append(
             Claim(
-                f"{says}: {form}, our network without start times (mean of all rounds).",
+                f"{says}: {form}, a network without start times, trend and spline (mean of all "
+                "rounds).",
                 f"{form} minus {measured}",
                 all_of([above(value, 0.0, trainings) for value in minus.values()]),
             )
