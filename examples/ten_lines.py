@@ -2,7 +2,8 @@
 
     python examples/ten_lines.py
 
-The same lines as in the README, with options. Learning takes about a minute.
+As the README's ten lines, but with `diffusion`, which takes about a minute to learn, an eye that
+rounds what it sees, and options.
 """
 
 from __future__ import annotations
