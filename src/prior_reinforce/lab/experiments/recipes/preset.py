@@ -1,4 +1,4 @@
-"""The paper's generator as we read it, in full, beside ours (ours; the paper gives no such figures).
+"""The paper's generator as we read it, in full, beside ours (ours; the paper has no such figures).
 
 Diffusion Policy's low-dimensional training: 69 million parameters, raw frames, 5,000 steps, DDPM.
 It is learned once a prior set (hours on a CPU) and sampled twice: with noise that all conditions
