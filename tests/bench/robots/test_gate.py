@@ -228,7 +228,7 @@ def test_a_box_that_cannot_be_checked_refuses():
 def test_without_a_box_it_is_said_what_is_not_looked_at():
     line = lines(check_plan(Plan(np.tile(HOME, (5, 1)), FORMAT), PANDA))["box"]
     assert line.status == "unchecked"
-    assert "the table is not looked at: set tool_tip, workspace_low" in line.text
+    assert "the tool tip is not checked: set tool_tip, workspace_low" in line.text
 
 
 def test_the_box_for_the_tool_tip():
