@@ -85,8 +85,12 @@ def test_verdicts_and_remarks_follow_the_figures():
         Verdict.CONFIRMED,
     ]  # fmt: skip
     assert "whole plans" in RECIPE.claims(figures)[4].measured
+    # No verdict calls the spline with its timing and network just "diffusion".
+    ours = "our default (spline, timing and network)"
+    assert all(c.measured.startswith(ours) for c in RECIPE.claims(figures)[:4])
     (remark,) = RECIPE.remarks(figures)
     assert "U-Net regression" in remark
+    assert f"above {ours} " in remark
     assert "nearest" not in remark
 
 
