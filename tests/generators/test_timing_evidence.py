@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from prior_reinforce.generators import timing_evidence
+from prior_reinforce.generators.interpolation import SmoothInterpolation
+from prior_reinforce.generators.timed import Timed
 from prior_reinforce.generators.timing_evidence import choose_timing, outcome_error
 from prior_reinforce.lab.tasks import make_task
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
@@ -132,3 +134,15 @@ def test_plans_of_few_frames_are_timed_as_any_others():
     choice = choose_timing(few)
     assert choice.decomposition.timeline.kind == "start"
     assert not choice.decomposition.exact
+
+
+def test_frames_that_cannot_be_moved_without_a_loss_are_learned_as_recorded():
+    plans = np.random.default_rng(0).uniform(-1, 1, (6, 5, 2))
+    outcomes = np.linspace([0.8, -0.2], [1.0, 0.2], 6) + [[0.0, 0.01 * (i % 2)] for i in range(6)]
+    jumpy = Demonstrations(plans, outcomes, PlanFormat(("a", "b"), ("rad",) * 2, 0.02))
+    choice = choose_timing(jumpy)
+    assert choice.decomposition.timeline.kind == "none"
+    assert "5 frames are too few" in choice.reason
+    generator = Timed(SmoothInterpolation(), "start").fit(jumpy, seed=0)
+    assert generator.remarks == (choice.reason,)
+    np.testing.assert_allclose(generator.generate(outcomes), plans, atol=1e-9)

@@ -169,7 +169,7 @@ class Goal(OnWorkspace):
     ] = DEFAULT_ADAPTER
     new_hardware: str | None = None
     """What was changed on the hardware since the last trial, a note: another ball, a new gripper.
-    What had changed before is then unknown anew, and all else stays known."""
+    What was known is then believed less, and the next reading more."""
 
     def run_on(self, workspace: Workspace) -> None:
         """Set it."""

@@ -7,8 +7,8 @@ which slows it: a throw 0.1 s too early and one 0.1 s too late average to one th
 
 - `start`, `tempo`: plans are decomposed into shapes on a common phase and a few numbers each
   (`plans.timeline`), which become dimensions of the plan, constant over it, that the generator
-  learns with the shape. Nothing is lost: demonstrations are reproduced, but those of fewer than 20
-  frames only nearly (`timeline`). Ours; movement primitives
+  learns with the shape. Nothing is lost: demonstrations are reproduced, or, where so few frames
+  cannot be moved, kept as recorded (`timeline`). Ours; movement primitives
   have parameters for start time and duration as well [Ijspeert2013].
 - `auto`: whichever of them, or none, best predicts left-out outcomes (`timing_evidence`);
   `remarks` says which, and why.
@@ -28,7 +28,7 @@ from prior_reinforce.arrays import Plans, Points
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.generators.base import Generator, Report
 from prior_reinforce.generators.saving import Tensors
-from prior_reinforce.generators.timing_evidence import choose_timing
+from prior_reinforce.generators.timing_evidence import TOO_FEW_FRAMES, choose_timing
 from prior_reinforce.generators.wrapping import Wrapper
 from prior_reinforce.plans.alignment import align
 from prior_reinforce.plans.motions import Demonstrations
@@ -97,7 +97,10 @@ class Timed(Wrapper):
             self.remarks = (choice.reason,)
             return choice.decomposition
         assert self.timing != "align"
-        return decompose(demonstrations, self.timing)
+        decomposition = decompose(demonstrations, self.timing)
+        if decomposition.timeline.kind != self.timing:
+            self.remarks = (TOO_FEW_FRAMES.format(demonstrations.horizon),)
+        return decomposition
 
 
 def _as_plans(decomposition: Decomposition, demonstrations: Demonstrations) -> Demonstrations:

@@ -58,6 +58,8 @@ differ by, above rounding; half and double choose the same timings."""
 _EQUALLY_GOOD = 0.1
 """Errors that differ by less than this part of the outcomes' spread are said to be as good as each
 other; it decides a remark only. Ours: with six demonstrations they are not known better."""
+TOO_FEW_FRAMES = "timing: as recorded, since {} frames are too few to be moved without a loss"
+"""A remark."""
 _WORDS: dict[WarpKind, str] = {
     "none": "plans start when the demonstrations did",
     "start": "when to start is learned apart from how to move",
@@ -87,6 +89,8 @@ def choose_timing(demonstrations: Demonstrations) -> TimingChoice:
         usual = decompose(demonstrations, "start")
     except InvalidDemonstrationsError as error:
         return TimingChoice(decompose(demonstrations, "none"), f"timing as recorded: {error}")
+    if usual.timeline.kind == "none":
+        return TimingChoice(usual, TOO_FEW_FRAMES.format(demonstrations.horizon))
     if n < max(_FEWEST, demonstrations.outcome_dim + 3):
         return TimingChoice(
             usual,

@@ -43,6 +43,9 @@ _EXACT = 2e-5
 """Demonstrations are reconstructed to this part of the largest range of their unit, rms, or the
 shapes are sampled more finely. Ours: a tenth of a milliradian of 5 rad. Plans of 16 frames come
 back to 2e-3: too few to be moved by parts of one without a loss (docs/decisions-generator.md)."""
+_LOSSY = 2e-2
+"""Demonstrations that come back no nearer than this part of the range are not timed at all. Ours:
+smooth swings of five frames come back to 1.6e-2, five frames that jump about to 4e-2."""
 _OVERSAMPLING = (1, 2, 4)
 """Samples of a shape for each frame that are tried. Ours: with one alone, plans that are cut in
 mid-swing and noisy ones come back to 0.5 % of a range."""
@@ -199,6 +202,9 @@ def decompose(demonstrations: Demonstrations, kind: WarpKind) -> Decomposition:
         demonstrations: N of them, of any kind of channel.
         kind: What the warps may do.
 
+    Returns:
+        The decomposition; of kind `none` where what was asked for would lose part of the motion.
+
     Raises:
         InvalidDemonstrationsError: Nothing moves, so nothing can be timed.
     """
@@ -245,7 +251,8 @@ def decompose(demonstrations: Demonstrations, kind: WarpKind) -> Decomposition:
         pose_band=tuple(signals.pose_band.tolist()),
     )
     extrapolated = ExtrapolatedPlans(plans, signals.jumps, np.linalg.norm(profiles, axis=2))
-    tolerance = _EXACT * largest_of_unit(np.ptp(plans, axis=(0, 1)), units)
+    size = largest_of_unit(np.ptp(plans, axis=(0, 1)), units)
+    size = np.where(size > 0, size, 1.0)
     for per_frame in _OVERSAMPLING:
         tau = first + np.arange((last - first) * per_frame + 1) / per_frame
         shapes = np.stack(
@@ -264,9 +271,11 @@ def decompose(demonstrations: Demonstrations, kind: WarpKind) -> Decomposition:
         cut = timeline.cut_off(shapes, warps)
         timeline = replace(timeline, rests=(not cut[:, 0].any(), not cut[:, 1].any()))
         off = np.sqrt(np.mean((timeline.reconstruct(shapes, numbers) - plans) ** 2, axis=1))
-        exact = bool(np.all(off <= np.where(tolerance > 0, tolerance, _EXACT)))
+        exact = bool(np.all(off <= _EXACT * size))
         if exact:
             break
+    if kind != "none" and np.any(off > _LOSSY * size):
+        return decompose(demonstrations, "none")
     return Decomposition(timeline, shapes, numbers, by_step, exact)
 
 

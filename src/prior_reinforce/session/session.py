@@ -189,9 +189,9 @@ class Session:
             tolerance: epsilon; the session's own if not given.
             carry_over: As in the constructor; the session's own if not given.
             adapter: Name of the adapter, for a log that is gone on with later.
-            new_hardware: What was changed on the hardware, a note; None where nothing was. What
-                had changed since the demonstrations is then unknown anew to adapters that know the
-                difference (`Adapter.change_hardware`), and the rest stays known.
+            new_hardware: What was changed on the hardware, a note; None where nothing was. An
+                adapter that knows the difference (`Adapter.change_hardware`) then believes less of
+                what it knew, and the next reading more.
 
         Raises:
             InvalidGoalError: Wrong shape, or not finite.
