@@ -22,9 +22,11 @@ from prior_reinforce.cli import main
 from prior_reinforce.errors import PriorReinforceError
 
 REMEDY = re.compile(
-    r"add|ask|call|check|choose|copy|correct|demonstrate|drop|expected|export|give|help|known|"
-    r"leave out|looks like|make|measure|mend|missing|must|name|need|put|record|remove|rename|"
-    r"restore|run:|say|see|tell|unknown; |use|valid|void|wait|want|write",
+    r"add|ask|call|check|choose|close|convert|copy|correct|demonstrate|drop|expected|export|give|"
+    r"help|import (?:again|all|without)|it (?:has|holds) |known|learn (?:it|again)|"
+    r"leave [\w ]{0,14}out|load it|looks like|make|measure|mend|missing|move the|must|name|need|"
+    r"put|record|remove|rename|resample|restore|run:|save it|say|see|set one|spread|tell|unknown; |"
+    r"use|valid|void|wait|want|write",
     re.IGNORECASE,
 )
 """What a refusal says must be done, in one of these words."""

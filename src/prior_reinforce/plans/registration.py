@@ -98,7 +98,9 @@ def register(
         return np.zeros((len(profiles), 0)), False
     speeds = np.linalg.norm(profiles, axis=2)
     if not np.all(speeds.max(axis=1) > 0):
-        raise InvalidDemonstrationsError("a demonstration does not move, so it cannot be timed")
+        raise InvalidDemonstrationsError(
+            "a demonstration does not move, so it cannot be timed; drop it"
+        )
     starts = np.mean([middle(speed) for speed in speeds]) - correlation_lags(profiles)
     length = float(np.median([np.ptp(motion_span(speed)) for speed in speeds]))
     by_step = decisive is not None and bool(np.std(decisive - starts) <= _GOES_WITH * length)

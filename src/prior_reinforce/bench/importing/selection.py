@@ -294,7 +294,7 @@ def _judge_units(
     for among in by_unit(unsaid):
         most, where, judged = judge(among)
         if not judged.plausible:
-            seen = f"it looks like {judged.looks}" if judged.looks else "and as degrees neither"
+            seen = f"it looks like {judged.looks}" if judged.looks else "check that recording"
             unclear.append(
                 f"{say_names([names[i] for i in among])} in {judged.unit} would reach {most:.4g} "
                 f"({where}), which no arm does: {seen}"
