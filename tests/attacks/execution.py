@@ -134,7 +134,7 @@ def attack(rng: random.Random, here: Path, asked: Path) -> str:
         time.sleep(rng.uniform(0, 0.5))
         _signal(rng, rng.choice(programs))
     try:
-        verdict = _judge(here, folders, programs, refused)
+        verdict = _judge(here, folders, programs, refused, again=kind == "says no")
         calm = signals == 0 and len(programs) == 1 and edit in ("nothing", "restore")
         if verdict == HELD and calm and limit > 1:
             verdict = _ends_as_it_was(folder, kind)
@@ -250,8 +250,10 @@ def _alive(pid: int) -> bool:
     return fields[0] != "Z" and not int(fields[6]) & _EXITING
 
 
-def _judge(here: Path, folders: list[Path], programs: list[Program], refused: bool) -> str:
-    """What became of it."""
+def _judge(
+    here: Path, folders: list[Path], programs: list[Program], refused: bool, *, again: bool
+) -> str:
+    """What became of it; `again`: the driver says that nothing moved, so it may be called again."""
     for program in programs:
         if not wait_until(program.ended, 40):
             return "a program hangs"
@@ -272,7 +274,7 @@ def _judge(here: Path, folders: list[Path], programs: list[Program], refused: bo
             kinds.update(entry.kind for entry in workspace.log.entries())
     if moved > kinds["executing"]:
         return "a motion is not recorded"
-    if moved > len(set(folders)):
+    if moved > len(set(folders)) and not again:
         return "a plan moved twice"
     # One of two programs may have been interrupted before it began, and the other not.
     if moved > kinds["executing"] - kinds["not_executed"] and not _says_no(here):
