@@ -274,7 +274,7 @@ def _judge(
             kinds.update(entry.kind for entry in workspace.log.entries())
     if moved > kinds["executing"]:
         return "a motion is not recorded"
-    if moved > len(set(folders)) and not again:
+    if moved > (len(programs) if again else len(set(folders))):
         return "a plan moved twice"
     # One of two programs may have been interrupted before it began, and the other not.
     if moved > kinds["executing"] - kinds["not_executed"] and not _says_no(here):
