@@ -18,6 +18,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from prior_reinforce.adapters.bayesian import BayesianAdapter
 from prior_reinforce.generators import make_generator
@@ -30,7 +31,7 @@ from prior_reinforce.session.session import Session
 TASK, LABELS, ROUNDS, NEW_GOALS = "basketball-v1", 10, 10, 40
 
 
-def say(misses: np.ndarray, tolerance: float) -> str:
+def say(misses: np.ndarray, tolerance: ArrayLike) -> str:
     return f"{100 * np.median(misses):.2f} cm, {np.mean(misses <= tolerance):.2f}"
 
 

@@ -19,10 +19,13 @@ from matplotlib.axes import Axes
 
 from prior_reinforce.environment import Task
 from prior_reinforce.generators import make_generator
+from prior_reinforce.lab.experiments.protocol import is_hit
 from prior_reinforce.lab.tasks import make_task
 from prior_reinforce.lab.tasks.zoo import DEVELOPED_ON, MEMBERS
 from prior_reinforce.lab.tasks.zoo.base import ZooTask
 from prior_reinforce.lab.tasks.zoo.human import KINDS
+from prior_reinforce.readings import as_tolerance
+from prior_reinforce.wording import say_tolerance
 
 SHOWN = "zoo-scoop"
 """Task whose demonstrations show what each kind of set varies."""
@@ -39,8 +42,7 @@ def first_throws(task: Task, kind: str, sets: int, goals: int, seed: int) -> flo
         )
         aims = task.sample_goals(goals, rng)
         for rollout, aim in zip(task.rollout(generator.generate(aims), rng), aims, strict=True):
-            near = np.linalg.norm(rollout.outcome - aim) <= task.tolerance
-            hits.append(bool(rollout.valid and near))
+            hits.append(is_hit(rollout, aim, task.tolerance))
     return float(np.mean(hits))
 
 
@@ -53,14 +55,16 @@ def row(task: Task, arguments: argparse.Namespace) -> str:
     rollouts = task.rollout(plans, np.random.default_rng(arguments.seed))
     each = (time.perf_counter() - begun) / len(plans)
     outcomes = np.array([rollout.outcome for rollout in rollouts]).reshape(6, 20, -1)
-    repeated = np.linalg.norm(outcomes.std(axis=1), axis=1).mean() / task.tolerance
+    repeated = np.linalg.norm(outcomes.std(axis=1) / task.tolerance, axis=1).mean()
     counts = arguments.sets, arguments.goals, arguments.seed
     clean, postures = (first_throws(task, kind, *counts) for kind in ("clean", "postures"))
     what = (type(task).__doc__ or "").splitlines()[0].rstrip(".")
-    units = ", ".join(dict.fromkeys(task.outcome_units or ("m",)))
+    outcome = prior.outcome_names, prior.outcome_units
+    tolerance = say_tolerance(as_tolerance(task.tolerance, *outcome), *outcome)
+    units = ", ".join(dict.fromkeys(prior.outcome_units))
     return (
         f"| `{task.name}` | {what} | {task.format.action_dim}, {prior.horizon} | "
-        f"{', '.join(task.outcome_names)} [{units}] | {task.release} | {task.tolerance:g} | "
+        f"{', '.join(task.outcome_names)} [{units}] | {task.release} | {tolerance} | "
         f"{clean:.2f}, {postures:.2f} | {repeated:.1f} | {1000 * each:.1f} |"
     )
 

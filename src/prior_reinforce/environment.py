@@ -116,9 +116,9 @@ class Task(ABC):
     """Names of the k components of an outcome."""
     outcome_units: tuple[str, ...] = ()
     """Unit of each component; metres where none are given."""
-    tolerance: float
-    """epsilon of the paper: largest true error that counts as reached, in [m]. Where units differ,
-    the error is the length of a vector of plain numbers: a second weighs as much as a metre."""
+    tolerance: float | tuple[float, ...]
+    """epsilon of the paper: largest true error that counts as reached, in the outcomes' unit, or
+    one for each component, which mixed units need (see `readings.in_tolerances`)."""
     region: Float[np.ndarray, "2 k"]
     """Reachable region of goals, a box: lower and upper corner, in the outcomes' units."""
     demonstration_sets: tuple[str, ...] = ("A", "B")

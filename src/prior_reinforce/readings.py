@@ -15,6 +15,7 @@ independent evidence, and an adapter would stop moving.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import msgspec
@@ -24,7 +25,7 @@ from numpy.typing import ArrayLike
 from typing_extensions import Self
 
 from prior_reinforce.arrays import Point, as_error
-from prior_reinforce.errors import InvalidFeedbackError
+from prior_reinforce.errors import ConfigurationError, InvalidFeedbackError
 
 EYE_NEAR = np.array([0.0, 0.02, 0.05, 0.10])
 """Distances an observer distinguishes near the goal, in [m] (paper: 0 cm, 2 cm, 5 cm, multiples of
@@ -45,6 +46,50 @@ _SAME = 1e-9
 """Numbers are compared to the nanometre."""
 _MEASURED = 0.5
 """A number with an sd below this share of the tolerance is more informative than a hit (ours)."""
+
+
+def as_tolerance(tolerance: ArrayLike, names: Sequence[str], units: Sequence[str]) -> Point:
+    """Return epsilon for each component, in its unit.
+
+    Args:
+        tolerance: One number where all components have one unit, else one for each: 2 cm are
+            neither more nor less than 20 ms until somebody says so.
+        names: Names of the k components.
+        units: Units of the k components.
+
+    Raises:
+        ConfigurationError: Not positive, another number of numbers, or one number for several
+            units.
+    """
+    each = ", ".join(f"{name} [{unit}]" for name, unit in zip(names, units, strict=True))
+    try:
+        array = np.asarray(tolerance)
+    except ValueError:
+        array = np.empty(0)
+    numbers = array.dtype.kind in "iuf" and array.shape in ((), (len(names),))
+    if not (numbers and np.all((array > 0) & np.isfinite(array))):
+        raise ConfigurationError(
+            f"tolerance must be a positive number, or one for each of {each}, got {tolerance!r}"
+        )
+    if array.ndim == 0 and len(set(units)) > 1:
+        raise ConfigurationError(
+            f"tolerance is one number, {tolerance!r}, for outcomes of several units; give one for "
+            f"each of {each}"
+        )
+    return np.broadcast_to(array, len(names)).astype(np.float64)
+
+
+def in_tolerances(error: ArrayLike, tolerance: ArrayLike) -> float:
+    """Return how far an error is from the goal, in tolerances: a hit is at most 1.
+
+    The length of the error, each component divided by its tolerance (ours: the one way in which
+    metres and seconds add up, and the paper's distance where all tolerances are one number).
+
+    Args:
+        error: Outcome minus goal, shape (k,), in the outcomes' units.
+        tolerance: epsilon, shape (k,), or one number for all.
+    """
+    return float(np.linalg.norm(np.asarray(error) / np.asarray(tolerance)))
 
 
 class ReadingRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -204,7 +249,7 @@ class Reading:
         kept in `missed_by_at_least`.
 
         Args:
-            radius: Tolerance in each component, shape (k,), in the outcomes' units.
+            radius: Tolerance of each component, shape (k,), in the outcomes' units.
         """
         if self.hit is None:
             return self

@@ -129,6 +129,23 @@ def say_length(length: float, units: Sequence[str]) -> str:
     return f"{float(f'{length:.3g}'):g} {unit}".strip()
 
 
+def say_tolerance(
+    tolerance: Sequence[float] | _Point, names: Sequence[str], units: Sequence[str]
+) -> str:
+    """Say what counts as reached, to the last digit: `1.5 cm`, `1.5 cm and 20 ms`.
+
+    With names where components of one unit differ: `x 2 cm and y 1 cm`.
+    """
+    drawn = {"m": (100.0, "cm"), "s": (1000.0, "ms")}
+    each = [
+        f"{value * drawn.get(unit, (1.0, unit))[0]:g} {drawn.get(unit, (1.0, unit))[1]}"
+        for value, unit in zip(tolerance, units, strict=True)
+    ]
+    if len(set(each)) > len(set(units)):
+        each = [f"{name} {said}" for name, said in zip(names, each, strict=True)]
+    return " and ".join(dict.fromkeys(each))
+
+
 def from_words(text: str, outcome_dim: int) -> Reading:
     """Read an error from words.
 

@@ -281,8 +281,9 @@ def test_p_hit_of_one_component_by_hand():
     assert adapter.expect(condition, goal, 0.1).p_hit == pytest.approx(expected, abs=1e-3)
 
 
+@pytest.mark.parametrize("tolerance", [np.full(3, 0.05), np.array([0.03, 0.2, 0.06])])
 @pytest.mark.parametrize("k", [2, 3])
-def test_p_hit_is_the_share_of_sampled_outcomes_within_the_tolerance(k):
+def test_p_hit_is_the_share_of_sampled_outcomes_within_the_tolerance(k, tolerance):
     rng = np.random.default_rng(k)
     adapter = started(rng.uniform(size=(8, k)))
     goal = np.full(k, 0.5)
@@ -299,8 +300,23 @@ def test_p_hit_is_the_share_of_sampled_outcomes_within_the_tolerance(k):
             model = rng.choice(len(mean), p=weights[:, j], size=len(moved))
             moved[:, j] = rng.normal(mean[model, j, 0], np.sqrt(variance[model, j, 0]))
         landed = condition + adapter._normalisation.scale * moved
-        inside.append(share * np.mean(np.linalg.norm(landed - goal, axis=1) <= 0.05))
-    assert adapter.expect(condition, goal, 0.05).p_hit == pytest.approx(sum(inside), abs=0.01)
+        off = (landed - goal) / tolerance[:k]
+        inside.append(share * np.mean(np.linalg.norm(off, axis=1) <= 1.0))
+    said = adapter.expect(condition, goal, tolerance[:k]).p_hit
+    assert said == pytest.approx(sum(inside), abs=0.01)
+
+
+def test_what_missed_in_one_component_is_searched_beside_by_its_own_tolerance():
+    """A metre and a second, of which 2 cm and 0.2 s count: what missed is as far to the side."""
+    adapter = started(CORNERS * [1.0, 10.0], units=("m", "s"))
+    goal, tolerance, tried = GOAL * [1.0, 10.0], np.array([0.02, 0.2]), []
+    for _ in range(4):
+        tried.append(adapter.propose(goal))
+        adapter.observe(tried[-1], goal, Reading.only(False, 2).within(tolerance))
+    apart = np.array(tried)[:, None] - tried
+    apart = np.linalg.norm(apart / tolerance, axis=-1)[np.triu_indices(4, 1)]
+    assert apart.min() > 0.3
+    assert adapter.expect(tried[0], goal, tolerance).p_hit < 0.3
 
 
 def test_p_hit_grows_with_the_tolerance_and_with_what_is_known():
@@ -370,7 +386,7 @@ def test_metres_and_milliseconds_are_as_good_as_metres_and_seconds():
         adapter = started(factor * CORNERS, units=("m", "s"))
         adapter.observe(factor * GOAL, factor * GOAL, Reading.measured(np.multiply(factor, 0.03)))
         proposals.append(adapter.propose(factor * GOAL) / factor)
-        hits.append(adapter.expect(factor * GOAL, factor * GOAL, 0.02).p_hit)
+        hits.append(adapter.expect(factor * GOAL, factor * GOAL, np.multiply(factor, 0.02)).p_hit)
     np.testing.assert_allclose(*proposals, atol=1e-9)
     assert hits[0] == pytest.approx(hits[1])
 

@@ -9,7 +9,7 @@ from tests.adapters.test_bayesian import CORNERS, started
 def remembering(conditions) -> Memory:
     known = Memory.empty(2)
     for number, condition in enumerate(conditions):
-        known = known.with_one(condition, number, condition, *np.zeros((3, 2)), 0.0)
+        known = known.with_one(condition, number, condition, *np.zeros((4, 2)))
     return known
 
 

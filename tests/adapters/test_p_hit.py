@@ -25,7 +25,7 @@ def belief(mean, variance, at_missed, among_missed, cross) -> Belief:
 def targets(aims, radius) -> Targets:
     """All of one size; aims of one component may be plain numbers."""
     aims = np.reshape(aims, (len(aims), -1)).astype(float)
-    return Targets(aims, np.full(len(aims), radius))
+    return Targets(aims, np.full(aims.shape, radius))
 
 
 @pytest.mark.parametrize("aim", [0.0, 0.05, 0.12, -0.2])
@@ -109,7 +109,7 @@ def test_the_share_within_a_ball_is_that_of_samples_whatever_its_size(k, sd):
     rng = np.random.default_rng(k)
     mean = 0.05 * rng.normal(size=k)
     sds = sd * rng.uniform(0.5, 1.5, size=k)
-    share = share_within(0.1, mean[None, :, None], sds[None, :, None], np.ones((1, k)))[0]
+    share = share_within(mean[None, :, None] / 0.1, sds[None, :, None] / 0.1, np.ones((1, k)))[0]
     samples = mean + sds * rng.normal(size=(400_000, k))
     assert share == pytest.approx(np.mean(np.linalg.norm(samples, axis=1) < 0.1), abs=0.006)
 
@@ -119,7 +119,8 @@ def test_each_component_is_a_mixture_of_its_own(k):
     rng = np.random.default_rng(k)
     mean, sd = 0.1 * rng.normal(size=(3, k)), rng.uniform(0.02, 0.2, size=(3, k))
     share = rng.dirichlet(np.ones(3), size=k).T
-    said = share_within(np.array([0.1, 0.2]), *(np.stack([of] * 2, 2) for of in (mean, sd)), share)
+    radii = np.array([0.1, 0.2])
+    said = share_within(*(np.stack([of] * 2, 2) / radii for of in (mean, sd)), share)
     model = np.stack([rng.choice(3, p=share[:, j], size=400_000) for j in range(k)], axis=1)
     samples = rng.normal(mean[model, np.arange(k)], sd[model, np.arange(k)])
     distance = np.linalg.norm(samples, axis=1)

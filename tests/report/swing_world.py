@@ -96,7 +96,7 @@ def adaptation(
     """Adapt until the goal is truly within 1.5 cm; perceived to a centimetre, one trial voided."""
     demos = demos or demonstrations(k, action_dim, units)
     goal = np.array([0.9, 0.1, 0.5])[:k] if goal is None else np.array(goal)
-    session = Session(Swing(action_dim), adapter or FullStep(), demos, goal, 0.015)
+    session = Session(Swing(action_dim), adapter or FullStep(), demos, goal, np.full(k, 0.015))
     rng = np.random.default_rng(seed)
     outcomes: list[np.ndarray | None] = []
     while not session.solved and len(session.trials) < most:
@@ -110,7 +110,9 @@ def adaptation(
         outcomes.append(outcome)
         seen = np.round(error / 0.01) * 0.01
         session.tell(trial.number, seen, hit=bool(np.linalg.norm(error) <= 0.015))
-    return AdaptationRecord(demos, goal, 0.015, session.trials, outcomes=tuple(outcomes))
+    return AdaptationRecord(
+        demos, goal, np.full(k, 0.015), session.trials, outcomes=tuple(outcomes)
+    )
 
 
 def told(

@@ -54,11 +54,12 @@ def test_a_record_checks_what_it_is_given():
         replace(record, outcomes=(GOAL,))
 
 
-def test_seconds_count_as_metres_by_the_spread_of_the_demonstrations():
-    """One metric for tolerance, distances and pictures: that of sessions."""
+def test_distances_are_lengths_where_all_have_one_unit_and_one_tolerance_else_tolerances():
     mixed = adaptation(seed=1, units=("m", "s"), most=1)
-    spread = mixed.demonstrations.outcomes_seen.std(axis=0)
-    seconds = 0.3 * spread[1]  # 0.3 spreads of seconds are 0.3 spreads of metres
-    assert mixed.distance(np.array([0.0, seconds])) == pytest.approx(0.3 * spread[0])
-    np.testing.assert_allclose(mixed.radius, 0.015 * np.array([1.0, spread[1] / spread[0]]))
-    assert told([0.03, 0.04]).distance(np.array([0.03, 0.04])) == pytest.approx(0.05)
+    assert (mixed.edge, mixed.distance_unit) == (1.0, "tolerances")
+    assert mixed.distance(np.array([0.009, 0.012])) == pytest.approx(1.0)
+    short = told([0.03, 0.04])
+    assert (short.edge, short.distance_unit) == (pytest.approx(1.5), "cm")
+    assert short.distance(np.array([0.03, 0.04])) == pytest.approx(5.0)
+    uneven = replace(short, tolerance=[0.01, 0.02])
+    assert (uneven.distance(np.array([0.0, 0.02])), uneven.distance_unit) == (1.0, "tolerances")

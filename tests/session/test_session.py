@@ -202,13 +202,13 @@ MIXED = Demonstrations(
 )
 
 
-def test_metres_and_seconds_are_measured_by_their_spreads():
+def test_metres_and_seconds_have_a_tolerance_each():
     generator = RepeatingGenerator().fit(MIXED, seed=0)
-    session = Session(generator, FullStepAdapter(), MIXED, [0.9, 2.0], 0.02)
-    session.tell(session.ask().number, [0.0, 0.21])  # as bad as 2.1 cm
-    session.tell(session.ask().number, [0.012, 0.15])  # 1.92 cm
+    session = Session(generator, FullStepAdapter(), MIXED, [0.9, 2.0], [0.015, 0.02])
+    session.tell(session.ask().number, [0.0, 0.021])
+    session.tell(session.ask().number, [0.009, 0.0159])  # 0.6 and 0.795 tolerances: 0.996 in all
     assert [trial.hit for trial in session.trials] == [False, True]
-    np.testing.assert_allclose(session.goals[0].radius, [0.02, 0.2])
+    np.testing.assert_allclose(session.tolerance, [0.015, 0.02])
     with pytest.raises(InvalidFeedbackError, match="words are for lengths"):
         session.tell(session.ask().number, "5 cm long")
 
@@ -373,7 +373,7 @@ def test_a_goal_waits_for_the_open_trial(session):
     with pytest.raises(TrialStateError, match="tell or void it"):
         session.set_goal([0.8, 0.0])
     session.void(1, "")
-    assert session.set_goal([0.8, 0.0], 0.02).tolerance == 0.02
+    assert session.set_goal([0.8, 0.0], 0.02).tolerance.tolist() == [0.02, 0.02]
 
 
 class Gate:
@@ -488,10 +488,19 @@ def test_a_number_that_is_no_whole_number_is_named(session, number):
     assert session.tell(np.int64(1), [0.05, 0.0]).number == 1
 
 
-@pytest.mark.parametrize("tolerance", [0.0, -1.0, np.nan, np.inf, "x", "0.01", None, True, [0.1]])
+@pytest.mark.parametrize(
+    "tolerance",
+    [0.0, -1.0, np.nan, np.inf, "x", "0.01", None, True, [0.1], [0.1, 0.0], [[0.1], 0.1]],
+)
 def test_bad_tolerances_are_named(tolerance):
     with pytest.raises(ConfigurationError, match="tolerance"):
         Session(RepeatingGenerator().fit(DEMOS, seed=0), FullStepAdapter(), DEMOS, GOAL, tolerance)
+
+
+def test_one_number_for_several_units_is_refused():
+    generator = RepeatingGenerator().fit(MIXED, seed=0)
+    with pytest.raises(ConfigurationError, match=r"several units; give one for each of .* \[s\]"):
+        Session(generator, FullStepAdapter(), MIXED, [0.9, 2.0], 0.02)
 
 
 def test_a_goal_of_the_wrong_dimension_is_named():

@@ -14,9 +14,7 @@ def reading(*error_seen):
     return Reading.measured(error_seen).record()
 
 
-GOAL = GoalSet(
-    goal=[0.9, 0.1], tolerance=0.015, metric=[1.0, 1.0], units=["m", "m"], carry_over=False
-)
+GOAL = GoalSet(goal=[0.9, 0.1], tolerance=[0.015, 0.015], units=["m", "m"], carry_over=False)
 ASKED = Asked(trial=1, goal=1, condition=[0.88, 0.1], model="m")
 TOLD = Told(trial=1, reading=reading(0.02, 0.0), hit=False)
 VOIDED = Voided(trial=1, reason="slipped")
@@ -40,7 +38,12 @@ def test_nothing_happened_yet():
 
 def test_a_goal_and_its_trial():
     told = state(GOAL, ASKED)
-    assert (told.goal.number, told.goal.tolerance, told.goal.carry_over) == (1, 0.015, False)
+    assert (told.goal.number, *told.goal.tolerance, told.goal.carry_over) == (
+        1,
+        0.015,
+        0.015,
+        False,
+    )
     (trial,) = told.trials
     assert told.open_trial is trial
     assert (trial.number, trial.goal_number, trial.stage, trial.model) == (1, 1, Stage.ASKED, "m")
@@ -75,10 +78,11 @@ def test_a_log_keeps_what_was_said():
         state(GOAL, ASKED, replace(TOLD, reading=damaged))
 
 
-def test_errors_are_measured_by_the_goals_metric():
-    goal = state(replace(GOAL, metric=[1.0, 0.1])).goal
-    assert goal.distance(np.array([0.3, 4.0])) == pytest.approx(0.5)
-    np.testing.assert_allclose(goal.radius, [0.015, 0.15])
+def test_an_error_of_one_tolerance_in_all_is_a_hit():
+    goal = state(replace(GOAL, tolerance=[0.015, 0.02], units=["m", "s"])).goal
+    assert goal.is_hit(np.array([0.009, 0.016]))
+    assert not goal.is_hit(np.array([0.0092, 0.016]))
+    np.testing.assert_allclose(goal.least_sd, [0.005, 0.02 / 3])
 
 
 def test_numbers_run_over_all_goals():
@@ -95,7 +99,8 @@ def test_numbers_run_over_all_goals():
         [replace(ASKED, trial=2)],
         [replace(ASKED, goal=2)],
         [replace(ASKED, condition=[0.88])],
-        [replace(GOAL, metric=[1.0])],
+        [replace(GOAL, tolerance=[0.015])],
+        [replace(GOAL, tolerance=[0.015, 0.0])],
         [ASKED, replace(ASKED, trial=2)],
         [ASKED, replace(TOLD, trial=0)],
         [ASKED, replace(TOLD, reading=reading(0.1))],
@@ -105,7 +110,8 @@ def test_numbers_run_over_all_goals():
         "a gap",
         "no goal",
         "half a condition",
-        "half a metric",
+        "half a tolerance",
+        "no tolerance",
         "two open",
         "number 0",
         "one component",

@@ -6,6 +6,7 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from prior_reinforce.arrays import Point, as_vector
@@ -97,13 +98,15 @@ class Adapter(ABC):
             reading = Reading.estimated(error)
         self._observe_reading(checked, about, reading)
 
-    def expect(self, condition: ArrayLike, goal: ArrayLike, tolerance: float) -> Expectation | None:
+    def expect(
+        self, condition: ArrayLike, goal: ArrayLike, tolerance: ArrayLike
+    ) -> Expectation | None:
         """Return what is expected of a trial; None from adapters that expect nothing.
 
         Args:
             condition: c, mostly what was proposed.
             goal: g.
-            tolerance: epsilon, in the first component's unit (`Normalisation.metric`).
+            tolerance: epsilon of each component, or one for all, in the outcomes' units.
 
         Raises:
             NotFittedError: Before `start`.
@@ -112,7 +115,7 @@ class Adapter(ABC):
         return self._expect(
             self._checked(condition, "condition", InvalidGoalError),
             self._checked(goal, "goal", InvalidGoalError),
-            tolerance,
+            np.broadcast_to(np.asarray(tolerance, np.float64), self._outcome_dim or 0),
         )
 
     def change_hardware(self) -> None:  # noqa: B027  # most know no difference
@@ -143,7 +146,7 @@ class Adapter(ABC):
         if reading.has_number:
             self._observe(condition, goal + reading.error_seen)
 
-    def _expect(self, condition: Point, goal: Point, tolerance: float) -> Expectation | None:
+    def _expect(self, condition: Point, goal: Point, tolerance: Point) -> Expectation | None:
         """See `expect`."""
         return None
 

@@ -12,6 +12,7 @@ from typing import ClassVar
 
 import numpy as np
 from jaxtyping import Bool, Float
+from numpy.typing import ArrayLike
 
 from prior_reinforce.adapters.base import Adapter, Expectation, Surprise
 from prior_reinforce.adapters.change_points import Change, History, split
@@ -167,7 +168,7 @@ class BayesianAdapter(Adapter):
             (reading.low + moved) / scale,
             (reading.high + moved) / scale,
             (reading.sd / scale) ** 2 + _SHARPEST**2,
-            0.0 if radius is None else float((radius / scale).min()),
+            np.zeros(len(scale)) if radius is None else radius / scale,
         )
         new = memory.only(slice(-1, None))
         sds = self._far_from_expected(new)
@@ -220,8 +221,8 @@ class BayesianAdapter(Adapter):
         if len(conditions) == 1:
             return np.asarray(conditions[0])
         missed, places = self._misses(), self._places(conditions, goal)
-        told = self._memory.missed_by[self._memory.missed_by > 0.0]
-        radius = float(told[-1]) if len(told) else _NOMINAL
+        told = self._memory.missed_by[np.any(self._memory.missed_by > 0.0, axis=1)]
+        radius = told[-1] if len(told) else np.full(len(goal), _NOMINAL)
         if len(missed.numbers) > 0:
             p_hit = self._p_hit_after(missed, places, radius)
         else:
@@ -259,7 +260,7 @@ class BayesianAdapter(Adapter):
         _, variance = best.predict(self._prior, at, self._memory)
         share = best.posterior.model_weights
         sd = math.sqrt(float(np.einsum("mk,mkp->k", share, variance).max()))
-        radius = float(missed.missed_by[-1])
+        radius = missed.missed_by[-1]
         reach = radius + 2.0 * min(sd, self.config.hardware_sd[1])
         cube = 2.0 * evenly_spread(len(goal)) - 1.0
         ball = cube[np.linalg.norm(cube, axis=1) <= 1.0]
@@ -268,7 +269,7 @@ class BayesianAdapter(Adapter):
         p_hit = self._p_hit_after(missed, self._places(candidates, goal), radius)
         return np.asarray(candidates[np.argmax(p_hit)])
 
-    def _expect(self, condition: Point, goal: Point, tolerance: float) -> Expectation:
+    def _expect(self, condition: Point, goal: Point, tolerance: Point) -> Expectation:
         p_hit = float(self.p_hit(condition[None], goal[None], tolerance)[0])
         last = self._memory.only(slice(-1, None))
         if np.any(last.missed_by > 0.0) and np.all(np.isinf(last.high - last.low)):
@@ -276,15 +277,17 @@ class BayesianAdapter(Adapter):
         trials = 1.0 + _TRIALS_AFTER_A_MISS * (1.0 - p_hit)
         return Expectation(p_hit, trials, self._surprise)
 
-    def p_hit(self, conditions: Points, goals: Points, tolerance: float) -> Float[np.ndarray, " n"]:
+    def p_hit(
+        self, conditions: Points, goals: Points, tolerance: ArrayLike
+    ) -> Float[np.ndarray, " n"]:
         """Return the probability that each condition's outcome is within the tolerance of its goal.
 
         Args:
             conditions: Shape (n, k), in the outcomes' units.
             goals: Shape (n, k).
-            tolerance: In the first component's unit (`Normalisation.metric`).
+            tolerance: Of each component, or one for all, in the outcomes' units.
         """
-        radius = tolerance / self._normalisation.scale[0]
+        radius = np.asarray(tolerance) / self._normalisation.scale
         at, targets = (self._normalisation.apply(values) for values in (conditions, goals))
         places = self._places(at, targets)
         missed = self._misses()
@@ -306,26 +309,26 @@ class BayesianAdapter(Adapter):
         shares = np.exp(logs - logs.max())
         return np.asarray(shares / shares.sum())
 
-    def _p_hit(
-        self, at: Places, aims: Points, radius: float | Float[np.ndarray, " n"]
-    ) -> Float[np.ndarray, " n"]:
-        """Probability that the displacement at each condition is within a radius of its aim."""
-        total = np.zeros(len(at.numbers))
+    def _p_hit(self, at: Places, aims: Points, radius: Point) -> Float[np.ndarray, " n"]:
+        """Probability that the displacement at each condition hits its aim."""
+        total, half_axes = np.zeros(len(at.numbers)), radius[:, None]
         for probability, history in zip(self._probabilities, self._histories, strict=True):
             mean, variance = history.predict(self._prior, at, self._memory)
             share = history.posterior.model_weights
-            total += probability * share_within(radius, mean - aims.T, np.sqrt(variance), share)
+            total += probability * share_within(
+                (mean - aims.T) / half_axes, np.sqrt(variance) / half_axes, share
+            )
         return total
 
     def _misses(self) -> Memory:
         """The latest trials that missed and of which their readings do not say so."""
         if self._missed is None:
             missed = self._memory.only(slice(-LATEST, None))
-            missed = missed.only(missed.missed_by > 0.0)
+            missed = missed.only(np.any(missed.missed_by > 0.0, axis=1))
             blur = _BLUR * np.sqrt(missed.variance)
             beyond = np.maximum(missed.low - missed.aims, missed.aims - missed.high) - blur
-            least = np.linalg.norm(np.maximum(beyond, 0.0), axis=1)
-            missed = missed.only(least < missed.missed_by)
+            least = np.linalg.norm(np.maximum(beyond, 0.0) / missed.missed_by, axis=1)
+            missed = missed.only(least < 1.0)
             self._missed = missed
         return self._missed
 
@@ -338,7 +341,7 @@ class BayesianAdapter(Adapter):
         return total
 
     def _p_hit_after(
-        self, missed: Memory, at: Places, radius: float, *, seed: int = 0
+        self, missed: Memory, at: Places, radius: Point, *, seed: int = 0
     ) -> Float[np.ndarray, " n"]:
         """`_p_hit`, given that those missed; what was chosen is judged by other draws."""
         prior, memory, beliefs = self._prior, self._memory, []
@@ -349,9 +352,9 @@ class BayesianAdapter(Adapter):
             from_missed = known.precision @ np.swapaxes(to_missed, 2, 3)
             at_missed, _ = history.predict(prior, missed, memory)
             mean, variance = history.predict(prior, at, memory)
-            noise = np.minimum(prior.noise, (_REPEATABLE * radius) ** 2)
+            noise = np.minimum(prior.noise[:, None], (_REPEATABLE * radius) ** 2)
             among = history.covariance(prior, missed, missed)[:, None]
-            among += (noise[:, None, None] * np.eye(len(missed.numbers)))[:, None]
+            among = among + noise[..., None, None] * np.eye(len(missed.numbers))
             beliefs.append(
                 Belief(
                     probability=probability,
@@ -359,11 +362,11 @@ class BayesianAdapter(Adapter):
                     at_missed=at_missed,
                     among_missed=among - to_missed @ from_missed,
                     mean=mean,
-                    variance=variance - (prior.noise - noise)[:, None, None],
+                    variance=variance - (prior.noise[:, None] - noise)[..., None],
                     cross=history.covariance(prior, at, missed)[:, None] - to_here @ from_missed,
                 )
             )
-        size = np.full(len(at.numbers), radius)
+        size = np.broadcast_to(radius, at.goals.shape)
         return p_hit_after(
             beliefs,
             Targets(missed.aims, missed.missed_by),
@@ -438,8 +441,8 @@ class BayesianAdapter(Adapter):
 
 def _tried(conditions: Points, missed: Memory) -> Bool[np.ndarray, " n"]:
     """Which conditions are next to one that missed."""
-    apart = np.linalg.norm(conditions[:, None] - missed.conditions, axis=2)
-    return np.asarray(np.any(apart < _AGAIN * missed.missed_by, axis=1))
+    apart = (conditions[:, None] - missed.conditions) / missed.missed_by
+    return np.asarray(np.any(np.linalg.norm(apart, axis=2) < _AGAIN, axis=1))
 
 
 def _clipped(vector: Point, longest: float) -> Point:

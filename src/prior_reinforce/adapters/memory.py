@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Int
 
 from prior_reinforce.arrays import Point, Points
 
@@ -37,14 +37,14 @@ class Memory(Places):
     low: Points
     high: Points
     variance: Points
-    missed_by: Float[np.ndarray, " n"]
-    """How far from its goal each missed at least; 0 where nothing is known of it."""
+    missed_by: Points
+    """Half-axes of the ellipsoid around its goal that each missed; 0 where nothing is known."""
 
     @classmethod
     def empty(cls, k: int) -> Memory:
         """Nothing yet."""
         none = np.empty((0, k))
-        return cls(none, np.empty(0, int), none, none, none, none, np.empty(0))
+        return cls(none, np.empty(0, int), none, none, none, none, none)
 
     @property
     def aims(self) -> Points:
@@ -59,11 +59,11 @@ class Memory(Places):
         low: Point,
         high: Point,
         variance: Point,
-        missed_by: float,
+        missed_by: Point,
     ) -> Memory:
         """The same and one more."""
         new: tuple[Any, ...] = (condition[None], [number], goal[None])
-        new += (low[None], high[None], variance[None], [missed_by])
+        new += (low[None], high[None], variance[None], missed_by[None])
         pairs = zip(vars(self).values(), new, strict=True)
         return Memory(*(np.concatenate(pair) for pair in pairs))
 

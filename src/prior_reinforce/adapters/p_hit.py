@@ -8,8 +8,8 @@ A miss says that an error lies outside of a ball, which no interval and no Gauss
 displacements at the conditions that missed are drawn, each draw is weighed by the probability that
 all of them would have missed, and a candidate's displacement follows from each draw:
 
-    P(hit at c | misses) = sum_q w_q P(|d_c - aim_c| < radius | draw q) / sum_q w_q,
-    w_q = prod_i [1 - (1 - e) P(|d_i - aim_i| < radius_i | draw q)]
+    P(hit at c | misses) = sum_q w_q P(|d_c - aim_c| < 1 | draw q) / sum_q w_q,
+    w_q = prod_i [1 - (1 - e) P(|d_i - aim_i| < 1 | draw q)],  lengths in tolerances
 
 With a share e of trials whose result says nothing. Where only one condition is concerned this is
 the search for a lost object: what was searched is unlikely, so search beside it.
@@ -72,15 +72,15 @@ class Targets:
 
     aims: Float[np.ndarray, "p k"]
     """Middles: goal minus condition."""
-    radii: Float[np.ndarray, " p"]
-    """Tolerances."""
+    radii: Float[np.ndarray, "p k"]
+    """Tolerances of the components: half-axes."""
 
     def share_within(self, drawn: Float[np.ndarray, "k q p"]) -> Float[np.ndarray, "q p"]:
         """Probability that each draw hits: 0 or 1, but for a blurred edge."""
         from scipy.special import ndtr  # as in `expectation_propagation`
 
-        distance = np.sqrt(np.square(drawn - self.aims.T[:, None]).sum(axis=0))
-        return np.asarray(ndtr((self.radii - distance) / (_EDGE * self.radii)))
+        off = (drawn - self.aims.T[:, None]) / self.radii.T[:, None]
+        return np.asarray(ndtr((1.0 - np.sqrt(np.square(off).sum(axis=0))) / _EDGE))
 
 
 def p_hit_after(
@@ -124,12 +124,11 @@ def p_hit_after(
 
 
 def share_within(
-    radius: float | Float[np.ndarray, " n"],
     mean: Float[np.ndarray, "m k n"],
     sd: Float[np.ndarray, "m k n"],
     share: Float[np.ndarray, "m k"],
 ) -> Float[np.ndarray, " n"]:
-    """Probability that independent numbers lie in the ball around 0, or in one each.
+    """Probability that independent numbers lie in the unit ball around 0.
 
     Each number has a distribution that is a mixture of m normal ones. The ball is cut into cells
     along one component after another; the last is exact.
@@ -153,8 +152,7 @@ def share_within(
         rest = left[..., None] * np.sqrt(1.0 - middles**2)
         return np.asarray(np.sum(in_cell * inside(rest, j + 1), axis=-1))
 
-    radii = np.broadcast_to(np.asarray(radius, float), mean.shape[2:])
-    return np.clip(inside(radii, 0), 0.0, 1.0)
+    return np.clip(inside(np.ones(mean.shape[2:]), 0), 0.0, 1.0)
 
 
 @functools.lru_cache

@@ -24,7 +24,7 @@ from prior_reinforce.errors import (
     InvalidFeedbackError,
     InvalidGoalError,
 )
-from prior_reinforce.wording import read_place, say_place
+from prior_reinforce.wording import read_place, say_place, say_tolerance
 
 Folder = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="WORKSPACE")]
 
@@ -72,8 +72,9 @@ class New:
     """Names of the outcome's components."""
     outcome_units: tuple[str, ...] = ("m",)
     """Unit of each component; a single one holds for all."""
-    tolerance: float = 0.015
-    """Largest distance from the goal that counts as reached, in the outcome's units."""
+    tolerance: tuple[float, ...] = (0.015,)
+    """Largest distance from the goal that counts as reached, in the outcome's units: one number,
+    or one for each component, which mixed units need."""
     robot: Annotated[
         str,
         tyro.conf.arg(
@@ -102,7 +103,7 @@ class New:
             dt=self.dt,
             outcome_names=self.outcome_names,
             outcome_units=_spread(self.outcome_units, len(self.outcome_names)),
-            tolerance=self.tolerance,
+            tolerance=self.tolerance[0] if len(self.tolerance) == 1 else self.tolerance,
             robot=robot if robot is not None and is_given else self.robot,
         )
         with Workspace.create(self.folder, manifest) as workspace:
@@ -149,9 +150,9 @@ def read_goal(workspace: Workspace, words: Sequence[str]) -> Point:
 
 def print_goal(workspace: Workspace) -> None:
     """Say which goal the next trials are for."""
-    goal, manifest = workspace.state.goals[-1], workspace.manifest
-    place = say_place(goal.goal, manifest.outcome_names, manifest.outcome_units)
-    print(f"goal {goal.number}: {place}")
+    goal, names = workspace.state.goals[-1], workspace.manifest.outcome_names
+    place = say_place(goal.goal, names, goal.units)
+    print(f"goal {goal.number}: {place}; within {say_tolerance(goal.tolerance, names, goal.units)}")
 
 
 @dataclass(frozen=True)

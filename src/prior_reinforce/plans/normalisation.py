@@ -1,4 +1,4 @@
-"""Outcomes around 0, spread about 1: the units in which adapters work, and the metric of them."""
+"""Outcomes around 0, spread about 1: the units in which adapters work."""
 
 from __future__ import annotations
 
@@ -33,15 +33,6 @@ class Normalisation:
         units = np.array(demonstrations.outcome_units)
         scale = np.sqrt([variance[units == unit].mean() for unit in units])
         return cls(offset=outcomes.mean(axis=0), scale=scale)
-
-    @property
-    def metric(self) -> Point:
-        """What one unit of each component counts, in the first component's unit; 1 for that unit.
-
-        A distance between outcomes is the length of their difference times this. So a spread of
-        seconds counts as a spread of metres, and a tolerance is told in the first unit.
-        """
-        return np.asarray(self.scale[0] / self.scale)
 
     def apply(self, values: Float[np.ndarray, "*n k"]) -> Float[np.ndarray, "*n k"]:
         """Return outcomes or conditions in normalised units."""

@@ -27,9 +27,8 @@ from prior_reinforce.report.style import (
     new_figure,
     trial_colour,
 )
-from prior_reinforce.report.summary import numbers, say_tolerance
+from prior_reinforce.report.summary import numbers, say_distance, say_tolerance
 from prior_reinforce.session.trials import Stage, Trial
-from prior_reinforce.wording import say_length
 
 _COLUMNS = 4
 _LEAST_TRIALS = 3  # that the error's axis has room for
@@ -90,23 +89,21 @@ def draw_errors(record: AdaptationRecord) -> Figure:
     axes = figure.subplots()
     calm_axes(axes)
     axes.grid(visible=False, axis="x")
-    n, tolerance = len(record.trials), record.tolerance * record.scale
+    n, tolerance = len(record.trials), record.edge
     axes.axhspan(0, tolerance, color=GOAL, alpha=0.13, linewidth=0)
     axes.axhline(tolerance, color=GOAL, linewidth=1.4)
     seen: dict[int, float] = {}
     true: dict[int, float] = {}
     for x, (trial, truth) in enumerate(zip(record.trials, record.true_outcomes, strict=True), 1):
         if truth is not None:
-            true[x] = record.distance(truth - record.goal) * record.scale
+            true[x] = record.distance(truth - record.goal)
         if trial.error_seen is None:
             _write(axes, trial.stage.value, (x, tolerance), (0, 8), rotation=90, ha="center")
             continue
-        off = record.distance(trial.error_seen)
-        seen[x] = off * record.scale
+        seen[x] = record.distance(trial.error_seen)
         colour = trial_colour(x - 1, n, hit=trial.hit)
         axes.plot(x, seen[x], "o", color=colour, markersize=10, clip_on=False, zorder=5)
-        said = say_length(off, record.demonstrations.outcome_units)
-        _write(axes, said, (x, seen[x]), (9, 7), color=INK, zorder=6)
+        _write(axes, say_distance(record, seen[x]), (x, seen[x]), (9, 7), color=INK, zorder=6)
     axes.plot(list(seen), list(seen.values()), "-", color=DEMONSTRATION, linewidth=1.5, zorder=3)
     if true:
         hollow: Any = {"markersize": 6, "markerfacecolor": "white", "markeredgecolor": INK_SOFT}
@@ -119,7 +116,7 @@ def draw_errors(record: AdaptationRecord) -> Figure:
     axes.set_xlim(0.5, room + 0.7)
     axes.set_xticks(range(1, n + 1), [str(trial.number) for trial in record.trials])
     axes.set_xlabel("trial")
-    axes.set_ylabel("distance from the goal" + (f" [{record.unit()}]" if record.unit() else ""))
+    axes.set_ylabel(f"distance from the goal [{record.distance_unit}]")
     return figure
 
 

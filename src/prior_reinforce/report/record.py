@@ -10,17 +10,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
+from numpy.typing import ArrayLike
 
 from prior_reinforce.arrays import Point, as_goal
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.plans.motions import Demonstrations
-from prior_reinforce.plans.normalisation import Normalisation
-from prior_reinforce.session.trials import Goal, Stage, Trial
+from prior_reinforce.readings import as_tolerance, in_tolerances
+from prior_reinforce.session.trials import Stage, Trial
 
 Box = Float[np.ndarray, "2 k"]
 """Lower and upper corner of a region of outcomes."""
@@ -63,8 +63,8 @@ class AdaptationRecord:
     """D_prior, what the generator was fitted to."""
     goal: Point
     """g tilde, in the outcomes' units."""
-    tolerance: float
-    """epsilon, in the first component's unit (`Normalisation.metric`)."""
+    tolerance: ArrayLike
+    """epsilon, as `Session` takes it."""
     trials: tuple[Trial, ...]
     """All trials in order, voided and open ones too; one without a plan is not drawn over time."""
     title: str = ""
@@ -87,9 +87,11 @@ class AdaptationRecord:
 
         Raises:
             InvalidGoalError: The goal has a wrong shape, or is not finite.
-            ConfigurationError: There are not as many outcomes as trials.
+            ConfigurationError: There are not as many outcomes as trials, or the tolerance is none.
         """
-        object.__setattr__(self, "goal", as_goal(self.goal, self.demonstrations.outcome_names))
+        names, units = self.demonstrations.outcome_names, self.demonstrations.outcome_units
+        object.__setattr__(self, "goal", as_goal(self.goal, names))
+        as_tolerance(self.tolerance, names, units)
         if self.outcomes is not None and len(self.outcomes) != len(self.trials):
             raise ConfigurationError(
                 f"{len(self.trials)} trials need as many true outcomes, got {len(self.outcomes)}; "
@@ -106,20 +108,27 @@ class AdaptationRecord:
         """Stage-2 trials up to and with the first hit; None while the goal is not reached."""
         return next((n for n, trial in enumerate(self.told, start=1) if trial.hit), None)
 
-    @cached_property
-    def _aimed(self) -> Goal:
-        """The goal as sessions know it, with the metric of these demonstrations."""
-        metric = Normalisation.of(self.demonstrations).metric
-        return Goal(1, self.goal, self.tolerance, metric)
-
-    def distance(self, error: Point) -> float:
-        """How far an error is from the goal, in the first component's unit; see `Goal.distance`."""
-        return self._aimed.distance(error)
+    @property
+    def half_axes(self) -> Point:
+        """The tolerance of each component, in its unit."""
+        demonstrations = self.demonstrations
+        names, units = demonstrations.outcome_names, demonstrations.outcome_units
+        return as_tolerance(self.tolerance, names, units)
 
     @property
-    def radius(self) -> Point:
-        """The tolerance along each component alone, in its own unit."""
-        return self._aimed.radius
+    def distance_unit(self) -> str:
+        """Of distances from the goal: that of all components, or `tolerances` where they differ."""
+        is_one = np.all(self.half_axes == self.half_axes[0])
+        return (self.unit() if is_one else "") or "tolerances"
+
+    @property
+    def edge(self) -> float:
+        """The greatest distance that counts as reached, in `distance_unit`."""
+        return 1.0 if self.distance_unit == "tolerances" else float(self.half_axes[0]) * self.scale
+
+    def distance(self, error: Point) -> float:
+        """How far an error is from the goal, in `distance_unit`."""
+        return self.edge * in_tolerances(error, self.half_axes)
 
     @property
     def landings(self) -> tuple[Point | None, ...]:
@@ -153,6 +162,5 @@ class AdaptationRecord:
     def _landing(self, trial: Trial) -> Point | None:
         if trial.error_seen is None:
             return None
-        distance = self.distance(trial.error_seen)
-        share = self.tolerance / distance if trial.hit and distance > self.tolerance else 1.0
-        return self.goal + share * trial.error_seen
+        off = in_tolerances(trial.error_seen, self.half_axes)
+        return self.goal + trial.error_seen / (max(off, 1.0) if trial.hit else 1.0)

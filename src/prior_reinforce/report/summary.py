@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from prior_reinforce import wording
 from prior_reinforce.report.record import AdaptationRecord
 from prior_reinforce.session.trials import Stage, Trial
-from prior_reinforce.wording import in_words, say_error, say_length, say_place, to_words
+from prior_reinforce.wording import in_words, say_error, say_place, to_words
 
 _OPEN = {
     Stage.ASKED: "not executed yet",
@@ -130,7 +131,16 @@ def say_goal(record: AdaptationRecord) -> str:
 
 def say_tolerance(record: AdaptationRecord) -> str:
     """Say how near counts as reached."""
-    return say_length(record.tolerance, record.demonstrations.outcome_units)
+    demonstrations = record.demonstrations
+    return wording.say_tolerance(
+        record.half_axes, demonstrations.outcome_names, demonstrations.outcome_units
+    )
+
+
+def say_distance(record: AdaptationRecord, distance: float) -> str:
+    """Say how far off a trial was: `1.2 cm`, `1.8 tolerances`."""
+    rounded = round(distance, 1) if record.distance_unit == "cm" else float(f"{distance:.3g}")
+    return f"{rounded:g} {record.distance_unit}"
 
 
 def _row(record: AdaptationRecord, i: int, trial: Trial) -> TrialRow:
@@ -151,7 +161,7 @@ def _row(record: AdaptationRecord, i: int, trial: Trial) -> TrialRow:
     truly_off = None if truth is None else record.distance(truth - record.goal)
     result = "hit" if trial.hit else "miss"
     # The truth, once known, is admitted where it disagrees.
-    disagrees = truly_off is not None and (truly_off <= record.tolerance) != trial.hit
+    disagrees = truly_off is not None and (truly_off <= record.edge) != trial.hit
     seen = say_error(trial.error_seen, names, units)
     if trial.number in record.warnings:
         seen += f"; {record.warnings[trial.number]}"
@@ -160,8 +170,8 @@ def _row(record: AdaptationRecord, i: int, trial: Trial) -> TrialRow:
         state=result,
         aim=aim,
         seen=seen,
-        off=say_length(record.distance(trial.error_seen), units),
-        truly_off="" if truly_off is None else say_length(truly_off, units),
+        off=say_distance(record, record.distance(trial.error_seen)),
+        truly_off="" if truly_off is None else say_distance(record, truly_off),
         result=f"taken for a {result}" if disagrees else result,
     )
 

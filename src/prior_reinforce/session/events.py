@@ -40,10 +40,8 @@ class GoalSet(Event, frozen=True):
 
     goal: list[float]
     """g, shape (k,), in the outcomes' units."""
-    tolerance: float
-    """epsilon."""
-    metric: list[float]
-    """See `Goal.metric`."""
+    tolerance: list[float]
+    """epsilon of each component, in its unit."""
     units: list[str]
     """Units of the outcomes."""
     carry_over: bool

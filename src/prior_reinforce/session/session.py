@@ -14,12 +14,10 @@ Notation (docs/notation.md):
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from functools import cached_property
-from numbers import Real
 from threading import RLock
 from types import FunctionType, MethodType
 from typing import TYPE_CHECKING, Any
@@ -36,8 +34,7 @@ from prior_reinforce.errors import (
     TrialStateError,
     WorkspaceError,
 )
-from prior_reinforce.plans.normalisation import Normalisation
-from prior_reinforce.readings import Reading
+from prior_reinforce.readings import Reading, as_tolerance
 from prior_reinforce.session.events import Amended, Asked, GoalSet, Told, Voided
 from prior_reinforce.session.trials import Goal, Log, MemoryLog, Stage, State, Trial, Verdict
 from prior_reinforce.wording import as_reading
@@ -60,7 +57,7 @@ class Session:
         adapter: Adapter | Callable[[], Adapter],
         demonstrations: Demonstrations | Callable[[], Demonstrations],
         goal: ArrayLike | None = None,
-        tolerance: float | None = None,
+        tolerance: ArrayLike | None = None,
         *,
         carry_over: bool | None = None,
         log: Log | None = None,
@@ -78,8 +75,9 @@ class Session:
             adapter: M; owned by this session from now on.
             demonstrations: D_prior with its perceived outcomes.
             goal: g tilde, shape (k,), in the outcomes' units; the log's latest goal if not given.
-            tolerance: epsilon, largest perceived error that counts as reached, in the same units;
-                where they are mixed, in the first one (see `Normalisation.metric`).
+            tolerance: epsilon, largest perceived error that counts as reached, in the same units:
+                one number, or one for each component, which mixed units need. A hit is an error
+                whose length, each component divided by its tolerance, is at most 1.
             carry_over: Let the adapter learn from the trials of earlier goals too; by default it
                 does where they serve it (`Adapter.carries_over`).
             log: What happened so far, and where to write what happens; in memory if not given.
@@ -88,8 +86,8 @@ class Session:
 
         Raises:
             InvalidGoalError: The goal has a wrong shape, or is not finite.
-            ConfigurationError: The tolerance is not a positive number, or a class is given instead
-                of an object.
+            ConfigurationError: The tolerance is not positive, or does not say what counts in each
+                unit; or a class is given instead of an object.
             TrialStateError: A goal is given, and a trial for the one before waits to be told.
         """
         for given in (generator, adapter, demonstrations):
@@ -141,8 +139,8 @@ class Session:
         return self._current_goal().goal
 
     @property
-    def tolerance(self) -> float:
-        """The tolerance epsilon of the goal that is worked on."""
+    def tolerance(self) -> Point:
+        """The tolerance epsilon of each component, of the goal that is worked on."""
         return self._current_goal().tolerance
 
     @property
@@ -176,7 +174,7 @@ class Session:
     def set_goal(
         self,
         goal: ArrayLike,
-        tolerance: float | None = None,
+        tolerance: ArrayLike | None = None,
         *,
         carry_over: bool | None = None,
         adapter: str = "",
@@ -195,13 +193,15 @@ class Session:
 
         Raises:
             InvalidGoalError: Wrong shape, or not finite.
-            ConfigurationError: The tolerance is not a positive number.
+            ConfigurationError: As in the constructor.
             TrialStateError: A trial for the goal before waits to be told.
         """
         self._refresh()
         self.state.refuse_open_trial("setting a goal")  # before anything is said of the goal
         checked = self.demonstrations.check_goal(goal)
-        tolerance = _as_tolerance(self._tolerance if tolerance is None else tolerance)
+        names, units = self.demonstrations.outcome_names, self.demonstrations.outcome_units
+        given = self._tolerance if tolerance is None else tolerance
+        tolerances = as_tolerance(() if given is None else given, names, units)
         carried = self._carry_over if carry_over is None else carry_over
         if carried is None:
             kind = ADAPTERS.kind(adapter) if adapter else type(self.adapter)
@@ -210,9 +210,8 @@ class Session:
             self.state.refuse_open_trial("setting a goal")
             event = GoalSet(
                 goal=checked.tolist(),
-                tolerance=tolerance,
-                metric=Normalisation.of(self.demonstrations).metric.tolist(),
-                units=list(self.demonstrations.outcome_units),
+                tolerance=tolerances.tolist(),
+                units=list(units),
                 carry_over=carried,
                 adapter=adapter,
                 new_hardware=new_hardware,
@@ -355,7 +354,7 @@ class Session:
         reading = as_reading(seen, hit, goal.units, goal.least_sd)
         reached = reading.hit
         if reached is None:
-            reached = goal.distance(reading.error_seen) <= goal.tolerance
+            reached = goal.is_hit(reading.error_seen)
         self.log.append(event(trial=trial.number, reading=reading.record(), hit=bool(reached)))
 
     def informed_adapter(self) -> Adapter:
@@ -388,7 +387,7 @@ class Session:
             goal = self.state.goal_of(trial)
             assert trial.reading is not None
             self._change_hardware_until(goal.number)
-            reading = trial.reading.within(goal.radius)
+            reading = trial.reading.within(goal.tolerance)
             self.adapter.observe(trial.condition, goal.goal, reading)
         self._observed = readings
         self._change_hardware_until(self._current_goal().number)
@@ -520,12 +519,3 @@ def ask_all(sessions: Sequence[Session], *, arm_did_not_move: bool = False) -> l
 def _loaded(given: Any) -> Any:
     """What was given, or what the function that was given loads; a network is callable too."""
     return given() if isinstance(given, (FunctionType, MethodType)) else given
-
-
-def _as_tolerance(tolerance: Any) -> float:
-    number = isinstance(tolerance, Real) and not isinstance(tolerance, bool)
-    if not (number and math.isfinite(tolerance) and tolerance > 0):
-        raise ConfigurationError(
-            f"tolerance must be a positive number in the outcomes' units, got {tolerance!r}"
-        )
-    return float(tolerance)

@@ -22,7 +22,7 @@ from prior_reinforce.errors import (
     TrialStateError,
     WorkspaceError,
 )
-from prior_reinforce.readings import Reading
+from prior_reinforce.readings import Reading, in_tolerances
 from prior_reinforce.session.events import (
     Amended,
     Asked,
@@ -77,11 +77,9 @@ class Goal:
     """From 1."""
     goal: Point
     """g, in the outcomes' units."""
-    tolerance: float
-    """epsilon, the largest perceived error that counts as reached, in the first component's
-    unit."""
-    metric: Point
-    """What one unit of each component counts in a distance; 1 everywhere where all units agree."""
+    tolerance: Point
+    """epsilon of each component, in its unit: an error of one tolerance's length still counts as
+    reached (see `in_tolerances`)."""
     carry_over: bool = False
     """Whether the adapter also learns from the trials of earlier goals."""
     adapter: str = ""
@@ -91,19 +89,14 @@ class Goal:
     units: tuple[str, ...] = ()
     """Units of the components."""
 
-    def distance(self, error: Point) -> float:
-        """How far an error, outcome minus goal, is from the goal, in the first component's unit."""
-        return float(np.linalg.norm(self.metric * error))
-
-    @property
-    def radius(self) -> Point:
-        """The tolerance along each component alone, in its own unit."""
-        return np.asarray(self.tolerance / self.metric)
+    def is_hit(self, error: Point) -> bool:
+        """Whether an error, outcome minus goal, counts as reached."""
+        return in_tolerances(error, self.tolerance) <= 1.0
 
     @property
     def least_sd(self) -> Point:
         """Least standard deviation of an error of unknown origin, in each component's unit."""
-        return _LEAST_SD * self.radius
+        return _LEAST_SD * self.tolerance
 
 
 @dataclass(frozen=True, eq=False)
@@ -283,12 +276,14 @@ class State:
     def _apply(self, event: Event) -> None:
         match event:
             case GoalSet():
-                if not len(event.goal) == len(event.metric) == len(event.units):
-                    raise ValueError("goal, metric and units have different lengths")
-                place, metric = _read_only(event.goal), _read_only(event.metric)
+                if not len(event.goal) == len(event.tolerance) == len(event.units):
+                    raise ValueError("goal, tolerance and units have different lengths")
+                place, tolerance = _read_only(event.goal), _read_only(event.tolerance)
+                if not np.all(tolerance > 0):
+                    raise ValueError("a tolerance is not positive")
                 rest = (event.carry_over, event.adapter, event.new_hardware, tuple(event.units))
                 number = len(self.goals) + 1
-                self.goals.append(Goal(number, place, event.tolerance, metric, *rest))
+                self.goals.append(Goal(number, place, tolerance, *rest))
             case Asked():
                 if event.trial != len(self.trials) + 1 or self.open_trial is not None:
                     raise ValueError(f"trial {event.trial} after {len(self.trials)}")

@@ -35,7 +35,7 @@ def test_the_template_says_what_was_filled_in(tmp_path):
     assert read.format.names == tuple(f"joint{i}" for i in range(1, 8))
     assert read.format.dt == 0.02
     assert read.outcome_units == ("m", "m")
-    assert read.tolerance == 0.015
+    assert read.tolerance == (0.015, 0.015)
     assert read.robot is not None
     assert read.robot.robot == "panda"
     assert read.robot.velocity[0] == 2.175
@@ -132,6 +132,11 @@ def test_an_arm_that_is_written_out_is_read_back(tmp_path, robot):
             load_manifest(write(tmp_path, text.replace(old, new, 1)))
 
 
+def test_each_component_has_its_tolerance(tmp_path):
+    text = manifest().replace('["m", "m"]', '["m", "s"]').replace("0.015", "[0.015, 0.02]")
+    assert load_manifest(write(tmp_path, text)).tolerance == (0.015, 0.02)
+
+
 def test_the_box_for_the_tool_tip(tmp_path):
     """The template's own example, its comment signs taken away."""
     text = manifest(robot="panda", **SEVEN)
@@ -186,9 +191,16 @@ def test_joints_may_stay_still_on_purpose(tmp_path, absent, message):
         (
             "tolerance = 0.015",
             'tolerance = "2cm"',
-            r"tolerance = '2cm'.*expected `float`, got `str`",
+            r"tolerance = '2cm'.*expected `float | array`, got `str`",
         ),
         ("tolerance = 0.015", "tolerance = nan", "must be finite"),
+        ("tolerance = 0.015", "tolerance = [0.015]", r":\d+: .outcome.: tolerance .* each of x"),
+        ("tolerance = 0.015", "tolerance = [0.015, 0]", r"expected `float` > 0"),
+        (
+            'units = ["m", "m"]',
+            'units = ["m", "s"]',
+            r"several units; give .* of x \[m\]",
+        ),
         ("tolerance = 0.015", "tolerance = 1.5", r":\d+:.*tolerance = 1.5: looks like centimetres"),
         ("dt = 0.02", "dt = 12.5", r":\d+:.*dt = 12.5: looks like milliseconds"),
         ("tolerance = 0.015", "", r"\[outcome\] tolerance: missing"),
@@ -252,7 +264,7 @@ def test_no_damage_causes_anything_but_a_named_error(tmp_path, position, junk):
     path = tmp_path / "workspace.toml"
     path.write_bytes(whole[:position] + junk + whole[position + len(junk) :])
     with contextlib.suppress(ConfigurationError, FileFormatError):
-        assert load_manifest(path).tolerance > 0
+        assert min(load_manifest(path).tolerance) > 0
 
 
 def test_reading_one_loads_nothing_heavy():

@@ -23,7 +23,7 @@ from prior_reinforce.errors import WorkspaceError
 from prior_reinforce.session.events import Entry, Event
 
 JOURNAL_FILE = "journal.sqlite"
-_VERSION = 2
+_VERSION = 3
 # Ours: an operator's second window should wait out a command, not a training.
 _LOCK_TIMEOUT_S = 10.0
 

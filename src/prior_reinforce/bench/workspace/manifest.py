@@ -30,6 +30,7 @@ from prior_reinforce.bench.robots.kinematics import Chain
 from prior_reinforce.errors import ConfigurationError, FileFormatError, PriorReinforceError
 from prior_reinforce.plans.interpolation import RATE
 from prior_reinforce.plans.motions import PlanFormat
+from prior_reinforce.readings import as_tolerance
 from prior_reinforce.wording import plain
 
 if sys.version_info >= (3, 11):
@@ -57,8 +58,8 @@ class Manifest:
     """Names of the k components of an outcome."""
     outcome_units: tuple[str, ...]
     """Unit of each component."""
-    tolerance: float
-    """epsilon, in the outcome's units."""
+    tolerance: tuple[float, ...]
+    """epsilon of each component, in its unit."""
     robot: RobotLimits | None
     """Limits that every plan is held against; None where the manifest says `none`."""
     gate: GateSettings
@@ -69,6 +70,7 @@ class Manifest:
 
 _Texts = Annotated[tuple[str, ...], Meta(min_length=1)]
 _Numbers = Annotated[tuple[float, ...], Meta(min_length=1)]
+_Positive = Annotated[tuple[Annotated[float, Meta(gt=0)], ...], Meta(min_length=1)]
 _Six = tuple[float, float, float, float, float, float]
 _Nine = tuple[float, float, float, float, float, float, float, float, float]
 
@@ -90,7 +92,7 @@ class _Plan(_Section, frozen=True):
 class _Outcome(_Section, frozen=True):
     names: _Texts
     units: _Texts
-    tolerance: Annotated[float, Meta(gt=0)]
+    tolerance: Annotated[float, Meta(gt=0)] | _Positive
 
 
 class _Robot(_Section, frozen=True):
@@ -144,7 +146,7 @@ def filled_in(
     dt: float,
     outcome_names: Sequence[str],
     outcome_units: Sequence[str],
-    tolerance: float,
+    tolerance: float | Sequence[float],
     robot: str | RobotLimits,
 ) -> str:
     """Return a manifest's text, the template filled in.
@@ -156,7 +158,7 @@ def filled_in(
         dt: Time between two frames of a plan, in [s].
         outcome_names: Of the outcome's components.
         outcome_units: Of the outcome's components.
-        tolerance: In the outcome's units.
+        tolerance: One number, or one for each component, in the outcome's units.
         robot: Name of a preset, `none`, or the limits of an arm, which are written out.
     """
     given = robot if isinstance(robot, RobotLimits) else None
@@ -167,7 +169,7 @@ def filled_in(
         dt=dt,
         outcome_names=_list(outcome_names),
         outcome_units=_list(outcome_units),
-        tolerance=tolerance,
+        tolerance=np.asarray(tolerance).tolist(),
         robot="given" if given is not None else robot,
     )
     if given is None:
@@ -260,12 +262,14 @@ class _Reader:
                 f"is less than an arm's cycle of {1 / RATE:g} s, within which nothing is checked"
             )
             raise self.error("plan", "dt", f"{cycle}; give more")
-        names, units, tolerance = outcome.names, outcome.units, outcome.tolerance
+        names, units = outcome.names, outcome.units
         if len(names) != len(units):
             raise self.error("outcome", "units", f"must name one unit for each of {list(names)}")
         if len(set(names)) < len(names):
             raise self.error("outcome", "names", "must differ from each other")
-        if set(units) == {"m"} and tolerance >= _IMPLAUSIBLE_METRES:
+        with self.named("outcome"):
+            tolerance = as_tolerance(outcome.tolerance, names, units)
+        if np.any(tolerance[np.array(units) == "m"] >= _IMPLAUSIBLE_METRES):
             raise self.error("outcome", "tolerance", "looks like centimetres; give metres")
         with self.named("plan"):
             form = PlanFormat(plan.names, plan.units, plan.dt)
@@ -287,7 +291,8 @@ class _Reader:
                 "out, or make the workspace with: prior-reinforce new --robot path/to/arm.urdf"
             )
             raise self.error("gate", _BOX["box_low"], why)
-        return Manifest(task, form, names, units, tolerance, limits, gate, robot.arm)
+        numbers = tuple(tolerance.tolist())
+        return Manifest(task, form, names, units, numbers, limits, gate, robot.arm)
 
     def check_values(self) -> None:
         """Refuse what a type does not say: numbers that are not finite, control characters."""

@@ -10,7 +10,7 @@ from prior_reinforce.bench.workspace.log import Executed, Executing, NotExecuted
 from prior_reinforce.bench.workspace.workspace import Workspace
 from prior_reinforce.registry import own_class
 from prior_reinforce.session.trials import Goal, Stage, Trial
-from prior_reinforce.wording import in_words, plain, say_place, say_reading
+from prior_reinforce.wording import in_words, plain, say_place, say_reading, say_tolerance
 
 _TRIALS_SHOWN = 3
 _POOR_TRIALS = 3
@@ -27,9 +27,10 @@ def describe(workspace: Workspace) -> str:
     state, manifest = workspace.state, workspace.manifest
     robot = manifest.robot.robot if manifest.robot is not None else "none, no limits are checked"
     n = 0 if state.demonstrations is None else workspace.demonstrations.n
+    names, units = manifest.outcome_names, manifest.outcome_units
     training = state.training
     rows = [
-        ("task", f"{manifest.name}, tolerance {manifest.tolerance:g} {manifest.outcome_units[0]}"),
+        ("task", f"{manifest.name}, tolerance {say_tolerance(manifest.tolerance, names, units)}"),
         (
             "plans",
             f"{manifest.format.action_dim} numbers a frame, a frame every "

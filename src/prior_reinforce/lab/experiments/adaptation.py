@@ -15,9 +15,9 @@ from prior_reinforce.errors import RenderingUnavailableError
 from prior_reinforce.lab.experiments.protocol import GoalTrials
 from prior_reinforce.perception.base import Perception
 from prior_reinforce.plans.motions import Demonstrations
-from prior_reinforce.readings import Reading
+from prior_reinforce.readings import Reading, as_tolerance
 from prior_reinforce.report import AdaptationRecord, Film, record_film, write_report
-from prior_reinforce.wording import say_length
+from prior_reinforce.wording import say_tolerance
 
 if TYPE_CHECKING:
     from prior_reinforce.perception.vlm import VisionLanguageModel
@@ -107,9 +107,8 @@ def report_adaptation(
         Path of the page.
     """
     units = demonstrations.outcome_units
-    tolerance = say_length(task.tolerance, units)
-    if set(units) == {"m"}:
-        tolerance = f"{task.tolerance * 100:g} cm"  # to the last digit, unlike an estimate
+    names = demonstrations.outcome_names
+    tolerance = say_tolerance(as_tolerance(task.tolerance, names, units), names, units)
     records = [
         AdaptationRecord(
             number=i,

@@ -28,6 +28,7 @@ from prior_reinforce.perception import make_perception
 from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
 from prior_reinforce.plans.alignment import align
 from prior_reinforce.plans.motions import Demonstrations
+from prior_reinforce.readings import in_tolerances
 from prior_reinforce.registry import own_class, parse_choice, source_digest
 
 GOAL_SEED = 100
@@ -286,14 +287,17 @@ class ZeroShot(Unit):
         landed = np.array([rollout.outcome for rollout in task.rollout(own, None)])
         grid = _grid(prior.outcomes_seen, self.spacing)
         rollouts = task.rollout(generator.generate(grid), None)
-        errors = np.linalg.norm([r.outcome for r in rollouts] - grid, axis=1)
+        misses = np.array([r.outcome for r in rollouts]) - grid
+        errors = np.linalg.norm(misses, axis=1)
         return {
             "own_rms_rad": own_rms.tolist(),
             "own_landing_from_demonstrated_m": np.linalg.norm(landed - shown, axis=1).tolist(),
             "grid_points": len(grid),
             "grid_median_m": float(np.median(errors)),
             "grid_p90_m": float(np.percentile(errors, 90)),
-            "grid_within_tolerance": float(np.mean(errors <= task.tolerance)),
+            "grid_within_tolerance": float(
+                np.mean([in_tolerances(miss, task.tolerance) <= 1.0 for miss in misses])
+            ),
             "grid_lost": float(np.mean([not rollout.valid for rollout in rollouts])),
         }
 

@@ -144,6 +144,7 @@ def measure(
     Raises:
         ConfigurationError: A plan was lost: such a field has holes.
     """
+    assert isinstance(task.tolerance, float), "both components are lengths"
     low, high = task.region[0] - _MARGIN, task.region[1] + _MARGIN
     counts = np.ceil((high - low) / SPACING).astype(int) + 1
     axes = [np.linspace(a, b, n) for a, b, n in zip(low, high, counts, strict=True)]

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
+from numpy.typing import ArrayLike
 
 from prior_reinforce.adapters.base import Adapter
 from prior_reinforce.arrays import Point, Points
@@ -22,7 +23,7 @@ from prior_reinforce.lab.experiments.statistics import reached_by
 from prior_reinforce.perception.base import Perception
 from prior_reinforce.perception.eye import Eye
 from prior_reinforce.plans.motions import Demonstrations
-from prior_reinforce.readings import Reading
+from prior_reinforce.readings import Reading, in_tolerances
 from prior_reinforce.session.session import Session, ask_all
 from prior_reinforce.session.trials import Trial
 
@@ -59,16 +60,15 @@ class GoalTrials:
         return np.array([rollout.outcome - self.goal for rollout in self.rollouts])
 
 
-def is_hit(rollout: Rollout, goal: Point, tolerance: float) -> bool:
+def is_hit(rollout: Rollout, goal: Point, tolerance: ArrayLike) -> bool:
     """Whether the true outcome is within the tolerance of the goal; a lost object never is.
 
     Args:
         rollout: What came of an execution.
         goal: g, shape (k,), in the outcomes' units.
-        tolerance: epsilon of the task. The plain norm is compared with it, also where units are
-            mixed; a session without such a judge uses `Normalisation.metric`.
+        tolerance: epsilon of the task, as sessions compare with it (`readings.in_tolerances`).
     """
-    return bool(rollout.valid and np.linalg.norm(rollout.outcome - goal) <= tolerance)
+    return bool(rollout.valid and in_tolerances(rollout.outcome - goal, tolerance) <= 1.0)
 
 
 def estimate_by_eye(

@@ -51,7 +51,7 @@ class Fishing(PandaTask):
 
     name = "fishing"
     format = PlanFormat(POSE_NAMES, POSE_UNITS, 0.02)
-    tolerance = 0.01  # the paper's magnet catches the hook within about 1 cm
+    tolerance: float = 0.01  # the paper's magnet catches the hook within about 1 cm
     region = np.array([[0.78, -0.20], [0.98, 0.20]])
     # The hook is a bead of 12 mm that touches the table; the magnet lies on a disc of 2 cm.
     scene = TableScene(

@@ -238,7 +238,7 @@ class Arrival(Latched):
     outcome_names = ("x", "arrival")
     outcome_units = ("m", "s")
     horizon = 90
-    tolerance = 0.009
+    tolerance = (0.009, 0.009)
     region = np.array([[1.00, 1.45], [1.80, 1.85]])
     spread = (0.002, 0.003)
     """Relative error of the speed, and the delay until the arm moves, in [s]; ours."""
@@ -275,7 +275,7 @@ class Hoop(ZooTask):
     outcome_units = ("m", "m", "s")
     horizon = 100
     release = "a grip channel, let down in six frames"
-    tolerance = 0.03
+    tolerance = (0.03, 0.03, 0.03)
     region = np.array([[-0.25, 0.65, 0.42], [0.25, 0.95, 0.52]])
     posture = (0.02, 0.03, 0.04, 0.04, 0.05, 0.05, 0.0)
     aim_range = ((-0.4, 0.4), (1.6, 3.4), (0.0, 0.5))
