@@ -185,6 +185,6 @@ def test_tuples_and_parts_can_be_written_in_a_choice():
 
 
 def test_a_part_of_a_network_leaves_the_rest_as_it_is_set():
-    made = make_generator("diffusion,network.widths=8:16,timing=none,exact=no")
+    made = make_generator("diffusion,network.widths=8:16,timing=none")
     laptop = DiffusionConfig().network
     assert made.config.network == replace(laptop, widths=(8, 16))

@@ -65,7 +65,7 @@ def test_wrong_input_is_one_line_and_writes_nothing(tmp_path, capsys, arguments,
 def test_a_model_reads_the_pictures_of_the_table_of_trials_alone():
     model = VisionLanguageModelConfig(model="mine")
     recipes = {r.name: r for r in Reproduce("all", reader="vlm", vlm=model)._recipes()}
-    assert list(recipes) == [name for name in RECIPES if name != "preset"]
+    assert list(recipes) == list(RECIPES)
     assert recipes["trials"].measurement.model is model
     assert all(recipes[name] is RECIPES[name] for name in recipes if name != "trials")
     assert Reproduce("trials")._recipes() == [RECIPES["trials"]]
@@ -92,10 +92,10 @@ def test_figures_name_the_command_that_makes_them_again(tmp_path):
         assert again.goals == 7
         assert again.seeds == (0, 3)
     assert again.vlm == model
-    half = Reproduce("preset", sets=("A",))
+    half = Reproduce("variation", sets=("A",))
     assert half._scale().sets == ("A",)
-    assert half._command(RECIPES["preset"], Run(tmp_path, half._scale())) == (
-        "prior-reinforce reproduce preset --goals 100 --seeds 0 1 2 --sets A"
+    assert half._command(RECIPES["variation"], Run(tmp_path, half._scale())) == (
+        "prior-reinforce reproduce variation --goals 100 --seeds 0 1 2 --sets A"
     )
     quick = Reproduce("all", quick=True)._command(RECIPES["adapters"], Run(tmp_path, Scale()))
     assert quick == "prior-reinforce reproduce adapters --quick"

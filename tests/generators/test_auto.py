@@ -8,7 +8,6 @@ import pytest
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.generators import load_generator, make_generator
 from prior_reinforce.generators.auto import Auto
-from prior_reinforce.generators.corrected import Corrected
 from prior_reinforce.generators.diffusion import DiffusionGenerator
 from prior_reinforce.generators.interpolation import SmoothInterpolation
 from prior_reinforce.lab.tasks import make_task
@@ -41,7 +40,6 @@ def test_the_larger_pattern_is_learned_and_the_odd_ones_are_named():
 def test_patterns_too_small_to_stand_alone_go_to_diffusion(monkeypatch):
     started = []
     monkeypatch.setattr(DiffusionGenerator, "_fit", lambda self, *a: started.append(self))
-    monkeypatch.setattr(Corrected, "_fit", lambda self, d, *a: self.generator.fit(d, seed=0))
     made = Auto().fit(throws((1, -1, -1, 1, 1, -1)), seed=0)
     assert len(started) == 1
     assert made.remarks[0].startswith("generator: diffusion, since the demonstrations show ")
@@ -66,12 +64,11 @@ def test_a_large_pattern_with_outcomes_on_a_line_goes_to_diffusion_with_the_rest
     outcomes[:5, 0] = [0.7, 0.8, 0.9, 1.0, 1.1]
     outcomes[5:] = [[0.9, 0.3], [0.8, -0.3], [1.0, 0.2], [0.85, -0.2]]
     monkeypatch.setattr(DiffusionGenerator, "_fit", lambda *a: None)
-    monkeypatch.setattr(Corrected, "_fit", lambda self, d, *a: self.generator.fit(d, seed=0))
     made = Auto().fit(Demonstrations(plans, outcomes, demos.format), seed=0)
     assert made.remarks[0].startswith("generator: diffusion")
 
 
-@pytest.mark.parametrize("setting", ["timing=align", "exact=no"])
+@pytest.mark.parametrize("setting", ["timing=align", "correction=spline"])
 def test_what_it_chooses_itself_is_not_set(setting):
     with pytest.raises(ConfigurationError, match="auto chooses its timing itself"):
         make_generator(f"auto,{setting}")

@@ -32,7 +32,7 @@ def test_settings_out_of_range_are_named(wrong):
         DiffusionConfig(**wrong)
 
 
-@pytest.mark.parametrize("config", [DiffusionConfig.preset("paper"), UNetRegressionConfig()])
+@pytest.mark.parametrize("config", [DiffusionConfig.paper(), UNetRegressionConfig()])
 def test_settings_survive_json(config):
     assert build(type(config), asdict(config)) == config
 

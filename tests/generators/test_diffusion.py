@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from prior_reinforce.errors import ConfigurationError, NotFittedError
-from prior_reinforce.generators import make_generator
+from prior_reinforce.errors import NotFittedError
 from prior_reinforce.generators.config import DiffusionConfig, PerceptronSize, UNetSize
 from prior_reinforce.generators.corrected import Corrected
 from prior_reinforce.generators.diffusion import DiffusionGenerator
@@ -14,6 +13,7 @@ from prior_reinforce.generators.timed import Timed
 from prior_reinforce.plans.motions import Demonstrations
 
 SMALL = DiffusionConfig(
+    coordinates="time",
     network=UNetSize(
         widths=(32, 64), step_width=32, condition_width=32, activation="silu"
     ),
@@ -27,7 +27,7 @@ SMALL = DiffusionConfig(
 )  # fmt: skip
 
 
-FEW = replace(SMALL, training_steps=30)
+FEW = DiffusionConfig(perceptron=PerceptronSize(members=2, width=32), training_steps=30)
 """Where the correction makes exact what the network leaves."""
 
 
@@ -50,7 +50,7 @@ def test_two_demonstrations_come_back_with_the_correction(throws):
 def test_demonstrations_come_back_and_between_them_the_direction_follows_the_condition(throws):
     """The network alone, with nothing around it but timing."""
     demos = throws(4)
-    generator = Timed(DiffusionGenerator(replace(SMALL, trend="zero"))).fit(demos, seed=0)
+    generator = Timed(DiffusionGenerator(SMALL)).fit(demos, seed=0)
     assert misses(generator, demos).max() < 0.02
     middle = demos.outcomes_seen.mean(axis=0, keepdims=True)
     plan = generator.generate(middle)[0]
@@ -132,8 +132,7 @@ def test_fresh_noise_is_another_plan_of_the_same_network(throws):
 
 def test_in_the_demonstrations_span_plans_are_mixtures_and_nearest_at_their_own_outcomes(throws):
     demos = throws(4)
-    config = DiffusionConfig.preset("span")
-    config = replace(config, perceptron=PerceptronSize(width=64), training_steps=300)
+    config = DiffusionConfig(perceptron=PerceptronSize(width=64), training_steps=300)
     own = {
         steps: DiffusionGenerator(replace(config, training_steps=steps)).fit(demos, seed=0)
         for steps in (0, 300)
@@ -149,18 +148,3 @@ def test_in_the_demonstrations_span_plans_are_mixtures_and_nearest_at_their_own_
     plan = own[300].generate([[0.95, 0.1]]).reshape(-1)
     weights = np.linalg.lstsq((flat[1:] - flat[0]).T, plan - flat[0], rcond=None)[0]
     np.testing.assert_allclose(flat[0] + weights @ (flat[1:] - flat[0]), plan, atol=2e-3)
-
-
-def test_presets_and_representation_are_one_word_each():
-    paper = DiffusionGenerator(preset="paper").config
-    assert paper.network.widths == (256, 512, 1024)
-    assert (paper.representation, paper.sampler, paper.prediction) == ("frames", "ddpm", "epsilon")
-    assert (paper.learning_rate, paper.warmup_steps, paper.training_steps) == (2e-4, 500, 5000)
-    assert DiffusionGenerator(representation="frames").config.representation == "frames"
-    assert DiffusionGenerator().config == DiffusionConfig()
-    assert make_generator("diffusion-paper").config == DiffusionConfig.preset("paper")
-
-
-def test_config_and_preset_contradict_each_other():
-    with pytest.raises(ConfigurationError, match="not both"):
-        DiffusionGenerator(DiffusionConfig(), preset="paper")

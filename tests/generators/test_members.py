@@ -10,6 +10,7 @@ from prior_reinforce.errors import ConfigurationError, FileFormatError
 from prior_reinforce.generators import GENERATORS, load_generator, make_generator
 from prior_reinforce.generators.auto import Auto
 from prior_reinforce.generators.config import DiffusionConfig
+from prior_reinforce.generators.corrected import Corrected
 from prior_reinforce.generators.diffusion import DiffusionGenerator
 from prior_reinforce.generators.interpolation import NearestNeighbours
 from prior_reinforce.generators.timed import Timed
@@ -28,9 +29,7 @@ OWN = f"{__name__}:Own"
 @pytest.mark.parametrize("name", GENERATORS.members)
 def test_a_name_is_that_of_its_class(name):
     kind = GENERATORS.kind(name)
-    assert kind.name == {"diffusion-paper": "diffusion", "diffusion-span": "diffusion"}.get(
-        name, name
-    )
+    assert kind.name == {"diffusion-paper": "diffusion"}.get(name, name)
 
 
 @pytest.mark.parametrize(
@@ -39,7 +38,6 @@ def test_a_name_is_that_of_its_class(name):
         ("diffusion", "auto"),
         ("regression", "auto"),
         ("auto", None),
-        ("diffusion-span", "auto"),
         ("diffusion-paper", None),
         ("dmp", None),
         ("nearest", None),
@@ -62,22 +60,26 @@ def test_timing_of_a_choice(choice, timing):
 
 
 def test_settings_of_a_choice():
-    config = make_generator("diffusion,training_steps=7,sampler=ddim,timing=none,exact=no").config
-    assert config == DiffusionConfig(training_steps=7, sampler="ddim")
-    assert make_generator("dmp,segmented=false,exact=no").config.segmented is False
-    alone = make_generator("diffusion-span")
-    assert isinstance(alone.generator, DiffusionGenerator)  # with no correction between
-    assert (alone.generator.config.coordinates, alone.generator.config.trend) == ("span", "zero")
-    assert make_generator("diffusion-paper").config == DiffusionConfig.preset("paper")
-    assert make_generator("regression", threads=2, device="cpu").generator.generator._threads == 2
+    config = make_generator("diffusion,training_steps=7,sampler=ddpm,timing=none").config
+    assert config == DiffusionConfig(training_steps=7, sampler="ddpm")
+    assert make_generator("dmp,segmented=false").config.segmented is False
+    # What is called diffusion is a network alone: a correction has to be asked for.
+    assert isinstance(make_generator("diffusion").generator, DiffusionGenerator)
+    assert isinstance(make_generator("diffusion,correction=spline").generator, Corrected)
+    paper = make_generator("diffusion-paper").config
+    assert paper == DiffusionConfig.paper()
+    assert (paper.network.widths, paper.coordinates) == ((256, 512, 1024), "time")
+    assert (paper.representation, paper.sampler, paper.prediction) == ("frames", "ddpm", "epsilon")
+    assert (paper.learning_rate, paper.warmup_steps, paper.training_steps) == (2e-4, 500, 5000)
+    assert make_generator("regression", threads=2, device="cpu").generator._threads == 2
 
 
 @pytest.mark.parametrize(
     ("choice", "named"),
     [
-        ("difusion", "known are auto, diffusion, diffusion-span"),
+        ("difusion", "known are auto, diffusion, diffusion-paper"),
         ("nearest,timing=late", "late"),
-        ("nearest,exact=perhaps", "exact must be yes or no"),
+        ("nearest,correction=perhaps", "correction must be spline or none"),
         ("nearest,speed=3", "speed"),
         ("diffusion,training_steps=-1", "training_steps"),
         ("prior_reinforce.lab.tasks:make_task", "must derive from"),

@@ -23,13 +23,13 @@ from prior_reinforce.generators.unet import ConditionalUNet
 TINY = UNetSize(widths=(8, 16), groups=2, step_width=8, condition_width=16)
 THIN = PerceptronSize(members=2, width=16, depth=1, step_width=8)
 MEMBERS = [
-    lambda **how: DiffusionGenerator(DiffusionConfig(network=TINY, training_steps=2), **how),
     lambda **how: DiffusionGenerator(
-        DiffusionConfig(coordinates="span", trend="zero", perceptron=THIN, training_steps=2), **how
+        DiffusionConfig(coordinates="time", network=TINY, training_steps=2), **how
     ),
+    lambda **how: DiffusionGenerator(DiffusionConfig(perceptron=THIN, training_steps=2), **how),
     lambda **how: UNetRegression(UNetRegressionConfig(network=TINY, training_steps=2), **how),
 ]
-each = pytest.mark.parametrize("make", MEMBERS, ids=["diffusion", "span", "regression"])
+each = pytest.mark.parametrize("make", MEMBERS, ids=["time", "span", "regression"])
 
 
 @each

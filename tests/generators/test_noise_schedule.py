@@ -1,13 +1,12 @@
 """The schedule against its closed form; the steps against worked values and exact recovery."""
 
-import itertools
 import math
 
 import numpy as np
 import pytest
 import torch
 
-from prior_reinforce.generators.noise_schedule import NoiseSchedule, inference_steps
+from prior_reinforce.generators.noise_schedule import NoiseSchedule
 
 SCHEDULE = NoiseSchedule.squared_cosine(100)
 
@@ -38,15 +37,6 @@ def test_ddpm_step_worked_by_hand():
     assert schedule.ddpm_step(noisy, clean, 0, noise).item() == pytest.approx(1.0, abs=1e-12)
 
 
-def test_ddim_step_worked_by_hand():
-    # x_1 = 2, x_0 = 1, abar_1 = 0.5: noise (2 - .707107) / .707107 = 1.828427;
-    # x_0' = sqrt(.8) + sqrt(.2) * 1.828427 = 1.712125.
-    schedule = NoiseSchedule(torch.tensor([0.8, 0.5], dtype=torch.float64))
-    noisy, clean = torch.full((1, 1, 1), 2.0).double(), torch.full((1, 1, 1), 1.0).double()
-    assert schedule.ddim_step(noisy, clean, 1, 0).item() == pytest.approx(1.712125, abs=1e-6)
-    assert schedule.ddim_step(noisy, clean, 1, -1).item() == pytest.approx(1.0, abs=1e-12)
-
-
 @pytest.mark.parametrize("prediction", ["epsilon", "v", "sample"])
 @pytest.mark.parametrize("step", [0, 40, 95])
 def test_a_perfect_prediction_gives_back_the_clean_sample(prediction, step):
@@ -60,13 +50,6 @@ def test_a_perfect_prediction_gives_back_the_clean_sample(prediction, step):
     torch.testing.assert_close(estimate, clean, atol=1e-9, rtol=0)
 
 
-def test_ddim_along_a_perfect_prediction_keeps_the_noise_direction():
-    rng = torch.Generator().manual_seed(1)
-    clean, noise = (torch.randn((1, 2, 4), generator=rng, dtype=torch.float64) for _ in range(2))
-    at = [SCHEDULE.add_noise(clean, noise, torch.tensor([step])) for step in (80, 30)]
-    torch.testing.assert_close(SCHEDULE.ddim_step(at[0], clean, 80, 30), at[1])
-
-
 def test_ddpm_steps_have_the_marginals_of_the_forward_process():
     # From x_t of the forward process, one exact reverse step has x_{t-1}'s mean and variance.
     rng = torch.Generator().manual_seed(2)
@@ -77,15 +60,6 @@ def test_ddpm_steps_have_the_marginals_of_the_forward_process():
     signal = SCHEDULE.signal_at(59)
     assert stepped.mean().item() == pytest.approx(math.sqrt(signal) * 0.7, abs=0.01)
     assert stepped.var().item() == pytest.approx(1 - signal, rel=0.01)
-
-
-@pytest.mark.parametrize("n", [1, 2, 10, 100])
-def test_sampling_visits_falling_levels_from_the_noisiest(n):
-    steps = inference_steps(100, n)
-    assert len(steps) == n
-    assert steps[0] == 99
-    assert all(a > b for a, b in itertools.pairwise(steps))
-    assert n == 1 or steps[-1] == 0
 
 
 def test_a_prediction_that_does_not_exist_is_never_taken_for_another():

@@ -1,4 +1,4 @@
-"""The generator that demonstrations ask for: closed form, or diffusion where patterns are mixed.
+"""The generator that demonstrations ask for: closed form, or a network where patterns are mixed.
 
 One motion pattern is learned in closed form, in about a second: plans are mixed by a spline over
 outcomes (`plans.outcome_weights`), timing apart (`timing_evidence`). Because the weights reproduce
@@ -19,7 +19,6 @@ from typing import Any, ClassVar
 from prior_reinforce.arrays import Plans, Points
 from prior_reinforce.errors import InvalidDemonstrationsError
 from prior_reinforce.generators.base import Generator, Report
-from prior_reinforce.generators.corrected import Corrected
 from prior_reinforce.generators.diffusion import DiffusionGenerator
 from prior_reinforce.generators.interpolation import SmoothInterpolation
 from prior_reinforce.generators.patterns import patterns
@@ -66,7 +65,7 @@ class Auto(Wrapper):
             with suppress(InvalidDemonstrationsError):  # its outcomes may lie on a line
                 learned = demonstrations.only(largest)
         if learned is None:
-            self.generator = Timed(Corrected(DiffusionGenerator(**self._network)))
+            self.generator = Timed(DiffusionGenerator(**self._network))
             learned = demonstrations
             remark = (
                 f"generator: diffusion, since the demonstrations show {len(groups)} patterns that "

@@ -14,11 +14,10 @@ from prior_reinforce.registry import build
 from prior_reinforce.settings import Checked, Count, NonNegative, Positive
 
 Activation = Literal["mish", "silu"]
-Preset = Literal["laptop", "span", "paper"]
 Prediction = Literal["epsilon", "v", "sample"]
 """What the network predicts from x_t: the noise, the velocity of Salimans and Ho (2022,
 "Progressive Distillation for Fast Sampling of Diffusion Models"), or the clean sample."""
-Sampler = Literal["mean_shift", "ddim", "ddpm"]
+Sampler = Literal["mean_shift", "ddpm"]
 
 
 @dataclass(frozen=True)
@@ -78,7 +77,7 @@ def _laptop() -> UNetSize:
 
 @dataclass(frozen=True)
 class UNetConfig(Checked):
-    """What all generators with a U-Net are set by; the defaults are sized for a laptop."""
+    """What all generators with a network are set by; the defaults are sized for a laptop."""
 
     representation: Representation = "splines"
     """Code plans by spline control points where they fit, or by raw frames."""
@@ -86,10 +85,8 @@ class UNetConfig(Checked):
     """Frames for each spline control point."""
     margin: NonNegative = 0.05
     """How far plans may leave the demonstrated range of a dimension, as a fraction of it."""
-    trend: Literal["affine", "zero"] = "affine"
-    """The network learns what an affine function of the outcome leaves of codes, or all of them."""
     network: UNetSize = field(default_factory=_laptop)
-    """Size of the U-Net."""
+    """Size of the U-Net, where it is one."""
     training_steps: Annotated[int, msgspec.Meta(ge=0)] = 500
     """Optimiser steps. 0 is the control: a network that has learned nothing."""
     learning_rate: Positive = 1e-3
@@ -100,18 +97,10 @@ class UNetConfig(Checked):
     """Of AdamW."""
 
 
-SPAN: dict[str, Any] = {
-    "coordinates": "span",
-    "trend": "zero",
-    "training_steps": 1500,
-    "batch_size": 48,
-    "sampling_steps": 3,
-}
-"""A network on its own feet, `diffusion-span`: with no trend, and a correction only if chosen."""
 PAPER: dict[str, Any] = {
+    "coordinates": "time",
     "representation": "frames",
     "margin": 0.0,
-    "trend": "zero",
     "network": {},  # the reference's
     "prediction": "epsilon",
     "sampler": "ddpm",
@@ -124,7 +113,7 @@ PAPER: dict[str, Any] = {
     "warmup_steps": 500,
     "ema_limit": 0.9999,
 }
-"""Where the paper's settings differ from the laptop's.
+"""Where the paper's settings differ from the defaults.
 
 Diffusion Policy's published low-dimensional training ([Chi2023] in docs/references.md) with the
 paper's learning rate: raw frames, widths 256, 512 and 1024, AdamW, cosine with 500 steps of
@@ -135,30 +124,32 @@ are fewer than its 256; its 5,000 epochs so are 5,000 steps.
 
 @dataclass(frozen=True)
 class DiffusionConfig(UNetConfig):
-    """Everything that decides what `DiffusionGenerator` learns; the defaults are the laptop's.
+    """Everything that decides what `DiffusionGenerator` learns; the defaults suit a laptop.
 
     docs/decisions-generator.md tells what was tried for each, with figures.
     """
 
-    coordinates: Literal["span", "time"] = "time"
+    coordinates: Literal["span", "time"] = "span"
     """What is denoised: coordinates of plans in the space that the demonstrations span (`span`), by
     a perceptron; or their codes over time, by the U-Net, as in the paper."""
     perceptron: PerceptronSize = field(default_factory=PerceptronSize)
     """Size of the perceptron."""
+    training_steps: Annotated[int, msgspec.Meta(ge=0)] = 1500
+    """Optimiser steps. 0 is the control: a network that has learned nothing."""
     prediction: Prediction = "v"
     """What the network predicts."""
     noise_levels: Count = 100
     """T, steps of the squared-cosine noise schedule."""
     sampler: Sampler = "mean_shift"
     """How codes are generated, see `denoiser`."""
-    sampling_steps: Count = 6
-    """Noise levels visited by mean shift or DDIM; DDPM visits all."""
+    sampling_steps: Count = 3
+    """Noise levels visited by mean shift; DDPM visits all."""
     noise_draws: Annotated[int, msgspec.Meta(ge=2, multiple_of=2)] = 8
     """K, noise draws over which a step of mean shift averages; even: a draw and its opposite."""
     shared_noise: bool = True
     """All conditions share what noise a sampler draws, so that near conditions have near plans; if
     not, each has its own, as where plans are sampled at random."""
-    batch_size: Count = 24
+    batch_size: Count = 48
     """Samples a step, at least one of each demonstration where there is room."""
     fill_batch: bool = True
     """Repeat demonstrations, at other noise levels, until the batch is full."""
@@ -185,16 +176,9 @@ class DiffusionConfig(UNetConfig):
             )
 
     @classmethod
-    def preset(cls, name: Preset) -> Self:
-        """Return the settings of that name: `laptop`, the default, `span` or `paper`.
-
-        Raises:
-            ConfigurationError: There is no such preset.
-        """
-        presets: dict[str, dict[str, Any]] = {"laptop": {}, "span": SPAN, "paper": PAPER}
-        if name not in presets:
-            raise ConfigurationError(f"no preset {name!r}; use one of {', '.join(presets)}")
-        made: Self = build(cls, presets[name])
+    def paper(cls) -> Self:
+        """Return the settings of `diffusion-paper`, our reading of the paper's."""
+        made: Self = build(cls, PAPER)
         return made
 
 

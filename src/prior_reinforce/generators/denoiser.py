@@ -1,4 +1,4 @@
-"""The denoising network, trained on a handful of codes, and three ways to run it.
+"""The denoising network, trained on a handful of codes, and two ways to run it.
 
 The adapter needs the same plan for the same condition, and near plans for near conditions. So
 noise comes from the fit's seed and is shared by all conditions. With `shared_noise=False` each has
@@ -20,11 +20,7 @@ from jaxtyping import Float, Int
 
 from prior_reinforce.generators.base import Report
 from prior_reinforce.generators.config import DiffusionConfig
-from prior_reinforce.generators.noise_schedule import (
-    NoiseSchedule,
-    inference_steps,
-    mean_shift_levels,
-)
+from prior_reinforce.generators.noise_schedule import NoiseSchedule, mean_shift_levels
 from prior_reinforce.generators.threads import torch
 from prior_reinforce.generators.training import Network, optimise
 
@@ -209,16 +205,6 @@ def _mean_shift(denoiser: _Denoiser) -> torch.Tensor:
     return x
 
 
-def _ddim(denoiser: _Denoiser) -> torch.Tensor:
-    """DDIM [Song2021] from x_T = 0, the mean of the latents."""
-    config = denoiser.config
-    steps = inference_steps(config.noise_levels, config.sampling_steps)
-    x = denoiser.mean()
-    for step, next_step in zip(steps, (*steps[1:], -1), strict=True):
-        x = denoiser.schedule.ddim_step(x, denoiser.clean(x, step), step, next_step)
-    return x
-
-
 def _ddpm(denoiser: _Denoiser) -> torch.Tensor:
     """DDPM [Ho2020] over all levels, as the paper samples."""
     x = denoiser.noise(1)[:, 0]
@@ -230,6 +216,5 @@ def _ddpm(denoiser: _Denoiser) -> torch.Tensor:
 
 _SAMPLERS: dict[str, Callable[[_Denoiser], torch.Tensor]] = {
     "mean_shift": _mean_shift,
-    "ddim": _ddim,
     "ddpm": _ddpm,
 }

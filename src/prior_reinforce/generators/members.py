@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 from prior_reinforce.errors import ConfigurationError, FileFormatError
-from prior_reinforce.generators.config import PAPER, SPAN
+from prior_reinforce.generators.config import PAPER
 from prior_reinforce.generators.saving import SavedLayer, read_model
 from prior_reinforce.registry import Member, Registry, parse_choice
 
@@ -22,12 +22,11 @@ if TYPE_CHECKING:
 
 _HERE = "prior_reinforce.generators"
 _BASE = f"{_HERE}.base:Generator"
-_TIMED_BY_DEFAULT = ("diffusion", "diffusion-span", "regression", "interpolation")
-_EXACT_BY_DEFAULT = ("diffusion", "regression", "dmp")
+_TIMED_BY_DEFAULT = ("diffusion", "regression", "interpolation")
 
 
 class GeneratorRegistry(Registry["Generator"]):
-    """All generators; each can be chosen with `timing` and `exact`, which wrap it."""
+    """All generators; each can be chosen with `timing` and `correction`, which wrap it."""
 
     @property
     def help(self) -> str:
@@ -36,9 +35,8 @@ class GeneratorRegistry(Registry["Generator"]):
             f"{super().help}; each but auto also with timing=start or tempo (learn when and "
             "how fast a motion runs apart from its shape), timing=auto (what the demonstrations "
             "ask for), timing=align (align the demonstrations first) or timing=none, and with "
-            "exact=yes (demonstrations come back as recorded) or exact=no; default: timing=auto "
-            f"for {' and '.join(_TIMED_BY_DEFAULT)}, "
-            f"exact=yes for {' and '.join(_EXACT_BY_DEFAULT)}"
+            "correction=spline (what it misses at the demonstrations is interpolated in closed "
+            f"form and added); default: timing=auto for {' and '.join(_TIMED_BY_DEFAULT)}"
         )
 
     def make(self, choice: str, **context: Any) -> Generator:
@@ -49,25 +47,25 @@ class GeneratorRegistry(Registry["Generator"]):
             context: `device`, `threads` and `states`, for those that take them.
 
         Raises:
-            ConfigurationError: Also where `exact` is neither yes nor no, or another device is asked
+            ConfigurationError: Also where there is no such `correction`, or another device is asked
                 for than the generator computes on.
         """
         name, settings = parse_choice(choice)
         device = context.get("device", "cpu")
         if device != "cpu" and "device" not in inspect.signature(self.kind(name)).parameters:
             raise ConfigurationError(f"{name} computes on the CPU, not on device {device!r}")
-        if name == "auto" and settings.keys() & {"timing", "exact"}:
+        if name == "auto" and settings.keys() & {"timing", "correction"}:
             raise ConfigurationError(
-                "auto chooses its timing itself, and is exact; name the generator that is to have "
-                "another, for instance interpolation,timing=align"
+                "auto chooses its timing itself, and corrects nothing; name the generator that is "
+                "to have another, for instance interpolation,timing=align"
             )
         timing = settings.pop("timing", "auto" if name in _TIMED_BY_DEFAULT else "none")
-        exact = settings.pop("exact", "yes" if name in _EXACT_BY_DEFAULT else "no")
-        if exact not in ("yes", "no"):
-            raise ConfigurationError(f"exact must be yes or no, got {exact!r}")
+        correction = settings.pop("correction", "none")
+        if correction not in ("spline", "none"):
+            raise ConfigurationError(f"correction must be spline or none, got {correction!r}")
         plain = ",".join([name, *(f"{key}={value}" for key, value in settings.items())])
         generator = super().make(plain, **context)
-        if exact == "yes":
+        if correction == "spline":
             generator = WRAPPERS.wrap("corrected", generator)
         return generator if timing == "none" else WRAPPERS.wrap("timed", generator, timing)
 
@@ -91,23 +89,20 @@ GENERATORS = GeneratorRegistry(
     _BASE,
     {
         "auto": Member(
-            f"{_HERE}.auto:Auto", "what the demonstrations ask for: closed form, or diffusion"
+            f"{_HERE}.auto:Auto", "what the demonstrations ask for: closed form, or a network"
         ),
         "diffusion": Member(
             f"{_HERE}.diffusion:DiffusionGenerator",
-            "a spline, plus a diffusion network's deviation from it",
-        ),
-        "diffusion-span": Member(
-            f"{_HERE}.diffusion:DiffusionGenerator",
-            "mixtures of demonstrations, by a network alone",
-            SPAN,
+            "a network alone, which denoises mixtures of demonstrations",
         ),
         "diffusion-paper": Member(
             f"{_HERE}.diffusion:DiffusionGenerator",
-            "a network alone, our reading of the paper's",
+            "a network alone, our reading of the paper's, on whole plans",
             PAPER,
         ),
-        "regression": Member(f"{_HERE}.regression:UNetRegression", "the same network, supervised"),
+        "regression": Member(
+            f"{_HERE}.regression:UNetRegression", "a network like the paper's, supervised"
+        ),
         "dmp": Member(f"{_HERE}.dmp:DynamicMovementPrimitives", "dynamic movement primitives"),
         "nearest": Member(
             f"{_HERE}.interpolation:NearestNeighbours", "nearest demonstrations, mixed"
@@ -122,7 +117,7 @@ WRAPPERS = _Wrappers(
     _BASE,
     {
         "timed": Member(f"{_HERE}.timed:Timed", "timing apart from shape"),
-        "corrected": Member(f"{_HERE}.corrected:Corrected", "exact at the demonstrations"),
+        "corrected": Member(f"{_HERE}.corrected:Corrected", "a spline corrects it"),
     },
 )
 make_generator = GENERATORS.make

@@ -25,7 +25,6 @@ from prior_reinforce.generators.base import ConditionScale, Generator, Report
 from prior_reinforce.generators.config import UNetConfig
 from prior_reinforce.generators.saving import Tensors
 from prior_reinforce.generators.span import Span
-from prior_reinforce.generators.trend import AffineTrend
 from prior_reinforce.plans.codec import PlanCodec
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.registry import build
@@ -44,9 +43,8 @@ class Learned:
 
     codec: PlanCodec
     scale: ConditionScale
-    trend: AffineTrend
     span: Span | None
-    """The space in which what the trend leaves has coordinates; None: the network makes codes."""
+    """The space in which codes have coordinates; None: the network makes codes themselves."""
     network: nn.Module
     """In evaluation mode, on the device to compute on."""
     seed: int
@@ -109,11 +107,11 @@ class NetworkGenerator(Generator):
         progress: Report,
         state: Path | None,
     ) -> nn.Module:
-        """Fit the network to what the trend leaves of codes (N, C, T), and conditions (N, k)."""
+        """Fit the network to codes (N, C, T) and conditions (N, k)."""
 
     @abstractmethod
     def _codes(self, learned: Learned, conditions: Tensor) -> Tensor:
-        """Make what the trend leaves of codes (n, C, T) for scaled conditions (n, k)."""
+        """Make codes (n, C, T) for scaled conditions (n, k)."""
 
     def _fit(self, demonstrations: Demonstrations, seed: int, progress: Report) -> None:
         from prior_reinforce.generators.threads import torch_threads
@@ -130,25 +128,20 @@ class NetworkGenerator(Generator):
         scale = ConditionScale.fit(outcomes)
         scaled, codes = scale.scale(outcomes), codec.encode(demonstrations.plans)
         shape = codec.channels, codec.length, outcomes.shape[1]
-        if self.config.trend == "affine":
-            trend = AffineTrend.fit(scaled, codes)
-        else:
-            trend = AffineTrend.zero(outcomes.shape[1], codec.channels, codec.length)
-        residuals = trend.remove(scaled, codes)
-        span = Span.fit(residuals) if self._in_span else None
+        span = Span.fit(codes) if self._in_span else None
         if span is not None:
-            residuals = span.encode(residuals)
-            shape = residuals.shape[1], 1, shape[2]
+            codes = span.encode(codes)
+            shape = codes.shape[1], 1, shape[2]
         state = None
         if self._states is not None:
             told = json.dumps([self.name, asdict(self.config), seed]).encode()
-            known = sha256(told + residuals.tobytes() + scaled.tobytes())
+            known = sha256(told + codes.tobytes() + scaled.tobytes())
             self._states.mkdir(parents=True, exist_ok=True)
             state = self._states / f"{known[:16]}.safetensors"
         with torch_threads(self._threads):
             network = self._train(
                 build(lambda: self._build(*shape), seed).to(self._device),
-                self._tensor(residuals),
+                self._tensor(codes),
                 self._tensor(scaled),
                 seed,
                 progress,
@@ -156,7 +149,7 @@ class NetworkGenerator(Generator):
             )
         if state is not None:
             state.unlink(missing_ok=True)
-        self._learned = Learned(codec, scale, trend, span, network, seed)
+        self._learned = Learned(codec, scale, span, network, seed)
 
     def _generate(self, conditions: Points) -> Plans:
         from prior_reinforce.generators.threads import torch, torch_threads
@@ -169,10 +162,10 @@ class NetworkGenerator(Generator):
         with torch_threads(1), torch.no_grad():
             for first in range(0, len(scaled), _CHUNK):
                 chunk = scaled[first : first + _CHUNK]
-                residuals = self._codes(learned, self._tensor(chunk)).double().cpu().numpy()
+                codes = self._codes(learned, self._tensor(chunk)).double().cpu().numpy()
                 if learned.span is not None:
-                    residuals = learned.span.decode(residuals)
-                plans.append(codec.decode(learned.trend.restore(chunk, residuals)))
+                    codes = learned.span.decode(codes)
+                plans.append(codec.decode(codes))
         return np.concatenate(plans)
 
     def state(self) -> tuple[dict[str, Any], Tensors]:
@@ -191,8 +184,6 @@ class NetworkGenerator(Generator):
                 "plan_range": learned.codec.plan_range,
                 "code_range": learned.codec.code_range,
                 "condition_range": learned.scale.range,
-                "trend": learned.trend.coefficients,
-                "trend_scale": learned.trend.scale,
                 **({} if learned.span is None else vars(learned.span)),
             },
         )
@@ -206,7 +197,6 @@ class NetworkGenerator(Generator):
         generator = cls(build(cls.config_type, settings["config"]))
         codec = PlanCodec.restore(settings["codec"], tensors["plan_range"], tensors["code_range"])
         scale = ConditionScale(tensors["condition_range"])
-        trend = AffineTrend(tensors["trend"], tensors["trend_scale"])
         shape = codec.channels, codec.length, scale.range.shape[1]
         span = None
         if generator._in_span:
@@ -220,7 +210,7 @@ class NetworkGenerator(Generator):
         }
         network.load_state_dict(weights)  # refuses missing, unknown and misshapen tensors
         network.eval().requires_grad_(False)
-        generator._learned = Learned(codec, scale, trend, span, network, int(settings["seed"]))
+        generator._learned = Learned(codec, scale, span, network, int(settings["seed"]))
         return generator
 
     def to(self, device: str) -> Self:

@@ -1,8 +1,7 @@
 """The forward noising process of diffusion, and the steps that undo it.
 
-Notation (Ho et al. 2020, "Denoising Diffusion Probabilistic Models"; Song et al. 2021, "Denoising
-Diffusion Implicit Models"): step t counts 0 ... T-1, x_t = sqrt(abar_t) x_0 + sqrt(1 - abar_t) eps,
-and abar_{-1} = 1 is the clean sample.
+Notation (Ho et al. 2020, "Denoising Diffusion Probabilistic Models"): step t counts 0 ... T-1,
+x_t = sqrt(abar_t) x_0 + sqrt(1 - abar_t) eps, and abar_{-1} = 1 is the clean sample.
 """
 
 from __future__ import annotations
@@ -83,15 +82,6 @@ class NoiseSchedule:
             return (noisy - add * predicted) / keep
         assert_never(prediction)
 
-    def ddim_step(self, noisy: Codes, clean: Codes, step: int, next_step: int) -> Codes:
-        """Go from x_t to x_s, s < t, without fresh noise (Song et al., equation 12, sigma = 0).
-
-        The noise direction is recomputed from the (clipped) estimate of x_0; s = -1 gives that.
-        """
-        signal, next_signal = self.signal_at(step), self.signal_at(next_step)
-        noise = (noisy - math.sqrt(signal) * clean) / math.sqrt(1 - signal)
-        return math.sqrt(next_signal) * clean + math.sqrt(1 - next_signal) * noise
-
     def ddpm_step(
         self, noisy: Codes, clean: Codes, step: int, noise: Float[torch.Tensor, "#B C T"]
     ) -> Codes:
@@ -116,17 +106,6 @@ class NoiseSchedule:
     ) -> tuple[Float[torch.Tensor, "B 1 1"], Float[torch.Tensor, "B 1 1"]]:
         signal = self.signal.to(steps.device)[steps].view(-1, 1, 1)
         return signal.sqrt().to(like.dtype), (1 - signal).sqrt().to(like.dtype)
-
-
-def inference_steps(n_training_steps: int, n_inference_steps: int) -> tuple[int, ...]:
-    """The noise levels visited while sampling, falling from T-1 to 0 in even strides.
-
-    Ours: both ends are always visited, so that sampling starts where training's noise ends.
-    """
-    if n_inference_steps == 1:
-        return (n_training_steps - 1,)
-    top = n_training_steps - 1
-    return tuple(round(top * (1 - i / (n_inference_steps - 1))) for i in range(n_inference_steps))
 
 
 def mean_shift_levels(n_training_steps: int, n_levels: int) -> tuple[int, ...]:

@@ -39,7 +39,7 @@ class _Config(msgspec.Struct):
     layers: Annotated[list[_LayerConfig], msgspec.Meta(min_length=1)]
     tensors_sha256: str
     file_format: Literal["prior-reinforce generator"] = "prior-reinforce generator"
-    version: Literal[5] = 5
+    version: Literal[6] = 6
 
 
 @dataclass(frozen=True)

@@ -13,9 +13,6 @@ _NETWORK = {"widths": (8, 16), "groups": 2, "step_width": 8, "condition_width": 
 
 TINY: Mapping[str, Mapping[str, Any]] = {
     "diffusion": {
-        "network": _NETWORK, "training_steps": 8, "warmup_steps": 2, "sampling_steps": 3,
-    },
-    "diffusion-span": {
         "perceptron": {"members": 2, "width": 16, "depth": 1, "step_width": 8}, "training_steps": 8,
         "warmup_steps": 2, "sampling_steps": 3,
     },

@@ -30,7 +30,8 @@ class Section:
 
     recipe: Recipe
     made_by: str
-    """The command with its scale, the code that ran it, and its version, in one line."""
+    """The command with its scale, the code that ran it, and its version, in one line; and a note
+    where what it measured is called otherwise now."""
     table: Table
     claims: list[Claim]
     remarks: list[str]
@@ -109,6 +110,7 @@ def _made_by(figures: Figures) -> str:
     return (
         f"{figures['command']}; goals of seed {figures['goal_seed']}; version "
         f"{figures['version']}, commit {figures['commit']}"
+        + (f". {figures['note']}" if "note" in figures else "")
     )
 
 

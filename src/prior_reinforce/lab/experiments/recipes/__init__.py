@@ -10,7 +10,6 @@ from prior_reinforce.lab.experiments.recipes import (
     alignment,
     displacement,
     generators,
-    preset,
     process,
     robustness,
     trials,
@@ -40,7 +39,6 @@ RECIPES: Mapping[str, Recipe] = {
         adaptation,
         robustness,
         variation,
-        preset,
     )
 }
 """Every recipe by its name, in the order of the evidence page."""

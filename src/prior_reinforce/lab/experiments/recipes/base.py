@@ -174,8 +174,6 @@ class Recipe:
     """Says in sentences what was measured besides the claims and must not be missed."""
     family: Family | None = None
     """Which family's members `--include` puts beside ours; None where none can join."""
-    by_name_only: bool = False
-    """It takes hours to learn, so that `reproduce all` leaves it out."""
 
     def joining(self, include: Sequence[str]) -> tuple[str, ...]:
         """Which of some choices belong to the family that is compared here.

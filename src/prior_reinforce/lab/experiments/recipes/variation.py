@@ -22,14 +22,13 @@ from prior_reinforce.lab.experiments.recipes.base import (
     Scale,
     Table,
 )
-from prior_reinforce.lab.experiments.recipes.generators import WHOLE_PLANS
 from prior_reinforce.lab.experiments.statistics import bootstrap_mean, trials_counted
 
 GENERATORS = (
     ("auto", "auto"),
     ("diffusion", "diffusion"),
     ("aligned thin-plate spline", "interpolation,kernel=thin-plate,timing=align"),
-    ("diffusion on whole plans", WHOLE_PLANS),
+    ("diffusion, untrained", "diffusion,training_steps=0"),
 )
 """What is compared is called, and its choice."""
 TASKS = ("zoo-drag", "zoo-hoop", "zoo-arrival", "zoo-curl")
