@@ -4,8 +4,8 @@
     python benchmarks/learning_curve.py OUT --widths 256,512,1024 --steps 20000 --device cuda
     python benchmarks/learning_curve.py OUT --only-table
 
-Paper's form: raw frames, noise predicted, 100-step DDPM, no timing, no trend, no correction
-(`DiffusionConfig.preset("paper")`, with SiLU and other widths). Each number of steps is a training
+Paper's form: raw frames, noise predicted, 100-step DDPM, no timing, no correction
+(`diffusion-paper`, with SiLU and other widths). Each number of steps is a training
 of its own, since the learning rate falls to 0 along a cosine: a snapshot of a longer training is
 not what somebody gets who trains for so long. Trainings keep their state every minute, and models
 and figures are kept in OUT, so that a run that was stopped goes on where it was.
@@ -105,7 +105,7 @@ def train(
     folder = out / f"{name}-{'-'.join(map(str, widths))}-{steps}-{seed}"
     if not (folder / "training.json").exists():
         config = replace(
-            DiffusionConfig.preset("paper"),
+            DiffusionConfig.paper(),
             network=UNetSize(widths=widths, activation="silu"),
             training_steps=steps,
         )

@@ -30,7 +30,7 @@ def main() -> None:
     task = BasketballShot()
     demos = task.demonstrations(arguments.set)
 
-    default, paper = DiffusionConfig(), DiffusionConfig.preset("paper")
+    default, paper = DiffusionConfig(), DiffusionConfig.paper()
     choices = {
         f"default, {default.sampler} {default.sampling_steps}": "diffusion",
         f"default's network, ddpm {default.noise_levels}": "diffusion,sampler=ddpm",

@@ -71,7 +71,7 @@ def main() -> None:
     parser.add_argument("--paper-full", action="store_true")
     arguments = parser.parse_args()
     demos = BasketballShot().demonstrations(arguments.set)
-    default, paper = DiffusionConfig(), DiffusionConfig.preset("paper")
+    default, paper = DiffusionConfig(), DiffusionConfig.paper()
     run = {"seed": arguments.seed, "threads": arguments.threads}
 
     ours: list[float] = []

@@ -2,7 +2,7 @@
 
     python examples/ten_lines.py
 
-As the README's ten lines, but with `diffusion`, which takes about a minute to learn, an eye that
+As the README's ten lines, but with `diffusion`, which takes half a minute to learn, an eye that
 rounds what it sees, and options.
 """
 

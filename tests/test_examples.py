@@ -71,10 +71,15 @@ def test_own_task_is_learned(printed):
     assert by_round[-1] >= 80
 
 
-def test_ten_lines_reach_a_goal_even_with_a_network_that_learned_next_to_nothing(printed):
-    status, text = printed("ten_lines", "--training-steps", "2")  # trend and correction are exact
+def test_ten_lines_reach_a_goal_with_a_network_that_has_learned_and_not_with_one_that_has_not(
+    printed,
+):
+    status, text = printed("ten_lines", "--training-steps", "200")
     assert status == 0
     assert re.search(r"^reached, N = 6 demonstrations \+ [1-3] throws$", text, re.MULTILINE)
+    status, text = printed("ten_lines", "--training-steps", "0", "--rounds", "4")
+    assert status == 1
+    assert text.endswith("not reached, N = 6 demonstrations + 4 throws\n")
 
 
 @pytest.mark.filterwarnings("ignore:goal .* outside")

@@ -34,14 +34,16 @@ def learn(tmp_path, capsys):
 def test_the_timing_that_was_chosen_is_told_in_a_line_and_kept(learn, generator, frames):
     told, model = learn("--generator", generator, frames=frames)
     assert "timing: when to start is learned apart from how to move" in " ".join(told.split())
-    assert len(model.remarks) == 1
+    assert [remark.partition(":")[0] for remark in model.remarks] == (
+        ["timing", "network"] if "diffusion" in generator else ["timing"]
+    )
 
 
 @pytest.mark.parametrize("generator", [f"diffusion,{TINY},timing=none", "nearest"])
 def test_nothing_is_told_where_nothing_was_chosen(learn, generator):
     told, model = learn("--generator", generator, frames=80)
     assert "timing" not in told
-    assert model.remarks == ()
+    assert all(remark.startswith("network: ") for remark in model.remarks)
 
 
 def test_by_default_the_generator_is_chosen_and_told(learn):

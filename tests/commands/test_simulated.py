@@ -64,6 +64,19 @@ def typed(monkeypatch):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("steps", [250, 0])
+def test_the_demo_says_what_the_network_learned_and_needs_it(tmp_path, capsys, steps):
+    """Nothing else reaches the goals: with an untrained network in its place the demo fails."""
+    choice = f"diffusion,training_steps={steps}"
+    arguments = ["demo", "--goals", "2", "--generator", choice, "--no-film", "--out"]
+    assert main([*arguments, str(tmp_path / "demo")]) == (0 if steps else 1)
+    (line,) = re.findall(r"learned: .*", capsys.readouterr().out.replace("\n", " "))
+    missed, untrained = (float(x) for x in re.findall(r"by ([\d.]+)%", line))
+    assert untrained > 80  # percent of how the demonstrations differ
+    assert missed < untrained / 2 if steps else missed == untrained
+
+
+@pytest.mark.slow
 def test_what_the_demo_learned_serves_adapt_together_with_what_it_saw(tmp_path, capsys):
     folder = tmp_path / "demo"
     quick = ["--generator", "nearest", "--no-film", "--out"]

@@ -72,7 +72,9 @@ class Plain(Wrapper):
 def test_remarks_of_what_is_wrapped_are_never_lost():
     wrapped = Plain(Corrected(Remarking()))
     for _ in range(2):
-        assert wrapped.fit(demonstrations(), seed=0).remarks == ("4 demonstrations",)
+        correction, inner = wrapped.fit(demonstrations(), seed=0).remarks
+        assert correction.startswith("correction")
+        assert inner == "4 demonstrations"
     timed = Timed(wrapped, "auto").fit(demonstrations(), seed=0)
     assert timed.remarks[0].startswith("timing")
-    assert timed.remarks[1:] == ("4 demonstrations",)
+    assert timed.remarks[1:] == (correction, inner)

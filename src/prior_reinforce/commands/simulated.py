@@ -85,8 +85,7 @@ def learn(
 
     with fit_progress(console) as progress:
         generator = generator.fit(demonstrations, seed=seed, progress=progress)
-    for remark in generator.remarks:
-        say(console, remark)
+    say(console, f"learned: {'; '.join(generator.remarks) or 'in closed form'}")
     save_learned(folder, generator, demonstrations, seed)
     return generator
 

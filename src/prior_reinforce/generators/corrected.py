@@ -51,6 +51,10 @@ class Corrected(Wrapper):
         missed[:, :, switches] = 0.0
         without_numbers = replace(demonstrations.format, per_plan=())  # which may not be constant
         self._residual.fit(demonstrations.with_plans(missed, without_numbers), seed=seed)
+        self.remarks = (
+            "correction: a closed-form spline adds what is missed at the demonstrations, so plans "
+            "are exact there whatever was learned",
+        )
 
     def _generate(self, conditions: Points) -> Plans:
         return self.generator.generate(conditions) + self._residual.generate(conditions)
