@@ -48,7 +48,7 @@ $(VENV)/.core: pyproject.toml constraints.txt
 	touch $@
 
 $(VENV)/.all: $(VENV)/.core
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[diffusion,lab,dev,baselines,vlm,lerobot,hdf5,ros,zarr,excel,ray]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[diffusion,lab,dev,baselines,vlm,lerobot,hdf5,ros,zarr,excel,ray,fr3]'
 	touch $@
 
 $(VENV)/.docs: $(VENV)/.core

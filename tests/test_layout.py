@@ -11,6 +11,7 @@ SOURCE, TESTS = REPOSITORY / "src" / "prior_reinforce", REPOSITORY / "tests"
 TESTED_ELSEWHERE = {
     "errors": "only names, which every test of bad input uses",
     "adapters/base": "what the base does for all is in testing/test_adapters",
+    "bench/robots/executors/base": "an interface, held to in bench/robots/executors/test_drive",
     "perception/base": "an interface, held to in testing/test_perception",
     "lab/tasks/demonstrations/basketball": "made again in lab/tasks/demonstrations/test_init",
     "lab/tasks/demonstrations/curling": "made again in lab/tasks/demonstrations/test_init",

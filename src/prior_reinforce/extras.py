@@ -30,6 +30,7 @@ EXTRA_OF = {
     "zarr": "zarr",
     "numcodecs": "zarr",
     "python_calamine": "excel",
+    "pylibfranka": "fr3",
 }
 """Library, as it is imported -> extra of `pyproject.toml`."""
 

@@ -5,6 +5,7 @@ import shutil
 import sqlite3
 import sys
 from collections import Counter
+from pathlib import Path
 
 import pytest
 
@@ -14,6 +15,7 @@ from prior_reinforce.bench.workspace.log import Executing
 from prior_reinforce.bench.workspace.workspace import Workspace
 from prior_reinforce.session.session import Session
 from prior_reinforce.session.trials import Stage
+from tests.bench.robots.executors import toy_arm
 from tests.bench.workspace.planar import events_in, trials_in
 
 NARROW = (
@@ -435,3 +437,134 @@ def test_the_journal_keeps_no_argument(run, folder, driver):
     run("goal", folder, "0.9", "0.05")
     run("ask", folder, "--yes", "--run", f"{driver} -p hunter2")
     assert "hunter2" not in run("log", folder)[1]
+
+
+@pytest.fixture
+def arm(run, folder, tmp_path, monkeypatch):
+    """A toy arm that the manifest names; call it with what is wrong with it."""
+    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parents[2]))
+    run("goal", folder, "0.9", "0.05")
+
+    def named(**options):
+        toy_arm.name_arm(tmp_path / folder, tmp_path / "arm", **options)
+        return tmp_path / "arm"
+
+    return named
+
+
+ON_ARM = ("--execute", "--executor", toy_arm.TOY)
+
+
+@pytest.mark.parametrize(
+    ("flags", "remedy"),
+    [
+        (("--execute",), "or add --yes"),
+        (("--execute", "--yes", "--run", "true {plan}"), "drop --run and --where"),
+        (("--rehearse", "0.2"), "go with --execute"),
+        (("--approach",), "go with --execute"),
+        ((*ON_ARM, "--yes", "--rehearse", "1.5"), "must be a fraction of the speed"),
+        ((*ON_ARM, "--yes", "--rehearse", "nan"), "must be a fraction of the speed"),
+    ],
+)
+def test_what_cannot_be_executed_is_said_before_a_trial_is_made(run, arm, folder, flags, remedy):
+    arm()
+    before = events_in(folder)
+    status, out, err = run("ask", folder, *flags)
+    assert (status, out) == (2, "")
+    assert remedy in err
+    assert events_in(folder) == before
+
+
+def test_a_manifest_starts_no_code_of_its_own(run, arm, folder):
+    toy = arm()
+    status, _, err = run("ask", folder, "--yes", "--execute")
+    assert status == 1  # the trial was asked for
+    assert f"a manifest starts no code of its own; add --executor {toy_arm.TOY}" in err
+    assert toy_arm.motions(toy) == 0
+
+
+def test_without_an_arm_the_manifest_is_to_name_one(run, folder):
+    run("goal", folder, "0.9", "0.05")
+    assert "add [arm] with its executor" in run("ask", folder, "--yes", "--execute")[2]
+
+
+@pytest.mark.parametrize("answer", ["no", "yes"])
+def test_a_person_is_told_what_was_not_checked(run, arm, folder, monkeypatch, answer):
+    toy, asked = arm(), []
+    monkeypatch.setattr("sys.stdin.isatty", lambda: True)
+    monkeypatch.setattr("builtins.input", lambda question: asked.append(question) or answer)
+    status, out, _ = run("ask", folder, *ON_ARM)
+    assert asked == [
+        "the arm will move (trial 1 at full speed, 0.5 s); NOT checked: self-collision, the arm's "
+        "limits, the table; is the area clear? (yes/no) "
+    ]
+    assert status == (answer != "yes")
+    assert toy_arm.motions(toy) == (answer == "yes")
+    assert "toy, firmware 1.0: the arm is off it by up to 3.24e-05 rad (joint1)" in out
+
+
+def test_each_motion_is_confirmed_and_none_is_made_unasked(run, arm, folder, monkeypatch):
+    toy, asked, answers = arm(), [], iter(["yes", "no"])
+    (toy / "pose").write_text("0.0 0.3")
+    status, _, err = run("ask", folder, "--yes", *ON_ARM)
+    assert status == 1
+    assert "0.3 rad (joint2), more than 0.02; move it there, or ask again with --approach" in err
+    assert toy_arm.motions(toy) == 0
+    monkeypatch.setattr("sys.stdin.isatty", lambda: True)
+    monkeypatch.setattr("builtins.input", lambda said: asked.append(said) or next(answers))
+    assert run("ask", folder, "--approach", *ON_ARM)[0] == 1
+    assert [question.partition(";")[0] for question in asked] == [
+        "the arm will move (slowly to where trial 1 begins, 1.9 s)",
+        "the arm will move (trial 1 at full speed, 0.5 s)",
+    ]
+    assert toy_arm.motions(toy) == 1
+    assert trials_in(folder)[0].stage is Stage.ASKED
+
+
+def test_a_rehearsal_leaves_the_trial_as_it_was(run, arm, folder):
+    toy = arm()
+    status, out, _ = run("ask", folder, "--yes", "--rehearse", "0.5", *ON_ARM)
+    assert status == 0
+    assert "measured: at most" in out
+    assert trials_in(folder)[0].stage is Stage.ASKED
+    assert run("ask", folder, "--yes", "--approach", *ON_ARM)[0] == 0
+    assert trials_in(folder)[0].stage is Stage.EXECUTED
+    assert toy_arm.motions(toy) == 3
+    assert "a plan runs once" in run("ask", folder, "--yes", *ON_ARM)[2]
+
+
+@pytest.mark.parametrize("answer", ["no", "yes"])
+def test_a_fault_voids_the_trial_after_a_question(run, arm, folder, monkeypatch, answer):
+    arm(kind="faults")
+    asked = []
+    monkeypatch.setattr("sys.stdin.isatty", lambda: True)
+    monkeypatch.setattr("builtins.input", lambda question: asked.append(question) or answer)
+    status, out, err = run("ask", folder, "--yes", *ON_ARM)
+    assert status == 1
+    assert f"aborted: {toy_arm.FAULT}" in err
+    assert asked == ["void trial 1? (yes/no) "]
+    trial = trials_in(folder)[0]
+    assert trial.stage is (Stage.VOIDED if answer == "yes" else Stage.EXECUTED)
+    assert trial.note == (toy_arm.FAULT if answer == "yes" else "")
+    assert "next: " in out
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [({"kind": "dead"}, "does not answer; switch it on"), ({"fastest": 0.1}, "more than 0.1000")],
+)
+def test_an_arm_that_refuses_is_not_asked_to_move(run, arm, folder, options, says):
+    toy = arm(**options)
+    status, _, err = run("ask", folder, "--yes", *ON_ARM)
+    assert status == 1
+    assert says in err
+    assert toy_arm.motions(toy) == 0
+    assert trials_in(folder)[0].stage is Stage.ASKED
+
+
+def test_a_check_asks_the_arm_and_moves_nothing(run, arm, folder):
+    toy = arm()
+    status, out, _ = run("ask", folder, "--check", *ON_ARM)
+    assert status == 0
+    assert "checked; nothing moved" in out
+    assert toy_arm.motions(toy) == 0

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
 import tyro
 
+from prior_reinforce.bench.robots.executors.base import ArmDescription, ArmSettings, Motion
 from prior_reinforce.bench.robots.plan_files import check_plan_path, write_plan
+from prior_reinforce.bench.robots.report import LimitReport
 from prior_reinforce.bench.workspace.status import (
     OUTDATED,
     execution_warning,
@@ -21,6 +24,7 @@ from prior_reinforce.commands.reading import Number, Seen
 from prior_reinforce.commands.workspace import OnWorkspace, print_goal, print_next, read_goal
 from prior_reinforce.errors import ConfigurationError, FileFormatError
 from prior_reinforce.plans.motions import Plan
+from prior_reinforce.registry import own_class
 from prior_reinforce.session.trials import Stage, State, Trial
 from prior_reinforce.wording import say_place
 
@@ -39,10 +43,18 @@ class Ask(OnWorkspace):
     run_command: Annotated[str | None, tyro.conf.arg(name="run")] = None
     """Execute the plan with this command, once, for instance "mycontroller {plan} {result}"; {plan}
     stands for the plan's file, {result} for a folder where it may say how it went."""
+    execute: bool = False
+    """Execute the plan on the arm that [arm] of the manifest names, once."""
+    approach: bool = False
+    """With --execute: move slowly to the plan's first frame before, if the arm stands elsewhere."""
+    rehearse: float | None = None
+    """With --execute: play the plan at this fraction of its speed, such as 0.2. It is no trial."""
+    executor: str | None = None
+    """The executor that [arm] names, where it is your own: module:Class."""
     yes: bool = False
-    """Execute it without asking whether the arm may move now."""
+    """Move without asking whether the arm may move now."""
     check: bool = False
-    """Check everything that --run needs, and move nothing."""
+    """Check everything that --run or --execute needs, and move nothing."""
     where: str | None = None
     """Ask this command first where the arm stands, and compare: its last line is JSON such as
     {"joint1": 0.1}, with every joint, in the plan's units. It must move nothing."""
@@ -83,9 +95,14 @@ class Ask(OnWorkspace):
         reached_before = session.solved
         trial = session.ask(arm_did_not_move=did_not_move)
         self._show(workspace, trial, reached_before)
-        if trial.stage is not Stage.EXECUTED:
+        if trial.stage is Stage.EXECUTED and not (self.run_command or self.execute):
+            print("it was executed already")
+        elif self.execute and trial.stage is not Stage.EXECUTED:
+            return self._on_arm(workspace, trial)
+        elif trial.stage is not Stage.EXECUTED:
             command = None if self.check else self.run_command
-            if command is not None and not self.yes and not _may_move():
+            unchecked = _unchecked(workspace, trial, start=self.where is None)
+            if command is not None and not self.yes and not _may_move(trial, unchecked):
                 print("nothing moved; ask again when it may")
                 return 1
             # Last: the arm may be moved by hand while a person is asked.
@@ -98,12 +115,51 @@ class Ask(OnWorkspace):
                 if self.check
                 else "execute it, then say where the object went:"
             )
-        elif self.run_command is not None:
-            return self._execute(workspace, trial.number, self.run_command)
         else:
-            print("it was executed already")
+            workspace.to_execute(trial.number)  # which refuses
         print_next(workspace)
         return 0
+
+    def _on_arm(self, workspace: Workspace, trial: Trial) -> int:
+        """Look at the arm, ask a person, and let its executor move it."""
+        arm = workspace.manifest.driven_by
+        if arm is None:
+            raise ConfigurationError(
+                f"{workspace.folder} names no arm; add [arm] with its executor to the manifest, "
+                "or give a command with --run"
+            )
+        if own_class(arm.executor) != self.executor:
+            raise ConfigurationError(
+                f"[arm] names {arm.executor}, and a manifest starts no code of its own; "
+                f"{'drop --executor' if self.executor else f'add --executor {arm.executor}'}"
+            )
+        speed = 1.0 if self.rehearse is None else self.rehearse
+        look = workspace.look_at_arm(trial.number, arm, speed=speed)
+        print(f"{_say_arm(look.arm)}: {look.said}")
+        if look.refused:
+            print(f"prior-reinforce: {look.refused}; nothing moved", file=sys.stderr)
+            return 1
+        if not look.there and not self.approach:
+            why = "move it there, or ask again with --approach"
+            print(f"prior-reinforce: {look.said}; {why}; nothing moved", file=sys.stderr)
+            return 1
+        if self.check:
+            print("checked; nothing moved")
+            return 0
+        unchecked = (*look.arm.unchecked, *_unchecked(workspace, trial, start=False))
+        motions: list[Motion] = [] if look.there else ["approach"]
+        motions.append("trial" if self.rehearse is None else "rehearsal")
+        for motion in motions:
+            share = speed if motion == "rehearsal" else 1.0
+            seconds = look.approach if motion == "approach" else _seconds(trial, workspace) / share
+            said = f"{_SAID[motion].format(trial.number, 100 * share)}, {seconds:.1f} s"
+            if not self.yes and not _may_move(trial, unchecked, said):
+                print("nothing moved; ask again when it may")
+                return 1
+            status = self._execute(workspace, trial.number, arm, motion, share)
+            if status != 0:
+                break
+        return status
 
     def _check_flags(self) -> None:
         """Say what cannot be before anything is changed."""
@@ -111,10 +167,19 @@ class Ask(OnWorkspace):
 
         if self.run_command is not None:
             check_command(self.run_command, time_limit=self.time_limit)
-            if not (self.yes or self.check or sys.stdin.isatty()):
-                raise ConfigurationError(
-                    "a person says that the arm may move: run it in a terminal, or add --yes"
-                )
+        moves = self.run_command is not None or self.execute
+        if moves and not (self.yes or self.check or sys.stdin.isatty()):
+            raise ConfigurationError(
+                "a person says that the arm may move: run it in a terminal, or add --yes"
+            )
+        if self.execute and (self.run_command is not None or self.where is not None):
+            raise ConfigurationError("--execute asks the arm itself; drop --run and --where")
+        if not self.execute and (self.approach or self.rehearse is not None or self.executor):
+            raise ConfigurationError("--approach, --rehearse and --executor go with --execute")
+        if self.rehearse is not None and not 0 < self.rehearse < 1:
+            raise ConfigurationError(
+                f"--rehearse must be a fraction of the speed, such as 0.2, got {self.rehearse:g}"
+            )
         if self.rate is not None and self.out is None:
             raise ConfigurationError(
                 "--rate is of the file that --out writes; --run is given the plan's own frames"
@@ -185,20 +250,35 @@ class Ask(OnWorkspace):
                 + ("" if "{trial}" in str(self.out) else hint)
             )
 
-    def _execute(self, workspace: Workspace, number: int, command: str) -> int:
+    def _execute(
+        self,
+        workspace: Workspace,
+        number: int,
+        command: str | ArmSettings,
+        motion: Motion = "trial",
+        speed: float = 1.0,
+    ) -> int:
         result = workspace.execute(
             number,
             command,
             time_limit=self.time_limit,
+            motion=motion,
+            speed=speed,
             show=lambda text: print(text, end="", flush=True),
         )
         if result.output_tail and not result.output_tail.endswith("\n"):
             print()
+        for unit, most in result.tracking_max.items():
+            print(f"measured: at most {most:.3g} {unit} off the plan")
         why = f": {result.reason}" if result.reason else ""
         if result.outcome == "not_moved":
             said = f"the arm did not move{why}; trial {number} may be executed again"
         elif result.outcome == "unknown":
             said = f"trial {number}{why}; nobody knows what moved: look, then ask again"
+        elif motion != "trial":
+            if result.succeeded:
+                return 0
+            said = f"the {motion} was aborted{why}; trial {number} was not executed"
         else:
             trial = workspace.state.trial(number)
             said = f"trial {number}: {say_trial(workspace, trial)}"
@@ -208,9 +288,16 @@ class Ask(OnWorkspace):
                 print_next(workspace)
                 return 0
         print(f"prior-reinforce: {said}", file=sys.stderr)
+        if result.outcome == "aborted" and motion == "trial" and self._voids(number):
+            workspace.session().void(number, result.reason)
+            print(f"trial {number} is void; nothing is learned from it")
         if result.outcome != "unknown":
             print_next(workspace)
         return 0 if result.succeeded else 1
+
+    def _voids(self, number: int) -> bool:
+        """Whether a person says that an aborted trial is no data."""
+        return sys.stdin.isatty() and _says_yes(f"void trial {number}? (yes/no) ")
 
 
 @dataclass(frozen=True)
@@ -333,10 +420,44 @@ def _print_outdated(workspace: Workspace) -> None:
         print(f"trial {trial.number} was {OUTDATED}")
 
 
-def _may_move() -> bool:
+_SAID: dict[Motion, str] = {
+    "trial": "trial {} at full speed",
+    "rehearsal": "a rehearsal of trial {} at {:g} % of its speed",
+    "approach": "slowly to where trial {} begins",
+}
+
+
+def _seconds(trial: Trial, workspace: Workspace) -> float:
+    """How long a trial's plan takes at its own speed."""
+    assert trial.plan is not None
+    return (len(trial.plan) - 1) * workspace.manifest.format.dt
+
+
+def _say_arm(arm: ArmDescription) -> str:
+    return f"{arm.model}{f', firmware {arm.firmware}' if arm.firmware else ''}"
+
+
+def _unchecked(workspace: Workspace, trial: Trial, *, start: bool) -> tuple[str, ...]:
+    """What nobody looked at, for the line that asks whether the arm may move."""
+    gate, verdict = workspace.manifest.gate, trial.verdict
+    found = ["where the arm stands"] if start else []
+    if not isinstance(verdict, LimitReport) or "velocity" in verdict.unchecked:
+        found.append("the arm's limits")
+    found.append("self-collision")
+    found.append("the table" if gate.box_low is None else "the table, but for the tool tip")
+    return tuple(found)
+
+
+def _may_move(trial: Trial, unchecked: Sequence[str], said: str = "") -> bool:
     """Whether a person says that the arm may move now."""
+    said = said or f"trial {trial.number} at full speed"
+    missing = f"NOT checked: {', '.join(dict.fromkeys(unchecked))}; " if unchecked else ""
+    return _says_yes(f"the arm will move ({said}); {missing}is the area clear? (yes/no) ")
+
+
+def _says_yes(question: str) -> bool:
     try:
-        return input("the arm will move; is the area clear? (yes/no) ").strip().lower() == "yes"
+        return input(question).strip().lower() == "yes"
     except EOFError:
         return False
 

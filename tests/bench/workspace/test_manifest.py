@@ -285,3 +285,31 @@ def test_frames_closer_than_an_arms_cycle_are_refused_before_anything_is_recorde
         == 0.001
     )
     assert load_manifest(write(tmp_path, manifest(dt=0.0005))).robot is None
+
+
+@pytest.mark.parametrize(
+    ("lines", "message"),
+    [
+        ('host = "172.16.0.2"', r":\d+: \[arm\] executor: must be one of fr3"),
+        ('executor = "r2d2"', "no executor 'r2d2'; known are fr3"),
+        ('executor = "fr3"', "missing required field `host`"),
+        ('executor = "fr3"\nhost = 5', "Expected `str`, got `int`"),
+        ('executor = "fr3"\nhost = "a"\nhots = "b"', "no setting 'hots'; it has host"),
+        ('executor = "fr3"\nhost = "a"\nfirmware = "4.2"', "no limits for fr3 with firmware"),
+        ('executor = "fr3"\nhost = "a"\ncontact = [20, -1]', "Expected `float` > 0"),
+    ],
+)
+def test_what_drives_the_arm_is_held_against_its_executor(tmp_path, lines, message):
+    with pytest.raises(ConfigurationError, match=message):
+        load_manifest(write(tmp_path, f"{manifest()}\n[arm]\n{lines}\n"))
+
+
+def test_the_arm_of_the_template_can_be_used_and_ones_own_is_not_imported(tmp_path):
+    text = manifest()
+    start = text.index("# [arm]")
+    named = re.sub("^# ", "", text[start:], flags=re.M)
+    driven_by = load_manifest(write(tmp_path, text[:start] + named)).driven_by
+    assert (driven_by.executor, driven_by.options) == ("fr3", {"host": "172.16.0.2"})
+    own = f'{text}\n[arm]\nexecutor = "no_such_module:Arm"\nport = 5\n'
+    assert load_manifest(write(tmp_path, own)).driven_by.options == {"port": 5}
+    assert load_manifest(write(tmp_path, text)).driven_by is None

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from contextlib import suppress
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -36,6 +37,7 @@ from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 from prior_reinforce.readings import Reading
 from prior_reinforce.session.session import Session
 from prior_reinforce.session.trials import Stage
+from tests.bench.robots.executors import toy_arm
 from tests.bench.workspace.planar import (
     amend,
     ask,
@@ -480,13 +482,13 @@ def test_what_is_raised_while_the_arm_moves_is_no_sign_that_it_did_not(workspace
 
 def test_nothing_moves_where_an_interruption_came_first(workspace, tmp_path, monkeypatch):
     number = ask(workspace).number
-    begin = Workspace._begin_execution
+    begin = Workspace._begin
 
     def interrupted(*args):
         begin(*args)
         os.kill(os.getpid(), signal.SIGINT)
 
-    monkeypatch.setattr(Workspace, "_begin_execution", interrupted)
+    monkeypatch.setattr(Workspace, "_begin", interrupted)
     with pytest.raises(KeyboardInterrupt):
         workspace.execute(number, f"touch {tmp_path}/ran {{plan}}", time_limit=20)
     assert not (tmp_path / "ran").exists()
@@ -521,13 +523,13 @@ def test_the_arm_is_the_one_that_the_manifest_names_by_now(workspace, monkeypatc
     arm = Workspace(workspace.folder).manifest.arm
     with executing_lock(arm=arm), pytest.raises(TrialStateError, match="right now"):
         workspace.execute(number, f"touch {ran} {{plan}}", time_limit=20)
-    check = Workspace._to_execute
+    check = Workspace.to_execute
 
     def renamed(*args):
         path.write_text(unnamed)  # while the lock of the other is held
         return check(*args)
 
-    monkeypatch.setattr(Workspace, "_to_execute", renamed)
+    monkeypatch.setattr(Workspace, "to_execute", renamed)
     with pytest.raises(ConfigurationError, match="names another arm"):
         workspace.execute(number, f"touch {ran} {{plan}}", time_limit=20)
     assert not ran.exists()
@@ -678,3 +680,100 @@ def test_a_training_that_was_interrupted_goes_on_where_it_was(tmp_path, monkeypa
                     models.append(workspace.learn(choice, progress=progress).model)
     assert steps == [1, 2, 2, 3, 4]
     assert models[0] == models[1]
+
+
+@pytest.fixture
+def arm(workspace, tmp_path, monkeypatch):
+    """A toy arm that the manifest names; its settings, with `.named(...)` for others."""
+    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parents[3]))
+    ask(workspace)
+
+    def named(**options):
+        toy_arm.name_arm(workspace.folder, tmp_path / "arm", **options)
+        return reopened(workspace)
+
+    return named
+
+
+def kinds(workspace):
+    return [entry.kind for entry in workspace.events][-4:]
+
+
+def test_an_arm_executes_a_trial_and_its_measured_path_is_kept(arm, tmp_path):
+    workspace = arm()
+    settings = workspace.manifest.driven_by
+    look = workspace.look_at_arm(1, settings)
+    assert (look.arm.model, look.there, look.refused) == ("toy", True, "")
+    assert toy_arm.motions(tmp_path / "arm") == 0
+    result = workspace.execute(1, settings, time_limit=60)
+    assert result.outcome == "done"
+    assert result.tracking_max["rad"] < 1e-6
+    ended = workspace.state.executions[1]
+    assert ended.end_error["rad"] < 1e-6
+    assert kinds(workspace)[-2:] == ["executing", "executed"]
+    began = workspace.events[-2].event
+    assert began.command == toy_arm.TOY
+    path = workspace.store.execution_folder(began.folder) / "executed.npz"
+    assert len(np.load(path)["t"]) == 47
+    with pytest.raises(TrialStateError, match="a plan runs once"):
+        workspace.execute(1, settings, time_limit=60)
+    assert toy_arm.motions(tmp_path / "arm") == 1
+
+
+def test_a_rehearsal_is_no_trial(arm, tmp_path):
+    workspace = arm()
+    settings = workspace.manifest.driven_by
+    result = workspace.execute(1, settings, time_limit=60, motion="rehearsal", speed=0.5)
+    assert result.outcome == "done"
+    assert result.tracking_max["rad"] < 1e-6
+    assert kinds(workspace)[-2:] == ["moving", "moved"]
+    assert workspace.state.trial(1).stage is Stage.ASKED
+    assert workspace.session().state.readings_for(workspace.state.goals[-1], "") == []
+    # The arm stands at the plan's end now.
+    assert workspace.execute(1, settings, time_limit=60).outcome == "not_moved"
+    assert workspace.execute(1, settings, time_limit=60, motion="approach").outcome == "done"
+    assert workspace.execute(1, settings, time_limit=60).outcome == "done"
+    assert toy_arm.motions(tmp_path / "arm") == 3
+    began = [entry.event for entry in workspace.events if entry.kind == "moving"]
+    assert [(event.motion, event.speed) for event in began] == [("rehearsal", 0.5), ("approach", 1)]
+
+
+def test_an_arm_that_was_changed_since_a_person_saw_it_is_not_moved(arm, workspace, tmp_path):
+    workspace = arm()
+    seen = workspace.manifest.driven_by
+    toy_arm.name_arm(workspace.folder, tmp_path / "arm", kind="faults")
+    with pytest.raises(ConfigurationError, match="names another arm since"):
+        workspace.execute(1, seen, time_limit=60)
+    workspace = reopened(workspace)
+    for call in (workspace.execute, workspace.look_at_arm):
+        with pytest.raises(ConfigurationError, match="names another arm since"):
+            call(1, seen, **({"time_limit": 60} if call == workspace.execute else {}))
+    assert toy_arm.motions(tmp_path / "arm") == 0
+    assert kinds(workspace)[-1] == "asked"
+
+
+@pytest.mark.parametrize(("motion", "speed"), [("trial", 0.5), ("rehearsal", 1), ("rehearsal", 0)])
+def test_only_a_rehearsal_is_slower(arm, motion, speed):
+    workspace = arm()
+    with pytest.raises(ConfigurationError, match="a rehearsal has a share"):
+        workspace.execute(
+            1, workspace.manifest.driven_by, time_limit=60, motion=motion, speed=speed
+        )
+    with pytest.raises(ConfigurationError, match=r"makes no approach; name the arm in \[arm\]"):
+        workspace.execute(1, "true {plan}", time_limit=60, motion="approach")
+
+
+def test_a_rehearsal_whose_program_was_killed_stays_in_the_journal(arm, tmp_path):
+    workspace = arm(seconds=3.0)
+    program = subprocess.Popen([
+        sys.executable, "-c", "import sys\nfrom prior_reinforce.bench.workspace.workspace import "
+        "Workspace\nwith Workspace(sys.argv[1]) as w: w.execute(1, w.manifest.driven_by, "
+        "time_limit=60, motion='rehearsal', speed=0.5)", workspace.folder,
+    ])  # fmt: skip
+    wait_for((tmp_path / "arm" / "pose").exists)
+    program.kill()
+    program.wait()
+    wait_for(lambda: not workspace.log.is_executing())
+    assert kinds(workspace)[-1] == "moving"
+    assert workspace.recover() is None
+    assert workspace.state.trial(1).stage is Stage.ASKED

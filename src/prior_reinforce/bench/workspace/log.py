@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from prior_reinforce.arrays import Frames
+from prior_reinforce.bench.robots.executors.base import Motion
 from prior_reinforce.bench.robots.executors.result import MotionResult, Outcome
 from prior_reinforce.bench.workspace.journal import JOURNAL_FILE, Journal
 from prior_reinforce.bench.workspace.store import Store
@@ -49,7 +50,8 @@ class Executing(Event, frozen=True):
 
     trial: int
     command: str
-    """Its program, without its arguments; empty where the execution was found in `folder` only."""
+    """Its program without its arguments, or the name of an executor; empty where the execution was
+    found in `folder` only."""
     folder: str
     """Name of the folder for what it writes; empty if it was never made."""
 
@@ -66,8 +68,33 @@ class NotExecuted(Executed, frozen=True, kw_only=True):
     outcome: Outcome = "not_moved"
 
 
+class Moving(Event, frozen=True):
+    """The arm is about to move for a trial without executing it: to its start, or to rehearse."""
+
+    trial: int
+    motion: Motion
+    speed: float
+    """Share of the plan's own speed."""
+    executor: str
+    folder: str
+    """As `Executing.folder`."""
+
+
+class Moved(Event, MotionResult, frozen=True, kw_only=True):
+    """That motion ended. It is no trial: nothing is learned from it."""
+
+    trial: int
+
+
 WorkspaceEvent = (
-    SessionEvent | DemonstrationsImported | ModelTrained | Executing | Executed | NotExecuted
+    SessionEvent
+    | DemonstrationsImported
+    | ModelTrained
+    | Executing
+    | Executed
+    | NotExecuted
+    | Moving
+    | Moved
 )
 
 
@@ -117,6 +144,8 @@ class WorkspaceState(State):
                 self._executed(event, Stage.ASKED)
             case Executed():
                 self._executed(event, Stage.EXECUTED)
+            case Moving() | Moved():
+                self.trial(event.trial)  # which must be there
             case _:
                 super()._apply(event)
 

@@ -26,11 +26,14 @@ from prior_reinforce.bench.robots import (
     missing_joints,
     robot_limits,
 )
+from prior_reinforce.bench.robots.executors import EXECUTORS
+from prior_reinforce.bench.robots.executors.base import ArmSettings
 from prior_reinforce.bench.robots.kinematics import Chain
 from prior_reinforce.errors import ConfigurationError, FileFormatError, PriorReinforceError
 from prior_reinforce.plans.interpolation import RATE
 from prior_reinforce.plans.motions import PlanFormat
 from prior_reinforce.readings import as_tolerance
+from prior_reinforce.registry import build, own_class
 from prior_reinforce.wording import plain
 
 if sys.version_info >= (3, 11):
@@ -66,6 +69,8 @@ class Manifest:
     """The gate's own lines."""
     arm: str = ""
     """Name of the arm, where this computer moves several: one motion at a time is made on each."""
+    driven_by: ArmSettings | None = None
+    """What drives it, for `ask --execute`; None where the manifest does not say."""
 
 
 _Texts = Annotated[tuple[str, ...], Meta(min_length=1)]
@@ -127,6 +132,7 @@ class _File(_Section, frozen=True):
     outcome: _Outcome
     robot: _Robot
     gate: _Gate = _Gate()  # type: ignore[valid-type]
+    arm: dict[str, Any] | None = None
 
 
 _LISTS = ("lower", "upper", "velocity", "acceleration", "jerk")
@@ -291,8 +297,21 @@ class _Reader:
                 "out, or make the workspace with: prior-reinforce new --robot path/to/arm.urdf"
             )
             raise self.error("gate", _BOX["box_low"], why)
-        numbers = tuple(tolerance.tolist())
-        return Manifest(task, form, names, units, numbers, limits, gate, robot.arm)
+        numbers, arm = tuple(tolerance.tolist()), self.driven_by(file.arm)
+        return Manifest(task, form, names, units, numbers, limits, gate, robot.arm, arm)
+
+    def driven_by(self, arm: dict[str, Any] | None) -> ArmSettings | None:
+        """What drives the arm; settings of one's own executor are checked where it is used."""
+        if arm is None:
+            return None
+        options = dict(arm)
+        name = options.pop("executor", None)
+        if not isinstance(name, str):
+            raise self.error("arm", "executor", f"must be one of {', '.join(EXECUTORS.members)}")
+        with self.named("arm"):
+            if own_class(name) is None:
+                build(EXECUTORS.kind(name).config_type, options, name)
+        return ArmSettings(name, options)
 
     def check_values(self) -> None:
         """Refuse what a type does not say: numbers that are not finite, control characters."""

@@ -14,11 +14,13 @@ a session's: demonstrations imported, a model trained.
 
 from __future__ import annotations
 
+import dataclasses
 import os
+import tempfile
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from msgspec.structs import replace
 from numpy.typing import ArrayLike
@@ -26,6 +28,7 @@ from typing_extensions import Self
 
 from prior_reinforce.adapters import ADAPTERS, DEFAULT_ADAPTER
 from prior_reinforce.arrays import Frames
+from prior_reinforce.bench.robots.executors.base import ArmSettings, Motion
 from prior_reinforce.bench.robots.plan_files import PlanFile
 from prior_reinforce.bench.workspace.journal import JOURNAL_FILE
 from prior_reinforce.bench.workspace.log import (
@@ -33,6 +36,8 @@ from prior_reinforce.bench.workspace.log import (
     Executed,
     Executing,
     ModelTrained,
+    Moved,
+    Moving,
     NotExecuted,
     WorkspaceLog,
     WorkspaceState,
@@ -52,7 +57,7 @@ from prior_reinforce.errors import (
     TrialStateError,
     WorkspaceError,
 )
-from prior_reinforce.files import inside, named_disk_errors, sweep, write
+from prior_reinforce.files import inside, named_disk_errors, sweep, write, write_once
 from prior_reinforce.plans.motions import Demonstrations, Plan
 from prior_reinforce.registry import own_class
 from prior_reinforce.session.events import Entry, KeptPlan
@@ -62,6 +67,7 @@ from prior_reinforce.session.trials import Goal, Stage, Trial
 if TYPE_CHECKING:
     from prior_reinforce.adapters.base import Adapter
     from prior_reinforce.bench.robots.executors.command import CommandResult
+    from prior_reinforce.bench.robots.executors.drive import Look
     from prior_reinforce.bench.robots.report import LimitReport
     from prior_reinforce.generators.base import FitProgress, Generator
 
@@ -71,6 +77,8 @@ _OWN = (
     *("demonstrations.png", "outcomes.csv"),
 )
 """What is read and written in the folder."""
+_LOOK_LIMIT = 20.0
+"""How long an arm may take to say where it stands, in [s]; ours: to start a program and connect."""
 
 
 class Workspace:
@@ -337,22 +345,27 @@ class Workspace:
     def execute(
         self,
         number: int,
-        command: str,
+        command: str | ArmSettings,
         *,
         time_limit: float,
+        motion: Motion = "trial",
+        speed: float = 1.0,
         show: Callable[[str], None] | None = None,
     ) -> CommandResult:
-        """Execute a trial's plan by a command, once.
+        """Execute a trial's plan by a command or by the manifest's arm, once.
 
         The journal says `executing` before the command starts and `executed` after all that it
         started ended, so a program that dies in between leaves a trial of which only a person knows
         what moved (or `recover`). While what it left behind goes on, the trial still counts as
-        executing.
+        executing. A motion that is no trial is noted likewise, by `moving` and `moved`, and the
+        plan may be executed afterwards.
 
         Args:
             number: The open trial.
-            command: For instance `mycontroller {plan} {result}`.
+            command: For instance `mycontroller {plan} {result}`; or the arm, as a person saw it.
             time_limit: Of the command, in [s].
+            motion: An arm may also approach the plan's first frame, or rehearse it.
+            speed: Share of the plan's own speed, of a rehearsal.
             show: Called with the command's output as it comes.
 
         Raises:
@@ -372,7 +385,13 @@ class Workspace:
         from prior_reinforce.bench.robots.executors.lock import executing_lock
         from prior_reinforce.bench.robots.executors.supervision import Interruptions
 
-        check_command(command, time_limit=time_limit)
+        if (speed != 1.0) != (motion == "rehearsal") or not 0 < speed <= 1:
+            raise ConfigurationError(
+                f"a rehearsal has a share of the plan's speed above 0 and below 1, and nothing "
+                f"else has; got {motion} at {speed}"
+            )
+        text = self._command(command, motion, speed)
+        check_command(text, time_limit=time_limit)
         self._read_manifest()
         arm = self.manifest.arm
         with (
@@ -380,19 +399,28 @@ class Workspace:
             Interruptions() as interruptions,
         ):
             self._note_unknown_execution(self.state.trial(number))
-            trial = self._to_execute(number)
+            trial = self.to_execute(number)
             verdict = self.gate(self.plan(trial).actions)
             if verdict is not None:
                 verdict.require()
-            if self.manifest.arm != arm:  # the gate has read it again
+            # The gate has read it again; a person said yes to what it said before.
+            if self.manifest.arm != arm or text != self._command(command, motion, speed):
                 raise ConfigurationError(
                     f"{self.folder / MANIFEST_FILE} names another arm since; ask again"
                 )
-            folder = self.store.make_execution_folder(_kept(trial).file)
-            self._begin_execution(number, without_arguments(command), folder.name)
+            name = _kept(trial).file
+            folder = self.store.make_execution_folder(
+                name if motion == "trial" else f"{motion}-{name}"
+            )
+            who = command.executor if isinstance(command, ArmSettings) else without_arguments(text)
+            self._begin(
+                Executing(number, who, folder.name)
+                if motion == "trial"
+                else Moving(number, motion, speed, who, folder.name)
+            )
             try:
                 result, raised = execute_command(
-                    command,
+                    text,
                     self._plan_file(trial),
                     folder,
                     time_limit=time_limit,
@@ -401,15 +429,68 @@ class Workspace:
                     show=show,
                 )
             except (PriorReinforceError, KeyboardInterrupt):
-                self._end_execution(NotExecuted(trial=number))  # never started: nothing moved
+                never = NotExecuted if motion == "trial" else Moved
+                self._end(never(trial=number, outcome="not_moved"))
                 raise
             if result.outcome != "unknown":
-                result = self._record(result, trial, folder)
+                result = self._record(result, trial, folder, motion, speed)
         if raised is not None:
             raise raised
         if interruptions.came:
             raise KeyboardInterrupt(f"trial {number}: {result.outcome} ({result.reason})")
         return result
+
+    def to_execute(self, number: int) -> Trial:
+        """A trial whose plan was not executed yet.
+
+        Raises:
+            TrialStateError: It was, or the trial is closed.
+        """
+        trial = self.state.trial(number)
+        if trial.stage is not Stage.ASKED:
+            raise TrialStateError(
+                f"trial {number} is {trial.stage.value} already; a plan runs once: tell it or "
+                "void it, then ask for the next"
+            )
+        return trial
+
+    def look_at_arm(self, number: int, arm: ArmSettings, *, speed: float = 1.0) -> Look:
+        """Ask the manifest's arm how it stands to a trial's plan, and whether it takes it.
+
+        Nothing moves, and nothing is written down.
+
+        Raises:
+            ConfigurationError: The arm does not answer, or is another one since.
+            FileFormatError: The plan's file is not what was written.
+        """
+        from prior_reinforce.bench.robots.executors.arguments import split_command
+        from prior_reinforce.bench.robots.executors.drive import read_look
+        from prior_reinforce.bench.robots.executors.pose import ask_arm
+
+        text = self._command(arm, "look", speed)
+        plan = self._plan_file(self.state.trial(number))
+        with tempfile.TemporaryDirectory() as place:
+            folder = Path(place)
+            copy = write_once(folder / plan.path.name, plan.verify())
+            words = split_command(text, copy, folder)
+            ask_arm(arm.executor, words, folder, time_limit=_LOOK_LIMIT)
+            return read_look(folder)
+
+    def _command(
+        self, command: str | ArmSettings, motion: Motion | Literal["look"], speed: float
+    ) -> str:
+        """The text of a command, or of the program that lets an arm's executor move it."""
+        if isinstance(command, str):
+            if motion != "trial":
+                raise ConfigurationError(f"a command makes no {motion}; name the arm in [arm]")
+            return command
+        from prior_reinforce.bench.robots.executors.drive import Request, drive_command
+
+        if self.manifest.driven_by != command:
+            raise ConfigurationError(
+                f"{self.folder / MANIFEST_FILE} names another arm since; ask again"
+            )
+        return drive_command(Request(command, self.manifest.gate, motion, speed))
 
     def recover(self) -> Trial | None:
         """Note how an execution ended whose program was killed, where its supervisor wrote it down.
@@ -433,26 +514,16 @@ class Workspace:
         self._record(result, trial, folder)
         return self.state.trial(trial.number)
 
-    def _to_execute(self, number: int) -> Trial:
-        """A trial whose plan was not executed yet; TrialStateError if there is no such."""
-        trial = self.state.trial(number)
-        if trial.stage is not Stage.ASKED:
-            raise TrialStateError(
-                f"trial {number} is {trial.stage.value} already; a plan runs once: tell it or "
-                "void it, then ask for the next"
-            )
-        return trial
-
-    def _begin_execution(self, number: int, command: str, folder: str) -> None:
+    def _begin(self, event: Executing | Moving) -> None:
         """Note that a trial's plan is given to a command now: a plan is executed once."""
         with self.log.exclusive():
-            self._to_execute(number)
-            self.log.append(Executing(trial=number, command=command, folder=folder))
+            self.to_execute(event.trial)
+            self.log.append(event)
 
-    def _end_execution(self, event: Executed) -> None:
+    def _end(self, event: Executed | Moved) -> None:
         """Note how the command ended, unless the trial was told meanwhile."""
         with self.log.exclusive():
-            if self.state.trial(event.trial).stage is Stage.EXECUTING:
+            if isinstance(event, Moved) or (self.state.trial(event.trial).stage is Stage.EXECUTING):
                 self.log.append(event)
 
     def _note_unknown_execution(self, trial: Trial) -> None:
@@ -467,13 +538,20 @@ class Workspace:
             known = {e.event.folder for e in self.log.entries() if isinstance(e.event, Executing)}
             for folder in folders:
                 if folder.name not in known and was_executed(folder):
-                    self._begin_execution(trial.number, "", folder.name)
+                    self._begin(Executing(trial=trial.number, command="", folder=folder.name))
                     return
 
     def _plan_file(self, trial: Trial) -> PlanFile:
         return PlanFile(self.plan_path(trial), _kept(trial).sha256)
 
-    def _record(self, result: CommandResult, trial: Trial, folder: Path) -> CommandResult:
+    def _record(
+        self,
+        result: CommandResult,
+        trial: Trial,
+        folder: Path,
+        motion: Motion = "trial",
+        speed: float = 1.0,
+    ) -> CommandResult:
         """Record how a command ended, with its tracking error where the driver measured its path.
 
         Returns:
@@ -482,13 +560,16 @@ class Workspace:
         from prior_reinforce.bench.robots.executors.result import measure_tracking
 
         try:
-            if measured := measure_tracking(folder, self.plan(trial)):
-                result = replace(result, tracking_rms=measured)
+            plan = self.plan(trial)
+            slow = dataclasses.replace(plan.format, dt=plan.format.dt / speed)
+            if motion != "approach":
+                measured = measure_tracking(folder, Plan(plan.actions, slow))
+                result = replace(result, **measured)
         except FileFormatError as error:
             reasons = filter(None, [result.reason, str(error)])
             result = replace(result, reason="; ".join(reasons))
-        event = NotExecuted if result.outcome == "not_moved" else Executed
-        self._end_execution(event(trial=trial.number, **result.as_json()))
+        event: type[Executed | Moved] = NotExecuted if result.outcome == "not_moved" else Executed
+        self._end((event if motion == "trial" else Moved)(trial=trial.number, **result.as_json()))
         return result
 
     def _names_of_plans(self) -> tuple[str, ...] | None:

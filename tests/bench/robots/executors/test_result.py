@@ -74,10 +74,23 @@ def test_tracking_is_the_measured_distance_from_the_plan(tmp_path):
     fine = np.load(plan.path)
     np.savez(tmp_path / "executed.npz", t=fine["t"], q=fine["q"] + [0.03, 0.04], dq=fine["dq"])
     # sqrt((0.03^2 + 0.04^2) / 2)
-    assert measure_tracking(tmp_path, PLAN) == {"rad": pytest.approx(0.05 / np.sqrt(2))}
+    found = measure_tracking(tmp_path, PLAN)
+    assert found["tracking_rms"] == {"rad": pytest.approx(0.05 / np.sqrt(2))}
+    assert found["tracking_max"] == {"rad": pytest.approx(0.04)}
     percent = Plan(PLAN.actions, PlanFormat(("a", "b"), ("rad", "percent"), 0.1))
     apart = {"rad": pytest.approx(0.03), "percent": pytest.approx(0.04)}
-    assert measure_tracking(tmp_path, percent) == apart
+    assert set(measure_tracking(tmp_path, percent)) == {*found}
+    assert all(each == apart for each in measure_tracking(tmp_path, percent).values())
+
+
+def test_a_motion_that_was_cut_off_ends_far_from_the_plans_end(tmp_path):
+    plan = write_plan(PLAN, tmp_path / "plan.npz", rate=1000)
+    fine, half = np.load(plan.path), 1000 * (PLAN.horizon - 1) // 20
+    np.savez(tmp_path / "executed.npz", t=fine["t"][:half], q=fine["q"][:half])
+    found = measure_tracking(tmp_path, PLAN)
+    assert found["tracking_max"]["rad"] < 1e-9
+    far = np.abs(fine["q"][half - 1] - PLAN.actions[-1]).max()
+    assert found["end_error"]["rad"] == pytest.approx(far)
 
 
 @pytest.mark.parametrize(

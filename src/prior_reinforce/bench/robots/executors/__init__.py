@@ -1,1 +1,14 @@
-"""Ways of executing a plan on an arm."""
+"""Ways of executing a plan on an arm: any command, or an executor by name."""
+
+from prior_reinforce.bench.robots.executors.base import Executor
+from prior_reinforce.registry import Member, Registry
+
+_HERE = "prior_reinforce.bench.robots.executors"
+
+EXECUTORS: Registry[Executor] = Registry(
+    "executor",
+    f"{_HERE}.base:Executor",
+    {
+        "fr3": Member(f"{_HERE}.fr3:FR3", "Franka Research 3"),
+    },
+)

@@ -32,22 +32,10 @@ def read_pose(command: str, form: PlanFormat, *, time_limit: float = 10.0) -> di
         ConfigurationError: It cannot be used, fails, or leaves a joint out.
     """
     check_program(command)
-    with tempfile.TemporaryDirectory() as folder, Interruptions() as noted:
-        ended, raised = supervise(
-            tuple(split(command)), Path(folder), time_limit=time_limit, interruptions=noted
-        )
-    if raised is not None:
-        raise raised
-    if noted.came:
-        raise KeyboardInterrupt
-    if ended is None or not ended["started"] or ended["timed_out"] or ended["exit_status"]:
-        said = "" if ended is None else ended.get("error") or ended["output_tail"].strip()
-        raise ConfigurationError(
-            f"the command {command!r} did not say where the arm stands: "
-            f"{said.splitlines()[-1] if said else 'no output'}; try it by itself"
-        )
+    with tempfile.TemporaryDirectory() as folder:
+        output = ask_arm(command, tuple(split(command)), Path(folder), time_limit=time_limit)
     try:
-        said = json.loads(ended["output_tail"].strip().splitlines()[-1])
+        said = json.loads(output.strip().splitlines()[-1])
         pose = said if isinstance(said, dict) else dict(zip(form.names, said, strict=True))
         pose = {name: float(value) for name, value in pose.items() if name in form.names}
         if not all(map(math.isfinite, pose.values())):
@@ -65,6 +53,36 @@ def read_pose(command: str, form: PlanFormat, *, time_limit: float = 10.0) -> di
             "joint as the plan does, in the plan's units"
         )
     return pose
+
+
+def ask_arm(command: str, arguments: tuple[str, ...], folder: Path, *, time_limit: float) -> str:
+    """Run a command that moves nothing, and return the end of what it writes.
+
+    Args:
+        command: What it is called in messages.
+        arguments: Its program and arguments.
+        folder: An empty folder for what watches over it.
+        time_limit: In [s].
+
+    Raises:
+        ConfigurationError: It cannot be started, fails, or takes too long.
+        KeyboardInterrupt: Interrupted, once all has ended.
+    """
+    with Interruptions() as noted:
+        ended, raised = supervise(arguments, folder, time_limit=time_limit, interruptions=noted)
+    if raised is not None:
+        raise raised
+    if noted.came:
+        raise KeyboardInterrupt
+    if ended is None or not ended["started"] or ended["timed_out"] or ended["exit_status"]:
+        said = "" if ended is None else ended.get("error") or ended["output_tail"].strip()
+        why = said.splitlines()[-1] if said else "no output"
+        if ended is not None and ended.get("timed_out"):
+            why = f"no answer within {time_limit:g} s"
+        raise ConfigurationError(
+            f"{command!r} did not say where the arm stands: {why}; mend that, then ask again"
+        )
+    return str(ended["output_tail"])
 
 
 def compare_pose(

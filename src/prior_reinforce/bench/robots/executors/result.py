@@ -11,11 +11,12 @@ from typing import Annotated, Literal
 
 import msgspec
 import numpy as np
+from jaxtyping import Float
 
 from prior_reinforce.errors import FileFormatError
 from prior_reinforce.files import open_npz
 from prior_reinforce.plans.interpolation import join_frames
-from prior_reinforce.plans.motions import Plan
+from prior_reinforce.plans.motions import Plan, PlanFormat
 
 Outcome = Literal["done", "not_moved", "aborted", "unknown"]
 """`done`: the whole plan was executed. `not_moved`: the arm stands where it stood. `aborted`: it
@@ -51,9 +52,13 @@ class MotionResult(msgspec.Struct, frozen=True, kw_only=True):
     reason: str = ""
     """Why it was not done."""
     start_error: dict[str, float] = {}
-    """The driver's distance from the plan's first frame, by unit."""
+    """Largest distance of a column from the plan's first frame, by unit."""
     tracking_rms: dict[str, float] = {}
-    """The driver's distance from the plan, root mean square, by unit."""
+    """Its distance from the plan on the way, root mean square, by unit."""
+    tracking_max: dict[str, float] = {}
+    """The largest such distance; only where the path was measured, as the next."""
+    end_error: dict[str, float] = {}
+    """The largest from the plan's last frame, at the end of what was measured."""
     exit_status: int | None = None
     """Status the command ended with; minus the signal's number if a signal ended it; None where
     nobody knows."""
@@ -91,32 +96,60 @@ def by_unit(distance: dict[str, float] | float) -> dict[str, float]:
     return distance if isinstance(distance, dict) else {"rad": distance}
 
 
-def measure_tracking(folder: Path, plan: Plan) -> dict[str, float]:
-    """How far the measured path was from the plan, root mean square over samples and columns.
+def measure_tracking(folder: Path, plan: Plan) -> dict[str, dict[str, float]]:
+    """How far the measured path was from the plan.
 
     Args:
-        folder: Where the driver may have put `executed.npz`: `t` (T,) in [s] from the motion's
-            start, `q` (T, D) in the plan's units.
+        folder: Where the driver may have put `executed.npz`; see `read_path`.
         plan: What was to be executed.
 
     Returns:
-        By unit, over the columns in it; empty where there is no such file.
+        `start_error`, `tracking_rms`, `tracking_max` and `end_error` of `MotionResult`, each by
+        unit over the columns in it; empty where there is no such file.
+
+    Raises:
+        FileFormatError: It is no such file.
+    """
+    path = read_path(folder, plan.format)
+    if path is None:
+        return {}
+    t, q = path
+    off = np.abs(q - join_frames(plan.actions, plan.format.dt)(np.clip(t, 0.0, plan.times[-1])))
+    start, end = np.abs(q[0] - plan.actions[0]), np.abs(q[-1] - plan.actions[-1])
+    found: dict[str, dict[str, float]] = {}
+    for unit in dict.fromkeys(plan.format.units):
+        own = np.array(plan.format.units) == unit
+        for name, distance in (
+            ("start_error", start[own].max()),
+            ("tracking_rms", np.sqrt(np.mean(off[:, own] ** 2))),
+            ("tracking_max", off[:, own].max()),
+            ("end_error", end[own].max()),
+        ):
+            found.setdefault(name, {})[unit] = float(distance)
+    return found
+
+
+def read_path(
+    folder: Path, form: PlanFormat
+) -> tuple[Float[np.ndarray, " T"], Float[np.ndarray, "T D"]] | None:
+    """Read `executed.npz`: `t` in [s] from the motion's start, `q` in the plan's units.
+
+    Returns:
+        Both; None where there is no such file.
 
     Raises:
         FileFormatError: It is no such file.
     """
     path = folder / PATH_FILE
     if not path.is_file() or path.is_symlink():
-        return {}
+        return None
     with open_npz(path, "write t (T,) and q (T, D) with numpy.savez") as archive:
         t, q = np.asarray(archive["t"], float), np.asarray(archive["q"], float)
         if not (
             len(t) > 0
-            and q.shape == (len(t), plan.format.action_dim)
+            and q.shape == (len(t), form.action_dim)
             and np.all(np.isfinite(t))
             and np.all(np.isfinite(q))
         ):
             raise ValueError(f"t {t.shape} and q {q.shape} are not one finite row a sample")
-    planned = join_frames(plan.actions, plan.format.dt)(np.clip(t, 0.0, plan.times[-1]))
-    squares, units = np.mean((q - planned) ** 2, axis=0), np.array(plan.format.units)
-    return {unit: float(np.sqrt(squares[units == unit].mean())) for unit in plan.format.units}
+    return t, q

@@ -1,0 +1,129 @@
+"""What drives one kind of arm: the contract of every executor.
+
+An executor works in its arm's own columns, order and units. It holds a plan against this arm's
+limits, streams it, and says what was measured. Everything else is done once for all of them in
+`drive.py`, in a process of its own: a plan's columns are matched to the arm's, the start pose is
+compared, a slow approach and a rehearsal are plans like any other, and what came of it is written
+down. A new arm is one file with one class, and a line in `EXECUTORS` if it comes with us.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+from jaxtyping import Float
+
+from prior_reinforce.plans.motions import Plan
+
+Motion = Literal["trial", "rehearsal", "approach"]
+"""What an arm is moved for: a trial; its plan at a fraction of the speed, which is no trial; or the
+slow way to its first frame."""
+
+
+@dataclass(frozen=True)
+class ArmSettings:
+    """The arm of a workspace: `[arm]` of its manifest."""
+
+    executor: str
+    """A name of `EXECUTORS`, or `module:Class` of one's own."""
+    options: Mapping[str, Any] = field(default_factory=dict)
+    """For its `config_type`: `host`, `port`."""
+
+
+@dataclass(frozen=True)
+class ArmDescription:
+    """An arm, as it answers."""
+
+    model: str
+    """For instance `fr3`."""
+    firmware: str
+    """As the arm says; empty where it does not."""
+    columns: tuple[str, ...]
+    """Name of each of its d channels; a plan's column is matched by `is_joint`."""
+    units: tuple[str, ...]
+    """Unit of each channel."""
+    rate: float
+    """Set points and measurements a second."""
+    checked: tuple[str, ...]
+    """What `check` refuses a plan for, in a few words each: `velocity at each position`."""
+    unchecked: tuple[str, ...]
+    """What neither it nor the arm checks: `self-collision`, `people`."""
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredPath:
+    """What an arm measured while it moved."""
+
+    t: Float[np.ndarray, " T"]
+    """Time from the plan's first frame, in [s]."""
+    q: Float[np.ndarray, "T d"]
+    """Position of each channel, in its unit; no rows where nothing was measured."""
+    fault: str = ""
+    """Why the plan was not executed to its end, in the arm's words."""
+    moved: bool = True
+    """Whether the arm moved, or may have."""
+
+
+class Executor(ABC):
+    """One arm, connected. Nothing moves but in `run`."""
+
+    config_type: ClassVar[type[Any]]
+    """Frozen dataclass of its settings; a field without a default must stand in the manifest."""
+
+    @abstractmethod
+    def __init__(self, config: Any) -> None:
+        """Connect.
+
+        Raises:
+            ConfigurationError: The arm cannot be reached, or its settings cannot be used.
+            MissingExtraError: Its library is not installed.
+        """
+
+    @abstractmethod
+    def describe(self) -> ArmDescription:
+        """Say which arm it is."""
+
+    @abstractmethod
+    def where(self) -> Float[np.ndarray, " d"]:
+        """Position of each channel, in its unit: where a motion would have to begin.
+
+        Raises:
+            ConfigurationError: The arm is in no state to move: a stop button is pressed, say.
+        """
+
+    @abstractmethod
+    def check(self, plan: Plan) -> None:
+        """Do nothing if the arm could execute a plan.
+
+        Args:
+            plan: In the arm's own columns.
+
+        Raises:
+            RobotLimitError: It breaks a limit of this arm with this firmware.
+        """
+
+    @abstractmethod
+    def run(self, plan: Plan) -> MeasuredPath:
+        """Execute a plan once, never again by itself, and wait until the arm is at rest.
+
+        Args:
+            plan: In the arm's own columns, from where it stands.
+
+        Returns:
+            What was measured; a fault of the arm is in it and raises nothing.
+        """
+
+    @abstractmethod
+    def stop(self) -> None:
+        """Bring the arm to rest: `run` ends soon after, with a fault.
+
+        Called from a signal's handler while `run` goes on, in the same thread: set a flag.
+        """
+
+    def close(self) -> None:
+        """Let go of the arm, which is at rest; by default nothing is to be done."""
+        return

@@ -1,0 +1,290 @@
+"""The program that lets an executor move an arm: what the supervisor runs for `ask --execute`.
+
+    python -m prior_reinforce.bench.robots.executors.drive REQUEST PLAN RESULT
+
+Once for all executors: a plan's columns become the arm's, where it stands is compared with the
+plan's first frame, the arm's limits are asked for, and a slow approach, a rehearsal and a trial are
+made as plans of the same kind. RESULT is the folder for what came of it: `result.json` and
+`executed.npz`, as any driver writes them, or `look.json` where nothing was to move.
+"""
+
+from __future__ import annotations
+
+import math
+import shlex
+import signal
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import msgspec
+import numpy as np
+from jaxtyping import Float
+
+from prior_reinforce.bench.robots.executors import EXECUTORS
+from prior_reinforce.bench.robots.executors.base import (
+    ArmDescription,
+    ArmSettings,
+    Executor,
+    Motion,
+)
+from prior_reinforce.bench.robots.executors.pose import compare_pose
+from prior_reinforce.bench.robots.executors.result import (
+    NOT_MOVED_STATUS,
+    PATH_FILE,
+    RESULT_FILE,
+    DriverResult,
+)
+from prior_reinforce.bench.robots.gate import GateSettings
+from prior_reinforce.bench.robots.limits import is_joint
+from prior_reinforce.bench.robots.plan_files import read_plan
+from prior_reinforce.errors import (
+    ConfigurationError,
+    FileFormatError,
+    InvalidPlanError,
+    PriorReinforceError,
+)
+from prior_reinforce.plans.motions import Plan, PlanFormat
+from prior_reinforce.registry import build
+
+LOOK_FILE = "look.json"
+_SLOW = {"rad": 0.3, "m": 0.1, "deg": 17.0, "percent": 50.0}
+"""Largest speed of an approach by unit, a second. Ours: a ninth of what the slowest joints of an
+FR3 do, at which a person steps back in time."""
+_APPROACH_DT, _SHORTEST = 0.02, 0.5
+"""Between frames of an approach, and its shortest duration, in [s]."""
+_SAME = 1e-6
+"""Distance from the first frame below which nothing is to be closed, in any unit; ours."""
+# Without the folder that the user happens to stand in: nothing there may be taken for a module.
+_START = f"import sys; sys.path[:] = filter(None, sys.path); import {__name__}; {__name__}.main()"
+
+
+class Request(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What is asked of the program."""
+
+    arm: ArmSettings
+    gate: GateSettings
+    """How far the arm may stand from the plan's first frame."""
+    motion: Motion | Literal["look"]
+    speed: float = 1.0
+    """Share of the plan's own speed."""
+
+
+class Look(msgspec.Struct, frozen=True):
+    """`look.json`: the arm before anything moves."""
+
+    arm: ArmDescription
+    pose: dict[str, float]
+    """Where each of the plan's columns stands."""
+    there: bool
+    """Whether that is near enough to the plan's first frame."""
+    said: str
+    """How near, in words."""
+    approach: float
+    """How long a slow approach takes, in [s]."""
+    refused: str = ""
+    """Why this arm refuses the plan; empty if it does not."""
+
+
+def drive_command(request: Request) -> str:
+    """The command that fulfils a request, with `{plan}` and `{result}` to be filled in."""
+    words = [sys.executable, "-c", _START, msgspec.json.encode(request).decode()]
+    return f"{shlex.join(words)} {{plan}} {{result}}"
+
+
+def read_look(folder: Path) -> Look:
+    """Read `look.json`.
+
+    Raises:
+        FileFormatError: The program did not write it.
+    """
+    try:
+        return msgspec.json.decode((folder / LOOK_FILE).read_bytes(), type=Look)
+    except (OSError, msgspec.MsgspecError) as error:
+        raise FileFormatError(f"the arm's executor said nothing ({error}); ask again") from error
+
+
+def make_executor(settings: ArmSettings) -> Executor:
+    """Connect to an arm.
+
+    Raises:
+        ConfigurationError: There is no such executor or setting, or the arm does not answer.
+        MissingExtraError: Its library is not installed.
+    """
+    kind = EXECUTORS.kind(settings.executor)
+    return kind(build(kind.config_type, settings.options, f"[arm] {settings.executor}"))
+
+
+def arms_columns(form: PlanFormat, arm: ArmDescription) -> list[int]:
+    """The arm's channel for each of a plan's columns.
+
+    Raises:
+        InvalidPlanError: A column is no channel of the arm, is in another unit, or two are one.
+    """
+    channels = []
+    for name, unit in zip(form.names, form.units, strict=True):
+        found = [i for i, own in enumerate(arm.columns) if name == own or is_joint(name, own)]
+        if not found or arm.units[found[0]] != unit:
+            has = ", ".join(map("{} [{}]".format, arm.columns, arm.units))
+            raise InvalidPlanError(
+                f"{arm.model} has no channel for {name} [{unit}]; it has {has}: name [plan]'s "
+                "columns so"
+            )
+        channels.append(found[0])
+    if len(set(channels)) < len(channels):
+        raise InvalidPlanError(f"two of {form.names} are one channel of {arm.model}; drop one")
+    return channels
+
+
+def approach(
+    pose: Float[np.ndarray, " d"], first: Float[np.ndarray, " d"], arm: ArmDescription
+) -> Plan:
+    """The slow way from one pose to another: a minimum-jerk motion of all channels together.
+
+    Raises:
+        InvalidPlanError: A channel is to move in a unit in which no slow speed is known.
+    """
+    far = np.abs(first - pose)
+    duration = _SHORTEST
+    for unit, distance in zip(arm.units, far, strict=True):
+        if distance > _SAME and unit not in _SLOW:
+            raise InvalidPlanError(
+                f"no slow speed is known in {unit}; move the arm to the plan's first frame"
+            )
+        # A minimum-jerk motion's peak is 15/8 of its mean speed.
+        duration = max(duration, 15 / 8 * float(distance) / _SLOW.get(unit, 1.0))
+    n = math.ceil(duration / _APPROACH_DT)
+    s = np.arange(n + 1)[:, None] / n
+    frames = pose + (10 * s**3 - 15 * s**4 + 6 * s**5) * (first - pose)
+    return Plan(frames, PlanFormat(arm.columns, arm.units, _APPROACH_DT))
+
+
+@dataclass(frozen=True, eq=False)
+class _Prepared:
+    """A plan in an arm's columns, and how the arm stands to it."""
+
+    arm: ArmDescription
+    channels: list[int]
+    pose: Float[np.ndarray, " d"]
+    plan: Plan
+    """Channels that the plan leaves out are held where they stand."""
+    said: str
+    there: bool
+
+    @property
+    def to_start(self) -> Plan:
+        return approach(self.pose, self.plan.actions[0], self.arm)
+
+
+def _prepare(executor: Executor, plan: Plan, request: Request) -> _Prepared:
+    arm, pose = executor.describe(), executor.where()
+    channels = arms_columns(plan.format, arm)
+    frames = np.tile(pose, (plan.horizon, 1))
+    frames[:, channels] = plan.actions
+    own = Plan(frames, PlanFormat(arm.columns, arm.units, plan.format.dt / request.speed))
+    here = dict(zip(plan.format.names, pose[channels].tolist(), strict=True))
+    said, there = compare_pose(here, plan.actions[0].tolist(), plan.format, request.gate)
+    return _Prepared(arm, channels, pose, own, said, there)
+
+
+def look(executor: Executor, plan: Plan, request: Request) -> Look:
+    """How the arm stands to a plan; nothing moves."""
+    prepared, refused = _prepare(executor, plan, request), ""
+    try:
+        executor.check(prepared.plan)
+    except PriorReinforceError as error:
+        refused = str(error)
+    pose = prepared.pose[prepared.channels].tolist()
+    return Look(
+        arm=prepared.arm,
+        pose=dict(zip(plan.format.names, pose, strict=True)),
+        there=prepared.there,
+        said=prepared.said,
+        approach=float(prepared.to_start.times[-1]),
+        refused=refused,
+    )
+
+
+class _Stop:
+    """The wish to stop, whenever it comes."""
+
+    def __init__(self) -> None:
+        self.asked = False
+        self.executor: Executor | None = None
+        signal.signal(signal.SIGTERM, self._note)
+
+    def _note(self, *_: object) -> None:
+        self.asked = True
+        if self.executor is not None:
+            self.executor.stop()
+
+    def raise_if_asked(self) -> None:
+        if self.asked:
+            raise ConfigurationError("it was asked to stop before it moved; ask again")
+
+
+def drive(request: Request, plan: Plan, folder: Path) -> DriverResult:
+    """Make one motion, or look; write what came of it."""
+    stop = _Stop()
+    moved = False
+    try:
+        stop.executor = executor = make_executor(request.arm)
+        try:
+            if request.motion == "look":
+                _write(folder / LOOK_FILE, look(executor, plan, request))
+                return DriverResult("done")
+            prepared = _prepare(executor, plan, request)
+            motions = _motions(prepared, request)
+            for motion in motions:
+                executor.check(motion)
+            for motion in motions:
+                stop.raise_if_asked()
+                print(f"{prepared.arm.model} moves for {motion.times[-1]:.2f} s", flush=True)
+                moved_before, moved = moved, True  # whatever happens now, it may have
+                path = executor.run(motion)
+                moved = moved_before or path.moved
+                if path.fault:
+                    break
+            if motion is motions[-1] and len(path.t):
+                np.savez(folder / PATH_FILE, t=path.t, q=path.q[:, prepared.channels])
+        finally:
+            executor.close()
+    except Exception as error:
+        said = str(error) if isinstance(error, PriorReinforceError) else repr(error)
+        result = DriverResult("aborted" if moved else "not_moved", said)
+    else:
+        outcome: Any = "done" if not path.fault else "aborted" if moved else "not_moved"
+        result = DriverResult(outcome, path.fault)
+    _write(folder / RESULT_FILE, result)
+    return result
+
+
+def _motions(prepared: _Prepared, request: Request) -> Sequence[Plan]:
+    """What is to be executed, one after the other; the arm's limits hold for all of it."""
+    to_start = prepared.to_start
+    if request.motion == "approach":
+        return [to_start]
+    if not prepared.there:
+        raise ConfigurationError(f"{prepared.said}; move it there, or ask again with --approach")
+    near = np.abs(prepared.plan.actions[0] - prepared.pose).max() <= _SAME
+    return [prepared.plan] if near else [to_start, prepared.plan]
+
+
+def _write(path: Path, content: Any) -> None:
+    path.write_bytes(msgspec.json.encode(content))
+
+
+def main() -> None:
+    """Fulfil the request of the command line."""
+    request = msgspec.json.decode(sys.argv[1], type=Request)
+    result = drive(request, read_plan(sys.argv[2]), Path(sys.argv[3]))
+    if result.reason:
+        print(result.reason, file=sys.stderr)
+    statuses = {"done": 0, "not_moved": NOT_MOVED_STATUS}
+    sys.exit(statuses.get(result.outcome, 1))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,178 @@
+"""Franka Research 3 through libfranka's own Python client, as joint positions at 1 kHz.
+
+The plan's spline is indexed by the robot's clock, not by this computer's: a cycle that was lost is
+skipped, as the robot extrapolates over it, and none is made up for (measured on a loaded computer:
+advancing by cycles instead asks for 294 rad/s^2 after 3 ms were lost).
+"""
+
+from __future__ import annotations
+
+import gc
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from jaxtyping import Float
+
+from prior_reinforce.bench.robots.executors.base import ArmDescription, Executor, MeasuredPath
+from prior_reinforce.bench.robots.gate import check_plan
+from prior_reinforce.bench.robots.presets import robot_limits
+from prior_reinforce.errors import ConfigurationError
+from prior_reinforce.plans.interpolation import RATE, interpolate
+from prior_reinforce.plans.motions import Plan
+from prior_reinforce.settings import Checked, Positive
+
+if TYPE_CHECKING:
+    import pylibfranka
+
+_HOLD = 0.15
+"""How long the last pose is held before the motion is said to have ended, in [s]: the arm comes to
+rest in it. Ours; the simulated arm needs a tenth of it."""
+_MOVED = 0.002
+"""Distance of a joint from where it stood that counts as having moved, in [rad]. Ours: ten times
+what a joint that is held shows."""
+_REALTIME = Path("/sys/kernel/realtime")
+"""Says 1 on a kernel with PREEMPT_RT, which is what libfranka looks at."""
+
+
+@dataclass(frozen=True)
+class FR3Config(Checked):
+    """`[arm]` with `executor = "fr3"`."""
+
+    host: str
+    """Address of the robot's controller."""
+    firmware: str = "any"
+    """Of its system image, `>=5.9` or `<5.9`; `any` holds plans against the narrower of both."""
+    contact: tuple[Positive, Positive] | None = None
+    """External torque of any joint in [Nm], and force of the end effector in [N], at which the arm
+    stops; None leaves what is set on the robot. A fast swing with a tool that the robot does not
+    know trips the usual 20."""
+
+    def __post_init__(self) -> None:
+        """Check the settings."""
+        super().__post_init__()
+        robot_limits("fr3", self.firmware)
+
+
+class FR3(Executor):
+    """A Franka Research 3 whose FCI is active."""
+
+    config_type = FR3Config
+
+    def __init__(self, config: FR3Config) -> None:
+        """Connect."""
+        import pylibfranka
+
+        self._lib, self._config, self._stopping = pylibfranka, config, False
+        self._errors = pylibfranka.FrankaException, RuntimeError  # which its others derive from
+        self._limits = robot_limits("fr3", config.firmware)
+        self._enforced = _REALTIME.exists() and _REALTIME.read_text().strip() == "1"
+        kind = pylibfranka.RealtimeConfig
+        try:
+            self._robot = pylibfranka.Robot(
+                config.host, kind.kEnforce if self._enforced else kind.kIgnore
+            )
+            if config.contact is not None:
+                torques, forces = [config.contact[0]] * 7, [config.contact[1]] * 6
+                self._robot.set_collision_behavior(torques, torques, forces, forces)
+        except self._errors as error:
+            raise ConfigurationError(
+                f"cannot reach the robot at {config.host} ({_line(error)}); unlock its joints, "
+                "activate FCI in Desk, and see that no other program is connected"
+            ) from error
+
+    def describe(self) -> ArmDescription:
+        """See `Executor`."""
+        here = () if self._enforced else ("real time, which this computer's kernel does not give",)
+        return ArmDescription(
+            model="fr3",
+            firmware=self._config.firmware,
+            columns=self._limits.joint_names,
+            units=("rad",) * 7,
+            rate=RATE,
+            checked=("position", "velocity at each position", "acceleration", "jerk", "rest"),
+            unchecked=("torque", "self-collision", *here),
+        )
+
+    def where(self) -> Float[np.ndarray, "7"]:
+        """The pose that the arm holds, q_d, from which a motion has to begin."""
+        return np.array(self._ready().q_d)
+
+    def check(self, plan: Plan) -> None:
+        """Hold a plan against the limits of FR3's firmware, velocities where they depend on it."""
+        check_plan(plan, self._limits).require()
+
+    def run(self, plan: Plan) -> MeasuredPath:
+        """Stream the plan as joint positions; an error is recovered from once, and named."""
+        fine = interpolate(plan.actions, plan.format.dt, hold_after=_HOLD)
+        rows: list[tuple[float, list[float]]] = []
+        fault = ""
+        before = np.array(self._ready().q)
+        gc.collect()
+        gc.disable()  # a collection takes longer than a cycle
+        try:
+            fault = self._stream(fine.q.tolist(), rows)
+        except self._errors as error:
+            fault = _line(error)
+        finally:
+            gc.enable()
+        t = np.array([t for t, _ in rows])
+        q = np.array([q for _, q in rows]).reshape(len(rows), 7)
+        try:
+            after = np.array(self._recover().q)
+            moved = bool(np.abs(np.vstack([q, after]) - before).max() > _MOVED)
+        except self._errors as error:
+            fault, moved = f"{fault}; then {_line(error)}".removeprefix("; "), True
+        return MeasuredPath(t, q, fault, moved)
+
+    def _stream(self, set_points: list[list[float]], rows: list[tuple[float, list[float]]]) -> str:
+        """Send set points by the robot's clock, and note where it is; why it ended early."""
+        last, k = len(set_points) - 1, 0
+        mode = self._lib.ControllerMode.JointImpedance
+        control = self._robot.start_joint_position_control(mode)
+        state, _ = control.readOnce()
+        while not self._stopping:
+            command = self._lib.JointPositions(set_points[k])
+            command.motion_finished = k == last
+            rows.append((k / RATE, state.q))
+            control.writeOnce(command)
+            if k == last:
+                return ""
+            state, passed = control.readOnce()
+            k = min(k + round(passed.to_sec() * RATE), last)
+        self._robot.stop()
+        return "stopped on request"
+
+    def stop(self) -> None:
+        """See `Executor`: the robot brakes by itself."""
+        self._stopping = True
+
+    def _ready(self) -> pylibfranka.RobotState:
+        """The robot's state, after one recovery where an error was left; ConfigurationError."""
+        modes = self._lib.RobotMode
+        try:
+            state = self._robot.read_once()
+            if state.robot_mode == modes.Reflex:
+                state = self._recover()
+        except self._errors as error:
+            raise ConfigurationError(f"the robot does not answer: {_line(error)}") from error
+        if state.robot_mode != modes.Idle:
+            why = (
+                "its stop button is pressed"
+                if state.robot_mode == modes.UserStopped
+                else (f"it is in mode {state.robot_mode.name}")
+            )
+            raise ConfigurationError(f"the robot cannot move, {why}; see to it, then ask again")
+        return state
+
+    def _recover(self) -> pylibfranka.RobotState:
+        """Clear an error, once; nothing moves by it."""
+        if self._robot.read_once().robot_mode == self._lib.RobotMode.Reflex:
+            self._robot.automatic_error_recovery()
+        return self._robot.read_once()
+
+
+def _line(error: Any) -> str:
+    """What libfranka says, in one line, without its own name."""
+    return " ".join(str(error).split()).removeprefix("libfranka: ")

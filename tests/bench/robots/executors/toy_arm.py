@@ -1,0 +1,118 @@
+"""An arm of two joints in a folder: where it stands is a file, and each motion leaves a line."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from prior_reinforce.bench.robots.executors.base import ArmDescription, Executor, MeasuredPath
+from prior_reinforce.errors import ConfigurationError, RobotLimitError
+from prior_reinforce.plans.interpolation import interpolate
+
+RATE = 100.0
+FAULT = "joint 2: overload"
+
+
+@dataclass(frozen=True)
+class ToyConfig:
+    """Where it is, and what is wrong with it."""
+
+    folder: str
+    kind: str = "works"
+    fastest: float = 1e9
+    seconds: float = 0.0
+    """How long a motion takes at least."""
+
+
+class ToyArm(Executor):
+    """A perfect servo, with the fault that it is told to have."""
+
+    config_type = ToyConfig
+
+    def __init__(self, config: ToyConfig) -> None:
+        if config.kind == "dead":
+            raise ConfigurationError("the arm does not answer; switch it on")
+        if config.kind == "deaf":
+            time.sleep(60)
+        self.config, self.folder, self.stopping = config, Path(config.folder), False
+
+    def describe(self) -> ArmDescription:
+        return ArmDescription(
+            model="toy",
+            firmware="1.0",
+            columns=("joint1", "joint2"),
+            units=("rad", "rad"),
+            rate=RATE,
+            checked=("velocity",),
+            unchecked=("self-collision",),
+        )
+
+    def where(self):
+        path = self.folder / "pose"
+        return np.array(path.read_text().split(), float) if path.exists() else np.zeros(2)
+
+    def check(self, plan):
+        fastest = np.abs(interpolate(plan.actions, plan.format.dt).dq).max()
+        if fastest > self.config.fastest:
+            raise RobotLimitError(f"{fastest:.4f} rad/s, more than {self.config.fastest:.4f}")
+
+    def run(self, plan):
+        others = self.folder / "motions"
+        with others.open("a") as motions:
+            pids = [int(word) for word in others.read_text().split() if word.isdigit()]
+            if any(pid != os.getpid() and _alive(pid) for pid in pids):
+                motions.write("AT ONCE\n")
+            motions.write(f"{os.getpid()}\n")
+        fine = interpolate(plan.actions, plan.format.dt, rate=RATE)
+        n, kind = len(fine.t), self.config.kind
+        for k, q in enumerate(fine.q):
+            if kind == "hangs" and k == n // 2:
+                time.sleep(60)
+            if kind == "crashes" and k == n // 2:
+                os._exit(3)
+            if kind == "raises" and k == n // 2:
+                raise ZeroDivisionError("division by zero")
+            if self.stopping or (kind == "faults" and k == n // 2):
+                fault = "stopped on request" if self.stopping else FAULT
+                return MeasuredPath(fine.t[:k], fine.q[:k], fault)
+            if kind == "jams":
+                return MeasuredPath(fine.t[:0], fine.q[:0], "brakes are closed", moved=False)
+            (self.folder / "pose").write_text(" ".join(map(str, q)))
+            time.sleep(max(0.0, self.config.seconds / n))
+        return MeasuredPath(fine.t, fine.q)
+
+    def stop(self):
+        self.stopping = True
+
+
+TOY = f"{__name__}:ToyArm"
+
+
+def name_arm(folder, arm, **options):
+    """Name a toy arm in a workspace's manifest; the arm's folder is made."""
+    Path(arm).mkdir(exist_ok=True)
+    path = Path(folder) / "workspace.toml"
+    lines = [
+        f"{key} = {json.dumps(value)}" for key, value in (options | {"folder": str(arm)}).items()
+    ]
+    before = path.read_text().partition("\n[arm]\n")[0]
+    path.write_text("\n".join([before, "[arm]", f'executor = "{TOY}"', *lines, ""]))
+
+
+def motions(arm):
+    """How many programs moved it."""
+    path = Path(arm) / "motions"
+    return len(set(path.read_text().split())) if path.exists() else 0
+
+
+def _alive(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
+    except OSError:
+        return False
