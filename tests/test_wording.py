@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 from prior_reinforce.errors import InvalidFeedbackError
 from prior_reinforce.readings import Reading
 from prior_reinforce.wording import (
+    error_example,
     from_words,
     in_words,
     plain,
-    read_error,
     read_numbers,
     read_place,
     read_uncertain_place,
@@ -56,7 +56,7 @@ def test_errors_are_said_in_centimetres(error, words):
     ],
 )
 def test_words_are_read(words, error):
-    np.testing.assert_allclose(from_words(words, 2).error_seen, error, atol=1e-12)
+    np.testing.assert_allclose(from_words(words, XY, METRES).error_seen, error, atol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -65,7 +65,7 @@ def test_words_are_read(words, error):
 )
 def test_other_words_are_refused_with_the_remedy(words):
     with pytest.raises(InvalidFeedbackError, match=r"cannot read|twice"):
-        from_words(words, 2)
+        from_words(words, XY, METRES)
 
 
 INF = np.inf
@@ -91,7 +91,7 @@ INF = np.inf
     ],
 )
 def test_words_are_intervals_in_centimetres(words, low, high, sd, hit):
-    reading = from_words(words, 2)
+    reading = from_words(words, XY, METRES)
     np.testing.assert_allclose(100 * reading.low, low)
     np.testing.assert_allclose(100 * reading.high, high)
     np.testing.assert_allclose(100 * reading.sd, sd, atol=1e-12)
@@ -100,17 +100,17 @@ def test_words_are_intervals_in_centimetres(words, low, high, sd, hit):
 
 
 def test_a_mere_direction_stands_for_five_centimetres():
-    np.testing.assert_allclose(from_words("long, right", 2).error_seen, [0.05, -0.05])
+    np.testing.assert_allclose(from_words("long, right", XY, METRES).error_seen, [0.05, -0.05])
 
 
 def test_what_cannot_be_read_is_named_once():
     with pytest.raises(InvalidFeedbackError, match=r"^cannot read 'a bit long'; write"):
-        from_words("A bit long", 2)
+        from_words("A bit long", XY, METRES)
 
 
 def test_hit_and_miss_exclude_each_other():
     with pytest.raises(InvalidFeedbackError, match="hit and miss"):
-        from_words("hit, miss", 2)
+        from_words("hit, miss", XY, METRES)
 
 
 def test_a_place_has_no_spread_and_no_mere_direction():
@@ -122,10 +122,10 @@ def test_a_place_has_no_spread_and_no_mere_direction():
 @pytest.mark.parametrize(
     ("reading", "said"),
     [
-        (from_words("long, somewhere", 2), "long, somewhere"),
-        (from_words("30 long, 2 to the left", 2), "30 cm long, 2 cm left"),
-        (from_words("5 +- 0.5 long, miss", 2), "5 +- 0.5 cm long, miss"),
-        (from_words("5 +- 0.5 cm long, 2mm left", 2), "5 +- 0.5 cm long, 2mm left"),
+        (from_words("long, somewhere", XY, METRES), "long, somewhere"),
+        (from_words("30 long, 2 to the left", XY, METRES), "30 cm long, 2 cm left"),
+        (from_words("5 +- 0.5 long, miss", XY, METRES), "5 +- 0.5 cm long, miss"),
+        (from_words("5 +- 0.5 cm long, 2mm left", XY, METRES), "5 +- 0.5 cm long, 2mm left"),
         (Reading.by_eye([0.05, -0.02]), "5 cm long, 2 cm right"),
         (Reading.only(True, 2), "hit"),
         (Reading.only(False, 2), "missed"),
@@ -138,20 +138,20 @@ def test_a_reading_is_said_in_its_own_words_or_as_its_number(reading, said):
 @pytest.mark.parametrize("words", ["0.05 long", "5cm short, 0.02 left"])
 def test_metres_without_their_unit_are_not_taken_for_a_hit(words):
     with pytest.raises(InvalidFeedbackError, match="has no unit and would be 0"):
-        from_words(words, 2)
+        from_words(words, XY, METRES)
 
 
 @given(st.lists(st.integers(-900, 900), min_size=1, max_size=3))
 def test_words_say_tenths_of_centimetres_without_loss(tenths):
     error = np.array(tenths) / 1000
-    read = from_words(to_words(error), len(tenths))
+    read = from_words(to_words(error), "xyz"[: len(tenths)], ["m"] * len(tenths))
     np.testing.assert_allclose(read.error_seen, error, atol=1e-12)
 
 
 @given(st.text(max_size=30))
 def test_no_text_causes_anything_but_the_named_error(text):
     with contextlib.suppress(InvalidFeedbackError):
-        assert from_words(text, 2).error_seen.shape == (2,)
+        assert from_words(text, XY, METRES).error_seen.shape == (2,)
 
 
 @pytest.mark.parametrize(
@@ -292,6 +292,12 @@ def test_a_place_that_cannot_be_meant_is_refused(text, says):
         read_place(text, ("x", "y"), ("m", "m"))
 
 
+def test_a_goal_of_more_than_a_turn_is_refused_as_65_metres_are():
+    with pytest.raises(InvalidFeedbackError, match=r"80 rad is more than a turn; say .* 80deg"):
+        read_place("80", ("angle",), ("rad",))
+    assert read_place("80", ("angle",), ("deg",)) == pytest.approx([80])
+
+
 @pytest.mark.parametrize(
     ("text", "shown"),
     [
@@ -317,10 +323,13 @@ def test_control_characters_are_shown_and_not_done(text, shown):
         ("5,5cm long", [0.055, 0.0]),
         ("2in long", [0.0508, 0.0]),
         ("hit!", [0.0, 0.0]),
+        ("spot on", [0.0, 0.0]),
+        ("2 inches short", [-0.0508, 0.0]),
+        ('2" short', [-0.0508, 0.0]),
     ],
 )
 def test_words_as_people_say_them(text, error):
-    np.testing.assert_allclose(from_words(text, 2).error_seen, error, atol=1e-12)
+    np.testing.assert_allclose(from_words(text, XY, METRES).error_seen, error, atol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -332,15 +341,75 @@ def test_words_as_people_say_them(text, error):
         ("0.2 short", ["turns"], [-0.2]),
         ("3cm long, 1cm left, 20ms late", ["m", "m", "s"], [0.03, 0.01, 0.02]),
         ("20 ms early", ["m", "s"], [0.0, -0.02]),
+        ("2 long", ["in"], [2.0]),
+        ("5 deg high", ["rad"], [np.deg2rad(5)]),
+        ("5° low", ["deg"], [-5.0]),
+        ("0.1 s late", ["ms"], [100.0]),
+        ("late, hit", ["s"], [0.0]),
     ],
 )
 def test_words_of_other_units(text, units, error):
-    seen = read_error(text, units)
-    np.testing.assert_allclose(getattr(seen, "error_seen", seen), error, atol=1e-12)
+    seen = from_words(text, [f"r{j}" for j in range(len(units))], units)
+    np.testing.assert_allclose(seen.error_seen, error, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("text", "units", "low", "high", "sd"),
+    [
+        ("5-7cm long", ["m", "m"], [0.05, -0.01], [0.07, 0.01], [0, 0]),
+        ("5 to 7 cm short", ["m", "m"], [-0.07, -0.01], [-0.05, 0.01], [0, 0]),
+        ("50mm – 7cm short", ["m"], [-0.07], [-0.05], [0]),
+        ("2 +- 0.5 long", ["in"], [2.0], [2.0], [0.5]),
+        ("20 +- 5 ms late", ["m", "s"], [-0.01, 0.02], [0.01, 0.02], [0, 0.005]),
+        ("20ms late", ["s"], [0.02], [0.02], [np.hypot(0.004, 0.01)]),
+        ("10-30 ms late", ["m", "s"], [-0.01, 0.01], [0.01, 0.03], [0, 0]),
+        ("early", ["m", "s"], [-INF, -INF], [INF, 0.0], [0, 0]),
+    ],
+)
+def test_every_task_is_told_in_intervals(text, units, low, high, sd):
+    reading = from_words(text, "xt"[: len(units)], units, 0.01)
+    np.testing.assert_allclose(reading.low, low)
+    np.testing.assert_allclose(reading.high, high)
+    np.testing.assert_allclose(reading.sd, sd, atol=1e-12)
+
+
+def test_components_have_the_words_of_their_names():
+    through = ("y", "z", "flight"), ("m", "m", "s")
+    read = from_words("5cm left, 2cm low, 20ms late", *through)
+    np.testing.assert_allclose(read.error_seen, [0.05, -0.02, 0.02])
+    with pytest.raises(InvalidFeedbackError, match="one of left, right, high, low, late, early"):
+        from_words("5cm long", *through)
+    assert error_example(*through) == "5cm left, 2cm high, 20ms late"
+    assert say_error([0.05, -0.02], ("y", "z"), METRES) == "5 cm left, 2 cm low"
+    assert say_place([0.05, 0.8], ("y", "z"), METRES) == "5 cm left, 80 cm up"
+    np.testing.assert_allclose(read_place("80cm up, 5cm right", ("y", "z"), METRES), [-0.05, 0.8])
+
+
+@pytest.mark.parametrize(
+    ("units", "example"),
+    [
+        (["m"], "5cm long"),
+        (["in"], "2in long"),
+        (["rad"], "5deg long"),
+        (["turns"], "0.2 long"),
+        (["s", "s"], ""),
+        (["m"] * 4, ""),
+    ],
+)
+def test_an_example_of_words_can_be_read(units, example):
+    names = [f"r{j}" for j in range(len(units))]
+    assert error_example(names, units) == example
+    assert not example or from_words(example, names, units).has_number
+
+
+def test_what_was_said_is_shown_with_the_unit_that_was_understood():
+    assert say_reading(from_words("2 long", ["x"], ["in"]), ["x"], ["in"]) == "2 in long"
+    both = XY, METRES
+    assert say_reading(from_words("5-7 long, 2 left", *both), *both) == "5-7 cm long, 2 cm left"
 
 
 def test_inches_are_an_interval_as_centimetres_are():
-    reading = read_error("2cm long", ["in"])
+    reading = from_words("2cm long", ["x"], ["in"])
     np.testing.assert_allclose(reading.low, 1 / 2.54)
     np.testing.assert_allclose(reading.high, 3.5 / 2.54)
 
@@ -354,11 +423,13 @@ def test_inches_are_an_interval_as_centimetres_are():
         ("5 kg long", ["rad"], "cannot read"),
         ("5 deg long, 2 deg short", ["rad"], "names long and short twice"),
         ("20 ms late", ["s", "s"], "cannot read"),
+        ("80 rad long", ["rad"], "more than a turn"),
+        ("90 m long", ["m"], "farther than any arm throws"),
     ],
 )
 def test_other_words_of_other_units_are_refused(text, units, says):
     with pytest.raises(InvalidFeedbackError, match=says):
-        read_error(text, units)
+        from_words(text, "xyz"[: len(units)], units)
 
 
 def test_numbers_with_what_stands_behind_plus_minus():

@@ -3,12 +3,13 @@
 An operator stands behind the robot and looks along x, from the robot's base over the table:
 
                       an error, seen from the goal    a place, seen from the base
-    component 0 (x)   long or short                   ahead or behind
-    component 1 (y)   left or right                   left or right
-    component 2 (z)   high or low                     up or down
+    x                 long or short                   ahead or behind
+    y                 left or right                   left or right
+    z                 high or low                     up or down
+    a time            late or early
 
-An error is outcome minus goal. Words are for lengths, of at most three components, in centimetres;
-anything else is given by its names and units.
+A component is x, y or z by its name, else by its position. An error is outcome minus goal. Lengths
+are said in centimetres, errors of other tasks by their names and units.
 Source: paper, Section IV, "Perception Process" (coarse human feedback); the words are ours.
 """
 
@@ -24,12 +25,12 @@ import numpy as np
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
-from prior_reinforce.arrays import BEYOND_DOUBT, FARTHEST, as_error
+from prior_reinforce.arrays import BEYOND_DOUBT, FARTHEST, LARGEST_TURN, as_error
 from prior_reinforce.errors import InvalidFeedbackError
 from prior_reinforce.readings import EYE_BETWEEN, OPEN_ERROR, Reading
 
 WORDS: tuple[tuple[str, str], ...] = (("long", "short"), ("left", "right"), ("high", "low"))
-"""For each component of an error: the word where it is positive, the word where it is negative."""
+"""For x, y and z of an error: the word where it is positive, the word where it is negative."""
 PLACE_WORDS: tuple[tuple[str, str], ...] = (("ahead", "behind"), ("left", "right"), ("up", "down"))
 """The same for a place."""
 
@@ -39,34 +40,40 @@ _Point = Float[np.ndarray, " k"]
 _LEAST_BARE_CM = 0.1
 """Ours: nobody sees a throw to a millimetre; a smaller number without a unit is in metres."""
 _METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
-_TO_UNIT = {(unit, "m"): factor for unit, factor in _METRES.items()} | {
-    ("ms", "s"): 0.001, ("deg", "rad"): math.pi / 180, ("rad", "deg"): 180 / math.pi
+_TO_UNIT = {(a, b): _METRES[a] / _METRES[b] for a in _METRES for b in _METRES} | {
+    ("ms", "s"): 0.001, ("s", "ms"): 1000.0,
+    ("deg", "rad"): math.pi / 180, ("rad", "deg"): 180 / math.pi,
 }  # fmt: skip
 """What to multiply with, from the unit that was said to the outcome's."""
 _TIMES: tuple[str, str] = ("late", "early")
 """The words of a component that is a time."""
+_EXAMPLES = {"m": "cm", "s": "20ms", "ms": "20ms", "rad": "5deg", "deg": "5deg"}
+_AXES = {"x": 0, "y": 1, "z": 2, "height": 2}
 _FILLERS = re.compile(r"\b(?:about|approximately|approx\.?|around|roughly|circa|ca\.?|too)\s+|~\s*")
 """What people say beside a length, which is an estimate anyway."""
 _DECIMAL_COMMA = re.compile(r"(?<=\d),(?=\d+\s*[a-z])")
+_RANGE = re.compile(r"(?<=[\da-z\"°.])\s*(?:–|-|\bto\b)\s*(?=\.?\d)")
 _PLUS_MINUS = r"(?:\+-|\+/-|±)"
 _NUMBER = r"\d{1,6}(?:\.\d*)?|\.\d+"
-_UNIT = r"cm|mm|m|in|"
+_UNIT = r"cm|mm|ms|deg(?:rees?)?|°|rad|inch(?:es)?|\"|(?:m|in|s)(?![a-z])|"
+_SHORT = {"inch": "in", "inches": "in", '"': "in", "°": "deg", "degree": "deg", "degrees": "deg"}
 _TERM = re.compile(
-    rf"(?:(?P<value>{_NUMBER})\s*(?P<unit>{_UNIT})\s*"
+    rf"(?:(?:(?P<least>{_NUMBER})\s*(?P<least_unit>{_UNIT})\s*-\s*)?"
+    rf"(?P<value>{_NUMBER})\s*(?P<unit>{_UNIT})\s*"
     rf"(?:{_PLUS_MINUS}\s*(?P<sd>{_NUMBER})\s*(?P<sd_unit>{_UNIT})\s*)?)?"
     r"(?:to the )?(?P<word>[a-z]+)"
 )
 _BARE_TERM = re.compile(rf"(?P<value>{_NUMBER})\s*(?P<unit>cm|mm|m|in)")
 _FROM_BASE = re.compile(r"(?P<length>.*?)\s*(?:away )?from (?:the )?(?:base|robot|arm|foot)\b.*")
-_PLACE_TERM = re.compile(
-    rf"(?P<number>[+-]?(?:{_NUMBER}))\s*(?P<unit>cm|mm|m|in|deg|rad|ms|s|)(?:\s*[,;]\s*|\s+|$)"
-)
-_WITH_WORD = re.compile(
-    rf"(?P<number>{_NUMBER})\s*(?:(?P<unit>cm|mm|m|in|deg|rad|ms|s)(?![a-z])\s*)?"
-    r"(?:to the )?(?P<word>[a-z]+)"
-)
+_PLACE_TERM = re.compile(rf"(?P<number>[+-]?(?:{_NUMBER}))\s*(?P<unit>{_UNIT})(?:\s*[,;]\s*|\s+|$)")
+_FARTHEST = {
+    "m": (FARTHEST, "farther than any arm throws"), "rad": (LARGEST_TURN, "more than a turn")
+}  # fmt: skip
+_OPEN_SDS = 10.0
+"""Number used for what is no length and of which only the direction is known, in its least sds
+(ours): in tolerances as far as 5 cm, where 1.5 cm are allowed."""
 _SOMEWHERE = "somewhere"
-_ON_THE_GOAL = ("on the goal", "0")
+_ON_THE_GOAL = ("on the goal", "spot on", "0")
 _HITS = {"hit": True, "miss": False}
 
 
@@ -90,25 +97,35 @@ def in_words(units: Sequence[str]) -> bool:
     return len(units) <= len(WORDS) and all(unit == "m" for unit in units)
 
 
-def to_words(error: ArrayLike) -> str:
+def axes_of(names: Sequence[str], units: Sequence[str]) -> list[int]:
+    """Which of x, y and z components are, by their names, else by their positions; 3: none."""
+    by_position = [3 if unit in ("s", "ms") else min(j, 3) for j, unit in enumerate(units)]
+    pairs = zip(names, by_position, strict=True)
+    by_name = [axis if axis == 3 else _AXES.get(name.lower(), axis) for name, axis in pairs]
+    spatial = [axis for axis in by_name if axis < 3]
+    return by_name if len(set(spatial)) == len(spatial) else by_position
+
+
+def to_words(error: ArrayLike, names: Sequence[str] = "xyz") -> str:
     """Describe an error as an operator would: `5 cm long, 2 cm left`, or `on the goal`.
 
     Args:
         error: Outcome minus goal, at most three numbers, in [m].
+        names: Of the components.
     """
-    said = _terms(error, WORDS)
+    said = _terms(error, [WORDS[axis] for axis in axes_of(names, "m" * len(names))])
     return ", ".join(term for term in said if not term.startswith("0 ")) or "on the goal"
 
 
 def say_error(error: ArrayLike, names: Sequence[str], units: Sequence[str]) -> str:
     """Describe an error: `5 cm long, 2 cm left`, or `x +0.05 m, t -0.1 s`."""
-    return to_words(error) if in_words(units) else _components(error, names, units, sign="+")
+    return to_words(error, names) if in_words(units) else _components(error, names, units, "+")
 
 
 def say_reading(reading: Reading, names: Sequence[str], units: Sequence[str]) -> str:
     """Describe what was seen: in its own words, with all units, else as its number."""
     if reading.said:
-        return _with_units(reading.said)
+        return _with_units(reading.said, names, units)
     if not np.any(np.isfinite(reading.low) | np.isfinite(reading.high)):
         return "hit" if reading.hit else "missed"
     return say_error(reading.error_seen, names, units)
@@ -117,8 +134,19 @@ def say_reading(reading: Reading, names: Sequence[str], units: Sequence[str]) ->
 def say_place(place: ArrayLike, names: Sequence[str], units: Sequence[str]) -> str:
     """Describe a goal, condition or outcome: `92 cm ahead, 10 cm left`, or `x 0.92 m, t 0.3 s`."""
     if in_words(units):
-        return ", ".join(_terms(place, PLACE_WORDS))
+        return ", ".join(_terms(place, [PLACE_WORDS[axis] for axis in axes_of(names, units)]))
     return _components(place, names, units)
+
+
+def error_example(names: Sequence[str], units: Sequence[str]) -> str:
+    """An error in words: `5cm long, 2cm left, 20ms late`; empty where a component has no words."""
+    pairs, lengths = _pairs(WORDS, names, units), ("5cm", "2cm", "1cm")
+    said = [
+        f"{('2in' if unit == 'in' else lengths[j]) if unit in _METRES else number} {pair[0]}"
+        for j, (pair, unit) in enumerate(zip(pairs, units, strict=True))
+        if pair and (number := _EXAMPLES.get(unit, "0.2" if len(units) == 1 else ""))
+    ]
+    return ", ".join(said) if len(said) == len(units) else ""
 
 
 def say_length(length: float, units: Sequence[str]) -> str:
@@ -146,29 +174,29 @@ def say_tolerance(
     return " and ".join(dict.fromkeys(each))
 
 
-def from_words(text: str, outcome_dim: int) -> Reading:
+def from_words(
+    text: str, names: Sequence[str], units: Sequence[str], least_sd: ArrayLike = 0.0
+) -> Reading:
     """Read an error from words.
 
     Args:
-        text: For instance `5cm long, 2 cm left`; numbers without a unit are centimetres, and a
-            component that is not named is zero. 0, 2, 5 cm and tens are an observer's words
-            (`Reading.by_eye`), other numbers estimates (`Reading.estimated`), `5 +- 0.5 cm long` is
-            a measurement. `long` means by 1 cm or more, and leaves components that are not named
-            unknown; so does `5 cm long, somewhere`. `hit` and `miss` stand alone or beside terms.
-        outcome_dim: k, at most 3.
+        text: For instance `5cm long, 2 cm left`, `20ms late`, `5-7 in short`, `5 deg high`. A
+            length without a unit is in centimetres, or in the outcome's inches; a component that
+            is not named is zero. 0, 2, 5 cm and tens are an observer's words (`Reading.by_eye`),
+            other numbers estimates (`Reading.estimated`), `5 +- 0.5 cm long` is a measurement.
+            `long` means by 1 cm or more, and leaves components that are not named unknown; so does
+            `5 cm long, somewhere`. `hit` and `miss` stand alone or beside terms.
+        names: Names of the k components.
+        units: Units of the k components.
+        least_sd: Least standard deviation of what is no length and was not measured, in `units`.
 
     Returns:
-        The reading, in [m].
+        The reading, in `units`.
 
     Raises:
         InvalidFeedbackError: Unknown words, or one direction named twice.
     """
-    if outcome_dim > len(WORDS):
-        raise InvalidFeedbackError(
-            f"words describe up to {len(WORDS)} components, this task has {outcome_dim}: give "
-            "numbers"
-        )
-    words = WORDS[:outcome_dim]
+    k, sds = len(units), np.broadcast_to(np.asarray(least_sd, dtype=np.float64), len(units))
     hits, terms, rest_unknown = set(), [], False
     for part in _parts(text):
         if part in _HITS:
@@ -181,28 +209,48 @@ def from_words(text: str, outcome_dim: int) -> Reading:
         raise InvalidFeedbackError(f"{text!r} says hit and miss; say one of them")
     hit = hits.pop() if hits else None
     if hit is not None and not terms:
-        return replace(Reading.only(hit, outcome_dim), said=text)
-    said = _read(terms, text, words, 'for instance "5cm long, 2cm left", or "hit"', sizes=False)
+        return replace(Reading.only(hit, k), said=text)
+    example = f'for instance "{error_example(names, units)}", or "hit"'
+    said = _read(terms, text, WORDS, names, units, example, sizes=False)
     rest_unknown |= any(term.size is None for term in said.values())
-    number = np.array([said[j].error if j in said else 0.0 for j in range(outcome_dim)])
-    eye = Reading.by_eye(number)
-    low, high, sd = eye.low.copy(), eye.high.copy(), eye.sd.copy()
-    for j in range(outcome_dim):
-        if j not in said:
-            if rest_unknown:
-                low[j], high[j], sd[j] = -math.inf, math.inf, 0.0
-        elif said[j].size is None:
-            ends = EYE_BETWEEN[0], math.inf
-            low[j], high[j] = ends if said[j].sign > 0 else (-ends[1], -ends[0])
+    metres = np.array([_METRES.get(unit, 0.0) for unit in units])
+    is_length = metres > 0.0
+    number = np.zeros(k)
+    for j, term in said.items():
+        unknown = OPEN_ERROR / metres[j] if is_length[j] else _OPEN_SDS * sds[j]
+        number[j] = term.sign * (unknown if term.size is None else term.size)
+        farthest, why = _FARTHEST.get("m" if is_length[j] else units[j], (math.inf, ""))
+        if abs(number[j]) * (metres[j] or 1.0) > farthest:
+            raise InvalidFeedbackError(
+                f"{text!r} is {number[j]:g} {units[j]}, {why}; say it again, in "
+                f"{'cm' if is_length[j] else 'deg'}, or void the trial if that is true"
+            )
+    seen = Reading.estimated(number, sds)
+    low, high, sd = seen.low.copy(), seen.high.copy(), seen.sd.copy()
+    if np.any(is_length):
+        eye = Reading.by_eye((number * metres)[is_length])
+        for ends, of in ((low, eye.low), (high, eye.high), (sd, eye.sd)):
+            ends[is_length] = of / metres[is_length]
+    if rest_unknown:
+        unsaid = [j for j in range(k) if j not in said]
+        low[unsaid], high[unsaid], sd[unsaid] = -math.inf, math.inf, 0.0
+    for j, term in said.items():
+        if term.size is None:
+            nearest = EYE_BETWEEN[0] / metres[j] if is_length[j] else 0.0
+            low[j], high[j] = sorted((term.sign * nearest, term.sign * math.inf))
             sd[j] = 0.0
-        elif said[j].sd is not None:
-            low[j], high[j], sd[j] = number[j], number[j], said[j].sd
+        elif term.least is not None:
+            low[j], high[j] = sorted((term.sign * term.least, number[j]))
+            number[j], sd[j] = 0.5 * (low[j] + high[j]), 0.0
+        elif term.sd is not None:
+            low[j], high[j], sd[j] = number[j], number[j], term.sd
     return Reading(number, low, high, sd, hit, text)
 
 
 def as_reading(
     seen: Reading | ArrayLike | None,
     hit: bool | None,
+    names: Sequence[str],
     units: Sequence[str],
     least_sd: _Point,
 ) -> Reading:
@@ -212,6 +260,7 @@ def as_reading(
         seen: A reading, words, or outcome minus goal as numbers of unknown origin, shape (k,); None
             if only `hit` is known.
         hit: Whether the goal was reached, if that was seen directly.
+        names: Names of the k components.
         units: Units of the k components.
         least_sd: Least standard deviation of numbers of unknown origin, shape (k,), in `units`.
 
@@ -220,70 +269,18 @@ def as_reading(
     """
     if not (hit is None or isinstance(hit, (bool, np.bool_))):
         raise InvalidFeedbackError(f"hit must be True, False or None, got {hit!r}")
-    k = len(units)
     if seen is None:
         if hit is None:
             raise InvalidFeedbackError("say what was seen, or whether it hit")
-        return Reading.only(bool(hit), k)
+        return Reading.only(bool(hit), len(units))
     if isinstance(seen, str):
-        if not in_words(units):
-            raise InvalidFeedbackError(
-                f"words are for lengths, these outcomes are in {', '.join(units)}; give {k} numbers"
-            )
-        reading = from_words(seen, k)
+        reading = from_words(seen, names, units, least_sd)
     elif isinstance(seen, Reading):
-        as_error(seen.error_seen, k)
+        as_error(seen.error_seen, len(units))
         reading = seen
     else:
-        reading = Reading.estimated(as_error(seen, k), least_sd)
+        reading = Reading.estimated(as_error(seen, len(units)), least_sd)
     return reading.with_hit(hit)
-
-
-def read_error(text: str, units: Sequence[str]) -> Reading | _Point:
-    """Read an error from words, in the outcome's units.
-
-    Args:
-        text: As in `from_words`; a time is `20ms late`, and for a single component the words are
-            `long` and `short`, whatever its unit: `5 deg long`.
-        units: Units of the k components.
-
-    Returns:
-        A reading if all components are lengths of one unit; else a number of unknown origin for
-        each component.
-
-    Raises:
-        InvalidFeedbackError: As `from_words` does.
-    """
-    k = len(units)
-    if len(set(units)) == 1 and units[0] in _METRES:
-        reading, scale = from_words(text, k), 1 / _METRES[units[0]]
-        if scale == 1:
-            return reading
-        error, low, high = (scale * n for n in (reading.error_seen, reading.low, reading.high))
-        return Reading(error, low, high, scale * reading.sd, reading.hit, reading.said)
-    words = [
-        _TIMES if unit in ("s", "ms") and k > 1 else w
-        for w, unit in zip(WORDS, units, strict=False)
-    ]
-    number = np.full(k, np.nan)
-    for part in _parts(text):
-        match = _WITH_WORD.fullmatch(part)
-        pair = next((w for w in words if match and match["word"] in w), None)
-        if match is None or pair is None or words.count(pair) > 1:
-            said = " or ".join(word for w in words for word in w)
-            raise InvalidFeedbackError(
-                f"cannot read {part!r}; write a number with its unit and {said}, or give {k} "
-                "numbers"
-            )
-        j, sign = words.index(pair), -1.0 if pair.index(match["word"]) else 1.0
-        unit = match["unit"] or units[j]
-        factor = 1.0 if unit == units[j] else _TO_UNIT.get((unit, units[j]))
-        if factor is None or (not match["unit"] and k > 1):
-            raise InvalidFeedbackError(f"{part!r} is to be in {units[j]}; say that unit")
-        if not np.isnan(number[j]):
-            raise InvalidFeedbackError(f"{text!r} names {' and '.join(pair)} twice; give each once")
-        number[j] = sign * float(match["number"]) * factor
-    return np.nan_to_num(number)
 
 
 def read_numbers(text: str) -> list[tuple[float, float | None]] | None:
@@ -333,23 +330,28 @@ def read_place(text: str, names: Sequence[str], units: Sequence[str]) -> _Point:
     Raises:
         InvalidFeedbackError: It is none of these, or farther than any arm throws.
     """
-    expected = f"{len(names)} finite numbers: {', '.join(names)}"
+    k, expected = len(names), f"{len(names)} finite numbers: {', '.join(names)}"
     numbers = _numbers_with_units(text, units)
     if numbers is None:
         if in_words(units):
-            words, example = PLACE_WORDS[: len(names)], 'for instance "92cm ahead, 10cm left"'
-            said = _read(_parts(text), text, words, example, sizes=True)
-            return np.array([said[j].error if j in said else 0.0 for j in range(len(names))])
+            example = 'for instance "92cm ahead, 10cm left"'
+            read = _read(_parts(text), text, PLACE_WORDS, names, units, example, sizes=True)
+            place = np.zeros(k)
+            for j, term in read.items():
+                place[j] = term.sign * (term.size or 0.0)
+            return place
         raise InvalidFeedbackError(f"cannot read {text!r}; give {expected}")
-    if len(numbers) != len(names) or not all(map(math.isfinite, numbers)):
+    if len(numbers) != k or not all(map(math.isfinite, numbers)):
         raise InvalidFeedbackError(f"{text!r} is not {expected}; give those")
     has_units = read_numbers(text) is None
     for number, unit in zip(numbers, units, strict=True):
-        possible = abs(number) <= FARTHEST * BEYOND_DOUBT
-        if unit == "m" and abs(number) > FARTHEST and not (has_units and possible):
+        farthest, said = _FARTHEST.get(unit, (math.inf, ""))
+        possible = abs(number) <= farthest * BEYOND_DOUBT and unit == "m"
+        if abs(number) > farthest and not (has_units and possible):
             raise InvalidFeedbackError(
-                f"{number:g} m is farther than any arm throws; say the unit, for instance "
-                f"{number:g}cm" + (f", or {number:g}m" if possible else "")
+                f"{number:g} {unit} is {said}; say the unit, for instance "
+                f"{number:g}{'cm' if unit == 'm' else 'deg'}"
+                + (f", or {number:g}{unit}" if possible else "")
             )
     return np.array(numbers)
 
@@ -365,7 +367,7 @@ def _numbers_with_units(text: str, units: Sequence[str]) -> list[float] | None:
     terms = list(_PLACE_TERM.finditer(text.strip()))
     if "".join(term[0] for term in terms) != text.strip():
         return None
-    said = [term["unit"] for term in terms]
+    said = [_SHORT.get(term["unit"], term["unit"]) for term in terms]
     if not any(said[:-1]):
         said = said[-1:] * len(terms)
     if len(said) != len(units):
@@ -381,26 +383,35 @@ def _numbers_with_units(text: str, units: Sequence[str]) -> list[float] | None:
 
 @dataclass(frozen=True)
 class _Term:
-    """What was said of one component, in [m]."""
+    """What was said of one component, in its unit."""
 
     sign: float
     size: float | None
     """None where only the direction was said."""
-    sd: float | None
-
-    @property
-    def error(self) -> float:
-        """The number that stands for it."""
-        return self.sign * (OPEN_ERROR if self.size is None else self.size)
+    least: float | None = None
+    """Lower end, where a range was said: `size` is its upper one."""
+    sd: float | None = None
 
 
 def _parts(text: str) -> list[str]:
     plainer = _DECIMAL_COMMA.sub(".", _FILLERS.sub("", text.strip().lower()))
+    plainer = _RANGE.sub("-", plainer)
     parts = re.split(r"\s*(?:,|;|\band\b)\s*|(?<=[a-z])\s+(?=\.?\d)", plainer)
     return [part.rstrip(".! ") for part in parts]
 
 
-def _with_units(text: str) -> str:
+def _pairs(
+    words: Sequence[tuple[str, str]], names: Sequence[str], units: Sequence[str]
+) -> list[tuple[str, str] | None]:
+    """The words of each component; None where it has none."""
+    pairs = [
+        _TIMES if unit in ("s", "ms") else words[axis] if axis < len(words) else None
+        for axis, unit in zip(axes_of(names, units), units, strict=True)
+    ]
+    return [pair if pairs.count(pair) == 1 else None for pair in pairs]
+
+
+def _with_units(text: str, names: Sequence[str], units: Sequence[str]) -> str:
     """Words with the unit that was understood where none was said: `5 cm long` for `5 long`."""
     said = []
     for part in _parts(text):
@@ -408,43 +419,60 @@ def _with_units(text: str) -> str:
         if term is None or not term["value"] or term["unit"] or term["sd_unit"]:
             said.append(part)
             continue
+        unit = next(
+            (u for pair, u in zip(_pairs(WORDS, names, units), units, strict=True)
+             if pair and term["word"] in pair), units[0]
+        )  # fmt: skip
+        least = f"{term['least']}-" if term["least"] else ""
         spread = f" +- {term['sd']}" if term["sd"] else ""
-        said.append(f"{term['value']}{spread} cm {term['word']}")
+        said.append(f"{least}{term['value']}{spread} {_bare(unit)} {term['word']}")
     return text if said == _parts(text) else ", ".join(said)
+
+
+def _bare(unit: str) -> str:
+    """The unit of a number that has none."""
+    return "cm" if unit == "m" else unit
 
 
 def _read(
     parts: Sequence[str],
     text: str,
     words: Sequence[tuple[str, str]],
+    names: Sequence[str],
+    units: Sequence[str],
     example: str,
     *,
     sizes: bool,
 ) -> dict[int, _Term]:
     """Read the terms of a text by component; `sizes` wants a number for each, and no `+-`."""
-    known = [word for pair in words for word in pair]
+    pairs, k = _pairs(words, names, units), len(units)
+    known = {word: (j, pair) for j, pair in enumerate(pairs) if pair for word in pair}
+    if k == 1 and units[0] not in _METRES:  # whatever is more of it
+        known |= {word: (0, pair) for pair in (*words, _TIMES) for word in pair}
     read: dict[int, _Term] = {}
     for turn, part in enumerate(parts):
         match, bare = _TERM.fullmatch(part), _BARE_TERM.fullmatch(part)
-        understood = match is not None and match["word"] in known
-        if bare is not None and sizes and len(parts) > 1 and turn < len(words):
-            match, component, negative = bare, turn, 0
-        elif match is None or not understood or (sizes and (not match["value"] or match["sd"])):
-            raise InvalidFeedbackError(_unread(part, text, known, example, sizes=sizes))
+        told = {} if match is None else match.groupdict()
+        if bare is not None and sizes and len(parts) > 1 and turn < k:
+            told, j, pair, sign = bare.groupdict(), turn, pairs[turn], 1.0
+        elif told.get("word") not in known or (
+            sizes and (not told["value"] or told["sd"] or told["least"])
+        ):
+            raise InvalidFeedbackError(_unread(part, text, [*known], example, sizes=sizes))
         else:
-            component, negative = divmod(known.index(match["word"]), 2)
-        if component in read:
+            j, pair = known[told["word"]]
+            sign = -1.0 if told["word"] == pair[1] else 1.0
+        if j in read:
             raise InvalidFeedbackError(
-                f"{text!r} names {' and '.join(words[component])} twice; give each direction once"
+                f"{text!r} names {' and '.join(pair or names[j])} twice; give each direction once"
             )
-        size = sd = None
-        told = match.groupdict()
-        if told["value"]:
-            unit = told["unit"] or told.get("sd_unit") or ""
-            size = _metres(told["value"], unit, part)
-            if told.get("sd"):
-                sd = _metres(told["sd"], told["sd_unit"] or unit, part)
-        read[component] = _Term(-1.0 if negative else 1.0, size, sd)
+
+        numbers: list[float | None] = []
+        for which in ("value", "least", "sd"):
+            unit = told.get(f"{which}_unit") or told.get("unit") or told.get("sd_unit") or ""
+            said = told.get(which)
+            numbers.append(_in_unit(said, unit, units[j], k, part) if said else None)
+        read[j] = _Term(sign, *numbers)
     return read
 
 
@@ -459,13 +487,19 @@ def _unread(part: str, text: str, known: Sequence[str], example: str, *, sizes: 
     return f"cannot read {part!r}{where}; write a length and one of {', '.join(known)}, {example}"
 
 
-def _metres(number: str, unit: str, part: str) -> float:
-    value = float(number)
-    if not unit and 0 < value < _LEAST_BARE_CM:
+def _in_unit(number: str, said: str, unit: str, k: int, part: str) -> float:
+    """A number in the outcome's unit."""
+    value, said = float(number), _SHORT.get(said, said)
+    if not said and unit == "m" and 0 < value < _LEAST_BARE_CM:
         raise InvalidFeedbackError(
             f"{part!r} has no unit and would be {10 * value:g} mm; say m, cm or mm"
         )
-    return value * _METRES[unit or "cm"]
+    if not said and (unit in _METRES or k == 1):
+        said = _bare(unit)
+    factor = 1.0 if said == unit else _TO_UNIT.get((said, unit))
+    if factor is None:
+        raise InvalidFeedbackError(f"{part!r} is to be in {unit}; say that unit")
+    return value * factor
 
 
 def _terms(values: ArrayLike, words: Sequence[tuple[str, str]]) -> list[str]:

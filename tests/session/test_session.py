@@ -209,8 +209,9 @@ def test_metres_and_seconds_have_a_tolerance_each():
     session.tell(session.ask().number, [0.009, 0.0159])  # 0.6 and 0.795 tolerances: 0.996 in all
     assert [trial.hit for trial in session.trials] == [False, True]
     np.testing.assert_allclose(session.tolerance, [0.015, 0.02])
-    with pytest.raises(InvalidFeedbackError, match="words are for lengths"):
-        session.tell(session.ask().number, "5 cm long")
+    session.tell(session.ask().number, "5 cm long, 20ms late")
+    assert session.trials[-1].reading.error_seen.tolist() == [0.05, 0.02]
+    assert session.trials[-1].reading.sd[1] == pytest.approx(np.hypot(0.02 / 3, 0.004))
 
 
 def test_the_tolerance_itself_is_a_hit(session):

@@ -14,7 +14,9 @@ def reading(*error_seen):
     return Reading.measured(error_seen).record()
 
 
-GOAL = GoalSet(goal=[0.9, 0.1], tolerance=[0.015, 0.015], units=["m", "m"], carry_over=False)
+GOAL = GoalSet(
+    goal=[0.9, 0.1], tolerance=[0.015, 0.015], names=["x", "y"], units=["m", "m"], carry_over=False
+)
 ASKED = Asked(trial=1, goal=1, condition=[0.88, 0.1], model="m")
 TOLD = Told(trial=1, reading=reading(0.02, 0.0), hit=False)
 VOIDED = Voided(trial=1, reason="slipped")

@@ -123,7 +123,7 @@ def asking(console: Console, task: Task, perception: Perception) -> FailedReadin
                     f"  what was the error, seen from {place(task, goal)}? for instance "
                     '"5cm long, 2cm left", or hit: '
                 )
-                return from_words(text, len(goal))
+                return from_words(text, task.outcome_names, ("m",) * len(goal))
             except EOFError as error:
                 raise PerceptionFailedError(f"{failure}; no answer came") from error
             except InvalidFeedbackError as error:

@@ -8,18 +8,18 @@ from typing import Annotated
 import numpy as np
 import tyro
 
-from prior_reinforce.arrays import FARTHEST, Point, as_error
-from prior_reinforce.bench.workspace.status import tell_example
+from prior_reinforce.arrays import Point, as_error
 from prior_reinforce.bench.workspace.workspace import Workspace
 from prior_reinforce.commands.workspace import OnWorkspace
 from prior_reinforce.errors import ConfigurationError, InvalidFeedbackError
 from prior_reinforce.readings import Reading
-from prior_reinforce.wording import in_words, read_error, read_numbers
+from prior_reinforce.session.trials import Goal
+from prior_reinforce.wording import error_example, from_words, read_numbers
 
 Number = Annotated[int, tyro.conf.Positional, tyro.conf.arg(metavar="TRIAL")]
 
-_LARGEST_PLAUSIBLE_METRES = 1.0
-"""Ours: larger bare numbers are centimetres far more often than a miss by a metre."""
+_IMPLAUSIBLE = {"m": (1.0, "centimetres"), "rad": (np.pi, "degrees")}
+"""Ours: bare numbers from there on are of another unit far more often than a miss by as much."""
 
 
 @dataclass(frozen=True)
@@ -61,40 +61,33 @@ class Seen(OnWorkspace):
                 "--miss if that was seen as well, or one of those alone"
             )
         hit = True if self.hit else False if self.miss else None
-        goal = workspace.state.goal_of(workspace.state.trial(self.trial)).goal
+        goal = workspace.state.goal_of(workspace.state.trial(self.trial))
         if self.outcome is not None:
-            if len(self.outcome) != goal.size:
+            if len(self.outcome) != len(goal.units):
                 raise InvalidFeedbackError(
-                    f"--outcome needs {goal.size} numbers, got {len(self.outcome)}: "
-                    f"{', '.join(workspace.manifest.outcome_names)}"
+                    f"--outcome needs {len(goal.units)} numbers, got {len(self.outcome)}: "
+                    f"{', '.join(goal.names)}"
                 )
-            return plausible(workspace, np.array(self.outcome) - goal), hit
+            return plausible(np.array(self.outcome) - goal.goal, goal), hit
         words = self.seen or self.error
-        return (None if words is None else read_seen(workspace, " ".join(words))), hit
+        return (None if words is None else read_seen(" ".join(words), goal)), hit
 
 
-def read_seen(workspace: Workspace, text: str) -> Reading | Point:
+def read_seen(text: str, goal: Goal) -> Reading | Point:
     """Read outcome minus goal, in the outcome's units, from words or numbers.
 
     Raises:
         InvalidFeedbackError: It is neither, or another number of numbers.
     """
-    names, units = workspace.manifest.outcome_names, workspace.manifest.outcome_units
-    k = len(names)
-    alone = text.strip().lower()
-    if alone in ("hit", "miss"):
-        return Reading.only(alone == "hit", k)
-    numbers = read_numbers(text)
+    k, numbers = len(goal.units), read_numbers(text)
     if numbers is None or (k > 1 and text == "0"):  # a lone 0 says: on the goal
-        error = read_error(text, units)
-        return _sayable(text, error) if in_words(units) else error
+        return from_words(text, goal.names, goal.units, goal.least_sd)
     if len(numbers) != k:
-        words = ", or words" if in_words(units) else ""
         raise InvalidFeedbackError(
             f"an error needs {k} numbers, got {len(numbers)}: outcome minus goal in "
-            f"{', '.join(names)}{words}: {tell_example(workspace)}"
+            f"{', '.join(goal.names)}{_or_words(goal)}"
         )
-    error = plausible(workspace, np.array([number for number, _ in numbers]))
+    error = plausible(np.array([number for number, _ in numbers]), goal)
     sds = [sd for _, sd in numbers if sd is not None]
     if not sds:
         return error
@@ -105,24 +98,18 @@ def read_seen(workspace: Workspace, text: str) -> Reading | Point:
     return Reading.measured(as_error(error, k), np.array(sds))
 
 
-def _sayable(text: str, reading: Reading | Point) -> Reading | Point:
-    """Return the reading, unless it is too large for any throw."""
-    number = reading.error_seen if isinstance(reading, Reading) else reading
-    largest = np.abs(number).max(initial=0.0)
-    if largest > FARTHEST:
-        raise InvalidFeedbackError(
-            f"{text!r} is {largest:g} m; say it again, in cm, or void the trial if that is true"
-        )
-    return reading
-
-
-def plausible(workspace: Workspace, error: Point) -> Point:
-    """Return the error, unless it looks like centimetres."""
-    largest = np.abs(error).max(initial=0.0)
-    words = in_words(workspace.manifest.outcome_units)
-    if words and _LARGEST_PLAUSIBLE_METRES <= largest < np.inf:
-        raise InvalidFeedbackError(
-            f"an error of {largest:g} m looks like centimetres; numbers are metres, or say it in "
-            f"words: {tell_example(workspace)}"
-        )
+def plausible(error: Point, goal: Goal) -> Point:
+    """Return the error, unless it looks like centimetres or degrees."""
+    for value, unit in zip(error, goal.units, strict=True):
+        least, looks = _IMPLAUSIBLE.get(unit, (np.inf, ""))
+        if least <= abs(value) < np.inf:
+            raise InvalidFeedbackError(
+                f"an error of {abs(value):g} {unit} looks like {looks}; say the unit"
+                f"{_or_words(goal)}"
+            )
     return error
+
+
+def _or_words(goal: Goal) -> str:
+    example = error_example(goal.names, goal.units)
+    return f', or words: "{example}"' if example else ""

@@ -84,13 +84,13 @@ def _seen(
     where: str, row: Any, table: Outcomes, workspace: Workspace, trial: Trial
 ) -> tuple[Reading | Point | None, bool | None]:
     """The error in one row, and whether it hit."""
-    names, hit = workspace.manifest.outcome_names, None
+    names, goal, hit = workspace.manifest.outcome_names, workspace.state.goal_of(trial), None
     if text := str(row.get(_HIT, "")).lower():
         if text not in _ANSWERS:
             raise FileFormatError(f"{where}: hit is {text[:40]!r}, expected yes or no; mend it")
         hit = _ANSWERS[text]
     if said := row.get(_SAID, ""):
-        return read_seen(workspace, said), hit
+        return read_seen(said, goal), hit
     place = np.array([row.get(name, np.nan) for name in names], dtype=np.float64)
     if np.all(np.isnan(place)) and hit is not None:
         return None, hit
@@ -99,7 +99,7 @@ def _seen(
             f"{where}: it has {', '.join(table.names)}, and no column for each of "
             f"{', '.join(names)}, nor one called said; add or rename one"
         )
-    return plausible(workspace, place - workspace.state.goal_of(trial).goal), hit
+    return plausible(place - goal.goal, goal), hit
 
 
 def _is_said(error: Point | None, seen: Reading | Point | None) -> bool:

@@ -42,8 +42,10 @@ class GoalSet(Event, frozen=True):
     """g, shape (k,), in the outcomes' units."""
     tolerance: list[float]
     """epsilon of each component, in its unit."""
+    names: list[str]
+    """Names of the outcomes' components."""
     units: list[str]
-    """Units of the outcomes."""
+    """Their units."""
     carry_over: bool
     """Whether the adapter also learns from the trials of earlier goals."""
     adapter: str = ""

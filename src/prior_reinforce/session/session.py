@@ -211,6 +211,7 @@ class Session:
             event = GoalSet(
                 goal=checked.tolist(),
                 tolerance=tolerances.tolist(),
+                names=list(names),
                 units=list(units),
                 carry_over=carried,
                 adapter=adapter,
@@ -249,8 +250,8 @@ class Session:
 
         Args:
             number: The open trial's number.
-            seen: What perception returned; or words, `5 cm long, 2 cm left`, where outcomes are
-                lengths (see `from_words`); or outcome minus goal as a number of unknown origin,
+            seen: What perception returned; or words, `5 cm long, 2 cm left`, `20 ms late` (see
+                `from_words`); or outcome minus goal as a number of unknown origin,
                 shape (k,), in the outcomes' units (see `Reading.estimated`). None where nothing
                 but `hit` is known.
             hit: Whether the goal was reached, where that is seen directly (the ball is in the
@@ -351,7 +352,7 @@ class Session:
         hit: bool | None,
     ) -> None:
         goal = self.state.goal_of(trial)
-        reading = as_reading(seen, hit, goal.units, goal.least_sd)
+        reading = as_reading(seen, hit, goal.names, goal.units, goal.least_sd)
         reached = reading.hit
         if reached is None:
             reached = goal.is_hit(reading.error_seen)

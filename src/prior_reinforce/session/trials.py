@@ -86,8 +86,10 @@ class Goal:
     """The adapter's name; empty where the session was given one by hand."""
     new_hardware: str | None = None
     """What was changed on the hardware before its first trial; None where nothing was."""
+    names: tuple[str, ...] = ()
+    """Names of the components."""
     units: tuple[str, ...] = ()
-    """Units of the components."""
+    """Their units."""
 
     def is_hit(self, error: Point) -> bool:
         """Whether an error, outcome minus goal, counts as reached."""
@@ -276,14 +278,16 @@ class State:
     def _apply(self, event: Event) -> None:
         match event:
             case GoalSet():
-                if not len(event.goal) == len(event.tolerance) == len(event.units):
-                    raise ValueError("goal, tolerance and units have different lengths")
+                each = (event.goal, event.tolerance, event.names, event.units)
+                if len({len(of) for of in each}) > 1:
+                    raise ValueError("goal, tolerance, names and units have different lengths")
                 place, tolerance = _read_only(event.goal), _read_only(event.tolerance)
                 if not np.all(tolerance > 0):
                     raise ValueError("a tolerance is not positive")
-                rest = (event.carry_over, event.adapter, event.new_hardware, tuple(event.units))
+                rest = (event.carry_over, event.adapter, event.new_hardware)
+                outcome = (tuple(event.names), tuple(event.units))
                 number = len(self.goals) + 1
-                self.goals.append(Goal(number, place, tolerance, *rest))
+                self.goals.append(Goal(number, place, tolerance, *rest, *outcome))
             case Asked():
                 if event.trial != len(self.trials) + 1 or self.open_trial is not None:
                     raise ValueError(f"trial {event.trial} after {len(self.trials)}")

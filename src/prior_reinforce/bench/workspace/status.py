@@ -10,7 +10,7 @@ from prior_reinforce.bench.workspace.log import Executed, Executing, NotExecuted
 from prior_reinforce.bench.workspace.workspace import Workspace
 from prior_reinforce.registry import own_class
 from prior_reinforce.session.trials import Goal, Stage, Trial
-from prior_reinforce.wording import in_words, plain, say_place, say_reading, say_tolerance
+from prior_reinforce.wording import error_example, plain, say_place, say_reading, say_tolerance
 
 _TRIALS_SHOWN = 3
 _POOR_TRIALS = 3
@@ -19,7 +19,6 @@ _POOR_CHANCE = 0.35
 by eye leave a chance of a half where all else is known."""
 OUTDATED = "planned before a correction: unless it was thrown, void it and ask again"
 """What to do about a trial whose plan knows nothing of what was amended or voided since."""
-_EXAMPLE = ("5cm long", "2cm left", "1cm high")
 
 
 def describe(workspace: Workspace) -> str:
@@ -162,8 +161,8 @@ def _say_nearer(workspace: Workspace) -> str:
 def tell_example(workspace: Workspace) -> str:
     """How an error of this task can be told."""
     names, units = workspace.manifest.outcome_names, workspace.manifest.outcome_units
-    if in_words(units):
-        return f'--error "{", ".join(_EXAMPLE[: len(names)])}"'
+    if example := error_example(names, units):
+        return f'--error "{example}"'
     return "--error " + " ".join(f"D{name.upper()}" for name in names)
 
 
