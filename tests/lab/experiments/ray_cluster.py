@@ -21,9 +21,12 @@ from prior_reinforce.lab.experiments.units import Workers, result_path, run_unit
 
 MEMORY = 80 * 2**20
 
-
 LASTS = 2.0
 """Seconds that a unit takes on the cluster: long enough to be killed in, on a busy machine too."""
+
+
+CONFIG = {"worker_niceness": 0}
+"""Ray runs its workers at 15, where tests at their side leave them no processor for minutes."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +51,12 @@ def main(folder: Path) -> None:
     reference = folder / "reference"
     run_units(units, reference, Workers(), lambda *_: None)
 
-    options = {"num_cpus": 1, "include_dashboard": False, "object_store_memory": MEMORY}
+    options = {
+        "num_cpus": 1,
+        "include_dashboard": False,
+        "object_store_memory": MEMORY,
+        "_system_config": CONFIG,
+    }
     cluster = Cluster(initialize_head=True, head_node_args=options)
     victim = cluster.add_node(num_cpus=1, object_store_memory=MEMORY)
     shared = folder / "ray"
