@@ -7,7 +7,9 @@ import numpy as np
 
 import prior_reinforce.lab.tasks
 from prior_reinforce.bench.robots.kinematics import Chain, tool_tip
-from prior_reinforce.bench.robots.presets import FRANKA
+from prior_reinforce.bench.robots.presets import robot_limits
+
+FRANKA = robot_limits("panda").chain
 
 
 def test_stretched_arm_by_hand():

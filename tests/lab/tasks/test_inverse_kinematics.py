@@ -3,8 +3,10 @@
 import mujoco
 import numpy as np
 
-from prior_reinforce.bench.robots.presets import PANDA
+from prior_reinforce.bench.robots.presets import robot_limits
 from prior_reinforce.lab.tasks import inverse_kinematics as ik
+
+PANDA = robot_limits("panda")
 
 DT = 0.02
 

@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from prior_reinforce.bench.robots.presets import PANDA
+from prior_reinforce.bench.robots.presets import robot_limits
 from prior_reinforce.lab.tasks import panda
+
+PANDA = robot_limits("panda")
 
 SCENE = Path(panda.__file__).with_name("basketball.xml")
 

@@ -3,10 +3,12 @@
 import numpy as np
 import pytest
 
-from prior_reinforce.bench.robots.presets import PANDA
+from prior_reinforce.bench.robots.presets import robot_limits
 from prior_reinforce.lab.tasks import TASKS, make_task, panda
 from prior_reinforce.lab.tasks.curling import Curling
 from prior_reinforce.lab.tasks.panda_task import first_descent
+
+PANDA = robot_limits("panda")
 
 
 def final_states(rollouts):
