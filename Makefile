@@ -20,8 +20,7 @@ install: $(VENV)/.core
 test: $(VENV)/.all
 	PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n 3 --dist load --maxschedchunk 4 $(ARGS)
 
-# CASES generated attacks, one table by class: a third as many on the way to the arm, a tenth kills.
-# and a third as many streams that shake an arm.
+# CASES generated attacks, one table by class; and a third as many streams that shake an arm.
 CASES ?= 3000
 attack: $(VENV)/.all
 	$(BIN)/python -m tests.attacks.table $(CASES)

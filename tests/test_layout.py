@@ -20,10 +20,7 @@ TESTED_ELSEWHERE = {
 """Modules without a test file of their own, and where they are tested instead."""
 
 OF_THE_WHOLE = {
-    "attacks/attacks": "generated attacks by class, and on the way to the arm",
-    "attacks/power_cut": "kill -9 at random moments of a session",
-    "attacks/refused_disk": "commands on a disk that is full or read-only",
-    "attacks/kills": "kill -9 at random moments of every command that writes",
+    "attacks/attacks": "generated attacks of every class: one table",
     "dependencies": "floors of libraries, and calls that would run code from data",
     "documentation": "what the docs show, run as it stands",
     "examples": "the examples as a reader runs them",

@@ -1,7 +1,5 @@
 """Attacks on the way from a plan to the arm: signals, kills, hangs, doubles, edits, copies.
 
-    python -m tests.attacks.execution [CASES] [SEED]
-
 Whatever is done, no plan that is refused moves, none moves twice, two never move at once, and every
 motion stands in the journal; and nobody is told of harm where there was none.
 """
@@ -10,21 +8,17 @@ from __future__ import annotations
 
 import collections
 import contextlib
-import multiprocessing
 import os
 import random
 import shutil
 import signal
 import sys
-import tempfile
 import time
-from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 from prior_reinforce.bench.robots.executors.lock import is_executing
 from prior_reinforce.bench.workspace.workspace import Workspace
 from tests.attacks.harness import HELD, wait_until
-from tests.attacks.table import prepare
 
 DRIVER = """
 import os, pathlib, shutil, signal, sys, time
@@ -82,7 +76,6 @@ ENDS = {"says no": None, "lies": "aborted", "crashes": "aborted", "changes": "ab
 """Outcome in the journal of a driver that nobody disturbs; the others are done."""
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGKILL)
 SIGNALS += (signal.SIGTSTP, signal.SIGKILL)
-FORK = multiprocessing.get_context("fork")
 _EXITING = 4
 """PF_EXITING (linux/sched.h): the kernel closes its files, and with them the lock, before it is a
 zombie."""
@@ -311,30 +304,3 @@ def _restored(here: Path, folder: Path, asked: Path, driver: str) -> str:
     if moved and len(_motions(here)) > moved:
         return "a restored journal moved a plan twice"
     return HELD
-
-
-def _attack(case: int, asked: Path) -> str:
-    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as here:
-        return attack(random.Random(f"execution {case}"), Path(here), asked)
-
-
-def main(cases: int, seed: int) -> int:
-    """Print what broke; how many."""
-    counted: collections.Counter[str] = collections.Counter()
-    with tempfile.TemporaryDirectory() as place, ProcessPoolExecutor(12, FORK) as pool:
-        asked = prepare(Path(place))
-        numbers = range(seed, seed + cases)
-        for case, verdict in zip(numbers, pool.map(_attack, numbers, [asked] * cases), strict=True):
-            counted[verdict] += 1
-            if verdict != HELD:
-                print(f"execution {case}: {verdict}", flush=True)
-            if sum(counted.values()) % 100 == 0:
-                print(f"{sum(counted.values())} tried, {counted[HELD]} held", flush=True)
-    held = counted.pop(HELD, 0)
-    print(f"{'execution':<12} {cases:>6} {held:>6} {counted.total():>6}")
-    return counted.total()
-
-
-if __name__ == "__main__":
-    numbers = [int(text) for text in sys.argv[1:]]
-    sys.exit(main(*(numbers + [1000, 0][len(numbers) :])) > 0)

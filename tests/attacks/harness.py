@@ -11,15 +11,20 @@ import io
 import os
 import random
 import re
+import shutil
 import signal
+import subprocess
+import sys
 import time
 import traceback
 import unicodedata
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+from prior_reinforce.bench.workspace.workspace import Workspace
 from prior_reinforce.cli import main
 from prior_reinforce.errors import PriorReinforceError
+from tests.bench.workspace.planar import demonstrations, manifest
 
 REMEDY = re.compile(
     r"add|ask|call|check|choose|close|convert|copy|correct|demonstrate|drop|expected|export|give|"
@@ -43,6 +48,32 @@ NASTY = [
     *("'", '"', "{", "}", "{plan}", "{trial}", "%s", "%n", "[red]", "<b>", "&", ";", "|", "$(x)"),
     *("None", "True", "[]", "{}", "null", "0.9", "0.05", "hit", "5cm long", "1", "2", "3"),
 ]
+
+
+def prepare(folder: Path) -> Path:
+    """A workspace with one open trial; beside it `learned`, the same without a goal."""
+    with Workspace.create(folder / "learned", manifest()) as workspace:
+        workspace.import_demonstrations(demonstrations(), "made up")
+        workspace.learn("interpolation")
+    shutil.copytree(folder / "learned", folder / "asked")
+    with Workspace(folder / "asked") as workspace:
+        workspace.set_goal([0.9, 0.05])
+        workspace.session().ask()
+    return folder / "asked"
+
+
+def program(module: str, *args: object) -> str:
+    """Call an attack that is a program of its own: one that has used threads cannot be forked."""
+    root = Path(__file__).parents[2]
+    path = [str(root / "tests/lab/experiments"), os.environ.get("PYTHONPATH", "")]
+    done = subprocess.run(
+        [sys.executable, "-m", f"tests.attacks.{module}", *map(str, args)],
+        cwd=root,
+        capture_output=True,
+        text=True,
+        env=os.environ | {"OMP_NUM_THREADS": "1", "PYTHONPATH": os.pathsep.join(path)},
+    )
+    return HELD if done.returncode == 0 else (done.stderr.splitlines() or [done.stdout])[-1]
 
 
 class HangError(BaseException):

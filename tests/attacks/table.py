@@ -1,66 +1,76 @@
 """Many attacks, and one table by class: tried, held, broke.
 
-A third as many on the way to the arm, a tenth as many kills.
+    python -m tests.attacks.table [CASES] [SEED] [CLASS ...]
 
-python -m tests.attacks.table [CASES] [SEED]
+The classes share the cases as they do in the tests.
 """
 
 from __future__ import annotations
 
 import collections
+import multiprocessing
 import random
-import shutil
 import sys
 import tempfile
 import warnings
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
 from pathlib import Path
 
-from prior_reinforce.bench.workspace.workspace import Workspace
-from tests.attacks.classes import CLASSES
-from tests.attacks.harness import HELD
-from tests.bench.workspace.planar import demonstrations, manifest
+from tests.attacks import execution, interruptions, runs, sessions
+from tests.attacks.classes import CLASSES, Attack
+from tests.attacks.harness import HELD, prepare, where
 
-
-def prepare(folder: Path) -> Path:
-    """A workspace with one open trial; beside it `learned`, the same without a goal."""
-    with Workspace.create(folder / "learned", manifest()) as workspace:
-        workspace.import_demonstrations(demonstrations(), "made up")
-        workspace.learn("interpolation")
-    shutil.copytree(folder / "learned", folder / "asked")
-    with Workspace(folder / "asked") as workspace:
-        workspace.set_goal([0.9, 0.05])
-        workspace.session().ask()
-    return folder / "asked"
+ATTACKS: dict[str, tuple[Attack, int]] = {
+    **{name: (attack, 84) for name, attack in CLASSES.items()},
+    "recordings": (CLASSES["recordings"], 320),  # there are twenty kinds
+    "files": (CLASSES["files"], 60),
+    "motions": (execution.attack, 150),
+    **{
+        f"{how}: {name}": (partial(interruptions.attack, how, name), cases)
+        for how, cases in interruptions.HOW.items()
+        for name in interruptions.COMMANDS
+    },
+    "killed sessions": (sessions.attack, 1),
+    "killed runs": (runs.attack, 1),
+}
+"""Each class, and how many of it the tests try."""
 
 
 def attack(name: str, seed: int, asked: Path) -> str:
     """One attack of a class; `held`, or how it broke."""
-    with tempfile.TemporaryDirectory() as here, warnings.catch_warnings():
+    here = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
+    with here, warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        return CLASSES[name](random.Random(f"{name} {seed}"), Path(here), asked)
+        try:
+            return ATTACKS[name][0](random.Random(f"{name} {seed}"), Path(here.name), asked)
+        except AssertionError as error:
+            return where(error)
 
 
-def main(cases: int, seed: int) -> int:
+def main(cases: int, seed: int, *names: str) -> int:
     """Print the table; the number of attacks that broke something."""
-    broke: dict[str, collections.Counter[str]] = {name: collections.Counter() for name in CLASSES}
-    with tempfile.TemporaryDirectory() as place:
+    chosen = {name: ATTACKS[name][1] for name in names or ATTACKS}
+    share = cases / sum(chosen.values())
+    broke = 0
+    print(f"{'class':<20} {'tried':>6} {'held':>6} {'broke':>6}")
+    fork = multiprocessing.get_context("fork")
+    with tempfile.TemporaryDirectory() as place, ProcessPoolExecutor(12, fork) as pool:
         asked = prepare(Path(place))
-        for name, counted in broke.items():
-            for case in range(cases // len(CLASSES)):
-                verdict = attack(name, seed + case, asked)
+        for name, usual in chosen.items():
+            seeds = range(seed, seed + max(1, round(share * usual)))
+            counted: collections.Counter[str] = collections.Counter()
+            verdicts = pool.map(partial(attack, name, asked=asked), seeds)
+            for case, verdict in zip(seeds, verdicts, strict=True):
                 counted[verdict] += 1
                 if verdict != HELD:
-                    print(f"{name} {seed + case}: {verdict}", flush=True)
-    print(f"{'class':<12} {'tried':>6} {'held':>6} {'broke':>6}")
-    for name, counted in broke.items():
-        held = counted.pop(HELD, 0)
-        print(f"{name:<12} {held + counted.total():>6} {held:>6} {counted.total():>6}")
-    from tests.attacks import execution, kills  # they prepare what they attack as we do
-
-    moved, lost = execution.main(cases // 3, seed), kills.main(cases // 10, seed)
-    return sum(counted.total() for counted in broke.values()) + moved + lost
+                    print(f"{name} {case}: {verdict}", flush=True)
+            held = counted.pop(HELD, 0)
+            broke += counted.total()
+            print(f"{name:<20} {len(seeds):>6} {held:>6} {counted.total():>6}", flush=True)
+    return broke
 
 
 if __name__ == "__main__":
-    numbers = [int(text) for text in sys.argv[1:]]
-    sys.exit(main(*(numbers + [3000, 0][len(numbers) :])) > 0)
+    numbers = [int(text) for text in sys.argv[1:3]]
+    sys.exit(main(*(numbers + [3000, 0][len(numbers) :]), *sys.argv[3:]) > 0)

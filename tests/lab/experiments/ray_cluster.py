@@ -11,8 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import ray
-from killed_runs import results
-from quick_units import Ends, Roots, real_units
+from quick_units import Ends, Roots, real_units, results
 from ray.cluster_utils import Cluster
 
 from prior_reinforce.errors import UnitFailedError

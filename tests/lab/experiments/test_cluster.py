@@ -1,7 +1,11 @@
 """Units on a Ray cluster: a node may be lost, and no cluster is told at once."""
 
+import os
+import subprocess
+import sys
+from pathlib import Path
+
 import pytest
-from killed_runs import printed_by
 from quick_units import Roots
 
 from prior_reinforce.errors import ConfigurationError
@@ -11,7 +15,16 @@ from prior_reinforce.lab.experiments.units import Workers, run_units
 @pytest.mark.slow
 def test_a_lost_node_of_a_ray_cluster_changes_nothing(tmp_path):
     pytest.importorskip("ray")
-    text = printed_by("ray_cluster.py", tmp_path)
+    here = Path(__file__).parent
+    done = subprocess.run(
+        [sys.executable, here / "ray_cluster.py", tmp_path],
+        capture_output=True,
+        text=True,
+        env=os.environ
+        | {"OMP_NUM_THREADS": "1", "RAY_USAGE_STATS_ENABLED": "0", "PYTHONPATH": here},
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    text = done.stdout
     assert "1 of them twice" in text
     assert "'one that raises' failed: ArithmeticError: 0 is no divisor;" in text
     assert "'one that dies' failed: WorkerCrashedError" in text

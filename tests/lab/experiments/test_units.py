@@ -1,11 +1,10 @@
-"""The same files whatever the number of workers, and however a run ends."""
+"""The same files whatever the number of workers; runs that are killed are in `tests/attacks/`."""
 
 import json
 from pathlib import Path
 
 import pytest
-from killed_runs import printed_by, results
-from quick_units import Ends, Roots, real_units
+from quick_units import Ends, Roots, real_units, results
 
 from prior_reinforce.errors import UnitFailedError
 from prior_reinforce.lab.experiments.evaluation import Training, Trials, ZeroShot
@@ -13,8 +12,6 @@ from prior_reinforce.lab.experiments.recipes import Run, Scale
 from prior_reinforce.lab.experiments.recipes.displacement import Displacement
 from prior_reinforce.lab.experiments.recipes.process import Process
 from prior_reinforce.lab.experiments.units import Workers, commit, result_path, run_units
-
-KILLS = 8
 
 
 def silent(done, total, label):
@@ -42,13 +39,6 @@ def test_a_model_of_which_nobody_says_what_made_it_is_learned_anew(tmp_path):
     assert (
         learned.generator.generate(learned.prior.outcomes_seen).shape == learned.prior.plans.shape
     )
-
-
-@pytest.mark.slow
-def test_runs_killed_at_any_moment_end_with_the_same_files(tmp_path):
-    text = printed_by("killed_runs.py", tmp_path, KILLS)
-    assert f"{KILLS} kills" in text
-    assert ", 0 unfinished ones" not in text  # some kills came while a file was being written
 
 
 def test_what_is_done_is_not_run_again(tmp_path):

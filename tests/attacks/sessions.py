@@ -1,8 +1,6 @@
 """Kill -9 at random moments of a scripted session: nothing missing, nothing doubled.
 
-    python -m tests.attacks.power_cut FOLDER KILLS
-
-A program of its own, because a process that has used other libraries' threads cannot be forked.
+python -m tests.attacks.sessions FOLDER SEED
 """
 
 import os
@@ -15,9 +13,15 @@ from pathlib import Path
 import numpy as np
 
 from prior_reinforce.bench.workspace.workspace import Workspace
+from tests.attacks.harness import program
 from tests.bench.workspace.planar import demonstrations, manifest
 
-TRIALS = 20
+TRIALS, KILLS = 20, 25
+
+
+def attack(rng, here, asked):
+    """Kill one session after another; see `main`."""
+    return program("sessions", here, rng.randrange(2**32))
 
 
 def script():
@@ -94,19 +98,18 @@ def said(folder):
     return events
 
 
-def main(folder, n_kills):
+def main(folder, seed):
     learned, reference, killed = folder / "learned", folder / "reference", folder / "killed"
     learn_in_child(learned)
     shutil.copytree(learned, reference)
     started = time.monotonic()
     assert os.waitpid(in_child(reference), 0)[1] == 0
     whole = time.monotonic() - started
-    rng = np.random.default_rng(1)
-    kills = sessions = 0
-    while kills < n_kills:
+    rng = np.random.default_rng(seed)
+    kills = 0
+    while kills < KILLS:
         if not killed.exists():
             shutil.copytree(learned, killed)
-            sessions += 1
             told = 0
         pid = in_child(killed)
         time.sleep(rng.uniform(0.0, 0.1 * whole))
@@ -122,7 +125,6 @@ def main(folder, n_kills):
         told = check(killed, told)
     assert os.waitpid(in_child(killed), 0)[1] == 0
     assert said(killed) == said(reference)
-    print(f"{kills} kills in {sessions} sessions of {len(said(reference))} events: all whole")
 
 
 if __name__ == "__main__":

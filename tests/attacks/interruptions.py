@@ -1,24 +1,26 @@
-"""Kill -9 at random moments of every command that writes.
+"""Every command that writes, interrupted: killed at a random moment, or refused by the disk.
 
-    python -m tests.attacks.kills [KILLS] [SEED]
-
-After each kill the workspace opens, its events are those of before or of the whole command, every
-file that an event names is whole, and the same command can be called again.
+Afterwards the workspace opens, its events are those of before or of the whole command, every file
+that an event names is whole, and the same command can be called again. A disk that refuses is named
+in one line.
 """
 
 from __future__ import annotations
 
+import ctypes
 import random
+import re
+import resource
 import shutil
 import subprocess
 import sys
-import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 from prior_reinforce.bench.workspace.workspace import Workspace
 from prior_reinforce.session.events import Entry
-from tests.attacks.table import prepare
+from tests.attacks.harness import HELD, tree
 from tests.bench.workspace.planar import recordings
 
 PROGRAM = """
@@ -49,26 +51,64 @@ OPEN = ("ask --run", "tell", "void", "export", "report", "ask --out")
 """Called with an open trial; the others have none."""
 
 
-def kill(name: str, rng: random.Random, here: Path, asked: Path) -> None:
-    """Call a command, kill it some time later, and check what is left; then finish it."""
+HOW = {"killed": 2, "read-only": 1, "full disk": 1}
+"""How a command is interrupted, and how often that is tried with each in the tests."""
+_PR_CAPBSET_DROP, _CAP_DAC_OVERRIDE = 24, 1
+"""Root's right to write where permissions forbid it; it stays root, and reads what is its own."""
+
+
+def attack(how: str, name: str, rng: random.Random, here: Path, asked: Path) -> str:
+    """Call a command, interrupt it, and check what is left; then finish it."""
     folder = here / "planar"
     shutil.copytree(asked, folder)
     recordings(here / "recorded")
     with Workspace(folder) as workspace:
-        session = workspace.session()
         if name not in OPEN:
-            session.tell(1, [0.05, 0.0])
+            workspace.session().tell(1, [0.05, 0.0])
         before = list(workspace.events)
-    program = _start(here, *COMMANDS[name])
-    time.sleep(rng.uniform(0, 1) ** 2 * 0.4)
-    program.kill()
-    program.communicate()
-    time.sleep(0.05)
+    if how == "killed":
+        program = _start(here, *COMMANDS[name])
+        time.sleep(rng.uniform(0, 1) ** 2 * 0.4)
+        program.kill()
+        program.communicate()
+        time.sleep(0.05)
+    else:
+        _refuse(how, name, here, 2 ** rng.randrange(8, 16))
     _check(folder, before, here)
     _finish(name, here, folder)
+    return HELD
 
 
-def _start(here: Path, *args: str) -> subprocess.Popen[str]:
+def _refuse(how: str, name: str, here: Path, limit: int) -> None:
+    """Call a command on a disk that holds files of a limited size, in bytes, or none at all."""
+    before = tree(here)
+    kept = {path: path.stat().st_mode for path in (here, *here.rglob("*"))}
+
+    def full() -> None:  # writing beyond the limit fails as a full disk does, for root as well
+        resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
+
+    def read_only() -> None:
+        ctypes.CDLL(None).prctl(_PR_CAPBSET_DROP, _CAP_DAC_OVERRIDE)  # fails where we are not root
+        for path, mode in kept.items():
+            path.chmod(mode & 0o555)
+
+    program = _start(here, *COMMANDS[name], first=full if how == "full disk" else read_only)
+    _, err = program.communicate(timeout=60)
+    for path, mode in kept.items():
+        path.chmod(mode)
+    says = "free some disk space|cannot write"
+    if how == "read-only":
+        says = "make the folder writable"
+        assert program.returncode == 2, err
+        assert tree(here) == before, "changed by a refusal"
+    if program.returncode:
+        assert (program.returncode, err.count("\n")) == (2, 1), err
+        assert re.search(says, err), err
+
+
+def _start(
+    here: Path, *args: str, first: Callable[[], None] | None = None
+) -> subprocess.Popen[str]:
     program = subprocess.Popen(
         [sys.executable, "-c", PROGRAM, *args],
         cwd=here,
@@ -76,6 +116,7 @@ def _start(here: Path, *args: str) -> subprocess.Popen[str]:
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
+        preexec_fn=first,
     )
     assert program.stdout is not None
     assert program.stdin is not None
@@ -133,25 +174,3 @@ def _finish(name: str, here: Path, folder: Path) -> None:
         assert kinds.count(expected) == 1 if name != "amend" else kinds.count(expected) in (1, 2)
     if name == "new":
         Workspace(here / "other").close()
-
-
-def main(kills: int, seed: int) -> int:
-    """Print what broke; how many."""
-    broke = 0
-    with tempfile.TemporaryDirectory() as place:
-        asked = prepare(Path(place))
-        for case in range(kills):
-            name = list(COMMANDS)[case % len(COMMANDS)]
-            with tempfile.TemporaryDirectory() as here:
-                try:
-                    kill(name, random.Random(f"{name} {seed + case}"), Path(here), asked)
-                except Exception as error:
-                    broke += 1
-                    print(f"kills {seed + case} {name}: {error!r:.300}", flush=True)
-    print(f"{'kills':<12} {kills:>6} {kills - broke:>6} {broke:>6}")
-    return broke
-
-
-if __name__ == "__main__":
-    numbers = [int(text) for text in sys.argv[1:]]
-    sys.exit(main(*(numbers + [300, 0][len(numbers) :])) > 0)

@@ -1,43 +1,34 @@
 """Runs that are killed at random moments, with all their workers, and then left to end.
 
-    python tests/lab/experiments/killed_runs.py FOLDER KILLS
-
-A program of its own, because a process that has used threads cannot be forked.
+python -m tests.attacks.runs FOLDER SEED
 """
 
 import os
+import random
 import signal
-import subprocess
 import sys
 import time
 from pathlib import Path
 
 import numpy as np
-from quick_units import real_units
 
 from prior_reinforce.lab.experiments.units import Workers, run_units
+from tests.attacks.harness import program
 
 WRITING = 0.02
 """Seconds that every write takes at least, so that a kill within one does not depend on luck."""
+KILLS = 8
 WORKERS = (1, 1, 1, 2)  # A new worker takes seconds to start, so most runs do without.
 
 
-def printed_by(program, *args):
-    """What a program of its own prints; these fork, or leave Ray around."""
-    here = Path(__file__).parent
-    path = os.pathsep.join([str(here), os.environ.get("PYTHONPATH", "")])
-    done = subprocess.run(
-        [sys.executable, here / program, *map(str, args)],
-        capture_output=True,
-        text=True,
-        env=os.environ
-        | {"OMP_NUM_THREADS": "1", "RAY_USAGE_STATS_ENABLED": "0", "PYTHONPATH": path},
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
-    return done.stdout
+def attack(rng: random.Random, here: Path, asked: Path) -> str:
+    """Kill one run after another; see `main`."""
+    return program("runs", here, rng.randrange(2**32))
 
 
 def start(folder: Path, workers: int) -> int:
+    from quick_units import real_units  # where `program` puts it
+
     pid = os.fork()
     if pid == 0:
         status = 1
@@ -52,15 +43,6 @@ def start(folder: Path, workers: int) -> int:
     return pid
 
 
-def results(folder: Path) -> dict[str, bytes]:
-    """Every file, the unfinished ones too."""
-    return {
-        str(path.relative_to(folder)): path.read_bytes()
-        for path in sorted(folder.rglob("*"))
-        if path.is_file()
-    }
-
-
 def wait_for_a_write(folder: Path, pid: int) -> None:
     """Return within a write, or when the run has ended."""
     known = set(folder.glob("*/.unfinished-*"))
@@ -70,15 +52,17 @@ def wait_for_a_write(folder: Path, pid: int) -> None:
         time.sleep(WRITING / 10)  # not a core of its own
 
 
-def main(folder: Path, n_kills: int) -> None:
+def main(folder: Path, seed: int) -> None:
+    from quick_units import results
+
     reference = folder / "reference"
     started = time.monotonic()
     assert os.waitpid(start(reference, 1), 0)[1] == 0
     whole = time.monotonic() - started
     wanted = results(reference)
-    rng = np.random.default_rng(1)
+    rng = np.random.default_rng(seed)
     kills = runs = unfinished = 0
-    while kills < n_kills:
+    while kills < KILLS:
         killed = folder / f"killed{runs}"
         runs += 1
         while True:
@@ -99,11 +83,11 @@ def main(folder: Path, n_kills: int) -> None:
             whole_ones = {name: data for name, data in there.items() if ".unfinished" not in name}
             unfinished += len(there) - len(whole_ones)
             assert whole_ones.items() <= wanted.items(), "a file is not as it should be"
-            if kills >= n_kills:
+            if kills >= KILLS:
                 assert os.waitpid(start(killed, 1), 0)[1] == 0
                 break
         assert results(killed) == wanted
-    print(f"{kills} kills in {runs} runs of {len(wanted)} files, {unfinished} unfinished ones left")
+    assert unfinished, "no kill came while a file was written"
 
 
 if __name__ == "__main__":
