@@ -29,10 +29,12 @@ from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
 from prior_reinforce.plans.alignment import align
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.readings import in_tolerances
-from prior_reinforce.registry import own_class, parse_choice, source_digest
+from prior_reinforce.registry import own_class, parse_choice
 
 GOAL_SEED = 100
 """Seed of the reported goals; what was decided looking at them is in docs/decisions.md."""
+_SEEN = ("outcomes_seen", "outcome_noise", "outcome_correction")
+"""What perception says of demonstrations."""
 
 
 @dataclass(frozen=True)
@@ -55,11 +57,6 @@ class PerceivedDemonstrations(Unit):
         """What it is, for a progress line."""
         return f"perceive {self.task} {self.demonstrations} by {self.perception}, {self.seed}"
 
-    @property
-    def own_sources(self) -> tuple[str, ...]:
-        """Hashes of a task's and a perception's own files; see `Unit`."""
-        return source_digest(self.task), source_digest(self.perception)
-
     def run(self, folder: Path) -> Mapping[str, Any]:
         """Execute and look."""
         task = make_task(self.task)
@@ -80,12 +77,8 @@ class PerceivedDemonstrations(Unit):
                 seed=seed,
                 on_failed_reading=count_and_estimate,
             )
-        return {
-            "outcomes_seen": perceived.outcomes_seen.tolist(),
-            "outcome_noise": perceived.outcome_noise.tolist(),
-            "outcome_correction": perceived.outcome_correction.tolist(),
-            "failed_readings": len(failures),
-        }
+        seen = {name: getattr(perceived, name).tolist() for name in _SEEN}
+        return {**seen, "failed_readings": len(failures)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,12 +115,6 @@ class Training(Unit):
         """What it is, for a progress line."""
         how = "" if self.perception is None else f" by {self.perception}"
         return f"learn {self.generator} on {self.task} {self.demonstrations}{how}, {self.seed}"
-
-    @property
-    def own_sources(self) -> tuple[str, ...]:
-        """Hashes of your own files behind what is learned; see `Unit`."""
-        own = source_digest(self.task), source_digest(self.generator)
-        return own if self.perceived is None else (*own, *self.perceived.own_sources)
 
     @property
     def perceived(self) -> PerceivedDemonstrations | None:
@@ -173,13 +160,9 @@ class Training(Unit):
         """The demonstrations that are learned from."""
         demonstrations = self.recorded()
         if self.perceived is not None:
-            seen = result_of(folder, self.perceived)
-            demonstrations = replace(
-                demonstrations,
-                outcomes_seen=np.array(seen["outcomes_seen"]),
-                outcome_noise=np.array(seen["outcome_noise"]),
-                outcome_correction=np.array(seen["outcome_correction"]),
-            )
+            kept = result_of(folder, self.perceived)
+            seen: dict[str, Any] = {name: np.array(kept[name]) for name in _SEEN}
+            demonstrations = replace(demonstrations, **seen)
         return demonstrations if self.subset is None else demonstrations.only(self.subset)
 
 
@@ -211,12 +194,6 @@ class Trials(Unit):
             f"{self.task}: {self.training.generator} + {self.adapter}, {self.perception}, "
             f"set {self.training.demonstrations}, {self.training.seed}"
         )
-
-    @property
-    def own_sources(self) -> tuple[str, ...]:
-        """Hashes of your own files behind what is tried; see `Unit`."""
-        own = (self.task, self.adapter, self.perception)
-        return super().own_sources + tuple(source_digest(choice) for choice in own)
 
     def run(self, folder: Path) -> Mapping[str, Any]:
         """Run the protocol, and keep plain numbers, a row a goal."""
@@ -267,7 +244,7 @@ class ZeroShot(Unit):
     training: Training
     """What was learned."""
     spacing: float = 0.02
-    """Of the grid inside the outcomes' hull, in [m]."""
+    """Spacing of the grid inside the outcomes' hull, in [m]."""
 
     @property
     def label(self) -> str:

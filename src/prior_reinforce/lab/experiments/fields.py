@@ -40,18 +40,17 @@ from prior_reinforce.lab.experiments.units import Unit, digest_of
 from prior_reinforce.lab.tasks import make_task
 from prior_reinforce.perception import make_perception
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
-from prior_reinforce.registry import source_digest
 
 SPACING = 0.04
-"""Of the grid, in [m] (ours): a spline through it is off by 0.2 cm between its points, half of the
-execution noise."""
+"""Spacing of the grid, in [m] (ours): a spline through it is off by 0.2 cm between its points, half
+of the execution noise."""
 _MARGIN = 0.05
 """How far beyond the region of goals is measured, in [m] (ours); beyond that, d is what it is at
 the edge."""
 _REPEATED = (4, 5)
 """Conditions whose plans are executed again, and how often, for the noise: right to 15 %."""
 _DRAWS = 50
-"""Of demonstrations, until no two of them look the same."""
+"""Draws of demonstrations, at most, until no two of them look the same."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,13 +66,13 @@ class Field:
     displacement: Float[np.ndarray, "nx ny 2"]
     """d at its points, in [m]."""
     noise_sd: Float[np.ndarray, "2"]
-    """Of execution, in [m]."""
+    """Standard deviation of execution, in [m]."""
     region: Float[np.ndarray, "2 2"]
-    """Of goals, in [m]; see `Task.region`."""
+    """Region of goals, in [m]; see `Task.region`."""
     tolerance: float
     """epsilon of the task, in [m]."""
     outcomes_seen: Points
-    """Of the demonstrations, in [m]."""
+    """Outcomes of the demonstrations as they were seen, in [m]."""
     outcome_noise: Points
     """How uncertain they are, in [m]."""
     outcome_correction: Points
@@ -134,13 +133,6 @@ def measure(
 ) -> Field:
     """Measure what a generator's plans do on a task with two components in [m].
 
-    Args:
-        task: Where they are executed.
-        generator: Fitted to the demonstrations.
-        demonstrations: With the outcomes that were seen.
-        name: Of the field.
-        seed: Of the repeated executions.
-
     Raises:
         ConfigurationError: A plan was lost: such a field has holes.
     """
@@ -188,18 +180,12 @@ class MeasuredField(Unit):
     generator: str = "interpolation,timing=align"
     """What is learned."""
     seed: int = GOAL_SEED
-    """Of the draws; what is decided is decided on others than the reported ones."""
+    """Seed of the draws; decisions are made on other seeds than the reported one."""
 
     @property
     def label(self) -> str:
         """What it is, for a progress line."""
         return f"measure {self.task} {self.demonstrations}{self.count or ''} by {self.perception}"
-
-    @property
-    def own_sources(self) -> tuple[str, ...]:
-        """Hashes of your own files behind it; see `Unit`."""
-        own = (self.task, self.learned_on, self.perception, self.generator)
-        return tuple(source_digest(choice) for choice in own)
 
     def run(self, folder: Path) -> Mapping[str, Any]:
         """Measure, and keep the field in the folder's `fields`."""
@@ -266,11 +252,11 @@ class Change:
     """What is different from the field as it was measured."""
 
     shift: tuple[float, float] = (0.0, 0.0)
-    """Of all outcomes, in [m]."""
+    """Shift of all outcomes, in [m]."""
     stretch: float = 1.0
-    """Of outcomes, from the middle of the region."""
+    """Factor on outcomes, from the middle of the region."""
     noise: float = 1.0
-    """Of execution, as a factor."""
+    """Factor on the noise of execution."""
     lost: float = 0.0
     """Share of trials whose object never comes down where outcomes are."""
 

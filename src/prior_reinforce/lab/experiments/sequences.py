@@ -1,4 +1,4 @@
-"""Afternoons: goals worked through one after another, with or without what came before.
+"""Sequences of goals, worked through one after another, with or without memory of earlier goals.
 
 In physics, or by the thousand on a displacement field.
 
@@ -21,7 +21,6 @@ from prior_reinforce.lab.experiments.protocol import GoalTrials, run_sequences
 from prior_reinforce.lab.experiments.units import Unit
 from prior_reinforce.lab.tasks import make_task
 from prior_reinforce.perception import make_perception
-from prior_reinforce.registry import source_digest
 
 
 @dataclass(frozen=True)
@@ -39,25 +38,19 @@ class Afternoons(Unit):
     carry_over: bool
     """Whether earlier goals' trials serve later ones."""
     sequences: int
-    """Number of afternoons."""
+    """Number of sequences."""
     goals: int = 8
     """Goals in each."""
     rounds: int = 10
     """Trials a goal at most."""
     seed: int = GOAL_SEED
-    """Of the goals; what is decided is decided on others than the reported ones."""
+    """Seed of the goals; decisions are made on other seeds than the reported one."""
 
     @property
     def label(self) -> str:
         """What it is, for a progress line."""
         carried = ", carried" if self.carry_over else ""
         return f"{self.task}: sequences with {self.adapter}{carried}, {self.training.label}"
-
-    @property
-    def own_sources(self) -> tuple[str, ...]:
-        """Hashes of your own files behind what is tried; see `Unit`."""
-        own = (self.task, self.adapter, self.perception)
-        return super().own_sources + tuple(source_digest(choice) for choice in own)
 
     def run(self, folder: Path) -> Mapping[str, Any]:
         """Run them in lock step, and keep plain numbers, a row a sequence."""
@@ -98,19 +91,13 @@ class FieldAfternoons(Unit):
     rounds: int = 10
     """Trials a goal at most."""
     seed: int = GOAL_SEED
-    """Of the goals."""
+    """Seed of the goals."""
 
     @property
     def label(self) -> str:
         """What it is, for a progress line."""
         carried = ", carried" if self.carry_over else ""
         return f"{self.adapter}{carried}, {self.measured.label.removeprefix('measure ')}"
-
-    @property
-    def own_sources(self) -> tuple[str, ...]:
-        """Hashes of your own files behind it; see `Unit`."""
-        own = (self.adapter, self.perception)
-        return super().own_sources + tuple(source_digest(choice) for choice in own)
 
     def run(self, folder: Path) -> Mapping[str, Any]:
         """Work through them, and keep plain numbers; one row, of the one sequence."""

@@ -22,6 +22,7 @@ from typing import Any
 from prior_reinforce.errors import UnitFailedError
 from prior_reinforce.files import sweep, write
 from prior_reinforce.lab.experiments.cluster import run_on_ray
+from prior_reinforce.registry import source_digest
 
 
 @dataclass(frozen=True)
@@ -35,12 +36,13 @@ class Unit(ABC):
 
     @property
     def own_sources(self) -> tuple[str, ...]:
-        """Hashes of the files of your own classes that it runs: when one is edited, it runs anew.
+        """Hashes of the files of your own classes that its fields choose, or units among them.
 
-        Those of the units that are its fields, unless a unit says more.
+        When one of these files is edited, the unit runs anew.
         """
-        parts = (getattr(self, field.name) for field in fields(self))
-        return tuple(s for part in parts if isinstance(part, Unit) for s in part.own_sources)
+        parts = [getattr(self, field.name) for field in fields(self)]
+        own = [source_digest(part) for part in parts if isinstance(part, str)]
+        return (*own, *(s for part in parts if isinstance(part, Unit) for s in part.own_sources))
 
     @abstractmethod
     def run(self, folder: Path) -> Mapping[str, Any]:
