@@ -66,7 +66,7 @@ def main() -> None:
     arguments = parser.parse_args()
     if arguments.copies < 2:
         parser.error("--copies must be at least 2, or there is no spread")
-    for name in arguments.tasks or [each for each in TASKS.members if TASKS.kind(each).scene]:
+    for name in arguments.tasks or [each for each in TASKS.members if TASKS.resolve(each).scene]:
         task, rng = make_task(name), np.random.default_rng(arguments.seed)
         plans = np.concatenate([task.demonstrations(key).plans for key in task.demonstration_sets])
         outcomes = np.array([rollout.outcome for rollout in task.rollout(plans, None)])

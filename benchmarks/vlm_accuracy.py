@@ -126,7 +126,7 @@ def main() -> None:
     arguments = parser.parse_args()
 
     total = Score([], [])
-    for name in arguments.tasks or [each for each in TASKS.members if TASKS.kind(each).scene]:
+    for name in arguments.tasks or [each for each in TASKS.members if TASKS.resolve(each).scene]:
         task = make_task(name)
         camera = Camera()
         if arguments.base_url is None:

@@ -48,7 +48,7 @@ def errors_seen(camera: Camera, task: Task, pairs: list[tuple[KeyFrame, np.ndarr
     return errors
 
 
-@pytest.mark.parametrize("name", [each for each in TASKS.members if TASKS.kind(each).scene])
+@pytest.mark.parametrize("name", [each for each in TASKS.members if TASKS.resolve(each).scene])
 def test_the_camera_sees_the_whole_region_and_is_calibrated_to_a_millimetre(name, camera):
     task = make_task(name)
     model, scene = task.model, task.scene

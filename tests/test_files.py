@@ -15,9 +15,9 @@ from prior_reinforce.files import (
     claim_folder,
     from_cell,
     in_place,
-    inside,
     open_npz,
     refuse_foreign,
+    require_inside,
     sha256_of_folder,
     sweep,
     write,
@@ -170,13 +170,13 @@ def test_links_lead_nowhere_else(tmp_path):
     (folder / "models").mkdir(parents=True)
     (folder / "latest").symlink_to("models")
     for name in ("models", "latest", "latest/model", "not there"):
-        assert inside(folder / name, folder) == folder / name
+        assert require_inside(folder / name, folder) == folder / name
     (folder / "out").symlink_to(tmp_path)
     for name in ("out", "out/model", ".."):
         with pytest.raises(FileFormatError, match="is a link out of"):
-            inside(folder / name, folder)
+            require_inside(folder / name, folder)
     (tmp_path / "linked").symlink_to(folder)
-    assert inside(tmp_path / "linked" / "models", tmp_path / "linked")
+    assert require_inside(tmp_path / "linked" / "models", tmp_path / "linked")
 
 
 def test_a_small_file_that_unpacks_to_a_flood_is_refused(tmp_path, monkeypatch):

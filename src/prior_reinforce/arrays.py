@@ -40,8 +40,8 @@ unless somebody says that it is metres."""
 LARGEST_TURN = 7.0
 """In [rad]; ours: joints of arms turn one turn (6.28 rad) either way, so more is degrees."""
 BEYOND_DOUBT = 7.0
-"""Ours: numbers so many times beyond that (eight turns of a joint, 35 m) are in another unit,
-whoever says what."""
+"""Beyond this factor (eight turns of a joint, 35 m) the unit is wrong even if it is stated;
+ours."""
 
 
 def as_plans(
@@ -220,7 +220,7 @@ def _as_numbers(
         raise problem(f"{expected}, got {values!r:.80}: {error}") from error
     if np.any(np.abs(array) > LARGEST, where=np.isfinite(array)):
         largest = float(np.abs(array[np.isfinite(array)]).max())
-        raise problem(f"{expected}, got {largest:.4g}, which is absurd in any unit; check it")
+        raise problem(f"{expected}, got {largest:.4g}, which is implausibly large; check the unit")
     return array
 
 

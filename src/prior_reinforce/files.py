@@ -240,7 +240,7 @@ def _holds_results(folder: Path) -> bool:
     return all((folder / name).is_dir() for name in ("units", "failures"))
 
 
-def inside(path: Path, folder: Path) -> Path:
+def require_inside(path: Path, folder: Path) -> Path:
     """Return a path within a folder, unless a link leads it out.
 
     Raises:

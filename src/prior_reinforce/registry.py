@@ -72,7 +72,7 @@ class Registry(Generic[T]):
                 that the setting cannot have.
         """
         name, given = parse_choice(choice)
-        kind, settings = self.kind(name), {**self._preset(name), **given}
+        kind, settings = self.resolve(name), {**self._preset(name), **given}
         takes = inspect.signature(kind).parameters
         context = {key: value for key, value in context.items() if key in takes}
         config = getattr(kind, "config_type", None)
@@ -99,7 +99,7 @@ class Registry(Generic[T]):
         if choice not in self.members:
             self.make(choice)
 
-    def kind(self, choice: str) -> type[T]:
+    def resolve(self, choice: str) -> type[T]:
         """Return the class of a member; it is imported now.
 
         Raises:

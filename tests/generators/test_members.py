@@ -28,7 +28,7 @@ OWN = f"{__name__}:Own"
 
 @pytest.mark.parametrize("name", GENERATORS.members)
 def test_a_name_is_that_of_its_class(name):
-    kind = GENERATORS.kind(name)
+    kind = GENERATORS.resolve(name)
     assert kind.name == {"diffusion-paper": "diffusion"}.get(name, name)
 
 

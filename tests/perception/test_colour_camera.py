@@ -96,7 +96,9 @@ def test_settings_that_mean_nothing_are_refused():
         ColourCamera(None)
 
 
-@pytest.fixture(scope="module", params=[each for each in TASKS.members if TASKS.kind(each).scene])
+@pytest.fixture(
+    scope="module", params=[each for each in TASKS.members if TASKS.resolve(each).scene]
+)
 def trials(request):
     """Six real trials of a task with their goals: half anywhere, half as near as they get."""
     task = make_task(request.param)

@@ -141,7 +141,7 @@ class Adapter(ABC):
     def _observe_reading(self, condition: Point, goal: Point, reading: Reading) -> None:
         """See `observe`; for adapters that know what to do with more than a number.
 
-        Others get the number. They hear nothing of a trial of which there is none: "a miss".
+        Others get the number, and are not called for a trial without one (a bare "a miss").
         """
         if reading.has_number:
             self._observe(condition, goal + reading.error_seen)

@@ -1,4 +1,4 @@
-"""A Bayesian condition adapter: readings are intervals, and nothing of an afternoon is forgotten.
+"""A Bayesian condition adapter with interval observations and the full history of trials.
 
 Ours; the paper's adapter is in `gaussian_process`. See `BayesianAdapter` for the model.
 """

@@ -97,7 +97,7 @@ def place(task: Task, point: Point) -> str:
 
 
 def asking(console: Console, task: Task, perception: Perception) -> FailedReading:
-    """Who looks where perception gives up: the person at the terminal, and nobody else.
+    """Fallback where perception fails: the person at the terminal.
 
     Args:
         console: Where to ask.

@@ -52,7 +52,7 @@ class GeneratorRegistry(Registry["Generator"]):
         """
         name, settings = parse_choice(choice)
         device = context.get("device", "cpu")
-        if device != "cpu" and "device" not in inspect.signature(self.kind(name)).parameters:
+        if device != "cpu" and "device" not in inspect.signature(self.resolve(name)).parameters:
             raise ConfigurationError(f"{name} computes on the CPU, not on device {device!r}")
         if name == "auto" and settings.keys() & {"timing", "correction"}:
             raise ConfigurationError(
@@ -80,7 +80,7 @@ class _Wrappers(Registry["Generator"]):
     """Generators around another one, by the names that saved models know them by."""
 
     def wrap(self, name: str, generator: Generator, *settings: Any) -> Generator:
-        wrapper: Any = self.kind(name)
+        wrapper: Any = self.resolve(name)
         return cast("Generator", wrapper(generator, *settings))
 
 
@@ -153,13 +153,13 @@ def unpack(layers: Sequence[SavedLayer], own: str | None = None) -> Generator:
 def _class_of(name: str, own: str | None) -> type[Generator]:
     """The class of a saved layer: a wrapper, `own` where that is given, or one of ours."""
     if name in WRAPPERS.members:
-        return WRAPPERS.kind(name)
+        return WRAPPERS.resolve(name)
     if own is None and name not in GENERATORS.members:
         raise FileFormatError(
             f"the model is of a generator {name!r}; known here are "
             f"{', '.join(GENERATORS.members)}, others have to be named as module:Class"
         )
-    kind = GENERATORS.kind(own or name)
+    kind = GENERATORS.resolve(own or name)
     if kind.name != name:
         raise FileFormatError(f"the model is of a {name} generator, not of {own or name}")
     return kind

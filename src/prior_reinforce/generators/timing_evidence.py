@@ -38,8 +38,8 @@ _CLOCK_ERROR = 0.35
 """A clock is looked for only where `start` misses outcomes by more than this. Ours: of the zoo's
 development sets that seemed clocked, it is less in 12 of 19 that are not, in 1 of 15 that are."""
 _MAX_USEFUL_ERROR = 0.7
-"""An error above this tells nothing: the mean of all outcomes is nearly as good, whose error is 1.
-Ours: half and double change no plan that was measured."""
+"""Above this error the model is no better than predicting the mean outcome, whose error is 1. Ours:
+half and double change no plan that was measured."""
 _FEWEST = 5
 """With fewer demonstrations than this, or than k + 3, none can be left out. Ours: of three sets of
 4 with one outcome, one would have its tempos learned, by chance."""

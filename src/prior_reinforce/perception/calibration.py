@@ -41,7 +41,8 @@ class _Saved(msgspec.Struct):
 # one line leave about 1e-16, points clicked to a pixel on a real table 1e-2 (ours).
 _RANK_FLOOR = 1e-6
 _HIGHEST = 20.0
-"""Of a camera above a table, in [m]; ours: beyond any hall, and below any height in centimetres."""
+"""Largest height of a camera above a table, in [m]; ours: beyond any hall, and below any height in
+centimetres."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -122,9 +122,6 @@ class VisionLanguageModel(Perception):
     def read(self, picture: Picture) -> PictureReading:
         """Read the error from any picture of the calibrated camera, a photograph for instance.
 
-        Args:
-            picture: RGB.
-
         Returns:
             The record; its `error_seen` is None, and `problem` says why, where reading failed.
 

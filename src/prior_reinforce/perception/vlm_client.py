@@ -50,7 +50,7 @@ class VisionLanguageModelConfig:
     """More than half of the answers lie within this distance of their median, or they do not
     agree, in [m]. 1 cm (ours): the order of the tasks' tolerances."""
     temperature: float = 0.7
-    """Of the model's sampling (ours). At 0 all votes are one answer, and voting means nothing."""
+    """Sampling temperature (ours). At 0 all votes are one answer, and voting means nothing."""
     max_tokens: int = 2048
     """Longest answer, thinking included."""
     timeout: float = 60.0

@@ -32,13 +32,7 @@ class Step:
     def split(
         self, values: Float[np.ndarray, " H"], times: Int[np.ndarray, " M"], tau: np.ndarray
     ) -> Float[np.ndarray, "L M"]:
-        """Split one demonstration: the first part with the value before it, the others as changes.
-
-        Args:
-            values: The channel, frame by frame.
-            times: When each transition comes, in whole frames.
-            tau: The L phases.
-        """
+        """Split a channel at transitions (frames): its first part, and the others as changes."""
         borders = np.concatenate([[0], (times[1:] + times[:-1]) // 2, [len(values) - 1]])
         parts = []
         for m, phase in enumerate(self.phases):
@@ -68,10 +62,6 @@ def transitions(
     values: Float[np.ndarray, "N H"], sigma: float = 0.0
 ) -> Float[np.ndarray, "N M"] | None:
     """Return when a `step` or `switch` changes: the middle of each transition, in frames.
-
-    Args:
-        values: One channel of the demonstrations.
-        sigma: Its noise.
 
     Returns:
         M times of each demonstration, in order; None where demonstrations differ in their number.

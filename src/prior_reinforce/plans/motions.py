@@ -242,11 +242,7 @@ class Demonstrations:
             return replace(self, plans=plans, format=format or self.format)
 
     def only(self, chosen: Sequence[int]) -> Self:
-        """Return some of the demonstrations.
-
-        Args:
-            chosen: Their numbers, from 0.
-        """
+        """Return some of the demonstrations, by their numbers from 0."""
         members = list(chosen)
         with _warned_before():
             return replace(

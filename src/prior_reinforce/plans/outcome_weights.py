@@ -21,8 +21,9 @@ from jaxtyping import Float
 from prior_reinforce.arrays import SAME_OUTCOME
 
 Kernel = Literal["auto", "cubic", "thin-plate", "linear"]
-"""Of `smooth_weights`: the radial function is d^3, d^2 log d, or d. `auto` is the first, or the
-last where the first amplifies what differs between demonstrations by chance (`amplification`)."""
+"""Kernel of `smooth_weights`: the radial function is d^3, d^2 log d, or d. `auto` is the first, or
+the last where the first amplifies what differs between demonstrations by chance
+(`amplification`)."""
 _LARGEST_AMPLIFICATION = 1.0
 """Ours: what is mixed varies by chance no more than one demonstration does. Outcomes on a grid stay
 below it, most that nobody spread do not; docs/decisions-generator.md."""

@@ -98,7 +98,7 @@ class Signals:
     """What some motions of D channels are made of; from `analyse`."""
 
     kinds: tuple[ChannelKind, ...]
-    """Of each channel, from all motions together."""
+    """Standard deviation of each channel's noise, from all motions together."""
     noise: Channels
     """sigma."""
     trim_band: Channels
@@ -272,12 +272,6 @@ def moving_ends(
     """Return which channels move at the first frames of a recording, and which at the last.
 
     The speed is the slope of a line through the frames of 40 ms, at least two.
-
-    Args:
-        times: Of its frames, in [s].
-        motion: Some of a recording.
-        units: Of the D channels.
-        signals: Of all recordings.
     """
     count = max(2, int(np.searchsorted(times, times[0] + _END_TIME, side="right")))
     fastest = np.abs(np.gradient(motion, times, axis=0)).max(axis=0)

@@ -204,7 +204,7 @@ class Session:
         tolerances = as_tolerance(() if given is None else given, names, units)
         carried = self._carry_over if carry_over is None else carry_over
         if carried is None:
-            kind = ADAPTERS.kind(adapter) if adapter else type(self.adapter)
+            kind = ADAPTERS.resolve(adapter) if adapter else type(self.adapter)
             carried = kind.carries_over
         with self._exclusive():
             self.state.refuse_open_trial("setting a goal")
@@ -361,7 +361,7 @@ class Session:
     def informed_adapter(self) -> Adapter:
         """The adapter, after it has seen every reading that counts for the goal of now.
 
-        For asking it what it knows; what else is done to it is undone by nothing.
+        For queries only; changes made to it are not rolled back.
 
         Raises:
             WorkspaceError: No goal is set.

@@ -472,7 +472,7 @@ def test_a_box_without_a_tool_tip_speaks_of_the_flange():
     line = lines(check_plan(plan, PANDA, settings=GateSettings(**corners)))["box"]
     assert line.status == "warn"
     assert line.text.startswith("flange at ")
-    assert line.text.endswith("the tool is not looked at: set tool_tip")
+    assert line.text.endswith("the tool is not checked: set tool_tip")
     meant = GateSettings(**corners, tool_tip=(0.0, 0.0, 0.0))
     again = lines(check_plan(plan, PANDA, settings=meant))["box"]
     assert (again.status, again.value) == ("pass", line.value)

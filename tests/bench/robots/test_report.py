@@ -32,7 +32,7 @@ def report(*lines):
     ("lines", "verdict"),
     [
         ((FINE,), "plan passes: limits of panda (firmware any)\n"),
-        ((FINE, NO_BOX), "plan passes: limits of panda (firmware any); not looked at: box\n"),
+        ((FINE, NO_BOX), "plan passes: limits of panda (firmware any); not checked: box\n"),
         ((FINE, NEAR), "plan passes with warnings: "),
         ((FAST, NEAR), "plan refused: "),
         ((LimitLine(check="velocity", status="unchecked", text=""),), "plan NOT CHECKED for the "),

@@ -30,11 +30,7 @@ LONGEST_NAME = 200
 def check_numbers(path: Path, name: str, shape: Iterable[int], bytes_each: int = 8) -> None:
     """Refuse an array, or a chunk of one, whose header claims too many numbers or bytes.
 
-    Args:
-        path: The file.
-        name: The array.
-        shape: Its shape.
-        bytes_each: Bytes that one number takes in the file.
+    A number takes `bytes_each` bytes in the file.
     """
     sizes = tuple(int(size) for size in shape)
     numbers = math.prod(sizes)

@@ -12,9 +12,9 @@ from prior_reinforce.bench.importing.units import SECONDS, Ambiguity, judge_unit
 from prior_reinforce.errors import ConfigurationError, FileFormatError, InvalidDemonstrationsError
 
 Times = Float[np.ndarray, " T"]
-"""Of T frames, [s]."""
+"""Times of T frames, in [s]."""
 Stamps = Shaped[np.ndarray, "..."]
-"""Of T frames, in the file's unit; as a file holds them, so of any shape and kind."""
+"""Times of T frames as a file holds them: in its unit, of any shape and kind."""
 FRAME = "frame"
 """The unit of a column that counts frames; the rate says how long one is."""
 TIME_UNITS = (*SECONDS, FRAME)

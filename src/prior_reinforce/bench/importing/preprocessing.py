@@ -176,10 +176,6 @@ def copies(plans: Plans, names: Sequence[str]) -> str:
     """Name two motions that are identical to the last bit, as no two recordings are; else "".
 
     Either a file was copied, or one plan was executed twice and its outcomes differ by noise alone.
-
-    Args:
-        plans: N of them.
-        names: A name for each.
     """
     first: dict[bytes, str] = {}
     for plan, name in zip(plans, names, strict=True):

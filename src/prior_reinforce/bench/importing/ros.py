@@ -28,7 +28,7 @@ from prior_reinforce.bench.importing.recording import (
 )
 from prior_reinforce.bench.importing.units import say_names
 from prior_reinforce.errors import FileFormatError
-from prior_reinforce.files import inside
+from prior_reinforce.files import require_inside
 
 _SUFFIXES = (".bag", ".mcap", ".db3")
 _STATE, _TRAJECTORY = "sensor_msgs/msg/JointState", "trajectory_msgs/msg/JointTrajectory"
@@ -59,7 +59,7 @@ def read(source: Path, options: ReadOptions) -> Episodes:
             continue
         # A link inside could name any file of this machine.
         for path in bag.iterdir() if bag.is_dir() else ():
-            inside(path, bag)
+            require_inside(path, bag)
         with named_damage(bag, "a ROS bag"):
             # Bags from before ROS 2 Iron carry no definitions; these two messages never changed.
             definitions = get_typestore(Stores.LATEST)

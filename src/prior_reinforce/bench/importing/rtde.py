@@ -14,7 +14,7 @@ from prior_reinforce.bench.importing.recording import Positions
 from prior_reinforce.plans.signals import REST_SPEED
 
 _CYCLE = 0.002
-"""Of UR's controller, in [s]."""
+"""Period of UR's controller, in [s]."""
 _SAME_CYCLE = 0.1
 """A median step that differs from the cycle by a smaller share is the cycle. Ours."""
 _COUNTS = 1.5

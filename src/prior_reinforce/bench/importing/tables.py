@@ -56,7 +56,7 @@ class Table:
     where: str
     """File, and sheet where it has several, for messages."""
     names: tuple[str, ...]
-    """Of the columns; `column 1`, ... where the file has no line of names."""
+    """Names of the columns; `column 1`, ... where the file has no line of names."""
     named: bool
     """Whether the file names them."""
     units: tuple[str | None, ...]

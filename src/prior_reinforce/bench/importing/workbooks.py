@@ -14,7 +14,7 @@ from xml.parsers import expat
 from prior_reinforce.bench.importing.bounds import check_bytes, check_table
 
 _REFERENCE = re.compile(r"([A-Z]{1,3})(\d{1,7})")
-"""Of a cell in an .xlsx, such as `XFD1048576`."""
+"""Address of a cell in an .xlsx, such as `XFD1048576`."""
 _CHUNK = 1 << 20
 """Bytes passed to the parser at a time."""
 

@@ -28,7 +28,7 @@ from prior_reinforce.bench.importing.recording import (
     recorded,
 )
 from prior_reinforce.errors import FileFormatError
-from prior_reinforce.files import inside
+from prior_reinforce.files import require_inside
 
 Arrays = Mapping[str, tuple[tuple[int, ...], tuple[int, ...]]]
 """Shape and chunks of each array of numbers, by its name in the store."""
@@ -147,6 +147,6 @@ def _metadata(source: Path) -> Iterator[tuple[str, bytes]]:
         return
     for path in sorted(source.rglob("*")):
         if path.is_symlink():
-            inside(path, source)
+            require_inside(path, source)
         if path.name in names:
             yield path.relative_to(source).as_posix(), path.read_bytes()

@@ -466,9 +466,7 @@ def _box(
     line = _range("box", "m", "xyz", t, tip, low, high, says=says + "{limit:.3f}").line()
     if settings.tool_tip is not None or line.status == "refuse":
         return line
-    return replace(
-        line, status="warn", text=f"{line.text}; the tool is not looked at: set tool_tip"
-    )
+    return replace(line, status="warn", text=f"{line.text}; the tool is not checked: set tool_tip")
 
 
 def _unchecked(check: str, why: str) -> LimitLine:

@@ -32,11 +32,11 @@ class Chain:
     """
 
     origins: tuple[Pose, ...]
-    """Of each joint's frame in the frame before it."""
+    """Pose of each joint's frame in the frame before it."""
     axes: tuple[tuple[float, float, float], ...]
     """About which each joint turns, in its own frame; of length 1."""
     flange: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    """Of the flange in the last joint's frame."""
+    """Pose of the flange in the last joint's frame."""
 
     @classmethod
     def craig(cls, rows: Sequence[tuple[float, float, float]], flange: float) -> Chain:
@@ -72,10 +72,7 @@ def tool_tip(
 ) -> Places:
     """Return where a point that is fixed to the flange is, in the base frame.
 
-    Args:
-        chain: The arm.
-        joints: Joint positions.
-        tip: The point in the flange's frame, in [m].
+    `tip` is the point in the flange's frame, in [m].
     """
     place = _moved(chain.flange, np.broadcast_to(tip, (*joints.shape[:-1], 3)))
     # From the flange back to the base, each joint turns the point and its origin moves it.

@@ -158,12 +158,7 @@ def match_joints(format: PlanFormat, limits: RobotLimits) -> dict[int, int]:
 def missing_joints(
     columns: dict[int, int], limits: RobotLimits, absent: Sequence[str]
 ) -> tuple[str, ...]:
-    """Name the joints that should have a column and have none.
-
-    Args:
-        columns: What `match_joints` found.
-        limits: Of the robot.
-        absent: Joints that plans leave out on purpose.
+    """Name the joints without a column (`match_joints`) that plans do not leave out on purpose.
 
     Raises:
         ConfigurationError: A joint is said to be absent that the robot has not, or the plan moves.

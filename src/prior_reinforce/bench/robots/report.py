@@ -12,9 +12,9 @@ from jaxtyping import Float
 from prior_reinforce.errors import RobotLimitError
 
 Samples = Float[np.ndarray, "T d"]
-"""Of d joints or axes at T times."""
+"""Values of d joints or axes at T times."""
 Times = Float[np.ndarray, " T"]
-"""Of as many samples, in [s]."""
+"""Times of T samples, in [s]."""
 
 Status = Literal["pass", "warn", "refuse", "unchecked"]
 _MARK: dict[Status, str] = {
@@ -57,7 +57,7 @@ class Check:
     name: str
     """As in `LimitLine.check`."""
     unit: str | Sequence[str]
-    """Of `value` and `limit`: of all, or of each joint."""
+    """Unit of `value` and `limit`: one for all joints, or one each."""
     says: str
     """The line's text; `{joint}`, `{value}`, `{unit}`, `{limit}`, `{margin}`, `{percent}`, `{time}`
     and `{within}` stand for those of the worst place."""
@@ -67,7 +67,7 @@ class Check:
     """From the plan's first frame."""
     value: Samples
     limit: Float[np.ndarray, "*T d"]
-    """Of the same at each time, or of each joint."""
+    """Limit of `value` at each time, or of each joint."""
     warn: float | Float[np.ndarray, " d"] = 1.0
     """Share of a limit from which on it warns."""
     used: Samples | None = None
@@ -148,7 +148,7 @@ class LimitReport:
             verdict = "passes with warnings" if self.warned else "passes"
         head = f"plan {verdict}: limits of {self.robot} (firmware {self.firmware})"
         if self.unchecked:
-            head += f"; not looked at: {', '.join(self.unchecked)}"
+            head += f"; not checked: {', '.join(self.unchecked)}"
         return "\n".join(
             [head, *(f"  {_MARK[line.status]} {line.check:<14} {line.text}" for line in self.lines)]
         )

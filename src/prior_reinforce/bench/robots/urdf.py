@@ -137,7 +137,7 @@ class _Joint:
         return values
 
     def pose(self) -> np.ndarray:
-        """Of the joint's frame in the frame before, 4 x 4."""
+        """Pose of the joint's frame in the frame before, 4 x 4."""
         if self.type in _TURNING and "origin" not in self.parts:
             raise self.error('has no <origin>; write <origin xyz="0 0 0" rpy="0 0 0"/> if it is so')
         pose = np.eye(4)

@@ -44,7 +44,7 @@ else:
 MANIFEST_FILE = "workspace.toml"
 TEMPLATE = Path(__file__).with_name("template.toml").read_text(encoding="utf-8")
 """The manifest that `new` writes, for `format` to fill in."""
-# Ours: every throw within a metre would count as reached, and no swing is told a frame a second.
+# Ours: every throw within a metre would count as reached, and no motion is sampled at 1 Hz.
 _IMPLAUSIBLE_METRES = 1.0
 _IMPLAUSIBLE_SECONDS = 1.0
 
@@ -310,7 +310,7 @@ class _Reader:
             raise self.error("arm", "executor", f"must be one of {', '.join(EXECUTORS.members)}")
         with self.named("arm"):
             if own_class(name) is None:
-                build(EXECUTORS.kind(name).config_type, options, name)
+                build(EXECUTORS.resolve(name).config_type, options, name)
         return ArmSettings(name, options)
 
     def check_values(self) -> None:

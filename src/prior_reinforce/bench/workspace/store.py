@@ -21,8 +21,8 @@ from prior_reinforce.bench.robots.plan_files import PlanFile, read_plan, write_p
 from prior_reinforce.errors import FileFormatError
 from prior_reinforce.files import (
     in_place,
-    inside,
     named_disk_errors,
+    require_inside,
     sha256,
     sha256_of_folder,
     sweep,
@@ -47,7 +47,7 @@ class Store:
     @property
     def training(self) -> Path:
         """Folder of what a training goes on from."""
-        return inside(self._folder / ".training", self._folder)
+        return require_inside(self._folder / ".training", self._folder)
 
     def save_demonstrations(self, demonstrations: Demonstrations) -> None:
         """Keep demonstrations under their hash.
@@ -87,7 +87,7 @@ class Store:
                 saved = Path(scratch) / "model"
                 generator.save(saved)
                 model = sha256_of_folder(saved)[:_DIGITS]
-                kept = inside(models / model, self._folder)
+                kept = require_inside(models / model, self._folder)
                 if not _is_model(kept, model):  # nothing can read it, and this mends it
                     if kept.is_dir():
                         shutil.rmtree(kept)
@@ -110,7 +110,7 @@ class Store:
         """
         from prior_reinforce.generators import load_generator
 
-        folder = inside(self._folder / "models" / model, self._folder)
+        folder = require_inside(self._folder / "models" / model, self._folder)
         if not _is_model(folder, model):
             raise FileFormatError(
                 f"the model in {folder} is not the one that was learned; restore it from a copy, "
@@ -139,7 +139,7 @@ class Store:
 
     def plan_path(self, name: str) -> Path:
         """Where a plan lies."""
-        return inside(self._folder / "plans" / name, self._folder)
+        return require_inside(self._folder / "plans" / name, self._folder)
 
     def plan(self, kept: KeptPlan) -> Plan:
         """Read a trial's plan.
@@ -172,10 +172,12 @@ class Store:
 
     def execution_folder(self, name: str) -> Path:
         """Where such a folder lies."""
-        return inside(self._folder / "executions" / Path(name).name, self._folder)
+        return require_inside(self._folder / "executions" / Path(name).name, self._folder)
 
     def _demonstrations_path(self, sha256: str) -> Path:
-        return inside(self._folder / "demonstrations" / f"{sha256[:_DIGITS]}.npz", self._folder)
+        return require_inside(
+            self._folder / "demonstrations" / f"{sha256[:_DIGITS]}.npz", self._folder
+        )
 
 
 def _is_model(folder: Path, model: str) -> bool:

@@ -57,7 +57,7 @@ from prior_reinforce.errors import (
     TrialStateError,
     WorkspaceError,
 )
-from prior_reinforce.files import inside, named_disk_errors, sweep, write, write_once
+from prior_reinforce.files import named_disk_errors, require_inside, sweep, write, write_once
 from prior_reinforce.plans.motions import Demonstrations, Plan
 from prior_reinforce.registry import own_class
 from prior_reinforce.session.events import Entry, KeptPlan
@@ -94,7 +94,7 @@ class Workspace:
         """
         self.folder = folder = Path(folder)
         for name in _OWN:
-            inside(folder / name, folder)
+            require_inside(folder / name, folder)
         if not (folder / MANIFEST_FILE).is_file():
             raise WorkspaceError(
                 f"{folder} is not a workspace (it has no {MANIFEST_FILE}); make one with: "

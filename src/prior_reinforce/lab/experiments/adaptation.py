@@ -93,15 +93,9 @@ def report_adaptation(
     films: Sequence[FilmOrWhyNot],
     facts: Mapping[str, str],
 ) -> Path:
-    """Write the report of goals that were worked through on a task.
+    """Write the report of goals that were worked through on a task, with a film each.
 
-    Args:
-        folder: For the page.
-        task: Where they were tried.
-        demonstrations: What was learned from.
-        results: One a goal.
-        films: One a goal.
-        facts: What else the report says of the run, by its heading.
+    `facts` says what else is known of the run, by its heading.
 
     Returns:
         Path of the page.

@@ -1,4 +1,4 @@
-"""The paper's claims, beside what was measured; the interval decides, nobody's taste."""
+"""The paper's claims beside what was measured; verdicts follow from confidence intervals."""
 
 from __future__ import annotations
 
@@ -37,11 +37,6 @@ class Claim:
 
 def above(interval: Interval, bound: float, trainings: int) -> Verdict:
     """Judge the claim that a quantity is above a bound.
-
-    Args:
-        interval: The quantity measured.
-        bound: What it should be above.
-        trainings: How many trainings the interval resampled.
 
     Returns:
         Confirmed where the lower end is above the bound, not confirmed where the upper end is not,

@@ -1,4 +1,4 @@
-"""People who err when they look: perceptions of comparisons, not for users to pick.
+"""Noisy observers: perceptions for comparisons, not for users to pick.
 
 Named by their class, as your own are: `prior_reinforce.lab.experiments.observers:ErringEye`. Both
 see two components.

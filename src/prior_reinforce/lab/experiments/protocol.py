@@ -28,7 +28,7 @@ from prior_reinforce.session.session import Session, ask_all
 from prior_reinforce.session.trials import Trial
 
 FailedReading = Callable[[PerceptionFailedError, Rollout, Point, np.random.Generator], Reading]
-"""Who looks where perception gives up: why, rollout, goal, source of noise -> what is seen."""
+"""Fallback where perception fails: why, rollout, goal, source of noise -> what is seen."""
 OnRound = Callable[[int, "list[GoalTrials]"], None]
 """Called after every round with its number and the results so far."""
 
@@ -257,16 +257,9 @@ def reach_goals(
     on_round: OnRound | None = None,
     on_failed_reading: FailedReading = estimate_by_eye,
 ) -> list[GoalTrials]:
-    """Try the goal that each session works on, in lock step; arguments and result as `run_goals`.
+    """Try the goal that each session works on, in lock step; else as `run_goals`.
 
-    Args:
-        task: See `run_goals`, like the arguments that are not named here.
-        sessions: With one fitted generator, and a goal each.
-        perception: P.
-        rounds: Largest number of trials a goal.
-        seed: Of the disturbances and of perception.
-        on_round: Called after every round.
-        on_failed_reading: Called where perception gives up.
+    All sessions have one fitted generator, and a goal each.
     """
     seers = [np.random.default_rng([seed, 1, i]) for i in range(len(sessions))]
     rollouts: list[list[Rollout]] = [[] for _ in sessions]

@@ -134,11 +134,6 @@ def mean_of_tasks(
 ) -> Interval:
     """Mean of tasks that weigh alike: trainings and goals are drawn anew in each, tasks are not.
 
-    Args:
-        rows: Values of each task.
-        within: What such a mean can be at all.
-        seed: Of the resampling.
-
     Returns:
         As `bootstrap_mean`, each task's deviations widened as a variance of so few trainings, all
         together to Student's tails.

@@ -26,8 +26,8 @@ the arm can accelerate it over 20 cm, far enough that it can be reached from beh
 STONE_RADIUS = 0.03
 """In [m]; ours, a table-top stone as in the paper's picture."""
 FRICTION = 0.12
-"""Of the stone on the table [-]; in `curling.xml` too. Ours: a waxed board. Less would need
-gentler pushes whose length is more sensitive to speed, more would need a faster arm."""
+"""Friction of the stone on the table [-]; in `curling.xml` too. Ours: a waxed board. Less would
+need gentler pushes whose length is more sensitive to speed, more would need a faster arm."""
 TARGET_BEHIND = 0.08
 """From a goal to the centre of the target stone behind it, along x, in [m]; in `curling.xml` too.
 Ours: a gap of 2 cm between two stones, so that a success never touches the target."""
@@ -67,11 +67,7 @@ class Curling(PandaTask):
     lead_out = 1.5  # the fastest stone slides for 1 s
 
     def __init__(self, disturbances: CurlingDisturbances | None = None) -> None:
-        """Compile the scene.
-
-        Args:
-            disturbances: How repeated executions differ; the documented ones when not given.
-        """
+        """Compile the scene; repeated executions differ as documented unless told."""
         self.disturbances = disturbances or CurlingDisturbances()
         super().__init__()
         stone = self.model.body("stone")

@@ -65,11 +65,7 @@ class Fishing(PandaTask):
     lead_out = 0.4
 
     def __init__(self, disturbances: FishingDisturbances | None = None) -> None:
-        """Compile the scene.
-
-        Args:
-            disturbances: How repeated executions differ; the documented ones when not given.
-        """
+        """Compile the scene; repeated executions differ as documented unless told."""
         self.disturbances = disturbances or FishingDisturbances()
         super().__init__()
         self._swivel = self.model.jnt_qposadr[self.model.joint("tool/swivel").id]

@@ -27,10 +27,10 @@ NOMINAL = np.diag([1.0, -1.0, -1.0])
 READY = np.array([0.0, -0.3, 0.0, -2.2, 0.0, 1.9, np.pi / 4])
 """Posture in which the search for the first frame begins, elbow up, in [rad]; ours."""
 _POSITION_COST, _ATTITUDE_COST = 100.0, 30.0
-"""Of a metre and of a radian off the pose. Far above one, or the solver's tolerance would hide the
-elbow's cost and leave the elbow to drift and jump."""
+"""Costs of a metre and of a radian off the pose. Far above one, or the solver's tolerance would
+hide the elbow's cost and leave the elbow to drift and jump."""
 _ELBOW_COST = np.array([0.0, 0.0, 3.0, 0.0, 0.0, 0.0, 0.0])
-"""Of a radian of joint 3, the joint that a pose leaves free: zero keeps the elbow in the vertical
+"""Cost of a radian of joint 3, which a pose leaves free: zero keeps the elbow in the vertical
 plane. Small beside the pose's cost: it moves the flange by less than 0.1 mm."""
 _STEPS_A_FRAME = 2
 """One Newton step leaves up to 1 mm where the arm is fast, the second leaves micrometres."""
@@ -53,15 +53,11 @@ def to_rotation_vector(attitudes: Float[np.ndarray, "*n 3 3"]) -> Float[np.ndarr
 
 
 def joint_paths(poses: Float[np.ndarray, "n H 6"], dt: float) -> Float[np.ndarray, "n H 7"]:
-    """Joint paths that carry the flange along pose paths, as well as the arm allows; in [rad].
+    """Joint paths in [rad] that carry the flange along pose paths, a frame each dt [s].
 
     Every frame is solved from the one before it as a quadratic program (mink, DAQP) with the
     Panda's position and velocity limits as bounds. Where a path asks for more than they allow the
     arm lags behind or stops short, as a real one would, and catches up when it can.
-
-    Args:
-        poses: Pose paths.
-        dt: Time between frames, in [s].
     """
     paths = np.empty((*poses.shape[:2], N_JOINTS))
     for path, out in zip(poses, paths, strict=True):

@@ -19,7 +19,8 @@ from prior_reinforce.plans.interpolation import join_frames
 N_JOINTS = 7
 JOINT_NAMES = tuple(f"joint{i}" for i in range(1, N_JOINTS + 1))
 VELOCITY_LIMIT = (2.175, 2.175, 2.175, 2.175, 2.61, 2.61, 2.61)
-"""Of each joint, in [rad/s]: Franka Emika, Control Parameters Documentation, limits for Panda."""
+"""Largest speed of each joint, in [rad/s]: Franka Emika, Control Parameters Documentation, limits
+for Panda."""
 STEP = 0.001
 """Physics and servo period, in [s]: the real arm's control loop runs at 1 kHz."""
 

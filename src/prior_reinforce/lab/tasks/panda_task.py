@@ -236,11 +236,7 @@ class PandaTask(Task):
 def first_descent(
     path: Float[np.ndarray, "steps 3"], height: float
 ) -> tuple[int, float, Float[np.ndarray, "2"]] | None:
-    """Return where a path first passes a height downwards, by linear interpolation, if it does.
-
-    Args:
-        path: Positions, in [m], one a row.
-        height: In [m].
+    """Return where a path in [m] first passes a height downwards, by linear interpolation, or None.
 
     Returns:
         The last row above, the part of a row after it, and (x, y) there.

@@ -113,7 +113,7 @@ def make_executor(settings: ArmSettings) -> Executor:
         ConfigurationError: There is no such executor or setting, or the arm does not answer.
         MissingExtraError: Its library is not installed.
     """
-    kind = EXECUTORS.kind(settings.executor)
+    kind = EXECUTORS.resolve(settings.executor)
     return kind(build(kind.config_type, settings.options, f"[arm] {settings.executor}"))
 
 

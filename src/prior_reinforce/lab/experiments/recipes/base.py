@@ -32,8 +32,8 @@ _ROUNDS_SHOWN = (1, 2, 4, 8, 10)
 
 Family = Literal["generator", "adapter"]
 _COMPARED: tuple[tuple[Family, Callable[[str], Any], Callable[[str], Any]], ...] = (
-    ("generator", GENERATORS.kind, make_generator),
-    ("adapter", ADAPTERS.kind, make_adapter),
+    ("generator", GENERATORS.resolve, make_generator),
+    ("adapter", ADAPTERS.resolve, make_adapter),
 )
 
 Figures = Mapping[str, Any]

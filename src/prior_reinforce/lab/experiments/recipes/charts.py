@@ -113,13 +113,7 @@ def _draw_panel(axes: Axes, panel: Panel) -> None:
 
 @drawing()
 def draw_kinds(kinds: Sequence[str], panels: Mapping[str, Sequence[Line]], path: Path) -> Path:
-    """Draw a value by kind, panels side by side: a mark a method, and what it is the mean of.
-
-    Args:
-        kinds: What stands below each group of marks.
-        panels: Label of the vertical axis, and the methods' values by kind.
-        path: PNG to write.
-    """
+    """Draw a value by kind, panels side by side: a mark a method, and what it is the mean of."""
     figure = new_figure(5.6 * len(panels), 4.6)
     subplots = figure.subplots(1, len(panels), squeeze=False)[0]
     for axes, (label, lines) in zip(subplots, panels.items(), strict=True):
@@ -225,15 +219,7 @@ def draw_alignment(
     dt: float,
     path: Path,
 ) -> Path:
-    """Draw one joint of all demonstrations, before and after alignment, on one time axis.
-
-    Args:
-        before: Its positions.
-        after: The same, aligned.
-        joint: Label of the vertical axis.
-        dt: Time of a frame, in [s].
-        path: PNG to write.
-    """
+    """Draw one joint of all demonstrations, before and after alignment, on one time axis in [s]."""
     figure = new_figure(8.0, 5.6)
     for axes, plans, title in zip(
         figure.subplots(2, 1, sharex=True, sharey=True),
@@ -257,9 +243,9 @@ class Mark:
     """One method of a chart of rows."""
 
     shape: str
-    """Of its marks, as matplotlib names it."""
+    """Shape of its marks, as matplotlib names it."""
     colour: str
-    """Of marks and intervals."""
+    """Colour of marks and intervals."""
     intervals: Sequence[Interval | None]
     """One a row; None where it was not tried."""
 
@@ -268,14 +254,7 @@ class Mark:
 def draw_rows(
     labels: Sequence[str], marks: Mapping[str, Mark], axis_label: str, path: Path
 ) -> Path:
-    """Draw intervals, a row each, the first on top, and a mark a method, one below another.
-
-    Args:
-        labels: What stands beside each row.
-        marks: By what the legend calls them.
-        axis_label: Below the horizontal axis.
-        path: PNG to write.
-    """
+    """Draw intervals, a row each, the first on top, and a mark a method, one below another."""
     figure = new_figure(8.2, 1.3 + 0.2 * len(marks) + (0.3 + 0.05 * len(marks)) * len(labels))
     axes = figure.subplots()
     calm_axes(axes)

@@ -51,7 +51,7 @@ class Displacement(Unit):
     training: Training
     """What was learned; its task has two-dimensional outcomes."""
     spacing: float = 0.025
-    """Of the grid, in [m]."""
+    """Spacing of the grid, in [m]."""
     margin: float = 0.05
     """How far the grid goes beyond the reachable region, in [m]."""
 
@@ -84,7 +84,7 @@ class DisplacementFields(Measurement):
     generator: str = "diffusion"
     """Generator whose conditions are laid out."""
     spacing: float = 0.025
-    """Of the grid of conditions, in [m]."""
+    """Spacing of the grid of conditions, in [m]."""
 
     def trainings(self, scale: Scale, include: Sequence[str] = ()) -> Sequence[Training]:
         """The generator from all demonstrations of each set, then from three."""

@@ -43,11 +43,7 @@ _HALO = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 2.0}
 
 @drawing()
 def draw_process(rows: Mapping[str, Row], path: Path) -> Path:
-    """Draw one row a task: the table, then its trials close up.
-
-    Args:
-        rows: By title, in the order drawn.
-        path: PNG to write.
+    """Draw one row a task, by title: the table, then its trials close up.
 
     Raises:
         RenderingUnavailableError: There is no OpenGL on this machine.

@@ -80,8 +80,8 @@ ROWS = (
 """Table II of the paper, in its order."""
 
 _Solved = Mapping[tuple[PaperRow, str], tuple[Int[np.ndarray, "n few"], Int[np.ndarray, "n many"]]]
-"""Of a row and an adapter: in which trial each unseen goal and each of the many was reached, a row
-a training."""
+"""By row and adapter: in which trial each unseen goal and each of the many was reached, a row a
+training."""
 
 
 @dataclass(frozen=True)

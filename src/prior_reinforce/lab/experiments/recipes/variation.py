@@ -32,8 +32,8 @@ GENERATORS = (
 )
 """What is compared is called, and its choice."""
 TASKS = ("zoo-drag", "zoo-hoop", "zoo-arrival", "zoo-curl")
-"""Of the zoo's reported half, without a clock and of at most 100 frames: a network learns them in a
-minute."""
+"""Tasks of the zoo's reported half, without a clock and of at most 100 frames: a network learns
+them in a minute."""
 SETS = ("clean-8", "mixed-4", "mixed-12", "styles-9")
 """Kind and number of the demonstrations (docs/tasks/zoo.md)."""
 _QUICK_SETS, _QUICK_TASKS, _QUICK_GENERATORS, _GOALS = 1, 1, 3, 30

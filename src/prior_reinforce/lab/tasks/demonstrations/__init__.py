@@ -12,14 +12,7 @@ from prior_reinforce.plans.motions import Demonstrations
 def write_sets(
     make: Callable[[str], Demonstrations], names: Iterable[str], recordings: str, about: str | None
 ) -> None:
-    """Make prior sets and write them to the folder that the command line names.
-
-    Args:
-        make: Makes the set of a name.
-        names: Of the sets.
-        recordings: Files are called `<recordings>_<set>.npz`.
-        about: For the command's help.
-    """
+    """Make prior sets, and write them as `<recordings>_<set>.npz` where the command line says."""
     parser = argparse.ArgumentParser(description=about)
     parser.add_argument("--folder", type=Path, default=Path(__file__).parent)
     folder = parser.parse_args().folder

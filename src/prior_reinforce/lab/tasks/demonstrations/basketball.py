@@ -34,7 +34,7 @@ LEAN = np.array([0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0])
 SWING_PER_REACH = 0.6
 """Relative change of the swing with reach, in [1/rad]: a longer throw also swings further."""
 DURATION = 1.05
-"""Of the throw at tempo 1, in [s]."""
+"""Duration of the throw at tempo 1, in [s]."""
 DESIGNED = {
     "A": ((0.92, -0.27), (0.92, 0.26), (1.18, -0.27), (1.19, 0.27), (1.00, -0.04), (1.11, 0.06)),
     "B": ((0.91, 0.03), (0.97, -0.28), (0.95, 0.27), (1.20, -0.20), (1.17, 0.27), (1.07, -0.03)),

@@ -25,11 +25,11 @@ GRAVITY = 9.81
 BAR_RADIUS = 0.01
 """As in `curling.xml`, in [m]."""
 BAR_HEIGHT = 0.015
-"""Of the bar's axis above the table, the middle of the stone's side, in [m]."""
+"""Height of the bar's axis above the table, the middle of the stone's side, in [m]."""
 HANDLE = 0.30
 """From the flange to the bar's axis, as in `curling.xml`, in [m]."""
 STROKE_TIME = 0.58
-"""Of a push at tempo 1, in [s]."""
+"""Duration of a push at tempo 1, in [s]."""
 CARRIED_ON = 0.02
 """How far past the middle of the stroke the bar carries a stone, about, in [m]."""
 TIPPED_BACK, TIPPED_FORWARD = 0.65, 0.05
@@ -56,7 +56,7 @@ class Variation:
     aside: float = 0.003
     """How far from its middle the bar meets the stone, in [m]."""
     tilt: float = 0.02
-    """Of the handle, through the whole stroke, in [rad]."""
+    """Tilt of the handle, through the whole stroke, in [rad]."""
     hand: Teleoperation = field(default_factory=Teleoperation)
     """Tremor, tracker and follower."""
 

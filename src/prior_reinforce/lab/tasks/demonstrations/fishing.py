@@ -29,7 +29,7 @@ flange in [m], and its tilt in [rad], under which the rod rises by 45 degrees le
 FURTHER = np.array([0.10, 0.10, 0.20])
 """How much further out those three are at reach 1 than at reach 0, in [m]."""
 RAISE_TIME, CAST_TIME = 0.65, 0.90
-"""Of the two strokes at tempo 1, in [s]."""
+"""Durations of the two strokes at tempo 1, in [s]."""
 NEAR, FAR = 0.832, 0.997
 """Where casts of reach 0 and 1 land, from the base axis, about; the operator's feel, in [m]."""
 AIMED = {
@@ -55,9 +55,9 @@ class Variation:
     tempo: float = 0.015
     """Relative difference of each stroke's duration."""
     place: float = 0.008
-    """Of the hand along each direction, before, at the top and after, in [m]."""
+    """Place of the hand along each direction, before, at the top and after, in [m]."""
     tilt: float = 0.03
-    """Of the hand, before, at the top and after, in [rad]."""
+    """Tilt of the hand, before, at the top and after, in [rad]."""
     hand: Teleoperation = field(default_factory=Teleoperation)
     """Tremor, tracker and follower."""
 

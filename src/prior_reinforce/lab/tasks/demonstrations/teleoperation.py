@@ -32,7 +32,7 @@ class Teleoperation:
     resolution_angle: float = 0.0005
     """Step of the tracker's angles, in [rad]."""
     bandwidth: float = 6.0
-    """Of the follower, a critically damped filter of second order, in [Hz]."""
+    """Bandwidth of the follower, a critically damped filter of second order, in [Hz]."""
 
 
 def record(meant: _Poses, dt: float, hand: Teleoperation, rng: np.random.Generator) -> _Poses:

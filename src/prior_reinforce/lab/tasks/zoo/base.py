@@ -39,7 +39,7 @@ class ZooTask(Task):
     """Standard deviations of what else differs between executions, as `_execute` takes them: by
     default the relative speed with which the object leaves. Ours."""
     bandwidth: ClassVar[float | None] = None
-    """Of the arm's servos, in [Hz]; None where the arm is where the plan says."""
+    """Bandwidth of the arm's servos, in [Hz]; None where the arm is where the plan says."""
     lead_out: ClassVar[float] = 0.3
     """A following arm is given so long to come to rest in the last frame, in [s]."""
     slack: ClassVar[float | None] = None

@@ -38,7 +38,7 @@ class Pour(ZooTask):
     ladle = 0.10
     """From the tool to the lip, along the tool's x, in [m]."""
     tilt = 0.35
-    """Of the lip below the horizontal at which the marble goes, in [rad]."""
+    """Tilt of the lip below the horizontal at which the marble goes, in [rad]."""
     roll = 0.3
     """Speed at which it rolls off the lip, in [m/s]."""
 

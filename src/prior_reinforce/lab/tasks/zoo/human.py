@@ -2,10 +2,10 @@
 
 A task has a base strategy: submovements (minimum-jerk strokes that may overlap) from a home
 posture, with as many aims as an outcome has components. A demonstrator draws a manner (when to
-start, how fast, how evenly, in what posture), and then aims by trying in the mind: the aims are
-solved for, in that manner, until the task's own rollout without disturbances comes near to the
-outcome that was meant. So the outcomes spread over the region in every kind of set but `scattered`,
-and each is exactly what its plan does. A manner in which nothing hits is drawn again.
+start, how fast, how evenly, in what posture), and then aims: the aims are solved for in simulation,
+in that manner, until the task's own rollout without disturbances comes near to the outcome that was
+meant. So the outcomes spread over the region in every kind of set but `scattered`, and each is
+exactly what its plan does. A manner in which nothing hits is drawn again.
 
 A set is named `KIND-COUNT-SEED`, for instance `warped-8-2`; the same name gives the same set.
 """
@@ -74,7 +74,7 @@ class Strategy:
 
     @property
     def duration(self) -> float:
-        """Of the motion, in [s]."""
+        """Duration of the motion, in [s]."""
         return max(move.start + move.duration for move in self.moves) + self.settle
 
 
@@ -89,14 +89,7 @@ def reach_and_strike(
 ) -> Strategy:
     """The two phases that most strategies have: wind up, then strike.
 
-    Args:
-        home: Channels at first.
-        wound: After the reach.
-        struck: After the strike.
-        reach: Its duration, in [s].
-        strike: Its duration, in [s].
-        overlap: The strike begins so long before the reach ends, in [s].
-        more: Further submovements.
+    They take `reach` and `strike` seconds; the strike begins `overlap` before the reach ends.
     """
     there = tuple(b - a for a, b in zip(home, wound, strict=True))
     onward = tuple(b - a for a, b in zip(wound, struck, strict=True))

@@ -32,7 +32,7 @@ class Arm:
     links: tuple[tuple[float, float, float], ...]
     """From each joint to the next, the last to the hand, in the turned frame, in [m]."""
     base: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """Of the first joint, in [m]."""
+    """Position of the first joint, in [m]."""
 
     @classmethod
     def straight(cls, axes: str, *lengths: float, base: float = 0.0) -> Arm:

@@ -46,9 +46,9 @@ class Push(ByIncrements):
     puck = (0.26, 0.0)
     """Where the puck begins, (x, y) in [m]."""
     radius = 0.03
-    """Of the puck, in [m]."""
+    """Radius of the puck, in [m]."""
     friction = 0.15
-    """Of the puck on the table [-]."""
+    """Friction of the puck on the table [-]."""
     grip = 0.3
     """Friction of the puck on the bar's face [-]."""
     per_frame = 6
@@ -182,7 +182,7 @@ class Curl(ByIncrements):
     posture = (0.01, 0.01, 0.05)
     aim_range = ((0.3, 0.9), (-0.9, 0.9))
     friction = 0.08
-    """Of the stone on the ice [-]."""
+    """Friction of the stone on the ice [-]."""
     curl = 0.25
     """Sideways deceleration over spin, in [m/s]."""
 
@@ -232,11 +232,11 @@ class Strike(ZooTask):
     ball = (0.0, 0.0, -0.65)
     """Where the ball lies, from the arm's base, in [m]."""
     radius, reach = 0.03, 0.08
-    """Of the ball; and how far beside it the putter still meets it, in [m]."""
+    """Radius of the ball, and how far beside it the putter still meets it, in [m]."""
     bounce = 0.5
     """Restitution of the ball on the putter, which is much heavier [-]."""
     friction = 0.15
-    """Of the ball on the lawn [-]."""
+    """Friction of the ball on the lawn [-]."""
 
     def strategy(self, aims: Point, style: int) -> Strategy:
         """Turn and reach back, wait 0.7 s, strike; style 1 bends the elbow more."""

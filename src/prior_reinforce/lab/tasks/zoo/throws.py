@@ -339,7 +339,7 @@ class Catapult(ZooTask):
     stiffness = 25.0
     """Speed over draw, the root of the spring's stiffness over the ball's mass, in [1/s]."""
     height = 0.2
-    """Of the muzzle, in [m]."""
+    """Height of the muzzle, in [m]."""
 
     def strategy(self, aims: Point, style: int) -> Strategy:
         """Draw and raise it, pull the trigger, let it sink; style 1: raise it first, steeply."""
