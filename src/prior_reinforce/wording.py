@@ -16,10 +16,12 @@ Source: paper, Section IV, "Perception Process" (coarse human feedback); the wor
 from __future__ import annotations
 
 import math
+import os
 import re
 import unicodedata
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TextIO
 
 import numpy as np
 from jaxtyping import Float
@@ -90,6 +92,16 @@ def plain(text: str, keep: str = "") -> str:
         else char
         for char in text
     )
+
+
+RED, YELLOW, GREEN = "1;31", "33", "32"
+"""ANSI codes."""
+
+
+def coloured(text: str, code: str, stream: TextIO) -> str:
+    """Return a text in an ANSI colour where its stream is a terminal that shows one (NO_COLOR)."""
+    plainly = os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb"
+    return text if plainly or not stream.isatty() else f"\x1b[{code}m{text}\x1b[0m"
 
 
 def in_words(units: Sequence[str]) -> bool:
