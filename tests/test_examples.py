@@ -196,7 +196,7 @@ def test_the_catapults_film_ends_with_the_ball_on_its_goal():
 @pytest.mark.slow
 def test_earlier_goals_are_compared_with_none(printed, tmp_path):
     model = ["--generator", "nearest", "--out", str(tmp_path / "model")]
-    assert main(["learn", "--task", "own_task:Toss", *model]) == 0
+    assert main(["train", "--task", "own_task:Toss", *model]) == 0
     options = ["--sequences", "2", "--rounds", "2", "--adapters", "gp", "--perception", "exact"]
     models = ["--models", str(tmp_path / "model"), "--task", "own_task:Toss"]
     _, text = printed("carry_over", *models, *options)

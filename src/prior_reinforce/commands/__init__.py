@@ -19,6 +19,8 @@ GROUPS: dict[str, dict[str, tuple[str, str]]] = {
         "log": ("workspace:Log", "all events, one JSON object a line"),
         "report": ("workspace:Report", "write a page with every goal, trial and plan"),
         "export": ("trials:Export", "write a trial's plan as NPZ, CSV or JSON"),
+        "pack": ("workspace:Pack", "write a workspace into one file"),
+        "unpack": ("workspace:Unpack", "make a workspace of such a file"),
         "calibrate": ("photographs:Calibrate", "fit the camera above the table"),
         "look": ("photographs:Look", "see a trial's error in a photograph"),
     },

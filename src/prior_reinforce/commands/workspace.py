@@ -24,6 +24,7 @@ from prior_reinforce.errors import (
     InvalidFeedbackError,
     InvalidGoalError,
 )
+from prior_reinforce.files import check_path
 from prior_reinforce.wording import read_place, say_place, say_tolerance
 
 
@@ -227,3 +228,55 @@ class Report(OnWorkspace):
         with drawing_progress(Console()) as progress:
             page = workspace.report(self.out, progress=progress)
         print(f"report: {page}")
+
+
+@dataclass(frozen=True)
+class Pack(OnWorkspace):
+    """Write a workspace into one file, to be opened on another machine.
+
+    For example:
+        prior-reinforce pack hoop hoop.zip
+    """
+
+    words: Annotated[Words, tyro.conf.arg(metavar="[WORKSPACE] FILE")] = ()
+    """The workspace (the current folder's if not given), and the file to write."""
+
+    takes_words = True
+
+    def run_on(self, workspace: Workspace, words: Sequence[str]) -> None:
+        """Write it."""
+        if len(words) != 1:
+            raise ConfigurationError("say which file to write: one name, such as hoop.zip")
+        file = check_path(Path(words[0]))
+        print(f"packed: {file}  sha256 {workspace.pack(file)}")
+        said = sum(bool(getattr(e, "output_tail", "")) for e in workspace.state.executions.values())
+        if said:
+            print(f"it holds the last output of {said} commands, as `log` shows: read it first")
+
+
+@dataclass(frozen=True)
+class Unpack:
+    """Make a workspace of what `pack` wrote; nothing in it is run.
+
+    For example:
+        prior-reinforce unpack hoop.zip hoop
+    """
+
+    file: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
+    """What `pack` wrote."""
+    folder: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="WORKSPACE")]
+    """Folder to make."""
+
+    def run(self) -> None:
+        """Make it."""
+        from prior_reinforce.bench.workspace.packing import unpack
+
+        print(f"unpacked: {self.folder}  sha256 {unpack(self.file, self.folder)}")
+        with Workspace(self.folder) as workspace:
+            waiting = workspace.state.open_trial
+            if waiting is not None:
+                print(
+                    f"trial {waiting.number} waits: was it executed where this was packed? then "
+                    "tell or void it here"
+                )
+            print(describe(workspace))

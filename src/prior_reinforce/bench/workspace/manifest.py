@@ -209,6 +209,18 @@ def with_columns(text: str, names: Sequence[str], units: Sequence[str]) -> str:
     return head + plan
 
 
+def without_arm(text: str) -> str:
+    """Return a manifest's text without what drives the arm, which is each machine's own.
+
+    Raises:
+        ConfigurationError: It says so elsewhere than in a section.
+    """
+    kept = re.sub(r"^[ \t]*\[\s*arm\b.*\n(?:(?![ \t]*\[).*(?:\n|\Z))*", "", text, flags=re.M)
+    if "arm" in tomllib.loads(kept):
+        raise ConfigurationError(f"{MANIFEST_FILE}: write what drives the arm as a section, [arm]")
+    return kept
+
+
 def _spread(values: Sequence[str], n: int) -> tuple[str, ...]:
     return tuple(values) * n if len(values) == 1 else tuple(values)
 

@@ -364,6 +364,36 @@ class Workspace:
             verdict.require()
         return write_plan(plan, Path(path), rate=rate)
 
+    def pack(self, path: str | os.PathLike[str]) -> str:
+        """Write the workspace into one file, without what is this machine's own ([arm], outputs).
+
+        Args:
+            path: The file; none is written over.
+
+        Returns:
+            Its SHA-256, for whoever gets it to compare.
+
+        Raises:
+            FileFormatError: The file is there already, or a file of the workspace is missing.
+            WorkspaceError: A trial is executing, or the disk refuses.
+        """
+        from prior_reinforce.bench.workspace.packing import pack
+
+        return pack(self, Path(path))
+
+    @classmethod
+    def unpack(cls, path: str | os.PathLike[str], folder: str | os.PathLike[str]) -> Self:
+        """Make a workspace of what `pack` wrote, and open it; nothing in it runs code.
+
+        Raises:
+            FileFormatError: It is damaged, was changed, or holds what `pack` does not write.
+            WorkspaceError: The folder exists, or the disk refuses.
+        """
+        from prior_reinforce.bench.workspace.packing import unpack
+
+        unpack(Path(path), Path(folder))
+        return cls(folder)
+
     def status(self) -> StatusRecord:
         """Where the workspace stands, as `prior-reinforce status --json`; printed, in ten lines."""
         from prior_reinforce.bench.workspace.records import status_record
