@@ -222,7 +222,7 @@ def test_the_arm_calls_where_the_ball_came_down(printed, tmp_path):
         "simulated_arm", str(tmp_path / "plan.npz"), "--goal", f"{x}", f"{y}", "--call", str(called)
     )
     assert status == 0
-    error = pr.from_words(called.read_text(), 2)
+    error = pr.from_words(called.read_text(), ("x", "y"), ("m", "m"))
     np.testing.assert_allclose(error.error_seen, [0.2, -0.1], atol=0.03)
     assert called.read_text().strip() in text
 
