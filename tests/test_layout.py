@@ -21,6 +21,7 @@ TESTED_ELSEWHERE = {
 
 OF_THE_WHOLE = {
     "attacks/attacks": "generated attacks of every class: one table",
+    "bench/console/page": "the page in a browser, from recordings to a hit",
     "dependencies": "floors of libraries, and calls that would run code from data",
     "documentation": "what the docs show, run as it stands",
     "examples": "the examples as a reader runs them",

@@ -31,6 +31,11 @@ EXTRA_OF = {
     "numcodecs": "zarr",
     "python_calamine": "excel",
     "pylibfranka": "fr3",
+    "starlette": "console",
+    "uvicorn": "console",
+    "anyio": "console",
+    "segno": "console",
+    "cv2": "camera",
 }
 """Library, as it is imported -> extra of `pyproject.toml`."""
 

@@ -21,7 +21,6 @@ from prior_reinforce.bench.importing.outcomes import (
 )
 from prior_reinforce.bench.importing.selection import Selection
 from prior_reinforce.bench.workspace.manifest import Manifest
-from prior_reinforce.commands.base import answer_to
 from prior_reinforce.errors import (
     InvalidDemonstrationsError,
     InvalidFeedbackError,
@@ -147,7 +146,7 @@ def _ask(question: str, episode: str, table: Path, manifest: Manifest) -> tuple[
     """A place and its standard deviation, `skip` or `back`."""
     while True:
         try:
-            text = answer_to(question).strip()
+            text = input(question).strip()
         except EOFError as error:
             raise InvalidDemonstrationsError(
                 f"no outcome for episode {episode}; import again to go on (what was typed is kept "

@@ -128,18 +128,14 @@ class VisionLanguageModel(Perception):
         Raises:
             ConfigurationError: There is no calibration.
         """
-        if self._calibration is None:
-            raise ConfigurationError(
-                "the camera is not calibrated; pass calibration=TableCalibration.fit(...)"
-            )
-        calibration, sent = self._calibration, _shrunk(picture, self.config)
         goal = goal_place = goal_pixel = None
-        reached = self._find(self.scene.reached, picture, sent, calibration)
+        reached = self.find(self.scene.reached, picture)
         if reached.problem is None:
-            goal = self._find(self.scene.goal, picture, sent, calibration)
+            goal = self.find(self.scene.goal, picture)
             if goal.place is not None:
                 goal_place = goal.place + np.array(self.scene.goal_offset)
-                x, y = calibration.to_pixels(goal_place).tolist()
+                assert self._calibration is not None
+                x, y = self._calibration.to_pixels(goal_place).tolist()
                 goal_pixel = (x, y)
         self.last_reading = PictureReading(
             picture, self._client.model, reached, goal, goal_place, goal_pixel
@@ -164,14 +160,21 @@ class VisionLanguageModel(Perception):
             self._scene_model = key_frame.model
         return camera
 
-    def _find(
-        self,
-        wanted: SeenObject,
-        picture: Picture,
-        sent: Picture,
-        calibration: TableCalibration,
-    ) -> Sighting:
-        """Ask for one object until enough answers agree, or none will."""
+    def find(self, wanted: SeenObject, picture: Picture) -> Sighting:
+        """Ask for one object until enough answers agree, or none will.
+
+        Args:
+            wanted: What to look for.
+            picture: RGB, of the calibrated camera.
+
+        Raises:
+            ConfigurationError: There is no calibration.
+        """
+        if self._calibration is None:
+            raise ConfigurationError(
+                "the camera is not calibrated; pass calibration=TableCalibration.fit(...)"
+            )
+        calibration, sent = self._calibration, _shrunk(picture, self.config)
         words, votes = wanted.words, self.config.votes
         answers: list[Answer] = []
         for _ in range(self.config.most_requests):

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 
 import prior_reinforce.lab.tasks
-from prior_reinforce.bench.robots.kinematics import Chain, tool_tip
+from prior_reinforce.bench.robots.kinematics import Chain, link_places, tool_tip
 from prior_reinforce.bench.robots.presets import robot_limits
 
 FRANKA = robot_limits("panda").chain
@@ -67,3 +67,16 @@ def test_both_tables_of_denavit_and_hartenberg_say_the_same_arm():
 def test_a_base_may_be_turned():
     turned = Chain.standard([(0.3, 0.1, 0.0)], yaw=np.pi)
     np.testing.assert_allclose(tool_tip(turned, np.zeros(1)), [-0.3, 0, 0.1], atol=1e-12)
+
+
+def test_the_links_are_the_base_each_joint_and_the_flange():
+    q = np.random.default_rng(4).uniform(-2, 2, (3, 5, 7))
+    places = link_places(FRANKA, q)
+    assert places.shape == (3, 5, 9, 3)
+    np.testing.assert_array_equal(places[..., 0, :], 0.0)
+    np.testing.assert_allclose(places[..., -1, :], tool_tip(FRANKA, q), atol=1e-12)
+    for joint in range(1, 8):  # the flange of an arm that ends there
+        short = Chain(FRANKA.origins[:joint], FRANKA.axes[:joint])
+        np.testing.assert_allclose(
+            places[..., joint, :], tool_tip(short, q[..., :joint]), atol=1e-12
+        )

@@ -86,6 +86,27 @@ def tool_tip(
     return place
 
 
+def link_places(chain: Chain, joints: JointPositions) -> Float[np.ndarray, "*n links 3"]:
+    """Return where the base, every joint's frame and the flange are, in the base frame: the arm.
+
+    Args:
+        chain: The arm.
+        joints: Joint positions.
+    """
+    at, turn = np.zeros((*joints.shape[:-1], 3)), np.eye(3)
+    places = [at]
+    for index, (origin, axis) in enumerate(zip(chain.origins, chain.axes, strict=True)):
+        at = at + turn @ np.array(origin[:3])
+        places.append(at)
+        # Rodrigues' formula: R = I + sin K + (1 - cos) K^2, with K the axis as a cross product.
+        cross = np.cross(np.eye(3), np.array(axis))
+        angle = joints[..., index, None, None]
+        turning = np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * (cross @ cross)
+        turn = turn @ rotation(*origin[3:]) @ turning
+    places.append(at + turn @ np.array(chain.flange[:3]))
+    return np.stack(places, axis=-2)
+
+
 def rotation(roll: float, pitch: float, yaw: float) -> Float[np.ndarray, "3 3"]:
     """Return Rz(yaw) Ry(pitch) Rx(roll), angles in [rad]."""
     cr, sr, cp, sp, cy, sy = (

@@ -1,8 +1,10 @@
 """The lock of an execution: one at a time, on a workspace and on an arm."""
 
 import os
+import signal
 import subprocess
 import sys
+import time
 
 import pytest
 
@@ -11,6 +13,7 @@ from prior_reinforce.bench.robots.executors.lock import (
     executing_lock,
     is_executing,
     marked,
+    stop_executing,
     stop_marked,
 )
 from prior_reinforce.errors import TrialStateError, WorkspaceError
@@ -86,6 +89,34 @@ def test_what_bears_a_mark_is_stopped_whatever_it_ignores():
         stop_marked("arm-0", 0.0)
         for driver in drivers:
             driver.wait()
+
+
+@on_linux
+def test_who_started_it_is_asked_to_stop_once_and_asks_what_it_started(tmp_path):
+    inner = "trap 'echo asked >> said; exit' TERM; while :; do sleep 0.05; done"
+    outer = f"sh -c '{inner.replace(chr(39), chr(34))}' & trap 'kill $!; wait; exit' TERM; wait"
+    with executing_lock(tmp_path) as lock:
+        env = os.environ | {MARK: " ".join(lock.names)}
+        started = subprocess.Popen(["sh", "-c", outer], env=env, cwd=tmp_path)
+        while len(marked(lock.names[1])) < 2:
+            pass
+        time.sleep(0.3)  # both have set their traps
+        stop_executing(tmp_path)
+        started.wait()
+        assert not marked(lock.names[1])
+    assert (tmp_path / "said").read_text() == "asked\n"
+
+
+@on_linux
+def test_what_does_not_stop_when_it_is_asked_is_killed(tmp_path, monkeypatch):
+    monkeypatch.setattr("prior_reinforce.bench.robots.executors.lock.GRACE", 0.1)
+    with executing_lock(tmp_path) as lock:
+        env = os.environ | {MARK: " ".join(lock.names)}
+        started = subprocess.Popen(["sh", "-c", "trap '' TERM; exec sleep 60"], env=env)
+        while not marked(lock.names[1]):
+            pass
+        stop_executing(tmp_path)
+        assert started.wait() == -signal.SIGKILL
 
 
 def test_there_is_no_file_to_delete(tmp_path):

@@ -30,6 +30,8 @@ ARM_VARIABLE = "PRIOR_REINFORCE_ARM"
 """Environment variable that names the arm where nothing else does."""
 MARK = "PRIOR_REINFORCE_EXECUTION"
 """Environment variable of what executes: the names of its locks."""
+GRACE = 2.0
+"""Between asking a command to stop and killing it, in [s]: time to bring an arm to rest."""
 # Ours: longer than a look at a lock ever holds it, shorter than any execution.
 _WAIT_S = 1.0
 _POLL_S = 0.01
@@ -89,6 +91,25 @@ def is_executing(folder: Path) -> bool:
     """
     with _opened(folder) as descriptor:
         return not _flock(folder, descriptor, shared=True) or bool(marked(_name_of_folder(folder)))
+
+
+def stop_executing(folder: Path) -> None:
+    """Stop what executes a trial of a workspace, whoever started it, and wait for its end.
+
+    Its supervisor is asked, which asks the command, once, and notes how it ended; or whatever is
+    left of both. What still runs after four times its grace is killed.
+    """
+    name, start = _name_of_folder(folder), time.monotonic()
+    running = marked(name)
+    for pid in running:
+        with suppress(OSError):
+            status = Path("/proc", str(pid), "stat").read_text()  # pid (name) state parent ...
+            if int(status.rpartition(")")[2].split()[1]) not in running:
+                os.kill(pid, signal.SIGTERM)
+                os.kill(pid, signal.SIGCONT)
+    while marked(name) and time.monotonic() < start + 4 * GRACE:
+        time.sleep(_POLL_S)
+    stop_marked(name, 0.0)
 
 
 def marked(name: str) -> list[int]:

@@ -16,14 +16,12 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any
 
-from prior_reinforce.bench.robots.executors.lock import MARK, ExecutingLock, stop_marked
+from prior_reinforce.bench.robots.executors.lock import GRACE, MARK, ExecutingLock, stop_marked
 from prior_reinforce.errors import ConfigurationError
 
 OUTPUT_FILE, ENDED_FILE = "output.txt", "ended.json"
 """In the result folder: what the command wrote, and how it ended."""
 _SUPERVISOR = Path(__file__).with_name("supervisor.py")
-_GRACE = 2.0
-"""Between asking a command to stop and killing it, in [s]: time to bring an arm to rest."""
 _LOOK = 0.02
 """How often the supervisor is looked at, in [s]."""
 # Ctrl-Z too: who presses it wants the arm to stop, and it would not.
@@ -87,7 +85,7 @@ def supervise(
         request = {
             "arguments": arguments,
             "time_limit": time_limit,
-            "grace": _GRACE,
+            "grace": GRACE,
             "keep_open": descriptors,
             "output": output.fileno(),
             "ended": ended.fileno(),
@@ -109,7 +107,7 @@ def supervise(
                         time.sleep(_LOOK)
                         shown.go_on()
                     # Nobody is left who would stop them, unless the supervisor ended as it should.
-                    stop_marked(run, 2 * _GRACE)
+                    stop_marked(run, 2 * GRACE)
                     shown.go_on()
                     break
                 except BaseException as error:

@@ -1,0 +1,123 @@
+"""Who may speak to the console: one secret, no cookies, no other site.
+
+The secret is in the link that the terminal shows, behind its `#`, which browsers send nowhere. The
+page adds it to every request as a header, which no other site can do; so nothing is ambient, and a
+request forged by another site has no right. Names that are resolved to this computer by somebody
+else's name server (DNS rebinding) are refused by the Host header.
+"""
+
+from __future__ import annotations
+
+import hmac
+import ipaddress
+import secrets
+import socket
+from pathlib import Path
+from urllib.parse import urlsplit
+
+from starlette.requests import Request
+from starlette.responses import JSONResponse
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from prior_reinforce.files import require_inside, write
+
+TOKEN_FILE = ".console-token"
+_PUBLIC = ("/", "/console.js", "/console.css", "/icon.svg")
+"""The page itself, which holds nothing of the workspace."""
+_SELF_ONLY = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:; media-src "
+    "blob:; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
+_REPORT = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; media-src data:"
+"""The report is one file, with its styles and pictures in it, and no script."""
+_HEADERS = {
+    "x-content-type-options": "nosniff",
+    "referrer-policy": "no-referrer",
+    "cross-origin-opener-policy": "same-origin",
+    "cross-origin-resource-policy": "same-origin",
+    "permissions-policy": "camera=(self), microphone=(), geolocation=()",
+    "cache-control": "no-store",
+}
+
+
+def token_of(folder: Path) -> str:
+    """Return a workspace's secret; made if there is none, and kept, so that open pages stay valid.
+
+    Raises:
+        FileFormatError: It is a link out of the workspace.
+    """
+    path = require_inside(folder / TOKEN_FILE, folder)
+    if not path.is_file() or not path.read_text(encoding="ascii").strip():
+        write(path, secrets.token_urlsafe(24))
+    path.chmod(0o600)
+    return path.read_text(encoding="ascii").strip()
+
+
+def report_path(token: str) -> str:
+    """Where the report is read: an address that cannot be guessed, for a page without a script."""
+    return f"/report/{hmac.new(token.encode(), b'report', 'sha256').hexdigest()}"
+
+
+class Guard:
+    """Lets through what comes from the page, and adds the headers that keep it ours."""
+
+    def __init__(self, app: ASGIApp, token: str, host: str) -> None:
+        """Guard an application.
+
+        Args:
+            app: What answers.
+            token: The secret.
+            host: Name or address that it was told to listen at.
+        """
+        self._app, self._token = app, token
+        self._names = {"localhost", host.lower(), socket.gethostname().lower()}
+        self._names |= {f"{name}.local" for name in self._names}
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer, or refuse."""
+        if scope["type"] != "http":
+            await self._app(scope, receive, send)
+            return
+        request = Request(scope)
+
+        async def send_guarded(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                policy = _REPORT if scope["path"].startswith("/report/") else _SELF_ONLY
+                added = _HEADERS | {"content-security-policy": policy}
+                message["headers"] += [(k.encode(), v.encode()) for k, v in added.items()]
+            await send(message)
+
+        refused = self._refusal(request)
+        answer = self._app if refused is None else refused
+        await answer(scope, receive, send_guarded)
+
+    def _refusal(self, request: Request) -> JSONResponse | None:
+        """Why a request is not answered; None if it is."""
+        host, path = request.headers.get("host", ""), request.url.path
+        if not self._is_here(host):
+            return _refuse(403, f"{host[:80]!r} is no name of this computer; open the link again")
+        origin = request.headers.get("origin")
+        if origin is not None and urlsplit(origin).netloc != host:
+            return _refuse(403, "a page of another site asks; open the console's own link")
+        if path in _PUBLIC or path == report_path(self._token):
+            return None
+        given = request.headers.get("authorization", "").removeprefix("Bearer ")
+        if not secrets.compare_digest(given.encode(), self._token.encode()):
+            return _refuse(401, "the link is incomplete; open the one that the terminal shows")
+        return None
+
+    def _is_here(self, host: str) -> bool:
+        """Whether a Host header names this computer: an address, or a name that it has itself."""
+        try:
+            name = urlsplit(f"//{host}").hostname or ""
+        except ValueError:
+            return False
+        try:
+            ipaddress.ip_address(name)
+        except ValueError:
+            return name in self._names
+        return True
+
+
+def _refuse(status: int, why: str) -> JSONResponse:
+    return JSONResponse({"error": why}, status)

@@ -1,0 +1,220 @@
+import asyncio
+import json
+import shutil
+import socket
+import time
+import warnings
+
+import httpx
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from prior_reinforce.bench.console import server as module
+from prior_reinforce.bench.console.server import Events
+from prior_reinforce.bench.workspace.workspace import Workspace
+from tests.bench.console.pictures import jpeg
+from tests.bench.console.served import Served
+
+with warnings.catch_warnings():
+    warnings.simplefilter("ignore")
+    import schemathesis
+    from schemathesis.checks import not_a_server_error
+    from schemathesis.specs.openapi.checks import (
+        content_type_conformance,
+        response_schema_conformance,
+        status_code_conformance,
+    )
+
+CHECKS = [
+    not_a_server_error,
+    status_code_conformance,
+    content_type_conformance,
+    response_schema_conformance,
+]
+
+
+def post(client, verb, **body):
+    return client.post(f"/api/{verb}", json=body)
+
+
+def aimed(client):
+    state = post(client, "goal", seen=2, goal=[0.9, 0.05]).json()
+    return post(client, "ask", seen=state["id"]).json()
+
+
+def test_a_trial_over_http(client):
+    state = aimed(client)
+    assert state["step"] == "execute"
+    motion = client.get("/api/plans/1").json()
+    assert motion["plan"] == state["trials"][0]["plan"]
+    file = client.get("/api/plans/1/file")
+    assert file.status_code == 200
+    import hashlib
+
+    assert hashlib.sha256(file.content).hexdigest() == motion["plan"]
+    told = post(client, "tell", seen=state["id"], trial=1, outcome=[0.95, 0.05])
+    assert told.json()["trials"][0]["said"] == "5 cm long"
+
+
+@pytest.mark.parametrize(
+    ("verb", "body", "status", "said"),
+    [
+        ("goal", {"seen": 1, "goal": [0.9, 0.0]}, 409, "meanwhile"),
+        ("goal", {"seen": 2, "goal": [0.9]}, 422, "goal"),
+        ("goal", {"seen": 2}, 400, "goal"),
+        ("goal", {"seen": 2, "goal": [0.9, 0.0], "other": 1}, 400, "other"),
+        ("goal", {"seen": 2, "goal": ["<b>", 0.0]}, 400, "float"),
+        ("tell", {"seen": 2, "trial": 1, "hit": True}, 409, "no trial 1"),
+        ("execute", {"seen": 2, "trial": 1, "plan": "x"}, 409, "no trial 1"),
+        ("ask", {"seen": 2}, 409, "no goal"),
+        ("find", {"words": "the red ball", "size": 0.04}, 422, "calibrated"),
+        ("nothing", {}, 404, "Not Found"),
+    ],
+)
+def test_what_cannot_be_done_is_one_sentence(client, verb, body, status, said):
+    answer = post(client, verb, **body)
+    assert answer.status_code == status
+    assert said in answer.json()["error"]
+
+
+@pytest.mark.parametrize("content", [b"", b"[", b"\xff\xfe", b'{"seen":1e999,"goal":[0,0]}', b"1"])
+def test_what_is_no_json_is_refused(client, content):
+    assert client.post("/api/goal", content=content).status_code == 400
+
+
+def test_a_body_that_is_too_large_is_refused_before_it_is_read(client):
+    told = client.post("/api/goal", content=b"x", headers={"content-length": "100000000"})
+    assert told.status_code == 413
+    assert client.post("/api/goal", content=iter([b"x" * 60_000] * 2)).status_code == 413
+    assert client.put("/api/picture", content=b"x" * 12_000_001).status_code == 413
+
+
+def test_a_client_that_dawdles_is_refused(client, monkeypatch):
+    monkeypatch.setattr(module, "_LONGEST_WAIT", 0.05)
+
+    async def never():
+        await asyncio.sleep(5)
+        return {"type": "http.request", "body": b"", "more_body": False}
+
+    sent = []
+
+    async def send(message):
+        sent.append(message)
+
+    headers = [(b"host", b"127.0.0.1"), (b"authorization", b"Bearer secret")]
+    scope = {"type": "http", "method": "POST", "path": "/api/goal", "headers": headers}
+    scope |= {"query_string": b"", "http_version": "1.1", "scheme": "http", "app": None}
+    asyncio.run(asyncio.wait_for(client.app(scope, never, send), 3))
+    assert sent[0]["status"] == 408
+
+
+def test_recordings_and_pictures_come_as_they_are(client):
+    answer = client.put("/api/recordings", params={"name": "x.npz"}, content=b"zip")
+    assert answer.json()["files"] == 1
+    assert client.put("/api/recordings", content=b"zip").status_code == 400
+    assert "x.npz" in client.get("/api/recordings").json()["problem"]
+    assert client.delete("/api/recordings").json()["files"] == 0
+    camera = client.put("/api/picture", content=jpeg()).json()
+    assert camera["width"] == 1280
+    assert client.get("/api/picture").headers["content-type"] == "image/jpeg"
+
+
+def test_every_tab_hears_and_one_that_lags_holds_nobody_up():
+    async def listening():
+        events = Events()
+        events.begin()
+        quick, slow = events._lines(), events._lines()
+        assert await anext(quick) == await anext(slow) == b"data: {}\n\n"
+        for number in range(3 * module._QUEUE):
+            events.publish({"id": number})
+            await asyncio.sleep(0)
+            assert json.loads((await anext(quick))[6:]) == {"id": number}
+        assert json.loads((await anext(slow))[6:]) == {"id": 0}
+        await quick.aclose()
+        await slow.aclose()
+        assert not events._tabs
+
+    asyncio.run(asyncio.wait_for(listening(), 20))
+
+
+def test_a_sign_of_life_comes_where_nothing_happens(monkeypatch):
+    monkeypatch.setattr(module, "_BEAT", 0.01)
+
+    async def listening():
+        events = Events()
+        lines = events._lines()
+        assert [await anext(lines) for _ in range(3)] == [b"data: {}\n\n"] * 3
+        await lines.aclose()
+
+    asyncio.run(asyncio.wait_for(listening(), 20))
+
+
+@pytest.fixture(scope="module")
+def served(learned_folder, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("served") / "planar"
+    shutil.copytree(learned_folder, folder)
+    with Workspace(folder) as workspace:
+        workspace.set_goal([0.9, 0.05])
+        workspace.session().ask()
+    served = Served(folder)
+    yield served
+    served.end()
+
+
+@pytest.fixture(scope="module")
+def operations(served):
+    headers = {"authorization": f"Bearer {served.token}"}
+    schema = schemathesis.openapi.from_url(f"{served.address}/api/openapi.json", headers=headers)
+    return [operation.ok() for operation in schema.get_all_operations()], headers
+
+
+def test_whatever_is_asked_the_answer_is_a_documented_one(served, operations):
+    table, headers = operations
+    assert len(table) == 23
+
+    for operation in table:
+        if operation.path == "/api/stop":
+            continue  # nothing is executing; what it does is in test_verbs
+
+        @settings(
+            max_examples=12, deadline=None, suppress_health_check=list(HealthCheck), database=None
+        )
+        @given(case=operation.as_strategy())
+        def answered(case):
+            case.validate_response(case.call(headers=headers), checks=CHECKS)
+
+        answered()
+    assert served.process.poll() is None
+
+
+@settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck), database=None)
+@given(
+    method=st.sampled_from(["GET", "POST", "PUT", "DELETE", "PATCH"]),
+    path=st.text(st.characters(min_codepoint=33, max_codepoint=126), max_size=30),
+    body=st.binary(max_size=200),
+)
+def test_no_request_at_all_ends_in_a_server_error(served, method, path, body):
+    headers = {"authorization": f"Bearer {served.token}"}
+    path = f"/api/{path}".split("#")[0].split("events")[0]
+    answer = httpx.request(method, served.address + path, content=body, headers=headers)
+    assert answer.status_code < 500
+
+
+def test_the_console_stays_up_beside_floods_and_half_requests(served):
+    idle = [socket.create_connection(("127.0.0.1", served.port)) for _ in range(40)]
+    for each in idle:
+        each.sendall(b"POST /api/goal HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Le")
+    headers = {"authorization": f"Bearer {served.token}"}
+    with socket.create_connection(("127.0.0.1", served.port)) as flood:
+        head = f"PUT /api/recordings?name=x HTTP/1.1\r\nHost: 127.0.0.1:{served.port}\r\n"
+        head += f"authorization: {headers['authorization']}\r\ncontent-length: 100000000\r\n\r\n"
+        flood.sendall(head.encode())
+        assert b"413" in flood.recv(100)
+    assert httpx.get(f"{served.address}/api/state", headers=headers).status_code == 200
+    deadline = time.monotonic() + 60
+    for each in idle:  # closed by the console, not by us
+        each.settimeout(max(1.0, deadline - time.monotonic()))
+        assert each.recv(1000) == b""
+        each.close()
+    assert httpx.get(f"{served.address}/api/state", headers=headers).status_code == 200

@@ -1,0 +1,138 @@
+import sys
+
+import numpy as np
+import pytest
+
+from prior_reinforce.bench.console.view import motion_of, state_of, step_of
+from prior_reinforce.bench.robots import robot_limits
+from prior_reinforce.bench.robots.kinematics import tool_tip
+from prior_reinforce.bench.workspace.manifest import filled_in
+from prior_reinforce.bench.workspace.workspace import Workspace
+from prior_reinforce.errors import TrialStateError
+from prior_reinforce.lab.tasks import make_task
+from prior_reinforce.session.trials import Stage
+from tests.bench.workspace.planar import ask, demonstrations, manifest, tell, void
+
+
+def test_each_step_in_turn(tmp_path):
+    with Workspace.create(tmp_path / "w", manifest()) as workspace:
+        assert step_of(workspace) == "import"
+        assert state_of(workspace).id == 0
+        workspace.import_demonstrations(demonstrations(), "made up")
+        assert step_of(workspace) == "learn"
+        workspace.learn("interpolation")
+        assert step_of(workspace) == "goal"
+        workspace.set_goal([0.9, 0.05])
+        assert step_of(workspace) == "ask"
+        ask(workspace)
+        assert step_of(workspace) == "execute"
+        workspace.execute(1, f"{sys.executable} -c 1 {{plan}}", time_limit=20)
+        assert step_of(workspace) == "tell"
+        tell(workspace, 1, [0.0, 0.0], hit=True)
+        assert step_of(workspace) == "reached"
+        ask(workspace)
+        command = f'{sys.executable} -c "raise SystemExit(1)" {{plan}}'
+        workspace.execute(2, command, time_limit=20)
+        assert step_of(workspace) == "settle"
+
+
+def test_the_state_is_the_journal_s(workspace):
+    ask(workspace)
+    tell(workspace, 1, "5cm long, 2cm left")
+    ask(workspace)
+    void(workspace, 2, "slipped <b>")
+    ask(workspace)
+    state = state_of(workspace)
+    assert state.id == workspace.events[-1].id
+    assert [d.outcome for d in state.demonstrations] == demonstrations().outcomes_seen.tolist()
+    first, second, third = state.trials
+    assert (first.stage, first.said, first.hit) == ("told", "5cm long, 2cm left", False)
+    np.testing.assert_allclose(first.outcome, [0.95, 0.07])
+    assert (second.stage, second.outcome, second.said) == ("voided", None, "void: slipped <b>")
+    assert state.open == third.number == 3
+    assert third.plan == workspace.state.trial(3).kept.sha256
+    assert state.goals[0].told == 1
+    assert state.goals[0].tolerance == [0.015, 0.015]
+
+
+def test_what_was_seen_without_a_number_has_no_place(workspace):
+    ask(workspace)
+    tell(workspace, 1, None, hit=False)
+    assert state_of(workspace).trials[0].outcome is None
+
+
+def test_a_surprise_names_its_trial(workspace):
+    from dataclasses import replace
+
+    ask(workspace)
+    trial = workspace.state.trials[0]
+    said = "trial 3 is 5 sd from what was likely (odds); mistyped: amend 3; changed: goal"
+    workspace.state.trials[0] = replace(trial, surprise=said)
+    seen = state_of(workspace).trials[0]
+    assert (seen.surprising, seen.surprise) == (3, "5 sd from what was likely (odds)")
+
+
+def test_sentences_about_surprises_are_read_as_the_session_writes_them(workspace):
+    from prior_reinforce.adapters.base import Surprise
+
+    ask(workspace)
+    tell(workspace, 1, [0.3, 0.0])
+    session = workspace.session()
+    session.informed_adapter()
+    said = session._say_surprise(Surprise(5.0, 0.3, 0.6))
+    ask(workspace)
+    from dataclasses import replace
+
+    workspace.state.trials[1] = replace(workspace.state.trials[1], surprise=said)
+    assert state_of(workspace).trials[1].surprising == 1
+
+
+@pytest.fixture(scope="module")
+def panda(tmp_path_factory):
+    task = make_task("basketball-v1")
+    demos = task.demonstrations("A")
+    text = filled_in(
+        name="shot",
+        names=demos.format.names,
+        units=demos.format.units,
+        dt=demos.format.dt,
+        outcome_names=("x", "y"),
+        outcome_units=("m", "m"),
+        tolerance=0.015,
+        robot="panda",
+    )
+    with Workspace.create(tmp_path_factory.mktemp("panda") / "w", text) as workspace:
+        workspace.import_demonstrations(demos, "A")
+        workspace.learn("interpolation")
+        workspace.set_goal([0.95, 0.05])
+        ask(workspace)
+        yield workspace
+
+
+def test_the_motion_is_the_plan_s_with_the_arm_s_places_and_limits(panda):
+    motion, plan = motion_of(panda, 1), panda.plan(panda.state.trial(1))
+    limits = robot_limits("panda")
+    assert motion.times[0] == 0
+    assert motion.times[-1] == pytest.approx(plan.times[-1])
+    for j, column in enumerate(motion.columns):
+        assert (column.low, column.high) == (limits.lower[j], limits.upper[j])
+        assert column.values[-1] == pytest.approx(plan.actions[-1, j], abs=1e-5)
+    tip = tool_tip(limits.chain, plan.actions[[0, -1]])
+    np.testing.assert_allclose(np.array(motion.links)[[0, -1], -1], tip, atol=1e-4)
+    assert len(motion.links[0]) == 9
+    assert motion.verdict.startswith("passes")
+    assert {line.check for line in motion.checks} >= {"position", "velocity", "jerk"}
+
+
+def test_without_a_robot_there_is_neither_arm_nor_limit(workspace):
+    ask(workspace)
+    motion = motion_of(workspace, 1)
+    assert motion.links == []
+    assert motion.columns[0].low is None
+    assert "no limits checked" in motion.verdict
+    with pytest.raises(TrialStateError):
+        motion_of(workspace, 2)
+
+
+def test_every_stage_has_its_name():
+    assert {stage.value for stage in Stage} == {"asked", "executing", "executed", "told", "voided"}

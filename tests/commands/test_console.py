@@ -1,0 +1,75 @@
+import re
+import socket
+
+import pytest
+
+from prior_reinforce.bench.console import server
+
+
+@pytest.fixture
+def port():
+    with socket.create_server(("127.0.0.1", 0)) as probe:
+        return probe.getsockname()[1]
+
+
+@pytest.fixture
+def opened(monkeypatch):
+    """What would be served; nothing is."""
+    served = []
+
+    def serve(app, listening):
+        served.append((app, listening.getsockname()))
+
+    monkeypatch.setattr(server, "serve", serve)
+    return served
+
+
+def test_it_listens_at_this_computer_alone_and_shows_the_link(folder, run, port, opened):
+    status, out, err = run("console", folder, "--port", port)
+    assert (status, err) == (0, "")
+    assert re.search(rf"http://127\.0\.0\.1:{port}/#[\w-]{{32,}}$", out.strip())
+    assert opened[0][1] == ("127.0.0.1", port)
+    assert "█" not in out
+
+
+def test_for_another_device_the_link_is_a_qr_code_too(folder, run, port, opened, monkeypatch):
+    monkeypatch.setattr("prior_reinforce.commands.console._own_address", lambda: "192.168.1.5")
+    status, out, _ = run("console", folder, "--host", "0.0.0.0", "--port", port)
+    assert status == 0
+    assert f"http://192.168.1.5:{port}/#" in out
+    assert "▀" in out or "█" in out
+    assert "whoever has this link can move the arm" in out
+
+
+def test_the_same_link_again(folder, run, port, opened):
+    assert run("console", folder, "--port", port) == run("console", folder, "--port", port)
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (["--host", "203.0.113.7"], "cannot listen"),
+        (["--port", "99999999"], "cannot listen"),
+        (["--run", "mycontroller"], "{plan}"),
+        (["--run", "mycontroller {plan}", "--time-limit", "-1"], "time"),
+    ],
+)
+def test_what_cannot_be_is_one_line(folder, run, opened, given, said):
+    status, _, err = run("console", folder, *given)
+    assert (status, err.count("\n")) == (2, 1)
+    assert said in err
+    assert not opened
+
+
+def test_a_folder_that_is_no_workspace_is_one_line(tmp_path, run, port, opened):
+    status, _, err = run("console", tmp_path, "--port", port)
+    assert status == 2
+    assert "not a workspace" in err
+    assert not (tmp_path / ".console-token").exists()
+
+
+def test_a_port_that_is_taken_is_one_line(folder, run, port, opened):
+    with socket.create_server(("127.0.0.1", port)):
+        status, _, err = run("console", folder, "--port", port)
+    assert status == 2
+    assert "another --host or --port" in err
