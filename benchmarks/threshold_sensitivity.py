@@ -49,7 +49,6 @@ THRESHOLDS = (
     "plans.registration._SEARCHED",
     "plans.registration._COMPARED",
     "plans.registration._FINE",
-    "plans.registration._TEMPO_SCALE",
     "plans.signals._MAX_LEVELS",
     "plans.signals._ACTIVE",
     "plans.signals._STEP_SHARE",
@@ -70,10 +69,7 @@ THRESHOLDS = (
     "generators.timing_evidence._RIDGE",
     "generators.timing_evidence._EQUALLY_GOOD",
 )
-OF_TEMPOS = (
-    "plans.registration._COMPARED",
-    "plans.registration._TEMPO_SCALE",
-)
+OF_TEMPOS = ("plans.registration._COMPARED",)
 OF_THE_CODEC = ("plans.signals.END_STEP", "plans.codec.")
 KINDS = ("mixed-8", "tempo-6", "noisy-paused-6", "cut-6", "few-mixed-6", "jitter-4", "scattered-8")
 FRAMES = 16

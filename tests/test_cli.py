@@ -1,12 +1,16 @@
 """The program: exit statuses, one line for what was wrong, and a reader that leaves."""
 
+import json
 import os
+import re
 import subprocess
 import sys
+from importlib.metadata import version
 
 import pytest
 
 from prior_reinforce.cli import main
+from prior_reinforce.commands import COMMANDS
 from prior_reinforce.errors import WorkspaceError
 from tests.bench.workspace.planar import events_in
 
@@ -124,12 +128,72 @@ def test_an_interruption_after_the_commit_says_so(run, folder, monkeypatch):
     assert (status, events_in(folder)[-1].kind) == (2, "told")
 
 
-@pytest.mark.parametrize("args", [("--help",), ("ask", "--help")])
-def test_help_is_shown_as_it_is(capsys, args):
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_help_has_an_example_and_says_no_none(capsys, name):
     with pytest.raises(SystemExit) as end:
-        main(args)
+        main((name, "--help"))
+    shown = capsys.readouterr().out
     assert end.value.code in (0, None)
-    assert capsys.readouterr().out.startswith("usage: prior-reinforce")
+    assert shown.startswith(f"usage: prior-reinforce {name}")
+    assert f"    prior-reinforce {name} " in shown or name == "completion"
+    for empty in ("{None}", "(default: None)", "(default: False)", "(default: )", "\0"):
+        assert empty not in shown
+    if "[WORKSPACE]" in shown:
+        assert "WORKSPACE" in shown.partition("\n\n")[0]
+
+
+@pytest.mark.parametrize("args", [(), ("-h",), ("--help",)])
+def test_alone_it_lists_the_commands_by_what_they_are_for(run, args):
+    status, out, err = run(*args)
+    assert (status, err) == (0, "")
+    at = [out.index(f"{group}:") for group in ("your arm", "simulated tasks", "the paper")]
+    assert at[0] < out.index("  tell ") < at[1] < out.index("  demo ") < at[2]
+    assert all(re.search(rf"^  {name} ", out, re.MULTILINE) for name in COMMANDS)
+
+
+@pytest.mark.parametrize("option", ["--version", "-V"])
+def test_the_version_is_the_installed_one(run, option):
+    assert run(option) == (0, f"prior-reinforce {version('prior-reinforce')}\n", "")
+
+
+@pytest.mark.parametrize(
+    ("args", "meant"),
+    [
+        (("staus", "planar"), "did you mean status?"),
+        (("--verion",), "there is no option --verion"),
+        (("ask", "planar", "--ot", "plan.npz"), "ask has no --ot; did you mean --out?"),
+        (("goal", "planar", "1", "0", "--memroy", "goal"), "did you mean --memory?"),
+        (("ask", "planar", "--nothing-like-it"), "ask has no --nothing-like-it; see"),
+    ],
+)
+def test_what_is_misspelt_is_named_with_what_was_meant(run, args, meant):
+    status, out, err = run(*args)
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert meant in err
+
+
+def test_quiet_leaves_errors_and_json(run, folder):
+    assert run("status", folder, "-q") == (0, "", "")
+    assert run("-q", "goal", folder, "0.9", "0.05") == (0, "", "")
+    status, out, err = run("ask", folder, "--quiet", "--json")
+    assert (status, err, json.loads(out)["trial"]["number"]) == (0, "", 1)
+    status, out, err = run("tell", folder, "9", "hit", "-q")
+    assert (status, out) == (2, "")
+    assert "there is no trial 9" in err
+
+
+def test_colour_is_for_terminals_that_want_it(folder, monkeypatch):
+    def said(**environment):
+        leader, follower = os.openpty()
+        given = {k: v for k, v in os.environ.items() if k != "NO_COLOR"} | environment
+        program = [sys.executable, "-m", "prior_reinforce.cli", "status", "nowhere"]
+        subprocess.run(program, stderr=follower, stdout=subprocess.DEVNULL, env=given)
+        os.close(follower)
+        return os.read(leader, 1000).decode()
+
+    assert said(TERM="xterm").startswith("\x1b[1;31mprior-reinforce:\x1b[0m ")
+    assert said(TERM="xterm", NO_COLOR="1").startswith("prior-reinforce: ")
+    assert said(TERM="dumb").startswith("prior-reinforce: ")
 
 
 def run_program(*args, **how):

@@ -196,7 +196,7 @@ def test_the_catapults_film_ends_with_the_ball_on_its_goal():
 @pytest.mark.slow
 def test_earlier_goals_are_compared_with_none(printed, tmp_path):
     model = ["--generator", "nearest", "--out", str(tmp_path / "model")]
-    assert main(["learn", "--task", "own_task:Toss", *model]) == 0
+    assert main(["train", "--task", "own_task:Toss", *model]) == 0
     options = ["--sequences", "2", "--rounds", "2", "--adapters", "gp", "--perception", "exact"]
     models = ["--models", str(tmp_path / "model"), "--task", "own_task:Toss"]
     _, text = printed("carry_over", *models, *options)
@@ -222,7 +222,7 @@ def test_the_arm_calls_where_the_ball_came_down(printed, tmp_path):
         "simulated_arm", str(tmp_path / "plan.npz"), "--goal", f"{x}", f"{y}", "--call", str(called)
     )
     assert status == 0
-    error = pr.from_words(called.read_text(), 2)
+    error = pr.from_words(called.read_text(), ("x", "y"), ("m", "m"))
     np.testing.assert_allclose(error.error_seen, [0.2, -0.1], atol=0.03)
     assert called.read_text().strip() in text
 

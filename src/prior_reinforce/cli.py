@@ -1,30 +1,33 @@
 """The `prior-reinforce` command: parse to a dataclass, call once, print.
 
-Each command is a class in `commands/`; this file lists them, and imports the one that is called.
+Each command is a class in `commands/`, which lists them; only the one that is called is imported.
 What a user did wrong is one line on standard error and exit status 2.
 """
 
 from __future__ import annotations
 
+import difflib
 import io
 import os
 import pkgutil
 import re
 import select
 import sys
-import unicodedata
 import warnings
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, redirect_stderr
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager, nullcontext, redirect_stderr, redirect_stdout
 from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Protocol
 
 import tyro
 
+import prior_reinforce
+from prior_reinforce.commands import COMMANDS, GROUPS
 from prior_reinforce.errors import ConfigurationError, PriorReinforceError
 from prior_reinforce.extras import missing_extra
-from prior_reinforce.wording import plain
+from prior_reinforce.files import check_path
+from prior_reinforce.wording import RED, YELLOW, coloured, plain
 
 
 class Command(Protocol):
@@ -34,33 +37,14 @@ class Command(Protocol):
         """Do it; the exit status, None for 0."""
 
 
-_HERE = "prior_reinforce.commands"
-COMMANDS = {
-    "demo": f"{_HERE}.simulated:Demo",
-    "learn": f"{_HERE}.learning:Learn",
-    "adapt": f"{_HERE}.simulated:Adapt",
-    "rollout": f"{_HERE}.simulated:Rollout",
-    "reproduce": f"{_HERE}.reproduce:Reproduce",
-    "new": f"{_HERE}.workspace:New",
-    "import": f"{_HERE}.importing:Import",
-    "goal": f"{_HERE}.workspace:Goal",
-    "ask": f"{_HERE}.trials:Ask",
-    "tell": f"{_HERE}.trials:Tell",
-    "void": f"{_HERE}.trials:Void",
-    "amend": f"{_HERE}.trials:Amend",
-    "status": f"{_HERE}.workspace:Status",
-    "log": f"{_HERE}.workspace:Log",
-    "report": f"{_HERE}.workspace:Report",
-    "advise": f"{_HERE}.advice:Advise",
-    "export": f"{_HERE}.trials:Export",
-    "console": f"{_HERE}.console:Console",
-    "calibrate": f"{_HERE}.photographs:Calibrate",
-    "look": f"{_HERE}.photographs:Look",
-}
-"""Where each command's class is: only the one that is called is imported."""
+_QUIET = {"-q", "--quiet"}
 _LARGEST_WHOLE = 2**32 - 1
 """Of a whole number on the command line: numpy's and torch's largest common seed, and no sensible
 size reaches it."""
+_EMPTY_DEFAULT = re.compile(
+    r"(?:\x1b\[\d+m)*\(default:(?:[\s\u2502]|\x1b\[\d*m)*(?:None|True|False|)\)(?:\x1b\[\d*m)*"
+)
+_ONLY_BLANKED = re.compile(r"(?:[ \u2502]|\x1b\[\d*m)*\0(?:[\0 \u2502]|\x1b\[\d*m)*$")
 _LONGEST = 1000
 """Characters of a message; ours: twelve lines of a terminal."""
 _NOBODY_READS = 141
@@ -81,8 +65,13 @@ def main(args: Sequence[str] | None = None) -> int:
     warnings.showwarning = _print_warning
     _open_streams()
     try:
-        command = _parse(list(sys.argv[1:] if args is None else args))
-        status = command.run() or 0
+        given = list(sys.argv[1:] if args is None else args)
+        quiet = bool(_QUIET & {*given})
+        command = _parse([arg for arg in given if arg not in _QUIET])
+        # JSON is printed though everything else is not.
+        nowhere = quiet and not getattr(command, "json", False)
+        with redirect_stdout(io.StringIO()) if nowhere else nullcontext():
+            status = (command.run() or 0) if command is not None else 0
         return status if _flushed() else _NOBODY_READS
     except BrokenPipeError:
         if _flushed() and not _reader_left():  # not our output's pipe
@@ -106,40 +95,79 @@ def main(args: Sequence[str] | None = None) -> int:
         return 130
 
 
-def _parse(args: list[str]) -> Command:
-    """Make the command that was called; all of them are imported only to list them."""
-    name = args[0] if args else ""
-    with _in_one_line():
-        if name in COMMANDS:
-            kind = pkgutil.resolve_name(COMMANDS[name])
-            command: Command = tyro.cli(kind, prog=f"prior-reinforce {name}", args=args[1:])
-        else:
-            kinds = {name: pkgutil.resolve_name(target) for name, target in COMMANDS.items()}
-            command = tyro.extras.subcommand_cli_from_dict(
-                kinds,
-                prog="prior-reinforce",
-                description="Hit a goal a robot arm has never hit, in about ten trials "
-                "(simulated so far).",
-                args=args,
-            )
+def _parse(args: list[str]) -> Command | None:
+    """Make the command that was called; None where only help or the version was asked for."""
+    name = args[0] if args else "--help"
+    if name in ("-h", "--help"):
+        print(_help())
+        return None
+    if name in ("-V", "--version"):
+        print(f"prior-reinforce {prior_reinforce.__version__}")
+        return None
+    if name not in COMMANDS:
+        kind = "option" if name.startswith("-") else "command"
+        raise ConfigurationError(
+            f"there is no {kind} {name}{_suggested(name, COMMANDS)}; prior-reinforce --help lists "
+            "them all"
+        )
+    with _in_one_line(name):
+        command: Command = tyro.cli(
+            pkgutil.resolve_name(COMMANDS[name]),
+            prog=f"prior-reinforce {name}",
+            args=args[1:],
+            config=(tyro.conf.DisallowNone, tyro.conf.FlagCreatePairsOff),
+        )
     _check_values(command)
     return command
 
 
+def _help() -> str:
+    """All commands, by what they are for."""
+    lines = [
+        "usage: prior-reinforce [-h] [-V] [-q] COMMAND ...",
+        "",
+        "Hit a goal a robot arm has never hit, in about ten trials (simulated so far).",
+    ]
+    for group, commands in GROUPS.items():
+        lines += ["", f"{group}:", *(f"  {name:<12}{what}" for name, (_, what) in commands.items())]
+    return "\n".join(
+        [
+            *lines,
+            "",
+            "WORKSPACE may be left out within its folder, and TRIAL for the one that waits.",
+            "-q, --quiet prints warnings and errors only; -V, --version the version.",
+            "examples: prior-reinforce COMMAND --help",
+        ]
+    )
+
+
+def _suggested(word: str, known: Iterable[str]) -> str:
+    closest = difflib.get_close_matches(word, known, n=1)
+    return f"; did you mean {closest[0]}?" if closest else ""
+
+
 @contextmanager
-def _in_one_line() -> Iterator[None]:
-    """Say in one line what is wrong with a command line; tyro draws a box.
+def _in_one_line(name: str) -> Iterator[None]:
+    """Say in one line what is wrong with a command line; tyro draws a box. Help is shown tidied.
 
     Raises:
         ConfigurationError: It is wrong.
     """
-    box = io.StringIO()
+    box, shown = io.StringIO(), io.StringIO()
+    shown.isatty = sys.stdout.isatty  # type: ignore[method-assign]
     try:
-        with redirect_stderr(box):
+        with redirect_stderr(box), redirect_stdout(shown):
             yield
     except SystemExit as end:
         if end.code != 2:
+            print(_tidied(shown.getvalue()), end="")
             raise
+        if found := re.search(r"Unrecognized options: ([^\s,]+)", box.getvalue()):
+            known = re.findall(r"(?<![\w-])--[a-z][\w-]*", box.getvalue()[found.end() :])
+            raise ConfigurationError(
+                f"{name} has no {found[1]}{_suggested(found[1], known)}; see prior-reinforce "
+                f"{name} --help"
+            ) from None
         words = re.sub(r"\u256d.*|[\u2502\u2570\u256f\s]+", " ", box.getvalue())
         parts = [" ".join(part.split()) for part in re.split("\u2500+", words)]
         said = [part for part in parts if part and "helptext:" not in part]
@@ -148,6 +176,13 @@ def _in_one_line() -> Iterator[None]:
         raise ConfigurationError(f"cannot read the command line ({error}); see --help") from error
     else:
         sys.stderr.write(box.getvalue())
+
+
+def _tidied(shown: str) -> str:
+    """Help in its box, without defaults that say nothing, such as `(default: None)`."""
+    blanked = _EMPTY_DEFAULT.sub(lambda said: re.sub(r"[^\s\u2502]", "\0", said[0]), shown)
+    lines = [line for line in blanked.splitlines(keepends=True) if not _ONLY_BLANKED.match(line)]
+    return "".join(lines).replace("\0", " ")
 
 
 def _check_values(given: object, name: str = "") -> None:
@@ -163,8 +198,7 @@ def _check_values(given: object, name: str = "") -> None:
         for each in given:
             _check_values(each, name)
     elif isinstance(given, Path):
-        if any(unicodedata.category(char) == "Cc" for char in str(given)):
-            raise ConfigurationError(f"the path {given} holds control characters; rename it")
+        check_path(given)
     elif isinstance(given, int):
         low = 0 if name == "seed" else -_LARGEST_WHOLE
         if not low <= given <= _LARGEST_WHOLE:
@@ -196,12 +230,12 @@ def _refuse(message: str, error: BaseException) -> int:
     return 1 if changed else 2
 
 
-def _complain(message: str) -> None:
+def _complain(message: str, colour: str = RED) -> None:
     """One line on standard error that can be read, whatever names and reasons hold."""
     line = plain(message)
     if len(line) > _LONGEST:  # what is wrong stands at the beginning, the remedy at the end
         line = f"{line[: _LONGEST // 2]} ... {line[-_LONGEST // 3 :]}"
-    print(f"prior-reinforce: {line}", file=sys.stderr)
+    print(f"{coloured('prior-reinforce:', colour, sys.stderr)} {line}", file=sys.stderr)
 
 
 def _flushed() -> bool:
@@ -225,7 +259,7 @@ def _reader_left() -> bool:
 
 
 def _print_warning(message: Warning | str, *_: object, **__: object) -> None:
-    _complain(f"warning: {message}")
+    _complain(f"warning: {message}", YELLOW)
 
 
 if __name__ == "__main__":

@@ -14,6 +14,7 @@ import os
 import shutil
 import socket
 import tempfile
+import unicodedata
 import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -21,7 +22,12 @@ from pathlib import Path
 
 import numpy as np
 
-from prior_reinforce.errors import FileFormatError, PriorReinforceError, WorkspaceError
+from prior_reinforce.errors import (
+    ConfigurationError,
+    FileFormatError,
+    PriorReinforceError,
+    WorkspaceError,
+)
 
 _PREFIX = ".unfinished-"
 _CLAIM = ".prior-reinforce"
@@ -238,6 +244,17 @@ def _holds_results(folder: Path) -> bool:
             if b"prior-reinforce" in file.read(_MARK_WITHIN):
                 return True
     return all((folder / name).is_dir() for name in ("units", "failures"))
+
+
+def check_path(path: Path) -> Path:
+    """Return a path that a person named, unless printing it would move the cursor.
+
+    Raises:
+        ConfigurationError: It would.
+    """
+    if any(unicodedata.category(char) == "Cc" for char in str(path)):
+        raise ConfigurationError(f"the path {path} holds control characters; rename it")
+    return path
 
 
 def require_inside(path: Path, folder: Path) -> Path:

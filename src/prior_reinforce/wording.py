@@ -16,10 +16,12 @@ Source: paper, Section IV, "Perception Process" (coarse human feedback); the wor
 from __future__ import annotations
 
 import math
+import os
 import re
 import unicodedata
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TextIO
 
 import numpy as np
 from jaxtyping import Float
@@ -92,6 +94,16 @@ def plain(text: str, keep: str = "") -> str:
     )
 
 
+RED, YELLOW, GREEN = "1;31", "33", "32"
+"""ANSI codes."""
+
+
+def coloured(text: str, code: str, stream: TextIO) -> str:
+    """Return a text in an ANSI colour where its stream is a terminal that shows one (NO_COLOR)."""
+    plainly = os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb"
+    return text if plainly or not stream.isatty() else f"\x1b[{code}m{text}\x1b[0m"
+
+
 def in_words(units: Sequence[str]) -> bool:
     """Whether words describe outcomes of these units: lengths, at most three of them."""
     return len(units) <= len(WORDS) and all(unit == "m" for unit in units)
@@ -138,9 +150,14 @@ def say_place(place: ArrayLike, names: Sequence[str], units: Sequence[str]) -> s
     return _components(place, names, units)
 
 
+def error_words(names: Sequence[str], units: Sequence[str]) -> list[tuple[str, str] | None]:
+    """For each component of an error the words where it is positive and negative; None: none."""
+    return _pairs(WORDS, names, units)
+
+
 def error_example(names: Sequence[str], units: Sequence[str]) -> str:
     """An error in words: `5cm long, 2cm left, 20ms late`; empty where a component has no words."""
-    pairs, lengths = _pairs(WORDS, names, units), ("5cm", "2cm", "1cm")
+    pairs, lengths = error_words(names, units), ("5cm", "2cm", "1cm")
     said = [
         f"{('2in' if unit == 'in' else lengths[j]) if unit in _METRES else number} {pair[0]}"
         for j, (pair, unit) in enumerate(zip(pairs, units, strict=True))
@@ -420,7 +437,7 @@ def _with_units(text: str, names: Sequence[str], units: Sequence[str]) -> str:
             said.append(part)
             continue
         unit = next(
-            (u for pair, u in zip(_pairs(WORDS, names, units), units, strict=True)
+            (u for pair, u in zip(error_words(names, units), units, strict=True)
              if pair and term["word"] in pair), units[0]
         )  # fmt: skip
         least = f"{term['least']}-" if term["least"] else ""

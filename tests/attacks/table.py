@@ -23,7 +23,7 @@ from tests.attacks.harness import HELD, prepare, where
 
 ATTACKS: dict[str, tuple[Attack, int]] = {
     **{name: (attack, 84) for name, attack in CLASSES.items()},
-    "recordings": (CLASSES["recordings"], 320),  # there are twenty kinds
+    "recordings": (CLASSES["recordings"], 200),  # there are twenty kinds
     "files": (CLASSES["files"], 60),
     "motions": (execution.attack, 150),
     **{

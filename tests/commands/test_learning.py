@@ -1,4 +1,4 @@
-"""`learn`: the model and its record; remarks are told, and nothing where nothing is lost."""
+"""`learn`, `train`: the model and its record; remarks, and nothing where nothing is lost."""
 
 from dataclasses import replace
 
@@ -23,7 +23,7 @@ def learn(tmp_path, capsys):
         cut = replace(RECORDED, plans=RECORDED.plans[:, :frames])
         cut.save(path)
         out = ["--demonstrations", str(path), "--out", str(tmp_path / "model")]
-        assert main(["learn", *flags, *out]) == 0
+        assert main(["train", *flags, *out]) == 0
         return capsys.readouterr().out, load_learned(tmp_path / "model", cut)
 
     return run
@@ -75,12 +75,11 @@ def test_align_is_short_for_a_setting(learn):
         (["--generator", "nearest,timing=never"], "timing"),
         (["--generator", "none"], "no generator 'none'; known are auto, diffusion"),
         (["--generator", "nearest", "--seed", "-1"], "--seed must be a whole number from 0"),
-        (["folder", "--task", "curling"], "drop one of the two"),
     ],
 )
 def test_wrong_input_is_one_line_and_leaves_nothing(flags, said, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    assert main(["learn", *flags]) == 2
+    assert main(["train", *flags]) == 2
     told = capsys.readouterr().err
     assert said in told
     assert told.count("\n") == 1

@@ -87,5 +87,4 @@ def test_a_table_goes_alone(run, folder, tmp_path):
     asked(run, folder)
     (tmp_path / "t.csv").write_text("trial,x,y\n1,0.90,0.05\n")
     assert "drop what else was given" in run("tell", folder, 1, "--from", tmp_path / "t.csv")[2]
-    assert "say which trial" in run("tell", folder, "--hit")[2]
     assert "no table at" in run("tell", folder, "--from", "gone.csv")[2]

@@ -13,7 +13,6 @@ from PIL import Image
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.report import page, record_film, write_report
 from prior_reinforce.report.record import CheckRow
-from prior_reinforce.report.style import PICTURE_DPI
 from tests.report.swing_world import FullStep, adaptation, demonstrations, pictures, told
 
 FACTS = {
@@ -124,18 +123,65 @@ def test_every_picture_says_what_it_shows(report):
     assert any("voided: ball slipped" in alt for alt in report[1].alts)
 
 
-def test_pictures_lie_beside_the_page_at_print_size(report):
+def test_pictures_are_sharp_at_any_size_and_lie_beside_the_page(report):
     folder = report[0].parent
-    for name in ("landings", "aims", "errors"):
-        with Image.open(folder / f"goal-1-{name}.png") as image:
-            assert image.size == (round(5.4 * PICTURE_DPI), round(4.5 * PICTURE_DPI))
-    with Image.open(folder / "goal-1-plans.png") as image:
-        assert image.size[0] == round(4 * 2.75 * PICTURE_DPI)
-    for name in ("goal-1-table", "overview"):  # as high as what they show
-        with Image.open(folder / f"{name}.png") as image:
-            assert image.size[0] == round(5.4 * PICTURE_DPI)
-            assert image.size[1] < 3.5 * PICTURE_DPI
+    names = [*(f"goal-1-{name}" for name in ("landings", "aims", "errors", "plans", "table"))]
+    for name in (*names, "overview", "trials-by-goal"):
+        svg = (folder / f"{name}.svg").read_text()
+        assert "<path" in svg
+        assert "<text" not in svg  # which would need the reader's fonts
+        assert "<image" not in svg
     assert not list(folder.glob(".*"))
+    assert not list(folder.glob("goal-*.png"))
+
+
+def test_goals_are_folded_but_for_the_last(report):
+    assert re.findall(r'<details class="goal"( open|)>', report[0].read_text()) == ["", " open"]
+
+
+def test_what_is_known_beside_the_trials_is_on_the_page(tmp_path):
+    photograph = tmp_path / "seen.png"
+    Image.new("RGB", (8, 8)).save(photograph)
+    record = told([0.05, 0.0], [0.02, 0.0])
+    first, second = record.trials
+    first = replace(first, p_hit=0.34, expected_trials=1.9)
+    record = replace(
+        record,
+        trials=(first, replace(second, hit=True)),
+        notes=("Set on 2026-05-04; new on the hardware: <smaller> ball.",),
+        measured={2: (np.linspace(0.0, 1.0, 50), np.zeros((50, 7)))},
+        photographs=(("Trial 1, as it was looked at.", photograph),),
+    )
+    reader = read(write_report(tmp_path / "report", [record], title="x"))
+    for text in (
+        "P(hit), to go",
+        "34%, 1.9",
+        "new on the hardware: <smaller> ball",
+        "called 2 cm ✓",
+        "that it hit was seen directly",
+        "Dotted: the path that was measured on the arm",
+        "Trial 1, as it was looked at.",
+    ):
+        assert text in reader.words
+    assert sum(address.startswith("data:image/png") for address in reader.addresses) == 1
+    unsaid = read(write_report(tmp_path / "other", [told([0.05, 0.0])], title="x")).words
+    for text in ("P(hit)", "Dotted", "seen directly"):
+        assert text not in unsaid
+
+
+@pytest.mark.parametrize(
+    ("k", "units", "said"),
+    [
+        (1, ("m",), "as perceived; long is beyond the goal, short before it."),
+        (3, ("m", "m", "m"), "high is above the goal, low below it."),
+        (2, ("m", "s"), "short before it; late is after the goal's time"),
+    ],
+)
+def test_the_words_that_are_explained_are_those_of_the_task(k, units, said, tmp_path):
+    record = adaptation(seed=1, k=k, units=units, action_dim=1, most=1)
+    words = read(write_report(tmp_path, [record], title="x")).words
+    assert said in words
+    assert ("seen from behind" in words) == (k > 1 and "s" not in units)
 
 
 @pytest.mark.slow
@@ -187,7 +233,7 @@ def test_a_goal_not_tried_yet_has_a_report(tmp_path):
 def test_goals_keep_their_numbers_and_only_what_shows_something_is_drawn(tmp_path):
     records = [replace(told([0.05, 0.0]), number=3), replace(told(None), number=7)]
     mine = ("goal-2-photo.png", "goal-of-my-thesis-plans.png")
-    for name in ("report.html", "goal-2-errors.png", *mine):
+    for name in ("report.html", "goal-2-errors.png", "goal-2-aims.svg", *mine):
         (tmp_path / name).write_bytes(b"there before")
     drawn = []
     path = write_report(
@@ -199,10 +245,10 @@ def test_goals_keep_their_numbers_and_only_what_shows_something_is_drawn(tmp_pat
     assert "Goal 3" in words
     assert "Goal 7 no trial that counts" in words
     assert "No plan was given for goal 5." in words
-    names = {picture.name for picture in tmp_path.glob("goal-*.png")}
+    names = {picture.name for picture in tmp_path.glob("goal-*.*")}
     assert names == {
-        *(f"goal-3-{name}.png" for name in ("table", "landings", "aims", "errors", "plans")),
-        *(f"goal-7-{name}.png" for name in ("table", "aims", "plans")),
+        *(f"goal-3-{name}.svg" for name in ("table", "landings", "aims", "errors", "plans")),
+        *(f"goal-7-{name}.svg" for name in ("table", "aims", "plans")),
         *mine,
     }
 
@@ -214,7 +260,7 @@ def test_where_there_was_no_report_nothing_is_removed(tmp_path):
 
 
 def test_a_large_film_lies_beside_the_page(records, tmp_path, monkeypatch):
-    monkeypatch.setattr(page, "LARGEST_INLINE_VIDEO", 10)
+    monkeypatch.setattr(page, "LARGEST_INLINE_FILE", 10)
     reader = read(write_report(tmp_path, records[:1], title="large"))
     assert "throw.mp4" in reader.addresses
     assert (tmp_path / "throw.mp4").read_bytes() == records[0].film.video.read_bytes()

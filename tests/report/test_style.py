@@ -11,7 +11,7 @@ from prior_reinforce.report.style import (
     drawing,
     lay_out,
     new_figure,
-    save_png,
+    save_figure,
     text_on,
     trial_colour,
 )
@@ -35,7 +35,8 @@ def test_text_on_a_badge_has_the_contrast_of_large_text(colour):
     assert (light + 0.05) / (dark + 0.05) >= 3.0  # WCAG 2.2, 1.4.3, large text
 
 
-def test_pictures_are_the_same_bytes_whatever_matplotlib_is_set_to(tmp_path):
+@pytest.mark.parametrize("kind", ["png", "svg"])
+def test_pictures_are_the_same_bytes_whatever_matplotlib_is_set_to(kind, tmp_path):
     @drawing()
     def draw():
         figure = new_figure(2, 1)
@@ -44,9 +45,9 @@ def test_pictures_are_the_same_bytes_whatever_matplotlib_is_set_to(tmp_path):
         axes.set_title("dollars: $5 and $6")
         return figure
 
-    first = save_png(draw(), tmp_path / "new" / "first.png")
+    first = save_figure(draw(), tmp_path / "new" / f"first.{kind}")
     with matplotlib.rc_context({"font.size": 30, "text.color": "red"}):
-        second = save_png(draw(), tmp_path / "second.png")
+        second = save_figure(draw(), tmp_path / f"second.{kind}")
         assert matplotlib.rcParams["font.size"] == 30
     assert first.read_bytes() == second.read_bytes()
 
@@ -62,7 +63,7 @@ def test_a_picture_that_cannot_be_drawn_leaves_the_one_before(tmp_path, monkeypa
 
     monkeypatch.setattr(figure, "savefig", fail)
     with pytest.raises(ValueError, match="cannot be drawn"):
-        save_png(figure, path)
+        save_figure(figure, path)
     assert path.read_bytes() == b"before"
     assert [p.name for p in tmp_path.iterdir()] == ["picture.png"]
 

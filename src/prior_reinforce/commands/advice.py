@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -11,8 +12,9 @@ import tyro
 from jaxtyping import Float
 
 from prior_reinforce.arrays import Points
+from prior_reinforce.bench.workspace.records import AdviceRecord
 from prior_reinforce.bench.workspace.workspace import Workspace
-from prior_reinforce.commands.workspace import OnWorkspace
+from prior_reinforce.commands.base import Json, OnWorkspace, print_json
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.wording import say_place
 
@@ -31,16 +33,20 @@ class Advise(OnWorkspace):
     """Say where first throws would hit, and where one more throw or demonstration teaches most.
 
     For a goal that was set with the adapter bayes.
+
+    For example:
+        prior-reinforce advise hoop --out advice.png
     """
 
     adapter: Annotated[str | None, tyro.conf.arg(metavar="module:Class")] = None
     """The adapter that the goal was set with, where it is your own: module:Class."""
     out: Path | None = None
     """Picture, a .png; advice.png in the workspace if not given."""
+    json: Json = False
 
-    def run_on(self, workspace: Workspace) -> None:
+    def run_on(self, workspace: Workspace, words: Sequence[str]) -> None:
         """Look over the region, print, and draw."""
-        out = self.out or self.folder / "advice.png"
+        out = self.out or workspace.folder / "advice.png"
         if out.suffix != ".png":
             raise ConfigurationError(f"--out must name a .png file, got {out}")
         session = workspace.session(own_adapter=self.adapter)
@@ -59,28 +65,45 @@ class Advise(OnWorkspace):
         tried = np.arange(0, len(goals), _DEMONSTRATED_EVERY)
         shown = gain(goals[tried], conditions, demonstrations=True)
         names, units = workspace.manifest.outcome_names, workspace.manifest.outcome_units
-        places = [say_place(goal, names, units) for goal in goals]
         best, worst, throw = np.argmax(p), np.argmin(p), np.argmax(throws)
-        demonstration = tried[np.argmax(shown)]
-        print(
-            f"first throws hit with probability {p.mean():.2f} on average over the "
-            f"demonstrated region: {p[best]:.2f} at {places[best]}, {p[worst]:.2f} at "
-            f"{places[worst]}\n"
-            f"the throw that teaches most: {places[throw]} ({throws[throw]:.0%} of what is "
-            f"unknown; half of all places teach less than {np.median(throws):.0%})"
-        )
-        if teaches := bool(shown.max() > 0):
-            print(
-                "the demonstration that teaches most: one that ends at "
-                f"{places[demonstration]} ({shown.max():.0%} of what is unknown)"
-            )
-        else:
-            print("one more demonstration here would teach nothing that trials do not")
+        demonstration = goals[tried[np.argmax(shown)]] if shown.max() > 0 else None
+        picture = None
         if goals.shape[1] == 2:
             from prior_reinforce.report.advice import draw_advice
 
-            shows = goals[demonstration] if teaches else None
-            picture = draw_advice(out, goals, p, outcomes, goals[throw], shows, (names, units))
+            about = names, units
+            picture = draw_advice(out, goals, p, outcomes, goals[throw], demonstration, about)
+        if self.json:
+            record = AdviceRecord(
+                mean_p_hit=float(p.mean()),
+                best=goals[best].tolist(),
+                best_p_hit=float(p[best]),
+                worst=goals[worst].tolist(),
+                worst_p_hit=float(p[worst]),
+                throw=goals[throw].tolist(),
+                throw_teaches=float(throws[throw]),
+                demonstration=None if demonstration is None else demonstration.tolist(),
+                demonstration_teaches=float(shown.max()),
+                picture=None if picture is None else str(picture),
+            )
+            print_json(record)
+            return
+        print(
+            f"first throws hit with probability {p.mean():.2f} on average over the "
+            f"demonstrated region: {p[best]:.2f} at {say_place(goals[best], names, units)}, "
+            f"{p[worst]:.2f} at {say_place(goals[worst], names, units)}\n"
+            f"the throw that teaches most: {say_place(goals[throw], names, units)} "
+            f"({throws[throw]:.0%} of what is unknown; half of all places teach less than "
+            f"{np.median(throws):.0%})"
+        )
+        if demonstration is not None:
+            print(
+                "the demonstration that teaches most: one that ends at "
+                f"{say_place(demonstration, names, units)} ({shown.max():.0%} of what is unknown)"
+            )
+        else:
+            print("one more demonstration here would teach nothing that trials do not")
+        if picture is not None:
             print(f"picture: {picture}")
 
 

@@ -4,25 +4,30 @@ from __future__ import annotations
 
 import ipaddress
 import socket
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Annotated
 
 import tyro
 
 from prior_reinforce.bench.workspace.workspace import Workspace
+from prior_reinforce.commands.base import OnWorkspace
 from prior_reinforce.commands.trials import arm_of
-from prior_reinforce.commands.workspace import Folder
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.extras import check_installed
 from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
 
 
 @dataclass(frozen=True)
-class Console:
-    """Open a page over a workspace, for whoever stands beside the arm: touch where it landed."""
+class Console(OnWorkspace):
+    """Open a page over a workspace, for whoever stands beside the arm: touch where it landed.
 
-    folder: Folder
-    """Workspace."""
+    For example:
+        prior-reinforce console hoop --run "mycontroller {plan}"
+        prior-reinforce console hoop --host 192.168.1.5
+    """
+
     host: str = "127.0.0.1"
     """Where to listen: this computer alone, or an address of it for a tablet in the same network,
     for instance 192.168.1.5, or 0.0.0.0 for all of them."""
@@ -42,7 +47,7 @@ class Console:
     vlm: VisionLanguageModelConfig = field(default_factory=VisionLanguageModelConfig)
     """Endpoint and model that find objects in pictures (docs/perception.md)."""
 
-    def run(self) -> None:
+    def run_on(self, workspace: Workspace, words: Sequence[str]) -> None:
         """Serve until interrupted."""
         check_installed("uvicorn")
         from prior_reinforce.bench.console.guard import report_path, token_of
@@ -54,8 +59,7 @@ class Console:
         )
 
         limit, by, name = self.time_limit, self.run_command, ""
-        with Workspace(self.folder) as workspace:
-            arm = arm_of(workspace, self.executor)
+        arm, folder = arm_of(workspace, self.executor), workspace.folder
         if by is not None:
             check_command(by, time_limit=limit)
             arm, name = None, without_arguments(by)
@@ -70,9 +74,9 @@ class Console:
             )
 
         with self._listening() as listening:
-            token, events = token_of(self.folder), Events()
+            token, events = token_of(folder), Events()
             verbs = Verbs(
-                self.folder,
+                folder,
                 execute=execute if name else None,
                 executor=name,
                 approaches=arm is not None,
@@ -82,7 +86,7 @@ class Console:
                 publish=events.publish,
             )
             try:
-                self._say(token)
+                self._say(folder, token)
                 serve(application(verbs, events, token, self.host, self.vlm), listening)
             finally:
                 verbs.close()
@@ -97,13 +101,13 @@ class Console:
                 f"cannot listen at {self.host}:{self.port} ({error}); give another --host or --port"
             ) from error
 
-    def _say(self, token: str) -> None:
+    def _say(self, folder: Path, token: str) -> None:
         """Show the link, and as a QR code where another device is to open it."""
         host = self.host
         if host in ("0.0.0.0", "::"):
             host = _own_address()
         link = f"http://{host}:{self.port}/#{token}"
-        print(f"console of {self.folder}: {link}", flush=True)
+        print(f"console of {folder}: {link}", flush=True)
         if not _is_loopback(host):
             import segno
 

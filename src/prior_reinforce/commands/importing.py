@@ -31,30 +31,43 @@ from prior_reinforce.bench.importing.outcomes import (
 )
 from prior_reinforce.bench.importing.selection import Selection
 from prior_reinforce.bench.importing.units import Ambiguity, raise_if_ambiguous
-from prior_reinforce.bench.workspace.manifest import Manifest
+from prior_reinforce.bench.workspace.manifest import UNKNOWN, Manifest
+from prior_reinforce.bench.workspace.records import InspectRecord
 from prior_reinforce.bench.workspace.workspace import Workspace
+from prior_reinforce.commands.base import (
+    Json,
+    OnWorkspace,
+    Words,
+    answer_to,
+    print_checked,
+    print_json,
+    print_next,
+)
 from prior_reinforce.commands.outcome_questions import ask_for_outcomes
-from prior_reinforce.commands.workspace import Folder, print_next
 from prior_reinforce.errors import (
     ConfigurationError,
     InvalidDemonstrationsError,
     UnclearUnitsError,
 )
-from prior_reinforce.files import named_disk_errors
+from prior_reinforce.files import check_path, named_disk_errors
 from prior_reinforce.wording import plain
 
 _PICTURE = "demonstrations.png"
 
 
 @dataclass(frozen=True)
-class Import:
-    """Bring recorded demonstrations into a workspace, and look at them."""
+class Import(OnWorkspace):
+    """Bring recorded demonstrations into a workspace, and look at them.
 
-    folder: Folder
-    """Workspace."""
-    source: Annotated[Path, tyro.conf.Positional]
-    """Recordings, a file or a folder: NPZ, NPY, CSV, a workbook, LeRobot, robomimic or DROID HDF5,
-    ROS 1, ROS 2 or MCAP, or a replay buffer in zarr."""
+    For example:
+        prior-reinforce import hoop recordings/ --inspect
+        prior-reinforce import hoop log.csv --units deg --outcomes landed.csv
+    """
+
+    words: Annotated[Words, tyro.conf.arg(metavar="[WORKSPACE] RECORDINGS")] = ()
+    """The workspace (the current folder's if not given) and the recordings, a file or a folder:
+    NPZ, NPY, CSV, a workbook, LeRobot, robomimic or DROID HDF5, ROS 1, ROS 2 or MCAP, or a replay
+    buffer in zarr."""
     outcomes: Path | None = None
     """CSV `episode,x,y` with where each object landed; if not given, `outcomes.csv` beside the
     source; on a terminal, missing entries are prompted for."""
@@ -74,29 +87,33 @@ class Import:
     inspect: bool = False
     """Only report what the recordings hold and what an import would make of them; write a table of
     outcomes to fill in if there is none."""
+    json: Json = False
 
-    def run(self) -> None:
+    takes_words = True
+
+    def run_on(self, workspace: Workspace, words: Sequence[str]) -> None:
         """Read, show, take in."""
+        if len(words) != 1:
+            raise ConfigurationError("say which recordings to import: one file or folder")
+        if self.json and not self.inspect:
+            raise ConfigurationError("--json is of --inspect; add it, or drop --json")
+        if not self.inspect:
+            workspace.state.refuse_open_trial("importing demonstrations")
+        form, source = workspace.manifest.format, check_path(Path(words[0]))
+        is_known = form.names != UNKNOWN
+        joints = self.options.joints or (form.names if is_known else None)
         try:
-            self._run()
-        except UnclearUnitsError as unclear:
-            also = f"{unclear.also}; and " if unclear.also else ""
-            command = self._command(unclear.options)
-            raise ConfigurationError(f"{also}{unclear.what}; if so: {command}") from unclear
-
-    def _run(self) -> None:
-        with Workspace(self.folder) as workspace:
-            if not self.inspect:
-                workspace.state.refuse_open_trial("importing demonstrations")
-            manifest = workspace.manifest
-            joints = self.options.joints or manifest.format.names
-            recordings = read(self.source, replace(self.options, joints=joints))
-            selection = recordings.select(manifest.format.names, manifest.format.units)
+            recordings = read(source, replace(self.options, joints=joints))
+            selection = recordings.select(*((form.names, form.units) if is_known else ()))
             unclear = recordings.ambiguities + selection.ambiguities
             if self.inspect:
-                self._inspect(manifest, recordings, selection, unclear)
+                self._inspect(workspace, recordings, selection, unclear)
             else:
                 self._import(workspace, recordings, selection, unclear)
+        except UnclearUnitsError as error:
+            also = f"{error.also}; and " if error.also else ""
+            command = self._command(error.options)
+            raise ConfigurationError(f"{also}{error.what}; if so: {command}") from error
 
     def _import(
         self,
@@ -110,7 +127,8 @@ class Import:
         _settle(unclear + more, at_terminal=at_terminal)
         partial = bool(self.options.episodes or self.options.leave_out)
         if at_terminal:
-            answers = ask_for_outcomes(workspace.folder, self.source, known, selection, manifest)
+            source = recordings.source
+            answers = ask_for_outcomes(workspace.folder, source, known, selection, manifest)
             if answers is not None:
                 print(
                     f"outcomes kept in {answers.where}; to import again: --outcomes {answers.where}"
@@ -125,19 +143,19 @@ class Import:
             selection, self._preprocessing(manifest), manifest.robot, manifest.gate
         )
         result = recordings.demonstrations(inspection, known, names, units, partial=partial)
-        print(plain(result.preview.text, keep="\n"))
-        demonstrations, source = result.demonstrations, str(self.source)
+        print_checked(result.preview.text)
+        demonstrations, said = result.demonstrations, str(recordings.source)
         if selection.left_out:
-            source = f"{source}, without what moves as well: {selection.left_out}"
+            said = f"{said}, without what moves as well: {selection.left_out}"
         if self.append:
             before = workspace.demonstrations
             demonstrations = appended(before, demonstrations)
-            source = f"{source}, appended to {before.n}"
+            said = f"{said}, appended to {before.n}"
             print(f"appended    {before.n} demonstrations were there, now {demonstrations.n}")
-        workspace.import_demonstrations(demonstrations, source)
-        with named_disk_errors(self.folder):
-            result.preview.draw(self.folder / _PICTURE)
-        print(f"picture: {self.folder / _PICTURE}  (look at it before you learn)")
+        workspace.import_demonstrations(demonstrations, said)
+        with named_disk_errors(workspace.folder):
+            result.preview.draw(workspace.folder / _PICTURE)
+        print(f"picture: {workspace.folder / _PICTURE}  (look at it before you learn)")
         if inspection.remedy:
             print(f"next: {self._command(inspection.remedy)}")
         else:
@@ -145,37 +163,54 @@ class Import:
 
     def _inspect(
         self,
-        manifest: Manifest,
+        workspace: Workspace,
         recordings: Recordings,
         selection: Selection,
         unclear: tuple[Ambiguity, ...],
     ) -> None:
+        manifest = workspace.manifest
         found = inspect(selection, self._preprocessing(manifest), manifest.robot, manifest.gate)
-        print(f"{self.source}: {len(found.recordings)} episodes")
-        print(plain(replace(found, ambiguities=unclear).text, keep="\n"))
-        print()
+        found = replace(found, ambiguities=unclear)
         places, episodes = recordings.outcome_places, selection.episodes
         table = self.outcomes or table_beside(places)
         known, more = self._known(manifest, recordings, unclear, may_lack=True)
+        missing: list[str] = []
         if table is not None:
             missing = missing_outcomes(episodes, known)
-            print(plain(f"outcomes: {table}, {', '.join(missing) or 'none'} missing"))
+            said = f"{table}, {', '.join(missing) or 'none'} missing"
         elif len(known.frame):
-            print("outcomes: in the recordings")
+            said = "in the recordings"
         else:
-            table = places[0] / OUTCOMES_FILE
+            table, missing = places[0] / OUTCOMES_FILE, [*episodes]
             rows: dict[str, tuple[object, ...]] = dict.fromkeys(episodes, ())
             with named_disk_errors(places[0]):
                 write_outcome_table(table, rows, manifest.outcome_names, manifest.outcome_units)
-            print(f"outcomes: none yet; fill in {table} (units are in its first line)")
+            said = f"none yet; fill in {table} (units are in its first line)"
         options = " ".join(dict.fromkeys(one.option for one in unclear + more))
-        print(f"nothing was taken in; next: {self._command(options, found.remedy)}")
+        command = self._command(options, found.remedy)
+        if self.json:
+            record = InspectRecord(
+                source=str(recordings.source),
+                format=recordings.format,
+                episodes=[*episodes],
+                findings=found.rows,
+                remarks=[*found.remarks],
+                unclear=[one.what for one in unclear + more],
+                outcomes=None if table is None else str(table),
+                outcomes_missing=missing,
+                next=command,
+            )
+            print_json(record)
+            return
+        print(f"{recordings.source}: {len(found.recordings)} episodes")
+        print_checked(found.text)
+        print(plain(f"\noutcomes: {said}", keep="\n"))
+        print(f"nothing was taken in; next: {command}")
 
     def _command(self, *options: str) -> str:
         """The whole command as given, with further options that replace or join those given."""
         more = " ".join(filter(None, options))
-        places = (shlex.quote(str(path)) for path in (self.folder, self.source))
-        said = ["prior-reinforce import", *places]
+        said = ["prior-reinforce import", *map(shlex.quote, self.words)]
         own: dict[str, Any] = {
             f.name: getattr(self, f.name)
             for f in fields(self)
@@ -213,7 +248,7 @@ class Import:
         return in_units(found, manifest.outcome_units, self.outcome_unit)
 
 
-_NOT_REPEATED = ("folder", "source", "inspect", "options")
+_NOT_REPEATED = ("words", "inspect", "json", "options")
 """Fields of `Import` that are not options of the command to repeat."""
 
 
@@ -229,6 +264,6 @@ def _settle(ambiguities: Sequence[Ambiguity], *, at_terminal: bool) -> None:
         if at_terminal:
             print(plain(unclear.what))
             with suppress(EOFError):
-                if input("is it so? (yes/no) ").strip().lower() in {"y", "yes"}:
+                if answer_to("is it so? (yes/no) ").strip().lower() in {"y", "yes"}:
                     return
         raise

@@ -14,6 +14,7 @@ from rich.progress import BarColumn, Progress, TextColumn
 from rich.text import Text
 
 from prior_reinforce.arrays import Point
+from prior_reinforce.commands.base import answer_to
 from prior_reinforce.errors import InvalidFeedbackError, PerceptionFailedError
 from prior_reinforce.readings import Reading
 from prior_reinforce.wording import from_words, plain, say_place, to_words
@@ -119,7 +120,7 @@ def asking(console: Console, task: Task, perception: Perception) -> FailedReadin
             say(console, f"  picture: {latest}")
         while True:
             try:
-                text = input(
+                text = answer_to(
                     f"  what was the error, seen from {place(task, goal)}? for instance "
                     '"5cm long, 2cm left", or hit: '
                 )

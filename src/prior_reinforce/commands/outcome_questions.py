@@ -21,6 +21,7 @@ from prior_reinforce.bench.importing.outcomes import (
 )
 from prior_reinforce.bench.importing.selection import Selection
 from prior_reinforce.bench.workspace.manifest import Manifest
+from prior_reinforce.commands.base import answer_to
 from prior_reinforce.errors import (
     InvalidDemonstrationsError,
     InvalidFeedbackError,
@@ -146,7 +147,7 @@ def _ask(question: str, episode: str, table: Path, manifest: Manifest) -> tuple[
     """A place and its standard deviation, `skip` or `back`."""
     while True:
         try:
-            text = input(question).strip()
+            text = answer_to(question).strip()
         except EOFError as error:
             raise InvalidDemonstrationsError(
                 f"no outcome for episode {episode}; import again to go on (what was typed is kept "

@@ -32,7 +32,11 @@ _SAME_GOAL = 0.02
 
 @dataclass(frozen=True)
 class Calibrate:
-    """Fit the camera to known points of the table, and say how well it fits."""
+    """Fit the camera to known points of the table, and say how well it fits.
+
+    For example:
+        prior-reinforce calibrate points.csv --out table.json
+    """
 
     points: Annotated[Path, tyro.conf.Positional]
     """CSV with columns x, y (table frame, in metres: forward, left) and u, v (in pixels: right,
@@ -71,7 +75,12 @@ class Calibrate:
 
 @dataclass(frozen=True)
 class Look:
-    """See a trial's error in a photograph from above, with a vision-language model."""
+    """See a trial's error in a photograph from above, with a vision-language model.
+
+    For example:
+        prior-reinforce look table.jpg --reached "the ball" --reached-size 0.04 --goal "the hoop"
+            --goal-size 0.2 --workspace hoop --trial 3
+    """
 
     picture: Annotated[Path, tyro.conf.Positional]
     """Photograph of the key frame, from the calibrated camera."""

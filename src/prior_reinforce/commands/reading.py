@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -10,13 +11,11 @@ import tyro
 
 from prior_reinforce.arrays import Point, as_error
 from prior_reinforce.bench.workspace.workspace import Workspace
-from prior_reinforce.commands.workspace import OnWorkspace
+from prior_reinforce.commands.base import OnWorkspace, Words
 from prior_reinforce.errors import ConfigurationError, InvalidFeedbackError
 from prior_reinforce.readings import Reading
 from prior_reinforce.session.trials import Goal
 from prior_reinforce.wording import error_example, from_words, read_numbers
-
-Number = Annotated[int, tyro.conf.Positional, tyro.conf.arg(metavar="TRIAL")]
 
 _IMPLAUSIBLE = {"m": (1.0, "centimetres"), "rad": (np.pi, "degrees")}
 """Ours: bare numbers from there on are of another unit far more often than a miss by as much."""
@@ -26,34 +25,27 @@ _IMPLAUSIBLE = {"m": (1.0, "centimetres"), "rad": (np.pi, "degrees")}
 class Seen(OnWorkspace):
     """A trial and its result."""
 
-    number: Annotated[int | None, tyro.conf.Positional, tyro.conf.arg(metavar="[TRIAL]")] = None
-    """Number of the trial."""
-    seen: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="[SEEN]")] = ()
-    """What was seen, outcome minus goal: "5cm long, 2cm left", "5.2 +- 0.3 cm long", "long", "hit",
-    "miss"; or a number for each component, in its own unit: 0.05 -0.02, 0.05+-0.003 0.02+-0.003."""
-    error: tuple[str, ...] | None = None
-    """The same, as a named option."""
-    outcome: tuple[float, ...] | None = None
+    words: Annotated[Words, tyro.conf.arg(metavar="[WORKSPACE] [TRIAL] [SEEN]")] = ()
+    """The workspace (the current folder's if not given), the trial's number (the one that waits if
+    not given), and what was seen, outcome minus goal: "5cm long, 2cm left", "5.2 +- 0.3 cm long",
+    "long", "hit", "miss"; or a number for each component, in its own unit: 0.05 -0.02,
+    0.05+-0.003 0.02+-0.003."""
+    error: Annotated[tuple[str, ...] | None, tyro.conf.arg(metavar="SEEN")] = None
+    """What was seen, as a named option."""
+    outcome: Annotated[tuple[float, ...] | None, tyro.conf.arg(metavar="PLACE")] = None
     """Or where the object ended, in the table frame, in the outcome's units."""
     hit: bool = False
     """The goal was reached, whatever the distance says."""
     miss: bool = False
     """The goal was not reached, whatever the distance says."""
 
-    @property
-    def trial(self) -> int:
-        """Number of the trial.
+    takes_words = True
 
-        Raises:
-            ConfigurationError: None was given.
-        """
-        if self.number is None:
-            raise ConfigurationError("say which trial: its number comes after the workspace")
-        return self.number
-
-    def read(self, workspace: Workspace) -> tuple[Reading | Point | None, bool | None]:
-        """Return what was seen, as `Session.tell` takes it, and whether it hit, if given."""
-        given = [bool(self.seen), self.error is not None, self.outcome is not None]
+    def read(
+        self, workspace: Workspace, number: int, seen: Sequence[str]
+    ) -> tuple[Reading | Point | None, bool | None]:
+        """Return what was seen of a trial, as `Session.tell` takes it, and whether it hit."""
+        given = [bool(seen), self.error is not None, self.outcome is not None]
         said = any(given) or self.hit or self.miss
         if sum(given) > 1 or not said or (self.hit and self.miss):
             raise ConfigurationError(
@@ -61,7 +53,7 @@ class Seen(OnWorkspace):
                 "--miss if that was seen as well, or one of those alone"
             )
         hit = True if self.hit else False if self.miss else None
-        goal = workspace.state.goal_of(workspace.state.trial(self.trial))
+        goal = workspace.state.goal_of(workspace.state.trial(number))
         if self.outcome is not None:
             if len(self.outcome) != len(goal.units):
                 raise InvalidFeedbackError(
@@ -69,7 +61,7 @@ class Seen(OnWorkspace):
                     f"{', '.join(goal.names)}"
                 )
             return plausible(np.array(self.outcome) - goal.goal, goal), hit
-        words = self.seen or self.error
+        words = seen or self.error
         return (None if words is None else read_seen(" ".join(words), goal)), hit
 
 

@@ -40,7 +40,11 @@ _BORDER = 3
 
 @dataclass(frozen=True)
 class Reproduce:
-    """Run a recipe of the paper's evidence; a killed run goes on where it was."""
+    """Run a recipe of the paper's evidence; a killed run goes on where it was.
+
+    For example:
+        prior-reinforce reproduce trials --quick
+    """
 
     recipe: Annotated[str, tyro.conf.Positional]
     """Which recipe, or all."""

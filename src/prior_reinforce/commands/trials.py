@@ -9,20 +9,35 @@ from pathlib import Path
 from typing import Annotated
 
 import tyro
+from msgspec import to_builtins
 
 from prior_reinforce.bench.robots.executors.base import ArmDescription, ArmSettings, Motion
 from prior_reinforce.bench.robots.plan_files import check_plan_path, write_plan
 from prior_reinforce.bench.robots.report import LimitReport
+from prior_reinforce.bench.workspace.records import AskRecord, trial_records
 from prior_reinforce.bench.workspace.status import (
     OUTDATED,
     execution_warning,
+    next_step,
     say_expectation,
     say_trial,
 )
 from prior_reinforce.bench.workspace.workspace import Workspace
-from prior_reinforce.commands.reading import Number, Seen
-from prior_reinforce.commands.workspace import OnWorkspace, print_goal, print_next, read_goal
+from prior_reinforce.commands.base import (
+    Json,
+    OnWorkspace,
+    Words,
+    answer_to,
+    print_checked,
+    print_json,
+    print_next,
+    silent,
+    trial_and_rest,
+)
+from prior_reinforce.commands.reading import Seen
+from prior_reinforce.commands.workspace import print_goal, read_goal
 from prior_reinforce.errors import ConfigurationError, FileFormatError
+from prior_reinforce.files import check_path
 from prior_reinforce.plans.motions import Plan
 from prior_reinforce.registry import own_class
 from prior_reinforce.session.trials import Stage, State, Trial
@@ -31,9 +46,14 @@ from prior_reinforce.wording import say_place
 
 @dataclass(frozen=True)
 class Ask(OnWorkspace):
-    """Get the plan of the next trial; asking again gives the same one until it is told."""
+    """Get the plan of the next trial; asking again gives the same one until it is told.
 
-    goal: tuple[str, ...] | None = None
+    For example:
+        prior-reinforce ask hoop --out "plan-{trial}.npz"
+        prior-reinforce ask hoop --run "mycontroller {plan} {result}"
+    """
+
+    goal: Annotated[tuple[str, ...] | None, tyro.conf.arg(metavar="PLACE")] = None
     """Set this goal first, as `goal` does, unless it is the present one: 0.92 0.10, 92cm 10cm."""
     out: Path | None = None
     """Write the plan to this file as well: .npz (t, q, dq, ddq), .csv or .json. {trial} in its
@@ -66,14 +86,38 @@ class Ask(OnWorkspace):
     """The generator that the model was learned by, where it is your own: module:Class."""
     adapter: str | None = None
     """The adapter that the goal was set with, where it is your own: module:Class."""
+    json: Json = False
 
     def run(self) -> int | None:
         """Check the flags before anything is opened."""
         self._check_flags()
         return super().run()
 
-    def run_on(self, workspace: Workspace) -> int:
+    def run_on(self, workspace: Workspace, words: Sequence[str]) -> int:
         """Show the plan, write it, execute it."""
+        with silent(self.json):
+            status = self._ask(workspace)
+        if self.json:
+            print_json(self._record(workspace))
+        return status
+
+    def _record(self, workspace: Workspace) -> AskRecord:
+        """The trial as it stands now."""
+        record, form = trial_records(workspace)[-1], workspace.manifest.format
+        plan = workspace.plan(workspace.state.trials[-1])
+        verdict = workspace.gate(plan.actions)
+        ended = workspace.state.executions.get(record.number)
+        out = self._out_of(record.number)
+        return AskRecord(
+            trial=record,
+            first_pose=dict(zip(form.names, plan.actions[0].tolist(), strict=True)),
+            gate=verdict.as_json() if verdict is not None else None,
+            written=None if out is None else str(out),
+            execution=to_builtins(ended) if ended is not None else None,
+            next=next_step(workspace),
+        )
+
+    def _ask(self, workspace: Workspace) -> int:
         session = workspace.session(self.generator, self.adapter)
         self._check_out(workspace.state)
         if self.goal is not None:
@@ -211,7 +255,10 @@ class Ask(OnWorkspace):
             print("the goal is reached already: this trial repeats it")
         assert trial.plan is not None
         verdict = trial.verdict
-        print("no robot in the manifest, no limits checked" if verdict is None else verdict.text())
+        if verdict is None:
+            print("no robot in the manifest, no limits checked")
+        else:
+            print_checked(verdict.text())
         print(f"plan: {workspace.plan_path(trial)}")
         form = manifest.format
         first = zip(form.names, trial.plan[0].round(4) + 0.0, form.units, strict=True)
@@ -297,26 +344,32 @@ class Ask(OnWorkspace):
 
 @dataclass(frozen=True)
 class Tell(Seen):
-    """Report what was seen of a trial."""
+    """Report what was seen of a trial.
+
+    For example:
+        prior-reinforce tell hoop 3 "5cm long, 2cm left"
+        prior-reinforce tell "5cm long"
+        prior-reinforce tell hoop --from tracker.csv
+    """
 
     table: Annotated[Path | None, tyro.conf.arg(name="from")] = None
     """Or a table with a row a trial, such as a tracker writes: trial, x, y (where the object ended,
     units as in x_cm) or said (words), and hit. Rows that were told already are passed over."""
 
-    def run_on(self, workspace: Workspace) -> None:
+    def run_on(self, workspace: Workspace, words: Sequence[str]) -> None:
         """Write it down."""
         if self.table is not None:
-            self._tell_table(workspace, self.table)
+            self._tell_table(workspace, self.table, words)
         else:
-            seen, hit = self.read(workspace)
-            _warn_of_its_execution(workspace, self.trial)
-            trial = workspace.session().tell(self.trial, seen, hit=hit)
+            number, said = trial_and_rest(workspace, words)
+            seen, hit = self.read(workspace, number, said)
+            _warn_of_its_execution(workspace, number)
+            trial = workspace.session().tell(number, seen, hit=hit)
             print(f"trial {trial.number}: {_say_told(workspace, trial)}")
         print_next(workspace)
 
-    def _tell_table(self, workspace: Workspace, path: Path) -> None:
-        given = (self.number, self.seen, self.error, self.outcome, self.hit, self.miss)
-        if given != (None, (), None, None, False, False):
+    def _tell_table(self, workspace: Workspace, path: Path, words: Sequence[str]) -> None:
+        if words or (self.error, self.outcome, self.hit, self.miss) != (None, None, False, False):
             raise ConfigurationError("--from tells what its table says; drop what else was given")
         from prior_reinforce.commands.tracked import rows_to_tell
 
@@ -331,12 +384,17 @@ class Tell(Seen):
 
 @dataclass(frozen=True)
 class Amend(Seen):
-    """Correct what was told of a trial."""
+    """Correct what was told of a trial, of any goal.
 
-    def run_on(self, workspace: Workspace) -> None:
+    For example:
+        prior-reinforce amend hoop 3 "5cm short"
+    """
+
+    def run_on(self, workspace: Workspace, words: Sequence[str]) -> None:
         """Write it down."""
-        seen, hit = self.read(workspace)
-        trial = workspace.session().amend(self.trial, seen, hit=hit)
+        number, said = trial_and_rest(workspace, words)
+        seen, hit = self.read(workspace, number, said)
+        trial = workspace.session().amend(number, seen, hit=hit)
         print(f"trial {trial.number}, corrected: {_say_told(workspace, trial)}")
         _print_outdated(workspace)
         print_next(workspace)
@@ -344,16 +402,26 @@ class Amend(Seen):
 
 @dataclass(frozen=True)
 class Void(OnWorkspace):
-    """Declare that a trial is not data: the ball slipped, the arm stopped."""
+    """Declare that a trial is not data: the ball slipped, the arm stopped.
 
-    number: Number
-    """Number of the trial."""
+    For example:
+        prior-reinforce void hoop 3 --reason "ball slipped"
+    """
+
+    words: Annotated[Words, tyro.conf.arg(metavar="[WORKSPACE] [TRIAL]")] = ()
+    """The workspace (the current folder's if not given), and the trial's number (the one that waits
+    if not given)."""
     reason: str = ""
     """Why, for the log and the report."""
 
-    def run_on(self, workspace: Workspace) -> None:
+    takes_words = True
+
+    def run_on(self, workspace: Workspace, words: Sequence[str]) -> None:
         """Write it down."""
-        trial = workspace.session().void(self.number, self.reason)
+        number, rest = trial_and_rest(workspace, words)
+        if rest:
+            raise ConfigurationError(f"unexpected {rest[0]!r}; say why with --reason")
+        trial = workspace.session().void(number, self.reason)
         print(f"trial {trial.number}: {say_trial(workspace, trial)}; nothing is learned from it")
         _print_outdated(workspace)
         print_next(workspace)
@@ -361,22 +429,27 @@ class Void(OnWorkspace):
 
 @dataclass(frozen=True)
 class Export(OnWorkspace):
-    """Write a trial's plan in another form: NPZ, CSV, or JSON in ROS 2's JointTrajectory order."""
+    """Write a trial's plan in another form: NPZ, CSV, or JSON in ROS 2's JointTrajectory order.
 
-    number: Number
-    """Number of the trial."""
-    out: Annotated[Path, tyro.conf.Positional]
-    """File: .npz, .csv or .json."""
+    For example:
+        prior-reinforce export hoop 3 plan.json
+        prior-reinforce export hoop 3 plan.csv --rate 500
+    """
+
+    words: Annotated[Words, tyro.conf.arg(metavar="[WORKSPACE] [TRIAL] FILE")] = ()
+    """The workspace (the current folder's if not given), the trial's number (the one that waits if
+    not given), and the file: .npz, .csv or .json."""
     rate: float | None = None
     """Samples a second; the plan's own frames if not given."""
 
-    def run_on(self, workspace: Workspace) -> None:
+    takes_words = True
+
+    def run_on(self, workspace: Workspace, words: Sequence[str]) -> None:
         """Write it, if it may still be executed."""
-        plan = workspace.plan(workspace.state.trial(self.number))
-        verdict = workspace.gate(plan.actions)
-        if verdict is not None:
-            verdict.require()
-        written = write_plan(plan, self.out, rate=self.rate)
+        number, rest = trial_and_rest(workspace, words)
+        if len(rest) != 1:
+            raise ConfigurationError("say the file to write after the trial: .npz, .csv or .json")
+        written = workspace.export(number, check_path(Path(rest[0])), rate=self.rate)
         print(f"written: {written.path}  sha256 {written.sha256}")
 
 
@@ -473,7 +546,7 @@ def _may_move(trial: Trial, unchecked: Sequence[str], said: str = "") -> bool:
 
 def _says_yes(question: str) -> bool:
     try:
-        return input(question).strip().lower() == "yes"
+        return answer_to(question).strip().lower() == "yes"
     except EOFError:
         return False
 
@@ -481,7 +554,7 @@ def _says_yes(question: str) -> bool:
 def _ask_whether_it_moved() -> bool:
     while True:
         try:
-            answer = input("did the arm move? (yes/no) ").strip().lower()
+            answer = answer_to("did the arm move? (yes/no) ").strip().lower()
         except EOFError as error:
             raise ConfigurationError(
                 "no answer; ask again, with --arm-did-not-move if it did not"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -13,54 +13,38 @@ import tyro
 
 from prior_reinforce.adapters import ADAPTERS, DEFAULT_ADAPTER
 from prior_reinforce.arrays import Point
-from prior_reinforce.bench.robots import RobotLimits, robot_limits
-from prior_reinforce.bench.robots.presets import GRIPPERS, PRESETS
-from prior_reinforce.bench.robots.urdf import read_urdf
-from prior_reinforce.bench.workspace.manifest import filled_in
-from prior_reinforce.bench.workspace.status import describe, next_step
+from prior_reinforce.bench.robots import RobotLimits
+from prior_reinforce.bench.robots.presets import PRESETS
+from prior_reinforce.bench.workspace.records import status_record, trial_records, trials_table
+from prior_reinforce.bench.workspace.status import describe, say_trial
 from prior_reinforce.bench.workspace.workspace import Workspace
+from prior_reinforce.commands.base import Json, OnWorkspace, Words, print_json, print_next
 from prior_reinforce.errors import (
     ConfigurationError,
     InvalidFeedbackError,
     InvalidGoalError,
 )
+from prior_reinforce.files import check_path
 from prior_reinforce.wording import read_place, say_place, say_tolerance
-
-Folder = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="WORKSPACE")]
-
-
-def print_next(workspace: Workspace) -> None:
-    """Say which command comes next."""
-    print(f"next: {next_step(workspace)}")
-
-
-@dataclass(frozen=True)
-class OnWorkspace:
-    """A command on a workspace."""
-
-    folder: Folder
-    """Workspace."""
-
-    def run(self) -> int | None:
-        """Open the workspace and do it there; the exit status, None for 0."""
-        with Workspace(self.folder) as workspace:
-            return self.run_on(workspace)
-
-    def run_on(self, workspace: Workspace) -> int | None:
-        """What the command does."""
-        raise NotImplementedError
 
 
 @dataclass(frozen=True)
 class New:
-    """Make a workspace: a folder with a commented manifest."""
+    """Make a workspace: a folder with a commented manifest.
 
-    folder: Folder
+    For example:
+        prior-reinforce new hoop --robot ur5e
+        prior-reinforce new hoop --robot my_arm.urdf --gripper percent
+        prior-reinforce new hoop --robot none
+    """
+
+    folder: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="WORKSPACE")]
     """Folder to make."""
     name: str | None = None
     """Name of the task; the folder's name if not given."""
     action_names: tuple[str, ...] | None = None
-    """Names of the action dimensions; the robot's joints if not given."""
+    """Names of the action dimensions; the robot's joints if not given, with --robot none those that
+    the first import has."""
     action_units: tuple[str, ...] = ("rad",)
     """Unit of each action dimension; a single one holds for all."""
     gripper: str | None = None
@@ -86,42 +70,12 @@ class New:
 
     def run(self) -> None:
         """Write the folder."""
-        robot = self._robot()
-        names = self.action_names
-        if names is None:
-            names = tuple(f"joint{i}" for i in range(1, 8)) if robot is None else robot.joint_names
-        units = _spread(self.action_units, len(names))
-        gripper, unit = GRIPPERS.get(self.robot.lower(), ("gripper", "none"))
-        unit = self.gripper or (unit if self.action_names is None else "none")
-        if unit != "none":
-            names, units = (*names, gripper), (*units, unit)
-        is_given = robot is not None and self.robot.lower() not in (*PRESETS, "fer")
-        manifest = filled_in(
-            name=self.name or self.folder.resolve().name,
-            names=names,
-            units=units,
-            dt=self.dt,
-            outcome_names=self.outcome_names,
-            outcome_units=_spread(self.outcome_units, len(self.outcome_names)),
-            tolerance=self.tolerance[0] if len(self.tolerance) == 1 else self.tolerance,
-            robot=robot if robot is not None and is_given else self.robot,
-        )
-        with Workspace.create(self.folder, manifest) as workspace:
+        settings = {each.name: getattr(self, each.name) for each in fields(self)}
+        with Workspace.create(**settings) as workspace:
             print(f"workspace made in {self.folder}; look through {self.folder / 'workspace.toml'}")
-            if robot is not None:
-                print(_say_robot(robot))
+            if workspace.manifest.robot is not None:
+                print(_say_robot(workspace.manifest.robot))
             print_next(workspace)
-
-    def _robot(self) -> RobotLimits | None:
-        """The arm that was named, None for none."""
-        is_file = self.robot.lower().endswith((".urdf", ".xml", ".xacro"))
-        if self.tip is not None and not is_file:
-            raise ConfigurationError(
-                f"--tip is a link of a URDF, and --robot is {self.robot}; drop it"
-            )
-        if self.robot == "none":
-            return None
-        return read_urdf(Path(self.robot), self.tip) if is_file else robot_limits(self.robot)
 
 
 def _say_robot(robot: RobotLimits) -> str:
@@ -157,11 +111,16 @@ def print_goal(workspace: Workspace) -> None:
 
 @dataclass(frozen=True)
 class Goal(OnWorkspace):
-    """Set the goal that the next trials are for."""
+    """Set the goal that the next trials are for.
 
-    goal: Annotated[tuple[str, ...], tyro.conf.Positional]
-    """Its place: 0.92 0.10 (metres ahead, metres left, or the outcome's units), 92cm 10cm, or
-    "92cm ahead, 10cm left"."""
+    For example:
+        prior-reinforce goal hoop 0.92 0.10
+        prior-reinforce goal hoop "92cm ahead, 10cm left" --new-hardware "another ball"
+    """
+
+    words: Annotated[Words, tyro.conf.arg(metavar="[WORKSPACE] PLACE")] = ()
+    """The workspace (the current folder's if not given) and the goal: 0.92 0.10 (metres ahead,
+    metres left, or the outcome's units), 92cm 10cm, or "92cm ahead, 10cm left"."""
     memory: Literal["goal", "workspace"] | None = None
     """Which trials the adapter learns from: this goal's, or earlier goals' as well; by default
     earlier ones too where they serve the adapter, as they do bayes."""
@@ -172,10 +131,12 @@ class Goal(OnWorkspace):
     """What was changed on the hardware since the last trial, a note: another ball, a new gripper.
     What was known is then believed less, and the next reading more."""
 
-    def run_on(self, workspace: Workspace) -> None:
+    takes_words = True
+
+    def run_on(self, workspace: Workspace, words: Sequence[str]) -> None:
         """Set it."""
         workspace.set_goal(
-            read_goal(workspace, self.goal),
+            read_goal(workspace, words),
             carry_over=None if self.memory is None else self.memory == "workspace",
             adapter=self.adapter,
             new_hardware=self.new_hardware,
@@ -186,18 +147,61 @@ class Goal(OnWorkspace):
 
 @dataclass(frozen=True)
 class Status(OnWorkspace):
-    """Say where a workspace stands and what to do next."""
+    """Say where a workspace stands and what to do next.
 
-    def run_on(self, workspace: Workspace) -> None:
-        """Print ten lines."""
-        print(describe(workspace))
+    For example:
+        prior-reinforce status hoop
+        prior-reinforce status hoop --json
+    """
+
+    json: Json = False
+
+    def run_on(self, workspace: Workspace, words: Sequence[str]) -> None:
+        """Print ten lines, and one for each earlier goal."""
+        if self.json:
+            print_json(status_record(workspace))
+        else:
+            print(describe(workspace))
+
+
+@dataclass(frozen=True)
+class Trials(OnWorkspace):
+    """Print every trial: what was asked for, what was seen.
+
+    For example:
+        prior-reinforce trials hoop
+        prior-reinforce trials hoop --csv > trials.csv
+    """
+
+    csv: bool = False
+    """As a table with a column for each number."""
+    json: Json = False
+
+    def run_on(self, workspace: Workspace, words: Sequence[str]) -> None:
+        """Print them."""
+        if self.csv and self.json:
+            raise ConfigurationError("--csv or --json: drop one of the two")
+        if self.json:
+            print_json(trial_records(workspace))
+        elif self.csv:
+            print(trials_table(workspace), end="")
+        else:
+            names, units = workspace.manifest.outcome_names, workspace.manifest.outcome_units
+            for trial in workspace.state.trials:
+                aim = say_place(trial.condition, names, units)
+                said = f"aimed at {aim}: {say_trial(workspace, trial)}"
+                print(f"goal {trial.goal_number}  trial {trial.number:<4}{said}")
 
 
 @dataclass(frozen=True)
 class Log(OnWorkspace):
-    """Print the journal, one JSON object a line."""
+    """Print the journal, one JSON object a line.
 
-    def run_on(self, workspace: Workspace) -> None:
+    For example:
+        prior-reinforce log hoop | grep told
+    """
+
+    def run_on(self, workspace: Workspace, words: Sequence[str]) -> None:
         """Print it."""
         for entry in workspace.events:
             event = msgspec.to_builtins(entry.event)
@@ -206,22 +210,73 @@ class Log(OnWorkspace):
 
 @dataclass(frozen=True)
 class Report(OnWorkspace):
-    """Write a page with every goal, its trials, and the plans that were executed."""
+    """Write a page with every goal, its trials, and the plans that were executed.
+
+    For example:
+        prior-reinforce report hoop --out shown-on-monday
+    """
 
     out: Path | None = None
     """Folder for the page and its pictures; `report` in the workspace if not given."""
 
-    def run_on(self, workspace: Workspace) -> None:
+    def run_on(self, workspace: Workspace, words: Sequence[str]) -> None:
         """Write it."""
         from rich.console import Console
 
-        from prior_reinforce.bench.workspace.report import report_workspace
         from prior_reinforce.commands.live import drawing_progress
 
         with drawing_progress(Console()) as progress:
-            page = report_workspace(workspace, self.out or self.folder / "report", progress)
+            page = workspace.report(self.out, progress=progress)
         print(f"report: {page}")
 
 
-def _spread(values: tuple[str, ...], n: int) -> tuple[str, ...]:
-    return values * n if len(values) == 1 else values
+@dataclass(frozen=True)
+class Pack(OnWorkspace):
+    """Write a workspace into one file, to be opened on another machine.
+
+    For example:
+        prior-reinforce pack hoop hoop.zip
+    """
+
+    words: Annotated[Words, tyro.conf.arg(metavar="[WORKSPACE] FILE")] = ()
+    """The workspace (the current folder's if not given), and the file to write."""
+
+    takes_words = True
+
+    def run_on(self, workspace: Workspace, words: Sequence[str]) -> None:
+        """Write it."""
+        if len(words) != 1:
+            raise ConfigurationError("say which file to write: one name, such as hoop.zip")
+        file = check_path(Path(words[0]))
+        print(f"packed: {file}  sha256 {workspace.pack(file)}")
+        said = sum(bool(getattr(e, "output_tail", "")) for e in workspace.state.executions.values())
+        if said:
+            print(f"it holds the last output of {said} commands, as `log` shows: read it first")
+
+
+@dataclass(frozen=True)
+class Unpack:
+    """Make a workspace of what `pack` wrote; nothing in it is run.
+
+    For example:
+        prior-reinforce unpack hoop.zip hoop
+    """
+
+    file: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
+    """What `pack` wrote."""
+    folder: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="WORKSPACE")]
+    """Folder to make."""
+
+    def run(self) -> None:
+        """Make it."""
+        from prior_reinforce.bench.workspace.packing import unpack
+
+        print(f"unpacked: {self.folder}  sha256 {unpack(self.file, self.folder)}")
+        with Workspace(self.folder) as workspace:
+            waiting = workspace.state.open_trial
+            if waiting is not None:
+                print(
+                    f"trial {waiting.number} waits: was it executed where this was packed? then "
+                    "tell or void it here"
+                )
+            print(describe(workspace))

@@ -98,9 +98,9 @@ class Signals:
     """What some motions of D channels are made of; from `analyse`."""
 
     kinds: tuple[ChannelKind, ...]
-    """Standard deviation of each channel's noise, from all motions together."""
+    """Kind of each channel, from all motions together."""
     noise: Channels
-    """sigma."""
+    """sigma: standard deviation of each channel's noise, in its unit."""
     trim_band: Channels
     """How far each channel may stray from a recording's end pose in frames that may be dropped."""
     pose_band: Channels

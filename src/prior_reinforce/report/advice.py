@@ -21,7 +21,7 @@ from prior_reinforce.report.style import (
     calm_axes,
     drawing,
     new_figure,
-    save_png,
+    save_figure,
 )
 
 
@@ -84,4 +84,4 @@ def draw_advice(
     if units[0] == units[1]:
         axes.set_aspect("equal")
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=3, frameon=False, fontsize=8)
-    return save_png(figure, path)
+    return save_figure(figure, path)

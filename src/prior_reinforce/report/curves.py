@@ -27,7 +27,7 @@ from prior_reinforce.report.style import (
     new_figure,
     trial_colour,
 )
-from prior_reinforce.report.summary import numbers, say_distance, say_tolerance
+from prior_reinforce.report.summary import CALLED, numbers, say_distance, say_tolerance
 from prior_reinforce.session.trials import Stage, Trial
 
 _COLUMNS = 4
@@ -35,6 +35,7 @@ _LEAST_TRIALS = 3  # that the error's axis has room for
 _LEAST_SHARE = 0.02
 """Ours: a joint that moves less than this share of what moves most is drawn as nearly at rest."""
 _SHOWN: Any = {"label": "demonstrations", "color": DEMONSTRATION, "alpha": 0.45, "linewidth": 1}
+_MEASURED = "measured on the arm"
 _TIGHT: Any = {"handlelength": 1.6, "columnspacing": 1.4}
 
 _Plan = Float[np.ndarray, "_ D"]
@@ -97,13 +98,17 @@ def draw_errors(record: AdaptationRecord) -> Figure:
     for x, (trial, truth) in enumerate(zip(record.trials, record.true_outcomes, strict=True), 1):
         if truth is not None:
             true[x] = record.distance(truth - record.goal)
-        if trial.error_seen is None:
-            _write(axes, trial.stage.value, (x, tolerance), (0, 8), rotation=90, ha="center")
+        if trial.error_seen is None or record.landings[x - 1] is None:
+            said = trial.stage.value if trial.error_seen is None else "miss"
+            _write(axes, said, (x, tolerance), (0, 8), rotation=90, ha="center")
             continue
         seen[x] = record.distance(trial.error_seen)
         colour = trial_colour(x - 1, n, hit=trial.hit)
         axes.plot(x, seen[x], "o", color=colour, markersize=10, clip_on=False, zorder=5)
-        _write(axes, say_distance(record, seen[x]), (x, seen[x]), (9, 7), color=INK, zorder=6)
+        called = CALLED if trial.hit and seen[x] > tolerance else ""
+        _write(
+            axes, called + say_distance(record, seen[x]), (x, seen[x]), (9, 7), color=INK, zorder=6
+        )
     axes.plot(list(seen), list(seen.values()), "-", color=DEMONSTRATION, linewidth=1.5, zorder=3)
     if true:
         hollow: Any = {"markersize": 6, "markerfacecolor": "white", "markeredgecolor": INK_SOFT}
@@ -151,6 +156,10 @@ def draw_plans(record: AdaptationRecord) -> Figure:
             continue
         for plan, style in zip((*shown, *plans), (*[_SHOWN] * len(shown), *styles), strict=True):
             panel.plot(np.arange(len(plan)) * form.dt, plan[:, j], **style)
+        for number, (times, path) in record.measured.items():
+            at = next(i for i, trial in enumerate(record.trials) if trial.number == number)
+            dotted = styles[at] | {"linestyle": ":", "linewidth": 2.2, "label": _MEASURED}
+            panel.plot(times, path[:, j], **dotted)
         _widen(panel, shown, form.units, j)
         panel.set_title(f"{form.names[j]} [{form.units[j]}]", loc="left", fontsize=9.5, color=INK)
         for axes in below:

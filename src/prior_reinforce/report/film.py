@@ -44,7 +44,7 @@ def record_film(
     Raises:
         ConfigurationError: No pictures, or of wrong or different shape or type.
     """
-    from prior_reinforce.report.style import save_png
+    from prior_reinforce.report.style import save_figure
 
     thumbnails: list[_Thumbnail] = []
 
@@ -55,7 +55,7 @@ def record_film(
 
     video = _write_video(watched(), folder / f"{stem}.mp4", fps)
     strip = _draw_strip(thumbnails, moments, fps)
-    return Film(video, save_png(strip, folder / f"{stem}-film.png"))
+    return Film(video, save_figure(strip, folder / f"{stem}-film.png"))
 
 
 def key_moments(pictures: Sequence[_Picture], moments: int) -> list[int]:

@@ -7,7 +7,10 @@ from importlib import resources
 from pathlib import Path
 
 _PACKAGE = "prior_reinforce.report"
-_MIME_TYPES = {".png": "image/png", ".mp4": "video/mp4"}
+_MIME_TYPES = {
+    ".png": "image/png", ".jpg": "image/jpeg", ".jpeg": "image/jpeg", ".svg": "image/svg+xml",
+    ".mp4": "video/mp4",
+}  # fmt: skip
 
 
 def render(template: str, *, package: str = _PACKAGE, **context: object) -> str:
@@ -33,6 +36,6 @@ def render(template: str, *, package: str = _PACKAGE, **context: object) -> str:
 
 
 def data_uri(path: Path) -> str:
-    """Return a PNG or mp4 as a `data:` address that carries the whole file."""
+    """Return a picture or an mp4 as a `data:` address that carries the whole file."""
     encoded = base64.b64encode(path.read_bytes()).decode("ascii")
     return f"data:{_MIME_TYPES[path.suffix.lower()]};base64,{encoded}"

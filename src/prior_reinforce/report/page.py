@@ -17,6 +17,8 @@ from prior_reinforce.files import write
 from prior_reinforce.report.html import data_uri, render
 from prior_reinforce.report.record import AdaptationRecord, Box
 from prior_reinforce.report.summary import (
+    CALLED,
+    explain_words,
     headline,
     numbers,
     outcome_line,
@@ -30,12 +32,12 @@ from prior_reinforce.wording import in_words
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-LARGEST_INLINE_VIDEO = 3_000_000
-"""[bytes]; a larger film lies beside the page instead of inside it, so that the page opens fast."""
+LARGEST_INLINE_FILE = 3_000_000
+"""[bytes]; a larger film or photograph lies beside the page, so that the page opens fast."""
 
 _PICTURES = ("table", "landings", "aims", "errors", "plans")
-_OF_A_GOAL = re.compile(rf"goal-\d+-(?:{'|'.join(_PICTURES)})\.png")
-"""Of a goal, `goal-3-table.png`; those that show something are drawn."""
+_OF_A_GOAL = re.compile(rf"goal-\d+-(?:{'|'.join(_PICTURES)})\.(?:png|svg)")
+"""Of a goal, `goal-3-table.svg`, PNG in earlier versions; those that show something are drawn."""
 
 
 def write_report(
@@ -48,7 +50,7 @@ def write_report(
     note: str = "",
     progress: Callable[[int, int], None] | None = None,
 ) -> Path:
-    """Write `report.html`, whole in one file, and its pictures as PNGs beside it.
+    """Write `report.html`, whole in one file, and its pictures as SVGs beside it.
 
     Pictures of goals that an earlier report left there and this one has not are removed.
 
@@ -98,21 +100,23 @@ def write_report(
         "page.html",
         title=title,
         headline=headline(adaptations),
-        overview=_picture(draw_table(adaptations, box), folder / "overview.png")
+        overview=_picture(draw_table(adaptations, box), folder / "overview.svg")
         if one_table
         else None,
-        by_goal=_picture(draw_trials_by_goal(adaptations), folder / "trials-by-goal.png")
+        by_goal=_picture(draw_trials_by_goal(adaptations), folder / "trials-by-goal.svg")
         if len(adaptations) > 1
         else None,
         sections=sections,
         note=note,
         from_behind=first.outcome_dim > 1 and in_words(first.outcome_units),
         any_truth=any(_knows_truth(record) for record in adaptations),
+        words=explain_words(adaptations[0]),
+        any_called=any(row.off.startswith(CALLED) for s in sections for row in s["rows"]),
         facts=dict(facts or {}),
     )
-    drawn = {f"{s['anchor']}-{name}.png" for s in sections for name in s["pictures"]}
+    drawn = {f"{s['anchor']}-{name}.svg" for s in sections for name in s["pictures"]}
     if (folder / "report.html").exists():  # an earlier one, whose pictures are not to be mixed in
-        for old in folder.glob("goal-*.png"):
+        for old in folder.glob("goal-*.*"):
             if _OF_A_GOAL.fullmatch(old.name) and old.name not in drawn:
                 old.unlink(missing_ok=True)
     return write(folder / "report.html", page)
@@ -143,32 +147,36 @@ def _section(
         "colours": [trial_colour(i, n, hit=trial.hit) for i, trial in enumerate(record.trials)],
         "joints": record.demonstrations.format.names,
         "knows_truth": _knows_truth(record),
+        "expects": any(trial.p_hit is not None for trial in record.trials),
+        "notes": record.notes,
+        "measured": bool(record.measured),
+        "photographs": [(said, _file(folder, picture)) for said, picture in record.photographs],
         "checks": record.checks,
         "strip": record.film and data_uri(record.film.strip),
-        "video": record.film and _video(folder, record.film.video),
+        "video": record.film and _file(folder, record.film.video),
         "film_caption": record.film_caption,
         "pictures": {
-            name: _picture(figure, folder / f"{stem}-{name}.png")
+            name: _picture(figure, folder / f"{stem}-{name}.svg")
             for name, figure in figures.items()
         },
     }
 
 
 def _picture(figure: Figure, path: Path) -> Mapping[str, Any]:
-    from prior_reinforce.report.style import save_png
+    from prior_reinforce.report.style import save_figure
 
-    return {"source": data_uri(save_png(figure, path)), "wide": figure.get_figwidth() > 6}
+    return {"source": data_uri(save_figure(figure, path)), "wide": figure.get_figwidth() > 6}
 
 
 def _knows_truth(record: AdaptationRecord) -> bool:
     return any(outcome is not None for outcome in record.true_outcomes)
 
 
-def _video(folder: Path, video: Path) -> str:
-    """Address of a film: its bytes where they are few, else a file beside the page."""
-    if video.stat().st_size <= LARGEST_INLINE_VIDEO:
-        return data_uri(video)
-    beside = folder / video.name
-    if beside.resolve() != video.resolve():
-        shutil.copyfile(video, beside)
-    return video.name
+def _file(folder: Path, path: Path) -> str:
+    """Address of a film or a photograph: its bytes where they are few, else a file beside it."""
+    if path.stat().st_size <= LARGEST_INLINE_FILE:
+        return data_uri(path)
+    beside = folder / path.name
+    if beside.resolve() != path.resolve():
+        shutil.copyfile(path, beside)
+    return path.name

@@ -75,6 +75,15 @@ class AdaptationRecord:
     """Why what was seen of a trial might mislead, by the trial's number: `but aborted: ...`."""
     outcomes: tuple[Point | None, ...] | None = None
     """True outcome of each trial where known; None as a whole on a real arm."""
+    notes: tuple[str, ...] = ()
+    """What else is known of this goal: when it was set, what was changed on the hardware, what was
+    told otherwise first."""
+    measured: Mapping[int, tuple[Float[np.ndarray, " T"], Float[np.ndarray, "T D"]]] = field(
+        default_factory=dict
+    )
+    """Path that the arm took, by the trial's number: times in [s], columns in the plan's units."""
+    photographs: tuple[tuple[str, Path], ...] = ()
+    """Pictures of trials, PNG or JPEG, each with its caption."""
     checks: tuple[CheckRow, ...] = ()
     """What the gate said of the plans; empty where no robot is named."""
     film: Film | None = None
@@ -132,7 +141,7 @@ class AdaptationRecord:
 
     @property
     def landings(self) -> tuple[Point | None, ...]:
-        """Perceived outcome r tilde of each trial; None unless told.
+        """Perceived outcome r tilde of each trial; None unless told with more than "a miss".
 
         A hit that a coarse eye called further off than the tolerance was within it all the same,
         and is put at its edge.
@@ -160,7 +169,7 @@ class AdaptationRecord:
         return "cm" if self.scale == 100 else drawn.pop() if len(drawn) == 1 else ""
 
     def _landing(self, trial: Trial) -> Point | None:
-        if trial.error_seen is None:
+        if trial.error_seen is None or trial.reading is None or not trial.reading.has_number:
             return None
         off = in_tolerances(trial.error_seen, self.half_axes)
         return self.goal + trial.error_seen / (max(off, 1.0) if trial.hit else 1.0)

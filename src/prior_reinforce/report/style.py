@@ -1,4 +1,4 @@
-"""Colours, figures and PNG files, shared by every picture of every report.
+"""Colours, figures and picture files, shared by every picture of every report.
 
 Colours are told apart by anyone: vermilion and bluish green of the Okabe-Ito palette (Okabe and
 Ito 2008, "Color Universal Design"), trials in one hue from light to dark, the rest in grey; and
@@ -39,6 +39,8 @@ _RC: Any = {  # matplotlib releases differ in how they type this
     "axes.unicode_minus": True,
     "text.color": INK,
     "text.parse_math": False,  # a title may hold dollar signs
+    "svg.fonttype": "path",  # whatever fonts the reader has
+    "svg.hashsalt": "prior-reinforce",
 }
 
 
@@ -119,13 +121,15 @@ def lay_out(figure: Figure) -> None:
             figure.set_layout_engine(None)  # "none" would be drawn twice as well
 
 
-def save_png(figure: Figure, path: Path) -> Path:
-    """Write a PNG, whole or not at all; the same figure gives the same bytes.
+def save_figure(figure: Figure, path: Path) -> Path:
+    """Write a PNG or an SVG, as its name says, whole or not at all: one figure, the same bytes.
 
     Returns:
         The path.
     """
     with drawing(), in_place(path) as unfinished:
         lay_out(figure)
-        figure.savefig(unfinished, format="png", dpi=PICTURE_DPI, metadata={"Software": None})
+        kind = path.suffix.lower()[1:]
+        unsaid = {"Date": None, "Creator": None} if kind == "svg" else {"Software": None}
+        figure.savefig(unfinished, format=kind, dpi=PICTURE_DPI, metadata=unsaid)
     return path

@@ -8,14 +8,25 @@ from dataclasses import dataclass
 import numpy as np
 
 from prior_reinforce import wording
+from prior_reinforce.readings import Reading
 from prior_reinforce.report.record import AdaptationRecord
 from prior_reinforce.session.trials import Stage, Trial
-from prior_reinforce.wording import in_words, say_error, say_place, to_words
+from prior_reinforce.wording import error_words, in_words, say_place, say_reading, to_words
 
 _OPEN = {
     Stage.ASKED: "not executed yet",
     Stage.EXECUTING: "executing",
     Stage.EXECUTED: "executed, not told yet",
+}
+
+
+CALLED = "called "
+"""Before the distance of a hit that was told to lie farther off than the tolerance."""
+_MEANS = {
+    "long": "long is beyond the goal, short before it",
+    "left": "left and right are as seen from behind the robot",
+    "high": "high is above the goal, low below it",
+    "late": "late is after the goal's time, early before it",
 }
 
 
@@ -29,7 +40,10 @@ class TrialRow:
     aim: str
     seen: str
     off: str
-    """How far off it was seen to be; a dash where nothing was told."""
+    """How far off it was seen to be; a dash where nothing was told of that."""
+    expected: str
+    """Its P(hit) and the trials to go, as the adapter saw it: `38%, 1.9`; empty from one that
+    expects nothing."""
     truly_off: str
     """How far off it truly was; empty where that is not known."""
     result: str
@@ -145,10 +159,13 @@ def say_distance(record: AdaptationRecord, distance: float) -> str:
 
 def _row(record: AdaptationRecord, i: int, trial: Trial) -> TrialRow:
     names, units = record.demonstrations.outcome_names, record.demonstrations.outcome_units
+    expected = ""
+    if trial.p_hit is not None and trial.expected_trials is not None:
+        expected = f"{trial.p_hit:.0%}, {trial.expected_trials:.1f}"
     aim = say_place(trial.condition, names, units)
     if in_words(units):
-        aim = to_words(trial.condition - record.goal).replace("on the goal", "at the goal")
-    if trial.error_seen is None:
+        aim = to_words(trial.condition - record.goal, names).replace("on the goal", "at the goal")
+    if trial.reading is None or trial.error_seen is None:
         if trial.stage is Stage.VOIDED:
             seen, state, result = "voided", "voided", "not counted"
             seen += f": {trial.note}" if trial.note else ""
@@ -156,13 +173,13 @@ def _row(record: AdaptationRecord, i: int, trial: Trial) -> TrialRow:
             seen, state, result = _OPEN[trial.stage], "open", "open"
             if trial.number in record.warnings:
                 seen = f"{trial.stage.value}, {record.warnings[trial.number]}"
-        return TrialRow(trial.number, state, aim, seen, "–", "", result)
+        return TrialRow(trial.number, state, aim, seen, "–", expected, "", result)
     truth = record.true_outcomes[i]
     truly_off = None if truth is None else record.distance(truth - record.goal)
     result = "hit" if trial.hit else "miss"
     # The truth, once known, is admitted where it disagrees.
     disagrees = truly_off is not None and (truly_off <= record.edge) != trial.hit
-    seen = say_error(trial.error_seen, names, units)
+    seen = say_reading(trial.reading, names, units)
     if trial.number in record.warnings:
         seen += f"; {record.warnings[trial.number]}"
     return TrialRow(
@@ -170,10 +187,25 @@ def _row(record: AdaptationRecord, i: int, trial: Trial) -> TrialRow:
         state=result,
         aim=aim,
         seen=seen,
-        off=say_distance(record, record.distance(trial.error_seen)),
+        off=_say_off(record, trial.reading, trial.hit),
+        expected=expected,
         truly_off="" if truly_off is None else say_distance(record, truly_off),
         result=f"taken for a {result}" if disagrees else result,
     )
+
+
+def _say_off(record: AdaptationRecord, reading: Reading, hit: bool) -> str:
+    if not np.all(np.isfinite(reading.low) & np.isfinite(reading.high)):
+        return "–"
+    off = record.distance(reading.error_seen)
+    return f"{CALLED if hit and off > record.edge else ''}{say_distance(record, off)}"
+
+
+def explain_words(record: AdaptationRecord) -> str:
+    """Say what the words of an error mean, of those that these outcomes have."""
+    demonstrations = record.demonstrations
+    pairs = error_words(demonstrations.outcome_names, demonstrations.outcome_units)
+    return "; ".join(_MEANS[pair[0]] for pair in pairs if pair)
 
 
 def _count(n: int, what: str) -> str:

@@ -6,7 +6,7 @@ import pytest
 from prior_reinforce.bench.console.view import motion_of, state_of, step_of
 from prior_reinforce.bench.robots import robot_limits
 from prior_reinforce.bench.robots.kinematics import tool_tip
-from prior_reinforce.bench.workspace.manifest import filled_in
+from prior_reinforce.bench.workspace.manifest import new_manifest
 from prior_reinforce.bench.workspace.workspace import Workspace
 from prior_reinforce.errors import TrialStateError
 from prior_reinforce.lab.tasks import make_task
@@ -91,16 +91,8 @@ def test_sentences_about_surprises_are_read_as_the_session_writes_them(workspace
 def panda(tmp_path_factory):
     task = make_task("basketball-v1")
     demos = task.demonstrations("A")
-    text = filled_in(
-        name="shot",
-        names=demos.format.names,
-        units=demos.format.units,
-        dt=demos.format.dt,
-        outcome_names=("x", "y"),
-        outcome_units=("m", "m"),
-        tolerance=0.015,
-        robot="panda",
-    )
+    names, dt = demos.format.names, demos.format.dt
+    text = new_manifest("shot", robot="panda", action_names=names, dt=dt)
     with Workspace.create(tmp_path_factory.mktemp("panda") / "w", text) as workspace:
         workspace.import_demonstrations(demos, "A")
         workspace.learn("interpolation")

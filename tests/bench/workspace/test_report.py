@@ -5,6 +5,7 @@ import sys
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from prior_reinforce.bench.robots.report import LimitLine, LimitReport
 from prior_reinforce.bench.workspace.report import _checks
@@ -57,8 +58,8 @@ def test_goals_are_called_what_status_calls_them_and_none_is_left_out_without_a_
         "<dd>by goal 3</dd>",  # goal 1 had no earlier trials
     ):
         assert text in page
-    names = {path.name for path in (tmp_path / "planar" / "report").glob("*-table.png")}
-    assert names == {"goal-1-table.png", "goal-3-table.png"}
+    names = {path.name for path in (tmp_path / "planar" / "report").glob("*-table.svg")}
+    assert names == {"goal-1-table.svg", "goal-3-table.svg"}
 
 
 def test_an_aborted_execution_is_said_as_status_says_it(run, folder, tmp_path):
@@ -70,6 +71,46 @@ def test_an_aborted_execution_is_said_as_status_says_it(run, folder, tmp_path):
     page = (tmp_path / "planar" / "report" / "report.html").read_text()
     assert "executed, but aborted: the command ended" in page
     assert "trial 1 waits to be told" in page
+
+
+_DRIVER = """
+import pathlib, sys, numpy
+plan = numpy.load(sys.argv[1])
+numpy.savez(pathlib.Path(sys.argv[2]) / "executed.npz", t=plan["t"], q=plan["q"] + 0.002)
+"""
+
+
+def test_amendments_hardware_seed_paths_and_photographs_are_reported(run, folder, tmp_path):
+    (tmp_path / "driver.py").write_text(_DRIVER)
+    run("goal", folder, "0.9", "0.05", "--new-hardware", "smaller ball")
+    driver = f"{sys.executable} driver.py {{plan}} {{result}}"
+    assert run("ask", folder, "--yes", "--run", driver)[0] == 0
+    run("tell", folder, 1, "30cm long")
+    run("amend", folder, 1, "3cm long")
+    pictures = tmp_path / "planar" / "pictures"
+    pictures.mkdir()
+    Image.new("RGB", (8, 8)).save(pictures / "trial-001-seen.png")
+    (pictures / "trial-002-seen.png").symlink_to("/etc/passwd")
+    run("ask", folder)
+    assert run("report", folder)[0] == 0
+    page = (tmp_path / "planar" / "report" / "report.html").read_text()
+    for text in (
+        "new on the hardware: smaller ball",
+        "Trial 1 was corrected on 20",
+        "before: 30cm long.",
+        "Trial 1 went 0.002 rad rms off its plan, as measured.",
+        "Dotted: the path that was measured on the arm",
+        "Trial 1, as it was looked at.",
+        "seed 0",
+        "Trials made",
+        "P(hit), to go",
+    ):
+        assert text in page
+    assert "Trial 2, as it was looked at." not in page
+    next((tmp_path / "planar" / "executions").glob("*/executed.npz")).write_bytes(b"no npz")
+    assert run("report", folder)[0] == 0
+    page = (tmp_path / "planar" / "report" / "report.html").read_text()
+    assert "the path of trial 1 is not drawn" in page
 
 
 def trial(number, **lines):

@@ -39,5 +39,5 @@ def test_a_model_of_other_demonstrations_is_refused(saved):
 def test_a_folder_without_a_readable_record_is_told_with_the_remedy(saved, text):
     record = saved[0] / "training.json"
     record.unlink() if text is None else record.write_text(text)
-    with pytest.raises(FileFormatError, match=r"no learned model in .* prior-reinforce learn"):
+    with pytest.raises(FileFormatError, match=r"no learned model in .* prior-reinforce train"):
         load_learned(saved[0], DEMONSTRATIONS)

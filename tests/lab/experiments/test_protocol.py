@@ -201,7 +201,8 @@ def test_a_goal_counts_as_reached_from_the_round_that_reached_it():
 
 def test_a_demonstration_of_which_only_the_direction_is_said_is_refused_in_one_line():
     def point(failure, rollout, goal, rng):
-        return replace(from_words("long, left", 2), error_seen=rng.normal(size=2))
+        words = from_words("long, left", ("x", "y"), ("m", "m"))
+        return replace(words, error_seen=rng.normal(size=2))
 
     with pytest.raises(
         InvalidDemonstrationsError, match="demonstration 0 has a direction but no distance"

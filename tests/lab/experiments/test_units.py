@@ -21,11 +21,10 @@ def silent(done, total, label):
 @pytest.mark.slow
 def test_any_number_of_workers_gives_the_same_files_bit_for_bit(tmp_path):
     units = [*real_units(), *map(Roots, range(4))]
-    for count in (1, 2, 3):
+    for count in (1, 3):
         run_units(units, tmp_path / str(count), Workers(count), silent)
     one = results(tmp_path / "1")
     assert len(one) == len(units) + 9  # three models of three files each
-    assert results(tmp_path / "2") == one
     assert results(tmp_path / "3") == one
 
 

@@ -23,7 +23,7 @@ from prior_reinforce.errors import WorkspaceError
 from prior_reinforce.session.events import Entry, Event
 
 JOURNAL_FILE = "journal.sqlite"
-_VERSION = 3
+JOURNAL_VERSION = 3
 # Ours: an operator's second window should wait out a command, not a training.
 _LOCK_TIMEOUT_S = 10.0
 
@@ -41,6 +41,16 @@ BEGIN SELECT RAISE(ABORT, 'the journal is append-only'); END;
 """
 _HEADER_BYTES = 100
 """Of any SQLite file that has something in it (sqlite.org/fileformat.html, section 1.3)."""
+
+
+class Row(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """An event as it is written."""
+
+    time: str
+    digest: str
+    """Of it and of all before it."""
+    event: msgspec.Raw
+    """JSON, to the byte."""
 
 
 class Journal:
@@ -79,12 +89,12 @@ class Journal:
             version = self._connection.execute("PRAGMA user_version").fetchone()[0]
             if version == 0:
                 self._connection.executescript(
-                    f"BEGIN IMMEDIATE; {_SCHEMA} PRAGMA user_version = {_VERSION}; COMMIT;"
+                    f"BEGIN IMMEDIATE; {_SCHEMA} PRAGMA user_version = {JOURNAL_VERSION}; COMMIT;"
                 )
-            elif version != _VERSION:
+            elif version != JOURNAL_VERSION:
                 raise WorkspaceError(
                     f"{path} was written by another version of this program (journal {version}, "
-                    f"this is {_VERSION}); use that version"
+                    f"this is {JOURNAL_VERSION}); use that version"
                 )
 
     def close(self) -> None:
@@ -103,6 +113,12 @@ class Journal:
                 self._read()
                 self._data_version = version
         return self._entries
+
+    def rows(self) -> list[Row]:
+        """All events as they are written, after they were checked."""
+        self.entries()
+        rows = self._connection.execute("SELECT time, digest, event FROM events ORDER BY id")
+        return [Row(time, digest, msgspec.Raw(text.encode())) for time, digest, text in rows]
 
     def _read(self) -> None:
         rows = self._connection.execute(
@@ -189,6 +205,8 @@ class Journal:
         # A damaged file has texts that are none, also in the errors themselves.
         except (sqlite3.Error, UnicodeDecodeError, msgspec.DecodeError, RecursionError) as error:
             text = str(error)
+            if "closed database" in text:
+                raise WorkspaceError(f"{self._path.parent} is closed; open it again") from error
             remedy = "restore it from a copy"
             if "locked" in text or "busy" in text:
                 remedy = "another command works on this workspace; wait for it, then try again"
@@ -197,6 +215,23 @@ class Journal:
             elif "full" in text or "disk I/O" in text:
                 remedy = "free some disk space; what was told before is safe"
             raise WorkspaceError(f"{self._path}: {text}; {remedy}") from error
+
+
+def restore(path: Path, rows: Sequence[Row]) -> None:
+    """Make a journal again from its rows; opened as any journal, it checks them.
+
+    Raises:
+        WorkspaceError: The disk refuses.
+    """
+    journal = Journal(path, object)
+    with journal._named_errors():
+        journal._connection.execute("BEGIN IMMEDIATE")
+        journal._connection.executemany(
+            "INSERT INTO events (time, event, digest) VALUES (?, ?, ?)",
+            ((row.time, bytes(row.event).decode(), row.digest) for row in rows),
+        )
+        journal._connection.execute("COMMIT")
+    journal.close()
 
 
 def _digest(before: str, time: str, event: str) -> str:

@@ -29,6 +29,8 @@ from prior_reinforce.bench.robots import (
 from prior_reinforce.bench.robots.executors import EXECUTORS
 from prior_reinforce.bench.robots.executors.base import ArmSettings
 from prior_reinforce.bench.robots.kinematics import Chain
+from prior_reinforce.bench.robots.presets import GRIPPERS, PRESETS
+from prior_reinforce.bench.robots.urdf import read_urdf
 from prior_reinforce.errors import ConfigurationError, FileFormatError, PriorReinforceError
 from prior_reinforce.plans.interpolation import RATE
 from prior_reinforce.plans.motions import PlanFormat
@@ -44,6 +46,8 @@ else:
 MANIFEST_FILE = "workspace.toml"
 TEMPLATE = Path(__file__).with_name("template.toml").read_text(encoding="utf-8")
 """The manifest that `new` writes, for `format` to fill in."""
+UNKNOWN = ("?",)
+"""Action names where the arm is not known yet: the first import replaces them by the recorded."""
 # Ours: every throw within a metre would count as reached, and no motion is sampled at 1 Hz.
 _IMPLAUSIBLE_METRES = 1.0
 _IMPLAUSIBLE_SECONDS = 1.0
@@ -144,44 +148,81 @@ _LENGTH_OF_AXIS = 1e-3
 """By how much an axis may differ from length 1: three written digits."""
 
 
-def filled_in(
-    *,
+def new_manifest(
     name: str,
-    names: Sequence[str],
-    units: Sequence[str],
-    dt: float,
-    outcome_names: Sequence[str],
-    outcome_units: Sequence[str],
-    tolerance: float | Sequence[float],
-    robot: str | RobotLimits,
+    *,
+    robot: str | RobotLimits = "panda",
+    tip: str | None = None,
+    action_names: Sequence[str] | None = None,
+    action_units: Sequence[str] = ("rad",),
+    gripper: str | None = None,
+    dt: float = 0.0125,
+    outcome_names: Sequence[str] = ("x", "y"),
+    outcome_units: Sequence[str] = ("m",),
+    tolerance: float | Sequence[float] = 0.015,
 ) -> str:
-    """Return a manifest's text, the template filled in.
-
-    Args:
-        name: Of the task.
-        names: Of the action dimensions.
-        units: Of the action dimensions.
-        dt: Time between two frames of a plan, in [s].
-        outcome_names: Of the outcome's components.
-        outcome_units: Of the outcome's components.
-        tolerance: One number, or one for each component, in the outcome's units.
-        robot: Name of a preset, `none`, or the limits of an arm, which are written out.
-    """
-    given = robot if isinstance(robot, RobotLimits) else None
+    """Return the text of a manifest; arguments and errors as in `Workspace.create`."""
+    known = robot if isinstance(robot, str) else robot.robot
+    is_file = known.lower().endswith((".urdf", ".xml", ".xacro"))
+    if tip is not None and not is_file:
+        raise ConfigurationError(f"--tip is a link of a URDF, and --robot is {known}; drop it")
+    if isinstance(robot, str) and robot != "none":
+        robot = read_urdf(Path(robot), tip) if is_file else robot_limits(robot)
+    own, unit = GRIPPERS.get(known.lower(), ("gripper", "none"))
+    unit = gripper or (unit if action_names is None else "none")
+    names = action_names
+    if names is None:
+        names = UNKNOWN if isinstance(robot, str) else robot.joint_names
+    if tuple(names) == UNKNOWN and unit != "none":
+        raise ConfigurationError(
+            "--gripper adds a column to an arm's joints, and --robot is none; name all columns "
+            "with --action-names, or drop it: the first import then takes what was recorded"
+        )
+    units = _spread(action_units, len(names))
+    if unit != "none":
+        names, units = (*names, own), (*units, unit)
+    given = robot if isinstance(robot, RobotLimits) and robot.robot not in PRESETS else None
+    numbers = np.atleast_1d(tolerance).tolist()
     text = TEMPLATE.format(
         name=_quoted(name)[1:-1],
         names=_list(names),
         units=_list(units),
         dt=dt,
         outcome_names=_list(outcome_names),
-        outcome_units=_list(outcome_units),
-        tolerance=np.asarray(tolerance).tolist(),
-        robot="given" if given is not None else robot,
+        outcome_units=_list(_spread(outcome_units, len(outcome_names))),
+        tolerance=numbers[0] if len(numbers) == 1 else numbers,
+        robot="given" if given is not None else known,
     )
     if given is None:
         return text
     start, end = text.index("# joint_names ="), text.index("# The program's own lines")
     return text[:start] + _written_out(given) + "\n" + text[end:]
+
+
+def with_columns(text: str, names: Sequence[str], units: Sequence[str]) -> str:
+    """Return a manifest's text with the columns of a plan that were not known when it was made."""
+    start = text.index("[plan]")
+    head, plan = text[:start], text[start:]
+    for key, values in (("names", names), ("units", units)):
+        said = f"{key} = {_list(values)}".replace("\\", r"\\")
+        plan = re.sub(rf"^[ \t]*{key}[ \t]*=[^\[]*\[[^\]]*\]", said, plan, count=1, flags=re.M)
+    return head + plan
+
+
+def without_arm(text: str) -> str:
+    """Return a manifest's text without what drives the arm, which is each machine's own.
+
+    Raises:
+        ConfigurationError: It says so elsewhere than in a section.
+    """
+    kept = re.sub(r"^[ \t]*\[\s*arm\b.*\n(?:(?![ \t]*\[).*(?:\n|\Z))*", "", text, flags=re.M)
+    if "arm" in tomllib.loads(kept):
+        raise ConfigurationError(f"{MANIFEST_FILE}: write what drives the arm as a section, [arm]")
+    return kept
+
+
+def _spread(values: Sequence[str], n: int) -> tuple[str, ...]:
+    return tuple(values) * n if len(values) == 1 else tuple(values)
 
 
 def _written_out(robot: RobotLimits) -> str:

@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from msgspec import convert
 
+from prior_reinforce.bench.robots.executors.result import read_path
 from prior_reinforce.bench.robots.report import LimitLine, LimitReport
-from prior_reinforce.bench.workspace.log import WorkspaceState
+from prior_reinforce.bench.workspace.log import Executed, Executing, WorkspaceState
 from prior_reinforce.bench.workspace.status import execution_warning
 from prior_reinforce.bench.workspace.workspace import Workspace
 from prior_reinforce.errors import FileFormatError, WorkspaceError
 from prior_reinforce.files import claim_folder, named_disk_errors
+from prior_reinforce.readings import Reading
 from prior_reinforce.report import AdaptationRecord, write_report
 from prior_reinforce.report.record import CheckRow
+from prior_reinforce.session.events import GoalSet, Told
 from prior_reinforce.session.trials import Goal, Trial
+from prior_reinforce.wording import say_reading
 
 
 def report_workspace(
@@ -48,10 +53,12 @@ def report_workspace(
     records = [_record(workspace, goal) for goal in goals]
     robot, training = workspace.manifest.robot, state.training
     models = (trial.model for goal in goals for trial in state.trials_of(goal.number))
+    dates = [entry.time[:10] for entry in workspace.events if entry.kind in ("asked", "told")]
     facts = {
         "Task": workspace.manifest.name,
+        "Trials made": " to ".join(dict.fromkeys((dates[0], dates[-1]))),
         "Demonstrations": str(records[-1].demonstrations.n),
-        "Model": ", ".join(dict.fromkeys(models)),
+        "Model": ", ".join(_say_model(state, model) for model in dict.fromkeys(models)),
         "Adapter": ", ".join(dict.fromkeys(goal.adapter for goal in goals)),
         "Robot": "none, no limits checked" if robot is None else robot.robot,
         "Earlier goals' trials used": "by "
@@ -67,6 +74,11 @@ def report_workspace(
             folder, records, title=title, facts=facts, note=_say_without_plan(state),
             progress=progress,
         )  # fmt: skip
+
+
+def _say_model(state: WorkspaceState, model: str) -> str:
+    training = state.trainings.get(model)
+    return model if training is None else f"{model} ({training.generator}, seed {training.seed})"
 
 
 def _say_without_plan(state: WorkspaceState) -> str:
@@ -106,8 +118,65 @@ def _record(workspace: Workspace, goal: Goal) -> AdaptationRecord:
         number=goal.number,
         warnings={t.number: said for t in trials if (said := execution_warning(workspace, t))},
         checks=_checks(trials),
+        notes=tuple(_notes(workspace, goal, trials)),
+        measured=_measured(workspace, trials, remarks),
+        photographs=tuple(_photographs(workspace.folder, trials)),
         film_caption="; ".join(remarks),
     )
+
+
+def _notes(workspace: Workspace, goal: Goal, trials: Sequence[Trial]) -> Iterator[str]:
+    """When a goal was set, what was changed before, what surprised, what was told otherwise."""
+    numbers, told = {trial.number for trial in trials}, dict[int, Reading]()
+    goals = 0
+    for entry in workspace.events:
+        match entry.event:
+            case GoalSet():
+                goals += 1
+                if goals == goal.number:
+                    changed = goal.new_hardware is not None
+                    hardware = f"; new on the hardware: {goal.new_hardware}" if changed else ""
+                    yield f"Set on {entry.time[:10]}, adapter {goal.adapter}{hardware}."
+            case Told(trial=number, reading=record) if number in numbers:
+                if number in told:
+                    first = say_reading(told[number], goal.names, goal.units)
+                    yield f"Trial {number} was corrected on {entry.time[:10]}; before: {first}."
+                told[number] = Reading.from_record(record)
+            case _:
+                pass
+    for trial in trials:
+        if trial.surprise:
+            yield f"Before trial {trial.number}: {trial.surprise}."
+        ended = workspace.state.executions.get(trial.number)
+        if isinstance(ended, Executed) and ended.tracking_rms:
+            off = ", ".join(f"{rms:.3g} {unit}" for unit, rms in ended.tracking_rms.items())
+            yield f"Trial {trial.number} went {off} rms off its plan, as measured."
+
+
+def _measured(
+    workspace: Workspace, trials: Sequence[Trial], remarks: list[str]
+) -> dict[int, tuple[Any, Any]]:
+    """Paths that drivers measured, by trial; what cannot be read is said in `remarks`."""
+    numbers, found = {trial.number for trial in trials}, dict[int, tuple[Any, Any]]()
+    for entry in workspace.events:
+        if isinstance(entry.event, Executing) and entry.event.trial in numbers:
+            number, folder = entry.event.trial, entry.event.folder
+            try:
+                kept = workspace.store.execution_folder(folder) if folder else None
+                path = None if kept is None else read_path(kept, workspace.manifest.format)
+            except FileFormatError as error:
+                remarks.append(f"the path of trial {number} is not drawn: {error}")
+            else:
+                found |= {} if path is None else {number: path}
+    return found
+
+
+def _photographs(folder: Path, trials: Sequence[Trial]) -> Iterator[tuple[str, Path]]:
+    """What `look --workspace` kept of trials."""
+    for trial in trials:
+        path = folder / "pictures" / f"trial-{trial.number:03d}-seen.png"
+        if path.is_file() and not path.is_symlink():
+            yield f"Trial {trial.number}, as it was looked at.", path
 
 
 def _checks(trials: Sequence[Trial]) -> tuple[CheckRow, ...]:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import shlex
+from pathlib import Path
 
 import numpy as np
 
 from prior_reinforce.bench.workspace.log import Executed, Executing, NotExecuted, WorkspaceState
-from prior_reinforce.bench.workspace.workspace import Workspace
+from prior_reinforce.bench.workspace.workspace import Workspace, workspace_around
 from prior_reinforce.registry import own_class
 from prior_reinforce.session.trials import Goal, Stage, Trial
 from prior_reinforce.wording import error_example, plain, say_place, say_reading, say_tolerance
@@ -22,7 +23,7 @@ OUTDATED = "planned before a correction: unless it was thrown, void it and ask a
 
 
 def describe(workspace: Workspace) -> str:
-    """Say where a workspace stands: ten lines at most, and one for each remark on the model."""
+    """Say where a workspace stands: ten lines, and one for each earlier goal and remark."""
     state, manifest = workspace.state, workspace.manifest
     robot = manifest.robot.robot if manifest.robot is not None else "none, no limits are checked"
     n = 0 if state.demonstrations is None else workspace.demonstrations.n
@@ -39,9 +40,8 @@ def describe(workspace: Workspace) -> str:
         ("model", _say_model(workspace)),
         *(("  note", remark) for remark in (training.remarks if training is not None else ())),
     ]
+    rows += [(f"goal {goal.number}", _say_goal(workspace, goal, n)) for goal in state.goals]
     if state.goals:
-        goal = state.goals[-1]
-        rows.append((f"goal {goal.number}", _say_goal(workspace, goal, n)))
         shown = state.current[-_TRIALS_SHOWN:]
         if earlier := len(state.current) - len(shown):
             rows.append((f"  {earlier} more", "before these; all are in the report"))
@@ -113,38 +113,44 @@ def execution_warning(workspace: Workspace, trial: Trial) -> str:
     return plain("; ".join(warnings))
 
 
+def call(workspace: Workspace, command: str, *words: object) -> str:
+    """A command as it is typed here: within the workspace, it need not be named."""
+    here = workspace_around(Path())
+    is_here = here is not None and here.resolve() == workspace.folder.resolve()
+    named = () if is_here else (shlex.quote(str(workspace.folder)),)
+    return " ".join(map(str, ("prior-reinforce", command, *named, *words)))
+
+
 def next_step(workspace: Workspace) -> str:
     """The command that comes next."""
     state = workspace.state
-    folder = shlex.quote(str(workspace.folder))
     if state.demonstrations is None:
-        return f"prior-reinforce import {folder} RECORDINGS"
+        return call(workspace, "import", "RECORDINGS")
     if state.stale:
-        return f"prior-reinforce learn {folder}"
-    new_goal = f"prior-reinforce goal {folder} {_goal_example(workspace)}"
+        return call(workspace, "learn")
+    new_goal = call(workspace, "goal", _goal_example(workspace))
     if not state.goals:
         return new_goal
     trial = state.open_trial
     if trial is not None:
-        tell = f"prior-reinforce tell {folder} {trial.number} {tell_example(workspace)}"
+        tell = call(workspace, "tell", trial.number, tell_example(workspace))
+        did_not_move = call(workspace, "ask", "--arm-did-not-move")
         if trial.stage is Stage.EXECUTING and not workspace.log.is_executing():
-            return f"if it moved: {tell}; if not: prior-reinforce ask {folder} --arm-did-not-move"
+            return f"if it moved: {tell}; if not: {did_not_move}"
         ended = state.executions.get(trial.number)
         if isinstance(ended, Executed) and ended.outcome == "aborted":
-            return (
-                f"prior-reinforce void {folder} {trial.number} --reason WHY; if it failed before "
-                f"the arm moved: prior-reinforce ask {folder} --arm-did-not-move"
-            )
+            void = call(workspace, "void", trial.number, "--reason WHY")
+            return f"{void}; if it failed before the arm moved: {did_not_move}"
         if isinstance(ended, NotExecuted):
-            return f'prior-reinforce ask {folder} --run "COMMAND {{plan}}"'
+            return call(workspace, "ask", '--run "COMMAND {plan}"')
         return f"{tell} (or --hit)"
     if state.solved:
-        return f"{new_goal}, or prior-reinforce report {folder}"
+        return f"{new_goal}, or {call(workspace, 'report')}"
     training = state.training
     own = {"generator": training.own if training is not None else None}
     own["adapter"] = own_class(state.goals[-1].adapter)
-    flags = (f" --{family} {shlex.quote(name)}" for family, name in own.items() if name)
-    return f"prior-reinforce ask {folder}" + "".join(flags)
+    flags = (f"--{family} {shlex.quote(name)}" for family, name in own.items() if name)
+    return call(workspace, "ask", *flags)
 
 
 def _say_nearer(workspace: Workspace) -> str:
@@ -154,7 +160,7 @@ def _say_nearer(workspace: Workspace) -> str:
         return ""
     if not np.any(workspace.demonstrations.far_outside(state.goals[-1].goal)):
         return ""
-    nearer = f"prior-reinforce goal {shlex.quote(str(workspace.folder))} {_goal_example(workspace)}"
+    nearer = call(workspace, "goal", _goal_example(workspace))
     return f"; if it refuses, a goal nearer to the demonstrations: {nearer}"
 
 
@@ -181,7 +187,8 @@ def _say_model(workspace: Workspace) -> str:
 def _say_goal(workspace: Workspace, goal: Goal, n: int) -> str:
     manifest = workspace.manifest
     place = say_place(goal.goal, manifest.outcome_names, manifest.outcome_units)
-    told = [trial for trial in workspace.state.current if trial.stage is Stage.TOLD]
+    trials = workspace.state.trials_of(goal.number)
+    told = [trial for trial in trials if trial.stage is Stage.TOLD]
     hits = [count for count, trial in enumerate(told, start=1) if trial.hit]
     if hits:
         total = f"N = {n} demonstrations + {hits[0]} = {n + hits[0]}"
@@ -189,6 +196,8 @@ def _say_goal(workspace: Workspace, goal: Goal, n: int) -> str:
     changed = f", new hardware: {goal.new_hardware}" if goal.new_hardware is not None else ""
     carried = ", with earlier goals' trials" if goal.carry_over else ""
     so_far = f"not reached yet, {_say_count(len(told))} told"
+    if goal.number < len(workspace.state.goals):
+        return f"{place}: not reached in {_say_count(len(told))}"
     return f"{place}: {so_far}; adapter {goal.adapter}{carried}{changed}"
 
 

@@ -149,6 +149,20 @@ class Store:
         """
         return read_plan(self.plan_path(kept.file), sha256=kept.sha256)
 
+    def read(self, name: str) -> bytes:
+        """Read one of the files, by its path in the workspace.
+
+        Raises:
+            FileFormatError: It is missing.
+        """
+        path = require_inside(self._folder / name, self._folder)
+        try:
+            return path.read_bytes()
+        except OSError as error:
+            raise FileFormatError(
+                f"{path} cannot be read ({error.strerror}); restore it from a copy"
+            ) from error
+
     def make_execution_folder(self, plan: str) -> Path:
         """Make an empty folder for what a command writes while it executes the plan of a file.
 

@@ -29,7 +29,7 @@ from typing_extensions import Self
 from prior_reinforce.adapters import ADAPTERS, DEFAULT_ADAPTER
 from prior_reinforce.arrays import Frames
 from prior_reinforce.bench.robots.executors.base import ArmSettings, Motion
-from prior_reinforce.bench.robots.plan_files import PlanFile
+from prior_reinforce.bench.robots.plan_files import PlanFile, write_plan
 from prior_reinforce.bench.workspace.journal import JOURNAL_FILE
 from prior_reinforce.bench.workspace.log import (
     DemonstrationsImported,
@@ -44,9 +44,12 @@ from prior_reinforce.bench.workspace.log import (
 )
 from prior_reinforce.bench.workspace.manifest import (
     MANIFEST_FILE,
+    UNKNOWN,
     Manifest,
+    new_manifest,
     parse_manifest,
     read_manifest,
+    with_columns,
 )
 from prior_reinforce.bench.workspace.store import Store
 from prior_reinforce.errors import (
@@ -58,7 +61,7 @@ from prior_reinforce.errors import (
     WorkspaceError,
 )
 from prior_reinforce.files import named_disk_errors, require_inside, sweep, write, write_once
-from prior_reinforce.plans.motions import Demonstrations, Plan
+from prior_reinforce.plans.motions import Demonstrations, Plan, PlanFormat
 from prior_reinforce.registry import own_class
 from prior_reinforce.session.events import Entry, KeptPlan
 from prior_reinforce.session.session import Session
@@ -66,9 +69,11 @@ from prior_reinforce.session.trials import Goal, Stage, Trial
 
 if TYPE_CHECKING:
     from prior_reinforce.adapters.base import Adapter
+    from prior_reinforce.bench.robots import RobotLimits
     from prior_reinforce.bench.robots.executors.command import CommandResult
     from prior_reinforce.bench.robots.executors.drive import Look
     from prior_reinforce.bench.robots.report import LimitReport
+    from prior_reinforce.bench.workspace.records import StatusRecord
     from prior_reinforce.generators.base import FitProgress, Generator
 
 
@@ -79,6 +84,20 @@ _OWN = (
 """What is read and written in the folder."""
 _LOOK_LIMIT = 20.0
 """How long an arm may take to say where it stands, in [s]; ours: to start a program and connect."""
+
+
+def workspace_around(folder: Path, *, above: bool = True) -> Path | None:
+    """Return the workspace that a folder is, or is in; None where it is in none.
+
+    Args:
+        folder: For instance the current one, `Path()`; what is returned is relative to it.
+        above: Whether folders above it count.
+    """
+    for up in ("", *([".."] * len(folder.resolve().parts) if above else ())):
+        folder = folder / up
+        if os.path.isfile(folder / MANIFEST_FILE):  # False for a name that is too long
+            return folder
+    return None
 
 
 class Workspace:
@@ -107,22 +126,69 @@ class Workspace:
         self._read: dict[str, Demonstrations] = {}
 
     @classmethod
-    def create(cls, folder: str | os.PathLike[str], manifest: str) -> Self:
-        """Make a workspace from the text of its manifest; nothing is made if that is wrong.
+    def create(
+        cls,
+        folder: str | os.PathLike[str],
+        manifest: str | None = None,
+        *,
+        name: str | None = None,
+        robot: str | RobotLimits = "panda",
+        tip: str | None = None,
+        action_names: Sequence[str] | None = None,
+        action_units: Sequence[str] = ("rad",),
+        gripper: str | None = None,
+        dt: float = 0.0125,
+        outcome_names: Sequence[str] = ("x", "y"),
+        outcome_units: Sequence[str] = ("m",),
+        tolerance: float | Sequence[float] = 0.015,
+    ) -> Self:
+        """Make a workspace, as `prior-reinforce new` does; nothing is made if a value is wrong.
+
+        Args:
+            folder: Folder to make.
+            manifest: Text of its manifest, in place of all that follows.
+            name: Of the task; the folder's name if not given.
+            robot: Whose limits hold: a preset (`robots.presets.PRESETS`), the path of a .urdf,
+                limits, or `none`.
+            tip: Link of the URDF that is the flange; tool0, flange or the last that turns if not
+                given.
+            action_names: Of the action dimensions; the robot's joints if not given, with no robot
+                those that the first import has.
+            action_units: Of each action dimension; a single one holds for all.
+            gripper: Unit of a gripper's opening, one more dimension, or `none`; a preset's own if
+                not given.
+            dt: Time between two frames of a plan, in [s].
+            outcome_names: Of the outcome's components.
+            outcome_units: Of each component; a single one holds for all.
+            tolerance: epsilon: one number, or one for each component, in its unit.
 
         Raises:
             WorkspaceError: The folder holds something already, or cannot be written.
-            FileFormatError: The manifest is no TOML.
-            ConfigurationError: The manifest holds a wrong value.
+            FileFormatError: The manifest is no TOML, or the URDF cannot be read.
+            ConfigurationError: A wrong value.
         """
         folder = Path(folder)
-        parse_manifest(manifest, folder / MANIFEST_FILE)
+        text = manifest
+        if text is None:
+            text = new_manifest(
+                name or folder.resolve().name,
+                robot=robot,
+                tip=tip,
+                action_names=action_names,
+                action_units=action_units,
+                gripper=gripper,
+                dt=dt,
+                outcome_names=outcome_names,
+                outcome_units=outcome_units,
+                tolerance=tolerance,
+            )
+        parse_manifest(text, folder / MANIFEST_FILE)
         with named_disk_errors(folder):
             sweep(folder)
             if folder.is_file() or (folder.is_dir() and any(folder.iterdir())):
                 raise WorkspaceError(f"{folder} exists and is not empty; choose a new folder")
             folder.mkdir(parents=True, exist_ok=True)
-            write(folder / MANIFEST_FILE, manifest)
+            write(folder / MANIFEST_FILE, text)
         return cls(folder)
 
     def _read_manifest(self) -> None:
@@ -276,6 +342,84 @@ class Workspace:
         """
         return self.store.plan(_kept(trial))
 
+    def export(
+        self, number: int, path: str | os.PathLike[str], *, rate: float | None = None
+    ) -> PlanFile:
+        """Write a trial's plan as NPZ, CSV, or JSON in ROS 2's JointTrajectory order.
+
+        Args:
+            number: The trial's.
+            path: Where to: .npz, .csv or .json; no file is written over.
+            rate: Samples a second; the plan's own frames if not given.
+
+        Raises:
+            RobotLimitError: The plan breaks a limit of now.
+            TrialStateError: There is no such trial.
+            FileFormatError: The file is there already, or the plan is not what was written.
+            ConfigurationError: Another kind of file, or an impossible rate.
+        """
+        plan = self.plan(self.state.trial(number))
+        verdict = self.gate(plan.actions)
+        if verdict is not None:
+            verdict.require()
+        return write_plan(plan, Path(path), rate=rate)
+
+    def pack(self, path: str | os.PathLike[str]) -> str:
+        """Write the workspace into one file, without what is this machine's own ([arm], outputs).
+
+        Args:
+            path: The file; none is written over.
+
+        Returns:
+            Its SHA-256, for whoever gets it to compare.
+
+        Raises:
+            FileFormatError: The file is there already, or a file of the workspace is missing.
+            WorkspaceError: A trial is executing, or the disk refuses.
+        """
+        from prior_reinforce.bench.workspace.packing import pack
+
+        return pack(self, Path(path))
+
+    @classmethod
+    def unpack(cls, path: str | os.PathLike[str], folder: str | os.PathLike[str]) -> Self:
+        """Make a workspace of what `pack` wrote, and open it; nothing in it runs code.
+
+        Raises:
+            FileFormatError: It is damaged, was changed, or holds what `pack` does not write.
+            WorkspaceError: The folder exists, or the disk refuses.
+        """
+        from prior_reinforce.bench.workspace.packing import unpack
+
+        unpack(Path(path), Path(folder))
+        return cls(folder)
+
+    def status(self) -> StatusRecord:
+        """Where the workspace stands, as `prior-reinforce status --json`; printed, in ten lines."""
+        from prior_reinforce.bench.workspace.records import status_record
+
+        return status_record(self)
+
+    def report(
+        self,
+        folder: str | os.PathLike[str] | None = None,
+        *,
+        progress: Callable[[int, int], None] | None = None,
+    ) -> Path:
+        """Write a page with every goal, its trials and plans, and return its path.
+
+        Args:
+            folder: For the page and its pictures; `report` in the workspace if not given.
+            progress: Called with the number of goals drawn and of all goals.
+
+        Raises:
+            WorkspaceError: There is nothing to report yet, or the folder cannot be written.
+            FileFormatError: The demonstrations are damaged.
+        """
+        from prior_reinforce.bench.workspace.report import report_workspace
+
+        return report_workspace(self, Path(folder or self.folder / "report"), progress)
+
     def import_demonstrations(self, demonstrations: Demonstrations, source: str) -> None:
         """Take in demonstrations, in place of earlier ones.
 
@@ -283,6 +427,8 @@ class Workspace:
             InvalidDemonstrationsError: They do not fit the manifest, or the trials so far.
             TrialStateError: A trial waits to be told.
         """
+        if self.manifest.format.names == UNKNOWN:
+            self._take_columns(demonstrations.format)
         self._check_fit(demonstrations, source)
         with self.log.exclusive():
             self.state.refuse_open_trial("importing demonstrations")
@@ -298,6 +444,15 @@ class Workspace:
                     n=demonstrations.n, sha256=demonstrations.sha256, source=source
                 )
             )
+
+    def _take_columns(self, form: PlanFormat) -> None:
+        """Write the names and units of recorded columns into the manifest, which knew none."""
+        path = self.folder / MANIFEST_FILE
+        with named_disk_errors(self.folder):
+            write(path, with_columns(read_manifest(path), form.names, form.units))
+        self._read_manifest()
+        self.log.close()
+        self.log = WorkspaceLog(self.folder, self.store, self.manifest.format)
 
     def learn(
         self,

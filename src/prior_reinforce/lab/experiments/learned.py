@@ -53,12 +53,12 @@ def load_learned(
         record = msgspec.json.decode(path.read_bytes(), type=TrainingRecord)
     except (OSError, msgspec.DecodeError) as error:
         raise FileFormatError(
-            f"no learned model in {folder} ({error}); make one with: prior-reinforce learn "
+            f"no learned model in {folder} ({error}); make one with: prior-reinforce train "
             f"--out {folder}"
         ) from error
     if record.demonstrations_sha256 != demonstrations.sha256:
         raise ConfigurationError(
             f"the model in {folder} was learned from other demonstrations; learn again with "
-            "prior-reinforce learn, or name what it was learned from with --demonstrations"
+            "prior-reinforce train, or name what it was learned from with --demonstrations"
         )
     return load_generator(folder, own=own_class(generator))

@@ -207,7 +207,7 @@ def table(figures: Figures) -> Table:
 def draw(figures: Figures, folder: Path) -> list[Picture]:
     """Means with their intervals, and how they go from goal to goal."""
     from prior_reinforce.report.style import GOAL, INK_SOFT, calm_axes, drawing, new_figure
-    from prior_reinforce.report.style import save_png as save
+    from prior_reinforce.report.style import save_figure as save
 
     with drawing():
         figure = new_figure(10.5, 4.4)

@@ -25,7 +25,7 @@ from prior_reinforce.report.style import (
     calm_axes,
     drawing,
     new_figure,
-    save_png,
+    save_figure,
     trial_colour,
 )
 
@@ -76,7 +76,7 @@ def draw_success(panels: Sequence[Panel], path: Path) -> Path:
             loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=2,
             frameon=False, fontsize=9.5, labelcolor=INK,
         )  # fmt: skip
-    return save_png(figure, path)
+    return save_figure(figure, path)
 
 
 def _draw_panel(axes: Axes, panel: Panel) -> None:
@@ -135,7 +135,7 @@ def draw_kinds(kinds: Sequence[str], panels: Mapping[str, Sequence[Line]], path:
         handles, labels, loc="outside lower center", ncols=len(labels),
         frameon=False, fontsize=9.5, labelcolor=INK,
     )  # fmt: skip
-    return save_png(figure, path)
+    return save_figure(figure, path)
 
 
 @drawing()
@@ -208,7 +208,7 @@ def draw_fields(
         bar = figure.colorbar(colours, ax=axes, extend="max", shrink=0.9, pad=0.02)
         bar.set_label("distance from goal to landing [cm]")
         bar.outline.set_visible(False)
-    return save_png(figure, path)
+    return save_figure(figure, path)
 
 
 @drawing()
@@ -235,7 +235,7 @@ def draw_alignment(
         axes.set_ylabel(joint)
     figure.axes[-1].set_xlabel("time [s]")
     figure.axes[-1].set_xlim(0, dt * (max(before.shape[1], after.shape[1]) - 1))
-    return save_png(figure, path)
+    return save_figure(figure, path)
 
 
 @dataclass(frozen=True)
@@ -279,4 +279,4 @@ def draw_rows(
     axes.set_ylim(len(labels) - 0.4, -0.6)
     axes.set_xlabel(axis_label)
     figure.legend(loc="outside lower center", frameon=False, fontsize=9.5, labelcolor=INK)
-    return save_png(figure, path)
+    return save_figure(figure, path)

@@ -14,7 +14,7 @@ from matplotlib.patches import FancyArrowPatch, Rectangle
 from prior_reinforce.environment import KeyFrame, TableScene, Task
 from prior_reinforce.lab.tasks import make_task
 from prior_reinforce.perception.calibration import TableCalibration
-from prior_reinforce.report.style import GOAL, HIT, INK, drawing, new_figure, save_png
+from prior_reinforce.report.style import GOAL, HIT, INK, drawing, new_figure, save_figure
 from prior_reinforce.wording import to_words
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ def draw_process(rows: Mapping[str, Row], path: Path) -> Path:
         _draw_row(line, row, fine, coarse)
     fine.close()
     coarse.close()
-    return save_png(figure, path)
+    return save_figure(figure, path)
 
 
 def _draw_row(line: Sequence[Axes], row: Row, fine: Camera, coarse: Camera) -> None:

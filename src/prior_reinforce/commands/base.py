@@ -1,0 +1,131 @@
+"""What commands share: which workspace and which trial their words are about, JSON, colour."""
+
+from __future__ import annotations
+
+import io
+import re
+import sys
+from collections.abc import Sequence
+from contextlib import AbstractContextManager, nullcontext, redirect_stdout
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, ClassVar
+
+import msgspec
+import tyro
+
+from prior_reinforce.bench.workspace.status import next_step
+from prior_reinforce.bench.workspace.workspace import Workspace, workspace_around
+from prior_reinforce.errors import ConfigurationError
+from prior_reinforce.files import check_path
+from prior_reinforce.wording import GREEN, RED, YELLOW, coloured, plain
+
+Words = Annotated[tuple[str, ...], tyro.conf.Positional]
+"""Positional words of a command on a workspace; see `find_workspace`."""
+Json = Annotated[bool, tyro.conf.arg(help="Print JSON for programs (docs/workspace.md).")]
+_COLOURS = {"REFUSE": RED, "WARN": YELLOW, "ok": GREEN}
+"""Of the words that begin a line of the gate."""
+
+
+@dataclass(frozen=True)
+class OnWorkspace:
+    """A command on a workspace."""
+
+    words: Annotated[Words, tyro.conf.arg(metavar="[WORKSPACE]")] = ()
+    """Folder of the workspace; the one that the current folder is in if not given."""
+
+    takes_words: ClassVar[bool] = False
+    """Whether the command takes words beside the workspace."""
+
+    def run(self) -> int | None:
+        """Open the workspace and do it there; the exit status, None for 0."""
+        folder, words = find_workspace(self.words)
+        if words and not self.takes_words:
+            raise ConfigurationError(
+                f"{words[0]!r} is no workspace, and this command takes nothing else; drop it"
+            )
+        with Workspace(folder) as workspace:
+            return self.run_on(workspace, words)
+
+    def run_on(self, workspace: Workspace, words: Sequence[str]) -> int | None:
+        """What the command does, with the words beside the workspace."""
+        raise NotImplementedError
+
+
+def find_workspace(words: Sequence[str]) -> tuple[Path, tuple[str, ...]]:
+    """Return a workspace's folder and the words that are not its name.
+
+    Within a workspace the words are about it, unless the first one names another; a number never
+    does (a folder that is called 3 is `./3`). Elsewhere the first word is the folder.
+
+    Raises:
+        ConfigurationError: None is named, and the current folder is in none.
+    """
+    here = workspace_around(Path())
+    if words and (here is None or _names_workspace(words[0])):
+        return check_path(Path(words[0])), tuple(words[1:])
+    if here is None:
+        raise ConfigurationError(
+            "name the workspace, or change into its folder; make one with: prior-reinforce new "
+            "WORKSPACE"
+        )
+    return here, tuple(words)
+
+
+def _names_workspace(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return workspace_around(Path(word), above=False) is not None
+    return False
+
+
+def trial_and_rest(workspace: Workspace, words: Sequence[str]) -> tuple[int, tuple[str, ...]]:
+    """Return the trial that the first word numbers, else the one that waits, and the other words.
+
+    Raises:
+        ConfigurationError: None is numbered, and none waits.
+    """
+    if words and re.fullmatch(r"-?\d{1,9}", words[0], re.ASCII):
+        return int(words[0]), tuple(words[1:])
+    waiting = workspace.state.open_trial
+    if waiting is None:
+        raise ConfigurationError("no trial waits; say which one: its number comes first")
+    return waiting.number, tuple(words)
+
+
+def silent(really: bool) -> AbstractContextManager[object]:
+    """Print nothing, where JSON or nothing is wanted."""
+    return redirect_stdout(io.StringIO()) if really else nullcontext()
+
+
+def print_next(workspace: Workspace) -> None:
+    """Say which command comes next."""
+    print(f"next: {next_step(workspace)}")
+
+
+def print_json(record: object) -> None:
+    """Print records of `bench.workspace.records`; what is not finite is null."""
+    print(msgspec.json.format(msgspec.json.encode(record)).decode())
+
+
+def print_checked(text: str) -> None:
+    """Print what the gate says, its verdicts in colour where a terminal shows them."""
+    print(
+        re.sub(
+            rf"^( *)({'|'.join(_COLOURS)})\b",
+            lambda found: found[1] + coloured(found[2], _COLOURS[found[2]], sys.stdout),
+            plain(text, keep="\n"),
+            flags=re.MULTILINE,
+        )
+    )
+
+
+def answer_to(question: str) -> str:
+    """Ask the person at the terminal; on standard error, since output may go elsewhere.
+
+    Raises:
+        EOFError: No answer came.
+    """
+    with redirect_stdout(sys.stderr):
+        return input(question)
