@@ -24,7 +24,7 @@ def test_the_report_shows_every_goal_and_the_voided_trials(run, folder, tmp_path
     assert status == 0
     page = (tmp_path / "planar" / "report" / "report.html").read_text()
     assert out == "report: planar/report/report.html\n"
-    for text in ("Goal 1", "Goal 2", "ball slipped", "3 cm long"):
+    for text in ("Goal 1", "Goal 2", "ball slipped", "3cm long"):
         assert text in page
     path = next((tmp_path / "planar" / "plans").glob("trial-001*"))
     path.chmod(0o644)
