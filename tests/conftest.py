@@ -32,7 +32,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Start the longest tests first, or one process waits for them in the end."""
 
     def place(item: pytest.Item) -> int:
-        if item.path.suffix == ".ipynb" or item.path.stem in ("test_tutorial", "test_cluster"):
+        if item.path.stem in ("test_notebook", "test_tutorial", "test_cluster"):
             return 0
         return 1 if item.get_closest_marker("slow") else 2
 

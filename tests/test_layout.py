@@ -28,6 +28,7 @@ OF_THE_WHOLE = {
     "extending": "a new member of each family",
     "folders": "folders as labs have them, from recordings to a plan",
     "layout": "this file",
+    "notebook": "the notebook as a reader runs it",
     "public": "what the package exports, and how little small commands load",
     "shapes": "the check of shapes that runs during the tests",
     "tutorial": "the tutorial from top to bottom",
