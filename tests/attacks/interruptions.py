@@ -51,8 +51,8 @@ OPEN = ("ask --run", "tell", "void", "export", "report", "ask --out")
 """Called with an open trial; the others have none."""
 
 
-HOW = {"killed": 2, "read-only": 1, "full disk": 1}
-"""How a command is interrupted, and how often that is tried with each in the tests."""
+HOW = ("killed", "refused")
+"""How a command is interrupted; refused by a disk that is full, or by one that is read-only."""
 _PR_CAPBSET_DROP, _CAP_DAC_OVERRIDE = 24, 1
 """Root's right to write where permissions forbid it; it stays root, and reads what is its own."""
 
@@ -73,13 +73,14 @@ def attack(how: str, name: str, rng: random.Random, here: Path, asked: Path) -> 
         program.communicate()
         time.sleep(0.05)
     else:
-        _refuse(how, name, here, 2 ** rng.randrange(8, 16))
+        disk = rng.choice(["full", "read-only"])
+        _refuse(disk, name, here, 2 ** rng.randrange(8, 16))
     _check(folder, before, here)
     _finish(name, here, folder)
     return HELD
 
 
-def _refuse(how: str, name: str, here: Path, limit: int) -> None:
+def _refuse(disk: str, name: str, here: Path, limit: int) -> None:
     """Call a command on a disk that holds files of a limited size, in bytes, or none at all."""
     before = tree(here)
     kept = {path: path.stat().st_mode for path in (here, *here.rglob("*"))}
@@ -92,12 +93,12 @@ def _refuse(how: str, name: str, here: Path, limit: int) -> None:
         for path, mode in kept.items():
             path.chmod(mode & 0o555)
 
-    program = _start(here, *COMMANDS[name], first=full if how == "full disk" else read_only)
+    program = _start(here, *COMMANDS[name], first=full if disk == "full" else read_only)
     _, err = program.communicate(timeout=60)
     for path, mode in kept.items():
         path.chmod(mode)
     says = "free some disk space|cannot write"
-    if how == "read-only":
+    if disk == "read-only":
         says = "make the folder writable"
         assert program.returncode == 2, err
         assert tree(here) == before, "changed by a refusal"

@@ -22,13 +22,13 @@ from tests.attacks.classes import CLASSES, Attack
 from tests.attacks.harness import HELD, prepare, where
 
 ATTACKS: dict[str, tuple[Attack, int]] = {
-    **{name: (attack, 84) for name, attack in CLASSES.items()},
-    "recordings": (CLASSES["recordings"], 200),  # there are twenty kinds
-    "files": (CLASSES["files"], 60),
-    "motions": (execution.attack, 150),
+    **{name: (attack, 40) for name, attack in CLASSES.items()},
+    "recordings": (CLASSES["recordings"], 120),  # there are twenty kinds
+    "files": (CLASSES["files"], 30),
+    "motions": (execution.attack, 90),
     **{
-        f"{how}: {name}": (partial(interruptions.attack, how, name), cases)
-        for how, cases in interruptions.HOW.items()
+        f"{how}: {name}": (partial(interruptions.attack, how, name), 1)
+        for how in interruptions.HOW
         for name in interruptions.COMMANDS
     },
     "killed sessions": (sessions.attack, 1),

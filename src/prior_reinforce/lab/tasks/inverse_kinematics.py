@@ -59,10 +59,7 @@ def joint_paths(poses: Float[np.ndarray, "n H 6"], dt: float) -> Float[np.ndarra
     Panda's position and velocity limits as bounds. Where a path asks for more than they allow the
     arm lags behind or stops short, as a real one would, and catches up when it can.
     """
-    paths = np.empty((*poses.shape[:2], N_JOINTS))
-    for path, out in zip(poses, paths, strict=True):
-        _follow(path, dt, out)
-    return paths
+    return np.stack([_followed(path.tobytes(), len(path), dt) for path in poses])
 
 
 @lru_cache(maxsize=1)
@@ -70,8 +67,11 @@ def _arm() -> mujoco.MjModel:
     return mujoco.MjModel.from_xml_path(str(Path(__file__).with_name("panda.xml")))
 
 
-def _follow(poses: Float[np.ndarray, "H 6"], dt: float, out: Float[np.ndarray, "H 7"]) -> None:
-    """Solve one path into `out`."""
+@lru_cache(maxsize=256)
+def _followed(path: bytes, horizon: int, dt: float) -> Float[np.ndarray, "H 7"]:
+    """Solve one path; demonstrations are executed again and again, and take 0.2 s each."""
+    poses = np.frombuffer(path).reshape(horizon, 6)
+    out = np.empty((horizon, N_JOINTS))
     arm = _arm()
     configuration = mink.Configuration(arm, q=READY)
     reach = mink.FrameTask("flange", "site", _POSITION_COST, _ATTITUDE_COST)
@@ -102,3 +102,5 @@ def _follow(poses: Float[np.ndarray, "H 6"], dt: float, out: Float[np.ndarray, "
             for _ in range(_STEPS_A_FRAME):
                 step([bounds, speed], dt / _STEPS_A_FRAME)
         out[frame] = configuration.q
+    out.setflags(write=False)
+    return out
