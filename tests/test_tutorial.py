@@ -1,4 +1,4 @@
-"""The tutorial's own code blocks, as they stand, in a fresh folder."""
+"""The code blocks of the tutorial and of the Python page, as they stand, in a fresh folder."""
 
 import os
 import re
@@ -39,3 +39,16 @@ def test_a_new_user_reaches_a_goal_by_following_the_tutorial(tmp_path):
     assert re.search(r"reached in \d+ trials? \(N = 6 demonstrations \+ \d+ = ", said), said
     page = (tmp_path / "hoop" / "report" / "report.html").read_text()
     assert "ball slipped" in page
+
+
+@pytest.mark.slow
+def test_the_afternoon_from_python_runs_as_it_stands(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    page = (REPOSITORY / "docs" / "python.md").read_text()
+    said = {}
+    exec("".join(code for _, code in BLOCK.findall(page)), said)
+    assert said["status"].goals[0].reached_after >= 1
+    assert said["page"].is_file()
+    assert {path.name for path in tmp_path.iterdir()} == {
+        *("recordings", "hoop", "plan.csv", "hoop.zip")
+    }

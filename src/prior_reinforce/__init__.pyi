@@ -99,6 +99,7 @@ from .plans.motions import PlanFormat as PlanFormat
 from .readings import Reading as Reading
 from .session.session import Session as Session
 from .session.session import ask_all as ask_all
+from .session.trials import AskedTrial as AskedTrial
 from .session.trials import Stage as Stage
 from .session.trials import Trial as Trial
 from .wording import from_words as from_words

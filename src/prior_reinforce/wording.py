@@ -15,6 +15,7 @@ Source: paper, Section IV, "Perception Process" (coarse human feedback); the wor
 
 from __future__ import annotations
 
+import html
 import math
 import os
 import re
@@ -102,6 +103,11 @@ def coloured(text: str, code: str, stream: TextIO) -> str:
     """Return a text in an ANSI colour where its stream is a terminal that shows one (NO_COLOR)."""
     plainly = os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb"
     return text if plainly or not stream.isatty() else f"\x1b[{code}m{text}\x1b[0m"
+
+
+def as_html(text: str) -> str:
+    """Return a text of several lines as a notebook shows it: as it is, names and all."""
+    return f"<pre>{html.escape(plain(text, keep=chr(10)))}</pre>"
 
 
 def in_words(units: Sequence[str]) -> bool:

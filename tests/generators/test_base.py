@@ -5,6 +5,7 @@ import pytest
 
 from prior_reinforce.errors import ConfigurationError, FileFormatError, NotFittedError
 from prior_reinforce.generators.base import ConditionScale, Generator
+from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 
 
 class Constant(Generator):
@@ -85,3 +86,22 @@ def test_scaled_conditions_span_minus_one_to_one_in_every_unit():
     outcomes = np.array([[0.8, 20.0], [1.2, 35.0], [1.0, 5.0]])
     scaled = ConditionScale.fit(outcomes).scale(outcomes)
     np.testing.assert_allclose(scaled, [[-1, 0], [1, 1], [0, -1]], atol=1e-12)
+
+
+class Remarking(Generator):
+    name = "remarking"
+
+    def _fit(self, demonstrations, seed, progress):
+        self.remarks = ("joint3 is held",)
+
+    def _generate(self, conditions): ...
+
+
+def test_what_a_fit_remarks_is_logged(caplog):
+    demos = Demonstrations(np.eye(2)[:, :, None], [[0.1], [0.2]], PlanFormat(["a"], ["rad"], 0.1))
+    generator = Remarking()
+    assert repr(generator) == "Remarking(not fitted)"
+    with caplog.at_level("INFO", logger="prior_reinforce"):
+        generator.fit(demos, seed=0)
+    assert caplog.messages == ["remarking: joint3 is held"]
+    assert repr(generator) == "Remarking(fitted)"

@@ -258,3 +258,26 @@ def test_outcomes_that_differ_by_rounding_are_the_same():
     almost[2] += 1e-12
     with pytest.warns(UserWarning, match="0 and 2 have the same outcome"):
         make(outcomes_seen=almost)
+
+
+def test_a_text_is_no_list_of_names():
+    with pytest.raises(InvalidPlanError, match=r"units must be a list such as \['rad'\], got a"):
+        PlanFormat(("pan", "arm"), "rad", 0.02)
+    with pytest.raises(InvalidPlanError, match="names must be a list"):
+        PlanFormat("pan", ("rad",), 0.02)
+
+
+def test_a_plan_is_drawn_by_unit_and_printed_in_a_line():
+    form = PlanFormat(("pan", "$arm", "gripper"), ("rad", "rad", "percent"), 0.02)
+    plan = Plan(np.linspace(0, [1.0, 2.0, 70.0], 11), form)
+    assert repr(plan) == "Plan(11 frames x 3, 0.2 s: pan, $arm, gripper)"
+    joints, gripper = plan.plot().axes
+    assert [len(axes.lines) for axes in (joints, gripper)] == [2, 1]
+    np.testing.assert_array_equal(joints.lines[1].get_ydata(), plan.actions[:, 1])
+    np.testing.assert_allclose(gripper.lines[0].get_xdata(), plan.times)
+    assert gripper.get_ylabel() == "[percent]"
+
+
+def test_demonstrations_are_printed_in_a_line():
+    demos = Demonstrations(np.zeros((2, 5, 1)), [[0.1], [0.2]], PlanFormat(["a"], ["rad"], 0.1))
+    assert repr(demos) == "Demonstrations(2 plans, 5 frames x 1, 0.4 s: a; outcomes x [m])"

@@ -1,5 +1,7 @@
 """Algorithm 1 as a state machine, on a closed-form world."""
 
+import copy
+import pickle
 import threading
 import warnings
 
@@ -18,6 +20,7 @@ from prior_reinforce.errors import (
     WorkspaceError,
 )
 from prior_reinforce.generators.base import Generator
+from prior_reinforce.generators.interpolation import SmoothInterpolation
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 from prior_reinforce.readings import Reading
 from prior_reinforce.session.session import Session, ask_all
@@ -666,3 +669,44 @@ def test_threads_may_share_a_session(session):
     assert not problems
     assert sorted(told) == list(range(1, len(told) + 1))
     assert session.n_trials == len(told)
+
+
+def test_what_another_session_did_is_known(session):
+    """`while not session.solved` does not end for a goal that was reached before."""
+    generator = RepeatingGenerator().fit(DEMOS, seed=0)
+    other = Session(generator, FullStepAdapter(), DEMOS, None, 0.015, log=session.log)
+    session.tell(session.ask().number, hit=True)
+    assert session.solved
+    other.set_goal([1.0, 0.0])
+    assert not session.solved
+    assert session.goal.tolist() == [1.0, 0.0]
+    assert len(session.goals) == 2
+    other.ask()
+    assert session.open_trial.number == 2
+    assert session.trials[0].number == 2
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda it: pickle.loads(pickle.dumps(it))])
+def test_a_session_in_memory_can_be_copied(copied):
+    session = Session(
+        SmoothInterpolation().fit(DEMOS, seed=0), BayesianAdapter(), DEMOS, GOAL, 0.015
+    )
+    session.tell(session.ask().number, "5cm long")
+    twin = copied(session)
+    assert twin.ask().plan.tolist() == session.ask().plan.tolist()
+    twin.tell(2, hit=True)
+    assert (twin.solved, session.solved) == (True, False)
+
+
+def test_printed_it_is_short(session):
+    trial = session.ask()
+    assert repr(trial) == "Trial(1 for goal 1, asked, condition [0.9, 0.1], plan 3 x 2)"
+    assert repr(session) == "Session(goal [0.9, 0.1] not reached, 0 trials told; trial 1 waits)"
+    told = session.tell(1, [0.05, 0.0])
+    assert "told, condition [0.9, 0.1], error [0.05, 0.0], miss" in repr(told)
+    assert repr(session) == "Session(goal [0.9, 0.1] not reached, 1 trial told)"
+    assert repr(Session(RepeatingGenerator(), FullStepAdapter(), DEMOS)) == "Session(no goal)"
+
+
+def test_a_void_needs_no_reason(session):
+    assert session.void(session.ask().number).note == ""

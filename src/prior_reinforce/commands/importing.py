@@ -16,7 +16,6 @@ from prior_reinforce.bench.importing import (
     Preprocessing,
     ReadOptions,
     Recordings,
-    appended,
     inspect,
     read,
 )
@@ -144,15 +143,10 @@ class Import(OnWorkspace):
         )
         result = recordings.demonstrations(inspection, known, names, units, partial=partial)
         print_checked(result.preview.text)
-        demonstrations, said = result.demonstrations, str(recordings.source)
-        if selection.left_out:
-            said = f"{said}, without what moves as well: {selection.left_out}"
-        if self.append:
-            before = workspace.demonstrations
-            demonstrations = appended(before, demonstrations)
-            said = f"{said}, appended to {before.n}"
-            print(f"appended    {before.n} demonstrations were there, now {demonstrations.n}")
-        workspace.import_demonstrations(demonstrations, said)
+        n_before = workspace.take_in(result, str(recordings.source), append=self.append)
+        if n_before:
+            n = n_before + result.demonstrations.n
+            print(f"appended    {n_before} demonstrations were there, now {n}")
         with named_disk_errors(workspace.folder):
             result.preview.draw(workspace.folder / _PICTURE)
         print(f"picture: {workspace.folder / _PICTURE}  (look at it before you learn)")

@@ -6,6 +6,7 @@ A member says how it learns (`_fit`), how it generates (`_generate`), and what i
 
 from __future__ import annotations
 
+import logging
 import os
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
@@ -22,6 +23,8 @@ from prior_reinforce.errors import ConfigurationError, FileFormatError, NotFitte
 from prior_reinforce.generators.members import unpack
 from prior_reinforce.generators.saving import SavedLayer, Tensors, read_model, write_model
 from prior_reinforce.plans.motions import Demonstrations
+
+_LOG = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -71,7 +74,14 @@ class Generator(ABC):
         self.remarks = ()
         self._fit(demonstrations, seed, progress or _silent)
         self._outcome_dim = demonstrations.outcome_dim
+        remarks: tuple[str, ...] = self.remarks
+        for remark in remarks:
+            _LOG.info("%s: %s", self.name, remark)
         return self
+
+    def __repr__(self) -> str:
+        """Class, and whether it is fitted."""
+        return f"{type(self).__name__}({'not fitted' if self._outcome_dim is None else 'fitted'})"
 
     def generate(self, conditions: ArrayLike) -> Plans:
         """Generate one plan for each condition.

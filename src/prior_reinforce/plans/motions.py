@@ -22,7 +22,7 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import Float
@@ -45,6 +45,9 @@ from prior_reinforce.arrays import (
 from prior_reinforce.errors import FileFormatError, InvalidDemonstrationsError, InvalidPlanError
 from prior_reinforce.files import open_npz
 from prior_reinforce.plans.signals import Signals, analyse
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _FILE_FORMAT = "prior-reinforce demonstrations"
 _FILE_VERSION = 1
@@ -71,6 +74,8 @@ class PlanFormat:
             InvalidPlanError: No names, repeated names, or another number of units than of names.
         """
         for name in ("names", "units", "per_plan"):
+            if isinstance(given := getattr(self, name), str):
+                raise InvalidPlanError(f"{name} must be a list such as [{given!r}], got a text")
             object.__setattr__(self, name, tuple(getattr(self, name)))
         if not self.names:
             raise InvalidPlanError("a plan format needs at least one action name, got none")
@@ -90,6 +95,12 @@ class PlanFormat:
     def action_dim(self) -> int:
         """D, the number of action dimensions."""
         return len(self.names)
+
+
+def _say_size(shape: tuple[int, ...], form: PlanFormat) -> str:
+    names = ", ".join(form.names if len(form.names) <= 8 else (*form.names[:7], "..."))
+    frames, columns = shape
+    return f"{frames} frames x {columns}, {(frames - 1) * form.dt:.3g} s: {names}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,6 +130,31 @@ class Plan:
         """Time of each frame from the first, in [s]."""
         return np.arange(self.horizon) * self.format.dt
 
+    def plot(self) -> Figure:
+        """Draw every action dimension over time, one axes a unit.
+
+        Returns:
+            A matplotlib figure, which a notebook shows; `figure.savefig(path)` writes it.
+        """
+        from matplotlib.figure import Figure
+
+        units = dict.fromkeys(self.format.units)
+        figure = Figure(figsize=(7, 2.2 * len(units) + 0.6), layout="constrained")
+        for axes, unit in zip(figure.subplots(len(units), squeeze=False)[:, 0], units, strict=True):
+            for name, of, column in zip(
+                self.format.names, self.format.units, self.actions.T, strict=True
+            ):
+                if of == unit:
+                    axes.plot(self.times, column, label=name.replace("$", r"\$"))
+            axes.set_ylabel(f"[{unit}]")
+            axes.legend(loc="center left", bbox_to_anchor=(1, 0.5), frameon=False)
+        axes.set_xlabel("time [s]")
+        return figure
+
+    def __repr__(self) -> str:
+        """Size, length in time, and names."""
+        return f"Plan({_say_size(self.actions.shape, self.format)})"
+
 
 @dataclass(frozen=True, eq=False)
 class Demonstrations:
@@ -140,6 +176,13 @@ class Demonstrations:
     """What each outcome is expected to be, minus the one seen, shape (N, k), in the outcomes'
     units; zero where none is given. "10 cm" by eye is anything from 7.5 to 15, 11.25 on average.
     Generators learn what was seen, as in the paper; `BayesianAdapter` corrects it."""
+
+    def __repr__(self) -> str:
+        """Number, size, and what the outcomes are."""
+        size = _say_size(self.plans.shape[1:], self.format)
+        pairs = zip(self.outcome_names, self.outcome_units, strict=True)
+        outcomes = ", ".join(f"{name} [{unit}]" for name, unit in pairs)
+        return f"Demonstrations({self.n} plans, {size}; outcomes {outcomes})"
 
     def __post_init__(self) -> None:
         """Copy and check everything; warn of units that look wrong, and of repeated outcomes.

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
-from dataclasses import replace
+from dataclasses import fields
 from functools import cached_property
 from threading import RLock
 from types import FunctionType, MethodType
@@ -36,7 +36,16 @@ from prior_reinforce.errors import (
 )
 from prior_reinforce.readings import Reading, as_tolerance
 from prior_reinforce.session.events import Amended, Asked, GoalSet, Told, Voided
-from prior_reinforce.session.trials import Goal, Log, MemoryLog, Stage, State, Trial, Verdict
+from prior_reinforce.session.trials import (
+    AskedTrial,
+    Goal,
+    Log,
+    MemoryLog,
+    Stage,
+    State,
+    Trial,
+    Verdict,
+)
 from prior_reinforce.wording import as_reading
 
 if TYPE_CHECKING:
@@ -131,32 +140,32 @@ class Session:
     @property
     def goals(self) -> tuple[Goal, ...]:
         """All goals so far, in order."""
-        return tuple(self.state.goals)
+        return tuple(self._known().goals)
 
     @property
     def goal(self) -> Point:
         """The goal g tilde that is worked on: the latest."""
-        return self._current_goal().goal
+        return self._current_goal(self._known()).goal
 
     @property
     def tolerance(self) -> Point:
         """The tolerance epsilon of each component, of the goal that is worked on."""
-        return self._current_goal().tolerance
+        return self._current_goal(self._known()).tolerance
 
     @property
     def trials(self) -> tuple[Trial, ...]:
         """All trials for the goal that is worked on, in order; `state.trials` has all."""
-        return self.state.current
+        return self._known().current
 
     @property
     def open_trial(self) -> Trial | None:
         """The trial that waits to be told, if any."""
-        return self.state.open_trial
+        return self._known().open_trial
 
     @property
     def solved(self) -> bool:
         """Whether a told trial reached the goal that is worked on."""
-        return self.state.solved
+        return self._known().solved
 
     @property
     def n_trials(self) -> int:
@@ -169,7 +178,7 @@ class Session:
         Raises:
             TrialStateError: There is no such trial.
         """
-        return self.state.trial(number)
+        return self._known().trial(number)
 
     def set_goal(
         self,
@@ -221,7 +230,7 @@ class Session:
         self._refresh()
         return self.state.goals[-1]
 
-    def ask(self, *, arm_did_not_move: bool = False) -> Trial:
+    def ask(self, *, arm_did_not_move: bool = False) -> AskedTrial:
         """Return the trial to execute next: the open one, or a new one.
 
         Asking again changes nothing until that trial is told or voided. Asking goes on after the
@@ -298,8 +307,12 @@ class Session:
             self._append_reading(Amended, trial, seen, hit)
         return self._now(number)
 
-    def void(self, number: int, reason: str) -> Trial:
+    def void(self, number: int, reason: str = "") -> Trial:
         """Declare that a trial, open or told, is not data; the adapter forgets it.
+
+        Args:
+            number: The trial's.
+            reason: Why, for the log and the report.
 
         Raises:
             TrialStateError: There is no such trial, or it is voided already.
@@ -313,13 +326,37 @@ class Session:
             self.log.append(Voided(trial=trial.number, reason=text))
         return self._now(number)
 
-    def _current_goal(self) -> Goal:
-        goal = self.state.goal
+    def _current_goal(self, state: State | None = None) -> Goal:
+        goal = (state or self.state).goal
         if goal is None:
             raise WorkspaceError(
                 "no goal is set; set one (Session.set_goal, or: prior-reinforce goal)"
             )
         return goal
+
+    def _known(self) -> State:
+        """All that the log says by now, whoever wrote it."""
+        self._refresh()
+        return self.state
+
+    def __repr__(self) -> str:
+        """The goal, and how far it is."""
+        state = self._known()
+        if state.goal is None:
+            return "Session(no goal)"
+        said = "reached" if state.solved else "not reached"
+        waits = f"; trial {state.open_trial.number} waits" if state.open_trial else ""
+        goal = np.round(state.goal.goal, 4).tolist()
+        told = f"{self.n_trials} trial{'s' * (self.n_trials != 1)} told"
+        return f"Session(goal {goal} {said}, {told}{waits})"
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Everything but the lock: a session in memory is copied with its log."""
+        return {name: value for name, value in self.__dict__.items() if name != "_lock"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """As it was, with a lock of its own."""
+        self.__dict__.update(state, _lock=RLock())
 
     def _refresh(self) -> None:
         """Know all that the log says, and forget what was loaded if other things are in use."""
@@ -373,7 +410,7 @@ class Session:
     def _propose(self) -> Point:
         """M(g), after the adapter has seen every reading that counts."""
         self._inform()
-        return self.adapter.propose(self.goal)
+        return self.adapter.propose(self._current_goal().goal)
 
     def _inform(self) -> None:
         """Let the adapter see every reading that counts."""
@@ -441,7 +478,7 @@ class Session:
             said += ", which lies far outside the demonstrations (choose one nearer to them)"
         return said
 
-    def _with_plan(self, number: int, opened: Sequence[Verdict | None]) -> Trial:
+    def _with_plan(self, number: int, opened: Sequence[Verdict | None]) -> AskedTrial:
         """A trial with its plan and the gate's verdict, unless the gate refuses it now.
 
         `opened` holds the verdict on a trial that was opened just now.
@@ -452,9 +489,10 @@ class Session:
         plan = self.log.plan(trial) if trial.plan is None else trial.plan
         refusal = f"trial {number} may not be executed now, void it and ask again"
         verdict = opened[0] if opened else self._check(plan, refusal)
-        if trial.plan is plan and verdict is None:
+        if isinstance(trial, AskedTrial) and trial.plan is plan and verdict is None:
             return trial
-        return replace(trial, plan=plan, verdict=verdict)
+        known = {each.name: getattr(trial, each.name) for each in fields(trial)}
+        return AskedTrial(**{**known, "plan": plan, "verdict": verdict})
 
     def _check(self, plan: Frames, refusal: str) -> Verdict | None:
         """What the gate says of a plan; an error that begins with `refusal` if it refuses."""
@@ -467,7 +505,7 @@ class Session:
         return verdict
 
 
-def ask_all(sessions: Sequence[Session], *, arm_did_not_move: bool = False) -> list[Trial]:
+def ask_all(sessions: Sequence[Session], *, arm_did_not_move: bool = False) -> list[AskedTrial]:
     """Ask many sessions at once: one call of the generator for all that have no open trial.
 
     Args:

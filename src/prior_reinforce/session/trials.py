@@ -137,6 +137,17 @@ class Trial:
     verdict: Verdict | None = None
     """The gate's verdict of now, on a trial that `Session.ask` returned; None without a gate."""
 
+    def __repr__(self) -> str:
+        """Number, what was asked for, and what was seen."""
+        said = [f"{self.number} for goal {self.goal_number}", self.stage.value]
+        said.append(f"condition {np.round(self.condition, 4).tolist()}")
+        if self.error_seen is not None:
+            hit = "hit" if self.hit else "miss"
+            said.append(f"error {np.round(self.error_seen, 4).tolist()}, {hit}")
+        if self.plan is not None:
+            said.append(f"plan {' x '.join(map(str, self.plan.shape))}")
+        return f"Trial({', '.join(said)})"
+
     @property
     def error_seen(self) -> Point | None:
         """The error e tilde, outcome minus goal as perceived; None unless told."""
@@ -146,6 +157,13 @@ class Trial:
     def open(self) -> bool:
         """Whether the trial still waits to be told or voided."""
         return self.stage in {Stage.ASKED, Stage.EXECUTING, Stage.EXECUTED}
+
+
+class AskedTrial(Trial):
+    """A trial with its plan, as `Session.ask` returns it."""
+
+    plan: Frames
+    """A = pi(c); read-only."""
 
 
 class Log(Protocol):
@@ -295,12 +313,14 @@ class State:
                     raise ValueError(f"there is no goal {event.goal}")
                 if len(event.condition) != self.goals[event.goal - 1].goal.size:
                     raise ValueError("the condition has another length than the goal")
+                plan = self.plans.get(event.trial)
+                kind = Trial if plan is None else AskedTrial
                 self.trials.append(
-                    Trial(
+                    kind(
                         event.trial,
                         event.goal,
                         _read_only(event.condition),
-                        self.plans.get(event.trial),
+                        plan,
                         p_hit=event.p_hit,
                         expected_trials=event.expected_trials,
                         surprise=event.surprise,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from typing import ClassVar
 
 import numpy as np
@@ -18,7 +19,8 @@ from prior_reinforce.readings import Reading
 class PerceptionContract:
     """Inherit it, and name the perception: `make = staticmethod(OverheadCamera)`.
 
-    One that reads pictures overrides `rollout`, to give it a key frame.
+    It may raise PerceptionFailedError now and then, in at most half of the looks. One that reads
+    pictures overrides `rollout`, to give it a key frame.
     """
 
     make: Callable[[], Perception]
@@ -36,39 +38,41 @@ class PerceptionContract:
             seen = []
             for _ in range(2):
                 with self.make() as perception:
-                    seen.append(_told(perception.perceive(trial, goal, np.random.default_rng(3))))
-            assert seen[0].shape == (4, k)
-            assert np.all(np.isfinite(seen[0][0]))
-            np.testing.assert_array_equal(seen[0], seen[1])
+                    seen.append(_looks(perception, trial, goal, 5))
+            assert [*seen[0]] == [*seen[1]]  # it fails at the same seeds, too
+            for seed, reading in seen[0].items():
+                assert _told(reading).shape == (4, k)
+                assert np.all(np.isfinite(reading.error_seen))
+                np.testing.assert_array_equal(_told(reading), _told(seen[1][seed]))
 
     def test_it_returns_fresh_arrays_and_leaves_its_inputs(self) -> None:
         trial, goal = self.rollout(np.array([0.9, 0.1])), np.array([0.8, 0.3])
         with self.make() as perception:
-            seen = perception.perceive(trial, goal, np.random.default_rng(0))
-        for part in (seen.error_seen, seen.low, seen.high, seen.sd):
-            assert not np.shares_memory(part, trial.outcome)
-            assert not np.shares_memory(part, goal)
+            looks = _looks(perception, trial, goal, 5)
+        for seen in looks.values():
+            for part in (seen.error_seen, seen.low, seen.high, seen.sd):
+                assert not np.shares_memory(part, trial.outcome)
+                assert not np.shares_memory(part, goal)
         np.testing.assert_array_equal(trial.outcome, [0.9, 0.1])
         np.testing.assert_array_equal(goal, [0.8, 0.3])
 
     def test_a_large_error_is_seen_on_its_own_side(self) -> None:
         trial, goal = self.rollout(np.array([1.1, 0.0])), np.array([0.9, 0.3])
         with self.make() as perception:
-            for seed in range(20):
-                seen = perception.perceive(trial, goal, np.random.default_rng(seed)).error_seen
-                assert seen[0] > 0.1
-                assert seen[1] < -0.15
+            for seen in _looks(perception, trial, goal, 20).values():
+                assert seen.error_seen[0] > 0.1
+                assert seen.error_seen[1] < -0.15
 
     def test_the_true_error_lies_where_the_reading_says(self) -> None:
         for k in self.dims:
             trial, goal = self.rollout(np.linspace(0.9, 0.3, k)), np.full(k, 0.55)
             true, inside = trial.outcome - goal, 0
             with self.make() as perception:
-                for seed in range(40):
-                    seen = perception.perceive(trial, goal, np.random.default_rng(seed))
-                    slack = 2.5 * seen.sd + 1e-9
-                    inside += bool(np.all((seen.low - slack <= true) & (true <= seen.high + slack)))
-            assert inside >= 34  # of 40
+                looks = _looks(perception, trial, goal, 40)
+            for seen in looks.values():
+                slack = 2.5 * seen.sd + 1e-9
+                inside += bool(np.all((seen.low - slack <= true) & (true <= seen.high + slack)))
+            assert inside >= 0.85 * len(looks)
 
     def test_a_lost_object_is_seen_where_the_task_says_it_went_or_not_at_all(self) -> None:
         trial, goal = self.rollout(np.array([0.0, 0.0]), valid=False), np.array([0.9, 0.0])
@@ -78,6 +82,16 @@ class PerceptionContract:
             except PerceptionFailedError:
                 return  # it is out of the picture, and an operator is asked
         assert seen[0] < -0.5
+
+
+def _looks(perception: Perception, trial: Rollout, goal: Point, n: int) -> dict[int, Reading]:
+    """What is seen of a trial with seeds 0 to n - 1; an operator is asked about the others."""
+    seen = {}
+    for seed in range(n):
+        with suppress(PerceptionFailedError):
+            seen[seed] = perception.perceive(trial, goal, np.random.default_rng(seed))
+    assert len(seen) >= n / 2
+    return seen
 
 
 def _told(reading: Reading) -> Float[np.ndarray, "4 k"]:

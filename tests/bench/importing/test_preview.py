@@ -134,3 +134,8 @@ def test_measured_outcomes_that_come_twice_are_told(folder):
     (remark,) = preview.remarks
     assert remark.startswith("throw_1 and throw_3 have the same outcome: the mean of both")
     assert remark in preview.text
+
+
+def test_the_picture_is_returned_too(folder):
+    preview = import_demonstrations(folder, outcome_names=["x", "y"]).preview
+    assert len(preview.draw().axes) >= len(JOINTS)

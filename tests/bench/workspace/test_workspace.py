@@ -1,7 +1,9 @@
 """A workspace: what happened is kept, whatever happens in between."""
 
+import copy
 import errno
 import os
+import pickle
 import shutil
 import signal
 import subprocess
@@ -43,6 +45,7 @@ from tests.bench.workspace.planar import (
     ask,
     demonstrations,
     manifest,
+    recordings,
     reopened,
     tell,
     trials,
@@ -777,3 +780,86 @@ def test_a_rehearsal_whose_program_was_killed_stays_in_the_journal(arm, tmp_path
     assert kinds(workspace)[-1] == "moving"
     assert workspace.recover() is None
     assert workspace.state.trial(1).stage is Stage.ASKED
+
+
+def test_closed_it_says_so_and_is_never_copied(workspace):
+    session = workspace.session()
+    for copied in (copy.deepcopy, pickle.dumps):
+        for each in (workspace, session):
+            with pytest.raises(WorkspaceError, match=r"not copied; open it again: Workspace\('"):
+                copied(each)
+    assert repr(workspace).endswith("planar': 1 goals, 0 trials)")
+    workspace.close()
+    for ask_it in (lambda: workspace.state, lambda: session.solved, session.ask):
+        with pytest.raises(WorkspaceError, match="planar is closed; open it again"):
+            ask_it()
+    assert "is closed" in repr(workspace)
+
+
+def test_it_is_made_as_new_makes_it(tmp_path, run, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    given = {"robot": "ur5e", "gripper": "percent", "dt": 0.01, "tolerance": [0.02, 0.03]}
+    Workspace.create("hoop", name="one", **given).close()
+    said = (
+        "--robot",
+        "ur5e",
+        "--gripper",
+        "percent",
+        "--dt",
+        "0.01",
+        "--tolerance",
+        "0.02",
+        "0.03",
+    )
+    assert run("new", "other", "--name", "one", *said)[0] == 0
+    assert Path("hoop/workspace.toml").read_text() == Path("other/workspace.toml").read_text()
+    with pytest.raises(ConfigurationError, match="--gripper adds a column"):
+        Workspace.create("third", robot="none", gripper="percent")
+
+
+@pytest.mark.parametrize("names", [None, ["joint1", "joint2"], ["joint2", "joint1"]])
+def test_an_arm_may_be_known_by_its_first_recordings(tmp_path, names):
+    recordings(tmp_path / "throws")
+    with Workspace.create(tmp_path / "hoop", robot="none", dt=0.02) as workspace:
+        options = {} if names is None else {"joints": names}
+        result = workspace.import_recordings(tmp_path / "throws", **options)
+        expected = tuple(names or ("joint1", "joint2"))
+        assert workspace.manifest.format.names == expected == result.demonstrations.format.names
+        assert workspace.manifest.format.units == ("rad",) * len(expected)
+        workspace.learn("nearest")
+        workspace.set_goal([0.9, 0.0])
+        trial = workspace.session().ask()
+        assert workspace.plan(trial).format.names == expected
+    with Workspace(tmp_path / "hoop") as workspace:
+        assert workspace.session().ask().plan.shape[1] == len(expected)
+
+
+def test_recordings_are_taken_in_as_the_command_does(tmp_path, run, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    recordings(tmp_path / "throws")
+    how = {"robot": "none", "action_names": ["joint1", "joint2"], "dt": 0.02}
+    for name in ("one", "other"):
+        Workspace.create(name, **how).close()
+    with Workspace("one") as workspace:
+        result = workspace.import_recordings("throws")
+        assert result._repr_html_().startswith("<pre>episodes    4 from throws (npz)")
+        assert repr(result) == "ImportResult(4 of throws (npz))"
+        with pytest.raises(InvalidDemonstrationsError, match=r"twice|identical|same"):
+            workspace.import_recordings("throws", append=True)
+        python = [e.event for e in workspace.events]
+    assert run("import", "other", "throws")[0] == 0
+    with Workspace("other") as workspace:
+        assert [e.event for e in workspace.events] == python
+
+
+def test_where_it_stands_reports_and_exports(workspace, tmp_path):
+    trial = ask(workspace)
+    status = workspace.status()
+    assert repr(status) == status.text
+    assert status._repr_html_().startswith("<pre>task")
+    assert (status.solved, status.open_trial.number, status.goals[0].told) == (False, 1, 0)
+    assert workspace.export(1, tmp_path / "plan.csv").path.is_file()
+    with pytest.raises(TrialStateError):
+        workspace.export(2, tmp_path / "none.csv")
+    tell(workspace, trial.number, "hit")
+    assert workspace.report() == workspace.folder / "report" / "report.html"

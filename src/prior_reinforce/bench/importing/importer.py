@@ -34,6 +34,7 @@ from prior_reinforce.errors import (
 )
 from prior_reinforce.extras import check_installed
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
+from prior_reinforce.wording import as_html
 
 
 @dataclass(frozen=True)
@@ -82,6 +83,13 @@ class ImportResult:
     """Name of each demonstration in its source, in order."""
     preview: Preview
     """`preview.text` to print, `preview.draw(path)` to look at."""
+
+    def __repr__(self) -> str:
+        """What was made of the recordings."""
+        return f"ImportResult({self.demonstrations.n} of {self.preview.source})"
+
+    def _repr_html_(self) -> str:
+        return as_html(self.preview.text)
 
 
 def import_demonstrations(

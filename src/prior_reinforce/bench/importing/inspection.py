@@ -58,6 +58,10 @@ class Inspection:
     ambiguities: tuple[Ambiguity, ...] = ()
     """Units, times and names of channels that are only inferred."""
 
+    def __repr__(self) -> str:
+        """The text."""
+        return self.text
+
     @property
     def robot(self) -> str | None:
         """The robot whose limits the demonstrations were checked against."""

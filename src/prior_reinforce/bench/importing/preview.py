@@ -15,6 +15,8 @@ from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.wording import plain
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from prior_reinforce.report.panels import View
 
 _COLUMNS = 4
@@ -69,8 +71,19 @@ class Preview:
         }
         return in_rows(rows, self.remarks)
 
-    def draw(self, path: str | os.PathLike[str]) -> None:
-        """Write the picture (PNG): every joint over time, and the outcomes with their hull."""
+    def __repr__(self) -> str:
+        """The text."""
+        return self.text
+
+    def draw(self, path: str | os.PathLike[str] | None = None) -> Figure:
+        """Draw every joint over time, and the outcomes with their hull.
+
+        Args:
+            path: Where to write it (PNG), if given.
+
+        Returns:
+            The matplotlib figure.
+        """
         from matplotlib import colormaps, rc_context
         from matplotlib.figure import Figure
 
@@ -98,7 +111,9 @@ class Preview:
                 f"{demos.n} demonstrations as they will be learned (colour, dot where the motion "
                 "ends) and as recorded (grey)"
             )
-            figure.savefig(path, format="png")
+            if path is not None:
+                figure.savefig(path, format="png")
+        return figure
 
     def _coverage(self) -> str:
         demos, points = self.demonstrations, self.demonstrations.outcomes_seen

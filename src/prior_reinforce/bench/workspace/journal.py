@@ -15,7 +15,7 @@ from contextlib import contextmanager, suppress
 from datetime import datetime, timezone
 from pathlib import Path
 from threading import RLock
-from typing import Any
+from typing import Any, NoReturn
 
 import msgspec
 
@@ -96,6 +96,15 @@ class Journal:
                     f"{path} was written by another version of this program (journal {version}, "
                     f"this is {JOURNAL_VERSION}); use that version"
                 )
+
+    def __reduce__(self) -> NoReturn:
+        """Refuse to be copied, with whatever holds it: what happened is in the folder.
+
+        Raises:
+            WorkspaceError: Always.
+        """
+        folder = str(self._path.parent)
+        raise WorkspaceError(f"a workspace is not copied; open it again: Workspace({folder!r})")
 
     def close(self) -> None:
         """Close the file."""

@@ -20,6 +20,7 @@ from prior_reinforce.bench.workspace.workspace import Workspace
 from prior_reinforce.files import as_cell
 from prior_reinforce.session.events import Asked, Told
 from prior_reinforce.session.trials import Goal, Stage, Trial
+from prior_reinforce.wording import as_html
 
 _TIMES = ("asked", "told")
 
@@ -119,6 +120,9 @@ class StatusRecord(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     def __repr__(self) -> str:
         """As `status` prints it."""
         return self.text
+
+    def _repr_html_(self) -> str:
+        return as_html(self.text)
 
 
 class AskRecord(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

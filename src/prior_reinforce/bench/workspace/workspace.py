@@ -17,10 +17,10 @@ from __future__ import annotations
 import dataclasses
 import os
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal, NoReturn
 
 from msgspec.structs import replace
 from numpy.typing import ArrayLike
@@ -66,9 +66,11 @@ from prior_reinforce.registry import own_class
 from prior_reinforce.session.events import Entry, KeptPlan
 from prior_reinforce.session.session import Session
 from prior_reinforce.session.trials import Goal, Stage, Trial
+from prior_reinforce.wording import as_html
 
 if TYPE_CHECKING:
     from prior_reinforce.adapters.base import Adapter
+    from prior_reinforce.bench.importing import ImportResult, Preprocessing
     from prior_reinforce.bench.robots import RobotLimits
     from prior_reinforce.bench.robots.executors.command import CommandResult
     from prior_reinforce.bench.robots.executors.drive import Look
@@ -198,6 +200,22 @@ class Workspace:
         if text != self._manifest_text:
             self.manifest: Manifest = parse_manifest(text, path)
             self._manifest_text = text
+
+    def __repr__(self) -> str:
+        """The folder, and what it holds."""
+        try:
+            state = self.state
+        except PriorReinforceError as error:
+            return f"Workspace({str(self.folder)!r}: {error})"
+        said = f"{len(state.goals)} goals, {len(state.trials)} trials"
+        return f"Workspace({str(self.folder)!r}: {said})"
+
+    def _repr_html_(self) -> str:
+        return as_html(self.status().text)
+
+    def __reduce__(self) -> NoReturn:
+        """As its log."""
+        self.log.__reduce__()
 
     def close(self) -> None:
         """Close the journal."""
@@ -419,6 +437,82 @@ class Workspace:
         from prior_reinforce.bench.workspace.report import report_workspace
 
         return report_workspace(self, Path(folder or self.folder / "report"), progress)
+
+    def import_recordings(
+        self,
+        source: str | os.PathLike[str],
+        *,
+        outcomes: str | os.PathLike[str] | Mapping[str, Sequence[float]] | None = None,
+        outcome_unit: str | None = None,
+        preprocessing: Preprocessing | None = None,
+        append: bool = False,
+        take_guesses: bool = False,
+        **options: Any,
+    ) -> ImportResult:
+        """Take in recordings, as `prior-reinforce import` does.
+
+        Args:
+            source: A file or a folder.
+            outcomes: Where each demonstration's object ended: a table, or numbers by episode;
+                `outcomes.csv` beside the source if not given.
+            outcome_unit: Unit of that table's columns that name none.
+            preprocessing: Horizon, trimming, smoothing; its time step is the manifest's.
+            append: Keep the demonstrations in use and add these.
+            take_guesses: Infer missing or implausible units, times and names instead of raising.
+            options: Fields of `ReadOptions`: `units=["deg"]`, `rate=100`, ...
+
+        Returns:
+            What was made of them: print `preview.text`, look at `preview.draw()`.
+
+        Raises:
+            InvalidDemonstrationsError, UnclearUnitsError, FileFormatError: See
+                `import_demonstrations`.
+            TrialStateError: A trial waits to be told.
+        """
+        from prior_reinforce.bench.importing import Preprocessing, import_demonstrations
+
+        self.state.refuse_open_trial("importing demonstrations")
+        manifest, form = self.manifest, self.manifest.format
+        is_known = form.names != UNKNOWN
+        if is_known:
+            options = {"joints": form.names, **options}
+        result = import_demonstrations(
+            source,
+            outcomes=outcomes,
+            outcome_names=manifest.outcome_names,
+            outcome_units=manifest.outcome_units,
+            outcome_unit=outcome_unit,
+            names=form.names if is_known else None,
+            plan_units=form.units if is_known else None,
+            preprocessing=dataclasses.replace(preprocessing or Preprocessing(), dt=form.dt),
+            robot=manifest.robot,
+            gate=manifest.gate,
+            take_guesses=take_guesses,
+            **options,
+        )
+        self.take_in(result, str(source), append=append)
+        return result
+
+    def take_in(self, result: ImportResult, source: str, *, append: bool = False) -> int:
+        """Take in what an import made, in place of earlier demonstrations or beside them.
+
+        Returns:
+            The number of demonstrations that were there and stay.
+
+        Raises:
+            InvalidDemonstrationsError, TrialStateError: As in `import_demonstrations`.
+        """
+        from prior_reinforce.bench.importing import appended
+
+        demonstrations, n_before = result.demonstrations, 0
+        if left_out := result.preview.inspection.selection.left_out:
+            source = f"{source}, without what moves as well: {left_out}"
+        if append:
+            before = self.demonstrations
+            demonstrations, n_before = appended(before, demonstrations), before.n
+            source = f"{source}, appended to {n_before}"
+        self.import_demonstrations(demonstrations, source)
+        return n_before
 
     def import_demonstrations(self, demonstrations: Demonstrations, source: str) -> None:
         """Take in demonstrations, in place of earlier ones.
