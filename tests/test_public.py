@@ -118,8 +118,7 @@ def test_the_loop_of_the_readme_has_types(tmp_path):
     """A reader's own checker at its strictest accepts the first thing that is copied."""
     loop = next(code for name, code in CODE.items() if name.startswith("README"))
     (tmp_path / "loop.py").write_text(loop)
-    config = ["--config-file", str(REPOSITORY / "pyproject.toml"), "--cache-dir", str(tmp_path)]
-    program = [sys.executable, "-m", "mypy", "--strict", *config, str(tmp_path / "loop.py")]
+    program = [sys.executable, "-m", "mypy", "--strict", str(tmp_path / "loop.py")]
     done = subprocess.run(program, capture_output=True, text=True, cwd=REPOSITORY)
     assert done.returncode == 0, done.stdout
     (tmp_path / "loop.py").write_text(loop + "\nsession.ask().plan + ''\nsession.asks()\n")
