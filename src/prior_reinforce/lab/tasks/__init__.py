@@ -22,6 +22,7 @@ TASKS: Registry[Task] = Registry(
         "basketball-v3": Member(_SHOT, "a smaller ball and a cup", {"hardware": "v3"}),
         "curling": Member(f"{_HERE}.curling:Curling", "slide a stone to a target"),
         "fishing": Member(f"{_HERE}.fishing:Fishing", "swing a hook onto a magnet"),
+        "so101": Member(f"{_HERE}.so101:SO101Shot", "the SO-101 throws a ball into a cup"),
         **zoo.MEMBERS,
     },
 )

@@ -25,17 +25,18 @@ STEP = 0.001
 """Physics and servo period, in [s]: the real arm's control loop runs at 1 kHz."""
 
 
-def build_scene(path: Path) -> mujoco.MjModel:
-    """Compile a task's scene with the Panda at its origin and the scene's tool on its flange.
+def build_scene(path: Path, flange: str = "panda/flange") -> mujoco.MjModel:
+    """Compile a task's scene with its tool on the flange of its arm.
 
     Args:
         path: MJCF of the task. Its body `tool`, written at the top level in the flange's frame,
             moves onto the flange; everything else stays where it is written.
+        flange: Site of the arm that carries the tool.
     """
     scene = mujoco.MjSpec.from_file(str(path))
     scene.delete(scene.body("tool"))
     tool = mujoco.MjSpec.from_file(str(path)).body("tool")
-    scene.site("panda/flange").attach_body(tool, "tool/", "")
+    scene.site(flange).attach_body(tool, "tool/", "")
     return scene.compile()
 
 

@@ -1,4 +1,4 @@
-"""What every task with the simulated Panda shares: batched executions, disturbances, the film.
+"""What every task with a simulated arm shares: batched executions, disturbances, the film.
 
 A task adds its scene, where its objects start, what differs between repetitions and how an
 outcome is read from the recorded path; see `curling.py`.
@@ -64,10 +64,12 @@ class Draws:
 
 
 class PandaTask(Task):
-    """A task in which the Panda executes a plan from rest, and physics decides the rest."""
+    """A task in which an arm, here the Panda, executes a plan from rest; physics decides."""
 
     xml: str
     """File name of the scene."""
+    flange: str = "panda/flange"
+    """Site of the scene's arm that carries its tool."""
     recordings: str
     """Shipped prior sets are `demonstrations/<recordings>_<set>.npz`."""
     lead_in: float
@@ -80,7 +82,7 @@ class PandaTask(Task):
 
     def __init__(self) -> None:
         """Compile the scene."""
-        self.model = build_scene(_FOLDER / self.xml)
+        self.model = build_scene(_FOLDER / self.xml, self.flange)
         self.model.opt.timestep = STEP
         self._workers = [mujoco.MjData(self.model) for _ in range(joblib.cpu_count())]
         self._scratch = mujoco.MjData(self.model)  # the workers' are busy while it is used
@@ -88,6 +90,12 @@ class PandaTask(Task):
     def joint_plans(self, plans: Plans) -> Float[np.ndarray, "n H 7"]:
         """Joint paths in [rad] that plans stand for; here a plan is the joint path."""
         return plans
+
+    def _controls(
+        self, joints: Float[np.ndarray, "n H d"], n_steps: int
+    ) -> Float[np.ndarray, "n steps d"]:
+        """What the model's servos are told so that the arm executes joint paths, [rad], 1 kHz."""
+        return servo_controls(self.model, joints, self.format.dt, n_steps, lead_in=self.lead_in)
 
     @abstractmethod
     def _draw(self, n: int, rng: np.random.Generator) -> Draws:
@@ -199,7 +207,7 @@ class PandaTask(Task):
         n, horizon, _ = plans.shape
         n_steps = round((self.lead_in + (horizon - 1) * self.format.dt + self.lead_out) / STEP)
         joints = self.joint_plans(plans)
-        controls = servo_controls(self.model, joints, self.format.dt, n_steps, lead_in=self.lead_in)
+        controls = self._controls(joints, n_steps)
         if rng is None:
             states = np.stack([self._start(frame, None) for frame in joints[:, 0]])
             return [self.model], states, controls
@@ -225,7 +233,7 @@ class PandaTask(Task):
         """Full physics state with the arm at `joints` and the objects in place."""
         data = self._scratch
         mujoco.mj_resetData(self.model, data)
-        data.qpos[:N_JOINTS] = joints
+        data.qpos[: len(joints)] = joints
         mujoco.mj_kinematics(self.model, data)
         self._place(data, start)
         state = np.empty(mujoco.mj_stateSize(self.model, _FULL))

@@ -105,13 +105,13 @@ def make(name: str, variation: Variation | None = None) -> Demonstrations:
     def land(knobs: Knobs) -> Points:
         return np.array([rollout.outcome for rollout in task.rollout(plans(knobs), None)])
 
-    knobs = _solve(land, designed)
+    knobs = aim(land, designed)
     solved = plans(knobs)
     outcomes = np.array([rollout.outcome for rollout in task.rollout(solved, rng)])
     return Demonstrations(solved, outcomes, task.format)
 
 
-def _solve(land: Callable[[Knobs], Points], targets: Points, tolerance: float = 4e-3) -> Knobs:
+def aim(land: Callable[[Knobs], Points], targets: Points, tolerance: float = 4e-3) -> Knobs:
     """Newton's method on reach and direction, all throws at once, differences of 0.03 rad."""
     knobs = np.column_stack([np.zeros(len(targets)), np.arctan2(targets[:, 1], targets[:, 0])])
     for _ in range(12):

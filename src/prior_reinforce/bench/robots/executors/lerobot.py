@@ -1,0 +1,270 @@
+"""Arms that LeRobot drives: the SO-101, and any other of its `Robot` interface.
+
+LeRobot takes goals for its servos and follows them as fast as it can; it has no trajectories, and
+checks little. So goals are sent at a fixed rate, each after the other, and what is measured comes
+back with every one. Such servos lag: `lag` sends goals ahead by as much, so that what is measured
+is the plan.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import subprocess
+import sys
+import time
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from jaxtyping import Float
+
+from prior_reinforce.bench.robots.executors.base import ArmDescription, Executor, MeasuredPath
+from prior_reinforce.errors import ConfigurationError, RobotLimitError
+from prior_reinforce.plans.interpolation import interpolate
+from prior_reinforce.plans.motions import Plan
+
+_LATE = 0.05
+"""How late a goal may be sent, in [s]. Ours: three times what a loaded computer takes to wake up a
+program; a servo that lags 70 ms hardly shows it."""
+_ASTRAY = 0.35
+"""How far from where it should be a joint ends the motion, in [rad]. Ours: 20 degrees, a joint that
+is blocked, or lost its power."""
+_CLIPPED = 1e-3
+"""Difference of the goal that LeRobot sent from the one that was given, beyond which it clipped it,
+in LeRobot's units (degrees, per cent)."""
+_SETTLE = 0.3
+"""How long the last goal is held before the arm is let go, beyond five times the lag, in [s]."""
+_UNITS = {"degrees": ("rad", math.pi / 180), "range_0_100": ("percent", 1.0)}
+"""Our unit of LeRobot's, and its size in it."""
+
+
+@dataclass(frozen=True)
+class LeRobotConfig:
+    """Settings of an arm that LeRobot drives."""
+
+    robot: Mapping[str, Any]
+    """LeRobot's own: `type`, `port`, `id` and what else its class has."""
+    leader: Mapping[str, Any] = field(default_factory=dict)
+    """Its teleoperator, to record with: `type`, `port`, `id`; none for an arm guided by hand."""
+    python: str = sys.executable
+    """A Python that has LeRobot."""
+    rate: float = 100.0
+    """Goals and measurements a second."""
+    lag: float = 0.0
+    """How far behind its goals the arm is at constant speed, in [s]."""
+    goals: Literal["ahead", "as planned"] = "ahead"
+    """Ahead of the plan by the lag, so that the measured motion is the plan; or the plan itself,
+    where commanded motions were recorded: the measured motion is then later by the lag."""
+    units: Mapping[str, str] = field(default_factory=dict)
+    """LeRobot's unit by column, `degrees` or `range_0_100`, for a robot that does not say."""
+    clock: Literal["wall", "cycles"] = "wall"
+    """`cycles` is for a simulated arm whose time passes with every goal."""
+
+    def __post_init__(self) -> None:
+        """Check the values.
+
+        Raises:
+            ConfigurationError: One is missing or out of range.
+        """
+        if not {"type"} <= {*self.robot}:
+            raise ConfigurationError('robot needs LeRobot\'s type, as {type = "so101_follower"}')
+        if not (1 <= self.rate <= 1000 and 0 <= self.lag <= 1):
+            raise ConfigurationError(
+                f"rate must be within 1 and 1000 a second and lag within 0 and 1 s, got "
+                f"{self.rate:g} and {self.lag:g}"
+            )
+
+
+class LeRobotArm(Executor):
+    """An arm behind LeRobot's `Robot` interface, in a process of LeRobot's Python."""
+
+    config_type = LeRobotConfig
+
+    def __init__(self, config: LeRobotConfig) -> None:
+        """Start LeRobot and connect; nothing moves.
+
+        Raises:
+            ConfigurationError: It cannot be started, or says why it cannot connect.
+        """
+        self._config, self._stop = config, False
+        bridge = Path(__file__).with_name("lerobot_bridge.py")
+        settings = {"robot": dict(config.robot), "leader": dict(config.leader)}
+        try:
+            self._process = subprocess.Popen(
+                [config.python, str(bridge), json.dumps(settings)],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                text=True,
+            )
+        except OSError as error:
+            raise ConfigurationError(
+                f"cannot start {config.python!r} ({error.strerror}); give the path of the Python "
+                "in which LeRobot is installed as python in [arm]"
+            ) from error
+        try:
+            said = self._answer()
+            self._columns = tuple(said["columns"])
+            units = said["units"] | dict(config.units)
+            for name in self._columns:
+                if units.get(name) not in _UNITS:
+                    raise ConfigurationError(
+                        f"{name} is in {units.get(name, 'a unit that LeRobot does not say')}; set "
+                        f"use_degrees = true in robot, or name it in units ({', '.join(_UNITS)})"
+                    )
+            self._units = tuple(_UNITS[units[name]][0] for name in self._columns)
+            self._sizes = np.array([_UNITS[units[name]][1] for name in self._columns])
+            # A gripper's per cent end at its range by their own meaning.
+            half = [said["half_ranges"].get(n, math.inf) for n in self._columns]
+            percent = np.array(self._units) == "percent"
+            self._high = np.where(percent, 100.0, half * self._sizes)
+            self._low = np.where(percent, 0.0, -self._high)
+        except BaseException:
+            self.close()
+            raise
+
+    def describe(self) -> ArmDescription:
+        """See `Executor`."""
+        return ArmDescription(
+            model=str(self._config.robot["type"]),
+            firmware="",
+            columns=self._columns,
+            units=self._units,
+            rate=self._config.rate,
+            checked=("the calibrated range of every joint", "how far it goes astray"),
+            unchecked=("torque", "temperature", "self-collision", "the table", "people"),
+        )
+
+    def where(self) -> Float[np.ndarray, " d"]:
+        """See `Executor`."""
+        return self._vector(self._ask("observe")["measured"])
+
+    def guided(self) -> tuple[Float[np.ndarray, " d"], Float[np.ndarray, " d"]]:
+        """See `Executor`: what the leader asks for, and where the arm is."""
+        said = self._ask("guide")
+        measured = self._vector(said["measured"])
+        return (self._vector(said["sent"]) if "sent" in said else measured), measured
+
+    def release(self) -> None:
+        """See `Executor`: the torque is switched off, unless there is a leader."""
+        self._ask("release")
+
+    def check(self, plan: Plan) -> None:
+        """See `Executor`."""
+        _, goals = self._expected_and_goals(plan)
+        for column, name in enumerate(self._columns):
+            beyond = np.maximum(
+                goals[:, column] - self._high[column], self._low[column] - goals[:, column]
+            )
+            if beyond.max() > 0:
+                raise RobotLimitError(
+                    f"{name} would be sent {goals[int(beyond.argmax()), column]:.3g} "
+                    f"{self._units[column]}, beyond its calibrated range of "
+                    f"{self._low[column]:.3g} to {self._high[column]:.3g}"
+                )
+
+    def _expected_and_goals(
+        self, plan: Plan
+    ) -> tuple[Float[np.ndarray, "T d"], Float[np.ndarray, "T d"]]:
+        """Where the arm is expected, and what it is sent, at every cycle."""
+        config = self._config
+        fine = interpolate(
+            plan.actions, plan.format.dt, rate=config.rate, hold_after=_SETTLE + 5 * config.lag
+        )
+        if config.goals == "ahead":
+            return fine.q, fine.q + config.lag * fine.dq
+        later = np.array([np.interp(fine.t - config.lag, fine.t, column) for column in fine.q.T]).T
+        return later, fine.q
+
+    def run(self, plan: Plan) -> MeasuredPath:
+        """See `Executor`."""
+        expected, goals = self._expected_and_goals(plan)
+        wall, period = self._config.clock == "wall", 1 / self._config.rate
+        # What lags a plan on purpose is that plan, later.
+        shift = self._config.lag if self._config.goals == "as planned" else 0.0
+        joints = np.array(self._units) == "rad"
+        times: list[float] = []
+        path: list[Float[np.ndarray, " d"]] = []
+        fault, moved, start = "", False, time.monotonic()
+        try:
+            for cycle, (goal, there) in enumerate(zip(goals, expected, strict=True)):
+                due = cycle * period
+                if wall:
+                    time.sleep(max(0.0, start + due - time.monotonic()))
+                    late = time.monotonic() - start - due
+                    if late > _LATE:
+                        fault = f"a goal was {late * 1e3:.0f} ms late; the computer is too busy"
+                if self._stop:
+                    fault = "it was asked to stop"
+                if fault:
+                    break
+                moved = True
+                asked = dict(zip(self._columns, (goal / self._sizes).tolist(), strict=True))
+                said = self._ask("move", goal=asked)
+                here = self._vector(said["measured"])
+                times.append((time.monotonic() - start if wall else due) - shift)
+                path.append(here)
+                worst = max(asked, key=lambda name: abs(said["sent"][name] - asked[name]))
+                if abs(said["sent"][worst] - asked[worst]) > _CLIPPED:
+                    fault = (
+                        f"LeRobot sent {worst} {said['sent'][worst]:.4g} instead of "
+                        f"{asked[worst]:.4g}; take max_relative_target out of robot"
+                    )
+                astray = np.where(joints, np.abs(here - there), 0.0)
+                if astray.max() > _ASTRAY:
+                    name = self._columns[int(astray.argmax())]
+                    fault = f"{name} is {astray.max():.2f} rad from where it should be"
+            if fault and path:
+                held = dict(zip(self._columns, (path[-1] / self._sizes).tolist(), strict=True))
+                self._ask("move", goal=held)
+        except ConfigurationError as error:
+            fault = str(error) if not fault else f"{fault}; {error}"
+        q = np.array(path) if path else np.empty((0, len(self._columns)))
+        return MeasuredPath(np.array(times), q, fault, moved)
+
+    def stop(self) -> None:
+        """See `Executor`."""
+        self._stop = True
+
+    def close(self) -> None:
+        """See `Executor`: the end of its input lets LeRobot let go."""
+        if self._process.stdin is not None:
+            self._process.stdin.close()
+        try:
+            self._process.wait(10.0)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        if self._process.stdout is not None:
+            self._process.stdout.close()
+
+    def _vector(self, values: Mapping[str, float]) -> Float[np.ndarray, " d"]:
+        """LeRobot's values as ours; one that is missing is no number."""
+        return np.array([values.get(n, math.nan) for n in self._columns]) * self._sizes
+
+    def _ask(self, do: str, **given: Any) -> dict[str, Any]:
+        assert self._process.stdin is not None
+        with suppress(OSError):  # it has ended; its last answer says why
+            print(json.dumps({"do": do, **given}), file=self._process.stdin, flush=True)
+        return self._answer()
+
+    def _answer(self) -> dict[str, Any]:
+        """The next answer of LeRobot's process.
+
+        Raises:
+            ConfigurationError: What went wrong there.
+        """
+        assert self._process.stdout is not None
+        line = self._process.stdout.readline()
+        if not line:
+            raise ConfigurationError(
+                f"LeRobot's process ended without a word; try {self._config.python} -c 'import "
+                "lerobot.robots'"
+            )
+        said: dict[str, Any] = json.loads(line)
+        if "error" in said:
+            raise ConfigurationError(f"LeRobot: {said['error']}")
+        return said

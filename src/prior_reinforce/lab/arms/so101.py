@@ -1,0 +1,223 @@
+"""A simulated SO-101 behind the bus of its servos, on a pseudo-terminal.
+
+LeRobot's own class drives it by that port. Physics, servos and ball are those of the task `so101`,
+where the same plan without a bus lands likewise. The ball is put back into the scoop whenever the
+arm stands still and the scoop opens upwards; where it comes down is told. Without torque the arm
+stays where it is, or a hand guides it through demonstrations, one after the other.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import select
+import time
+import tty
+from collections.abc import Callable
+from pathlib import Path
+
+import mujoco
+import numpy as np
+from jaxtyping import Float
+
+from prior_reinforce.lab.arms.feetech import (
+    GOAL_POSITION,
+    HOMING_OFFSET,
+    P_COEFFICIENT,
+    PRESENT_POSITION,
+    TORQUE_ENABLE,
+    Servo,
+    ServoBus,
+)
+from prior_reinforce.lab.tasks.demonstrations.teleoperation import smoothstep
+from prior_reinforce.lab.tasks.panda import STEP, setpoints
+from prior_reinforce.lab.tasks.panda_task import first_descent
+from prior_reinforce.lab.tasks.so101 import MOTORS, RIM_HEIGHT, SO101Shot, servo_lag, servo_speed
+from prior_reinforce.plans.motions import Demonstrations
+
+_STEPS = 4095 / (2 * math.pi)
+"""Steps of the encoder a radian, as LeRobot counts them."""
+_GRIPPER = (2030, 3480)
+"""Its closed and its open end, in steps; ours."""
+_STILL, _STILL_FOR, _UPRIGHT = 0.02, 0.3, 0.95
+"""The ball is put back once no joint was faster [rad/s] for so long [s], if the cosine of the
+scoop's tilt is more. Ours."""
+_BETWEEN = 2.0
+"""How long a hand takes from one throw to the next, and how long it waits there, in [s]. Ours."""
+
+
+class SimulatedSO101:
+    """The arm, its six servos and the ball; time passes in `advance`."""
+
+    def __init__(
+        self, demonstrations: Demonstrations | None = None, tell: Callable[[str], None] = print
+    ) -> None:
+        """Stand in the zero of all joints.
+
+        Args:
+            demonstrations: Through which a hand guides the arm while it has no torque.
+            tell: Called with what a person at the table sees.
+        """
+        self.task, self.tell = SO101Shot(), tell
+        self.landings: list[Float[np.ndarray, "2"]] = []
+        """Where the ball came down, (x, y) in [m], throw by throw."""
+        model = self.task.model
+        self._data = mujoco.MjData(model)
+        mujoco.mj_forward(model, self._data)
+        ranges = [tuple(np.round(model.jnt_range[i] * _STEPS).astype(int)) for i in range(4)]
+        limits = [(2047 + int(low), 2047 + int(high)) for low, high in ranges]
+        self.servos = {i + 1: Servo(*ends) for i, ends in enumerate([*limits, (0, 4095), _GRIPPER])}
+        self._middle = np.array([sum(ends) / 2 for ends in [*limits, (0, 4095)]])
+        self._position = np.zeros(6)
+        """Of each servo, in [rad] from the middle; of the gripper, from its closed end."""
+        self._hand = np.empty((0, 5)) if demonstrations is None else _guided(demonstrations)
+        self._guided, self._still, self._thrown = 0, 0.0, False
+        self._remember()
+
+    def advance(self, duration: float) -> None:
+        """Let time pass, in [s]."""
+        goals, torque = self._goals()
+        lag = np.array([servo_lag(max(s.memory[P_COEFFICIENT], 1)) for s in self.servos.values()])
+        for _ in range(round(duration / STEP)):
+            speed = np.where(torque, servo_speed(goals, self._position, lag), 0.0)
+            if not torque.any() and self._guided < len(self._hand):
+                speed[:5] = (self._hand[self._guided] - self._position[:5]) / STEP
+                self._guided += 1
+            self._step(speed)
+        self._remember()
+
+    def _step(self, speed: Float[np.ndarray, "6"]) -> None:
+        """One period of the servos."""
+        data, ball = self._data, self.task.ball
+        data.ctrl[:] = self._position[:5] + self.task.feed_forward * speed[:5]
+        self._position += STEP * speed
+        before = data.qpos[ball : ball + 3].copy()
+        mujoco.mj_step(self.task.model, data)
+        path = np.stack([before, data.qpos[ball : ball + 3]])
+        if not self._thrown and (descent := first_descent(path, RIM_HEIGHT)) is not None:
+            self._thrown = True
+            self.landings.append(descent[2])
+            x, y = descent[2]
+            self.tell(f"the ball came down at x = {x:.3f} m, y = {y:.3f} m")
+        self._still = 0.0 if np.abs(speed).max() > _STILL else self._still + STEP
+        if self._still > _STILL_FOR:
+            self._put_back()
+
+    def _put_back(self) -> None:
+        """A person puts the ball into a scoop that is empty and opens upwards."""
+        data, seat, ball = self._data, self._data.site("tool/seat"), self.task.ball
+        away = np.linalg.norm(data.qpos[ball : ball + 3] - seat.xpos) > 0.02
+        if away and seat.xmat[8] > _UPRIGHT:
+            data.qpos[ball : ball + 3] = seat.xpos
+            velocity = self.task.model.jnt_dofadr[self.task.model.joint("ball").id]
+            data.qvel[velocity : velocity + 6] = 0.0
+            self._thrown = False
+            self.tell("the ball lies in the scoop")
+
+    def _goals(self) -> tuple[Float[np.ndarray, "6"], Float[np.ndarray, "6"]]:
+        servos = list(self.servos.values())
+        steps = np.array([servo.goal for servo in servos], dtype=float)
+        goals = np.append((steps[:5] - self._middle) / _STEPS, (steps[5] - _GRIPPER[0]) / _STEPS)
+        return goals, np.array([servo.memory[TORQUE_ENABLE] == 1 for servo in servos])
+
+    def _remember(self) -> None:
+        """What the encoders say, and a goal that is there while nobody gave another one."""
+        measured = self._data.qpos[:5] * _STEPS + self._middle
+        steps = np.round(np.append(measured, self._position[5] * _STEPS + _GRIPPER[0]))
+        for servo, value in zip(self.servos.values(), steps.astype(int), strict=True):
+            servo.write_word(PRESENT_POSITION, int(value))
+            if not servo.memory[TORQUE_ENABLE]:
+                servo.write_word(GOAL_POSITION, int(value))
+
+    def calibration(self) -> dict[str, dict[str, int]]:
+        """What LeRobot's calibration wrote down of these servos: the content of its file."""
+        return {
+            motor: {
+                "id": identity,
+                "drive_mode": 0,
+                "homing_offset": servo.word(HOMING_OFFSET),
+                "range_min": servo.word(9),
+                "range_max": servo.word(11),
+            }
+            for motor, (identity, servo) in zip(
+                [*MOTORS, "gripper"], self.servos.items(), strict=True
+            )
+        }
+
+
+def _guided(demonstrations: Demonstrations) -> Float[np.ndarray, "steps 5"]:
+    """The hand's path at every period: to the first frame, a wait, the motion, and so on."""
+    dt, wait = demonstrations.format.dt, round(_BETWEEN / STEP)
+    n_steps = round(demonstrations.horizon * dt / STEP)
+    motions, _ = setpoints(demonstrations.plans, dt, n_steps)
+    path, here = [], np.zeros(5)
+    share = smoothstep(np.arange(wait) / wait)[:, None]
+    for motion in motions:
+        path += [here + share * (motion[0] - here), np.tile(motion[0], (wait, 1)), motion]
+        here = motion[-1]
+    return np.vstack([*path, np.tile(here, (wait, 1))])
+
+
+class Port:
+    """A pseudo-terminal at which the arm answers, and a folder with all that LeRobot needs.
+
+    In the folder: `port`, a link to the terminal, and `calibration/simulated.json`.
+    """
+
+    def __init__(
+        self,
+        arm: SimulatedSO101,
+        folder: Path,
+        *,
+        lock_step: float | None = None,
+        dies_after: int | None = None,
+    ) -> None:
+        """Open it.
+
+        Args:
+            arm: The arm.
+            folder: Is made if it is not there.
+            lock_step: Time passes by so much, in [s], whenever positions are read, and not
+                otherwise: then the same motion always ends alike. None follows the clock.
+            dies_after: The plug is pulled after so many goals.
+        """
+        self.arm, self._lock_step, self._left = arm, lock_step, dies_after
+        self._bus = ServoBus(arm.servos, before_read=self._cycle, after_goals=self._count)
+        self._ours, self._theirs = os.openpty()
+        tty.setraw(self._theirs)
+        self.path = os.ttyname(self._theirs)
+        self._stopped = False
+        (folder / "calibration").mkdir(parents=True, exist_ok=True)
+        (folder / "port").unlink(missing_ok=True)
+        (folder / "port").symlink_to(self.path)
+        text = json.dumps(arm.calibration(), indent=4)
+        (folder / "calibration" / "simulated.json").write_text(text)
+
+    def serve(self) -> None:
+        """Answer until `stop`, or until the plug is pulled."""
+        then = time.monotonic()
+        while not self._stopped:
+            readable, _, _ = select.select([self._ours], [], [], 0.002)
+            now = time.monotonic()
+            if self._lock_step is None:
+                whole = math.floor((now - then) / STEP)
+                self.arm.advance(whole * STEP)
+                then += whole * STEP
+            if readable and (answer := self._bus.answer(os.read(self._ours, 4096))):
+                os.write(self._ours, answer)
+        for end in (self._ours, self._theirs):
+            os.close(end)
+
+    def stop(self) -> None:
+        """End `serve`, and close the terminal as a pulled plug does."""
+        self._stopped = True
+
+    def _cycle(self) -> None:
+        if self._lock_step is not None:
+            self.arm.advance(self._lock_step)
+
+    def _count(self) -> None:
+        if self._left is not None:
+            self._left -= 1
+            self._stopped |= self._left <= 0
