@@ -7,6 +7,7 @@ GROUPS: dict[str, dict[str, tuple[str, str]]] = {
     "your arm": {
         "new": ("workspace:New", "make a workspace: a folder for one task of one arm"),
         "import": ("importing:Import", "bring recorded demonstrations into it"),
+        "record": ("record:Record", "record demonstrations at the arm, and import them"),
         "learn": ("learning:Learn", "learn the motion from them"),
         "goal": ("workspace:Goal", "set the goal of the next trials"),
         "ask": ("trials:Ask", "get the plan of the next trial, and execute it"),

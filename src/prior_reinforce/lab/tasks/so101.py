@@ -44,7 +44,9 @@ LAG = servo_lag(16)
 
 
 def servo_speed(
-    goal: Float[np.ndarray, "*n"], position: Float[np.ndarray, "*n"], lag: float
+    goal: Float[np.ndarray, "*n"],
+    position: Float[np.ndarray, "*n"],
+    lag: float | Float[np.ndarray, "*n"],
 ) -> Float[np.ndarray, "*n"]:
     """Speed of servos towards their goals, in [rad/s]: a first-order lag, limited in speed."""
     return np.clip((goal - position) / lag, -SPEED, SPEED)

@@ -10,5 +10,6 @@ EXECUTORS: Registry[Executor] = Registry(
     f"{_HERE}.base:Executor",
     {
         "fr3": Member(f"{_HERE}.fr3:FR3", "Franka Research 3"),
+        "lerobot": Member(f"{_HERE}.lerobot:LeRobotArm", "any arm that LeRobot drives"),
     },
 )

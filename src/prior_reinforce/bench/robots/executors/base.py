@@ -9,8 +9,10 @@ down. A new arm is one file with one class, and a line in `EXECUTORS` if it come
 
 from __future__ import annotations
 
+import itertools
+import time
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal
 
@@ -19,6 +21,8 @@ from jaxtyping import Float
 
 from prior_reinforce.plans.motions import Plan
 
+GUIDED_RATE = 200.0
+"""Most states a second that are read of a guided arm. Ours: ten a frame of the shortest plans."""
 Motion = Literal["trial", "rehearsal", "approach"]
 """What an arm is moved for: a trial; its plan at a fraction of the speed, which is no trial; or the
 slow way to its first frame."""
@@ -66,6 +70,18 @@ class MeasuredPath:
     """Why the plan was not executed to its end, in the arm's words."""
     moved: bool = True
     """Whether the arm moved, or may have."""
+
+
+@dataclass(frozen=True, eq=False)
+class GuidedState:
+    """Where an arm is that somebody guides."""
+
+    t: float
+    """Time since it began, in [s]."""
+    commanded: Float[np.ndarray, " d"]
+    """What it is told, by a leader arm, say; what is measured, if nobody tells it anything."""
+    measured: Float[np.ndarray, " d"]
+    """Where it is."""
 
 
 class Executor(ABC):
@@ -123,6 +139,20 @@ class Executor(ABC):
 
         Called from a signal's handler while `run` goes on, in the same thread: set a flag.
         """
+
+    def guide(self) -> Iterator[GuidedState]:
+        """Let a person guide the arm, and say where it is, at a steady rate, until nobody asks.
+
+        By default nothing is let go: the arm is in a state in which it can be guided by itself.
+
+        Raises:
+            ConfigurationError: The arm does not answer any more.
+        """
+        period, start = 1 / min(self.describe().rate, GUIDED_RATE), time.monotonic()
+        for cycle in itertools.count():
+            time.sleep(max(0.0, start + cycle * period - time.monotonic()))
+            q = self.where()
+            yield GuidedState(time.monotonic() - start, q, q)
 
     def close(self) -> None:
         """Let go of the arm, which is at rest; by default nothing is to be done."""

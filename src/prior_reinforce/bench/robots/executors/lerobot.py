@@ -8,12 +8,13 @@ is the plan.
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 import subprocess
 import sys
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -22,7 +23,13 @@ from typing import Any, Literal
 import numpy as np
 from jaxtyping import Float
 
-from prior_reinforce.bench.robots.executors.base import ArmDescription, Executor, MeasuredPath
+from prior_reinforce.bench.robots.executors.base import (
+    ArmDescription,
+    Executor,
+    GuidedState,
+    MeasuredPath,
+)
+from prior_reinforce.bench.robots.executors.result import lag_behind
 from prior_reinforce.errors import ConfigurationError, RobotLimitError
 from prior_reinforce.plans.interpolation import interpolate
 from prior_reinforce.plans.motions import Plan
@@ -142,15 +149,18 @@ class LeRobotArm(Executor):
         """See `Executor`."""
         return self._vector(self._ask("observe")["measured"])
 
-    def guided(self) -> tuple[Float[np.ndarray, " d"], Float[np.ndarray, " d"]]:
-        """See `Executor`: what the leader asks for, and where the arm is."""
-        said = self._ask("guide")
-        measured = self._vector(said["measured"])
-        return (self._vector(said["sent"]) if "sent" in said else measured), measured
-
-    def release(self) -> None:
-        """See `Executor`: the torque is switched off, unless there is a leader."""
+    def guide(self) -> Iterator[GuidedState]:
+        """See `Executor`: a leader leads the arm; without one, its torque is switched off."""
         self._ask("release")
+        wall, period, start = self._config.clock == "wall", 1 / self._config.rate, time.monotonic()
+        for cycle in itertools.count():
+            if wall:
+                time.sleep(max(0.0, start + cycle * period - time.monotonic()))
+            said = self._ask("guide")
+            measured = self._vector(said["measured"])
+            commanded = self._vector(said["sent"]) if "sent" in said else measured
+            t = time.monotonic() - start if wall else cycle * period
+            yield GuidedState(t, commanded, measured)
 
     def check(self, plan: Plan) -> None:
         """See `Executor`."""
@@ -223,6 +233,9 @@ class LeRobotArm(Executor):
         except ConfigurationError as error:
             fault = str(error) if not fault else f"{fault}; {error}"
         q = np.array(path) if path else np.empty((0, len(self._columns)))
+        if not fault:
+            behind = lag_behind(goals[:, joints], q[:, joints], period)
+            print(f"the arm followed its goals {behind * 1e3:.0f} ms behind", flush=True)
         return MeasuredPath(np.array(times), q, fault, moved)
 
     def stop(self) -> None:

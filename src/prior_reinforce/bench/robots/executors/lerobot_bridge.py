@@ -62,7 +62,7 @@ class Bridge:
                 "make_teleoperator_from_config",
                 settings["leader"],
             )
-        self.bus = getattr(self.robot, "bus", None)
+        self.bus: Any = getattr(self.robot, "bus", None)
         self._configure, self.robot.configure = self.robot.configure, self._configure_once
         self.robot.connect(calibrate=False)
         if not self.robot.is_calibrated:
