@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 # Pictures are drawn without a display (EGL); without OpenGL the report says so in one line.
 export MUJOCO_GL ?= egl
 
-.PHONY: demo install test attack check reproduce docs clean
+.PHONY: demo install test attack check reproduce docs lerobot clean
 
 demo: $(VENV)/.core
 	$(BIN)/prior-reinforce demo --out runs/demo $(ARGS)
@@ -17,7 +17,7 @@ install: $(VENV)/.core
 
 # Three processes share the tests, the longest first: a third of the time of some is waiting.
 # Bytecode is kept, or every program that a test starts would compile the package again.
-test: $(VENV)/.all
+test: $(VENV)/.all $(VENV)/.lerobot
 	PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n 3 --dist load --maxschedchunk 4 $(ARGS)
 
 # CASES generated attacks, one table by class; and a third as many streams that shake an arm.
@@ -50,9 +50,19 @@ $(VENV)/.all: $(VENV)/.core
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[diffusion,lab,dev,baselines,vlm,lerobot,hdf5,ros,zarr,excel,ray,fr3,console,camera]'
 	touch $@
 
+# A Python with LeRobot, for the executor of that name: .venv/lerobot/python.
+$(VENV)/.lerobot: lerobot.txt $(VENV)/.core
+	rm -rf $(VENV)/lerobot
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --target $(VENV)/lerobot -r lerobot.txt
+	printf '#!/bin/sh\nPYTHONPATH="$(CURDIR)/$(VENV)/lerobot" exec "$(CURDIR)/$(BIN)/python" "$$@"\n' > $(VENV)/lerobot/python
+	chmod +x $(VENV)/lerobot/python
+	touch $@
+
 $(VENV)/.docs: $(VENV)/.core
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[diffusion,lab,docs]'
 	touch $@
+
+lerobot: $(VENV)/.lerobot
 
 clean:
 	rm -rf $(VENV) runs site

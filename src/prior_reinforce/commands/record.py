@@ -119,8 +119,6 @@ class Record(OnWorkspace):
                 session.add(state)
                 state = _state(watch)
             session.toggle()
-            # What was read meanwhile is no take: a person was asked.
-            watch.forget()
 
 
 def _by_keys(watch: Watch, session: _Session, terminal: _Terminal) -> None:
@@ -164,7 +162,10 @@ class _Session:
         channels: list[int],
         motion: Literal["measured", "commanded"] | None,
         terminal: _Terminal,
+        *,
+        asks: bool,
     ) -> None:
+        self._asks = asks  # by the clock, the next take comes at once, and `import` asks
         self._manifest, self._folder, self._channels = manifest, folder, channels
         self._motion, self._terminal = motion, terminal
         self._open: Take | None = None
@@ -211,7 +212,8 @@ class _Session:
         if led:
             lag = take.lag(self._channels)
             print(f"the arm was {1e3 * lag:.0f} ms behind what it was told: lag = {lag:.3f}")
-        self._ask_place(take.name)
+        if self._asks:
+            self._ask_place(take.name)
 
     def discard(self) -> None:
         """Drop the take that is being recorded, or else the last."""
@@ -249,10 +251,10 @@ class _Session:
         return self._taken
 
     def _ask_place(self, name: str) -> None:
-        """Ask where the object of a take landed; without a terminal, or skipped, `import` asks."""
+        """Ask where the object of a take landed; what is skipped, `import` asks for."""
         names, units = self._manifest.outcome_names, self._manifest.outcome_units
         question = f"where did it land, {' '.join(names)} [{', '.join(dict.fromkeys(units))}]? "
-        while sys.stdin.isatty():
+        while True:
             text = self._terminal.line(question).strip()
             if text.lower() in ("", "s", "skip"):
                 return
