@@ -16,6 +16,7 @@ TESTED_ELSEWHERE = {
     "lab/tasks/demonstrations/basketball": "made again in lab/tasks/demonstrations/test_init",
     "lab/tasks/demonstrations/curling": "made again in lab/tasks/demonstrations/test_init",
     "lab/tasks/demonstrations/fishing": "made again in lab/tasks/demonstrations/test_init",
+    "lab/tasks/demonstrations/so101": "made again in lab/tasks/demonstrations/test_init",
 }
 """Modules without a test file of their own, and where they are tested instead."""
 

@@ -19,7 +19,7 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from prior_reinforce.lab.arms.feetech import (
     GOAL_POSITION,
@@ -115,7 +115,8 @@ class SimulatedSO101:
             self._thrown = False
             self.tell("the ball lies in the scoop")
 
-    def _goals(self) -> tuple[Float[np.ndarray, "6"], Float[np.ndarray, "6"]]:
+    def _goals(self) -> tuple[Float[np.ndarray, "6"], Bool[np.ndarray, "6"]]:
+        """Where each servo goes, in the units of its position, and whether it has torque."""
         servos = list(self.servos.values())
         steps = np.array([servo.goal for servo in servos], dtype=float)
         goals = np.append((steps[:5] - self._middle) / _STEPS, (steps[5] - _GRIPPER[0]) / _STEPS)

@@ -54,8 +54,8 @@ def _interpolation(
 
 
 def setpoints(
-    plans: Float[np.ndarray, "n H 7"], dt: float, n_steps: int, *, lead_in: float = 0.0
-) -> tuple[Float[np.ndarray, "n steps 7"], Float[np.ndarray, "n steps 7"]]:
+    plans: Float[np.ndarray, "n H d"], dt: float, n_steps: int, *, lead_in: float = 0.0
+) -> tuple[Float[np.ndarray, "n steps d"], Float[np.ndarray, "n steps d"]]:
     """Joint positions and velocities asked for at every servo period.
 
     Frames are joined by a cubic spline with continuous acceleration, at rest at both ends; the

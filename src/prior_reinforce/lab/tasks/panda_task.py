@@ -28,7 +28,7 @@ from prior_reinforce.plans.motions import Demonstrations
 
 _FOLDER = Path(__file__).parent
 _FULL = mujoco.mjtState.mjSTATE_FULLPHYSICS
-_Batch = tuple[list[mujoco.MjModel], Float[np.ndarray, "n s"], Float[np.ndarray, "n steps 7"]]
+_Batch = tuple[list[mujoco.MjModel], Float[np.ndarray, "n s"], Float[np.ndarray, "n steps d"]]
 """Models (one, or one an execution), initial full physics states, and controls in [rad]."""
 
 
@@ -53,9 +53,9 @@ class ArmDisturbances:
 class Draws:
     """What differs between the executions of one batch; row i belongs to execution i."""
 
-    pose: Float[np.ndarray, "n 7"]
+    pose: Float[np.ndarray, "n d"]
     """Offset of every joint, in [rad]."""
-    servo: Float[np.ndarray, "n 7"]
+    servo: Float[np.ndarray, "n d"]
     """Factor on every joint's servo stiffness and damping."""
     scene: Float[np.ndarray, "n p"]
     """The task's own numbers for `_disturb`."""
@@ -87,7 +87,7 @@ class PandaTask(Task):
         self._workers = [mujoco.MjData(self.model) for _ in range(joblib.cpu_count())]
         self._scratch = mujoco.MjData(self.model)  # the workers' are busy while it is used
 
-    def joint_plans(self, plans: Plans) -> Float[np.ndarray, "n H 7"]:
+    def joint_plans(self, plans: Plans) -> Float[np.ndarray, "n H d"]:
         """Joint paths in [rad] that plans stand for; here a plan is the joint path."""
         return plans
 
@@ -219,7 +219,7 @@ class PandaTask(Task):
         return models, states, controls
 
     def _disturbed(
-        self, servo: Float[np.ndarray, "7"], scene: Float[np.ndarray, " p"]
+        self, servo: Float[np.ndarray, " d"], scene: Float[np.ndarray, " p"]
     ) -> mujoco.MjModel:
         model = copy.copy(self.model)
         model.actuator_gainprm[:, 0] *= servo
@@ -228,7 +228,7 @@ class PandaTask(Task):
         return model
 
     def _start(
-        self, joints: Float[np.ndarray, "7"], start: Float[np.ndarray, " q"] | None
+        self, joints: Float[np.ndarray, " d"], start: Float[np.ndarray, " q"] | None
     ) -> Float[np.ndarray, " s"]:
         """Full physics state with the arm at `joints` and the objects in place."""
         data = self._scratch

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from prior_reinforce.lab.tasks import make_task
-from prior_reinforce.lab.tasks.demonstrations import basketball, curling, fishing
+from prior_reinforce.lab.tasks.demonstrations import basketball, curling, fishing, so101
 
-MAKING = {"basketball-v1": basketball, "curling": curling, "fishing": fishing}
+MAKING = {"basketball-v1": basketball, "curling": curling, "fishing": fishing, "so101": so101}
 
 
 @pytest.mark.slow
