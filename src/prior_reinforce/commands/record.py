@@ -285,7 +285,7 @@ class _Terminal:
     def __enter__(self) -> Self:
         if sys.stdin.isatty():
             self._before = termios.tcgetattr(sys.stdin)
-            tty.setcbreak(sys.stdin)
+            tty.setcbreak(sys.stdin, termios.TCSADRAIN)  # which keeps what was typed ahead
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -84,7 +84,7 @@ def test_a_plan_that_is_followed_late_on_purpose_is_measured_as_that_plan(toy):
 def test_a_goal_beyond_the_calibrated_range_is_refused(toy):
     arm = toy()
     arm.check(swing(math.radians(89.9)))
-    with pytest.raises(RobotLimitError, match=r"joint1\.pos would be sent to 1\.586 rad"):
+    with pytest.raises(RobotLimitError, match=r"joint1\.pos would be sent to 1\.587 rad"):
         arm.check(swing(math.radians(90.9)))
 
 

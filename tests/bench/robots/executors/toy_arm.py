@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import os
 import time
@@ -10,7 +11,12 @@ from pathlib import Path
 
 import numpy as np
 
-from prior_reinforce.bench.robots.executors.base import ArmDescription, Executor, MeasuredPath
+from prior_reinforce.bench.robots.executors.base import (
+    ArmDescription,
+    Executor,
+    GuidedState,
+    MeasuredPath,
+)
 from prior_reinforce.errors import ConfigurationError, RobotLimitError
 from prior_reinforce.plans.interpolation import interpolate
 
@@ -26,7 +32,8 @@ class ToyConfig:
     kind: str = "works"
     fastest: float = 1e9
     seconds: float = 0.0
-    """How long a motion takes at least."""
+    """How long a motion takes at least, and a state while it is guided."""
+    led: bool = False
 
 
 class ToyArm(Executor):
@@ -86,8 +93,23 @@ class ToyArm(Executor):
             time.sleep(max(0.0, self.config.seconds / n))
         return MeasuredPath(fine.t, fine.q)
 
+    def guide(self):
+        """A throw from 1.2 to 1.9 s of every two seconds; measured 0.1 s behind the command."""
+        for k in itertools.count():
+            if self.config.kind == "unplugged" and k == 50:
+                raise ConfigurationError("the arm does not answer any more")
+            time.sleep(self.config.seconds)
+            t = k / RATE
+            yield GuidedState(t, _thrown(t), _thrown(t - 0.1) if self.config.led else _thrown(t))
+
     def stop(self):
         self.stopping = True
+
+
+def _thrown(t):
+    number, share = int(t // 2), min(max((t % 2 - 1.2) / 0.6, 0.0), 1.0)
+    course = 10 * share**3 - 15 * share**4 + 6 * share**5
+    return course * np.array([0.8 + 0.1 * number, 0.3 - 0.2 * (number % 3)])
 
 
 TOY = f"{__name__}:ToyArm"

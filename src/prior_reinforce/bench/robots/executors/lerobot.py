@@ -169,14 +169,12 @@ class LeRobotArm(Executor):
         """See `Executor`."""
         _, goals = self._expected_and_goals(plan)
         for column, name in enumerate(self._columns):
-            beyond = np.maximum(
-                goals[:, column] - self._high[column], self._low[column] - goals[:, column]
-            )
+            sent, low, high = goals[:, column], self._low[column], self._high[column]
+            beyond = np.maximum(sent - high, low - sent)
             if beyond.max() > 0:
                 raise RobotLimitError(
-                    f"{name} would be sent {goals[int(beyond.argmax()), column]:.3g} "
-                    f"{self._units[column]}, beyond its calibrated range of "
-                    f"{self._low[column]:.3g} to {self._high[column]:.3g}"
+                    f"{name} would be sent to {sent[beyond.argmax()]:.4g} {self._units[column]}, "
+                    f"beyond its calibrated range of {low:.4g} to {high:.4g}"
                 )
 
     def _expected_and_goals(

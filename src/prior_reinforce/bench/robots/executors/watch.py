@@ -97,13 +97,14 @@ class Watch:
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
         )
+        self._listener = threading.Thread(target=self._listen, daemon=True)
         try:
             self.arm = msgspec.json.decode(self._line(), type=ArmDescription)
         except BaseException:
             self.__exit__()
             raise
         self._states: queue.SimpleQueue[State | PriorReinforceError] = queue.SimpleQueue()
-        threading.Thread(target=self._listen, daemon=True).start()
+        self._listener.start()
 
     def _line(self) -> bytes:
         assert self._process.stdout is not None
@@ -147,12 +148,16 @@ class Watch:
     def __exit__(self, *_: object) -> None:
         """End the program, which lets go of the arm."""
         assert self._process.stdin is not None
+        assert self._process.stdout is not None
         self._process.stdin.close()
         try:
             self._process.wait(15.0)
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
+        if self._listener.ident is not None:
+            self._listener.join()
+        self._process.stdout.close()
 
 
 def main() -> None:

@@ -1,0 +1,152 @@
+"""Recording at an arm: by the clock, and by keys at a terminal."""
+
+import os
+import re
+import select
+import subprocess
+import sys
+import time
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from prior_reinforce.bench.workspace.workspace import Workspace
+from tests.bench.robots.executors.toy_arm import TOY, name_arm
+from tests.bench.workspace.planar import manifest
+
+BY_CLOCK = ("--takes", "4", "--seconds", "1", "--pause", "1", "--executor", TOY)
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch, request):
+    """A workspace whose arm is thrown by a hand every two seconds."""
+    monkeypatch.setenv("PYTHONPATH", str(request.config.rootpath))
+    folder = tmp_path / "planar"
+    Workspace.create(folder, manifest()).close()
+    name_arm(folder, tmp_path / "arm")
+    return folder
+
+
+def test_takes_by_the_clock_end_in_the_workspace(run, folder):
+    status, _, refused = run("record", folder, *BY_CLOCK)
+    assert status == 2
+    assert "no outcomes for episodes take-1, take-2, take-3, take-4" in refused
+    recorded = folder / "recordings/1"
+    assert sorted(path.name for path in recorded.glob("*.png")) == [
+        f"take-{i}.png" for i in range(1, 5)
+    ]
+    rows = ["episode,x_m,y_m", *(f"take-{i + 1},{0.8 + 0.1 * i},{0.1 * (i % 2)}" for i in range(4))]
+    (recorded / "outcomes.csv").write_text("\n".join(rows))
+    assert run("import", folder, recorded)[0] == 0
+    with Workspace(folder) as workspace:
+        plans = workspace.demonstrations.plans
+    # Each take has the whole throw: 0.8 rad first, 0.1 rad farther every time.
+    assert np.ptp(plans[:, :, 0], axis=1) == pytest.approx([0.8, 0.9, 1.0, 1.1], abs=2e-3)
+
+
+def test_what_a_leader_told_the_arm_is_learned_and_the_lag_is_said(run, folder, tmp_path):
+    name_arm(folder, tmp_path / "arm", led=True)
+    _, said, _ = run("record", folder, *BY_CLOCK)
+    assert "its commanded motion" in said
+    assert "100 ms behind what it was told: lag = 0.100" in said
+    with np.load(folder / "recordings/1/take-1.npz") as take:
+        assert np.array_equal(take["q"], take["commanded"])
+        assert not np.array_equal(take["q"], take["measured"])
+    _, said, _ = run("record", folder, *BY_CLOCK, "--motion", "measured")
+    assert "its measured motion" in said
+    with np.load(folder / "recordings/2/take-1.npz") as take:
+        assert np.array_equal(take["q"], take["measured"])
+
+
+@pytest.mark.parametrize(
+    ("flags", "said"),
+    [
+        ((), "without a terminal there are no keys"),
+        (("--takes", "0"), "--takes and --seconds must be more than 0"),
+        (("--takes", "2", "--seconds", "0"), "--takes and --seconds must be more than 0"),
+        (("--takes", "2"), "a manifest starts no code of its own; add --executor"),
+    ],
+)
+def test_what_cannot_be_recorded_is_said_and_leaves_nothing(run, folder, flags, said):
+    status, _, refused = run("record", folder, *flags)
+    assert status == 2
+    assert said in refused
+    assert not (folder / "recordings").exists()
+
+
+def test_an_arm_that_a_leader_would_move_waits_for_a_person(run, folder, tmp_path):
+    path = folder / "workspace.toml"
+    name_arm(folder, tmp_path / "arm")
+    path.write_text(path.read_text() + 'leader = "arm 2"\n')
+    _, _, refused = run("record", folder, *BY_CLOCK)
+    assert "nobody said that the arm may move" in refused
+
+
+def test_an_arm_that_is_unplugged_keeps_what_was_recorded(run, folder, tmp_path):
+    name_arm(folder, tmp_path / "arm", kind="unplugged")
+    _, _, refused = run("record", folder, *BY_CLOCK[:3], "0.2", "--pause", "0.1", "--executor", TOY)
+    assert "does not answer any more" in refused
+    assert (folder / "recordings/1/take-1.npz").is_file()
+
+
+class Typed:
+    """A command at a terminal."""
+
+    def __init__(self, *args):
+        self.ours, theirs = os.openpty()
+        self.process = subprocess.Popen(
+            [Path(sys.executable).with_name("prior-reinforce"), *map(str, args)],
+            stdin=theirs,
+            stdout=theirs,
+            stderr=theirs,
+            start_new_session=True,
+        )
+        os.close(theirs)
+        self.seen = ""
+
+    def wait_for(self, text, limit=60.0):
+        deadline = time.monotonic() + limit
+        while text not in self.seen:
+            assert time.monotonic() < deadline, self.seen
+            if not select.select([self.ours], [], [], 1.0)[0]:
+                continue
+            try:
+                self.seen += os.read(self.ours, 4096).decode()
+            except OSError:
+                assert text in self.seen, self.seen
+        self.seen = self.seen.partition(text)[2]
+
+    def type(self, text):
+        os.write(self.ours, text.encode())
+
+
+def test_takes_are_cut_dropped_named_and_placed_by_keys(folder, tmp_path):
+    name_arm(folder, tmp_path / "arm", seconds=0.005)
+    typed = Typed("record", folder, "--executor", TOY)
+    typed.wait_for("q imports them")
+    for place, key in (("80cm 10cm", "d"), ("90cm 5cm", "n")):
+        typed.type(" ")
+        typed.wait_for("take-")
+        time.sleep(0.3)  # a take has ten states at least
+        typed.type("\n")
+        typed.wait_for("where did it land")
+        typed.type("there\n")
+        typed.wait_for("where did it land")
+        typed.type(f"{place}\n")
+        typed.type(key)
+    typed.wait_for("another name for take-2: ")
+    typed.type("good\n")
+    typed.type("q")
+    with suppress(AssertionError):
+        typed.wait_for("nothing that it says", 30.0)
+    typed.process.kill()
+    typed.process.wait()
+    recorded = folder / "recordings/1"
+    assert sorted(path.name for path in recorded.iterdir()) == [
+        "good.npz",
+        "good.png",
+        "outcomes.csv",
+    ]
+    assert re.search(r"^good,0\.9,0\.05,", (recorded / "outcomes.csv").read_text(), re.MULTILINE)
