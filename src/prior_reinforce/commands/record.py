@@ -332,7 +332,7 @@ def _ask_whether_it_may_be_led() -> None:
 
 def _draw(take: Take, form: PlanFormat, channels: list[int], kind: str, path: Path) -> None:
     """A take over time: what will be learned, and in grey the other motion."""
-    from prior_reinforce.report.style import INK_SOFT, calm_axes, drawing, new_figure, save_png
+    from prior_reinforce.report.style import INK_SOFT, calm_axes, drawing, new_figure, save_figure
 
     with drawing():
         columns = min(form.action_dim, 3)
@@ -348,4 +348,4 @@ def _draw(take: Take, form: PlanFormat, channels: list[int], kind: str, path: Pa
             axes.set_title(f"{name} [{unit}]", fontsize=9)
         for spare in panels[form.action_dim :]:
             spare.set_axis_off()
-        save_png(figure, path)
+        save_figure(figure, path)

@@ -28,7 +28,6 @@ from prior_reinforce.commands.base import (
     OnWorkspace,
     Words,
     answer_to,
-    arm_of,
     print_checked,
     print_json,
     print_next,

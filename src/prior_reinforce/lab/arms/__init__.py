@@ -1,1 +1,1 @@
-"""Simulated arms that speak their robot's protocol, for its own client library to drive."""
+"""Simulated arms that speak their robots' own protocols, with a task's objects before them."""
