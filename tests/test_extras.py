@@ -11,7 +11,7 @@ import pytest
 from packaging.requirements import Requirement
 
 import prior_reinforce
-from prior_reinforce.extras import EXTRA_OF
+from prior_reinforce.extras import ALONE, EXTRA_OF
 from tests.bench.importing import recorded
 from tests.test_dependencies import PROJECT
 
@@ -37,7 +37,7 @@ READERS = {"lerobot", "ros"}
 
 def light(code, *args, cwd):
     """Run a program without the libraries of any extra but `READERS`."""
-    absent = [library for library, extra in EXTRA_OF.items() if extra not in READERS]
+    absent = [library for library, extra in EXTRA_OF.items() if extra not in READERS] + [*ALONE]
     done = subprocess.run(
         [sys.executable, "-c", WITHOUT + code, json.dumps(absent), *map(str, args)],
         cwd=cwd,
@@ -72,7 +72,7 @@ def test_every_library_is_required_or_an_extra_is_named_for_it():
         f"{path.relative_to(SOURCE)}: {name}"
         for path in SOURCE.rglob("*.py")
         for name in libraries(path)
-        if name not in sys.stdlib_module_names | EXTRA_OF.keys() | brought
+        if name not in sys.stdlib_module_names | EXTRA_OF.keys() | ALONE.keys() | brought
         and name.lower() not in required
     }
     assert not unnamed

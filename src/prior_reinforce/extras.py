@@ -38,12 +38,15 @@ EXTRA_OF = {
     "cv2": "camera",
 }
 """Library, as it is imported -> extra of `pyproject.toml`."""
+ALONE = {"franka_sim": "franka-sim==1.1.7"}
+"""Library -> what installs it with --no-deps, which no extra can say: it asks for old versions of
+NumPy and MuJoCo, and works with those of now."""
 
 
 def missing_extra(error: ImportError) -> MissingExtraError | None:
     """Return the error to raise for a failed import; None if no extra has the library."""
     library = (error.name or "").partition(".")[0]
-    return _missing(library) if library in EXTRA_OF else None
+    return _missing(library) if library in {*EXTRA_OF, *ALONE} else None
 
 
 def check_installed(library: str) -> None:
@@ -57,7 +60,9 @@ def check_installed(library: str) -> None:
 
 
 def _missing(library: str) -> MissingExtraError:
-    return MissingExtraError(
-        f"{library} is not installed; install it with: pip install "
-        f"'prior-reinforce[{EXTRA_OF[library]}]'"
+    what = (
+        f"--no-deps {ALONE[library]}"
+        if library in ALONE
+        else f"'prior-reinforce[{EXTRA_OF[library]}]'"
     )
+    return MissingExtraError(f"{library} is not installed; install it with: pip install {what}")

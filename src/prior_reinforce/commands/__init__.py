@@ -31,6 +31,7 @@ GROUPS: dict[str, dict[str, tuple[str, str]]] = {
         "train": ("simulated:Train", "learn from a simulated task's demonstrations"),
         "adapt": ("simulated:Adapt", "reach new goals, trial by trial"),
         "rollout": ("simulated:Rollout", "execute one plan"),
+        "simulate": ("simulate:Simulate", "serve a simulated arm to programs that drive one"),
     },
     "the paper": {
         "reproduce": ("reproduce:Reproduce", "make its tables and figures again"),

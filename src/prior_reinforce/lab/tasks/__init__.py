@@ -20,6 +20,9 @@ TASKS: Registry[Task] = Registry(
         "basketball-v1": Member(_SHOT, "throw a ball into a hoop"),
         "basketball-v2": Member(_SHOT, "the same with a shorter spoon", {"hardware": "v2"}),
         "basketball-v3": Member(_SHOT, "a smaller ball and a cup", {"hardware": "v3"}),
+        "basketball-fr3": Member(
+            f"{_HERE}.basketball_fr3:BasketballFR3", "the first on a Franka Research 3"
+        ),
         "curling": Member(f"{_HERE}.curling:Curling", "slide a stone to a target"),
         "fishing": Member(f"{_HERE}.fishing:Fishing", "swing a hook onto a magnet"),
         "so101": Member(f"{_HERE}.so101:SO101Shot", "the SO-101 throws a ball into a cup"),

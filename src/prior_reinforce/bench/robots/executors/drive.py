@@ -55,8 +55,9 @@ _SLOW = {"rad": 0.3, "m": 0.1, "deg": 17.0, "percent": 50.0}
 FR3 do, at which a person steps back in time."""
 _APPROACH_DT, _SHORTEST = 0.02, 0.5
 """Between frames of an approach, and its shortest duration, in [s]."""
-_SAME = 1e-6
-"""Distance from the first frame below which nothing is to be closed, in any unit; ours."""
+_CLOSE = {"rad": 0.002, "m": 0.0005, "deg": 0.1, "percent": 0.5}
+"""Distance from the first frame by unit up to which an executor takes a plan as beginning where the
+arm stands; what is left beyond it is closed slowly first. Ours: what a servo at rest is off."""
 # Without the folder that the user happens to stand in: nothing there may be taken for a module.
 _START = f"import sys; sys.path[:] = filter(None, sys.path); import {__name__}; {__name__}.main()"
 
@@ -149,7 +150,7 @@ def approach(
     far = np.abs(first - pose)
     duration = _SHORTEST
     for unit, distance in zip(arm.units, far, strict=True):
-        if distance > _SAME and unit not in _SLOW:
+        if distance > 0 and unit not in _SLOW:
             raise InvalidPlanError(
                 f"no slow speed is known in {unit}; move the arm to the plan's first frame"
             )
@@ -268,7 +269,8 @@ def _motions(prepared: _Prepared, request: Request) -> Sequence[Plan]:
         return [to_start]
     if not prepared.there:
         raise ConfigurationError(f"{prepared.said}; move it there, or ask again with --approach")
-    near = np.abs(prepared.plan.actions[0] - prepared.pose).max() <= _SAME
+    far = np.abs(prepared.plan.actions[0] - prepared.pose)
+    near = all(d <= _CLOSE.get(u, 0.0) for d, u in zip(far, prepared.arm.units, strict=True))
     return [prepared.plan] if near else [to_start, prepared.plan]
 
 

@@ -29,9 +29,16 @@ if TYPE_CHECKING:
 _HOLD = 0.15
 """How long the last pose is held before the motion is said to have ended, in [s]: the arm comes to
 rest in it. Ours; the simulated arm needs a tenth of it."""
+_BLEND = 0.2
+"""Within this time, in [s], the stream goes from the pose that the robot holds over to the plan: it
+refuses set points that do not begin there exactly. Of the 2 mrad that may be left, 0.3 rad/s^2."""
+_FARTHEST = 0.005
+"""From the plan's first frame at which a motion is begun, in [rad]; ours: what a servo at rest is
+off, and the whole of what a path may be off its plan."""
 _MOVED = 0.002
 """Distance of a joint from where it stood that counts as having moved, in [rad]. Ours: ten times
 what a joint that is held shows."""
+_NOTHING = np.empty(0), np.empty((0, 7))
 _REALTIME = Path("/sys/kernel/realtime")
 """Says 1 on a kernel with PREEMPT_RT, which is what libfranka looks at."""
 
@@ -107,12 +114,16 @@ class FR3(Executor):
         """Stream the plan as joint positions; an error is recovered from once, and named."""
         fine = interpolate(plan.actions, plan.format.dt, hold_after=_HOLD)
         rows: list[tuple[float, list[float]]] = []
-        fault = ""
-        before = np.array(self._ready().q)
+        state = self._ready()
+        before, offset = np.array(state.q), np.array(state.q_d) - plan.actions[0]
+        if (far := np.abs(offset).max()) > _FARTHEST:
+            return MeasuredPath(*_NOTHING, f"it stands {far:.4f} rad off the plan", moved=False)
+        s = np.clip(fine.t / _BLEND, 0, 1)[:, None]
+        set_points = fine.q + offset * (1 - s**3 * (10 - 15 * s + 6 * s**2))
         gc.collect()
         gc.disable()  # a collection takes longer than a cycle
         try:
-            fault = self._stream(fine.q.tolist(), rows)
+            fault = self._stream(set_points.tolist(), rows)
         except self._errors as error:
             fault = _line(error)
         finally:
@@ -147,6 +158,10 @@ class FR3(Executor):
     def stop(self) -> None:
         """See `Executor`: the robot brakes by itself."""
         self._stopping = True
+
+    def close(self) -> None:
+        """Disconnect: the robot takes one client at a time, and lets others wait without a word."""
+        del self._robot
 
     def _ready(self) -> pylibfranka.RobotState:
         """The robot's state, after one recovery where an error was left; ConfigurationError."""

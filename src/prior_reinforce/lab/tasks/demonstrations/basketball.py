@@ -20,6 +20,7 @@ from scipy.special import betainc
 
 from prior_reinforce.arrays import Plans, Points
 from prior_reinforce.lab.tasks.basketball import BasketballShot
+from prior_reinforce.lab.tasks.basketball_fr3 import BasketballFR3
 from prior_reinforce.lab.tasks.demonstrations import write_sets
 from prior_reinforce.plans.motions import Demonstrations
 
@@ -82,10 +83,12 @@ def throw(
     return posture + travel * betainc(3, 3, part)[:, None]
 
 
-def make(name: str, variation: Variation | None = None) -> Demonstrations:
-    """Make the prior set `name` ("A" or "B"), the same every time on the same machine."""
+def make(
+    name: str, variation: Variation | None = None, task: BasketballShot | None = None
+) -> Demonstrations:
+    """Make the prior set `name` ("A" or "B") of V1, or of another task, the same every time."""
     size = variation or Variation()
-    task = BasketballShot()
+    task = task or BasketballShot()
     rng = np.random.default_rng(SEEDS[name])
     designed = np.array(DESIGNED[name])
     n, dt = len(designed), task.format.dt
@@ -127,3 +130,5 @@ def aim(land: Callable[[Knobs], Points], targets: Points, tolerance: float = 4e-
 
 if __name__ == "__main__":
     write_sets(make, DESIGNED, "basketball", __doc__)
+    on_fr3 = BasketballFR3()
+    write_sets(lambda name: make(name, task=on_fr3), DESIGNED, "basketball_fr3", __doc__)

@@ -1,0 +1,116 @@
+"""`simulate`: an arm that is not there, for the programs that drive one that is."""
+
+from __future__ import annotations
+
+import csv
+import signal
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import numpy as np
+import tyro
+
+from prior_reinforce.commands.simulated import TaskChoice
+from prior_reinforce.errors import ConfigurationError
+from prior_reinforce.files import claim_folder, named_disk_errors
+from prior_reinforce.lab.tasks import make_task
+from prior_reinforce.plans.interpolation import RATE, interpolate
+from prior_reinforce.readings import as_tolerance, in_tolerances
+from prior_reinforce.wording import say_reading
+
+if TYPE_CHECKING:
+    from prior_reinforce.environment import Rollout, Task
+    from prior_reinforce.lab.tasks.panda_task import PandaTask
+
+
+@dataclass(frozen=True)
+class Simulate:
+    """Serve a simulated arm, with a task's objects before it, until Ctrl-C."""
+
+    arm: Annotated[Literal["fr3"], tyro.conf.Positional]
+    """Which: fr3 (Franka Research 3, for libfranka's clients)."""
+    task: TaskChoice = "basketball-fr3"
+    host: str = "127.0.77.1"
+    """Address of this computer to serve on; each simulated arm needs its own."""
+    goal: tuple[float, ...] = ()
+    """Say of each throw how far it was from here, as somebody sees it who stands beside: 1.0 0.05,
+    in the outcome's units."""
+    recordings: Path | None = None
+    """Serve nothing, but write recordings of the task's six demonstrations to this folder, as the
+    arm measured them, and where each ended."""
+
+    def run(self) -> None:
+        """Serve, or write."""
+        from prior_reinforce.lab.tasks.panda_task import PandaTask
+
+        task = make_task(self.task)
+        if not isinstance(task, PandaTask):
+            raise ConfigurationError(f"{self.task} is no task of this arm; choose basketball-fr3")
+        if self.recordings is not None:
+            _record(task, self.recordings)
+            return
+        if self.goal and len(self.goal) != len(task.outcome_names):
+            raise ConfigurationError(f"--goal needs {len(task.outcome_names)} numbers")
+        from prior_reinforce.lab.arms.fr3 import SimulatedFR3
+
+        arm = SimulatedFR3(task, self.host, lambda rollout: self._say(task, rollout))
+
+        def stop(*_: object) -> None:
+            arm.running = False
+
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, stop)
+        arm.serve(
+            lambda: print(
+                f"{self.arm} serves {task.name} at {self.host}; Ctrl-C ends it", flush=True
+            )
+        )
+
+    def _say(self, task: Task, rollout: Rollout) -> None:
+        """Where the object went, and what an observer would call that."""
+        from prior_reinforce.perception import make_perception
+
+        names = task.outcome_names
+        units = task.outcome_units or ("m",) * len(names)
+        if not rollout.valid:
+            print("the object went where no outcome is", flush=True)
+            return
+        places = zip(names, rollout.outcome, units, strict=True)
+        said = ", ".join(f"{name} {place:.4f} {unit}" for name, place, unit in places)
+        if self.goal:
+            eye, rng = make_perception("eye"), np.random.default_rng(0)
+            error = rollout.outcome - np.array(self.goal)
+            seen = say_reading(eye.perceive(rollout, np.array(self.goal), rng), names, units)
+            hit = in_tolerances(error, as_tolerance(task.tolerance, names, units)) <= 1
+            said += f"; by eye: {seen}{', a hit' if hit else ''}"
+        print(f"the object came down at {said}", flush=True)
+
+
+def _record(task: PandaTask, folder: Path) -> None:
+    """Execute a task's demonstrations, and write what the arm measured and where each ended."""
+    from prior_reinforce.lab.tasks.stepped import SteppedTask
+
+    claim_folder(folder)
+    rows = [["episode", *task.outcome_names]]
+    for i, plan in enumerate(task.demonstrations("A").plans, start=1):
+        stepped = SteppedTask(task, plan[0])
+        stepped.begin()
+        every, motion = 10, interpolate(plan, task.format.dt, hold_after=task.lead_out)
+        q = []
+        for target in motion.q:
+            q.append(stepped.q)
+            stepped.step(target)
+        outcome = stepped.end().outcome
+        n = len(plan) * round(task.format.dt * RATE)
+        name = f"throw-{i}"
+        np.savez(
+            folder / f"{name}.npz",
+            t=motion.t[:n:every],
+            q=np.array(q)[:n:every],
+            joint_names=task.format.names,
+        )
+        rows.append([name, *(f"{place:.4f}" for place in outcome)])
+    with named_disk_errors(folder), (folder / "outcomes.csv").open("w", newline="") as file:
+        csv.writer(file).writerows(rows)
+    print(f"written: {len(rows) - 1} recordings and outcomes.csv in {folder}")
