@@ -107,7 +107,7 @@ def attack(rng: random.Random, here: Path, asked: Path) -> str:
     raises = rng.choice(["show", "alarm"]) if edit == "raises" else ""
     programs = [Program(place, wrapper + driver, limit, raises) for place in folders]
     if edit == "limit":  # one per cent below what the plan asks for
-        peak = _peak_velocity(folder)
+        peak = peak_velocity(folder)
         factor = rng.choice([0.99, 1.01])
         refused = factor < 1
         path = folder / "workspace.toml"
@@ -115,17 +115,13 @@ def attack(rng: random.Random, here: Path, asked: Path) -> str:
         path.write_text(path.read_text().replace('model = "none"', narrow, 1))
     if edit == "plan":
         refused = True
-        (plan,) = (folder / "plans").iterdir()
-        plan.chmod(0o644)
-        content = bytearray(plan.read_bytes())
-        content[rng.randrange(len(content))] ^= 1 << rng.randrange(8)
-        plan.write_bytes(content)
+        damage_plan(rng, folder)
     for program in programs:
         program.go()
     signals = rng.choice([0, 0, 1, 1, 3])
     for _ in range(signals):
         time.sleep(rng.uniform(0, 0.5))
-        _signal(rng, rng.choice(programs))
+        send_signal(rng, rng.choice(programs))
     try:
         verdict = _judge(here, folders, programs, refused, again=kind == "says no")
         calm = signals == 0 and len(programs) == 1 and edit in ("nothing", "restore")
@@ -137,7 +133,7 @@ def attack(rng: random.Random, here: Path, asked: Path) -> str:
     finally:
         for program in programs:
             program.kill()
-        for pid in _motions(here):
+        for pid in motions(here):
             with contextlib.suppress(OSError):
                 os.kill(pid, signal.SIGKILL)
 
@@ -161,14 +157,13 @@ class Program:
                     os.dup2(null, descriptor)
                 os.close(self._pipe)
                 os.read(here, 1)
-                self._execute(folder, command, limit, raises)
+                self.execute(folder, command, limit, raises)
             except BaseException:
                 os._exit(1)
             os._exit(0)
         os.close(here)
 
-    @staticmethod
-    def _execute(folder: Path, command: str, limit: float, raises: str) -> None:
+    def execute(self, folder: Path, command: str, limit: float, raises: str) -> None:
         def fail(*_: object) -> None:
             raise ZeroDivisionError
 
@@ -200,7 +195,7 @@ class Program:
         os.close(self._pipe)
 
 
-def _signal(rng: random.Random, program: Program) -> None:
+def send_signal(rng: random.Random, program: Program) -> None:
     """Send some signal to a program, its group, or one or both processes of its supervisor."""
     number, to = rng.choice(SIGNALS), rng.choice(["program", "group", "guard", "runner", "both"])
     with contextlib.suppress(OSError, IndexError):
@@ -219,13 +214,22 @@ def _children(pid: int) -> list[int]:
     return [int(word) for word in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
 
 
-def _motions(here: Path) -> list[int]:
+def motions(here: Path) -> list[int]:
     path = here / "motions"
     text = path.read_text() if path.exists() else ""
     return [int(word) for word in text.split() if word.isdigit()]
 
 
-def _peak_velocity(folder: Path) -> float:
+def damage_plan(rng: random.Random, folder: Path) -> None:
+    """Change a bit of the plan that waits."""
+    (plan,) = (folder / "plans").iterdir()
+    plan.chmod(0o644)
+    content = bytearray(plan.read_bytes())
+    content[rng.randrange(len(content))] ^= 1 << rng.randrange(8)
+    plan.write_bytes(content)
+
+
+def peak_velocity(folder: Path) -> float:
     from prior_reinforce.plans.interpolation import interpolate
 
     with Workspace(folder) as workspace:
@@ -233,7 +237,7 @@ def _peak_velocity(folder: Path) -> float:
     return float(abs(interpolate(plan.actions, plan.format.dt).dq).max())
 
 
-def _alive(pid: int) -> bool:
+def alive(pid: int) -> bool:
     """Whether a process still runs code of its own."""
     try:
         stat = Path(f"/proc/{pid}/stat").read_text()
@@ -254,11 +258,11 @@ def _judge(
         if not wait_until(lambda folder=folder: not is_executing(folder), 80):
             return "the lock is never given back"
     # A supervisor that was killed takes nothing with it: what goes on must hold the lock.
-    if any(_alive(pid) for pid in _motions(here)):
+    if any(alive(pid) for pid in motions(here)):
         return "a motion goes on without the lock"
-    if "AT ONCE" in ((here / "motions").read_text() if _motions(here) else ""):
+    if "AT ONCE" in ((here / "motions").read_text() if motions(here) else ""):
         return "two motions at once"
-    moved = len(_motions(here))
+    moved = len(motions(here))
     if refused and moved:
         return "a refused plan moved"
     kinds: collections.Counter[str] = collections.Counter()
@@ -290,7 +294,7 @@ def _ends_as_it_was(folder: Path, kind: str) -> str:
 
 def _restored(here: Path, folder: Path, asked: Path, driver: str) -> str:
     """The journal of before is put back, and the same is asked for again."""
-    moved = len(_motions(here))
+    moved = len(motions(here))
     for path in folder.glob("journal.sqlite*"):
         path.unlink()
     shutil.copy(asked / "journal.sqlite", folder)
@@ -301,6 +305,6 @@ def _restored(here: Path, folder: Path, asked: Path, driver: str) -> str:
             return "a program hangs"
     finally:
         again.kill()
-    if moved and len(_motions(here)) > moved:
+    if moved and len(motions(here)) > moved:
         return "a restored journal moved a plan twice"
     return HELD

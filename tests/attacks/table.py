@@ -17,7 +17,7 @@ from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from pathlib import Path
 
-from tests.attacks import execution, interruptions, runs, sessions
+from tests.attacks import arms, execution, interruptions, runs, sessions
 from tests.attacks.classes import CLASSES, Attack
 from tests.attacks.harness import HELD, prepare, where
 
@@ -26,6 +26,7 @@ ATTACKS: dict[str, tuple[Attack, int]] = {
     "recordings": (CLASSES["recordings"], 120),  # there are twenty kinds
     "files": (CLASSES["files"], 30),
     "motions": (execution.attack, 90),
+    "arms": (arms.attack, 12),
     **{
         f"{how}: {name}": (partial(interruptions.attack, how, name), 1)
         for how in interruptions.HOW

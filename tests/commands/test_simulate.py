@@ -35,7 +35,7 @@ def test_its_recordings_are_six_throws_that_can_be_imported(run, tmp_path, monke
     [
         (("--task", "zoo-swing"), "is no task of this arm"),
         (("--goal", "1.0"), "--goal needs 2 numbers"),
-        (("--recordings", "."), "not empty"),
+        (("--recordings", "."), "choose an empty or a new folder"),
     ],
 )
 def test_what_it_cannot_do_is_said_in_a_line(run, tmp_path, monkeypatch, flags, says):

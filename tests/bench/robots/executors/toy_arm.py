@@ -69,12 +69,8 @@ class ToyArm(Executor):
             raise RobotLimitError(f"{fastest:.4f} rad/s, more than {self.config.fastest:.4f}")
 
     def run(self, plan):
-        others = self.folder / "motions"
-        with others.open("a") as motions:
-            pids = [int(word) for word in others.read_text().split() if word.isdigit()]
-            if any(pid != os.getpid() and _alive(pid) for pid in pids):
-                motions.write("AT ONCE\n")
-            motions.write(f"{os.getpid()}\n")
+        if self.config.kind != "jams":
+            self._leave_a_line()
         fine = interpolate(plan.actions, plan.format.dt, rate=RATE)
         n, kind = len(fine.t), self.config.kind
         for k, q in enumerate(fine.q):
@@ -101,6 +97,14 @@ class ToyArm(Executor):
             time.sleep(self.config.seconds)
             t = k / RATE
             yield GuidedState(t, _thrown(t), _thrown(t - 0.1) if self.config.led else _thrown(t))
+
+    def _leave_a_line(self):
+        path = self.folder / "motions"
+        with path.open("a") as motions:
+            pids = [int(word) for word in path.read_text().split() if word.isdigit()]
+            if any(pid != os.getpid() and _alive(pid) for pid in pids):
+                motions.write("AT ONCE\n")
+            motions.write(f"{os.getpid()}\n")
 
     def stop(self):
         self.stopping = True

@@ -1,0 +1,162 @@
+"""Attacks on the way from a plan to the arm through an executor (`ask --execute`).
+
+As in `execution.py`, and beside it: an arm that stands elsewhere, refuses by one per cent, does not
+answer, faults, jams, hangs or dies in mid-swing; rehearsals and approaches, which are no trials;
+and another arm in the manifest than a person saw.
+"""
+
+from __future__ import annotations
+
+import collections
+import contextlib
+import os
+import random
+import shutil
+import signal
+import time
+from pathlib import Path
+
+from prior_reinforce.bench.robots.executors.base import ArmSettings, Motion
+from prior_reinforce.bench.robots.executors.lock import is_executing
+from prior_reinforce.bench.workspace.workspace import Workspace
+from tests.attacks.execution import (
+    NARROW,
+    Program,
+    alive,
+    damage_plan,
+    motions,
+    peak_velocity,
+    send_signal,
+)
+from tests.attacks.harness import HELD, wait_until
+from tests.bench.robots.executors import toy_arm
+
+KINDS = ("works", "works", "works", "faults", "jams", "raises", "crashes", "hangs", "dead")
+OUTCOMES = {
+    "works": {"done"},
+    "faults": {"aborted"},
+    "raises": {"aborted"},
+    "crashes": {"aborted"},
+    "jams": {"not_moved"},
+    "dead": {"not_moved"},
+    "hangs": {"aborted"},
+}
+"""What the journal says of an arm that nobody disturbs."""
+TOLERANCE = 0.02
+"""`GateSettings.start_error`."""
+
+
+class Arm(Program):
+    """A program that executes a workspace's trial on the arm that somebody saw in its manifest."""
+
+    def __init__(self, folder: Path, seen: ArmSettings, limit: float, motion: Motion) -> None:
+        self.seen, self.motion = seen, motion
+        super().__init__(folder, "", limit)
+
+    def execute(self, folder: Path, command: str, limit: float, raises: str) -> None:
+        speed = 0.5 if self.motion == "rehearsal" else 1.0
+        with Workspace(folder) as workspace:
+            number = workspace.session().ask().number
+            workspace.execute(number, self.seen, time_limit=limit, motion=self.motion, speed=speed)
+
+
+def attack(rng: random.Random, here: Path, asked: Path) -> str:
+    """One attack; `held`, or what went wrong."""
+    folder, refused = here / "planar", False
+    os.environ["PRIOR_REINFORCE_ARM"] = str(here)  # other attacks run at the same time
+    os.environ["PYTHONPATH"] = str(Path(__file__).parents[2])
+    shutil.copytree(asked, folder)
+    kind, options = rng.choice(KINDS), {}
+    motion: Motion = rng.choice(["trial", "trial", "trial", "rehearsal", "approach"])
+    edits = ["nothing", "nothing", "fastest", "limit", "pose", "plan", "arm", "copy"]
+    edit = rng.choice(edits)
+    factor = rng.choice([0.99, 1.01])
+    speed = 0.5 if motion == "rehearsal" else 1.0
+    if edit == "fastest":  # the arm's own limit
+        options["fastest"] = speed * factor * peak_velocity(folder)
+        refused = factor < 1 and motion != "approach"
+    toy_arm.name_arm(folder, here, kind=kind, seconds=0.3, **options)
+    with Workspace(folder) as workspace:
+        seen = workspace.manifest.driven_by
+        first = workspace.plan(workspace.session().trial(1)).actions[0]
+    if edit == "pose":
+        away = rng.choice([0.99, 1.01, 10]) * TOLERANCE
+        (here / "pose").write_text(" ".join(map(str, first + away)))
+        refused = away > TOLERANCE and motion != "approach"
+    folders = [folder] * rng.choice([1, 1, 2])
+    if edit == "copy":
+        shutil.copytree(folder, here / "copy")
+        folders = [folder, here / "copy"]
+    manifest = folder / "workspace.toml"
+    if edit == "limit":  # the workspace's
+        narrow = NARROW.format(limit=factor * peak_velocity(folder))
+        manifest.write_text(manifest.read_text().replace('model = "none"', narrow, 1))
+        refused = factor < 1
+    if edit == "arm":
+        refused = True
+        manifest.write_text(manifest.read_text().replace("seconds = 0.3", "seconds = 0.4"))
+    if edit == "plan":
+        refused = True
+        damage_plan(rng, folder)
+    limit = 3.0 if kind == "hangs" else 30.0
+    programs = [Arm(place, seen, limit, motion) for place in folders]
+    for program in programs:
+        program.go()
+    signals = rng.choice([0, 0, 1, 1, 3])
+    for _ in range(signals):
+        time.sleep(rng.uniform(0, 1.5))
+        send_signal(rng, rng.choice(programs))
+    try:
+        verdict = judge(here, folders, programs, refused, motion)
+        if verdict == HELD and signals == 0 and len(programs) == 1 and not refused:
+            verdict = ends_as_it_was(folder, kind)
+        return verdict
+    finally:
+        for program in programs:
+            program.kill()
+        for pid in motions(here):
+            with contextlib.suppress(OSError):
+                os.kill(pid, signal.SIGKILL)
+
+
+def judge(
+    here: Path, folders: list[Path], programs: list[Arm], refused: bool, motion: Motion
+) -> str:
+    """What became of it."""
+    for program in programs:
+        if not wait_until(program.ended, 60):
+            return "a program hangs"
+    for folder in set(folders):
+        if not wait_until(lambda folder=folder: not is_executing(folder), 80):
+            return "the lock is never given back"
+    if any(alive(pid) for pid in motions(here)):
+        return "a motion goes on without the lock"
+    if motions(here) and "AT ONCE" in (here / "motions").read_text():
+        return "two motions at once"
+    moved = len(set(motions(here)))
+    if refused and moved:
+        return "a refused plan moved"
+    kinds: collections.Counter[str] = collections.Counter()
+    for folder in set(folders):
+        with Workspace(folder) as workspace:
+            for entry in workspace.log.entries():
+                none = getattr(entry.event, "outcome", "") == "not_moved"
+                kinds["none" if none else entry.kind] += 1
+            if motion != "trial" and workspace.state.executions:
+                return f"{motion} is in the journal as an execution"
+    began = kinds["executing"] + kinds["moving"]
+    if moved > began:
+        return "a motion is not recorded"
+    if moved > began - kinds["none"]:
+        return "a motion is recorded as none"
+    if moved > (len(set(folders)) if motion == "trial" else len(programs)):
+        return "a plan moved twice"
+    return HELD
+
+
+def ends_as_it_was(folder: Path, kind: str) -> str:
+    """Nobody cries wolf where nobody disturbed the arm, and a fault is not taken for success."""
+    with Workspace(folder) as workspace:
+        last = workspace.log.entries()[-1].event
+    outcome = getattr(last, "outcome", last.kind)
+    return HELD if outcome in OUTCOMES[kind] else f"{kind} is recorded as {outcome}"
