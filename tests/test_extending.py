@@ -3,6 +3,7 @@
 import ast
 import os
 import re
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -11,6 +12,10 @@ import numpy as np
 import pytest
 
 from prior_reinforce.adapters import ADAPTERS, make_adapter
+from prior_reinforce.bench.robots import GateSettings
+from prior_reinforce.bench.robots.executors.base import ArmSettings
+from prior_reinforce.bench.robots.executors.drive import Request, drive
+from prior_reinforce.bench.robots.executors.result import measure_tracking
 from prior_reinforce.cli import main
 from prior_reinforce.generators import GENERATORS, Timed, load_generator, make_generator
 from prior_reinforce.lab.experiments.recipes import RECIPES, Run, Scale
@@ -18,6 +23,7 @@ from prior_reinforce.lab.experiments.recipes.adapters import Adapters
 from prior_reinforce.lab.experiments.recipes.generators import Generators, Method
 from prior_reinforce.lab.tasks import TASKS, make_task
 from prior_reinforce.perception import PERCEPTIONS, make_perception
+from prior_reinforce.plans.motions import Plan, PlanFormat
 from prior_reinforce.registry import Member
 from prior_reinforce.testing import synthetic_demonstrations
 
@@ -159,3 +165,20 @@ def test_all_four_go_through_trials_together(added, tmp_path, capsys):
     ]
     assert main(["adapt", *chosen, "--goal", "0.8", "--no-film", "--out", str(tmp_path)]) == 0
     assert "HIT" in capsys.readouterr().out
+
+
+def test_the_guides_executor_moves_its_arm_and_no_faster_than_it_may(tmp_path, monkeypatch):
+    (tmp_path / "slider.py").write_text(FILES["slider.py"])
+    monkeypatch.syspath_prepend(tmp_path)
+    before = signal.getsignal(signal.SIGTERM)
+    s = np.linspace(0, 1, 51)[:, None]
+    plan = Plan(0.1 * (10 * s**3 - 15 * s**4 + 6 * s**5), PlanFormat(("rail",), ("m",), 0.02))
+    try:
+        for fastest, outcome in ((0.5, "done"), (0.1, "not_moved")):
+            arm = ArmSettings("slider:Slider", {"port": "/dev/null", "fastest": fastest})
+            result = drive(Request(arm, GateSettings(), "trial"), plan, tmp_path)
+            assert result.outcome == outcome
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    measured = measure_tracking(tmp_path, plan)
+    assert measured["end_error"] == {"m": pytest.approx(0.0, abs=1e-9)}
