@@ -15,6 +15,9 @@ from .bench.importing.importer import inspect_recordings as inspect_recordings
 from .bench.importing.importer import read_recordings as read_recordings
 from .bench.importing.options import ReadOptions as ReadOptions
 from .bench.importing.preprocessing import Preprocessing as Preprocessing
+from .bench.robots.executors.base import ArmDescription as ArmDescription
+from .bench.robots.executors.base import Executor as Executor
+from .bench.robots.executors.base import MeasuredPath as MeasuredPath
 from .bench.robots.executors.command import CommandResult as CommandResult
 from .bench.robots.executors.command import run_command as run_command
 from .bench.robots.gate import GateSettings as GateSettings
@@ -93,6 +96,7 @@ from .perception.vlm import VisionLanguageModel as VisionLanguageModel
 from .perception.vlm_client import VisionLanguageModelConfig as VisionLanguageModelConfig
 from .plans.alignment import Alignment as Alignment
 from .plans.alignment import align as align
+from .plans.interpolation import interpolate as interpolate
 from .plans.motions import Demonstrations as Demonstrations
 from .plans.motions import Plan as Plan
 from .plans.motions import PlanFormat as PlanFormat
