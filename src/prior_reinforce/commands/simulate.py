@@ -26,7 +26,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Simulate:
-    """Serve a simulated arm, with a task's objects before it, until Ctrl-C."""
+    """Serve a simulated arm, with a task's objects before it, until Ctrl-C.
+
+    For example:
+        prior-reinforce simulate fr3 --goal 1.05 0.10
+    """
 
     arm: Annotated[Literal["fr3"], tyro.conf.Positional]
     """Which: fr3 (Franka Research 3, for libfranka's clients)."""

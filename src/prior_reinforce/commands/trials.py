@@ -51,6 +51,7 @@ class Ask(OnWorkspace):
     For example:
         prior-reinforce ask hoop --out "plan-{trial}.npz"
         prior-reinforce ask hoop --run "mycontroller {plan} {result}"
+        prior-reinforce ask hoop --execute --approach
     """
 
     goal: Annotated[tuple[str, ...] | None, tyro.conf.arg(metavar="PLACE")] = None
