@@ -59,7 +59,7 @@ def put(folder, name, figures):
 
 def test_the_page_holds_claims_tables_and_pictures_in_one_file(tmp_path):
     put(tmp_path, "adapters", ADAPTERS)
-    put(tmp_path, "alignment", alignment.Alignment().run(Run(tmp_path, Scale(sets=("A",)))))
+    put(tmp_path, "alignment", alignment.AlignmentShifts().run(Run(tmp_path, Scale(sets=("A",)))))
     page, markdown = write_evidence(tmp_path)
     text, plain = page.read_text(), markdown.read_text()
     assert len(re.findall(r'src="data:image/png;base64,', text)) == 2

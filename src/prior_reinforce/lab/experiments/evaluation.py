@@ -82,7 +82,7 @@ class PerceivedDemonstrations(Unit):
 
 
 @dataclass(frozen=True, eq=False)
-class Learned:
+class LearnedGenerator:
     """What a training gives."""
 
     generator: Generator
@@ -139,7 +139,7 @@ class Training(Unit):
         """The whole prior set with its exact outcomes."""
         return make_task(self.task).demonstrations(self.demonstrations)
 
-    def learned(self, folder: Path) -> Learned:
+    def learned(self, folder: Path) -> LearnedGenerator:
         """What was learned: from the folder's models, or now, and put there."""
         home = self._home(folder)
         if not home.is_dir():
@@ -151,7 +151,7 @@ class Training(Unit):
                 generator.save(unfinished / "generator")
                 prior.save(unfinished / "demonstrations.npz")
         generator = load_generator(home / "generator", own=own_class(self.generator))
-        return Learned(generator, Demonstrations.load(home / "demonstrations.npz"))
+        return LearnedGenerator(generator, Demonstrations.load(home / "demonstrations.npz"))
 
     def _home(self, folder: Path) -> Path:
         return folder / "models" / digest_of(self)
@@ -206,7 +206,7 @@ class Trials(Unit):
             "failed_readings": [result.failed_readings for result in results],
         }
 
-    def learned(self, folder: Path) -> Learned:
+    def learned(self, folder: Path) -> LearnedGenerator:
         """What is tried: from the folder's models, or learned now."""
         return self.training.learned(folder)
 

@@ -87,12 +87,12 @@ def _widening(trainings: int) -> float:
 
 
 def bootstrap_difference(
-    a: Values, b: Values, *, within: tuple[float, float] = _ANYWHERE, seed: int = 0
+    a: Values, b: Values, *, within: tuple[float, float] = _ANYWHERE
 ) -> Interval:
     """Mean of a - b, paired by training and goal; `within` is what either mean can be."""
     low, high = within
     difference = np.asarray(a, dtype=float) - np.asarray(b, dtype=float)
-    return bootstrap_mean(difference, within=(low - high, high - low), seed=seed)
+    return bootstrap_mean(difference, within=(low - high, high - low))
 
 
 def trials_counted(solved_at: Shaped[np.ndarray, "*any"], rounds: int) -> Float[np.ndarray, "*any"]:
@@ -155,7 +155,7 @@ def mean_of_tasks(
     return Interval(value, float(low), float(high))
 
 
-def difference_of_tasks(a: ValuesByTask, b: ValuesByTask, *, seed: int = 0) -> Interval:
+def difference_of_tasks(a: ValuesByTask, b: ValuesByTask) -> Interval:
     """Mean of a - b over tasks, paired; of the trainings of a, the first that b has as well."""
     pairs = zip(a, b, strict=True)
-    return mean_of_tasks([of_a[: len(of_b)] - of_b for of_a, of_b in pairs], seed=seed)
+    return mean_of_tasks([of_a[: len(of_b)] - of_b for of_a, of_b in pairs])

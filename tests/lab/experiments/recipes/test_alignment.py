@@ -3,11 +3,11 @@
 import numpy as np
 
 from prior_reinforce.lab.experiments.recipes import Run, Scale
-from prior_reinforce.lab.experiments.recipes.alignment import RECIPE, Alignment
+from prior_reinforce.lab.experiments.recipes.alignment import RECIPE, AlignmentShifts
 
 
 def test_alignment_brings_starts_and_middles_together(tmp_path):
-    figures = Alignment().run(Run(tmp_path, Scale(sets=("A",))))
+    figures = AlignmentShifts().run(Run(tmp_path, Scale(sets=("A",))))
     assert [row["task"] for row in figures["rows"]] == ["basketball-v1", "curling", "fishing"]
     for row in figures["rows"]:
         for before, after in (row["start_sd_s"], row["middle_sd_s"]):

@@ -4,10 +4,10 @@ import pytest
 
 from prior_reinforce.lab.experiments.recipes import Run, Scale
 from prior_reinforce.lab.experiments.recipes.base import from_json, to_json
-from prior_reinforce.lab.experiments.recipes.variation import RECIPE, Variation
+from prior_reinforce.lab.experiments.recipes.variation import RECIPE, GeneratorsByVariation
 
 SMALL = Scale(goals=6, seeds=(0,), sets=("A",), rounds=3)
-MEASUREMENT = Variation(
+MEASUREMENT = GeneratorsByVariation(
     tasks=("zoo-hoop", "zoo-catapult"),
     sets=("clean-6", "mixed-4", "styles-9"),
     generators=(("auto", "auto"), ("nearest neighbours", "nearest")),
@@ -33,6 +33,6 @@ def test_one_set_of_each_kind_gives_table_and_picture(tmp_path):
 
 def test_a_quick_run_takes_one_task_and_one_kind():
     quick = Scale(goals=6, seeds=(0,), sets=("A",), variants=False)
-    trainings = Variation().trainings(quick)
+    trainings = GeneratorsByVariation().trainings(quick)
     assert {training.demonstrations for training in trainings} == {"clean-8-0"}
     assert len({training.task for training in trainings}) == 1

@@ -32,7 +32,7 @@ _TASKS = (TASK, "curling", "fishing")
 
 
 @dataclass(frozen=True)
-class Alignment(Measurement):
+class AlignmentShifts(Measurement):
     """When the demonstrations' motions begin, before and after alignment."""
 
     def run(self, run: Run) -> dict[str, Any]:
@@ -106,4 +106,4 @@ def draw(figures: Figures, folder: Path) -> list[Picture]:
     return [Picture(path, caption)]
 
 
-RECIPE = Recipe("alignment", "Timeline alignment", "Figure 6", Alignment(), table, draw)
+RECIPE = Recipe("alignment", "Timeline alignment", "Figure 6", AlignmentShifts(), table, draw)

@@ -29,7 +29,12 @@ from prior_reinforce.lab.experiments.claims import (
     above_by_round,
     all_of,
 )
-from prior_reinforce.lab.experiments.evaluation import Learned, Training, Trials, is_aligned
+from prior_reinforce.lab.experiments.evaluation import (
+    LearnedGenerator,
+    Training,
+    Trials,
+    is_aligned,
+)
 from prior_reinforce.lab.experiments.recipes.base import (
     Figures,
     Measurement,
@@ -127,10 +132,10 @@ class FreshNoise(Wrapper):
 class FreshNoiseTrials(Trials):
     """Trials for each of which the network of a training is sampled anew."""
 
-    def learned(self, folder: Path) -> Learned:
+    def learned(self, folder: Path) -> LearnedGenerator:
         """What was learned, sampled anew for every trial."""
         learned = self.training.learned(folder)
-        return Learned(FreshNoise(learned.generator), learned.prior)
+        return LearnedGenerator(FreshNoise(learned.generator), learned.prior)
 
 
 METHODS = (

@@ -40,7 +40,7 @@ _QUICK_SETS, _QUICK_TASKS, _QUICK_GENERATORS, _GOALS = 1, 1, 3, 30
 
 
 @dataclass(frozen=True)
-class Variation(Measurement):
+class GeneratorsByVariation(Measurement):
     """First throws and trials of every generator on every kind of set."""
 
     tasks: tuple[str, ...] = TASKS
@@ -162,6 +162,6 @@ def _in_words(name: str) -> str:
 
 
 RECIPE = Recipe(
-    "variation", "When is diffusion needed?", "not in the paper", Variation(), table, draw,
-    family="generator",
+    "variation", "When is diffusion needed?", "not in the paper", GeneratorsByVariation(), table,
+    draw, family="generator",
 )  # fmt: skip

@@ -47,7 +47,7 @@ SEEDS = {"A": 1, "B": 2}
 
 
 @dataclass(frozen=True)
-class Variation:
+class ThrowVariation:
     """How repetitions of the throw differ; standard deviations unless said otherwise; ours."""
 
     start: tuple[float, float] = (0.04, 0.60)
@@ -83,11 +83,9 @@ def throw(
     return posture + travel * betainc(3, 3, part)[:, None]
 
 
-def make(
-    name: str, variation: Variation | None = None, task: BasketballShot | None = None
-) -> Demonstrations:
+def make(name: str, task: BasketballShot | None = None) -> Demonstrations:
     """Make the prior set `name` ("A" or "B") of V1, or of another task, the same every time."""
-    size = variation or Variation()
+    size = ThrowVariation()
     task = task or BasketballShot()
     rng = np.random.default_rng(SEEDS[name])
     designed = np.array(DESIGNED[name])

@@ -44,7 +44,7 @@ SEEDS = {"A": 1, "B": 2}
 
 
 @dataclass(frozen=True)
-class Variation:
+class PushVariation:
     """How an operator's pushes differ; standard deviations unless said otherwise; ours."""
 
     start: tuple[float, float] = (0.10, 0.68)
@@ -105,9 +105,9 @@ def _speed_for(distance: float) -> float:
     return float((np.sqrt(b * b + 4 * a * (distance - CARRIED_ON)) - b) / (2 * a))
 
 
-def make(name: str, variation: Variation | None = None) -> Demonstrations:
+def make(name: str) -> Demonstrations:
     """Make the prior set `name` ("A" or "B"), the same every time on the same machine."""
-    size = variation or Variation()
+    size = PushVariation()
     task = Curling()
     rng = np.random.default_rng(SEEDS[name])
     dt, aimed = task.format.dt, AIMED[name]

@@ -47,7 +47,7 @@ SEEDS = {"A": 1, "B": 2}
 
 
 @dataclass(frozen=True)
-class Variation:
+class CastVariation:
     """How an operator's casts differ; standard deviations unless said otherwise; ours."""
 
     start: tuple[float, float] = (0.10, 1.03)
@@ -94,9 +94,9 @@ def cast(
     )
 
 
-def make(name: str, variation: Variation | None = None) -> Demonstrations:
+def make(name: str) -> Demonstrations:
     """Make the prior set `name` ("A" or "B"), the same every time on the same machine."""
-    size = variation or Variation()
+    size = CastVariation()
     task = Fishing()
     rng = np.random.default_rng(SEEDS[name])
     dt, aimed = task.format.dt, np.array(AIMED[name])

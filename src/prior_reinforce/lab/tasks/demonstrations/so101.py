@@ -15,7 +15,7 @@ from scipy.special import betainc
 
 from prior_reinforce.arrays import Plans, Points
 from prior_reinforce.lab.tasks.demonstrations import write_sets
-from prior_reinforce.lab.tasks.demonstrations.basketball import Knobs, Variation, aim
+from prior_reinforce.lab.tasks.demonstrations.basketball import Knobs, ThrowVariation, aim
 from prior_reinforce.lab.tasks.so101 import SO101Shot
 from prior_reinforce.plans.motions import Demonstrations
 
@@ -37,9 +37,9 @@ DESIGNED = {
 SEEDS = {"A": 1, "B": 2}
 
 
-def make(name: str, variation: Variation | None = None) -> Demonstrations:
+def make(name: str) -> Demonstrations:
     """Make the prior set `name` ("A" or "B"), the same every time on the same machine."""
-    size = variation or Variation(start=(0.04, 0.60))
+    size = ThrowVariation(start=(0.04, 0.60))
     task = SO101Shot()
     rng = np.random.default_rng(SEEDS[name])
     designed = np.array(DESIGNED[name])
