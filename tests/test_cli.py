@@ -131,7 +131,7 @@ def test_an_interruption_after_the_commit_says_so(run, folder, monkeypatch):
 @pytest.mark.parametrize("name", COMMANDS)
 def test_every_help_has_an_example_and_says_no_none(capsys, name):
     with pytest.raises(SystemExit) as end:
-        main((name, "--help"))
+        main((name, "ur", "--help"))
     shown = capsys.readouterr().out
     assert end.value.code in (0, None)
     assert shown.startswith(f"usage: prior-reinforce {name}")
@@ -160,7 +160,7 @@ def test_the_version_is_the_installed_one(run, option):
     ("args", "meant"),
     [
         (("staus", "planar"), "did you mean status?"),
-        (("--verion",), "there is no option --verion"),
+        (("--verion",), "there is no option --verion; did you mean --version?"),
         (("ask", "planar", "--ot", "plan.npz"), "ask has no --ot; did you mean --out?"),
         (("goal", "planar", "1", "0", "--memroy", "goal"), "did you mean --memory?"),
         (("ask", "planar", "--nothing-like-it"), "ask has no --nothing-like-it; see"),

@@ -107,14 +107,16 @@ def _parse(args: list[str]) -> Command | None:
     if name not in COMMANDS:
         kind = "option" if name.startswith("-") else "command"
         raise ConfigurationError(
-            f"there is no {kind} {name}{_suggested(name, COMMANDS)}; prior-reinforce --help lists "
-            "them all"
+            f"there is no {kind} {name}{_suggested(name, [*COMMANDS, '--help', '--version'])}; "
+            "prior-reinforce --help lists them all"
         )
+    # Else the usage lacks the words that are there already.
+    rest = ["--help"] if {"-h", "--help"} & {*args[1:]} else args[1:]
     with _in_one_line(name):
         command: Command = tyro.cli(
             pkgutil.resolve_name(COMMANDS[name]),
             prog=f"prior-reinforce {name}",
-            args=args[1:],
+            args=rest,
             config=(tyro.conf.DisallowNone, tyro.conf.FlagCreatePairsOff),
         )
     _check_values(command)

@@ -2,14 +2,13 @@
 
 These records are the schema (`msgspec.json.schema(StatusRecord)`): a field is added now and then,
 none is renamed or changes its meaning within a major version. Numbers are in the manifest's units;
-what is not known, or not finite, is null.
+what is not known is null. The whole reading of a trial, its interval and its sd, is in the journal.
 """
 
 from __future__ import annotations
 
 import csv
 import io
-import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -57,10 +56,6 @@ class TrialRecord(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     """The outcome that the generator was asked for."""
     error: list[float] | None
     """What was seen, outcome minus goal; of a direction alone, what it is taken to be."""
-    low: list[float | None] | None
-    high: list[float | None] | None
-    """The interval in which the error lies, up to sd; null where it is open."""
-    sd: list[float] | None
     said: str | None
     """The same in the words that were typed."""
     hit: bool | None
@@ -210,20 +205,12 @@ def _trial_record(
     workspace: Workspace, trial: Trial, times: Mapping[tuple[str, int], str]
 ) -> TrialRecord:
     reading = trial.reading
-    seen: dict[str, list[Any]] = {}
-    if reading is not None:
-        ends = {"error": reading.error_seen, "low": reading.low, "high": reading.high}
-        ends["sd"] = reading.sd
-        seen = {name: [_finite(v) for v in values.tolist()] for name, values in ends.items()}
     return TrialRecord(
         number=trial.number,
         goal=trial.goal_number,
         stage=trial.stage.value,
         condition=trial.condition.tolist(),
-        error=seen.get("error"),
-        low=seen.get("low"),
-        high=seen.get("high"),
-        sd=seen.get("sd"),
+        error=reading.error_seen.tolist() if reading is not None else None,
         said=reading.said or None if reading is not None else None,
         hit=trial.hit if reading is not None else None,
         reason=trial.note or None,
@@ -236,10 +223,6 @@ def _trial_record(
         asked=times["asked", trial.number],
         told=times.get(("told", trial.number)) if reading is not None else None,
     )
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
 
 
 def status_record(workspace: Workspace) -> StatusRecord:
@@ -275,7 +258,7 @@ def trials_table(workspace: Workspace) -> str:
     """Return all trials as CSV: a row each, vectors a column a component with its unit."""
     names, units = workspace.manifest.outcome_names, workspace.manifest.outcome_units
     goals = {goal.number: goal.goal.tolist() for goal in workspace.state.goals}
-    vectors = ("goal", "condition", "error", "low", "high", "sd")
+    vectors = ("goal", "condition", "error")
     plainly = ("stage", "hit", "said", "reason", "p_hit", "expected_trials", "model")
     components = [(v, f"{v} {n} [{u}]") for v in vectors for n, u in zip(names, units, strict=True)]
     text = io.StringIO()

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from prior_reinforce.bench.workspace.log import Executed, Executing, NotExecuted, WorkspaceState
+from prior_reinforce.bench.workspace.manifest import UNKNOWN
 from prior_reinforce.bench.workspace.workspace import Workspace, workspace_around
 from prior_reinforce.registry import own_class
 from prior_reinforce.session.trials import Goal, Stage, Trial
@@ -28,13 +29,14 @@ def describe(workspace: Workspace) -> str:
     robot = manifest.robot.robot if manifest.robot is not None else "none, no limits are checked"
     n = 0 if state.demonstrations is None else workspace.demonstrations.n
     names, units = manifest.outcome_names, manifest.outcome_units
-    training = state.training
+    training, columns = state.training, f"{manifest.format.action_dim} numbers"
+    if manifest.format.names == UNKNOWN:
+        columns = "what the first import has"
     rows = [
         ("task", f"{manifest.name}, tolerance {say_tolerance(manifest.tolerance, names, units)}"),
         (
             "plans",
-            f"{manifest.format.action_dim} numbers a frame, a frame every "
-            f"{manifest.format.dt * 1000:g} ms; robot: {robot}",
+            f"{columns} a frame, a frame every {manifest.format.dt * 1000:g} ms; robot: {robot}",
         ),
         ("demonstrations", f"{n} from {state.demonstrations_source}" if n else "none yet"),
         ("model", _say_model(workspace)),
