@@ -1,5 +1,6 @@
 """Which workspace and which trial the words of a command are about."""
 
+import os
 import sys
 
 import pytest
@@ -75,6 +76,16 @@ def test_a_folder_in_a_workspace_that_is_called_like_a_trial_is_none(run, within
         pass
     assert run("tell", "1", "hit")[1].startswith("trial 1: reached")
     assert "task            1," in run("status", "./1")[1]
+
+
+@pytest.mark.skipif(os.name != "posix" or os.geteuid() != 0, reason="only root gives folders away")
+def test_a_folder_of_somebody_else_is_not_searched(run, within, tmp_path, monkeypatch):
+    """Else a manifest in /tmp would be everybody's."""
+    (within / "mine").mkdir()
+    monkeypatch.chdir(within / "mine")
+    assert run("status")[0] == 0
+    os.chown(within / "mine", 12345, -1)
+    assert "name the workspace" in run("status")[2]
 
 
 def test_elsewhere_the_workspace_is_named_first(run, folder):

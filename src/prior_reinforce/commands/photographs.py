@@ -97,8 +97,8 @@ class Look:
     calibration: Path = Path("table.json")
     """What `calibrate` wrote."""
     workspace: Path | None = None
-    """Workspace whose trial it was: the error is seen from the goal that is set there, and what was
-    seen is kept there, in pictures/."""
+    """Workspace whose trial it was (the current folder's if not given): the error is seen from the
+    goal that is set there, and what was seen is kept there, in pictures/."""
     trial: int | None = None
     """Number of that trial."""
     vlm: VisionLanguageModelConfig = field(default_factory=VisionLanguageModelConfig)
@@ -113,7 +113,7 @@ class Look:
         drawn = folder / f"{stem}.png"
         written = drawn.with_suffix(".json")
         for path in (folder, drawn, written):
-            if self.workspace is not None and path.is_symlink():
+            if goal is not None and path.is_symlink():
                 raise FileFormatError(f"{path} is a link; nothing is written through it, remove it")
         refuse_foreign(drawn if not written.exists() else written, "picture_size_px")
         calibration = TableCalibration.load(self.calibration)
@@ -149,20 +149,19 @@ class Look:
                 )
         print(f"seen: {to_words(error)}   boxes: {drawn}")
         numbers = " ".join(f"{component:.4f}+-{CAMERA_SD:g}" for component in error)
-        told = (
-            "FOLDER TRIAL" if goal is None else f"{shlex.quote(str(self.workspace))} {self.trial}"
-        )
+        told = "FOLDER TRIAL" if goal is None else f"{shlex.quote(str(folder.parent))} {self.trial}"
         print(f"if the boxes are right: prior-reinforce tell {told} {numbers}")
 
     def _of_trial(self) -> tuple[Point | None, Path, str]:
         """The goal that the trial was for, where to keep what is seen, and its name there."""
         if self.workspace is None and self.trial is None:
             return None, self.picture.parent, f"{self.picture.stem}-seen"
-        if self.workspace is None or self.trial is None:
-            raise ConfigurationError("--workspace and --trial say together which trial it was")
-        from prior_reinforce.bench.workspace.workspace import Workspace
+        from prior_reinforce.bench.workspace.workspace import Workspace, workspace_around
 
-        with Workspace(self.workspace) as workspace:
+        folder = self.workspace or workspace_around(Path())
+        if folder is None or self.trial is None:
+            raise ConfigurationError("--workspace and --trial say together which trial it was")
+        with Workspace(folder) as workspace:
             state, units = workspace.state, workspace.manifest.outcome_units
             if tuple(units) != ("m", "m"):
                 raise ConfigurationError(
@@ -170,7 +169,7 @@ class Look:
                     " leave --workspace out, and tell what you see"
                 )
             goal = state.goal_of(state.trial(self.trial)).goal
-        return goal, self.workspace / "pictures", f"trial-{self.trial:03d}-seen"
+        return goal, folder / "pictures", f"trial-{self.trial:03d}-seen"
 
 
 def _read_points(path: Path) -> Float[np.ndarray, "n 4"]:

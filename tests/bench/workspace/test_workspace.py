@@ -788,7 +788,7 @@ def test_closed_it_says_so_and_is_never_copied(workspace):
         for each in (workspace, session):
             with pytest.raises(WorkspaceError, match=r"not copied; open it again: Workspace\('"):
                 copied(each)
-    assert repr(workspace).endswith("planar': 1 goals, 0 trials)")
+    assert repr(workspace).endswith("planar': goal 1, trial 0)")
     workspace.close()
     for ask_it in (lambda: workspace.state, lambda: session.solved, session.ask):
         with pytest.raises(WorkspaceError, match="planar is closed; open it again"):

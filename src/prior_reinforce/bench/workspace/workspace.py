@@ -93,10 +93,14 @@ def workspace_around(folder: Path, *, above: bool = True) -> Path | None:
 
     Args:
         folder: For instance the current one, `Path()`; what is returned is relative to it.
-        above: Whether folders above it count.
+        above: Whether folders above it count, as far as they have the same owner: what somebody
+            else put into a shared folder is nobody's workspace.
     """
+    owner = folder.stat().st_uid if above else None
     for up in ("", *([".."] * len(folder.resolve().parts) if above else ())):
         folder = folder / up
+        if above and folder.stat().st_uid != owner:
+            return None
         if os.path.isfile(folder / MANIFEST_FILE):  # False for a name that is too long
             return folder
     return None
@@ -207,8 +211,8 @@ class Workspace:
             state = self.state
         except PriorReinforceError as error:
             return f"Workspace({str(self.folder)!r}: {error})"
-        said = f"{len(state.goals)} goals, {len(state.trials)} trials"
-        return f"Workspace({str(self.folder)!r}: {said})"
+        goal = f"goal {len(state.goals)}" if state.goals else "no goal"
+        return f"Workspace({str(self.folder)!r}: {goal}, trial {len(state.trials)})"
 
     def _repr_html_(self) -> str:
         return as_html(self.status().text)
