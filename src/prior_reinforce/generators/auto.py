@@ -18,7 +18,7 @@ from typing import Any, ClassVar
 
 from prior_reinforce.arrays import Plans, Points
 from prior_reinforce.errors import InvalidDemonstrationsError
-from prior_reinforce.generators.base import Generator, Report
+from prior_reinforce.generators.base import Generator, OnProgress
 from prior_reinforce.generators.diffusion import DiffusionGenerator
 from prior_reinforce.generators.interpolation import SmoothInterpolation
 from prior_reinforce.generators.patterns import patterns
@@ -57,7 +57,7 @@ class Auto(Wrapper):
             super().__init__(generator)
         self._network: dict[str, Any] = {"device": device, "threads": threads, "states": states}
 
-    def _fit(self, demonstrations: Demonstrations, seed: int, progress: Report) -> None:
+    def _fit(self, demonstrations: Demonstrations, seed: int, progress: OnProgress) -> None:
         groups = patterns(demonstrations)
         largest, *others = groups
         learned = demonstrations if not others else None

@@ -41,7 +41,7 @@ class FitProgress:
     """Estimated, in [s]."""
 
 
-Report = Callable[[FitProgress], None]
+OnProgress = Callable[[FitProgress], None]
 
 
 class Generator(ABC):
@@ -59,7 +59,7 @@ class Generator(ABC):
     """k of the demonstrations; None before `fit`."""
 
     def fit(
-        self, demonstrations: Demonstrations, *, seed: int, progress: Report | None = None
+        self, demonstrations: Demonstrations, *, seed: int, progress: OnProgress | None = None
     ) -> Self:
         """Learn outcome -> plan from all demonstrations (none is held out).
 
@@ -181,7 +181,7 @@ class Generator(ABC):
         return generator
 
     @abstractmethod
-    def _fit(self, demonstrations: Demonstrations, seed: int, progress: Report) -> None:
+    def _fit(self, demonstrations: Demonstrations, seed: int, progress: OnProgress) -> None:
         """Learn; called by `fit`."""
 
     @abstractmethod
@@ -213,7 +213,7 @@ class Generator(ABC):
         return self._outcome_dim
 
 
-def at_once(progress: Report, loss: float) -> None:
+def at_once(progress: OnProgress, loss: float) -> None:
     """Report a fit that is a single step."""
     progress(FitProgress(step=1, n_steps=1, loss=loss, seconds_left=0.0))
 

@@ -23,7 +23,7 @@ from dataclasses import replace
 from typing import Any, ClassVar
 
 from prior_reinforce.arrays import Plans, Points
-from prior_reinforce.generators.base import Generator, Report
+from prior_reinforce.generators.base import Generator, OnProgress
 from prior_reinforce.generators.interpolation import SmoothInterpolation
 from prior_reinforce.generators.saving import Tensors
 from prior_reinforce.generators.wrapping import Wrapper
@@ -43,7 +43,7 @@ class Corrected(Wrapper):
         super().__init__(generator)
         self._residual = SmoothInterpolation()
 
-    def _fit(self, demonstrations: Demonstrations, seed: int, progress: Report) -> None:
+    def _fit(self, demonstrations: Demonstrations, seed: int, progress: OnProgress) -> None:
         self.generator.fit(demonstrations, seed=seed, progress=progress)
         missed = demonstrations.plans - self.generator.generate(demonstrations.outcomes_seen)
         # A switch has no values between its own: it is right, or at another frame.

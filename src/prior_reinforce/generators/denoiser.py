@@ -18,7 +18,7 @@ from pathlib import Path
 
 from jaxtyping import Float, Int
 
-from prior_reinforce.generators.base import Report
+from prior_reinforce.generators.base import OnProgress
 from prior_reinforce.generators.config import DiffusionConfig
 from prior_reinforce.generators.noise_schedule import NoiseSchedule, mean_shift_levels
 from prior_reinforce.generators.threads import torch
@@ -42,7 +42,7 @@ def train(
     conditions: Float[torch.Tensor, "N k"],
     config: DiffusionConfig,
     seed: int,
-    progress: Report,
+    progress: OnProgress,
     *,
     state: Path | None = None,
 ) -> Network:

@@ -19,7 +19,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
-from prior_reinforce.generators.base import Report
+from prior_reinforce.generators.base import OnProgress
 from prior_reinforce.generators.config import DiffusionConfig, Sampler
 from prior_reinforce.generators.network import Learned, NetworkGenerator
 
@@ -83,7 +83,7 @@ class DiffusionGenerator(NetworkGenerator):
         codes: Tensor,
         conditions: Tensor,
         seed: int,
-        progress: Report,
+        progress: OnProgress,
         state: Path | None,
     ) -> nn.Module:
         from prior_reinforce.generators.denoiser import train

@@ -37,7 +37,7 @@ from typing_extensions import Self
 
 from prior_reinforce.arrays import Frames, Plans, Points
 from prior_reinforce.errors import MissingExtraError
-from prior_reinforce.generators.base import Generator, Report, at_once
+from prior_reinforce.generators.base import Generator, OnProgress, at_once
 from prior_reinforce.generators.saving import Tensors
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.plans.outcome_weights import smooth_weights
@@ -81,7 +81,7 @@ class DynamicMovementPrimitives(Generator):
         _library()
         self.config = config or DynamicMovementPrimitivesConfig()
 
-    def _fit(self, demonstrations: Demonstrations, seed: int, progress: Report) -> None:
+    def _fit(self, demonstrations: Demonstrations, seed: int, progress: OnProgress) -> None:
         """Fit one DMP to each demonstration; nothing is random."""
         plans, horizon = demonstrations.plans, demonstrations.horizon
         spans = np.tile([0.0, horizon - 1.0], (demonstrations.n, 1))

@@ -29,7 +29,7 @@ from jaxtyping import Float
 from typing_extensions import Self
 
 from prior_reinforce.arrays import Plans, Points
-from prior_reinforce.generators.base import Generator, Report, at_once
+from prior_reinforce.generators.base import Generator, OnProgress, at_once
 from prior_reinforce.generators.saving import Tensors
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.plans.outcome_weights import (
@@ -76,7 +76,7 @@ class _Mixture(Generator):
     def _weights(self, conditions: Points) -> Float[np.ndarray, "n N"]:
         """How much of each plan goes into the plan for each condition."""
 
-    def _fit(self, demonstrations: Demonstrations, seed: int, progress: Report) -> None:
+    def _fit(self, demonstrations: Demonstrations, seed: int, progress: OnProgress) -> None:
         """Keep the demonstrations; nothing is random and nothing takes time."""
         self._keep(
             demonstrations.plans.copy(),
@@ -137,7 +137,7 @@ class SmoothInterpolation(_Mixture):
     config_type: ClassVar[type[SmoothInterpolationConfig]] = SmoothInterpolationConfig
     config: SmoothInterpolationConfig
 
-    def _fit(self, demonstrations: Demonstrations, seed: int, progress: Report) -> None:
+    def _fit(self, demonstrations: Demonstrations, seed: int, progress: OnProgress) -> None:
         super()._fit(demonstrations, seed, progress)
         if self.config.kernel == "auto" and self._spline.kernel == "linear":
             self.remarks = (

@@ -21,7 +21,7 @@ from prior_reinforce.arrays import Plans, Points
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.extras import check_installed
 from prior_reinforce.files import sha256
-from prior_reinforce.generators.base import ConditionScale, Generator, Report
+from prior_reinforce.generators.base import ConditionScale, Generator, OnProgress
 from prior_reinforce.generators.config import UNetConfig
 from prior_reinforce.generators.saving import Tensors
 from prior_reinforce.generators.span import Span
@@ -104,7 +104,7 @@ class NetworkGenerator(Generator):
         codes: Tensor,
         conditions: Tensor,
         seed: int,
-        progress: Report,
+        progress: OnProgress,
         state: Path | None,
     ) -> nn.Module:
         """Fit the network to codes (N, C, T) and conditions (N, k)."""
@@ -113,7 +113,7 @@ class NetworkGenerator(Generator):
     def _codes(self, learned: Learned, conditions: Tensor) -> Tensor:
         """Make codes (n, C, T) for scaled conditions (n, k)."""
 
-    def _fit(self, demonstrations: Demonstrations, seed: int, progress: Report) -> None:
+    def _fit(self, demonstrations: Demonstrations, seed: int, progress: OnProgress) -> None:
         from prior_reinforce.generators.threads import torch_threads
         from prior_reinforce.generators.training import build
 

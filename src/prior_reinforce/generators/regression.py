@@ -17,7 +17,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
-from prior_reinforce.generators.base import Report
+from prior_reinforce.generators.base import OnProgress
 from prior_reinforce.generators.config import UNetRegressionConfig
 from prior_reinforce.generators.network import Learned, NetworkGenerator
 
@@ -45,7 +45,7 @@ class UNetRegression(NetworkGenerator):
         codes: Tensor,
         conditions: Tensor,
         seed: int,
-        progress: Report,
+        progress: OnProgress,
         state: Path | None,
     ) -> nn.Module:
         """Fit to all demonstrations at every step; the seed has drawn the initial weights."""

@@ -26,7 +26,7 @@ import numpy as np
 
 from prior_reinforce.arrays import Plans, Points
 from prior_reinforce.errors import ConfigurationError
-from prior_reinforce.generators.base import Generator, Report
+from prior_reinforce.generators.base import Generator, OnProgress
 from prior_reinforce.generators.saving import Tensors
 from prior_reinforce.generators.timing_evidence import TOO_FEW_FRAMES, choose_timing
 from prior_reinforce.generators.wrapping import Wrapper
@@ -63,7 +63,7 @@ class Timed(Wrapper):
         """The common phase that was learned on; None before `fit`, and where plans are aligned."""
         return self._timeline
 
-    def _fit(self, demonstrations: Demonstrations, seed: int, progress: Report) -> None:
+    def _fit(self, demonstrations: Demonstrations, seed: int, progress: OnProgress) -> None:
         self._timeline = None
         if self.timing == "align":
             learned = align(demonstrations).demonstrations

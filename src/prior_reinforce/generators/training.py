@@ -17,7 +17,7 @@ from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
 
 from prior_reinforce.errors import FileFormatError
 from prior_reinforce.files import write
-from prior_reinforce.generators.base import FitProgress, Report
+from prior_reinforce.generators.base import FitProgress, OnProgress
 from prior_reinforce.generators.config import UNetConfig
 from prior_reinforce.generators.threads import torch
 
@@ -49,7 +49,7 @@ def optimise(
     network: Network,
     loss_of_step: Callable[[], torch.Tensor],
     config: UNetConfig,
-    progress: Report,
+    progress: OnProgress,
     *,
     betas: tuple[float, float] = (0.9, 0.999),
     decay: Callable[[int], float] | None = None,

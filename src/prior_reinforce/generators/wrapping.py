@@ -8,7 +8,7 @@ from typing import Any
 from typing_extensions import Self
 
 from prior_reinforce.errors import ConfigurationError
-from prior_reinforce.generators.base import Generator, Report
+from prior_reinforce.generators.base import Generator, OnProgress
 from prior_reinforce.generators.saving import SavedLayer, Tensors
 from prior_reinforce.plans.motions import Demonstrations
 
@@ -33,7 +33,7 @@ class Wrapper(Generator):
         self.generator = generator
 
     def fit(
-        self, demonstrations: Demonstrations, *, seed: int, progress: Report | None = None
+        self, demonstrations: Demonstrations, *, seed: int, progress: OnProgress | None = None
     ) -> Self:
         """Learn with the wrapped generator, whose remarks follow one's own; see `Generator.fit`."""
         super().fit(demonstrations, seed=seed, progress=progress)

@@ -33,7 +33,7 @@ from prior_reinforce.errors import (
 )
 from prior_reinforce.files import in_place
 from prior_reinforce.generators import Generator, make_generator
-from prior_reinforce.generators.base import Report
+from prior_reinforce.generators.base import OnProgress
 from prior_reinforce.lab.experiments.evaluation import GOAL_SEED
 from prior_reinforce.lab.experiments.protocol import perceive_demonstrations
 from prior_reinforce.lab.experiments.units import Unit, digest_of
@@ -299,7 +299,7 @@ class Conditions(Generator):
 
     name = "conditions"
 
-    def _fit(self, demonstrations: Demonstrations, seed: int, progress: Report) -> None:
+    def _fit(self, demonstrations: Demonstrations, seed: int, progress: OnProgress) -> None:
         """There is nothing to learn."""
 
     def _generate(self, conditions: Points) -> Plans:

@@ -19,7 +19,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from prior_reinforce.arrays import Plans, Points
-from prior_reinforce.generators.base import Generator, Report
+from prior_reinforce.generators.base import Generator, OnProgress
 from prior_reinforce.generators.diffusion import DiffusionGenerator
 from prior_reinforce.generators.wrapping import Wrapper
 from prior_reinforce.lab.experiments.claims import (
@@ -112,7 +112,7 @@ class FreshNoise(Wrapper):
         super().__init__(generator)
         self._asked, self._outcome_dim = 0, generator._fitted_to()
 
-    def _fit(self, demonstrations: Demonstrations, seed: int, progress: Report) -> None:
+    def _fit(self, demonstrations: Demonstrations, seed: int, progress: OnProgress) -> None:
         raise NotImplementedError("wrap what was fitted")
 
     def _generate(self, conditions: Points) -> Plans:
