@@ -2,7 +2,7 @@
 
 LeRobot's own class drives it by that port. Physics, servos and ball are those of the task `so101`,
 where the same plan without a bus lands likewise. The ball is put back into the scoop whenever the
-arm stands still and the scoop opens upwards; where it comes down is told. Without torque the arm
+arm stands still and the scoop opens upwards. Without torque the arm
 stays where it is, or a hand guides it through demonstrations, one after the other.
 """
 
@@ -12,6 +12,7 @@ import json
 import math
 import os
 import select
+import threading
 import time
 import tty
 from collections.abc import Callable
@@ -21,6 +22,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Bool, Float
 
+from prior_reinforce.environment import Rollout
 from prior_reinforce.lab.arms.feetech import (
     GOAL_POSITION,
     HOMING_OFFSET,
@@ -33,7 +35,14 @@ from prior_reinforce.lab.arms.feetech import (
 from prior_reinforce.lab.tasks.demonstrations.teleoperation import smoothstep
 from prior_reinforce.lab.tasks.panda import STEP, setpoints
 from prior_reinforce.lab.tasks.panda_task import first_descent
-from prior_reinforce.lab.tasks.so101 import MOTORS, RIM_HEIGHT, SO101Shot, servo_lag, servo_speed
+from prior_reinforce.lab.tasks.so101 import (
+    LAG,
+    MOTORS,
+    RIM_HEIGHT,
+    SO101Shot,
+    servo_lag,
+    servo_speed,
+)
 from prior_reinforce.plans.motions import Demonstrations
 
 _STEPS = 4095 / (2 * math.pi)
@@ -51,17 +60,17 @@ class SimulatedSO101:
     """The arm, its six servos and the ball; time passes in `advance`."""
 
     def __init__(
-        self, demonstrations: Demonstrations | None = None, tell: Callable[[str], None] = print
+        self,
+        demonstrations: Demonstrations | None = None,
+        landed: Callable[[Rollout], None] = lambda rollout: None,
     ) -> None:
         """Stand in the zero of all joints.
 
         Args:
             demonstrations: Through which a hand guides the arm while it has no torque.
-            tell: Called with what a person at the table sees.
+            landed: Called with where the ball came down, throw by throw.
         """
-        self.task, self.tell = SO101Shot(), tell
-        self.landings: list[Float[np.ndarray, "2"]] = []
-        """Where the ball came down, (x, y) in [m], throw by throw."""
+        self.task, self._landed = SO101Shot(), landed
         model = self.task.model
         self._data = mujoco.MjData(model)
         mujoco.mj_forward(model, self._data)
@@ -97,9 +106,7 @@ class SimulatedSO101:
         path = np.stack([before, data.qpos[ball : ball + 3]])
         if not self._thrown and (descent := first_descent(path, RIM_HEIGHT)) is not None:
             self._thrown = True
-            self.landings.append(descent[2])
-            x, y = descent[2]
-            self.tell(f"the ball came down at x = {x:.3f} m, y = {y:.3f} m")
+            self._landed(Rollout(descent[2], True))
         self._still = 0.0 if np.abs(speed).max() > _STILL else self._still + STEP
         if self._still > _STILL_FOR:
             self._put_back()
@@ -113,7 +120,6 @@ class SimulatedSO101:
             velocity = self.task.model.jnt_dofadr[self.task.model.joint("ball").id]
             data.qvel[velocity : velocity + 6] = 0.0
             self._thrown = False
-            self.tell("the ball lies in the scoop")
 
     def _goals(self) -> tuple[Float[np.ndarray, "6"], Bool[np.ndarray, "6"]]:
         """Where each servo goes, in the units of its position, and whether it has torque."""
@@ -163,7 +169,8 @@ def _guided(demonstrations: Demonstrations) -> Float[np.ndarray, "steps 5"]:
 class Port:
     """A pseudo-terminal at which the arm answers, and a folder with all that LeRobot needs.
 
-    In the folder: `port`, a link to the terminal, and `calibration/simulated.json`.
+    In the folder: `port`, a link to the terminal, and `calibration/simulated.json`, which goes with
+    `id = "simulated"`.
     """
 
     def __init__(
@@ -222,3 +229,57 @@ class Port:
         if self._left is not None:
             self._left -= 1
             self._stopped |= self._left <= 0
+
+
+def serve(
+    folder: Path,
+    landed: Callable[[Rollout], None],
+    *,
+    hand: bool = False,
+    leader: bool = False,
+    lock_step: float | None = None,
+    ready: Callable[[], None] = lambda: None,
+) -> None:
+    """Serve a simulated arm until interrupted; with a leader, a second one in `leader`.
+
+    Args:
+        folder: For the ports and calibrations, as `Port`.
+        landed: Called with where the ball came down, throw by throw.
+        hand: A hand guides the arm, or its leader, through six throws.
+        leader: Serve a leader arm too.
+        lock_step: As `Port`.
+        ready: Called when clients may connect.
+    """
+    throws = SO101Shot().demonstrations("A") if hand else None
+    ports = [Port(SimulatedSO101(None if leader else throws, landed), folder, lock_step=lock_step)]
+    if leader:
+        ports.append(Port(SimulatedSO101(throws), folder / "leader", lock_step=lock_step))
+    serving = [threading.Thread(target=port.serve) for port in ports]
+    for thread in serving:
+        thread.start()
+    ready()
+    try:
+        for thread in serving:
+            thread.join()
+    finally:
+        for port in ports:
+            port.stop()
+
+
+def manifest_section(folder: Path, *, leader: bool = False, lock_step: bool = False) -> str:
+    """`[arm]` of a manifest for the arm of `serve`."""
+
+    def device(kind: str, where: Path) -> str:
+        at = where.resolve()
+        return (
+            f'{{ type = "so101_{kind}", id = "simulated", port = "{at}/port", '
+            f'calibration_dir = "{at}/calibration" }}'
+        )
+
+    lines = ["[arm]", 'executor = "lerobot"', f"robot = {device('follower', folder)}"]
+    if leader:
+        lines += [f"leader = {device('leader', folder / 'leader')}", 'goals = "as planned"']
+    lines.append(f"lag = {LAG:.3f}")
+    if lock_step:
+        lines.append('clock = "cycles"')
+    return "\n".join(lines)

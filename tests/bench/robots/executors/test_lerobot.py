@@ -175,8 +175,8 @@ def serve(tmp_path):
     """A simulated SO-101 on a port, in lock-step with whoever reads it."""
     ports = []
 
-    def start(**more):
-        arm = SimulatedSO101(tell=lambda _: None)
+    def start(landed=lambda rollout: None, **more):
+        arm = SimulatedSO101(landed=landed)
         port = Port(arm, tmp_path / "arm", lock_step=0.01, **more)
         thread = threading.Thread(target=port.serve)
         thread.start()
@@ -218,7 +218,8 @@ def line_to(arm, frame):
 
 @pytest.mark.slow
 def test_lerobots_own_so101_class_throws_as_the_task_does(serve, tmp_path):
-    simulated, task = serve(), SO101Shot()
+    landed, task = [], SO101Shot()
+    serve(landed.append)
     frames = task.demonstrations("A").plans[4]
     arm = so101(tmp_path)
     try:
@@ -234,9 +235,9 @@ def test_lerobots_own_so101_class_throws_as_the_task_does(serve, tmp_path):
     assert path.fault == ""
     planned = np.array([np.interp(path.t, plan.times, column) for column in plan.actions.T]).T
     assert np.abs(path.q - planned)[:, :5].max() < 0.02
-    (landed,) = simulated.landings
+    (throw,) = landed
     expected = task.rollout(frames[None], None)[0].outcome
-    assert landed == pytest.approx(expected, abs=0.005)
+    assert throw.outcome == pytest.approx(expected, abs=0.005)
 
 
 @pytest.mark.slow

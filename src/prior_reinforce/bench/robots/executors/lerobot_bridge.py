@@ -22,6 +22,10 @@ _TRIES = 3
 """How often positions are read before they count as lost. Ours: a packet is lost now and then, and
 LeRobot waits 50 ms for each, after which the executor says that it was late."""
 
+_JUMP = 20.0
+"""How far an arm may stand from its leader when it begins to follow, in LeRobot's units (degrees,
+per cent). Ours: it goes there as fast as it can."""
+
 
 def make_device(family: str, base: str, make: str, settings: dict[str, Any]) -> Any:
     """Make a robot or a teleoperator of LeRobot from its `type` and other settings."""
@@ -46,6 +50,13 @@ def make_device(family: str, base: str, make: str, settings: dict[str, Any]) -> 
     return getattr(package, make)(draccus.decode(kind, given))
 
 
+def _check_calibrated(device: Any) -> None:
+    if not device.is_calibrated:
+        raise ValueError(
+            f"{device} is not calibrated, or not as its file says; run lerobot-calibrate"
+        )
+
+
 class Bridge:
     """A robot, and the teleoperator that leads it, if there is one."""
 
@@ -65,10 +76,7 @@ class Bridge:
         self.bus: Any = getattr(self.robot, "bus", None)
         self._configure, self.robot.configure = self.robot.configure, self._configure_once
         self.robot.connect(calibrate=False)
-        if not self.robot.is_calibrated:
-            raise ValueError(
-                f"{self.robot} is not calibrated, or not as its file says; run lerobot-calibrate"
-            )
+        _check_calibrated(self.robot)
 
     def _configure_once(self) -> None:
         """LeRobot lets go of an arm to configure it; one that holds its pose is configured."""
@@ -118,6 +126,14 @@ class Bridge:
             return self.observe()
         if not self.leader.is_connected:
             self.leader.connect(calibrate=False)
+            _check_calibrated(self.leader)
+            here, there = self.observe()["measured"], self.leader.get_action()
+            name = max(there, key=lambda n: abs(there[n] - here[n]))
+            if abs(there[name] - here[name]) > _JUMP:
+                raise ValueError(
+                    f"{name} of the leader is {abs(there[name] - here[name]):.0f} from the arm's, "
+                    "which would jump there; bring the leader to where the arm is"
+                )
         return self.move(self.leader.get_action())
 
     def release(self) -> dict[str, Any]:
