@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import signal
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -30,11 +31,12 @@ class Simulate:
 
     For example:
         prior-reinforce simulate fr3 --goal 1.05 0.10
+        prior-reinforce simulate so101 --hand
     """
 
-    arm: Annotated[Literal["fr3"], tyro.conf.Positional]
-    """Which: fr3 (Franka Research 3, for libfranka's clients)."""
-    task: TaskChoice = "basketball-fr3"
+    arm: Annotated[Literal["fr3", "so101"], tyro.conf.Positional]
+    """Which: fr3 (Franka Research 3, for libfranka's clients), so101 (for LeRobot)."""
+    task: TaskChoice = ""
     host: str = "127.0.77.1"
     """Address of this computer to serve on; each simulated arm needs its own."""
     goal: tuple[float, ...] = ()
@@ -43,19 +45,33 @@ class Simulate:
     recordings: Path | None = None
     """Serve nothing, but write recordings of the task's six demonstrations to this folder, as the
     arm measured them, and where each ended."""
+    folder: Path = Path("so101")
+    """Of an so101: for its serial port, and the calibration that LeRobot reads."""
+    hand: bool = False
+    """Of an so101: a hand guides it, or its leader, through six throws, once it has no torque."""
+    leader: bool = False
+    """Of an so101: serve a leader arm too."""
+    lock_step: bool = False
+    """Of an so101: its time passes with every goal, so that a busy computer changes no throw."""
 
     def run(self) -> None:
         """Serve, or write."""
         from prior_reinforce.lab.tasks.panda_task import PandaTask
 
-        task = make_task(self.task)
-        if not isinstance(task, PandaTask):
-            raise ConfigurationError(f"{self.task} is no task of this arm; choose basketball-fr3")
+        usual = {"fr3": "basketball-fr3", "so101": "so101"}[self.arm]
+        task = make_task(self.task or usual)
+        if not isinstance(task, PandaTask) or ((self.arm == "so101") != (task.name == "so101")):
+            raise ConfigurationError(f"{self.task} is no task of this arm; choose {usual}")
+        if self.recordings is not None and self.arm == "so101":
+            raise ConfigurationError("--recordings are an fr3's; record an so101 with: record")
         if self.recordings is not None:
             _record(task, self.recordings)
             return
         if self.goal and len(self.goal) != len(task.outcome_names):
             raise ConfigurationError(f"--goal needs {len(task.outcome_names)} numbers")
+        if self.arm == "so101":
+            self._serve_so101(task)
+            return
         from prior_reinforce.lab.arms.fr3 import SimulatedFR3
 
         arm = SimulatedFR3(task, self.host, lambda rollout: self._say(task, rollout))
@@ -70,6 +86,21 @@ class Simulate:
                 f"{self.arm} serves {task.name} at {self.host}; Ctrl-C ends it", flush=True
             )
         )
+
+    def _serve_so101(self, task: Task) -> None:
+        from prior_reinforce.lab.arms.so101 import manifest_section, serve
+
+        section = manifest_section(self.folder, leader=self.leader, lock_step=self.lock_step)
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
+        with suppress(KeyboardInterrupt):
+            serve(
+                self.folder,
+                lambda rollout: self._say(task, rollout),
+                hand=self.hand,
+                leader=self.leader,
+                lock_step=0.01 if self.lock_step else None,
+                ready=lambda: print(f"{section}\n# so101 is served; Ctrl-C ends it", flush=True),
+            )
 
     def _say(self, task: Task, rollout: Rollout) -> None:
         """Where the object went, and what an observer would call that."""

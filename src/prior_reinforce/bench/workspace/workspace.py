@@ -84,8 +84,9 @@ _OWN = (
     *("demonstrations.png", "outcomes.csv"),
 )
 """What is read and written in the folder."""
-_LOOK_LIMIT = 20.0
-"""How long an arm may take to say where it stands, in [s]; ours: to start a program and connect."""
+_LOOK_LIMIT = 60.0
+"""How long an arm may take to say where it stands, in [s]; ours: to start a program and connect.
+LeRobot imports for 6 s, and for 40 on a computer that is busy."""
 
 
 def workspace_around(folder: Path, *, above: bool = True) -> Path | None:

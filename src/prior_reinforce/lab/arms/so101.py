@@ -52,6 +52,8 @@ _GRIPPER = (2030, 3480)
 _STILL, _STILL_FOR, _UPRIGHT = 0.02, 0.3, 0.95
 """The ball is put back once no joint was faster [rad/s] for so long [s], if the cosine of the
 scoop's tilt is more. Ours."""
+_SILENT = 0.5
+"""A client that asks for nothing for so long has ended, in [s]; ours."""
 _BETWEEN = 2.0
 """How long a hand takes from one throw to the next, and how long it waits there, in [s]. Ours."""
 
@@ -81,7 +83,7 @@ class SimulatedSO101:
         self._position = np.zeros(6)
         """Of each servo, in [rad] from the middle; of the gripper, from its closed end."""
         self._hand = np.empty((0, 5)) if demonstrations is None else _guided(demonstrations)
-        self._guided, self._still, self._thrown = 0, 0.0, False
+        self._guided, self._still, self._thrown = 0, 0.0, True  # the ball lies on the table
         self._remember()
 
     def advance(self, duration: float) -> None:
@@ -111,11 +113,20 @@ class SimulatedSO101:
         if self._still > _STILL_FOR:
             self._put_back()
 
+    @property
+    def flying(self) -> bool:
+        """Whether the ball has left the scoop and not come down yet."""
+        return not self._thrown and self._away
+
+    @property
+    def _away(self) -> bool:
+        ball, seat = self.task.ball, self._data.site("tool/seat")
+        return bool(np.linalg.norm(self._data.qpos[ball : ball + 3] - seat.xpos) > 0.02)
+
     def _put_back(self) -> None:
         """A person puts the ball into a scoop that is empty and opens upwards."""
         data, seat, ball = self._data, self._data.site("tool/seat"), self.task.ball
-        away = np.linalg.norm(data.qpos[ball : ball + 3] - seat.xpos) > 0.02
-        if away and seat.xmat[8] > _UPRIGHT:
+        if self._away and seat.xmat[8] > _UPRIGHT:
             data.qpos[ball : ball + 3] = seat.xpos
             velocity = self.task.model.jnt_dofadr[self.task.model.joint("ball").id]
             data.qvel[velocity : velocity + 6] = 0.0
@@ -204,10 +215,13 @@ class Port:
 
     def serve(self) -> None:
         """Answer until `stop`, or until the plug is pulled."""
-        then = time.monotonic()
+        then = heard = time.monotonic()
         while not self._stopped:
             readable, _, _ = select.select([self._ours], [], [], 0.002)
             now = time.monotonic()
+            heard = now if readable else heard
+            if self._lock_step is not None and now - heard > _SILENT and self.arm.flying:
+                self.arm.advance(self._lock_step)  # what flies comes down, whoever looks
             if self._lock_step is None:
                 whole = math.floor((now - then) / STEP)
                 self.arm.advance(whole * STEP)
