@@ -55,7 +55,7 @@ $(VENV)/.all: $(VENV)/.core
 $(VENV)/.lerobot: lerobot.txt $(VENV)/.core
 	rm -rf $(VENV)/lerobot
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --target $(VENV)/lerobot -r lerobot.txt
-	printf '#!/bin/sh\nPYTHONPATH="$(CURDIR)/$(VENV)/lerobot" exec "$(CURDIR)/$(BIN)/python" "$$@"\n' > $(VENV)/lerobot/python
+	printf '#!/bin/sh\nPYTHONPATH="$(CURDIR)/$(VENV)/lerobot" exec "$(CURDIR)/$(BIN)/python" -W ignore "$$@"\n' > $(VENV)/lerobot/python
 	chmod +x $(VENV)/lerobot/python
 	touch $@
 
