@@ -27,6 +27,7 @@ OF_THE_WHOLE = {
     "documentation": "what the docs show, run as it stands",
     "examples": "the examples as a reader runs them",
     "extending": "a new member of each family",
+    "fr3_page": "the page of the FR3, from an empty folder to a hit on the simulated arm",
     "folders": "folders as labs have them, from recordings to a plan",
     "layout": "this file",
     "notebook": "the notebook as a reader runs it",

@@ -98,7 +98,7 @@ def attack(rng: random.Random, here: Path, asked: Path) -> str:
     if edit == "plan":
         refused = True
         damage_plan(rng, folder)
-    limit = 3.0 if kind == "hangs" else 30.0
+    limit = 3.0 if kind == "hangs" else 100.0  # twelve of them start at once
     programs = [Arm(place, seen, limit, motion) for place in folders]
     for program in programs:
         program.go()
@@ -124,7 +124,7 @@ def judge(
 ) -> str:
     """What became of it."""
     for program in programs:
-        if not wait_until(program.ended, 60):
+        if not wait_until(program.ended, 120):
             return "a program hangs"
     for folder in set(folders):
         if not wait_until(lambda folder=folder: not is_executing(folder), 80):
@@ -158,5 +158,5 @@ def ends_as_it_was(folder: Path, kind: str) -> str:
     """Nobody cries wolf where nobody disturbed the arm, and a fault is not taken for success."""
     with Workspace(folder) as workspace:
         last = workspace.log.entries()[-1].event
-    outcome = getattr(last, "outcome", last.kind)
-    return HELD if outcome in OUTCOMES[kind] else f"{kind} is recorded as {outcome}"
+    outcome, why = getattr(last, "outcome", last.kind), getattr(last, "reason", "")
+    return HELD if outcome in OUTCOMES[kind] else f"{kind} is recorded as {outcome}: {why}"

@@ -1,6 +1,7 @@
 """The FR3's executor, through libfranka's own client, on the simulated arm and its limits."""
 
 import contextlib
+import itertools
 import re
 import signal
 
@@ -164,3 +165,12 @@ def test_it_says_who_it_is_and_what_nobody_checks(arm):
     assert (described.model, described.rate) == ("fr3", 1000.0)
     assert described.columns == FORM.names
     assert {"torque", "self-collision"} <= {*described.unchecked}
+
+
+def test_while_it_is_guided_it_says_what_it_measures_by_its_own_clock(arm):
+    states = list(itertools.islice(arm.guide(), 20))
+    t = np.array([state.t for state in states])
+    assert t[0] == 0
+    assert np.diff(t).min() > 0.0044
+    assert np.round(t / 0.001) * 0.001 == pytest.approx(t, abs=1e-6)
+    assert states[-1].measured == pytest.approx(arm.where(), abs=1e-3)

@@ -8,6 +8,8 @@ advancing by cycles instead asks for 294 rad/s^2 after 3 ms were lost).
 from __future__ import annotations
 
 import gc
+import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,7 +17,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from jaxtyping import Float
 
-from prior_reinforce.bench.robots.executors.base import ArmDescription, Executor, MeasuredPath
+from prior_reinforce.bench.robots.executors.base import (
+    GUIDED_RATE,
+    ArmDescription,
+    Executor,
+    GuidedState,
+    MeasuredPath,
+)
 from prior_reinforce.bench.robots.gate import check_plan
 from prior_reinforce.bench.robots.presets import robot_limits
 from prior_reinforce.errors import ConfigurationError
@@ -158,6 +166,20 @@ class FR3(Executor):
     def stop(self) -> None:
         """See `Executor`: the robot brakes by itself."""
         self._stopping = True
+
+    def guide(self) -> Iterator[GuidedState]:
+        """What its joints measure, by its clock, in any mode: it is guided by its own buttons."""
+        start = last = -math.inf
+        while True:
+            try:
+                state = self._robot.read_once()
+            except self._errors as error:
+                raise ConfigurationError(f"the robot does not answer: {_line(error)}") from error
+            t = state.time.to_sec()
+            start = t if start == -math.inf else start
+            if t - last > 1 / GUIDED_RATE - 0.5 / RATE:
+                last, q = t, np.array(state.q)
+                yield GuidedState(t - start, q, q)
 
     def close(self) -> None:
         """Disconnect: the robot takes one client at a time, and lets others wait without a word."""
