@@ -1,0 +1,50 @@
+"""The FR3's page as a reader runs it: from an empty folder to a hit, through libfranka's client."""
+
+import re
+import shlex
+
+import numpy as np
+import pytest
+
+from prior_reinforce.bench.workspace.workspace import Workspace
+from prior_reinforce.lab.tasks import make_task
+from tests.lab.arms import served
+from tests.test_documentation import blocks
+
+MOST_TRIALS = 4
+
+
+@pytest.mark.slow
+def test_the_sequence_of_the_page_ends_in_a_hit(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    prepare, simulate, throw = blocks("fr3.md", "sh")
+    (serve,) = simulate.splitlines()
+    ask, tell = (shlex.split(line, comments=True)[1:] for line in throw.splitlines())
+    with served.fr3(*shlex.split(serve)[3:]) as robot:
+        for line in prepare.replace("127.0.77.1", robot.host).splitlines():
+            words = shlex.split(line, comments=True)
+            if words[0] == "printf":
+                text, _, path = words[1:]
+                with (tmp_path / path).open("a") as manifest:
+                    manifest.write(text.encode().decode("unicode_escape"))
+            elif words[0] != "pip":
+                status, _, err = run(*words[1:])
+                assert status == 0, err
+        task = make_task("basketball-fr3")
+        for number in range(1, MOST_TRIALS + 1):
+            status, _, err = run(*ask, "--yes")
+            assert status == 0, err
+            said = robot.said()
+            with Workspace("hoop") as workspace:
+                plan = workspace.plan(workspace.state.trial(number)).actions
+                assert workspace.state.executions[number].tracking_max["rad"] < 0.005
+            landed = np.array(re.findall(r"(-?[\d.]+) m\b", said), float)
+            alone = task.rollout(plan[None], None)[0].outcome
+            assert landed == pytest.approx(alone, abs=0.001)
+            seen = re.search(r"by eye: (.*)", said)[1]
+            if hit := seen.endswith(", a hit"):
+                assert run("tell", "hoop", number, "--hit")[0] == 0
+                break
+            assert run(*tell[:2], number, "--error", seen)[0] == 0
+        assert hit
+        assert f"reached in {number} trial" in run("status", "hoop")[1]
