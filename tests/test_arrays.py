@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from prior_reinforce.arrays import as_error, as_goal, as_outcomes, as_plans
+from prior_reinforce.arrays import as_error, as_goal, as_outcomes, as_plans, is_positive
 from prior_reinforce.errors import (
     InvalidDemonstrationsError,
     InvalidFeedbackError,
@@ -62,3 +62,10 @@ def test_outcomes_on_a_line_are_found_at_any_scale(scale):
     bent = line.copy()
     bent[2, 1] *= 1.1
     as_outcomes(bent, 3)
+
+
+@pytest.mark.parametrize("value", [0, -1.0, np.nan, np.inf, None, "1", True, [1.0]])
+def test_what_is_no_positive_number_is_told(value):
+    assert not is_positive(value)
+    assert is_positive(0.01)
+    assert is_positive(np.float32(2))

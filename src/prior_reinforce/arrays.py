@@ -6,7 +6,10 @@ is wrong and how to mend it. The shapes of the package's arrays have their names
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from numbers import Real
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -42,6 +45,12 @@ LARGEST_TURN = 7.0
 BEYOND_DOUBT = 7.0
 """Beyond this factor (eight turns of a joint, 35 m) the unit is wrong even if it is stated;
 ours."""
+
+
+def is_positive(value: Any) -> bool:
+    """Whether a value is a finite number above 0, whatever a caller gave."""
+    is_number = isinstance(value, Real) and not isinstance(value, bool)
+    return is_number and math.isfinite(value) and bool(value > 0)
 
 
 def as_plans(

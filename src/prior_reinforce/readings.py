@@ -146,11 +146,14 @@ class Reading:
         k = np.size(self.error_seen)
         object.__setattr__(self, "error_seen", as_error(self.error_seen, k))
         for name in ("low", "high", "sd"):
-            array = np.array(getattr(self, name), dtype=np.float64)
+            try:
+                array = np.array(getattr(self, name), dtype=np.float64)
+            except (TypeError, ValueError):
+                array = np.empty(0)
             if array.shape != (k,) or np.any(np.isnan(array)):
                 raise InvalidFeedbackError(
                     f"{name} must be {k} numbers, one for each component of the error, got "
-                    f"{array.tolist()}"
+                    f"{getattr(self, name)!r:.80}"
                 )
             object.__setattr__(self, name, array)
         if np.any((self.low > self.high) | (self.low == np.inf) | (self.high == -np.inf)):

@@ -136,8 +136,10 @@ def parse_choice(choice: str) -> tuple[str, dict[str, str]]:
     """Split `name,setting=value,...` into the name and its settings.
 
     Raises:
-        ConfigurationError: A setting without a value, or given twice.
+        ConfigurationError: No text, a setting without a value, or one given twice.
     """
+    if not isinstance(choice, str):
+        raise ConfigurationError(f"a choice is a name such as 'auto', got {choice!r}; give one")
     name, *parts = choice.split(",")
     settings: dict[str, str] = {}
     for part in parts:
@@ -170,29 +172,30 @@ def build(config: type[Any], settings: Mapping[str, Any], choice: str = "") -> A
     """
     import msgspec
 
-    fields = config.__dataclass_fields__
-    unknown = [key for key in settings if key.partition(".")[0] not in fields]
-    if unknown:
-        raise ConfigurationError(
-            f"{choice or config.__name__} has no setting {unknown[0]!r}; it has {', '.join(fields)}"
-        )
     try:
-        return msgspec.convert(_plain(config, settings), config, strict=False)
+        plain = _plain(config, settings, choice or config.__name__)
+        return msgspec.convert(plain, config, strict=False)
     except msgspec.ValidationError as error:
         raise ConfigurationError(f"{choice or config.__name__}: {error}") from error
 
 
-def _plain(config: type[Any], settings: Mapping[str, Any]) -> dict[str, Any]:
+def _plain(config: type[Any], settings: Mapping[str, Any], choice: str) -> dict[str, Any]:
     """Settings as msgspec takes them: `none`, `64:128` for a tuple, `network.kernel` for a part."""
     hints = typing.get_type_hints(config)
     plain: dict[str, Any] = {}
     for key, value in settings.items():
         outer, _, inner = key.partition(".")
+        fields = config.__dataclass_fields__
+        if outer not in fields:
+            raise ConfigurationError(f"{choice} has no setting {key!r}; it has {', '.join(fields)}")
         hint = hints[outer]
         kinds: list[Any] = [typing.get_origin(each) for each in (hint, *typing.get_args(hint))]
         if inner and is_dataclass(hint):
             whole = plain[outer] if outer in plain else asdict(getattr(config(), outer))
-            plain[outer] = {**whole, **_plain(cast(type[Any], hint), {inner: value})}
+            plain[outer] = {
+                **whole,
+                **_plain(cast(type[Any], hint), {inner: value}, f"{choice}, {outer},"),
+            }
         elif value in ("none", "None"):
             plain[outer] = None
         elif isinstance(value, str) and tuple in kinds:

@@ -17,7 +17,7 @@ from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from pathlib import Path
 
-from tests.attacks import arms, execution, interruptions, runs, sessions
+from tests.attacks import arms, execution, interruptions, reviewed, runs, sessions
 from tests.attacks.classes import CLASSES, Attack
 from tests.attacks.harness import HELD, prepare, where
 
@@ -32,6 +32,7 @@ ATTACKS: dict[str, tuple[Attack, int]] = {
         for how in interruptions.HOW
         for name in interruptions.COMMANDS
     },
+    **{name: (partial(reviewed.attack, name), 1) for name in reviewed.QUICK},
     "killed sessions": (sessions.attack, 1),
     "killed runs": (runs.attack, 1),
 }

@@ -46,7 +46,7 @@ def test_pictures_are_the_same_bytes_whatever_matplotlib_is_set_to(kind, tmp_pat
         return figure
 
     first = save_figure(draw(), tmp_path / "new" / f"first.{kind}")
-    with matplotlib.rc_context({"font.size": 30, "text.color": "red"}):
+    with matplotlib.rc_context({"font.size": 30, "text.color": "red", "text.usetex": True}):
         second = save_figure(draw(), tmp_path / f"second.{kind}")
         assert matplotlib.rcParams["font.size"] == 30
     assert first.read_bytes() == second.read_bytes()

@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import math
 import os
 import warnings
 from collections.abc import Iterator, Sequence
@@ -41,6 +40,7 @@ from prior_reinforce.arrays import (
     as_goal,
     as_outcomes,
     as_plans,
+    is_positive,
 )
 from prior_reinforce.errors import FileFormatError, InvalidDemonstrationsError, InvalidPlanError
 from prior_reinforce.files import open_npz
@@ -86,8 +86,8 @@ class PlanFormat:
                 f"{len(self.names)} action names need as many units, got {len(self.units)}: "
                 f"{self.units}"
             )
-        if not (math.isfinite(self.dt) and self.dt > 0):
-            raise InvalidPlanError(f"dt must be a positive number of seconds, got {self.dt}")
+        if not is_positive(self.dt):
+            raise InvalidPlanError(f"dt must be a positive number of seconds, got {self.dt!r}")
         if unknown := set(self.per_plan) - set(self.names):
             raise InvalidPlanError(f"per_plan names {sorted(unknown)}, but actions {self.names}")
 

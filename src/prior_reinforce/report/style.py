@@ -39,6 +39,7 @@ _RC: Any = {  # matplotlib releases differ in how they type this
     "axes.unicode_minus": True,
     "text.color": INK,
     "text.parse_math": False,  # a title may hold dollar signs
+    "text.usetex": False,  # whatever a matplotlibrc of the folder wants run
     "svg.fonttype": "path",  # whatever fonts the reader has
     "svg.hashsalt": "prior-reinforce",
 }

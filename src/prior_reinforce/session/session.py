@@ -322,7 +322,7 @@ class Session:
             if trial.stage is Stage.VOIDED:
                 raise TrialStateError(f"trial {number} is already voided; ask for another")
             # What a terminal could not decode cannot be printed again.
-            text = reason.encode(errors="replace").decode()
+            text = str(reason).encode(errors="replace").decode()
             self.log.append(Voided(trial=trial.number, reason=text))
         return self._now(number)
 

@@ -1,13 +1,15 @@
 """The preview says what was found, in about ten lines and one picture."""
 
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 import pytest
 from matplotlib.image import imread
 
 from prior_reinforce.bench.importing import Preprocessing, import_demonstrations
-from prior_reinforce.bench.importing.preview import hull_corners
+from prior_reinforce.bench.importing.preview import hull_corners, swapped_outcomes
+from prior_reinforce.lab.tasks import make_task
 from tests.bench.importing.recorded import JOINTS, OUTCOMES, write_bags, write_npz, write_outcomes
 
 
@@ -139,3 +141,18 @@ def test_measured_outcomes_that_come_twice_are_told(folder):
 def test_the_picture_is_returned_too(folder):
     preview = import_demonstrations(folder, outcome_names=["x", "y"]).preview
     assert len(preview.draw().axes) >= len(JOINTS)
+
+
+def test_two_rows_that_were_exchanged_are_doubted_and_no_others(tmp_path):
+    shown = make_task("fishing").demonstrations("A")
+    assert swapped_outcomes(shown) == []
+    outcomes = shown.outcomes_seen.copy()
+    found = 0
+    for i, j in combinations(range(shown.n), 2):
+        other = outcomes.copy()
+        other[[i, j]] = other[[j, i]]
+        doubted = swapped_outcomes(replace(shown, outcomes_seen=other))
+        assert doubted in ([], [(i, j)])
+        found += len(doubted)
+    assert found >= 10
+    assert swapped_outcomes(make_task("curling").demonstrations("A")) == []  # six: too few to tell

@@ -5,9 +5,10 @@ import threading
 
 import pytest
 
+from prior_reinforce.bench.workspace.journal import JOURNAL_VERSION, Journal
 from prior_reinforce.bench.workspace.workspace import Workspace
 from prior_reinforce.errors import TrialStateError, WorkspaceError
-from prior_reinforce.session.events import Voided
+from prior_reinforce.session.events import Told, Voided
 from prior_reinforce.session.trials import Stage
 from tests.bench.workspace.planar import ask, tell, trials, void
 
@@ -117,3 +118,13 @@ def test_it_knows_whether_anything_became_durable(workspace):
         assert not other.log.appended
         ask(other)
         assert other.log.appended
+
+
+def test_a_journal_whose_events_are_a_view_is_refused(tmp_path):
+    """One that counts without end would never be read."""
+    journal = sqlite3.connect(tmp_path / "journal.sqlite")
+    journal.execute("CREATE VIEW events AS SELECT 1 AS id")
+    journal.execute(f"PRAGMA user_version = {JOURNAL_VERSION}")
+    journal.commit()
+    with pytest.raises(WorkspaceError, match="no table of events"):
+        Journal(tmp_path / "journal.sqlite", Told)

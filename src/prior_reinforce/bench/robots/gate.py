@@ -25,6 +25,7 @@ from prior_reinforce.errors import ConfigurationError, InvalidPlanError
 from prior_reinforce.plans.interpolation import RATE, join_frames
 from prior_reinforce.plans.motions import Demonstrations, Plan
 from prior_reinforce.plans.signals import REST_SPEED
+from prior_reinforce.settings import Checked
 
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
@@ -67,7 +68,7 @@ Ends = Float[np.ndarray, " d"]
 
 
 @dataclass(frozen=True)
-class GateSettings:
+class GateSettings(Checked):
     """Where the gate draws the lines that no maker publishes, and the box for the tool tip."""
 
     warn_above: float = 0.95
@@ -117,8 +118,9 @@ class GateSettings:
         """Check the settings.
 
         Raises:
-            ConfigurationError: A value outside its range, or half a box.
+            ConfigurationError: A value of another type or outside its range, or half a box.
         """
+        super().__post_init__()
         if not (0 < self.warn_above <= 1 and 0 <= self.beyond_warn <= self.beyond_refuse):
             raise ConfigurationError(
                 "warn_above must be within (0, 1] and beyond_warn at most beyond_refuse, got "

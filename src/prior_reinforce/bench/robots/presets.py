@@ -38,7 +38,8 @@ def robot_limits(robot: str, firmware: str = "any") -> RobotLimits:
     Raises:
         ConfigurationError: No such robot or firmware; the message lists the known ones.
     """
-    name = "panda" if robot.lower() == "fer" else robot.lower()
+    called = str(robot).lower()
+    name = "panda" if called == "fer" else called
     by_firmware = _presets().get(name)
     if by_firmware is None:
         raise ConfigurationError(

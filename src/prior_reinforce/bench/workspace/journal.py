@@ -96,6 +96,13 @@ class Journal:
                     f"{path} was written by another version of this program (journal {version}, "
                     f"this is {JOURNAL_VERSION}); use that version"
                 )
+            # A view or a virtual table may never end.
+            found = self._connection.execute("SELECT sql FROM sqlite_master WHERE name = 'events'")
+            if not str((found.fetchone() or ("",))[0]).startswith("CREATE TABLE"):
+                raise WorkspaceError(
+                    f"the journal {path} is damaged (it has no table of events); restore it from a "
+                    "copy"
+                )
 
     def __reduce__(self) -> NoReturn:
         """Refuse to be copied, with whatever holds it: what happened is in the folder.

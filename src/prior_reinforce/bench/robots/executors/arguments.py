@@ -5,13 +5,13 @@ No shell ever sees it: nothing in a path can become a second command.
 
 from __future__ import annotations
 
-import math
 import re
 import shlex
 import shutil
 import sys
 from pathlib import Path
 
+from prior_reinforce.arrays import is_positive
 from prior_reinforce.errors import ConfigurationError
 
 PLAN, RESULT = "{plan}", "{result}"
@@ -84,7 +84,7 @@ def check_command(command: str, *, time_limit: float) -> None:
         ConfigurationError: It cannot be split, names no program that can run, or lacks `{plan}`;
             the limit is not a positive number; or this is not Linux.
     """
-    if not (math.isfinite(time_limit) and time_limit > 0):
-        raise ConfigurationError(f"the time limit must be a positive number, got {time_limit} s")
+    if not is_positive(time_limit):
+        raise ConfigurationError(f"the time limit must be a positive number, got {time_limit!r} s")
     split_command(command, Path("plan"))
     check_program(command)
