@@ -125,6 +125,28 @@ def test_a_photograph_tells_the_error(table, capsys):
         assert "photo-seen.png and tell what you see" in capsys.readouterr().err
 
 
+def test_the_photograph_is_taken_first(table, tmp_path, run):
+    folder = table[0]
+    photo = imageio.imread(folder / "photo.png")[..., :3]
+    (tmp_path / "feed.mjpeg").write_bytes(imageio.imwrite("<bytes>", photo, extension=".jpg") * 3)
+    status, _, err = run("calibrate", folder / "points.csv", "--out", folder / "table.json")
+    assert (status, err) == (0, "")
+    taken, feed = tmp_path / "taken.png", tmp_path / "feed.mjpeg"
+    objects = ["--reached", "the orange ball", "--reached-size", "0.06", "--goal", "the red hoop"]
+    objects += ["--goal-size", "0.1", "--calibration", folder / "table.json"]
+    nobody = "http://127.0.0.1:9/v1"  # the discard port: no model answers
+    given = [*objects, "--vlm.base-url", nobody, "--vlm.max-retries", "0"]
+    assert "cannot reach" in run("look", taken, "--camera", feed, *given)[2]
+    assert np.abs(imageio.imread(taken).astype(float) - photo).mean() < 3
+    status, _, err = run("look", taken, "--camera", feed, *given)
+    assert status == 2
+    assert "is there already" in err
+    status, _, err = run("look", tmp_path / "x.jpg", "--camera", tmp_path / "no", *given)
+    assert status == 2
+    assert "gives no picture" in err
+    assert not (tmp_path / "x.jpg").exists()
+
+
 def test_wrong_files_are_named(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     points = tmp_path / "points.csv"

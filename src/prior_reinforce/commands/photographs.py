@@ -21,11 +21,14 @@ from prior_reinforce.errors import (
     FileFormatError,
     PerceptionFailedError,
 )
-from prior_reinforce.files import named_disk_errors, refuse_foreign
+from prior_reinforce.extras import check_installed
+from prior_reinforce.files import named_disk_errors, refuse_foreign, write
 from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
 from prior_reinforce.wording import to_words
 
 _COLUMNS = ("x", "y", "u", "v")
+_EXPOSURE = 10
+"""Frames, of which the last is kept; ours: the first are dark until a webcam has set itself."""
 _SAME_GOAL = 0.02
 """By how far what stands at the goal may be seen from it, in [m]; ours: twice a camera's error."""
 
@@ -83,7 +86,7 @@ class Look:
     """
 
     picture: Annotated[Path, tyro.conf.Positional]
-    """Photograph of the key frame, from the calibrated camera."""
+    """Photograph of the key frame, from the calibrated camera; where to keep it, with --camera."""
     reached: str
     """What flew or slid, in words that fit one thing only: "the orange ball"."""
     reached_size: float
@@ -94,6 +97,8 @@ class Look:
     """Longer side of a box around it, in [m]."""
     goal_offset: tuple[float, float] = (0.0, 0.0)
     """From that object's centre to the goal, forward and left, in [m]."""
+    camera: str | None = None
+    """Take the photograph first, with this camera: 0, 1, ... or the address of a stream."""
     calibration: Path = Path("table.json")
     """What `calibrate` wrote."""
     workspace: Path | None = None
@@ -123,6 +128,8 @@ class Look:
             plane_height=calibration.height,
             goal_offset=self.goal_offset,
         )
+        if self.camera is not None:
+            _photograph(self.camera, self.picture)
         picture = _read_picture(self.picture)
         with VisionLanguageModel(scene, self.vlm, calibration=calibration) as model:
             reading = model.read(picture)
@@ -170,6 +177,28 @@ class Look:
                 )
             goal = state.goal_of(state.trial(self.trial)).goal
         return goal, folder / "pictures", f"trial-{self.trial:03d}-seen"
+
+
+def _photograph(camera: str, path: Path) -> None:
+    """Take a picture with a camera of this computer, by OpenCV, and keep it as a JPEG or PNG."""
+    check_installed("cv2")
+    import cv2
+
+    if path.exists() or path.suffix.lower() not in (".jpg", ".jpeg", ".png"):
+        raise FileFormatError(
+            f"{path} is there already, or does not end in .jpg or .png; choose another name"
+        )
+    capture, frame = cv2.VideoCapture(int(camera) if camera.isdecimal() else camera), None
+    for _ in range(_EXPOSURE):
+        ok, seen = capture.read()
+        frame = seen if ok else frame
+    capture.release()
+    if frame is None:
+        raise PerceptionFailedError(
+            f"camera {camera} gives no picture; is it plugged in, and does no other program use it?"
+        )
+    with named_disk_errors(path.parent):
+        write(path, cv2.imencode(path.suffix, frame)[1].tobytes())
 
 
 def _read_points(path: Path) -> Float[np.ndarray, "n 4"]:

@@ -79,6 +79,17 @@ def test_a_table_that_was_dropped_beside_them_serves(tmp_path):
     verbs.close()
 
 
+def test_a_workspace_without_columns_takes_those_that_were_recorded(tmp_path):
+    recordings(tmp_path / "recorded")
+    verbs = Verbs(Workspace.create(tmp_path / "w", robot="none").folder)
+    imports = Imports(verbs)
+    for path in (tmp_path / "recorded").iterdir():
+        imports.drop(path.name, path.read_bytes())
+    assert imports.take(Take(seen=0)).step == "learn"
+    assert verbs.workspace.manifest.format.names == ("joint1", "joint2")
+    verbs.close()
+
+
 def test_guesses_are_for_a_person_to_confirm(tmp_path):
     Workspace.create(tmp_path / "w", manifest()).close()
     recordings(tmp_path / "recorded")

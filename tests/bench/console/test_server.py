@@ -2,6 +2,7 @@ import asyncio
 import json
 import shutil
 import socket
+import threading
 import time
 import warnings
 
@@ -118,6 +119,36 @@ def test_recordings_and_pictures_come_as_they_are(client):
     camera = client.put("/api/picture", content=jpeg()).json()
     assert camera["width"] == 1280
     assert client.get("/api/picture").headers["content-type"] == "image/jpeg"
+
+
+def test_stop_waits_for_nothing_else(client, monkeypatch):
+    """Forty requests that hang hold all other threads."""
+    free, hanging = threading.Event(), threading.Semaphore(0)
+
+    def hang():
+        hanging.release()
+        free.wait(60)
+        return b""
+
+    async def ask_for_all():
+        transport = httpx.ASGITransport(client.app)
+        headers = {"authorization": "Bearer secret"}
+        base = "http://127.0.0.1"
+        async with httpx.AsyncClient(transport=transport, base_url=base, headers=headers) as asking:
+            held = [asyncio.create_task(asking.get("/api/camera")) for _ in range(60)]
+            for _ in range(40):
+                while not hanging.acquire(blocking=False):
+                    await asyncio.sleep(0.01)
+            stopped = await asyncio.wait_for(asking.post("/api/stop"), 30)
+            free.set()
+            await asyncio.gather(*held)
+            return stopped.status_code
+
+    for route in client.app._app.routes:
+        if route.path == "/api/camera":
+            endpoint = route.endpoint.__closure__[0].cell_contents.args[0]
+            monkeypatch.setitem(endpoint.__dict__, "call", hang)
+    assert asyncio.run(ask_for_all()) == 200
 
 
 def test_every_tab_hears_and_one_that_lags_holds_nobody_up():

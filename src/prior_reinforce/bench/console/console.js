@@ -27,6 +27,16 @@ const problemOf = async (answer) => {
   try { return (await answer.json()).error; } catch { return `the console answers ${answer.status}`; }
 };
 
+// What can be asked again at any time; null where nothing came.
+async function get(path) {
+  try {
+    const answer = await request(path);
+    if (answer.ok) return answer;
+    complain(await problemOf(answer));
+  } catch { lost(); }
+  return null;
+}
+
 // A verb is sent once: what came of it where no answer arrived, the next state says.
 async function verb(name, body = {}, { seen = S.id } = {}) {
   if (L.busy && name !== "stop") return false;
@@ -56,11 +66,8 @@ async function verb(name, body = {}, { seen = S.id } = {}) {
 }
 
 async function refresh() {
-  try {
-    const answer = await request("/api/state");
-    if (!answer.ok) { complain(await problemOf(answer)); return; }
-    take(await answer.json());
-  } catch { lost(); }
+  const answer = await get("/api/state");
+  if (answer) take(await answer.json());
 }
 
 function take(state) {
@@ -80,8 +87,8 @@ function take(state) {
 }
 
 async function fetchMotion(number) {
-  const answer = await request(`/api/plans/${number}`);
-  if (!answer.ok) return;
+  const answer = await get(`/api/plans/${number}`);
+  if (!answer) return;
   motion = await answer.json();
   playing = { at: 0, on: false };
   draw();
@@ -105,6 +112,7 @@ async function listen() {
       if (!answer.ok) { complain(await problemOf(answer)); throw new Error("refused"); }
       const reader = answer.body.pipeThrough(new TextDecoderStream()).getReader();
       L.connected = true;
+      if (S) S.id = -1; // whatever it says now counts, even where a journal was restored from a copy
       await refresh();
       fetchRecordings();
       fetchCamera();
@@ -113,6 +121,7 @@ async function listen() {
         const { value, done } = await reader.read();
         if (done) break;
         beat = Date.now();
+        if (!L.connected) { L.connected = true; refresh(); } // one request was lost, not the console
         const parts = (rest + value).split("\n\n");
         rest = parts.pop();
         for (const part of parts) heard(JSON.parse(part.replace(/^data: /, "")));
@@ -190,7 +199,7 @@ function h(tag, props = {}, ...children) {
     else if (value === true) element.setAttribute(key, "");
     else if (value !== false && value !== null && value !== undefined) element.setAttribute(key, value);
   }
-  element.append(...children.flat().filter((child) => child !== null && child !== undefined && child !== false && child !== ""));
+  element.append(...children.flat(Infinity).filter((child) => child !== null && child !== undefined && child !== false && child !== ""));
   return element;
 }
 function g(tag, props = {}, text = "") {
@@ -213,7 +222,7 @@ function fill(id, ...children) {
   const place = $(id);
   const focused = place.contains(document.activeElement) ? document.activeElement : null;
   const at = focused && focused.selectionStart !== undefined && focused.type === "text" ? focused.selectionStart : null;
-  place.replaceChildren(...children.flat().filter(Boolean));
+  place.replaceChildren(...children.flat(Infinity).filter(Boolean));
   place.hidden = !place.childNodes.length;
   if (focused && focused.id && $(focused.id)) {
     $(focused.id).focus({ preventScroll: true });
@@ -455,8 +464,8 @@ async function changed(trial) {
   if (await verb("void", { trial, reason: "something changed on the hardware before it" })) setGoal({ goal, new_hardware: "changed, as a surprise showed" });
 }
 async function download(trial) {
-  const answer = await request(`/api/plans/${trial.number}/file`);
-  if (!answer.ok) { complain(await problemOf(answer)); return; }
+  const answer = await get(`/api/plans/${trial.number}/file`);
+  if (!answer) return;
   const link = h("a", { href: URL.createObjectURL(await answer.blob()), download: `${S.name}-trial-${trial.number}.npz` });
   link.click();
   setTimeout(() => URL.revokeObjectURL(link.href), 10000);
@@ -491,7 +500,7 @@ function fields() {
 }
 const SIZES = [-20, -10, -5, -2, 0, 2, 5, 10, 20];
 function byEye() {
-  const rows = S.outcome_names.map((name, i) => h("fieldset", {}, h("legend", {}, { 0: "Short or long", 1: "Right or left", 2: "Low or high" }[i] + " of the goal, in cm"),
+  const rows = S.outcome_names.map((name, i) => h("fieldset", {}, h("legend", {}, { 0: "Short or long", 1: "Left or right", 2: "Low or high" }[i] + " of the goal, in cm"),
     h("div", { class: "scale" }, (i === 1 ? [...SIZES].reverse() : SIZES).map((size) => h("label", {}, `${Math.abs(size)}`,
       h("input", { type: "radio", name: `eye-${i}`, id: `eye-${i}-${size}`, "aria-label": size ? `${Math.abs(size)} cm ${WORDS[i][size > 0 ? 0 : 1]}` : "neither",
         checked: L.words[i] === size, onchange: () => { L.words[i] = size; draw(); } })))),
@@ -665,8 +674,8 @@ function drawHistory() {
 
 let R = null;
 async function fetchRecordings() {
-  const answer = await request("/api/recordings");
-  if (answer.ok) { R = await answer.json(); draw(); }
+  const answer = await get("/api/recordings");
+  if (answer) { R = await answer.json(); draw(); }
 }
 const shownDemonstrations = () => {
   const touched = R && (L.episode || S.step === "import") ? R.episodes.filter((e) => e.outcome) : [];
@@ -718,7 +727,7 @@ function importPanel() {
     R.episodes.length > 0 && h("ul", {}, R.episodes.map((e) => h("li", { class: "entry" }, h("span", {}, `${e.name}: ${e.outcome ? sayPlace(e.outcome) : "not touched yet"}`),
       mapped() && button(`place-${e.name}`, e.outcome ? "Correct" : "Touch", () => { L.episode = e.name; L.mark = e.outcome; draw(); }, "plain", { "aria-label": `Touch where ${e.name} landed` })))),
     R.text && details("preview", "What the recordings hold", h("pre", { class: "output", tabindex: "0" }, R.text)),
-    zone, button("discard", "Forget these files", async () => { await request("/api/recordings", { method: "DELETE" }); L.skipped = []; fetchRecordings(); }, "plain"),
+    zone, button("discard", "Forget these files", async () => { L.skipped = []; if (await send("/api/recordings", "DELETE")) fetchRecordings(); }, "plain"),
   ];
 }
 async function takeIn() {
@@ -750,15 +759,15 @@ let stream = null;
 let pictureUrl = "";
 let box = null;
 async function fetchCamera() {
-  const answer = await request("/api/camera");
-  if (answer.ok) seen(await answer.json());
+  const answer = await get("/api/camera");
+  if (answer) seen(await answer.json());
 }
 async function seen(camera) {
   const before = C;
   C = camera;
   if (C.picture && (!before || before.picture !== C.picture || !pictureUrl)) {
-    const answer = await request("/api/picture");
-    if (answer.ok) {
+    const answer = await get("/api/picture");
+    if (answer) {
       if (pictureUrl) URL.revokeObjectURL(pictureUrl);
       pictureUrl = URL.createObjectURL(await answer.blob());
       box = null;
@@ -895,7 +904,7 @@ function drawCamera() {
         h("span", { class: "fields" }, [0, 1].map((j) => h("label", {}, ["ahead [cm]", "left [cm]"][j], h("input", { type: "text", inputmode: "decimal", id: `known-${i}-${j}`, value: Math.round(point[j] * 1000) / 10,
           onchange: (event) => { const value = parseFloat(event.target.value.replace(",", ".")); if (Number.isFinite(value)) L.points[i][j] = value / 100; } }))))))),
       h("div", { class: "row" }, button("more", "One more point", () => { L.points.push([0, 0]); L.at = L.points.length - 1; draw(); }), button("tags", "Find printed tags", findTags),
-        button("sheet", "Tags to print", async () => { const answer = await request("/api/tags/sheet"); if (!answer.ok) { complain(await problemOf(answer)); return; } h("a", { href: URL.createObjectURL(await answer.blob()), download: "tags.png" }).click(); })),
+        button("sheet", "Tags to print", async () => { const answer = await get("/api/tags/sheet"); if (answer) h("a", { href: URL.createObjectURL(await answer.blob()), download: "tags.png" }).click(); })),
       button("fit", known < 4 ? `${4 - known} more points` : `Keep the calibration of ${known} points`, calibrate, "big", { disabled: known < 4 }),
       button("no-calibration", "Leave it as it is", () => { L.calibrating = false; draw(); }, "plain"));
   }

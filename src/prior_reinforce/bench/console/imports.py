@@ -26,7 +26,7 @@ from prior_reinforce.bench.importing.outcomes import (
 )
 from prior_reinforce.bench.importing.selection import Selection
 from prior_reinforce.bench.importing.units import Ambiguity
-from prior_reinforce.bench.workspace.manifest import Manifest
+from prior_reinforce.bench.workspace.manifest import UNKNOWN, Manifest
 from prior_reinforce.errors import (
     FileFormatError,
     InvalidDemonstrationsError,
@@ -176,9 +176,11 @@ class Imports:
         if not self._folder.is_dir():
             raise InvalidDemonstrationsError("no recordings are here yet; drop some on the page")
         form = self._manifest.format
-        recordings = read(
-            require_inside(self._source, self._verbs.folder), ReadOptions(joints=form.names)
-        )
+        source = require_inside(self._source, self._verbs.folder)
+        if form.names == UNKNOWN:  # the first import takes what was recorded
+            recordings = read(source)
+            return recordings, recordings.select()
+        recordings = read(source, ReadOptions(joints=form.names))
         return recordings, recordings.select(form.names, form.units)
 
     def _known(self, recordings: Recordings) -> tuple[Outcomes, tuple[Ambiguity, ...]]:

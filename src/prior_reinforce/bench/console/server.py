@@ -73,6 +73,8 @@ _STATUSES = {
     422: "Not done: what was given cannot be used.",
     429: "Too many tabs.",
 }
+_FOR_STOP = anyio.CapacityLimiter(8)
+"""Threads that only stop the arm: whatever else is asked at the same time, some are free."""
 Problem = msgspec.defstruct("Problem", [("error", str)])
 
 
@@ -91,7 +93,7 @@ class Endpoint:
     largest: int = _LARGEST_BODY
 
 
-_RECORDINGS = "/api/recordings"
+_STOP, _RECORDINGS = "/api/stop", "/api/recordings"
 _PLAN = "/api/plans/{number:int}"
 _NUMBER = {"number": {"type": "integer", "minimum": 0, "maximum": 2**31}}
 
@@ -104,7 +106,7 @@ def endpoints(verbs: Verbs, imports: Imports, pictures: Pictures) -> list[Endpoi
         Endpoint("POST", "/api/goal", verbs.set_goal, SetGoal, Console),
         Endpoint("POST", "/api/ask", verbs.ask, Ask, Console),
         Endpoint("POST", "/api/execute", verbs.execute, Execute, Console),
-        Endpoint("POST", "/api/stop", verbs.stop, answers=Console),
+        Endpoint("POST", _STOP, verbs.stop, answers=Console),
         Endpoint("POST", "/api/tell", verbs.tell, Tell, Console),
         Endpoint("POST", "/api/amend", verbs.amend, Tell, Console),
         Endpoint("POST", "/api/void", verbs.void, Void, Console),
@@ -190,7 +192,8 @@ async def _answer(endpoint: Endpoint, request: Request) -> Response:
         given.append(
             msgspec.json.decode(await _read(request, endpoint.largest), type=endpoint.body)
         )
-    answer = await anyio.to_thread.run_sync(partial(endpoint.call, *given))
+    threads = _FOR_STOP if endpoint.path == _STOP else None
+    answer = await anyio.to_thread.run_sync(partial(endpoint.call, *given), limiter=threads)
     if isinstance(endpoint.answers, str):
         return FileResponse(answer, media_type=endpoint.answers)
     return _json(answer)
@@ -363,7 +366,6 @@ def serve(app: Guard, listening: socket.socket) -> None:
         server_header=False,
         timeout_keep_alive=30,
         timeout_graceful_shutdown=1,
-        limit_concurrency=4 * _MOST_TABS,
         h11_max_incomplete_event_size=16_384,
     )
     server = uvicorn.Server(config)

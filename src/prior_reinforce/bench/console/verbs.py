@@ -21,7 +21,14 @@ import numpy as np
 from msgspec import Struct, to_builtins
 
 from prior_reinforce.adapters import DEFAULT_ADAPTER
-from prior_reinforce.bench.console.view import MotionView, State, motion_of, output_of, state_of
+from prior_reinforce.bench.console.view import (
+    MotionView,
+    State,
+    motion_of,
+    output_of,
+    state_of,
+    step_of,
+)
 from prior_reinforce.bench.robots.executors.base import Motion
 from prior_reinforce.bench.robots.executors.lock import stop_executing
 from prior_reinforce.bench.workspace.report import report_workspace
@@ -162,8 +169,10 @@ class Verbs:
         self._approaches, self._report = approaches, report
         self._execution: Execution | None = None
         self._learning: Learning | None = None
+        self._shown_for: tuple[int, str] = (-1, "")
+        self._shown: State
         self._closed = threading.Event()
-        self._watcher = threading.Thread(target=self._watch, name="journal")
+        self._watcher = threading.Thread(target=self._watch, name="journal", daemon=True)
         self._watcher.start()
 
     def close(self) -> None:
@@ -180,7 +189,7 @@ class Verbs:
     def state(self) -> Console:
         """What the page shows."""
         with self._lock:
-            state = state_of(self.workspace)
+            state = self._state()
             return Console(
                 **{name: getattr(state, name) for name in State.__struct_fields__},
                 executor=self._executor,
@@ -289,6 +298,14 @@ class Verbs:
         """Write the report of now; return its page."""
         with Workspace(self.folder) as workspace:
             return report_workspace(workspace, self.folder / "report")
+
+    def _state(self) -> State:
+        """The workspace; computed once for all tabs that ask after an event."""
+        entries, step = self.workspace.events, step_of(self.workspace)
+        now = (len(entries), step)
+        if now != self._shown_for or step == "executing" or not entries:
+            self._shown, self._shown_for = state_of(self.workspace), now
+        return self._shown
 
     @contextmanager
     def as_seen(self, seen: int) -> Iterator[None]:

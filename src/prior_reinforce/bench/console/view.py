@@ -11,7 +11,14 @@ from msgspec import Struct
 from prior_reinforce.arrays import Frames
 from prior_reinforce.bench.robots.kinematics import link_places
 from prior_reinforce.bench.robots.limits import match_joints
-from prior_reinforce.bench.workspace.log import Executed, Executing, Moved, Moving, NotExecuted
+from prior_reinforce.bench.workspace.log import (
+    Executed,
+    Executing,
+    Moved,
+    Moving,
+    NotExecuted,
+    WorkspaceState,
+)
 from prior_reinforce.bench.workspace.status import execution_warning, say_trial
 from prior_reinforce.bench.workspace.workspace import Workspace
 from prior_reinforce.session.events import Event
@@ -120,8 +127,8 @@ def state_of(workspace: Workspace) -> State:
         model="" if training is None else training.generator,
         remarks=[] if training is None else [*training.remarks],
         demonstrations=[Demonstration(outcome) for outcome in shown.tolist()],
-        goals=[_goal(workspace, goal) for goal in state.goals],
-        trials=[_trial(workspace, trial, asked.get(trial.number, "")) for trial in state.trials],
+        goals=[_goal(workspace, state, goal) for goal in state.goals],
+        trials=[_trial(workspace, state, trial, asked[trial.number]) for trial in state.trials],
         open=None if waiting is None else waiting.number,
         output="" if waiting is None else output_of(workspace, waiting),
     )
@@ -170,8 +177,8 @@ def _latest(workspace: Workspace, trial: Trial) -> Event | None:
     return next((event for event in moves if event.trial == trial.number), None)
 
 
-def _goal(workspace: Workspace, goal: Goal) -> GoalView:
-    told = [t for t in workspace.state.trials_of(goal.number) if t.stage is Stage.TOLD]
+def _goal(workspace: Workspace, state: WorkspaceState, goal: Goal) -> GoalView:
+    told = [t for t in state.trials_of(goal.number) if t.stage is Stage.TOLD]
     manifest = workspace.manifest
     return GoalView(
         number=goal.number,
@@ -184,10 +191,10 @@ def _goal(workspace: Workspace, goal: Goal) -> GoalView:
     )
 
 
-def _trial(workspace: Workspace, trial: Trial, asked: str) -> TrialView:
+def _trial(workspace: Workspace, state: WorkspaceState, trial: Trial, asked: str) -> TrialView:
     manifest, outcome = workspace.manifest, None
     if trial.reading is not None and trial.reading.has_number:
-        outcome = (workspace.state.goal_of(trial).goal + trial.reading.error_seen).tolist()
+        outcome = (state.goal_of(trial).goal + trial.reading.error_seen).tolist()
     surprise = _SURPRISE.match(trial.surprise)
     told = trial.reading is not None
     return TrialView(

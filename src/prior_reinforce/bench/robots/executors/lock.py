@@ -32,6 +32,8 @@ MARK = "PRIOR_REINFORCE_EXECUTION"
 """Environment variable of what executes: the names of its locks."""
 GRACE = 2.0
 """Between asking a command to stop and killing it, in [s]: time to bring an arm to rest."""
+_HANGS = 60.0
+"""In [s]; ours: no computer takes so long to start a program, be it ever so busy."""
 # Ours: longer than a look at a lock ever holds it, shorter than any execution.
 _WAIT_S = 1.0
 _POLL_S = 0.01
@@ -96,20 +98,26 @@ def is_executing(folder: Path) -> bool:
 def stop_executing(folder: Path) -> None:
     """Stop what executes a trial of a workspace, whoever started it, and wait for its end.
 
-    Its supervisor is asked, which asks the command, once, and notes how it ended; or whatever is
-    left of both. What still runs after four times its grace is killed.
+    Its supervisor is asked, which asks the command, once, kills it after the grace, and notes how
+    it ended; or whatever is left of both is asked. What else runs after four times the grace is
+    killed, and a supervisor that hangs, much later: on a busy computer it may only be slow.
     """
     name, start = _name_of_folder(folder), time.monotonic()
-    running = marked(name)
-    for pid in running:
+    asked = marked(name)
+    for pid in asked:
         with suppress(OSError):
             status = Path("/proc", str(pid), "stat").read_text()  # pid (name) state parent ...
-            if int(status.rpartition(")")[2].split()[1]) not in running:
+            if int(status.rpartition(")")[2].split()[1]) not in asked:
                 os.kill(pid, signal.SIGTERM)
                 os.kill(pid, signal.SIGCONT)
-    while marked(name) and time.monotonic() < start + 4 * GRACE:
+    while running := marked(name):
         time.sleep(_POLL_S)
-    stop_marked(name, 0.0)
+        late = time.monotonic() - start
+        for pid in running if late > 4 * GRACE else ():
+            with suppress(OSError):
+                supervises = b"supervisor.py" in Path("/proc", str(pid), "cmdline").read_bytes()
+                if late > _HANGS or not supervises:
+                    os.kill(pid, signal.SIGKILL)
 
 
 def marked(name: str) -> list[int]:
