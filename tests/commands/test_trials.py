@@ -495,12 +495,25 @@ def test_a_person_is_told_what_was_not_checked(run, arm, folder, monkeypatch, an
     monkeypatch.setattr("builtins.input", lambda question: asked.append(question) or answer)
     status, out, _ = run("ask", folder, *ON_ARM)
     assert asked == [
-        "the arm will move (trial 1 at full speed, 0.5 s); NOT checked: self-collision, the arm's "
-        "limits, the table; is the area clear? (yes/no) "
+        "the arm will move (trial 1 at full speed, 0.5 s); NOT checked: self-collision, the "
+        "table; is the area clear? (yes/no) "
     ]
     assert status == (answer != "yes")
     assert toy_arm.motions(toy) == (answer == "yes")
     assert "toy, firmware 1.0: the arm is off it by up to 3.24e-05 rad (joint1)" in out
+
+
+def test_a_command_is_asked_nothing_so_less_is_checked(run, folder, driver, tmp_path, monkeypatch):
+    run("goal", folder, "0.9", "0.05")
+    (tmp_path / "say.json").write_text('{"outcome": "done"}')
+    asked = []
+    monkeypatch.setattr("sys.stdin.isatty", lambda: True)
+    monkeypatch.setattr("builtins.input", lambda question: asked.append(question) or "no")
+    run("ask", folder, "--run", driver)
+    assert asked == [
+        "the arm will move (trial 1 at full speed); NOT checked: where the arm stands, the arm's "
+        "limits, self-collision, the table; is the area clear? (yes/no) "
+    ]
 
 
 def test_each_motion_is_confirmed_and_none_is_made_unasked(run, arm, folder, monkeypatch):

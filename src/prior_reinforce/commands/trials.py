@@ -146,7 +146,7 @@ class Ask(OnWorkspace):
             return self._on_arm(workspace, trial)
         elif trial.stage is not Stage.EXECUTED:
             command = None if self.check else self.run_command
-            unchecked = _unchecked(workspace, trial, start=self.where is None)
+            unchecked = _unchecked(workspace, trial, where=self.where is not None)
             if command is not None and not self.yes and not _may_move(trial, unchecked):
                 print("nothing moved; ask again when it may")
                 return 1
@@ -186,7 +186,9 @@ class Ask(OnWorkspace):
         if self.check:
             print("checked; nothing moved")
             return 0
-        unchecked = (*look.arm.unchecked, *_unchecked(workspace, trial, start=False))
+        limits = bool(look.arm.checked)
+        nobody = _unchecked(workspace, trial, where=True, limits=limits)
+        unchecked = (*look.arm.unchecked, *nobody)
         motions: list[Motion] = [] if look.there else ["approach"]
         motions.append("trial" if self.rehearse is None else "rehearsal")
         for motion in motions:
@@ -527,11 +529,20 @@ def _say_arm(arm: ArmDescription) -> str:
     return f"{arm.model}{f', firmware {arm.firmware}' if arm.firmware else ''}"
 
 
-def _unchecked(workspace: Workspace, trial: Trial, *, start: bool) -> tuple[str, ...]:
-    """What nobody looked at, for the line that asks whether the arm may move."""
+def _unchecked(
+    workspace: Workspace, trial: Trial, *, where: bool, limits: bool = False
+) -> tuple[str, ...]:
+    """What nobody looked at, for the line that asks whether the arm may move.
+
+    Args:
+        workspace: The trial's.
+        trial: Whose plan it is.
+        where: Whether the arm was asked where it stands.
+        limits: Whether the arm held the plan against limits of its own.
+    """
     gate, verdict = workspace.manifest.gate, trial.verdict
-    found = ["where the arm stands"] if start else []
-    if not isinstance(verdict, LimitReport) or "velocity" in verdict.unchecked:
+    found = [] if where else ["where the arm stands"]
+    if not limits and (not isinstance(verdict, LimitReport) or "velocity" in verdict.unchecked):
         found.append("the arm's limits")
     found.append("self-collision")
     found.append("the table" if gate.box_low is None else "the table, but for the tool tip")

@@ -691,7 +691,8 @@ class Workspace:
         if raised is not None:
             raise raised
         if interruptions.came:
-            raise KeyboardInterrupt(f"trial {number}: {result.outcome} ({result.reason})")
+            which = f"trial {number}" if motion == "trial" else f"the {motion} of trial {number}"
+            raise KeyboardInterrupt(f"{which}: {result.outcome} ({result.reason})")
         return result
 
     def to_execute(self, number: int) -> Trial:
