@@ -141,20 +141,29 @@ def test_a_reading_that_the_next_ones_contradict_was_told_wrongly():
     throw(adapter, GOAL, np.zeros(2), seen, words=False)
     assert np.linalg.norm(adapter.propose(GOAL) - GOAL) < TOLERANCE
     assert 2 in adapter._histories[0].mistaken
-    assert adapter.expect(GOAL, GOAL, TOLERANCE).surprise is None
     assert adapter.expect(adapter.propose(GOAL), GOAL, TOLERANCE).p_hit > 0.5
 
 
 def test_a_reading_far_from_what_was_believed_is_news_until_the_next_one():
+    """What is expected of a trial, and how surely, is what a surprise is held against."""
     adapter, seen = after_two_hits(), partial(Reading.measured, sd=0.002)
-    assert adapter.expect(GOAL, GOAL, TOLERANCE).surprise is None
-    throw(adapter, GOAL, np.array([0.16, -0.12]), seen, words=False)
-    surprise = adapter.expect(GOAL, GOAL, TOLERANCE).surprise
-    assert surprise.sds > 5
-    assert surprise.p_mistaken + surprise.p_changed > 0.9
-    assert min(surprise.p_mistaken, surprise.p_changed) > 0.02
-    throw(adapter, GOAL, np.array([0.16, -0.12]), seen, words=False)
-    assert adapter.expect(GOAL, GOAL, TOLERANCE).surprise is None
+    jump = np.array([0.16, -0.12])
+    condition = adapter.propose(GOAL)
+    expected = adapter.expect(condition, GOAL, TOLERANCE)
+    assert np.linalg.norm(expected.error) < TOLERANCE
+    assert np.linalg.norm((condition + jump - GOAL - expected.error) / expected.sd) > 5
+    throw(adapter, GOAL, jump, seen, words=False)
+    again = adapter.expect(condition, GOAL, TOLERANCE)
+    assert np.linalg.norm((condition + jump - GOAL - again.error) / again.sd) < 2
+    assert again.p_hit < 0.6
+
+
+def test_where_nothing_learned_leads_to_the_goal_what_was_demonstrated_is_tried():
+    """A motion that lost its object says where it lost it, and points away from everywhere."""
+    adapter, goal = started(), np.array([0.97, -0.12])
+    for _ in range(4):
+        adapter.observe(adapter.propose(GOAL), GOAL, Reading.measured([-0.5, 0.3], 0.002))
+    assert np.linalg.norm(adapter.propose(goal) - goal) < 0.1
 
 
 def test_a_goal_that_was_moved_is_told_from_a_table_that_was():
@@ -332,7 +341,7 @@ def test_p_hit_grows_with_the_tolerance_and_with_what_is_known():
 
 
 def test_what_a_reading_would_teach_is_what_it_takes_off_the_variance():
-    adapter = started(label_sd=0.2, generator_sd=(1e-6,), hardware_sd=(0.3, 0.3))
+    adapter = started(noise=np.full((6, 2), 0.02), generator_sd=(1e-6,), hardware_sd=(0.3, 0.3))
     throw(adapter, GOAL, np.array([0.03, 0.0]))
     region = np.random.default_rng(0).uniform([0.8, -0.2], [1.0, 0.2], size=(40, 2))
     at = np.array([0.85, -0.12])

@@ -26,23 +26,25 @@ def test_models_are_all_combinations_of_what_may_be_wrong():
 
 
 def of_labels(**settings) -> DisplacementPrior:
-    return prior(generator_sd=(1e-9,), hardware_sd=(1e-9, 1e-9), execution_sd=(1e-9,), **settings)
+    return prior(generator_sd=(1e-9,), hardware_sd=(1e-9, 1e-9), **settings)
 
 
-def test_at_a_demonstration_its_own_label_is_off_and_no_other():
-    only_labels = of_labels(label_sd=0.3)
-    at = only_labels.normalisation.apply(OUTCOMES)
-    np.testing.assert_allclose(only_labels.covariance(at, at)[0], 0.09 * np.eye(len(at)), atol=1e-9)
-    np.testing.assert_allclose(only_labels.variance(at)[0], 0.09, atol=1e-9)
+def test_a_demonstration_was_one_execution_whose_outcome_is_off_by_itself():
+    """The next execution of the same plan is off by as much again."""
+    only_noise = of_labels(execution_sd=(0.1, 0.3))
+    at = only_noise.normalisation.apply(OUTCOMES)
+    for covariance, sd in zip(only_noise.covariance(at, at), (0.1, 0.3) * 2, strict=True):
+        np.testing.assert_allclose(covariance, sd**2 * np.eye(len(at)), atol=1e-9)
+    np.testing.assert_allclose(only_noise.variance(at), [[0.02] * 5, [0.18] * 5] * 2, atol=1e-9)
 
 
-def test_stated_noise_of_labels_adds_to_what_they_may_be_off_besides():
-    stated = of_labels(noise=0.02)
+def test_stated_noise_of_labels_adds_to_that_of_their_execution():
+    stated = of_labels(noise=0.02, execution_sd=(0.02,))
     weights = np.square(stated._weights(OUTCOMES[:1])).sum()
     assert weights < 1.0  # what is uncertain is smoothed
     each = (0.02 / stated.normalisation.scale[0]) ** 2 + 0.02**2
     at = stated.normalisation.apply(OUTCOMES[:1])
-    np.testing.assert_allclose(stated.variance(at)[:, 0], weights * each, atol=1e-9)
+    np.testing.assert_allclose(stated.variance(at)[:, 0], weights * each + 0.02**2, atol=1e-9)
 
 
 def of_generator(**settings) -> DisplacementPrior:
@@ -50,7 +52,6 @@ def of_generator(**settings) -> DisplacementPrior:
         generator_sd=(0.5,),
         hardware_sd=(1e-9, 1e-9),
         execution_sd=(1e-9,),
-        label_sd=1e-9,
         **settings,
     )
 
@@ -80,9 +81,7 @@ def test_what_the_generator_gets_wrong_is_what_weights_make_of_a_random_landing(
 
 
 def test_what_is_different_from_the_demonstrations_day_is_shared_and_can_be_left_out():
-    of_hardware = prior(
-        generator_sd=(1e-9,), execution_sd=(1e-9,), label_sd=1e-9, hardware_sd=(0.03, 0.3)
-    )
+    of_hardware = prior(generator_sd=(1e-9,), execution_sd=(1e-9,), hardware_sd=(0.03, 0.3))
     at = of_hardware.normalisation.apply(OUTCOMES[:1])
     same, changed = of_hardware.covariance(at, at)[:, 0, 0]
     assert (same, changed) == pytest.approx((0.03**2, 0.3**2))

@@ -8,7 +8,7 @@ import warnings
 import numpy as np
 import pytest
 
-from prior_reinforce.adapters.base import Adapter, Expectation, Surprise
+from prior_reinforce.adapters.base import Adapter, Expectation
 from prior_reinforce.adapters.bayesian import BayesianAdapter
 from prior_reinforce.errors import (
     ConfigurationError,
@@ -330,17 +330,22 @@ def test_trials_are_carried_over_where_they_serve_the_adapter():
     assert not session.set_goal(GOAL, carry_over=False).carry_over
 
 
-def test_a_surprise_is_said_with_what_to_do_about_it():
+def test_a_surprise_is_said_at_once_with_what_to_do_about_it():
     session = carrying()
-    session.tell(session.ask().number, [0.05, 0.0])
-    assert session.ask().surprise == ""
-    odd = Expectation(0.1, 2.1, Surprise(12.3, 0.2, 0.75))
-    session.adapter._expect = lambda *of: odd
-    session.tell(2, [0.3, 0.0])
-    said = session.ask().surprise
-    assert said.startswith("trial 2 is 12 sd from what the trials before it made likely")
-    assert "told wrongly 20%, changed 75%" in said
-    assert "mistyped: amend 2; changed: goal --new-hardware" in said
+    expected = Expectation(0.9, 1.1, np.array([0.01, 0.0]), np.array([0.01, 0.02]))
+    session.adapter._expect = lambda *of: expected
+    session.ask()
+    told = session.tell(1, Reading.measured([0.21, 0.0], 0.0))
+    assert told.surprise == (
+        "20 sd from what was made likely by the trials before it; mistyped: amend 1; "
+        "changed: goal --new-hardware"
+    )
+    assert session.amend(1, Reading.measured([0.04, 0.0], 0.0)).surprise == ""
+    assert session.amend(1, Reading.measured([0.21, 0.0], 0.2)).surprise == ""  # a coarse look
+    session.amend(1, hit=False)
+    assert session.trials[0].surprise == ""
+    session.ask()
+    assert session.tell(2, "20 cm long").surprise.startswith("14 sd")  # of 15 cm
 
 
 def test_the_adapter_hears_of_new_hardware_between_the_trials_before_and_after():

@@ -15,19 +15,7 @@ from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.readings import Reading
 
 
-@dataclass(frozen=True)
-class Surprise:
-    """The latest reading, if chance hardly explains it."""
-
-    sds: float
-    """How many standard deviations it lies from what the readings before it made likely."""
-    p_mistaken: float
-    """Probability that it was told wrongly."""
-    p_changed: float
-    """Probability that something has changed since the trial before it."""
-
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Expectation:
     """What is expected of a trial before it is executed."""
 
@@ -35,8 +23,10 @@ class Expectation:
     """Probability that it reaches the goal."""
     trials: float
     """Trials until the goal is reached, this one included."""
-    surprise: Surprise | None = None
-    """What the reading before it was, where that was far from what was believed."""
+    error: Point | None = None
+    """Expected error, outcome minus goal, shape (k,), in the outcomes' units; None if unknown."""
+    sd: Point | None = None
+    """Its standard deviation, likewise."""
 
 
 class Adapter(ABC):

@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 from numpy.typing import ArrayLike
 
-from prior_reinforce.adapters.base import Adapter, Expectation, Surprise
+from prior_reinforce.adapters.base import Adapter, Expectation
 from prior_reinforce.adapters.change_points import Change, History, split
 from prior_reinforce.adapters.displacement import BayesianConfig, DisplacementPrior
 from prior_reinforce.adapters.expectation_propagation import Readings, infer
@@ -40,8 +40,8 @@ _FARTHEST = 6.0
 """A correction is so many spreads at most (ours). Where weights are
 steep, an outcome may lie a hundred spreads away. Three demonstrations nearly in a line need 2 to 4:
 bounded at 2 spreads, goals took 2.3 instead of 2.2 trials (24 draws; docs/decisions-adapter.md)."""
-_WORTH_A_THROW = 0.02
-"""Less probable histories are asked for no condition (ours)."""
+_HARDLY = 0.02
+"""Where the probability of a hit is less, what was learned is no guide (ours)."""
 _NOMINAL = 0.1
 """Tolerance where no trial told one, in spreads (ours): theirs is 0.02 to 0.3."""
 _NOTHING = 0.1
@@ -60,9 +60,6 @@ says more than its reading, where words are coarse, or numbers noisy."""
 _REPEATABLE = 0.3
 """What missed would miss again: executions of one plan are then taken to lie no farther apart than
 this share of the tolerance, as a standard deviation (ours). On our own tasks it is 0.13 to 0.30."""
-_NEWS = 0.5
-"""A reading is a surprise where it was told wrongly, or something changed, with more than this
-probability (ours)."""
 _SHARPEST = 1e-3
 """Least sd of a reading, in spreads (ours)."""
 _AGAIN = 0.5
@@ -82,7 +79,7 @@ class BayesianAdapter(Adapter):
 
         e   mean m_i, sd s_i    by how much the outcome of demonstration i is off: m_i as its label
                                 says (`Demonstrations.outcome_correction`), give or take the noise
-                                that it states, and 0.02 more
+                                that it states, and that of an execution
         F   sd 0.05, 0.2 or 0.8, reach 1.4    where landing bends between demonstrations; a
                                 demonstration that was measured is a reading of it
         h   sd 0.01, or with probability 0.2 0.3, reach 2.5    what is different from their day
@@ -102,10 +99,9 @@ class BayesianAdapter(Adapter):
     probability 0.002, nothing at all. The posterior of each model and history is found by
     expectation propagation.
 
-    The next condition is the fixed point c = g - E d(c) of a history, of several the one that most
-    probably hits, all histories considered. With nothing but demonstrations it is the goal, less
-    what their labels say to be off: nothing, where they were measured. Where the fixed point has
-    just missed the same goal, since its reading did not say what to change (a word coarser than the
+    The next condition is the fixed point c = g - E d(c) of the most probable history; where that
+    hardly hits, and with nothing but demonstrations, it is the goal, less what their labels say to
+    be off: nothing, where they were measured. Where the fixed point has just missed the same goal, since its reading did not say what to change (a word coarser than the
     tolerance, or "a miss" and nothing else), the condition beside it that most probably hits is
     next, given all that missed (`adapters.p_hit`).
 
@@ -121,7 +117,6 @@ class BayesianAdapter(Adapter):
     config_type: ClassVar[type[BayesianConfig]] = BayesianConfig
     carries_over: ClassVar[bool] = True
     _missed: Memory | None
-    _surprise: Surprise | None
 
     def __init__(self, config: BayesianConfig | None = None) -> None:
         """Take the settings, or the defaults."""
@@ -132,7 +127,7 @@ class BayesianAdapter(Adapter):
         self._normalisation = self._prior.normalisation
         self._memory, self._now = Memory.empty(demonstrations.outcome_dim), 0
         self._histories = [self._from_the_beginning()]
-        self._missed = self._surprise = None
+        self._missed = None
 
     def _from_the_beginning(self) -> History:
         """What follows from demonstrations alone, where nothing happened."""
@@ -171,55 +166,31 @@ class BayesianAdapter(Adapter):
             np.zeros(len(scale)) if radius is None else radius / scale,
         )
         new = memory.only(slice(-1, None))
-        sds = self._far_from_expected(new)
         may_be = split(self._histories, self._prior, self._memory, new)
         keep = memory.worth_keeping()
         memory = memory.only(keep)
         base = self._prior.covariance(memory.conditions, memory.conditions)
         told = [history.told(self._prior, memory, base, keep[:-1]) for history in may_be]
         self._histories = sorted(told, key=lambda history: -history.log_weight)
-        mistaken = np.array([self._now in h.mistaken for h in self._histories])
-        changed = np.array(
-            [
-                any(change.since == self._now and not change.announced for change in h.changes)
-                for h in self._histories
-            ]
-        )
-        p_mistaken, p_changed = (float(self._probabilities @ of) for of in (mistaken, changed))
-        is_news = p_mistaken + p_changed > _NEWS
-        self._surprise = Surprise(sds, p_mistaken, p_changed) if is_news else None
         self._memory, self._now, self._missed = memory, self._now + 1, None
-
-    def _far_from_expected(self, new: Memory) -> float:
-        """How many standard deviations a reading lies from what is most probable before it."""
-        best = self._histories[0]
-        mean, variance = (of[..., 0] for of in best.predict(self._prior, new, self._memory))
-        share = best.posterior.model_weights
-        expected = np.sum(share * mean, axis=0)
-        spread = np.sum(share * (variance + (mean - expected) ** 2), axis=0) + new.variance[0]
-        off = np.maximum(np.maximum(new.low[0] - expected, expected - new.high[0]), 0.0)
-        return float(np.linalg.norm(off / np.sqrt(spread)))
 
     def _propose(self, goal_seen: Point) -> Point:
         goal = self._normalisation.apply(goal_seen)
-        condition = self._best_of_histories(goal)
+        condition = self._most_probable(goal)
         missed = self._misses()
         same = self._as_now(missed, goal) & np.all(missed.goals == goal, axis=1)
         if np.any(_tried(condition[None], missed.only(same))):
             condition = self._likeliest_beside(condition, goal, missed, missed.only(same))
         return self._normalisation.undo(condition)
 
-    def _best_of_histories(self, goal: Point) -> Point:
-        """Of the fixed points of all histories the one that most probably hits.
+    def _most_probable(self, goal: Point) -> Point:
+        """The fixed point of the most probable history, unless it hardly hits.
 
-        Not the fixed point of their mean: half-way between what happened and what did not, nothing
-        is hit.
+        What demonstrations alone ask for is then asked for, if it hits more probably: a motion that
+        lost its object points away from everywhere.
         """
-        likely = self._probabilities > _WORTH_A_THROW
-        histories = [h for h, worth in zip(self._histories, likely, strict=True) if worth]
-        conditions = np.array([self._expected_to_land_on(goal, history) for history in histories])
-        if len(conditions) == 1:
-            return np.asarray(conditions[0])
+        learned = self._expected_to_land_on(goal, self._histories[0])
+        conditions = np.array([learned, goal - self._prior.mean(goal[None])[:, 0]])
         missed, places = self._misses(), self._places(conditions, goal)
         told = self._memory.missed_by[np.any(self._memory.missed_by > 0.0, axis=1)]
         radius = told[-1] if len(told) else np.full(len(goal), _NOMINAL)
@@ -227,7 +198,7 @@ class BayesianAdapter(Adapter):
             p_hit = self._p_hit_after(missed, places, radius)
         else:
             p_hit = self._p_hit(places, goal - conditions, radius)
-        return np.asarray(conditions[np.argmax(p_hit)])
+        return np.asarray(conditions[0 if p_hit[0] > _HARDLY else np.argmax(p_hit)])
 
     def _expected_to_land_on(self, goal: Point, history: History) -> Point:
         """Return the fixed point c = g - E d(c) of a history, in normalised units."""
@@ -271,11 +242,14 @@ class BayesianAdapter(Adapter):
 
     def _expect(self, condition: Point, goal: Point, tolerance: Point) -> Expectation:
         p_hit = float(self.p_hit(condition[None], goal[None], tolerance)[0])
+        trials = 1.0 + _TRIALS_AFTER_A_MISS * (1.0 - p_hit)
         last = self._memory.only(slice(-1, None))
         if np.any(last.missed_by > 0.0) and np.all(np.isinf(last.high - last.low)):
-            return Expectation(p_hit, 1.0 / max(p_hit, _LEAST_P_HIT), self._surprise)
-        trials = 1.0 + _TRIALS_AFTER_A_MISS * (1.0 - p_hit)
-        return Expectation(p_hit, trials, self._surprise)
+            trials = 1.0 / max(p_hit, _LEAST_P_HIT)
+        at, aim = (self._normalisation.apply(point) for point in (condition, goal))
+        mean, variance = (of[0] for of in self._expected(self._places(at[None], aim)))
+        scale = self._normalisation.scale
+        return Expectation(p_hit, trials, (at + mean - aim) * scale, np.sqrt(variance) * scale)
 
     def p_hit(
         self, conditions: Points, goals: Points, tolerance: ArrayLike
@@ -332,13 +306,15 @@ class BayesianAdapter(Adapter):
             self._missed = missed
         return self._missed
 
-    def _expected(self, at: Places) -> Points:
-        """Mean displacements over all that may be."""
-        total = np.zeros(at.conditions.shape)
+    def _expected(self, at: Places) -> tuple[Points, Points]:
+        """Mean and variance of displacements over all that may be."""
+        total, square = np.zeros((2, *at.conditions.shape))
         for probability, history in zip(self._probabilities, self._histories, strict=True):
-            mean, _ = history.predict(self._prior, at, self._memory)
-            total += probability * np.einsum("mk,mkp->pk", history.posterior.model_weights, mean)
-        return total
+            mean, variance = history.predict(self._prior, at, self._memory)
+            share = probability * history.posterior.model_weights
+            total += np.einsum("mk,mkp->pk", share, mean)
+            square += np.einsum("mk,mkp->pk", share, variance + mean**2)
+        return total, square - total**2
 
     def _p_hit_after(
         self, missed: Memory, at: Places, radius: Point, *, seed: int = 0
@@ -387,9 +363,8 @@ class BayesianAdapter(Adapter):
             Outcome minus condition, shape (n, k), in the outcomes' units.
         """
         at = self._normalisation.apply(conditions)
-        return self._expected(self._places(at, at, None if hardware else -1)) * (
-            self._normalisation.scale
-        )
+        mean, _ = self._expected(self._places(at, at, None if hardware else -1))
+        return mean * self._normalisation.scale
 
     def gain(
         self, candidates: Points, over: Float[np.ndarray, "m k"], *, demonstrations: bool = False

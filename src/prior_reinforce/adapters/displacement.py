@@ -6,8 +6,9 @@ off by what its weights do not carry over:
 
     d(c) = sum_i w_i(c) e_i + F(c) - sum_i w_i(c) F(r_i) + h(c) + noise,    F ~ GP(0, a^2 K)
 
-e_i is by how much the outcome of demonstration i is off, h what is different from their day, and
-the noise what differs from one execution to the next. F less its mixture is zero at demonstrations,
+e_i is by how much the outcome of demonstration i is off: what was seen of it is uncertain, and it
+was one execution. h is what is different from their day, and the noise what differs from one
+execution to the next. F less its mixture is zero at demonstrations,
 grows away from them, and has no affine part, which the weights reproduce.
 
 Of no arm are the size a, the size of h and that of the noise known beforehand. All combinations are
@@ -54,8 +55,6 @@ class BayesianConfig:
     sizes each is beforehand two thirds as probable as the one before.
     """
 
-    label_sd: float = 0.02
-    """How far demonstrated outcomes are off, beside the noise that they state."""
     generator_sd: tuple[float, ...] = (0.05, 0.2, 0.8)
     """a, by how much landing bends between demonstrations."""
     generator_reach: float = 1.4
@@ -143,7 +142,7 @@ class DisplacementPrior:
         self._demonstrated, self._noise, self._correction = demonstrated, noise, correction
         outcomes = self.normalisation.undo(demonstrated)
         self._weights = smooth_weights(outcomes, noise=noise * self.normalisation.scale)
-        self._label = np.mean(noise**2, axis=1) + self.config.label_sd**2
+        self._label = np.mean(noise**2, axis=1)
         self._asked: dict[bytes, Any] = {}
 
     def mean(self, at: Float[np.ndarray, "p k"]) -> Float[np.ndarray, "k p"]:
@@ -157,6 +156,7 @@ class DisplacementPrior:
         (w_a, of_a, s_a, _), (w_b, of_b, s_b, _) = self._at(a), self._at(b)
         bent = self._matern(a, b) * np.outer(s_a, s_b) - of_a @ w_b.T - w_a @ of_b.T
         covariance = self._square[:, None, None] * bent + (w_a * self._label) @ w_b.T
+        covariance += self.noise[:, None, None] * (w_a @ w_b.T)
         if hardware:
             covariance += self._hardware[:, None, None] * self._shared(a, b)
         return np.asarray(covariance)
@@ -168,7 +168,8 @@ class DisplacementPrior:
         w, left, scaled, _ = self._at(at)
         bent = np.maximum(scaled**2 - 2.0 * np.sum(w * left, axis=1), 0.0)
         of_each = self._square[:, None] * bent + np.square(w) @ self._label
-        return np.asarray(of_each + (hardware * self._hardware + self.noise)[:, None])
+        of_each += self.noise[:, None] * (1.0 + np.square(w).sum(axis=1))
+        return np.asarray(of_each + (hardware * self._hardware)[:, None])
 
     def of_change(self, a: Float[np.ndarray, "p k"], b: Points) -> Float[np.ndarray, "p n"]:
         """Covariance of what changed hardware adds: shift and stretch."""

@@ -111,8 +111,7 @@ def infer(
             break
         before = mean
         # The distribution of each latent without its own site, and with its reading instead.
-        rest_tau = np.maximum(1.0 / variance - tau, _LEAST_PRECISION)
-        rest_mean = (mean / variance - nu) / rest_tau
+        rest_tau, rest_mean = _rest(mean, variance, tau, nu)
         _, tilted_mean, tilted_variance = tilted(rest_mean, 1.0 / rest_tau, readings)
         new_tau = np.clip(1.0 / tilted_variance - rest_tau, _LEAST_PRECISION, 1e10)
         new_nu = (rest_tau + new_tau) * tilted_mean - rest_tau * rest_mean
@@ -120,8 +119,7 @@ def infer(
         share = 1.0 if sweep == 0 and start is None else _DAMPING
         tau, nu = tau + share * (new_tau - tau), nu + share * (new_nu - nu)
     mean, variance, precision = _latent(prior, tau, nu)
-    rest_tau = np.maximum(1.0 / variance - tau, _LEAST_PRECISION)
-    rest_mean = (mean / variance - nu) / rest_tau
+    rest_tau, rest_mean = _rest(mean, variance, tau, nu)
     log_z, _, _ = tilted(rest_mean, 1.0 / rest_tau, readings)
     both = rest_tau + tau
     of_sites = log_z + 0.5 * (
@@ -135,6 +133,22 @@ def infer(
     evidence += np.reshape(log_prior, (-1, 1))
     weights = nu - (precision @ (prior @ nu[..., None]))[..., 0]
     return Posterior(tau, nu, weights, precision, evidence)
+
+
+def _rest(
+    mean: Float[np.ndarray, "m k n"],
+    variance: Float[np.ndarray, "m k n"],
+    tau: Float[np.ndarray, "m k n"],
+    nu: Float[np.ndarray, "m k n"],
+) -> tuple[Float[np.ndarray, "m k n"], Float[np.ndarray, "m k n"]]:
+    """Precision and mean of each latent without its own site.
+
+    Where updates swing, nothing may be left of the precision; the mean then stays where it is.
+    """
+    rest = 1.0 / variance - tau
+    sound = rest > _LEAST_PRECISION
+    rest = np.where(sound, rest, _LEAST_PRECISION)
+    return rest, np.where(sound, (mean / variance - nu) / rest, mean)
 
 
 def _whitened(

@@ -75,7 +75,8 @@ class Asked(Event, frozen=True):
     """The gate's verdict as plain data (`Verdict.as_json`)."""
     p_hit: float | None = None
     expected_trials: float | None = None
-    surprise: str = ""
+    expected_error: list[float] | None = None
+    expected_sd: list[float] | None = None
     plan: KeptPlan | None = None
     """None where the log keeps plans in memory."""
 

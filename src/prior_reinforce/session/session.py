@@ -49,7 +49,7 @@ from prior_reinforce.session.trials import (
 from prior_reinforce.wording import as_reading
 
 if TYPE_CHECKING:
-    from prior_reinforce.adapters.base import Adapter, Surprise
+    from prior_reinforce.adapters.base import Adapter
     from prior_reinforce.generators.base import Generator
     from prior_reinforce.plans.motions import Demonstrations
 
@@ -437,17 +437,6 @@ class Session:
                 self.adapter.change_hardware()
         self._on_hardware_of = max(self._on_hardware_of, goal_number)
 
-    def _say_surprise(self, surprise: Surprise | None) -> str:
-        """What was odd about the latest reading, and what to do about that."""
-        if surprise is None or not self._observed:
-            return ""
-        number = self._observed[-1].number
-        odds = f"told wrongly {surprise.p_mistaken:.0%}, changed {surprise.p_changed:.0%}"
-        return (
-            f"trial {number} is {surprise.sds:.0f} sd from what the trials before it made likely "
-            f"({odds}); mistyped: amend {number}; changed: goal --new-hardware"
-        )
-
     def _open(self, condition: Point, plan: Frames) -> Verdict | None:
         """Write a new trial down, if its plan may be executed."""
         goal = self._current_goal()
@@ -462,7 +451,8 @@ class Session:
             gate=None if verdict is None else verdict.as_json(),
             p_hit=None if expected is None else expected.p_hit,
             expected_trials=None if expected is None else expected.trials,
-            surprise="" if expected is None else self._say_surprise(expected.surprise),
+            expected_error=_plain(None if expected is None else expected.error),
+            expected_sd=_plain(None if expected is None else expected.sd),
             plan=self.log.keep_plan(number, plan),
         )
         self.log.append(event)
@@ -553,6 +543,10 @@ def ask_all(sessions: Sequence[Session], *, arm_did_not_move: bool = False) -> l
         session._with_plan(number, [verdicts[session]] if session in verdicts else [])
         for session, number in zip(sessions, numbers, strict=True)
     ]
+
+
+def _plain(numbers: Point | None) -> list[float] | None:
+    return None if numbers is None else numbers.tolist()
 
 
 def _loaded(given: Any) -> Any:

@@ -113,6 +113,27 @@ def test_amendments_hardware_seed_paths_and_photographs_are_reported(run, folder
     assert "the path of trial 1 is not drawn" in page
 
 
+def test_a_surprise_is_said_by_every_command_until_it_is_amended(run, folder, tmp_path):
+    odd = "made likely by the trials before it; mistyped: amend 3; changed: goal --new-hardware"
+    run("goal", folder, "0.9", "0.05")
+    for number in ("1", "2"):
+        run("ask", folder)
+        assert "sd from" not in run("tell", folder, number, "--hit")[1]
+    run("ask", folder)
+    assert odd in run("tell", folder, "3", "20cm long, 20cm left")[1]
+    assert odd in run("status", folder)[1]
+    assert odd in run("ask", folder)[1]
+    run("report", folder)
+    page = tmp_path / "planar" / "report" / "report.html"
+    assert odd in page.read_text()
+    said = run("amend", folder, "3", "2cm long")
+    assert said[0] == 0
+    assert odd not in said[1]
+    assert odd not in run("status", folder)[1]
+    run("report", folder)
+    assert odd not in page.read_text()
+
+
 def trial(number, **lines):
     """A trial whose gate said this of each check: its status and margin."""
     said = [

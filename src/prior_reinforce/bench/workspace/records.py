@@ -67,7 +67,7 @@ class TrialRecord(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     expected_trials: float | None
     """Trials until the goal is reached, this one included, likewise."""
     surprise: str | None
-    """What was odd about the reading before it."""
+    """What is odd about what was told of it."""
     outdated: bool
     """Whether it was planned before a correction."""
     model: str

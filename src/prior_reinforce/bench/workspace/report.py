@@ -116,7 +116,11 @@ def _record(workspace: Workspace, goal: Goal) -> AdaptationRecord:
         tolerance=goal.tolerance,
         trials=tuple(trials),
         number=goal.number,
-        warnings={t.number: said for t in trials if (said := execution_warning(workspace, t))},
+        warnings={
+            t.number: "; ".join(said)
+            for t in trials
+            if (said := [text for text in (execution_warning(workspace, t), t.surprise) if text])
+        },
         checks=_checks(trials),
         notes=tuple(_notes(workspace, goal, trials)),
         measured=_measured(workspace, trials, remarks),

@@ -61,7 +61,8 @@ def _say_trial(workspace: Workspace, trial: Trial) -> str:
     if trial.reading is not None:
         manifest = workspace.manifest
         seen = say_reading(trial.reading, manifest.outcome_names, manifest.outcome_units)
-        return f"reached ({seen})" if trial.hit else seen
+        seen = f"reached ({seen})" if trial.hit else seen
+        return f"{seen}, {trial.surprise}" if trial.surprise else seen
     if trial.stage is Stage.VOIDED:
         return f"void: {trial.note}" if trial.note else "void"
     if trial.stage is Stage.EXECUTING:
@@ -86,8 +87,10 @@ def say_expectation(state: WorkspaceState, trial: Trial) -> list[str]:
     if trial.p_hit is None or trial.expected_trials is None:
         return []
     lines = [f"hits with probability {trial.p_hit:.2f}; {trial.expected_trials:.1f} trials to go"]
-    lines += [trial.surprise] if trial.surprise else []
-    missed = sum(told.stage is Stage.TOLD for told in state.current)
+    told = [known for known in state.trials if known.stage is Stage.TOLD]
+    if told and told[-1].surprise:
+        lines.append(f"trial {told[-1].number} was {told[-1].surprise}")
+    missed = sum(known.goal_number == trial.goal_number for known in told)
     if missed >= _POOR_TRIALS and not state.solved and trial.p_hit < _POOR_CHANCE:
         lines.append(
             "what would help: a demonstration near this goal, or a finer look at the next trial "
