@@ -101,9 +101,10 @@ class BayesianAdapter(Adapter):
 
     The next condition is the fixed point c = g - E d(c) of the most probable history; where that
     hardly hits, and with nothing but demonstrations, it is the goal, less what their labels say to
-    be off: nothing, where they were measured. Where the fixed point has just missed the same goal, since its reading did not say what to change (a word coarser than the
-    tolerance, or "a miss" and nothing else), the condition beside it that most probably hits is
-    next, given all that missed (`adapters.p_hit`).
+    be off: nothing, where they were measured. Where the fixed point has just missed the same goal,
+    since its reading did not say what to change (a word coarser than the tolerance, or "a miss" and
+    nothing else), the condition beside it that most probably hits is next, given all that missed
+    (`adapters.p_hit`).
 
     64 trials are remembered; then the older of the two closest together is forgotten
     (`adapters.memory`). Proposals depend on what was observed alone, never on what was proposed

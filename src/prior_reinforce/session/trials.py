@@ -69,8 +69,8 @@ gives numbers for words means to; with twice as much, P(hit) is said too low and
 (docs/decisions-adapter.md)."""
 
 _NEWS = 4.0
-"""A reading is a surprise from so many standard deviations on (ours): of 398 trials in which nothing
-happened, on our own tasks and four others', three were, and one in thirty lay beyond three."""
+"""A reading is a surprise from so many standard deviations on (ours): of 398 trials in which
+nothing happened, on our own tasks and four others', three were, and one in thirty lay beyond 3."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from typing import Any, Literal
 
 import numpy as np
@@ -30,7 +29,6 @@ Step = Literal[
 ]
 _SAMPLES = 120
 """Of a motion that is played: more cannot be told apart on a screen."""
-_SURPRISE = re.compile(r"trial (\d+) is (.*?); mistyped")
 _OUTPUT = 20_000
 """Bytes of an execution's output that are shown, from its end."""
 
@@ -195,7 +193,8 @@ def _trial(workspace: Workspace, state: WorkspaceState, trial: Trial, asked: str
     manifest, outcome = workspace.manifest, None
     if trial.reading is not None and trial.reading.has_number:
         outcome = (state.goal_of(trial).goal + trial.reading.error_seen).tolist()
-    surprise = _SURPRISE.match(trial.surprise)
+    before = [t for t in state.trials[: trial.number - 1] if t.stage is Stage.TOLD]
+    surprise = before[-1].surprise.partition("; mistyped")[0] if before else ""
     told = trial.reading is not None
     return TrialView(
         number=trial.number,
@@ -209,8 +208,8 @@ def _trial(workspace: Workspace, state: WorkspaceState, trial: Trial, asked: str
         hit=trial.hit,
         p_hit=trial.p_hit,
         expected_trials=trial.expected_trials,
-        surprising=int(surprise[1]) if surprise else None,
-        surprise=surprise[2] if surprise else trial.surprise,
+        surprising=before[-1].number if surprise else None,
+        surprise=surprise,
         outdated=trial.outdated,
         warning="" if told else _warning(workspace, trial),
         plan="" if trial.kept is None else trial.kept.sha256,

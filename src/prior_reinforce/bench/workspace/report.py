@@ -116,11 +116,7 @@ def _record(workspace: Workspace, goal: Goal) -> AdaptationRecord:
         tolerance=goal.tolerance,
         trials=tuple(trials),
         number=goal.number,
-        warnings={
-            t.number: "; ".join(said)
-            for t in trials
-            if (said := [text for text in (execution_warning(workspace, t), t.surprise) if text])
-        },
+        warnings={t.number: said for t in trials if (said := execution_warning(workspace, t))},
         checks=_checks(trials),
         notes=tuple(_notes(workspace, goal, trials)),
         measured=_measured(workspace, trials, remarks),
@@ -150,7 +146,7 @@ def _notes(workspace: Workspace, goal: Goal, trials: Sequence[Trial]) -> Iterato
                 pass
     for trial in trials:
         if trial.surprise:
-            yield f"Before trial {trial.number}: {trial.surprise}."
+            yield f"Trial {trial.number} was {trial.surprise}."
         ended = workspace.state.executions.get(trial.number)
         if isinstance(ended, Executed) and ended.tracking_rms:
             off = ", ".join(f"{rms:.3g} {unit}" for unit, rms in ended.tracking_rms.items())
