@@ -16,12 +16,13 @@ from prior_reinforce.lab.experiments.units import Workers, run_units
 def test_a_lost_node_of_a_ray_cluster_changes_nothing(tmp_path):
     pytest.importorskip("ray")
     here = Path(__file__).parent
+    path = os.pathsep.join([str(here), os.environ.get("PYTHONPATH", "")])
     done = subprocess.run(
         [sys.executable, here / "ray_cluster.py", tmp_path],
         capture_output=True,
         text=True,
         env=os.environ
-        | {"OMP_NUM_THREADS": "1", "RAY_USAGE_STATS_ENABLED": "0", "PYTHONPATH": here},
+        | {"OMP_NUM_THREADS": "1", "RAY_USAGE_STATS_ENABLED": "0", "PYTHONPATH": path},
     )
     assert done.returncode == 0, done.stdout + done.stderr
     text = done.stdout
