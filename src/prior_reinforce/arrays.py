@@ -91,10 +91,6 @@ def as_plans(
 def as_outcomes(values: ArrayLike, n_plans: int) -> Points:
     """Return the outcomes of demonstrations as a fresh, read-only float64 array.
 
-    Args:
-        values: Shape (N, k).
-        n_plans: N that is expected.
-
     Raises:
         InvalidDemonstrationsError: Wrong shape, fewer than two, outcomes in a subspace (on one line
             when k = 2), or values that are not finite.

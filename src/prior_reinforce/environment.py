@@ -192,11 +192,6 @@ class Task(ABC):
 def make_renderer(model: mujoco.MjModel, width: int, height: int) -> mujoco.Renderer:
     """Make a renderer of `width` x `height` pixels; its `close` frees the graphics memory.
 
-    Args:
-        model: The scene; not changed.
-        width: In [px].
-        height: In [px].
-
     Raises:
         RenderingUnavailableError: There is no OpenGL on this machine.
     """

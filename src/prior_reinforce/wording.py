@@ -81,12 +81,7 @@ _HITS = {"hit": True, "miss": False}
 
 
 def plain(text: str, keep: str = "") -> str:
-    """Escape control characters in untrusted text, such as a name, before it is printed.
-
-    Args:
-        text: The text.
-        keep: Control characters that stay.
-    """
+    """Escape control characters but for `keep` in untrusted text, such as a name, to print it."""
     return "".join(
         char.encode("unicode_escape").decode()
         if char not in keep and unicodedata.category(char) in _UNPRINTED

@@ -139,11 +139,7 @@ def split(
 ) -> list[History]:
     """Return histories that may explain one more trial, before its reading is taken in.
 
-    Args:
-        histories: Of the trials in memory.
-        prior: Of displacements.
-        memory: Without the new one.
-        new: The new trial alone.
+    `memory` is without it, `new` is that trial alone.
     """
     config, number, goal = prior.config, int(new.numbers[0]), new.goals[0]
     size = new.high - new.low

@@ -27,12 +27,7 @@ if TYPE_CHECKING:
 
 
 def say(console: Console, *parts: str | tuple[str, str]) -> None:
-    """Print a line as it is: names and reasons hold no markup, emoji or control characters.
-
-    Args:
-        console: Where to.
-        parts: Texts, or texts with a style of rich.
-    """
+    """Print a line as it is: names and reasons hold no markup, emoji or control characters."""
     styled = [(part, "") if isinstance(part, str) else part for part in parts]
     shown = [(plain(text, keep="\n"), style) for text, style in styled]
     console.print(Text.assemble(*shown), soft_wrap=True)

@@ -90,11 +90,6 @@ def draw_batch(
 ) -> tuple[Int[torch.Tensor, " B"], Int[torch.Tensor, " B"]]:
     """Draw which demonstrations and which noise levels make a batch.
 
-    Args:
-        n: N, demonstrations there are.
-        config: Batch size and how it is filled.
-        rng: Source of both.
-
     Returns:
         Rows in 0 ... N-1, each as often as any other to within one, and levels.
     """

@@ -29,9 +29,6 @@ motions agree in direction as well."""
 def patterns(demonstrations: Demonstrations) -> tuple[tuple[int, ...], ...]:
     """Sort demonstrations into patterns that do not mix, the largest first.
 
-    Args:
-        demonstrations: N of them.
-
     Returns:
         Numbers of the demonstrations of each pattern; mostly one pattern of all.
     """

@@ -58,12 +58,7 @@ class SavedLayer:
 
 
 def write_model(folder: Path, layers: Sequence[SavedLayer]) -> None:
-    """Write both files, `config.json` last; files of these names in the folder are replaced.
-
-    Args:
-        folder: Made if need be.
-        layers: At least one, the outermost first.
-    """
+    """Write both files, `config.json` last, replacing older ones; the outermost layer is first."""
     from safetensors.numpy import save
 
     packed = save(

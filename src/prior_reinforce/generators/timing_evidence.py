@@ -125,10 +125,6 @@ def choose_timing(demonstrations: Demonstrations) -> TimingChoice:
 def outcome_error(demonstrations: Demonstrations, decomposition: Decomposition) -> float:
     """Return how far left-out outcomes are missed, relative to their spread.
 
-    Args:
-        demonstrations: N of them.
-        decomposition: Theirs.
-
     Returns:
         Root mean square at the decisive phase; 1 is what the mean of the others would do.
     """

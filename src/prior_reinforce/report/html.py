@@ -14,13 +14,7 @@ _MIME_TYPES = {
 
 
 def render(template: str, *, package: str = _PACKAGE, **context: object) -> str:
-    """Render a template with everything escaped; it may extend this package's `base.html`.
-
-    Args:
-        template: File name of the template.
-        package: Python package whose folder holds it.
-        context: What the template names.
-    """
+    """Render a template with everything escaped; it may extend this package's `base.html`."""
     from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
     from markupsafe import Markup
 

@@ -164,11 +164,7 @@ def said_and_came(result: Mapping[str, Any], rounds: int) -> list[tuple[float, f
 
 
 def reliability(said: Float[np.ndarray, "n 3"]) -> dict[str, Any]:
-    """What was said of P(hit) and what came of it, over trials; Brier score beside the base rate's.
-
-    Args:
-        said: Rows of `said_and_came`.
-    """
+    """What was said of P(hit) and came of it; Brier score beside the base rate's."""
     p_hit, hit, to_go = said.T
     which = np.clip(np.digitize(p_hit, _BINS) - 1, 0, len(_BINS) - 2)
     return {
