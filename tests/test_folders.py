@@ -369,7 +369,7 @@ def test_an_arm_with_a_gripper_has_a_plan_in_four_commands(run, tmp_path, monkey
     assert plan.max() == pytest.approx(70, abs=2)
     assert plan[0] < 10 < 60 < plan[-1]
     first = run("ask", "hoop", "--goal", "90cm", "2cm")[1]  # the goal stands, and so does the trial
-    assert first.startswith("goal 1: 90 cm ahead, 2 cm left\ntrial 1:")
+    assert first.startswith("goal 1: 90 cm ahead, 2 cm left; within 1.5 cm\ntrial 1:")
     status, _, err = run("ask", "hoop", "--goal", "95cm", "2cm")
     assert status == 2
     assert "trial 1 waits to be told" in err
