@@ -11,7 +11,7 @@ import pytest
 from packaging.requirements import Requirement
 
 import prior_reinforce
-from prior_reinforce.extras import ALONE, EXTRA_OF
+from prior_reinforce.extras import ALONE, EXTRA_OF, missing_extra
 from tests.bench.importing import recorded
 from tests.test_dependencies import PROJECT
 
@@ -169,3 +169,14 @@ except MissingExtraError as error:
     status, out, _ = light(code, cwd=tmp_path)
     assert status == 0
     assert out.endswith(f"'prior-reinforce[{extra}]'\n")
+
+
+def test_what_no_extra_can_install_is_installed_by_make_and_named_in_the_docs():
+    for what in ALONE.values():
+        for page in ("Makefile", "docs/fr3.md"):
+            assert f"--no-deps {what}" in (SOURCE.parents[1] / page).read_text()
+
+
+def test_a_library_that_goes_without_its_dependencies_is_named_so():
+    error = missing_extra(ModuleNotFoundError("no", name="franka_sim.server"))
+    assert "pip install --no-deps franka-sim==1.1.7" in str(error)
