@@ -24,6 +24,7 @@ TASKS: Registry[Task] = Registry(
             f"{_HERE}.basketball_fr3:BasketballFR3", "the first on a Franka Research 3"
         ),
         "curling": Member(f"{_HERE}.curling:Curling", "slide a stone to a target"),
+        "curling-round": Member(f"{_HERE}.curling:CurlingRound", "go round the stone first"),
         "fishing": Member(f"{_HERE}.fishing:Fishing", "swing a hook onto a magnet"),
         "so101": Member(f"{_HERE}.so101:SO101Shot", "the SO-101 throws a ball into a cup"),
         **zoo.MEMBERS,

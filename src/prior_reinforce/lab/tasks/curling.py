@@ -98,3 +98,13 @@ class Curling(PandaTask):
         if stone[2] < 0.0:
             return self._lost(states)
         return Rollout(stone[:2].copy(), True, self._key_frame(states[-1], len(states)))
+
+
+class CurlingRound(Curling):
+    """Curling from beyond the stone: the bar goes round it first, by the left or the right; ours.
+
+    What lies between the two ways sweeps the stone off before it is pushed.
+    """
+
+    name = "curling-round"
+    recordings = "curling_round"

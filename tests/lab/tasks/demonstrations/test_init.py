@@ -4,12 +4,19 @@ import numpy as np
 import pytest
 
 from prior_reinforce.lab.tasks import make_task
-from prior_reinforce.lab.tasks.demonstrations import basketball, curling, fishing, so101
+from prior_reinforce.lab.tasks.demonstrations import (
+    basketball,
+    curling,
+    curling_round,
+    fishing,
+    so101,
+)
 
 MAKING = {
     "basketball-v1": basketball.make,
     "basketball-fr3": lambda name: basketball.make(name, task=make_task("basketball-fr3")),
     "curling": curling.make,
+    "curling-round": curling_round.make,
     "fishing": fishing.make,
     "so101": so101.make,
 }

@@ -70,8 +70,9 @@ def push(
     aside: float,
     tilt: float,
     dt: float,
+    horizon: int = HORIZON,
 ) -> Float[np.ndarray, "H 6"]:
-    """Flange poses that carry the bar through one push, as meant, `HORIZON` frames.
+    """Flange poses that carry the bar through one push, as meant.
 
     Args:
         heading: Direction of the push from the x axis, in [rad].
@@ -82,8 +83,9 @@ def push(
         aside: From the stone's middle to the bar's, to the left, in [m].
         tilt: Added to the handle's tilt throughout, in [rad].
         dt: Time between frames, in [s].
+        horizon: H, frames.
     """
-    part = smoothstep((np.arange(HORIZON) * dt - start) / duration)
+    part = smoothstep((np.arange(horizon) * dt - start) / duration)
     length = speed * duration / 1.875  # a minimum-jerk stroke's peak is 15/8 of its mean speed
     forward = np.array([np.cos(heading), np.sin(heading), 0.0])
     left = np.array([-np.sin(heading), np.cos(heading), 0.0])
@@ -92,11 +94,11 @@ def push(
     angle = (TIPPED_BACK + (TIPPED_FORWARD - TIPPED_BACK) * part + tilt)[:, None]
     down = np.array([0.0, 0.0, -1.0])
     handle = np.cos(angle) * down - np.sin(angle) * forward
-    attitudes = np.stack([np.cross(-left, handle), np.tile(-left, (HORIZON, 1)), handle], axis=-1)
+    attitudes = np.stack([np.cross(-left, handle), np.tile(-left, (horizon, 1)), handle], axis=-1)
     return np.hstack([bar - HANDLE * handle, to_rotation_vector(attitudes)])
 
 
-def _speed_for(distance: float) -> float:
+def speed_for(distance: float) -> float:
     """Speed of a push in [m/s] that an operator feels right for a stone to go so far, in [m].
 
     Half the stroke, then the slide: v STROKE_TIME / 3.75 + CARRIED_ON + v^2 / (2 mu g).
@@ -118,7 +120,7 @@ def make(name: str) -> Demonstrations:
         way = np.array(aim) - STONE_START
         meant = push(
             heading=float(np.arctan2(way[1], way[0])),
-            speed=_speed_for(float(np.linalg.norm(way))),
+            speed=speed_for(float(np.linalg.norm(way))),
             start=float(start),
             duration=STROKE_TIME * (1.0 + rng.normal(0.0, size.tempo)),
             gap=rng.uniform(*size.gap),

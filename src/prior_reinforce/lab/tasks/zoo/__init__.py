@@ -13,6 +13,7 @@ _THROWS = "prior_reinforce.lab.tasks.zoo.throws"
 _PUSHES = "prior_reinforce.lab.tasks.zoo.pushes"
 
 _CARRIED = "prior_reinforce.lab.tasks.zoo.carried"
+_WAYS = "prior_reinforce.lab.tasks.zoo.ways"
 
 MEMBERS = {
     "zoo-lob": Member(f"{_THROWS}:Lob", "a ball let go by a clock"),
@@ -29,6 +30,9 @@ MEMBERS = {
     "zoo-catapult": Member(f"{_THROWS}:Catapult", "a trigger channel"),
     "zoo-curl": Member(f"{_PUSHES}:Curl", "a spinning stone, by increments"),
     "zoo-strike": Member(f"{_PUSHES}:Strike", "a putt of 400 frames"),
+    "zoo-sidearm": Member(f"{_WAYS}:Sidearm", "forehand or backhand"),
+    "zoo-overarm": Member(f"{_WAYS}:Overarm", "over the shoulder or underhand"),
+    "zoo-bank": Member(f"{_WAYS}:Bank", "straight or off the cushion"),
 }
 """The zoo's tasks by name, for the registry of all tasks."""
 
@@ -55,3 +59,7 @@ REPORTED = (
     "zoo-strike",
 )
 """On these, results are only reported."""
+
+SEVERAL_WAYS = ("zoo-sidearm", "zoo-overarm", "zoo-bank")
+"""Tasks that are done in two ways, for sets of the kind `ways`. Of the first, sets of seeds 100 and
+more were seen while the network was chosen; none of the others."""

@@ -142,11 +142,13 @@ KINDS = {
     "jitter": Variation(jitter=_ENCODER),
     "mixed": _MIXED,
     "scattered": replace(_MIXED, scattered=True),
+    "ways": Variation((0.3, 0.7), tempo=0.05, posture=0.5, second_style=0.5, jitter=_ENCODER),
 }
 """What each kind of set varies; `mixed` varies all that one person does, at about half the size,
-and `scattered` also where it ends up."""
+and `scattered` also where it ends up. `ways` has as many demonstrations in each of two styles, in
+no order, with some difference of start, tempo and posture."""
 
-COUNTS = (3, 12)
+COUNTS = (3, 16)
 """Fewest and most demonstrations of a set that is made by name."""
 
 
