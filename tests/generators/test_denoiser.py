@@ -9,7 +9,7 @@ import torch
 
 from prior_reinforce.generators import DiffusionConfig
 from prior_reinforce.generators.config import UNetSize
-from prior_reinforce.generators.denoiser import draw_batch, sample, train
+from prior_reinforce.generators.denoiser import draw_batch, mixed, sample, train
 from prior_reinforce.generators.noise_schedule import NoiseSchedule, mean_shift_levels
 from prior_reinforce.generators.threads import torch_threads
 from prior_reinforce.generators.training import build
@@ -67,7 +67,7 @@ def test_mean_shift_ends_in_a_mode_not_between_two():
 
 
 @pytest.mark.parametrize("shared", [True, False])
-@pytest.mark.parametrize("sampler", ["mean_shift", "ddpm"])
+@pytest.mark.parametrize("sampler", ["mean_shift", "ddim", "ddpm"])
 def test_a_code_depends_on_its_condition_alone(sampler, shared):
     config = DiffusionConfig(prediction="sample", margin=1.0, sampler=sampler, shared_noise=shared)
     conditions = torch.tensor([[0.1], [0.5], [-0.7]])
@@ -115,6 +115,20 @@ def test_the_papers_batch_is_one_pass_over_the_demonstrations():
     assert sorted(rows.tolist()) == [0, 1, 2, 3, 4, 5]
     assert levels.min() >= 0
     assert levels.max() < 100
+
+
+def test_mixtures_are_of_those_that_move_alike_and_their_outcomes_are_mixed_the_same_way():
+    codes = torch.tensor([[0.0], [0.1], [5.0], [5.2]])[:, :, None]
+    conditions = 2 * codes[:, :, 0] + 1  # so a mixture has the mixture of conditions
+    alike = torch.tensor([[0, 1], [3, 2]]).repeat(200, 1)
+    clean, given = mixed(codes, conditions, alike, torch.Generator().manual_seed(0))
+    torch.testing.assert_close(given, 2 * clean[:, :, 0] + 1)
+    low, high = clean[::2, 0, 0], clean[1::2, 0, 0]
+    assert low.min() >= -0.06
+    assert low.max() <= 0.16  # of the two near 0, a quarter beyond them at most
+    assert high.min() > 4.9
+    assert (low < 0).any()
+    assert 5 <= (low == 0).sum() <= 50  # demonstrations as they are
 
 
 TINY = UNetSize(

@@ -42,6 +42,19 @@ def test_two_manners_of_one_throw_are_one_pattern(kind):
     assert len(patterns(make_task("zoo-scoop").demonstrations(kind))) == 1
 
 
+@pytest.mark.parametrize("name", ["zoo-sidearm", "zoo-overarm", "zoo-bank"])
+def test_two_ways_are_told_apart_by_what_each_tells_of_its_own(name):
+    """Motions that return, whose mirror image correlates with them at a delay."""
+    demos = make_task(name).demonstrations("ways-12-101")
+    one, other = patterns(demos)
+    assert len(one) == len(other) == 6
+    turns = demos.plans[:, :, 1 if name == "zoo-overarm" else 0]
+    far = turns[np.arange(12), np.abs(turns - turns[:, :1]).argmax(axis=1)]
+    assert max(far[list(one)]) < min(far[list(other)]) or min(far[list(one)]) > max(
+        far[list(other)]
+    )
+
+
 def test_what_does_not_move_is_one_pattern():
     still = Demonstrations(
         np.ones((6, 20, 2)), OUTCOMES, PlanFormat(("a", "b"), ("rad",) * 2, 0.02)

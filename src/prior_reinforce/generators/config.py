@@ -17,7 +17,7 @@ Activation = Literal["mish", "silu"]
 Prediction = Literal["epsilon", "v", "sample"]
 """What the network predicts from x_t: the noise, the velocity of Salimans and Ho (2022,
 "Progressive Distillation for Fast Sampling of Diffusion Models"), or the clean sample."""
-Sampler = Literal["mean_shift", "ddpm"]
+Sampler = Literal["mean_shift", "ddim", "ddpm"]
 
 
 @dataclass(frozen=True)
@@ -122,6 +122,17 @@ are fewer than its 256; its 5,000 epochs so are 5,000 steps.
 """
 
 
+WAYS: dict[str, Any] = {
+    "mixtures": 4,
+    "sampler": "ddim",
+    "training_steps": 3000,
+    "learning_rate": 3e-3,
+    "perceptron": {"members": 2, "width": 128},
+}
+"""Where demonstrations show several ways (`mixtures`). Ours, chosen on `zoo-sidearm`
+(docs/decisions-generator.md)."""
+
+
 @dataclass(frozen=True)
 class DiffusionConfig(UNetConfig):
     """Everything that decides what `DiffusionGenerator` learns; the defaults suit a laptop.
@@ -136,6 +147,9 @@ class DiffusionConfig(UNetConfig):
     """Size of the perceptron."""
     training_steps: Annotated[int, msgspec.Meta(ge=0)] = 1500
     """Optimiser steps. 0 is the control: a network that has learned nothing."""
+    mixtures: Annotated[int, msgspec.Meta(ge=0)] = 0
+    """m: samples are mixtures of a demonstration and the m - 1 that move most like it, with the
+    same mixture of their outcomes; 0: they are demonstrations alone. See `denoiser.mixed`."""
     prediction: Prediction = "v"
     """What the network predicts."""
     noise_levels: Count = 100

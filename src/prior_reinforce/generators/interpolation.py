@@ -58,6 +58,9 @@ class SmoothInterpolationConfig(Checked):
     kernel: Kernel = "auto"
     """Radial function: the cube of distance, of least bending (`thin-plate`), or distance itself
     (`linear`); `auto` is the first, or the last where outcomes lie too close together for it."""
+    ways: tuple[tuple[int, ...], ...] = ()
+    """Demonstrations of each way, which are not mixed with those of another: a plan is of the way
+    that has the nearest outcome. Empty: all are of one way."""
 
 
 class _Mixture(Generator):
@@ -139,16 +142,28 @@ class SmoothInterpolation(_Mixture):
 
     def _fit(self, demonstrations: Demonstrations, seed: int, progress: OnProgress) -> None:
         super()._fit(demonstrations, seed, progress)
-        if self.config.kernel == "auto" and self._spline.kernel == "linear":
+        if self.config.kernel == "auto" and self._splines[0].kernel == "linear":
             self.remarks = (
                 "kernel: linear, since outcomes lie too close together for a cubic spline",
             )
 
     def _weights(self, conditions: Points) -> Float[np.ndarray, "n N"]:
-        """Weigh all plans; at an outcome that was measured its own alone, to rounding."""
-        return self._spline(conditions)
+        """Weigh all plans of a way; at an outcome that was measured its own alone, to rounding."""
+        if not self.config.ways:
+            return self._splines[0](conditions)
+        apart = (conditions[:, None] - self._outcomes) / np.ptp(self._outcomes, axis=0)
+        nearest = np.argmin(np.sum(apart**2, axis=2), axis=1)
+        weights = np.zeros((len(conditions), len(self._outcomes)))
+        for members, spline in zip(self.config.ways, self._splines, strict=True):
+            mine = np.isin(nearest, members)
+            weights[np.ix_(mine, np.array(members))] = spline(conditions[mine])
+        return weights
 
     def _keep(self, plans: Plans, outcomes: Points, noise: Points) -> None:
-        """Keep the demonstrations, and fit the weights to them once."""
+        """Keep the demonstrations, and fit the weights of each way to them once."""
         super()._keep(plans, outcomes, noise)
-        self._spline = smooth_weights(outcomes, kernel=self.config.kernel, noise=noise)
+        ways = [list(members) for members in self.config.ways] or [list(range(len(outcomes)))]
+        self._splines = [
+            smooth_weights(outcomes[way], kernel=self.config.kernel, noise=noise[way])
+            for way in ways
+        ]

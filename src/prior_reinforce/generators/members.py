@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 from prior_reinforce.errors import ConfigurationError, FileFormatError
-from prior_reinforce.generators.config import PAPER
+from prior_reinforce.generators.config import PAPER, WAYS
 from prior_reinforce.generators.saving import SavedLayer, read_model
 from prior_reinforce.registry import Member, Registry, parse_choice
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 _HERE = "prior_reinforce.generators"
 _BASE = f"{_HERE}.base:Generator"
-_TIMED_BY_DEFAULT = ("diffusion", "regression", "interpolation")
+_TIMED_BY_DEFAULT = ("diffusion", "diffusion-ways", "regression", "interpolation")
 
 
 class GeneratorRegistry(Registry["Generator"]):
@@ -94,6 +94,11 @@ GENERATORS = GeneratorRegistry(
         "diffusion": Member(
             f"{_HERE}.diffusion:DiffusionGenerator",
             "a network alone, which denoises mixtures of demonstrations",
+        ),
+        "diffusion-ways": Member(
+            f"{_HERE}.diffusion:DiffusionGenerator",
+            "the same for demonstrations of several ways",
+            WAYS,
         ),
         "diffusion-paper": Member(
             f"{_HERE}.diffusion:DiffusionGenerator",

@@ -16,6 +16,10 @@ TINY: Mapping[str, Mapping[str, Any]] = {
         "perceptron": {"members": 2, "width": 16, "depth": 1, "step_width": 8}, "training_steps": 8,
         "warmup_steps": 2, "sampling_steps": 3,
     },
+    "diffusion-ways": {
+        "perceptron": {"members": 2, "width": 16, "depth": 1, "step_width": 8}, "training_steps": 8,
+        "warmup_steps": 2, "mixtures": 2,
+    },
     "diffusion-paper": {
         "network": _NETWORK, "training_steps": 8, "warmup_steps": 2, "noise_levels": 6,
         "sampling_steps": 6,
