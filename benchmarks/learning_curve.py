@@ -2,7 +2,8 @@
 
     python benchmarks/learning_curve.py OUT                   # sets A and B, small widths, seed 0
     python benchmarks/learning_curve.py OUT --widths 256,512,1024 --steps 20000 --device cuda
-    python benchmarks/learning_curve.py OUT --only-table
+    python benchmarks/learning_curve.py OUT --only-table --save results/learning-curve.json
+    python benchmarks/learning_curve.py OUT --rows results/learning-curve.json --picture curve.png
 
 Paper's form: raw frames, noise predicted, 100-step DDPM, no timing, no correction
 (`diffusion-paper`, with SiLU and other widths). Each number of steps is a training
@@ -19,8 +20,9 @@ m = 2, amplified noise.
     noise     `shared` by all conditions, as everywhere here; each condition's `own`, so that it has
               one plan; or `fresh` at every trial, the paper's "repeatedly generating actions"
     filter    what stands for the arm's controller: `none`; `100 Hz`, first order on the 1 kHz
-              stream, libfranka's default (`franka::kDefaultCutoffFrequency`); `5 Hz`, a Gaussian of
-              25 ms over time, for a compliant controller (ours, not from a data sheet)
+              stream, libfranka's default (`franka::kDefaultCutoffFrequency = 100.0` and
+              `franka::lowpassFilter` in its API reference); `5 Hz`, a Gaussian of 25 ms over
+              time, for a compliant controller (ours, not from a data sheet)
 """
 
 from __future__ import annotations
@@ -28,8 +30,10 @@ from __future__ import annotations
 import argparse
 import json
 import time
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,6 +46,7 @@ from prior_reinforce.bench.robots import check_plan, robot_limits
 from prior_reinforce.generators import DiffusionConfig, DiffusionGenerator, Generator, UNetSize
 from prior_reinforce.generators.wrapping import Wrapper
 from prior_reinforce.lab.experiments.protocol import run_goals
+from prior_reinforce.lab.experiments.recipes.generators import FreshNoise
 from prior_reinforce.lab.tasks.basketball import BasketballShot
 from prior_reinforce.perception import make_perception
 from prior_reinforce.plans.motions import Demonstrations, Plan
@@ -78,24 +83,6 @@ class Filtered(Wrapper):
         start = (1 - gain) * dense[:, :1]
         smooth, _ = lfilter([gain], [1, gain - 1], dense, axis=1, zi=start)
         return CubicSpline(stream, smooth, axis=1)(frames)
-
-
-class Fresh(Wrapper):
-    """A network that is sampled anew whenever it is asked, so no function of the condition."""
-
-    name = "fresh"
-
-    def __init__(self, generator: DiffusionGenerator) -> None:
-        super().__init__(generator)
-        self._asked, self._outcome_dim = 0, generator._outcome_dim
-
-    def _fit(self, *_: object) -> None:
-        raise NotImplementedError("wrap what was fitted")
-
-    def _generate(self, conditions: NDArray[np.float64]) -> NDArray[np.float64]:
-        assert isinstance(self.generator, DiffusionGenerator)
-        self._asked += 1
-        return self.generator.sampled(shared_noise=False, seed=self._asked).generate(conditions)
 
 
 def train(
@@ -165,7 +152,11 @@ def evaluate(folder: Path, name: str, n_goals: int) -> dict[str, object]:
         task.sample_goals(n_goals, np.random.default_rng(GOAL_SEED)),
     )
     network = DiffusionGenerator.load(folder)
-    drawn = {"shared": network, "own": network.sampled(shared_noise=False), "fresh": Fresh(network)}
+    drawn = {
+        "shared": network,
+        "own": network.sampled(shared_noise=False),
+        "fresh": FreshNoise(network),
+    }
     for noise, cutoff, adapter in (
         ("shared", "none", "gp"),
         ("shared", "100 Hz", "gp"),
@@ -188,24 +179,63 @@ def evaluate(folder: Path, name: str, n_goals: int) -> dict[str, object]:
     return figures
 
 
-def table(out: Path) -> None:
-    """Print all that was measured, a row a model and way of sampling."""
+def collected(out: Path) -> list[dict[str, Any]]:
+    """All that was measured in OUT, a row a model and way of sampling."""
+    rows = []
+    for path in sorted(out.glob("*/figures-*.json")):
+        trained = json.loads((path.parent / "training.json").read_text())
+        name, *widths, steps, seed = path.parent.name.split("-")
+        model = {"set": name, "widths": widths, "steps": int(steps), "seed": int(seed), **trained}
+        figures = json.loads(path.read_text())
+        rows += [{**model, "sampled": key, **measured} for key, measured in figures.items()]
+    return rows
+
+
+def shares(row: Mapping[str, Any]) -> tuple[float, list[float]]:
+    """Trials a goal, one more than there were rounds where none hit; and shares by 1, 2, 4, 10."""
+    solved = np.array(row["solved_at"])
+    by = [float(np.mean((solved > 0) & (solved <= n))) for n in (1, 2, 4, ROUNDS)]
+    return float(np.where(solved > 0, solved, ROUNDS + 1).mean()), by
+
+
+def table(rows: Sequence[Mapping[str, Any]]) -> None:
+    """Print rows."""
     print(
         "| set, widths, steps, seed | noise, filter, adapter | loss | own plans [mrad] "
         "| own landing [cm] | rough [mrad] | gate passes | first throws | trials | by 1, 2, 4, 10 |"
     )
     print("|" + "---|" * 10)
-    for path in sorted(out.glob("*/figures-*.json")):
-        loss = json.loads((path.parent / "training.json").read_text())["loss"]
-        for key, f in json.loads(path.read_text()).items():
-            solved = np.array(f["solved_at"])
-            by = [np.mean((solved > 0) & (solved <= n)) for n in (1, 2, 4, ROUNDS)]
-            took = np.where(solved > 0, solved, ROUNDS + 1).mean()
-            print(
-                f"| {path.parent.name} | {key} | {loss:.4f} | {f['own_mrad']:.1f} "
-                f"| {f['own_landing_cm']:.1f} | {f['rough_mrad']:.2f} | {f['gate']:.2f} "
-                f"| {by[0]:.2f} | {took:.2f} | {' '.join(f'{share:.2f}' for share in by)} |"
-            )
+    for f in rows:
+        took, by = shares(f)
+        print(
+            f"| {f['set']}, {'-'.join(f['widths'])}, {f['steps']}, {f['seed']} | {f['sampled']} "
+            f"| {f['loss']:.4f} | {f['own_mrad']:.1f} "
+            f"| {f['own_landing_cm']:.1f} | {f['rough_mrad']:.2f} | {f['gate']:.2f} "
+            f"| {by[0]:.2f} | {took:.2f} | {' '.join(f'{share:.2f}' for share in by)} |"
+        )
+
+
+def draw(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
+    """Draw share by round 4 and trials against steps, of what is sampled with shared noise."""
+    from prior_reinforce.report.style import calm_axes, new_figure, save_png
+
+    figure = new_figure(9.6, 3.8)
+    by_four, trials_of = figure.subplots(1, 2)
+    shown = [row for row in rows if row["sampled"] == "shared, none, gp"]
+    for marker, name in zip("os", ("A", "B"), strict=True):
+        mine = sorted((r for r in shown if r["set"] == name), key=lambda r: r["steps"])
+        steps, took = [r["steps"] for r in mine], [shares(r) for r in mine]
+        by_four.plot(steps, [by[2] for _, by in took], marker + "-", label=f"set {name}")
+        trials_of.plot(steps, [trials for trials, _ in took], marker + "-", label=f"set {name}")
+    by_four.axhline(0.9, color="grey", linestyle="--", linewidth=1)
+    by_four.annotate("the paper: over 90 %", (0.02, 0.92), xycoords=("axes fraction", "data"))
+    by_four.set(ylim=(0, 1.05), ylabel="goals reached within 4 trials")
+    trials_of.set(ylim=(0, ROUNDS + 1), ylabel="trials a goal")
+    for axes in (by_four, trials_of):
+        calm_axes(axes)
+        axes.set(xlabel="optimiser steps", xlim=(0, None))
+        axes.legend(frameon=False)
+    save_png(figure, path)
 
 
 def main() -> None:
@@ -219,14 +249,22 @@ def main() -> None:
     parser.add_argument("--goals", type=int, default=40)
     parser.add_argument("--device", default="cpu")
     parser.add_argument("--only-table", action="store_true")
+    parser.add_argument("--save", type=Path, help="write all rows to this JSON file")
+    parser.add_argument("--rows", type=Path, help="take rows from such a file, train nothing")
+    parser.add_argument("--picture", type=Path, help="draw trials against steps as this PNG")
     options = parser.parse_args()
     widths = tuple(map(int, options.widths.split(",")))
-    for seed in () if options.only_table else options.seeds:
+    for seed in () if options.only_table or options.rows else options.seeds:
         for steps in options.steps:
             for name in options.sets:
                 folder = train(options.out, name, widths, steps, seed, options.device)
                 evaluate(folder, name, options.goals)
-    table(options.out)
+    rows = json.loads(options.rows.read_text()) if options.rows else collected(options.out)
+    table(rows)
+    if options.save:
+        options.save.write_text(json.dumps(rows, indent=1) + "\n")
+    if options.picture:
+        draw(rows, options.picture)
 
 
 if __name__ == "__main__":

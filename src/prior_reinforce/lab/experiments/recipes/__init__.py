@@ -14,6 +14,7 @@ from prior_reinforce.lab.experiments.recipes import (
     robustness,
     trials,
     variation,
+    ways,
     zero_shot,
 )
 from prior_reinforce.lab.experiments.recipes.base import (
@@ -39,6 +40,7 @@ RECIPES: Mapping[str, Recipe] = {
         adaptation,
         robustness,
         variation,
+        ways,
     )
 }
 """Every recipe by its name, in the order of the evidence page."""

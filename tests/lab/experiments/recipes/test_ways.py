@@ -1,0 +1,39 @@
+"""Generators on demonstrations of two ways: what is like no demonstration, and the figures."""
+
+import numpy as np
+import pytest
+
+from prior_reinforce.lab.experiments.recipes import Run, Scale
+from prior_reinforce.lab.experiments.recipes.base import from_json, to_json
+from prior_reinforce.lab.experiments.recipes.ways import GENERATORS, RECIPE, SETS, Ways, unlike
+from prior_reinforce.lab.tasks import make_task
+
+
+def test_half_of_each_way_is_like_no_demonstration():
+    demos = make_task("zoo-sidearm").demonstrations("ways-8-100")
+    turned = demos.plans[:, :, 0]
+    forehand = np.abs(turned.min(axis=1)) > np.abs(turned.max(axis=1))
+    one, other = demos.plans[forehand][0], demos.plans[~forehand][0]
+    plans = np.stack([one, 0.98 * one + 0.02 * other, (one + other) / 2])
+    assert unlike(demos, plans).tolist() == [False, False, True]
+
+
+def test_the_network_and_its_untrained_self_learn_from_every_set():
+    choices = [choice for _, choice in GENERATORS]
+    assert choices[1] == f"{choices[0]},training_steps=0"
+    trainings = Ways().trainings(Scale())
+    assert len(trainings) == len(GENERATORS) * sum(map(len, SETS.values()))
+
+
+@pytest.mark.slow
+def test_closed_form_within_each_way_is_above_one_of_all(tmp_path):
+    """Also what the table shows, of quick generators."""
+    quick = tuple(GENERATORS[i] for i in (3, 2))
+    measurement = Ways({"zoo-overarm": ("ways-8-100", "ways-8-101")}, quick)
+    figures = from_json(to_json(measurement.run(Run(tmp_path, Scale(goals=10, rounds=3)))))
+    within, of_all = (row["tasks"]["zoo-overarm"] for row in figures["rows"])
+    assert within["first"].value > 0.5 > of_all["first"].value
+    assert within["unlike"] < 0.2 < of_all["unlike"]
+    table = RECIPE.table(figures)
+    assert {len(row) for row in table.rows} == {len(table.header)}
+    assert [row[1] for row in table.rows] == [label for label, _ in quick]
