@@ -217,7 +217,7 @@ def table(rows: Sequence[Mapping[str, Any]]) -> None:
 
 def draw(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
     """Draw share by round 4 and trials against steps, of what is sampled with shared noise."""
-    from prior_reinforce.report.style import calm_axes, new_figure, save_png
+    from prior_reinforce.report.style import calm_axes, new_figure, save_figure
 
     figure = new_figure(9.6, 3.8)
     by_four, trials_of = figure.subplots(1, 2)
@@ -235,7 +235,7 @@ def draw(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
         calm_axes(axes)
         axes.set(xlabel="optimiser steps", xlim=(0, None))
         axes.legend(frameon=False)
-    save_png(figure, path)
+    save_figure(figure, path)
 
 
 def main() -> None:

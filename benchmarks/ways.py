@@ -17,7 +17,7 @@ import numpy as np
 from prior_reinforce.generators import load_generator, make_generator
 from prior_reinforce.generators.patterns import patterns
 from prior_reinforce.lab.tasks import make_task
-from prior_reinforce.report.style import calm_axes, new_figure, save_png
+from prior_reinforce.report.style import calm_axes, new_figure, save_figure
 
 CHOICES = {
     "closed form of all": "interpolation",
@@ -62,7 +62,7 @@ def main() -> None:
         axes.set_title(f"{label}\n{hits} of {len(goals)} land near their goals", fontsize=10)
         axes.set_xlabel("time [s]")
     panels[0].set_ylabel(f"{demos.format.names[options.channel]} [rad]")
-    save_png(figure, options.picture)
+    save_figure(figure, options.picture)
 
 
 if __name__ == "__main__":

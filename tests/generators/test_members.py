@@ -28,15 +28,10 @@ OWN = f"{__name__}:Own"
 
 @pytest.mark.parametrize("name", GENERATORS.members)
 def test_a_name_is_that_of_its_class(name):
-<<<<<<< HEAD
     kind = GENERATORS.resolve(name)
-    assert kind.name == {"diffusion-paper": "diffusion"}.get(name, name)
-=======
-    kind = GENERATORS.kind(name)
     assert kind.name == {"diffusion-paper": "diffusion", "diffusion-ways": "diffusion"}.get(
         name, name
     )
->>>>>>> fb3fbfb (Find several ways by leaving demonstrations out, learn each in closed form; add diffusion-ways, which keeps them apart)
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,7 @@ from prior_reinforce.lab.tasks.curling import STONE_START, CurlingRound
 from prior_reinforce.lab.tasks.demonstrations import write_sets
 from prior_reinforce.lab.tasks.demonstrations.curling import (
     STROKE_TIME,
-    Variation,
+    PushVariation,
     push,
     speed_for,
 )
@@ -51,7 +51,7 @@ def way_round(times: Float[np.ndarray, " H"], side: float) -> Float[np.ndarray, 
 
 def make(name: str) -> Demonstrations:
     """Make the prior set `name` ("A" or "B"), the same every time on the same machine."""
-    size = replace(Variation(), gap=(0.045, 0.055), start=(0.05, 0.45))
+    size = replace(PushVariation(), gap=(0.045, 0.055), start=(0.05, 0.45))
     task, rng = CurlingRound(), np.random.default_rng(SEEDS[name])
     dt = task.format.dt
     low, high = task.region
