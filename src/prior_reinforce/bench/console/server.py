@@ -9,12 +9,13 @@ from __future__ import annotations
 import asyncio
 import socket
 import threading
-from collections.abc import AsyncIterator, Callable, Mapping
+from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 from importlib import resources
-from typing import Any
+from pathlib import Path
+from typing import Any, get_type_hints
 
 import anyio
 import msgspec
@@ -26,28 +27,10 @@ from starlette.responses import FileResponse, Response, StreamingResponse
 from starlette.routing import Route
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
-from prior_reinforce.bench.console.camera import (
-    LARGEST_PICTURE,
-    Calibrate,
-    Camera,
-    Found,
-    Look,
-    Pictures,
-    Tag,
-)
+from prior_reinforce.bench.console.camera import LARGEST_PICTURE, Pictures
 from prior_reinforce.bench.console.guard import Guard, report_path
-from prior_reinforce.bench.console.imports import LARGEST_FILE, Dropped, Imports, Place, Take
-from prior_reinforce.bench.console.verbs import (
-    Ask,
-    Console,
-    Execute,
-    Seen,
-    SetGoal,
-    Tell,
-    Verbs,
-    Void,
-)
-from prior_reinforce.bench.console.view import MotionView
+from prior_reinforce.bench.console.imports import LARGEST_FILE, Imports
+from prior_reinforce.bench.console.verbs import Verbs
 from prior_reinforce.errors import PriorReinforceError, TrialStateError, WorkspaceError
 from prior_reinforce.extras import missing_extra
 from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
@@ -80,51 +63,71 @@ Problem = msgspec.defstruct("Problem", [("error", str)])
 
 @dataclass(frozen=True)
 class Endpoint:
-    """One thing that can be asked of the console."""
+    """One thing that can be asked of the console; what it takes and gives is in its annotations.
+
+    A struct or bytes is the request's body, anything else stands in the path or the query. A path
+    that is returned is a file to be sent.
+    """
 
     method: str
     path: str
     call: Callable[..., Any]
-    """Given the body, if there is one, and the path's parameters; in a thread of its own."""
-    body: Any = None
-    answers: Any = "application/octet-stream"
-    """Type of the answer in JSON, or the media type of a file."""
-    parameters: Mapping[str, dict[str, Any]] = field(default_factory=dict)
+    """In a thread of its own."""
     largest: int = _LARGEST_BODY
+    media: str = "application/octet-stream"
+    """Of a file that is sent."""
+
+    @property
+    def takes(self) -> dict[str, Any]:
+        """Type of each argument."""
+        hints = get_type_hints(self.call)
+        return {name: kind for name, kind in hints.items() if name != "return"}
+
+    @property
+    def body(self) -> Any:
+        """Type of the body; None where there is none."""
+        return next((kind for kind in self.takes.values() if kind not in (int, str)), None)
+
+    @property
+    def answers(self) -> Any:
+        """Type of the answer."""
+        return get_type_hints(self.call)["return"]
 
 
 _STOP, _RECORDINGS = "/api/stop", "/api/recordings"
 _PLAN = "/api/plans/{number:int}"
-_NUMBER = {"number": {"type": "integer", "minimum": 0, "maximum": 2**31}}
+_PARAMETERS = {
+    int: {"type": "integer", "minimum": 0, "maximum": 2**31},
+    str: {"type": "string", "minLength": 1, "maxLength": 600},
+}
 
 
 def endpoints(verbs: Verbs, imports: Imports, pictures: Pictures) -> list[Endpoint]:
     """Everything that can be asked, but for the stream of events."""
-    name = {"name": {"type": "string", "minLength": 1, "maxLength": 600}}
     return [
-        Endpoint("GET", "/api/state", verbs.state, answers=Console),
-        Endpoint("POST", "/api/goal", verbs.set_goal, SetGoal, Console),
-        Endpoint("POST", "/api/ask", verbs.ask, Ask, Console),
-        Endpoint("POST", "/api/execute", verbs.execute, Execute, Console),
-        Endpoint("POST", _STOP, verbs.stop, answers=Console),
-        Endpoint("POST", "/api/tell", verbs.tell, Tell, Console),
-        Endpoint("POST", "/api/amend", verbs.amend, Tell, Console),
-        Endpoint("POST", "/api/void", verbs.void, Void, Console),
-        Endpoint("POST", "/api/learn", verbs.learn, Seen, Console),
-        Endpoint("GET", _PLAN, verbs.motion, answers=MotionView, parameters=_NUMBER),
-        Endpoint("GET", f"{_PLAN}/file", verbs.plan_file, parameters=_NUMBER),
-        Endpoint("GET", _RECORDINGS, imports.look, answers=Dropped),
-        Endpoint("PUT", _RECORDINGS, imports.drop, bytes, Dropped, name, LARGEST_FILE),
-        Endpoint("DELETE", _RECORDINGS, imports.discard, answers=Dropped),
-        Endpoint("POST", "/api/outcome", imports.place, Place, Dropped),
-        Endpoint("POST", "/api/import", imports.take, Take, Console),
-        Endpoint("GET", "/api/camera", pictures.look_up, answers=Camera),
-        Endpoint("GET", "/api/picture", pictures.file, answers="image/jpeg"),
-        Endpoint("PUT", "/api/picture", pictures.keep, bytes, Camera, largest=LARGEST_PICTURE),
-        Endpoint("POST", "/api/calibrate", pictures.calibrate, Calibrate, Camera),
-        Endpoint("GET", "/api/tags", pictures.tags, answers=list[Tag]),
-        Endpoint("GET", "/api/tags/sheet", pictures.sheet, answers="image/png"),
-        Endpoint("POST", "/api/find", pictures.find, Look, Found),
+        Endpoint("GET", "/api/state", verbs.state),
+        Endpoint("POST", "/api/goal", verbs.set_goal),
+        Endpoint("POST", "/api/ask", verbs.ask),
+        Endpoint("POST", "/api/execute", verbs.execute),
+        Endpoint("POST", _STOP, verbs.stop),
+        Endpoint("POST", "/api/tell", verbs.tell),
+        Endpoint("POST", "/api/amend", verbs.amend),
+        Endpoint("POST", "/api/void", verbs.void),
+        Endpoint("POST", "/api/learn", verbs.learn),
+        Endpoint("GET", _PLAN, verbs.motion),
+        Endpoint("GET", f"{_PLAN}/file", verbs.plan_file),
+        Endpoint("GET", _RECORDINGS, imports.look),
+        Endpoint("PUT", _RECORDINGS, imports.drop, LARGEST_FILE),
+        Endpoint("DELETE", _RECORDINGS, imports.discard),
+        Endpoint("POST", "/api/outcome", imports.place),
+        Endpoint("POST", "/api/import", imports.take),
+        Endpoint("GET", "/api/camera", pictures.look_up),
+        Endpoint("GET", "/api/picture", pictures.file, media="image/jpeg"),
+        Endpoint("PUT", "/api/picture", pictures.keep, LARGEST_PICTURE),
+        Endpoint("POST", "/api/calibrate", pictures.calibrate),
+        Endpoint("GET", "/api/tags", pictures.tags),
+        Endpoint("GET", "/api/tags/sheet", pictures.sheet, media="image/png"),
+        Endpoint("POST", "/api/find", pictures.find),
     ]
 
 
@@ -182,20 +185,19 @@ def application(
 
 
 async def _answer(endpoint: Endpoint, request: Request) -> Response:
-    said = {**request.query_params, **request.path_params}
-    if not said.keys() >= endpoint.parameters.keys():
-        raise HTTPException(400, f"say {' and '.join(endpoint.parameters)}")
-    given = [said[name] for name in endpoint.parameters]
-    if endpoint.body is bytes:
-        given.append(await _read(request, endpoint.largest))
-    elif endpoint.body is not None:
-        given.append(
-            msgspec.json.decode(await _read(request, endpoint.largest), type=endpoint.body)
-        )
+    said, given = {**request.query_params, **request.path_params}, {}
+    for name, kind in endpoint.takes.items():
+        if kind in _PARAMETERS:
+            if name not in said:
+                raise HTTPException(400, f"say {name}")
+            given[name] = said[name]
+        else:
+            content = await _read(request, endpoint.largest)
+            given[name] = content if kind is bytes else msgspec.json.decode(content, type=kind)
     threads = _FOR_STOP if endpoint.path == _STOP else None
-    answer = await anyio.to_thread.run_sync(partial(endpoint.call, *given), limiter=threads)
-    if isinstance(endpoint.answers, str):
-        return FileResponse(answer, media_type=endpoint.answers)
+    answer = await anyio.to_thread.run_sync(partial(endpoint.call, **given), limiter=threads)
+    if isinstance(answer, Path):
+        return FileResponse(answer, media_type=endpoint.media)
     return _json(answer)
 
 
@@ -294,19 +296,17 @@ class Events:
 
 def openapi(table: list[Endpoint]) -> dict[str, Any]:
     """What the interface says of itself, OpenAPI 3.1."""
-    kinds = dict.fromkeys(each for e in table for each in (e.body, e.answers))
-    typed = (kind for kind in kinds if kind not in (None, bytes) and not isinstance(kind, str))
-    types = [Problem, *typed]
+    kinds = dict.fromkeys(kind for e in table for kind in (e.body, e.answers))
+    types = [Problem, *(kind for kind in kinds if kind not in (None, bytes, Path))]
     shapes, components = msgspec.json.schema_components(
         types, ref_template="#/components/schemas/{name}"
     )
     shape = dict(zip(types, shapes, strict=True))
 
-    def content(kind: Any) -> dict[str, Any]:
-        if kind not in shape:
-            media = kind if isinstance(kind, str) else "application/octet-stream"
-            return {media: {"schema": {"type": "string", "format": "binary"}}}
-        return {"application/json": {"schema": shape[kind]}}
+    def content(kind: Any, media: str = "application/octet-stream") -> dict[str, Any]:
+        if kind in shape:
+            return {"application/json": {"schema": shape[kind]}}
+        return {media: {"schema": {"type": "string", "format": "binary"}}}
 
     problems = {
         str(status): {"description": said, "content": content(Problem)}
@@ -314,18 +314,17 @@ def openapi(table: list[Endpoint]) -> dict[str, Any]:
     }
     paths: dict[str, Any] = {}
     for e in table:
-        path = e.path.replace(":int}", "}").replace(":path}", "}")
+        path = e.path.replace(":int}", "}")
+        done = {"description": "Done.", "content": content(e.answers, e.media)}
         operation: dict[str, Any] = {
             "summary": (e.call.__doc__ or "").partition("\n")[0],
             "operationId": e.call.__name__,
-            "responses": {
-                "200": {"description": "Done.", "content": content(e.answers)},
-                **problems,
-            },
+            "responses": {"200": done, **problems},
             "parameters": [
                 {"name": name, "in": "path" if f"{{{name}}}" in path else "query", "required": True}
-                | {"schema": schema}
-                for name, schema in e.parameters.items()
+                | {"schema": _PARAMETERS[kind]}
+                for name, kind in e.takes.items()
+                if kind in _PARAMETERS
             ],
         }
         if e.body is not None:
