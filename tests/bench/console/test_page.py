@@ -367,7 +367,7 @@ def test_a_surprise_is_questioned(browser, serve, tmp_path):
             session = workspace.session()
             session.tell(session.ask().number, seen, hit=False)
         workspace.session().ask()
-        assert workspace.state.trials[-1].surprise
+        assert workspace.state.trials[-2].surprise
     page = opened(browser, served)
     expect(page.locator("#surprise")).to_contain_text("Mistyped?")
     accessible(page)
