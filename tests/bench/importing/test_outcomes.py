@@ -317,3 +317,23 @@ def test_inches_in_the_head_or_said(recording, tmp_path):
         import_demonstrations(recording, outcomes=bare)
     said = import_demonstrations(recording, outcomes=bare, outcome_unit="in").demonstrations
     np.testing.assert_allclose(said.outcomes_seen, list(OUTCOMES.values()))
+
+
+@pytest.mark.parametrize(
+    ("rows", "doubted"),
+    [
+        ("1,1.488,-302\n2,902,150\n", True),
+        ("1,1.488,-302\n2,902.5,150\n", False),  # so the sign is a decimal one
+        ("1,1.4880,-302\n2,902,150\n", False),
+        ("1,1.488,-0.302\n2,1.402,0.150\n", False),
+        ("1,1.488,2\n2,1.402,1\n", False),
+    ],
+)
+def test_a_thousand_that_may_be_one_and_a_half_is_doubted(tmp_path, rows, doubted):
+    path = tmp_path / "outcomes.csv"
+    path.write_text(f"episode,x [mm],y [mm]\n{rows}")
+    if not doubted:
+        assert read_outcomes(path).values.shape == (2, 2)
+        return
+    with pytest.raises(FileFormatError, match=r"line 2: x \[mm\] is '1.488' beside '902'.*1.4880"):
+        read_outcomes(path)

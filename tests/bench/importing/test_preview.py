@@ -156,3 +156,17 @@ def test_two_rows_that_were_exchanged_are_doubted_and_no_others(tmp_path):
         found += len(doubted)
     assert found >= 10
     assert swapped_outcomes(make_task("curling").demonstrations("A")) == []  # six: too few to tell
+
+
+def test_when_a_gripper_changes_is_marked(folder):
+    preview = import_demonstrations(folder).preview
+    demos = preview.demonstrations
+    assert len(preview._changes(0)) == 0
+    opening = np.linspace(0.0, 1.0, demos.horizon)[None].repeat(demos.n, axis=0)
+    plans = np.concatenate([demos.plans, 100 * (opening > 0.4)[..., None]], axis=2)
+    units = (*demos.format.units, "percent")
+    form = replace(demos.format, names=(*demos.format.names, "gripper"), units=units)
+    marked = replace(preview, demonstrations=replace(demos, plans=plans, format=form))
+    times = marked._changes(demos.action_dim)
+    assert len(times) == demos.n
+    np.testing.assert_allclose(times, 0.4 * demos.horizon * form.dt, atol=2 * form.dt)

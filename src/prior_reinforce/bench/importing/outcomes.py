@@ -47,6 +47,8 @@ if TYPE_CHECKING:
 OUTCOMES_FILE = "outcomes.csv"
 SD = "sd"
 """Column of the standard deviation of a row's components."""
+_HUNDREDS = re.compile(r"[+-]?[1-9]\d\d+")
+_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}([.,]\d{3})+")
 _NOT_COMPONENTS = (SD, "source", "note", "notes", "comment", "comments")
 
 
@@ -239,6 +241,7 @@ def read_outcomes(
             f"{path} begins with {','.join(table.names)!r:.200}, expected column names such as "
             f"{example}"
         )
+    _doubt_thousands(path, table, columns)
     units = [table.units[i] or split[i][1] for i in columns]
     scale = [base_of(unit)[1] if unit else 1.0 for unit in units]
     sd = lower.index(SD) if SD in lower else None
@@ -260,6 +263,23 @@ def read_outcomes(
     sd_unit = None if sd is None else table.units[sd] or split[sd][1] or (units or [None])[0]
     bare = tuple(base_of(unit)[0] if unit else None for unit in units)
     return Outcomes(str(path), frame, tuple(kept), bare, sd_unit)
+
+
+def _doubt_thousands(path: Path, table: Table, columns: Sequence[int]) -> None:
+    """Refuse `1.488` beside `-302`: is that one and a half, or one and a half thousand?
+
+    Raises:
+        FileFormatError: Every number with a decimal sign may be a whole one of four digits or more.
+    """
+    cells = [(table.cells[i][row], row, i) for i in columns for row in range(len(table))]
+    signed = [each for each in cells if table.decimal in each[0]]
+    whole = [cell for cell, _, _ in cells if _HUNDREDS.fullmatch(cell)]
+    if signed and whole and all(_THOUSANDS.fullmatch(cell) for cell, _, _ in signed):
+        cell, row, column = signed[0]
+        raise FileFormatError(
+            f"{path}, line {table.lines[row]}: {table.names[column]} is {cell!r} beside "
+            f"{whole[0]!r}; if that is a thousand, write it without a sign, else write {cell}0"
+        )
 
 
 def _finite(path: Path, table: Table, row: int, column: int) -> float:

@@ -159,19 +159,30 @@ class Preview:
             moving = np.flatnonzero(np.any(plan != plan[-1], axis=1))
             end = min(int(moving[-1]) + 1, len(times) - 1) if moving.size else 0
             axes.plot(times[end], plan[end, channel], "o", color=colour, markersize=3, zorder=3)
-        steps = find_transitions(demos.plans, analyse(demos.plans, form.units, form.dt))
-        for at in np.ravel(steps.get(channel, ())):
-            axes.axvline(at * form.dt, color="0.5", linewidth=0.6, linestyle=":", zorder=0)
+        changes = self._changes(channel)
+        for at in changes:
+            axes.axvline(at, color="0.5", linewidth=0.6, linestyle=":", zorder=0)
         # A channel that hardly moves must not look as if it did.
         low, high = axes.get_ylim()
         like = np.array(form.units) == form.units[channel]
         least = _LEAST_RANGE * float(np.ptp(demos.plans, axis=(0, 1))[like].max())
         if high - low < least:
             axes.set_ylim((low + high - least) / 2, (low + high + least) / 2)
-        kind = ", steps (dotted)" if channel in steps else ""
+        kind = ", changes dotted" if len(changes) else ""
         axes.set_title(f"{form.names[channel]} [{form.units[channel]}]{kind}", fontsize=10)
         axes.set_xlabel("time from the plan's start [s]", fontsize=8)
         axes.tick_params(labelsize=8)
+
+    def _changes(self, channel: int) -> Float[np.ndarray, " n"]:
+        """When a step or a gripper changes, in [s]; empty for other channels."""
+        demos, form = self.demonstrations, self.demonstrations.format
+        steps = find_transitions(demos.plans, analyse(demos.plans, form.units, form.dt))
+        times = np.ravel(steps.get(channel, ())) * form.dt
+        values = demos.plans[:, :, channel]
+        if times.size or form.units[channel] in ("rad", "m") or not np.ptp(values):
+            return times
+        beyond = np.abs(values - values[:, :1]) >= 0.5 * np.ptp(values, axis=1, keepdims=True)
+        return np.argmax(beyond, axis=1) * form.dt
 
     def _draw_outcomes(self, axes: Any, view: View, colours: list[Any]) -> None:
         """Outcomes as a report draws them, with their hull; a single component on a line."""
