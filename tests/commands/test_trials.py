@@ -111,11 +111,9 @@ def test_ask_says_what_the_trial_may_expect(run, folder):
 def test_what_was_told_is_repeated_as_it_was_understood(run, folder):
     run("goal", folder, "0.9", "0.05")
     run("ask", folder)
-    out = run("tell", folder, 1, "--error", "30 long, 2 left")[1]
-    assert out.startswith(
-        "trial 1: 30 cm long, 2 cm left; numbers without a unit are centimetres\n"
-    )
-    assert "30 cm long, 2 cm left" in run("status", folder)[1]
+    out = run("tell", folder, 1, "--error", "5 long, 2 left")[1]
+    assert out.startswith("trial 1: 5 cm long, 2 cm left; numbers without a unit are centimetres\n")
+    assert "5 cm long, 2 cm left" in run("status", folder)[1]
     out = run("amend", folder, 1, "--error", "3 cm long, 2 cm left")[1]
     assert out.startswith("trial 1, corrected: 3 cm long, 2 cm left\n")
 
