@@ -42,6 +42,16 @@ OUTCOMES = {
     "hangs": {"aborted"},
 }
 """What the journal says of an arm that nobody disturbs."""
+BUS = {
+    "works": {"done"},
+    "unplugged": {"aborted"},
+    "crashes": {"aborted"},
+    "clips": {"aborted"},
+    "blocked": {"aborted"},
+    "silent": {"aborted"},
+    "not there": {"not_moved"},
+}
+"""The same of an arm that LeRobot drives, whose bus is dead, or dies in mid-swing."""
 TOLERANCE = 0.02
 """`GateSettings.start_error`."""
 
@@ -66,16 +76,21 @@ def attack(rng: random.Random, here: Path, asked: Path) -> str:
     os.environ["PRIOR_REINFORCE_ARM"] = str(here)  # other attacks run at the same time
     os.environ["PYTHONPATH"] = str(Path(__file__).parents[2])
     shutil.copytree(asked, folder)
-    kind, options = rng.choice(KINDS), {}
+    kind, options, on_bus = rng.choice(KINDS), {}, rng.random() < 0.3
     motion: Motion = rng.choice(["trial", "trial", "trial", "rehearsal", "approach"])
     edits = ["nothing", "nothing", "fastest", "limit", "pose", "plan", "arm", "copy"]
     edit = rng.choice(edits)
+    if on_bus:
+        kind, edit = rng.choice(["works", *BUS]), edit.replace("fastest", "nothing")
     factor = rng.choice([0.99, 1.01])
     speed = 0.5 if motion == "rehearsal" else 1.0
     if edit == "fastest":  # the arm's own limit
         options["fastest"] = speed * factor * peak_velocity(folder)
         refused = factor < 1 and motion != "approach"
-    toy_arm.name_arm(folder, here, kind=kind, seconds=0.3, **options)
+    if on_bus:
+        toy_arm.name_bus(folder, here, kind)
+    else:
+        toy_arm.name_arm(folder, here, kind=kind, seconds=0.3, **options)
     with Workspace(folder) as workspace:
         seen = workspace.manifest.driven_by
         first = workspace.plan(workspace.session().trial(1)).actions[0]
@@ -98,7 +113,7 @@ def attack(rng: random.Random, here: Path, asked: Path) -> str:
     if edit == "plan":
         refused = True
         damage_plan(rng, folder)
-    limit = 3.0 if kind == "hangs" else 100.0  # twelve of them start at once
+    limit = 3.0 if kind in ("hangs", "silent") else 100.0  # twelve of them start at once
     programs = [Arm(place, seen, limit, motion) for place in folders]
     for program in programs:
         program.go()
@@ -109,7 +124,7 @@ def attack(rng: random.Random, here: Path, asked: Path) -> str:
     try:
         verdict = judge(here, folders, programs, refused, motion)
         if verdict == HELD and signals == 0 and len(programs) == 1 and not refused:
-            verdict = ends_as_it_was(folder, kind)
+            verdict = ends_as_it_was(folder, kind, BUS if on_bus else OUTCOMES)
         return verdict
     finally:
         for program in programs:
@@ -154,9 +169,9 @@ def judge(
     return HELD
 
 
-def ends_as_it_was(folder: Path, kind: str) -> str:
+def ends_as_it_was(folder: Path, kind: str, outcomes: dict[str, set[str]]) -> str:
     """Nobody cries wolf where nobody disturbed the arm, and a fault is not taken for success."""
     with Workspace(folder) as workspace:
         last = workspace.log.entries()[-1].event
     outcome, why = getattr(last, "outcome", last.kind), getattr(last, "reason", "")
-    return HELD if outcome in OUTCOMES[kind] else f"{kind} is recorded as {outcome}: {why}"
+    return HELD if outcome in outcomes[kind] else f"{kind} is recorded as {outcome}: {why}"

@@ -26,12 +26,14 @@ def toy(tmp_path):
     """Start an arm whose LeRobot is `toy_bridge`."""
     python = tmp_path / "python"
     bridge = Path(__file__).with_name("toy_bridge.py")
-    python.write_text(f'#!/bin/sh\nexec {REPOSITORY}/.venv/bin/python {bridge} "$@"\n')
+    python.write_text(
+        f'#!/bin/sh\nPYTHONPATH={REPOSITORY} exec {REPOSITORY}/.venv/bin/python {bridge} "$@"\n'
+    )
     python.chmod(0o755)
     started = []
 
     def start(kind="works", **settings):
-        robot = {"type": "toy", "kind": kind, "log": str(tmp_path / "log")}
+        robot = {"type": "toy", "kind": kind, "folder": str(tmp_path)}
         arm = LeRobotArm(
             LeRobotConfig(robot=robot, python=str(python), **{"clock": "cycles"} | settings)
         )
@@ -94,7 +96,7 @@ def test_a_goal_beyond_the_calibrated_range_is_refused(toy):
         ("unplugged", "LeRobot: There is no status packet!"),
         ("crashes", "ended without a word"),
         ("clips", r"LeRobot sent joint1\.pos .* instead of"),
-        ("jams", r"joint1\.pos is 0\.\d+ rad from where it should be"),
+        ("blocked", r"joint1\.pos is 0\.\d+ rad from where it should be"),
     ],
 )
 def test_what_goes_wrong_in_mid_swing_is_a_fault(toy, kind, said):
@@ -120,7 +122,7 @@ def test_to_stop_is_to_hold_where_the_arm_is(toy, tmp_path):
 
 
 def test_an_arm_that_jams_is_held_where_it_was_measured(toy, tmp_path):
-    path = toy("jams").run(swing(1.0))
+    path = toy("blocked").run(swing(1.0))
     assert sent(tmp_path)[-1] == pytest.approx(math.degrees(path.q[-1, 0]))
 
 
@@ -164,7 +166,7 @@ def test_settings_that_cannot_be_are_refused(options):
 
 def test_a_guided_arm_says_what_its_leader_asks_for_and_where_it_is(toy):
     state = next(iter(toy("led").guide()))
-    assert state.commanded == pytest.approx([math.radians(9.0), 0.0])
+    assert state.commanded == pytest.approx([math.radians(9.0), 9.0])
     assert state.measured == pytest.approx([0.0, 20.0])
     alone = next(iter(toy().guide()))
     assert np.array_equal(alone.commanded, alone.measured)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import json
 import os
+import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -70,7 +71,7 @@ class ToyArm(Executor):
 
     def run(self, plan):
         if self.config.kind != "jams":
-            self._leave_a_line()
+            note_motion(self.folder)
         fine = interpolate(plan.actions, plan.format.dt, rate=RATE)
         n, kind = len(fine.t), self.config.kind
         for k, q in enumerate(fine.q):
@@ -98,14 +99,6 @@ class ToyArm(Executor):
             t = k / RATE
             yield GuidedState(t, _thrown(t), _thrown(t - 0.1) if self.config.led else _thrown(t))
 
-    def _leave_a_line(self):
-        path = self.folder / "motions"
-        with path.open("a") as motions:
-            pids = [int(word) for word in path.read_text().split() if word.isdigit()]
-            if any(pid != os.getpid() and _alive(pid) for pid in pids):
-                motions.write("AT ONCE\n")
-            motions.write(f"{os.getpid()}\n")
-
     def stop(self):
         self.stopping = True
 
@@ -128,6 +121,36 @@ def name_arm(folder, arm, **options):
     ]
     before = path.read_text().partition("\n[arm]\n")[0]
     path.write_text("\n".join([before, "[arm]", f'executor = "{TOY}"', *lines, ""]))
+
+
+def note_motion(folder):
+    """Leave this process's number, and say so if another one moves the arm too."""
+    others = folder / "motions"
+    with others.open("a") as motions:
+        pids = [int(word) for word in others.read_text().split() if word.isdigit()]
+        if any(pid != os.getpid() and _alive(pid) for pid in pids):
+            motions.write("AT ONCE\n")
+        motions.write(f"{os.getpid()}\n")
+
+
+def name_bus(folder, arm, kind="works"):
+    """Name in a manifest an arm that LeRobot drives, which `toy_bridge` stands in for."""
+    Path(arm).mkdir(exist_ok=True)
+    python = Path(arm) / "python"
+    bridge = Path(__file__).with_name("toy_bridge.py")
+    python.write_text(f'#!/bin/sh\nexec {sys.executable} {bridge} "$@"\n')
+    python.chmod(0o755)
+    columns = '{ joint1 = "degrees", joint2 = "degrees" }'
+    path = Path(folder) / "workspace.toml"
+    before = path.read_text().partition("\n[arm]\n")[0]
+    lines = [
+        'executor = "lerobot"',
+        f'python = "{python}"',
+        'clock = "cycles"',
+        f'robot = {{ type = "toy", kind = "{kind}", folder = "{arm}", columns = {columns}, '
+        "seconds = 0.3 }",
+    ]
+    path.write_text("\n".join([before, "[arm]", *lines, ""]))
 
 
 def motions(arm):
