@@ -15,7 +15,7 @@ settings = json.loads(sys.argv[2])["robot"]
 kind, folder = settings.get("kind", "works"), Path(settings["folder"])
 units = settings.get("columns", {"joint1.pos": "degrees", "gripper.pos": "range_0_100"})
 sizes = [57.29577951308232 if unit == "degrees" else 1.0 for unit in units.values()]
-pose = dict(zip(units, [0.0, 20.0], strict=True))
+pose = {name: 20.0 * (unit == "range_0_100") for name, unit in units.items()}
 if (folder / "pose").exists():
     stands = map(float, (folder / "pose").read_text().split())
     pose = {name: s * size for name, s, size in zip(units, stands, sizes, strict=True)}
