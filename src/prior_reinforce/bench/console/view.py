@@ -193,8 +193,9 @@ def _trial(workspace: Workspace, state: WorkspaceState, trial: Trial, asked: str
     manifest, outcome = workspace.manifest, None
     if trial.reading is not None and trial.reading.has_number:
         outcome = (state.goal_of(trial).goal + trial.reading.error_seen).tolist()
-    before = [t for t in state.trials[: trial.number - 1] if t.stage is Stage.TOLD]
-    surprise = before[-1].surprise.partition("; mistyped")[0] if before else ""
+    earlier = reversed(state.trials[: trial.number - 1])
+    before = next((t for t in earlier if t.stage is Stage.TOLD), None)
+    surprise = "" if before is None else before.surprise.partition("; mistyped")[0]
     told = trial.reading is not None
     return TrialView(
         number=trial.number,
@@ -208,7 +209,7 @@ def _trial(workspace: Workspace, state: WorkspaceState, trial: Trial, asked: str
         hit=trial.hit,
         p_hit=trial.p_hit,
         expected_trials=trial.expected_trials,
-        surprising=before[-1].number if surprise else None,
+        surprising=before.number if before is not None and surprise else None,
         surprise=surprise,
         outdated=trial.outdated,
         warning="" if told else _warning(workspace, trial),
