@@ -161,8 +161,9 @@ def test_a_reading_far_from_what_was_believed_is_news_until_the_next_one():
 def test_where_nothing_learned_leads_to_the_goal_what_was_demonstrated_is_tried():
     """A motion that lost its object says where it lost it, and points away from everywhere."""
     adapter, goal = started(), np.array([0.97, -0.12])
-    for _ in range(4):
-        adapter.observe(adapter.propose(GOAL), GOAL, Reading.measured([-0.5, 0.3], 0.002))
+    lost = Reading.measured([-0.35, 0.12], 0.002, hit=False).within(np.full(2, TOLERANCE))
+    for _ in range(6):
+        adapter.observe(adapter.propose(GOAL), GOAL, lost)
     assert np.linalg.norm(adapter.propose(goal) - goal) < 0.1
 
 
