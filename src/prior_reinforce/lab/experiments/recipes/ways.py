@@ -8,6 +8,7 @@ exactly.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -82,14 +83,17 @@ def unlike(demonstrations: Demonstrations, plans: Plans) -> np.ndarray:
     way and half of another is like none.
     """
     n, outcomes = demonstrations.n, demonstrations.outcomes_seen
-    both = Demonstrations(
-        np.concatenate([demonstrations.plans, plans]),
-        # What is compared are motions: outcomes of plans are made up, and of no demonstration.
-        np.concatenate([outcomes, outcomes.max(axis=0) * np.arange(2.0, len(plans) + 2)[:, None]]),
-        demonstrations.format,
-        demonstrations.outcome_names,
-        demonstrations.outcome_units,
-    )
+    # What is compared are motions: outcomes of plans are made up, and of no demonstration.
+    made_up = outcomes.max(axis=0) * np.arange(2.0, len(plans) + 2)[:, None]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # they advise on recordings; a wild plan is the point here
+        both = Demonstrations(
+            np.concatenate([demonstrations.plans, plans]),
+            np.concatenate([outcomes, made_up]),
+            demonstrations.format,
+            demonstrations.outcome_names,
+            demonstrations.outcome_units,
+        )
     motions = motion_vectors(both)
     apart = np.linalg.norm(motions[:, None] - motions[None, :n], axis=2)
     own = apart[:n] + np.where(np.eye(n, dtype=bool), np.inf, 0.0)
