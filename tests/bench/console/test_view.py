@@ -6,6 +6,7 @@ import pytest
 from prior_reinforce.bench.console.view import motion_of, state_of, step_of
 from prior_reinforce.bench.robots import robot_limits
 from prior_reinforce.bench.robots.kinematics import tool_tip
+from prior_reinforce.bench.workspace.log import Moved, Moving
 from prior_reinforce.bench.workspace.manifest import new_manifest
 from prior_reinforce.bench.workspace.workspace import Workspace
 from prior_reinforce.errors import TrialStateError
@@ -53,6 +54,17 @@ def test_the_state_is_the_journal_s(workspace):
     assert third.plan == workspace.state.trial(3).kept.sha256
     assert state.goals[0].told == 1
     assert state.goals[0].tolerance == [0.015, 0.015]
+
+
+def test_what_a_motion_that_was_no_trial_came_to_is_said(workspace):
+    ask(workspace)
+    workspace._begin(Moving(1, "approach", 1.0, "toy", ""))
+    assert state_of(workspace).trials[0].warning == "nobody wrote down what moved"
+    workspace._end(Moved(trial=1, outcome="not_moved", reason="brakes are closed"))
+    assert state_of(workspace).trials[0].warning == "nothing moved: brakes are closed"
+    workspace._begin(Moving(1, "approach", 1.0, "toy", ""))
+    workspace._end(Moved(trial=1, outcome="aborted", reason="overload"))
+    assert state_of(workspace).trials[0].warning == "the arm only began to move: overload"
 
 
 def test_what_was_seen_without_a_number_has_no_place(workspace):

@@ -220,10 +220,12 @@ def _trial(workspace: Workspace, state: WorkspaceState, trial: Trial, asked: str
 
 def _warning(workspace: Workspace, trial: Trial) -> str:
     ended = _latest(workspace, trial)
+    if isinstance(ended, Moving) and not workspace.log.is_executing():
+        return "nobody wrote down what moved"
+    if isinstance(ended, Moved | NotExecuted) and ended.outcome == "not_moved":
+        return f"nothing moved: {ended.reason}" if ended.reason else "nothing moved"
     if isinstance(ended, Moved):
         return "" if ended.outcome == "done" else f"the arm only began to move: {ended.reason}"
-    if isinstance(ended, NotExecuted):
-        return f"nothing moved: {ended.reason}" if ended.reason else "nothing moved"
     return execution_warning(workspace, trial)
 
 
