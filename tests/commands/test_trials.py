@@ -6,13 +6,17 @@ import sqlite3
 import sys
 from collections import Counter
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from prior_reinforce.bench.robots.executors.lock import executing_lock
+from prior_reinforce.bench.robots.gate import GateSettings
+from prior_reinforce.bench.robots.report import LimitReport
 from prior_reinforce.bench.workspace import workspace as workspace_module
 from prior_reinforce.bench.workspace.log import Executing
 from prior_reinforce.bench.workspace.workspace import Workspace
+from prior_reinforce.commands.trials import _unchecked
 from prior_reinforce.session.session import Session
 from prior_reinforce.session.trials import Stage
 from tests.bench.robots.executors import toy_arm
@@ -512,6 +516,35 @@ def test_a_command_is_asked_nothing_so_less_is_checked(run, folder, driver, tmp_
         "the arm will move (trial 1 at full speed); NOT checked: where the arm stands, the arm's "
         "limits, self-collision, the table; is the area clear? (yes/no) "
     ]
+
+
+def asked_at(run, folder, monkeypatch, *flags):
+    """What a person is asked, who says no."""
+    asked = []
+    monkeypatch.setattr("sys.stdin.isatty", lambda: True)
+    monkeypatch.setattr("builtins.input", lambda said: asked.append(said) or "no")
+    assert run("ask", folder, *flags)[0] == 1
+    return asked
+
+
+def test_an_arm_that_checks_its_range_alone_has_not_checked_its_limits(
+    run, arm, folder, monkeypatch
+):
+    arm()
+    assert "NOT checked: self-coll" in asked_at(run, folder, monkeypatch, *ON_ARM)[0]
+    arm(checks="the range of every joint")
+    asked = asked_at(run, folder, monkeypatch, *ON_ARM)[0]
+    assert "NOT checked: self-collision, the arm's limits, the table; " in asked
+
+
+@pytest.mark.parametrize("gated", [True, False])
+def test_the_box_for_the_tool_tip_holds_for_a_plan_that_the_gate_saw_and_no_approach(gated):
+    gate = GateSettings(box_low=(0.2, -0.6, 0.05), box_high=(0.9, 0.6, 1.2))
+    workspace = SimpleNamespace(manifest=SimpleNamespace(gate=gate))
+    trial = SimpleNamespace(verdict=LimitReport("fr3", "any", "", ()) if gated else None)
+    said = "the table, but for the tool tip" if gated else "the table"
+    assert _unchecked(workspace, trial, where=True)[-1] == said
+    assert _unchecked(workspace, trial, where=True, box=False)[-1] == "the table"
 
 
 def test_each_motion_is_confirmed_and_none_is_made_unasked(run, arm, folder, monkeypatch):

@@ -88,8 +88,8 @@ class Record(OnWorkspace):
         if arm.options.get("leader") and not self.yes:
             _ask_whether_it_may_be_led()
         with (
-            executing_lock(workspace.folder, manifest.arm),
-            Watch(arm) as watch,
+            executing_lock(workspace.folder, manifest.arm) as lock,
+            Watch(arm, lock) as watch,
             _Terminal() as terminal,
         ):
             channels = arms_columns(manifest.format, watch.arm)

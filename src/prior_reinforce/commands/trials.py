@@ -186,16 +186,16 @@ class Ask(OnWorkspace):
         if self.check:
             print("checked; nothing moved")
             return 0
-        limits = bool(look.arm.checked)
-        nobody = _unchecked(workspace, trial, where=True, limits=limits)
-        unchecked = (*look.arm.unchecked, *nobody)
+        limits = any("velocity" in check for check in look.arm.checked)
         motions: list[Motion] = [] if look.there else ["approach"]
         motions.append("trial" if self.rehearse is None else "rehearsal")
         for motion in motions:
             share = speed if motion == "rehearsal" else 1.0
             seconds = look.approach if motion == "approach" else _seconds(trial, workspace) / share
             said = f"{_SAID[motion].format(trial.number, 100 * share)}, {seconds:.1f} s"
-            if not self.yes and not _may_move(trial, unchecked, said):
+            approaches = motion == "approach"
+            nobody = _unchecked(workspace, trial, where=True, limits=limits, box=not approaches)
+            if not self.yes and not _may_move(trial, (*look.arm.unchecked, *nobody), said):
                 print("nothing moved; ask again when it may")
                 return 1
             status = self._execute(workspace, trial.number, arm, motion, share)
@@ -530,7 +530,7 @@ def _say_arm(arm: ArmDescription) -> str:
 
 
 def _unchecked(
-    workspace: Workspace, trial: Trial, *, where: bool, limits: bool = False
+    workspace: Workspace, trial: Trial, *, where: bool, limits: bool = False, box: bool = True
 ) -> tuple[str, ...]:
     """What nobody looked at, for the line that asks whether the arm may move.
 
@@ -538,14 +538,16 @@ def _unchecked(
         workspace: The trial's.
         trial: Whose plan it is.
         where: Whether the arm was asked where it stands.
-        limits: Whether the arm held the plan against limits of its own.
+        limits: Whether the arm held the plan against velocities of its own.
+        box: Whether the motion is the one that the gate saw; an approach is not.
     """
     gate, verdict = workspace.manifest.gate, trial.verdict
     found = [] if where else ["where the arm stands"]
     if not limits and (not isinstance(verdict, LimitReport) or "velocity" in verdict.unchecked):
         found.append("the arm's limits")
     found.append("self-collision")
-    found.append("the table" if gate.box_low is None else "the table, but for the tool tip")
+    box = box and gate.box_low is not None and verdict is not None
+    found.append("the table, but for the tool tip" if box else "the table")
     return tuple(found)
 
 

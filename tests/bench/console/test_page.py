@@ -306,6 +306,35 @@ def test_two_tabs_see_the_same_and_the_late_one_is_told(browser, serve):
     assert len(served.landed()) == 1
 
 
+def test_a_second_tap_meant_for_the_button_before_moves_nothing(browser, serve):
+    served = serve()
+    page = opened(browser, served)
+    page.evaluate(
+        """() => new MutationObserver((_, watch) => {
+            const button = document.getElementById("execute");
+            if (!button) return;
+            watch.disconnect();
+            button.click();
+            document.body.id = "tapped";
+        }).observe(document.getElementById("act"), { childList: true })"""
+    )
+    touch(page, [0.9, 0.05])
+    page.click("#goal")
+    expect(page.locator("#tapped")).to_be_visible()
+    expect(page.locator("#execute")).to_be_enabled(timeout=10_000)
+    page.click("#execute")
+    expect(page.locator("#tell")).to_be_visible()
+    assert len(served.landed()) == 1
+
+
+def test_stop_stops_before_anything_is_known(browser, serve):
+    page = opened(browser, serve())
+    page.route("**/api/state", lambda route: route.abort())
+    page.reload()
+    with page.expect_request("**/api/stop"):
+        page.click("#stop")
+
+
 def test_stop_is_always_there_and_stops(browser, serve, tmp_path):
     served = serve(seconds=60)
     page = opened(browser, served)

@@ -118,6 +118,13 @@ def test_a_verb_is_for_the_state_that_was_seen(verbs):
     assert kinds(verbs.folder).count("told") == 1
 
 
+def test_a_state_of_a_journal_that_was_restored_from_a_copy_is_not_the_one_seen(verbs):
+    state = aimed(verbs)
+    with pytest.raises(TrialStateError, match="fewer events than the page"):
+        verbs.tell(Tell(seen=state.id + 1, trial=1, hit=True))
+    assert "told" not in kinds(verbs.folder)
+
+
 def test_the_command_line_goes_on_beside_it(verbs):
     state = aimed(verbs)
     with Workspace(verbs.folder) as workspace:

@@ -755,6 +755,12 @@ def test_an_arm_that_was_changed_since_a_person_saw_it_is_not_moved(arm, workspa
     assert kinds(workspace)[-1] == "asked"
 
 
+def test_an_arm_that_somebody_moves_is_not_connected_to_for_a_look(arm):
+    workspace = arm()
+    with executing_lock(), pytest.raises(TrialStateError, match="a motion is being executed"):
+        workspace.look_at_arm(1, workspace.manifest.driven_by)
+
+
 @pytest.mark.parametrize(("motion", "speed"), [("trial", 0.5), ("rehearsal", 1), ("rehearsal", 0)])
 def test_only_a_rehearsal_is_slower(arm, motion, speed):
     workspace = arm()

@@ -38,7 +38,7 @@ async function get(path) {
 }
 
 // A verb is sent once: what came of it where no answer arrived, the next state says.
-async function verb(name, body = {}, { seen = S.id } = {}) {
+async function verb(name, body = {}) {
   if (L.busy && name !== "stop") return false;
   L.busy = name !== "stop";
   draw();
@@ -46,7 +46,7 @@ async function verb(name, body = {}, { seen = S.id } = {}) {
     const answer = await request(`/api/${name}`, {
       method: "POST",
       headers: { "content-type": "application/json" },
-      body: JSON.stringify(name === "stop" ? {} : { seen, ...body }),
+      body: JSON.stringify(name === "stop" ? {} : { seen: S.id, ...body }),
     });
     L.busy = false;
     if (!answer.ok) {
@@ -65,6 +65,11 @@ async function verb(name, body = {}, { seen = S.id } = {}) {
   }
 }
 
+// What moves the arm waits for so long, in ms, after something has changed: a second tap was meant for
+// the button that stood in its place.
+const CALM = 1000;
+let calmAt = 0;
+
 async function refresh() {
   const answer = await get("/api/state");
   if (answer) take(await answer.json());
@@ -75,6 +80,8 @@ function take(state) {
   const before = S;
   S = state;
   if (!before || before.id !== S.id) {
+    calmAt = performance.now() + CALM;
+    setTimeout(draw, CALM + 20);
     L.voiding = 0;
     if (before && (before.open !== S.open || before.goals.length !== S.goals.length)) { L.mark = null; L.byHand = 0; L.words = {}; }
     const told = L.amending && S.trials[L.amending - 1];
@@ -541,6 +548,7 @@ function tellPanel() {
 function drawAct() {
   const trial = openTrial();
   const off = { disabled: !L.connected || L.busy };
+  const still = { disabled: off.disabled || performance.now() < calmAt };
   const parts = [];
   if (!L.connected) parts.push(h("p", {}, "What is below may be old. This page goes on by itself once the console answers; nothing is lost."));
   else if (L.episode) parts.push(...episodePanel());
@@ -555,11 +563,11 @@ function drawAct() {
   else if (S.step === "ask") parts.push(button("ask", "Get the next plan", () => verb("ask"), "big", off));
   else if (S.step === "execute") {
     parts.push(chance(trial), surprise(trial), old(trial), trial.warning && h("p", { class: "ask" }, `Last time ${trial.warning}.`),
-      button("execute", `Execute trial ${trial.number}`, () => verb("execute", { trial: trial.number, plan: trial.plan }), "big", off),
+      button("execute", `Execute trial ${trial.number}`, () => verb("execute", { trial: trial.number, plan: trial.plan }), "big", still),
       h("p", { class: "soft" }, "The arm moves at once: keep clear, and the stop button in your hand."),
       details("other", "Another way", h("div", { class: "row" },
-        S.approaches && button("approach", "Go to its start, slowly", () => verb("execute", { trial: trial.number, plan: trial.plan, motion: "approach" }), "", off),
-        S.approaches && button("rehearse", "Rehearse at 20 % of its speed", () => verb("execute", { trial: trial.number, plan: trial.plan, motion: "rehearsal", speed: 0.2 }), "", off),
+        S.approaches && button("approach", "Go to its start, slowly", () => verb("execute", { trial: trial.number, plan: trial.plan, motion: "approach" }), "", still),
+        S.approaches && button("rehearse", "Rehearse at 20 % of its speed", () => verb("execute", { trial: trial.number, plan: trial.plan, motion: "rehearsal", speed: 0.2 }), "", still),
         button("download", "Download the plan", () => download(trial)),
         button("by-hand", "It was executed otherwise", () => { L.byHand = trial.number; draw(); }), voider(trial.number, "Void it")), confirmVoid(trial.number)));
   } else if (S.step === "executing") {

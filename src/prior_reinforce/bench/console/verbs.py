@@ -315,7 +315,10 @@ class Verbs:
             TrialStateError: It is not; the message says what happened.
         """
         with self._lock:
-            since = [entry for entry in self.workspace.events if entry.id > seen]
+            entries = self.workspace.events
+            if seen > (entries[-1].id if entries else 0):
+                raise TrialStateError("the journal has fewer events than the page; look again")
+            since = [entry for entry in entries if entry.id > seen]
             if since:
                 said = ", ".join(_say(to_builtins(entry.event)) for entry in since[-3:])
                 raise TrialStateError(f"not done, since meanwhile: {said}; look again")

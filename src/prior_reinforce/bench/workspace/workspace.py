@@ -715,16 +715,18 @@ class Workspace:
         Nothing moves, and nothing is written down.
 
         Raises:
+            TrialStateError: It is moved or recorded right now: two programs on one bus clash.
             ConfigurationError: The arm does not answer, or is another one since.
             FileFormatError: The plan's file is not what was written.
         """
         from prior_reinforce.bench.robots.executors.arguments import split_command
         from prior_reinforce.bench.robots.executors.drive import read_look
+        from prior_reinforce.bench.robots.executors.lock import executing_lock
         from prior_reinforce.bench.robots.executors.pose import ask_arm
 
         text = self._command(arm, "look", speed)
         plan = self._plan_file(self.state.trial(number))
-        with tempfile.TemporaryDirectory() as place:
+        with executing_lock(arm=self.manifest.arm), tempfile.TemporaryDirectory() as place:
             folder = Path(place)
             copy = write_once(folder / plan.path.name, plan.verify())
             words = split_command(text, copy, folder)

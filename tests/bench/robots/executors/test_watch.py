@@ -5,6 +5,7 @@ import pytest
 
 from prior_reinforce.bench.importing import read_recordings
 from prior_reinforce.bench.robots.executors.base import ArmSettings
+from prior_reinforce.bench.robots.executors.lock import executing_lock, stop_executing
 from prior_reinforce.bench.robots.executors.result import lag_behind
 from prior_reinforce.bench.robots.executors.watch import State, Take, Watch
 from prior_reinforce.errors import ConfigurationError
@@ -24,36 +25,52 @@ def found(monkeypatch, request):
     monkeypatch.setenv("PYTHONPATH", str(request.config.rootpath))
 
 
-def test_states_come_with_the_arms_own_times(tmp_path):
-    with Watch(arm(tmp_path, led=True)) as watch:
+@pytest.fixture
+def lock():
+    with executing_lock() as lock:
+        yield lock
+
+
+def test_states_come_with_the_arms_own_times(tmp_path, lock):
+    with Watch(arm(tmp_path, led=True), lock) as watch:
         assert watch.arm.columns == ("joint1", "joint2")
         states = [watch.next(20.0) for _ in range(151)]
     assert [state.t for state in states] == pytest.approx(np.arange(151) / 100)
     assert states[150].commanded != states[150].measured
 
 
-def test_an_arm_that_is_not_there_says_why(tmp_path):
+def test_an_arm_that_is_not_there_says_why(tmp_path, lock):
     with pytest.raises(ConfigurationError, match="does not answer; switch it on"):
-        Watch(arm(tmp_path, kind="dead"))
+        Watch(arm(tmp_path, kind="dead"), lock)
 
 
-def test_an_arm_that_is_unplugged_says_so_after_what_it_said(tmp_path):
-    with Watch(arm(tmp_path, kind="unplugged")) as watch:
+def test_an_arm_that_is_unplugged_says_so_after_what_it_said(tmp_path, lock):
+    with Watch(arm(tmp_path, kind="unplugged"), lock) as watch:
         for _ in range(50):
             assert watch.next(20.0) is not None
         with pytest.raises(ConfigurationError, match="does not answer any more"):
             watch.next(20.0)
 
 
-def test_the_program_ends_with_whoever_listens(tmp_path):
-    watch = Watch(arm(tmp_path, seconds=0.01))
+def test_the_program_ends_with_whoever_listens(tmp_path, lock):
+    watch = Watch(arm(tmp_path, seconds=0.01), lock)
     watch.__exit__()
     assert watch._process.returncode == 0
 
 
-def test_without_an_arm_the_program_says_one_line(tmp_path):
+def test_an_arm_that_is_led_is_stopped_as_any_motion_of_its_workspace(tmp_path):
+    with (
+        executing_lock(tmp_path) as lock,
+        Watch(arm(tmp_path, seconds=0.01), lock) as watch,
+    ):
+        stop_executing(tmp_path)
+        with pytest.raises(ConfigurationError, match="ended without a word"):
+            any(watch.next(20.0) is None for _ in range(10_000))
+
+
+def test_without_an_arm_the_program_says_one_line(lock):
     with pytest.raises(ConfigurationError, match="no executor 'nothing'; known are"):
-        Watch(ArmSettings("nothing"))
+        Watch(ArmSettings("nothing"), lock)
 
 
 @pytest.fixture

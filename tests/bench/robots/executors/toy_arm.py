@@ -35,6 +35,7 @@ class ToyConfig:
     seconds: float = 0.0
     """How long a motion takes at least, and a state while it is guided."""
     led: bool = False
+    checks: str = "velocity"
 
 
 class ToyArm(Executor):
@@ -56,7 +57,7 @@ class ToyArm(Executor):
             columns=("joint1", "joint2"),
             units=("rad", "rad"),
             rate=RATE,
-            checked=("velocity",),
+            checked=(self.config.checks,),
             unchecked=("self-collision",),
         )
 

@@ -8,6 +8,7 @@ then a state at every cycle. It ends with its input.
 
 from __future__ import annotations
 
+import os
 import queue
 import select
 import signal
@@ -26,6 +27,7 @@ from typing_extensions import Self
 
 from prior_reinforce.bench.robots.executors.base import ArmDescription, ArmSettings
 from prior_reinforce.bench.robots.executors.drive import make_executor
+from prior_reinforce.bench.robots.executors.lock import MARK, ExecutingLock
 from prior_reinforce.bench.robots.executors.result import lag_behind
 from prior_reinforce.errors import ConfigurationError, PriorReinforceError
 from prior_reinforce.files import named_disk_errors
@@ -86,8 +88,12 @@ class Take:
 class Watch:
     """An arm that is being read by the program; use it in a `with` block."""
 
-    def __init__(self, arm: ArmSettings) -> None:
+    def __init__(self, arm: ArmSettings, lock: ExecutingLock) -> None:
         """Start the program, and wait until the arm has answered.
+
+        Args:
+            arm: Whose leader may move it.
+            lock: The right to, which the program holds too: it is stopped as any motion is.
 
         Raises:
             ConfigurationError: It has not.
@@ -96,6 +102,8 @@ class Watch:
             [sys.executable, "-c", _START, msgspec.json.encode(arm).decode()],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
+            pass_fds=lock.descriptors,
+            env=os.environ | {MARK: " ".join(lock.names)},
         )
         self._listener = threading.Thread(target=self._listen, daemon=True)
         try:
