@@ -76,12 +76,27 @@ def test_what_cannot_be_recorded_is_said_and_leaves_nothing(run, folder, flags, 
     assert not (folder / "recordings").exists()
 
 
-def test_an_arm_that_a_leader_would_move_waits_for_a_person(run, folder, tmp_path):
-    path = folder / "workspace.toml"
-    name_arm(folder, tmp_path / "arm")
-    path.write_text(path.read_text() + 'leader = "arm 2"\n')
+@pytest.mark.parametrize(
+    ("guiding", "said"), [("let go", "its torque goes off"), ("led", "where its leader is")]
+)
+def test_an_arm_that_would_fall_or_move_waits_for_a_person(run, folder, tmp_path, guiding, said):
+    name_arm(folder, tmp_path / "arm", guiding=guiding)
     _, _, refused = run("record", folder, *BY_CLOCK)
-    assert "nobody said that the arm may move" in refused
+    assert said in refused
+    assert not (folder / "recordings").exists()
+    run("record", folder, *BY_CLOCK, "--yes")
+    assert (folder / "recordings/1/take-4.npz").exists()
+
+
+def test_a_person_who_holds_the_arm_says_so_at_the_terminal(folder, tmp_path):
+    name_arm(folder, tmp_path / "arm", guiding="let go", seconds=0.005)
+    for answer, then in (("no", "nothing was done"), ("yes", "q imports them")):
+        typed = Typed("record", folder, "--executor", TOY)
+        typed.wait_for("do you hold it? (yes/no)")
+        typed.type(f"{answer}\n")
+        typed.wait_for(then)
+        typed.process.kill()
+        typed.process.wait()
 
 
 def test_an_arm_that_is_unplugged_keeps_what_was_recorded(run, folder, tmp_path):

@@ -82,7 +82,7 @@ def test_an_so101_goes_from_six_recorded_throws_to_a_hit(run, tmp_path, monkeypa
         assert run("new", "hoop", "--robot", "so101", "--dt", "0.02", "--tolerance", "0.02")[0] == 0
         with Path("hoop/workspace.toml").open("a") as manifest:
             manifest.write("".join(["\n", *section, f'python = "{LEROBOT}"\n']))
-        run("record", "hoop", "--takes", "6", "--seconds", "1.7", "--pause", "3.8")
+        run("record", "hoop", "--takes", "6", "--seconds", "1.7", "--pause", "3.8", "--yes")
         rows = ["episode,x,y"]
         for i in range(1, 7):
             place = re.findall(r"[xy] (-?[\d.]+) m", lines_of(served, "came down")[-1])

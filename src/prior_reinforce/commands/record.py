@@ -18,7 +18,8 @@ from typing_extensions import Self
 
 from prior_reinforce.bench.importing.options import ReadOptions
 from prior_reinforce.bench.importing.outcomes import OUTCOMES_FILE, SD, write_outcome_table
-from prior_reinforce.bench.robots.executors.drive import arms_columns
+from prior_reinforce.bench.robots.executors.base import Guiding
+from prior_reinforce.bench.robots.executors.drive import arms_columns, guiding_of
 from prior_reinforce.bench.robots.executors.lock import executing_lock
 from prior_reinforce.bench.robots.executors.watch import State, Take, Watch
 from prior_reinforce.bench.workspace.manifest import Manifest
@@ -42,6 +43,12 @@ _FEWEST = 10
 """States of a take; ours: a tenth of a second, which nobody means."""
 _SILENT = 10.0
 """How long an arm may be silent, in [s]; ours."""
+_QUESTIONS: dict[Guiding, str] = {
+    "as it is": "",
+    "let go": "hold the arm: its torque goes off, and what nobody holds falls; do you hold it?",
+    "led": "the arm goes at once where its leader is, and follows it; may it?",
+}
+"""What a person is asked before an arm is guided."""
 _KEYS = "space or enter starts and ends a take, d drops the last, n names it, q imports them"
 
 
@@ -68,7 +75,7 @@ class Record(OnWorkspace):
     executor: str | None = None
     """The executor that [arm] names, where it is your own: module:Class."""
     yes: bool = False
-    """A leader moves the arm at once; do not ask whether it may."""
+    """The arm's torque goes off, or a leader moves it at once: do not ask whether it may."""
 
     def run_on(self, workspace: Workspace, words: Sequence[str]) -> None:
         """Record, ask where each landed, import."""
@@ -85,8 +92,11 @@ class Record(OnWorkspace):
             raise ConfigurationError(
                 f"{workspace.folder} names no arm; add [arm] with its executor to the manifest"
             )
-        if arm.options.get("leader") and not self.yes:
-            _ask_whether_it_may_be_led()
+        question = _QUESTIONS[guiding_of(arm)]
+        if question and not (self.yes or _says_yes(question)):
+            raise ConfigurationError(
+                f"nobody said yes to {question!r}; nothing was done: say --yes"
+            )
         with (
             executing_lock(workspace.folder, manifest.arm) as lock,
             Watch(arm, lock) as watch,
@@ -319,15 +329,13 @@ def _new_folder(recordings: Path) -> Path:
     return folder
 
 
-def _ask_whether_it_may_be_led() -> None:
-    """Ask a person; with a leader, the arm moves as soon as it is read.
-
-    Raises:
-        ConfigurationError: Nobody says yes.
-    """
-    question = "the arm goes at once where its leader is, and follows it; may it? (yes/no) "
-    if not sys.stdin.isatty() or input(question).strip().lower() not in ("y", "yes"):
-        raise ConfigurationError("nobody said that the arm may move; nothing moved: say --yes")
+def _says_yes(question: str) -> bool:
+    """Whether a person at a terminal says yes."""
+    if not sys.stdin.isatty():
+        return False
+    with suppress(EOFError):
+        return input(f"{question} (yes/no) ").strip().lower() in ("y", "yes")
+    return False
 
 
 def _draw(take: Take, form: PlanFormat, channels: list[int], kind: str, path: Path) -> None:

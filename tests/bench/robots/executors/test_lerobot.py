@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from prior_reinforce.bench.robots.executors.base import ArmSettings
-from prior_reinforce.bench.robots.executors.drive import make_executor
+from prior_reinforce.bench.robots.executors.drive import guiding_of, make_executor
 from prior_reinforce.bench.robots.executors.lerobot import LeRobotArm, LeRobotConfig
 from prior_reinforce.errors import ConfigurationError, RobotLimitError
 from prior_reinforce.lab.arms.so101 import Port, SimulatedSO101
@@ -170,6 +170,12 @@ def test_a_guided_arm_says_what_its_leader_asks_for_and_where_it_is(toy):
     assert state.measured == pytest.approx([0.0, 20.0])
     alone = next(iter(toy().guide()))
     assert np.array_equal(alone.commanded, alone.measured)
+
+
+def test_an_arm_is_let_go_unless_a_leader_leads_it():
+    robot = {"type": "so101_follower"}
+    assert guiding_of(ArmSettings("lerobot", {"robot": robot})) == "let go"
+    assert guiding_of(ArmSettings("lerobot", {"robot": robot, "leader": {"type": "x"}})) == "led"
 
 
 @pytest.fixture

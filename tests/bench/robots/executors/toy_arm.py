@@ -35,6 +35,7 @@ class ToyConfig:
     seconds: float = 0.0
     """How long a motion takes at least, and a state while it is guided."""
     led: bool = False
+    guiding: str = "as it is"
     checks: str = "velocity"
 
 
@@ -90,6 +91,10 @@ class ToyArm(Executor):
             (self.folder / "pose").write_text(" ".join(map(str, q)))
             time.sleep(max(0.0, self.config.seconds / n))
         return MeasuredPath(fine.t, fine.q)
+
+    @classmethod
+    def guiding(cls, config):
+        return config.guiding
 
     def guide(self):
         """A throw from 1.2 to 1.9 s of every two seconds; measured 0.1 s behind the command."""

@@ -26,6 +26,9 @@ GUIDED_RATE = 200.0
 Motion = Literal["trial", "rehearsal", "approach"]
 """What an arm is moved for: a trial; its plan at a fraction of the speed, which is no trial; or the
 slow way to its first frame."""
+Guiding = Literal["as it is", "let go", "led"]
+"""What being guided does to an arm: nothing; its torque goes off, and it falls unless somebody
+holds it; or a leader moves it at once."""
 
 
 @dataclass(frozen=True)
@@ -141,10 +144,16 @@ class Executor(ABC):
         Called from a signal's handler while `run` goes on, in the same thread: set a flag.
         """
 
+    @classmethod
+    def guiding(cls, config: Any) -> Guiding:
+        """What `guide` does to an arm with these settings: a person is asked first."""
+        return "as it is"
+
     def guide(self) -> Iterator[GuidedState]:
         """Let a person guide the arm, and say where it is, at a steady rate, until nobody asks.
 
         By default nothing is let go: the arm is in a state in which it can be guided by itself.
+        One that lets it go or moves it says so in `guiding`.
 
         Raises:
             ConfigurationError: The arm does not answer any more.

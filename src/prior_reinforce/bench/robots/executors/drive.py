@@ -28,6 +28,7 @@ from prior_reinforce.bench.robots.executors.base import (
     ArmDescription,
     ArmSettings,
     Executor,
+    Guiding,
     Motion,
 )
 from prior_reinforce.bench.robots.executors.pose import compare_pose
@@ -114,8 +115,23 @@ def make_executor(settings: ArmSettings) -> Executor:
         ConfigurationError: There is no such executor or setting, or the arm does not answer.
         MissingExtraError: Its library is not installed.
     """
+    kind, config = _class_and_config(settings)
+    return kind(config)
+
+
+def guiding_of(settings: ArmSettings) -> Guiding:
+    """What being guided would do to an arm; it is not connected to.
+
+    Raises:
+        ConfigurationError: There is no such executor or setting.
+    """
+    kind, config = _class_and_config(settings)
+    return kind.guiding(config)
+
+
+def _class_and_config(settings: ArmSettings) -> tuple[type[Executor], Any]:
     kind = EXECUTORS.resolve(settings.executor)
-    return kind(build(kind.config_type, settings.options, f"[arm] {settings.executor}"))
+    return kind, build(kind.config_type, settings.options, f"[arm] {settings.executor}")
 
 
 def arms_columns(form: PlanFormat, arm: ArmDescription) -> list[int]:

@@ -27,6 +27,7 @@ from prior_reinforce.bench.robots.executors.base import (
     ArmDescription,
     Executor,
     GuidedState,
+    Guiding,
     MeasuredPath,
 )
 from prior_reinforce.bench.robots.executors.result import lag_behind
@@ -151,6 +152,11 @@ class LeRobotArm(Executor):
     def where(self) -> Float[np.ndarray, " d"]:
         """See `Executor`."""
         return self._vector(self._ask("observe")["measured"])
+
+    @classmethod
+    def guiding(cls, config: LeRobotConfig) -> Guiding:
+        """See `Executor`."""
+        return "led" if config.leader else "let go"
 
     def guide(self) -> Iterator[GuidedState]:
         """See `Executor`: a leader leads the arm; without one, its torque is switched off."""
