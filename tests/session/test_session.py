@@ -337,8 +337,7 @@ def test_a_surprise_is_said_at_once_with_what_to_do_about_it():
     session.ask()
     told = session.tell(1, Reading.measured([0.21, 0.0], 0.0))
     assert told.surprise == (
-        "20 sd from what was made likely by the trials before it; mistyped: amend 1; "
-        "changed: goal --new-hardware"
+        "20 sd from what was expected of it; mistyped: amend 1; changed: goal --new-hardware"
     )
     assert session.amend(1, Reading.measured([0.04, 0.0], 0.0)).surprise == ""
     assert session.amend(1, Reading.measured([0.21, 0.0], 0.2)).surprise == ""  # a coarse look

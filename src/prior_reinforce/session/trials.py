@@ -170,7 +170,7 @@ class Trial:
         if sds < _NEWS:
             return ""
         return (
-            f"{sds:.0f} sd from what was made likely by the trials before it; mistyped: amend {n}; "
+            f"{sds:.0f} sd from what was expected of it; mistyped: amend {n}; "
             "changed: goal --new-hardware"
         )
 

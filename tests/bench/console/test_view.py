@@ -80,7 +80,7 @@ def test_a_surprise_names_its_trial(workspace):
     third, fourth = state_of(workspace).trials[2:]
     assert (third.surprising, third.surprise) == (None, "")
     assert fourth.surprising == 3
-    assert fourth.surprise.endswith("sd from what was made likely by the trials before it")
+    assert fourth.surprise.endswith("sd from what was expected of it")
 
 
 @pytest.fixture(scope="module")

@@ -114,7 +114,7 @@ def test_amendments_hardware_seed_paths_and_photographs_are_reported(run, folder
 
 
 def test_a_surprise_is_said_by_every_command_until_it_is_amended(run, folder, tmp_path):
-    odd = "made likely by the trials before it; mistyped: amend 3; changed: goal --new-hardware"
+    odd = "expected of it; mistyped: amend 3; changed: goal --new-hardware"
     run("goal", folder, "0.9", "0.05")
     for number in ("1", "2"):
         run("ask", folder)
