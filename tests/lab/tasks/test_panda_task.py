@@ -9,6 +9,7 @@ from prior_reinforce.lab.tasks.curling import Curling
 from prior_reinforce.lab.tasks.panda_task import first_descent
 
 PANDA = robot_limits("panda")
+WAYS = {"curling-round": 2}
 
 
 def final_states(rollouts):
@@ -31,12 +32,14 @@ def test_batches_draw_their_disturbances_one_after_another():
     assert len(np.unique(final_states(together)[:, 0])) == len(plans)
 
 
-@pytest.mark.parametrize("name", [name for name in TASKS.members if "zoo" not in name])
+@pytest.mark.parametrize(
+    "name", [name for name in TASKS.members if "zoo" not in name and name != "so101"]
+)
 def test_demonstrations_leave_a_tenth_of_the_arms_limits_at_1_khz_and_rest_at_both_ends(name):
     task = make_task(name)
     for name in task.demonstration_sets:
         plans = task.demonstrations(name).plans
-        assert 6 <= len(plans) <= 8
+        assert 6 <= len(plans) / WAYS.get(task.name, 1) <= 8
         n_steps = round(plans.shape[1] * task.format.dt / panda.STEP) + 50
         joints = task.joint_plans(plans)
         position, velocity = panda.setpoints(joints, task.format.dt, n_steps)

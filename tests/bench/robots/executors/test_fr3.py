@@ -155,7 +155,7 @@ def test_a_connection_that_dies_in_mid_swing_is_a_fault_of_a_motion():
             signal.signal(signal.SIGALRM, before)
         assert path.moved
         assert re.search("(?i)connection|timeout|receive", path.fault)
-        assert path.t[-1] < 4.0
+        assert np.all(path.t < 4.0)  # none was read where it died at once
         with pytest.raises(ConfigurationError, match="the robot does not answer"):
             arm.where()
 

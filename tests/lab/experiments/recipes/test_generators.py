@@ -24,12 +24,12 @@ def test_generators_with_an_own_one(tmp_path):
     rows = {row["generator"]: row for row in figures["rows"]}
     aligned = {name for name, row in rows.items() if row["aligned"]}
     assert aligned == {"nearest,timing=align", "interpolation,timing=align"}
-    assert set(rows) == {"dmp", "nearest", OWN, *aligned}
+    assert set(rows) == {"dmp", "nearest", "interpolation", OWN, *aligned}
     # The same class under its own name gives the same trials, to the last digit.
     assert rows[OWN]["success"] == rows["nearest"]["success"]
     # A DMP with its own clock is at the goal where neighbours out of time are nowhere.
     assert rows["nearest"]["ours_minus"][0].value > 0.3
-    assert [len(row["success"]) for row in rows.values()] == [3] * 5
+    assert [len(row["success"]) for row in rows.values()] == [3] * 6
     claims = RECIPE.claims(figures)
     assert {claim.verdict for claim in claims} == {Verdict.OPEN}
     assert any("aligned" in claim.paper for claim in claims)

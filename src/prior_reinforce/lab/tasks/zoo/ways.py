@@ -61,6 +61,7 @@ class Sidearm(_Swung):
     """A ball slung around the body: forehand from the right, or backhand from the left."""
 
     name = "zoo-sidearm"
+    demonstration_sets = ("ways-8-0", "ways-12-0", "warped-8-0", "mixed-8-0")
     format = PlanFormat(("joint1", "joint2", "joint3"), ("rad",) * 3, 0.02)
     horizon = 140
     tolerance = 0.02
