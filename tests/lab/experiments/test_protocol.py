@@ -199,6 +199,23 @@ def test_a_goal_counts_as_reached_from_the_round_that_reached_it():
     np.testing.assert_allclose(results[0].errors[0], OFF, atol=1e-3)  # the goal is aimed at first
 
 
+class RunningAway(Straight):
+    """Its plans for goals to the right are of numbers that no arm has."""
+
+    def _generate(self, conditions):
+        return super()._generate(conditions) * np.where(conditions[:, :1, None] > 0.5, 1e7, 1.0)
+
+
+def test_a_plan_that_ran_away_loses_its_object_and_nobody_elses():
+    goals = np.array([[0.2, 0.5], [0.8, 0.5]])
+    runaway = RunningAway().fit(CALM, seed=0)
+    near, far = run_goals(WIND[0], runaway, *WIND[2:], goals, rounds=3, seed=0)
+    assert near.solved_at is not None
+    assert far.solved_at is None
+    assert not far.rollouts[0].valid
+    assert all(rollout.valid for rollout in near.rollouts)
+
+
 def test_a_demonstration_of_which_only_the_direction_is_said_is_refused_in_one_line():
     def point(failure, rollout, goal, rng):
         words = from_words("long, left", ("x", "y"), ("m", "m"))

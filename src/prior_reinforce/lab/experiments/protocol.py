@@ -15,7 +15,7 @@ from jaxtyping import Float
 from numpy.typing import ArrayLike
 
 from prior_reinforce.adapters.base import Adapter
-from prior_reinforce.arrays import Point, Points
+from prior_reinforce.arrays import LARGEST, Plans, Point, Points
 from prior_reinforce.environment import Rollout, Task
 from prior_reinforce.errors import EndpointError, InvalidDemonstrationsError, PerceptionFailedError
 from prior_reinforce.generators.base import Generator
@@ -277,7 +277,7 @@ def reach_goals(
             break
         trials = ask_all([sessions[i] for i in active])
         plans = np.stack([trial.plan for trial in trials if trial.plan is not None])
-        executed = task.rollout(plans, np.random.default_rng([seed, 0, number]))
+        executed = _executed(task, plans, np.random.default_rng([seed, 0, number]))
         for i, trial, rollout in zip(active, trials, executed, strict=True):
             goal = sessions[i].goal
             try:
@@ -290,6 +290,13 @@ def reach_goals(
         if on_round is not None:
             on_round(number, results())
     return results()
+
+
+def _executed(task: Task, plans: Plans, rng: np.random.Generator) -> list[Rollout]:
+    """Roll plans out; one with numbers that no arm has (a DMP that ran away) loses its object."""
+    wild = np.abs(plans).max(axis=(1, 2)) > LARGEST
+    rollouts = task.rollout(np.where(wild[:, None, None], 0.0, plans), rng)
+    return [replace(r, valid=False) if w else r for r, w in zip(rollouts, wild, strict=True)]
 
 
 def success_by_round(results: Sequence[GoalTrials], rounds: int) -> Float[np.ndarray, " rounds"]:

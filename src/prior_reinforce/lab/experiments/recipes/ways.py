@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from prior_reinforce.arrays import Plans
+from prior_reinforce.arrays import LARGEST, Plans
 from prior_reinforce.generators.patterns import motion_vectors
 from prior_reinforce.lab.experiments.evaluation import GOAL_SEED, Training, Trials
 from prior_reinforce.lab.experiments.recipes.base import (
@@ -83,6 +83,8 @@ def unlike(demonstrations: Demonstrations, plans: Plans) -> np.ndarray:
     way and half of another is like none.
     """
     n, outcomes = demonstrations.n, demonstrations.outcomes_seen
+    ran_away = np.abs(plans).max(axis=(1, 2)) > LARGEST  # no numbers to compare
+    plans = np.where(ran_away[:, None, None], demonstrations.plans[0], plans)
     # What is compared are motions: outcomes of plans are made up, and of no demonstration.
     made_up = outcomes.max(axis=0) * np.arange(2.0, len(plans) + 2)[:, None]
     with warnings.catch_warnings():
@@ -98,7 +100,7 @@ def unlike(demonstrations: Demonstrations, plans: Plans) -> np.ndarray:
     apart = np.linalg.norm(motions[:, None] - motions[None, :n], axis=2)
     own = apart[:n] + np.where(np.eye(n, dtype=bool), np.inf, 0.0)
     far: np.ndarray = apart[n:].min(axis=1) > own.min(axis=1).max()
-    return far
+    return far | ran_away
 
 
 @dataclass(frozen=True)
