@@ -48,8 +48,8 @@ GENERATORS = (
 )
 """What is compared is called, and its choice; the first is the network."""
 SETS: Mapping[str, tuple[str, ...]] = {
-    **dict.fromkeys(SEVERAL_WAYS, ("ways-12-0",)),
-    "curling-round": ("A",),
+    **dict.fromkeys(SEVERAL_WAYS, ("ways-12-0", "ways-12-1")),
+    "curling-round": ("A", "B"),
 }
 """Sets of demonstrations of each task."""
 _GOALS = 20
