@@ -48,7 +48,7 @@ GENERATORS = (
 )
 """What is compared is called, and its choice; the first is the network."""
 SETS: Mapping[str, tuple[str, ...]] = {
-    **dict.fromkeys(SEVERAL_WAYS, ("ways-12-0", "ways-12-1")),
+    **dict.fromkeys(SEVERAL_WAYS, tuple(f"ways-12-{seed}" for seed in range(5))),
     "curling-round": ("A", "B"),
 }
 """Sets of demonstrations of each task."""
