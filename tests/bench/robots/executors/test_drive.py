@@ -239,3 +239,13 @@ def test_a_request_survives_its_way_through_the_command_line(arm):
     again = msgspec.json.decode(msgspec.json.encode(request), type=Request)
     assert again == request
     assert sys.executable in drive_command(request)
+
+
+def test_an_arm_that_does_not_say_where_a_joint_stands_is_not_moved(arm):
+    arm.folder.mkdir(exist_ok=True)
+    (arm.folder / "pose").write_text("0.0 nan")
+    for motion in ("trial", "approach"):
+        result = arm.drive(motion)
+        assert result.outcome == "not_moved"
+        assert "toy does not say where joint2 stands" in result.reason
+    assert arm.motions() == 0

@@ -96,6 +96,7 @@ def test_a_goal_beyond_the_calibrated_range_is_refused(toy):
         ("unplugged", "LeRobot: There is no status packet!"),
         ("crashes", "ended without a word"),
         ("clips", r"LeRobot sent joint1\.pos .* instead of"),
+        ("forgets", r"LeRobot does not say where joint1\.pos is"),
         ("blocked", r"joint1\.pos is 0\.\d+ rad from where it should be"),
     ],
 )
@@ -119,6 +120,13 @@ def test_to_stop_is_to_hold_where_the_arm_is(toy, tmp_path):
     path = arm.run(swing())
     assert (path.fault, path.moved, len(path.t)) == ("it was asked to stop", False, 0)
     assert not (tmp_path / "log").exists()
+
+
+def test_a_joint_that_is_not_seen_any_more_is_held_where_it_was_seen_last(toy, tmp_path):
+    path = toy("forgets").run(swing(1.0))
+    assert np.isfinite(path.q).all()
+    assert np.isfinite(sent(tmp_path)).all()
+    assert sent(tmp_path)[-1] == pytest.approx(math.degrees(path.q[-1, 0]))
 
 
 def test_an_arm_that_jams_is_held_where_it_was_measured(toy, tmp_path):

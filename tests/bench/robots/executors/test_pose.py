@@ -50,7 +50,8 @@ OF_UNITS = PlanFormat(("joint1", "rail", "gripper", "valve"), UNITS, 0.01)
         ((0.01, 0.005, -12.0, 0), "12 percent (gripper), more than 5; 0 steps", False),
         ((0.03, 0.005, 0.1, 0), "0.03 rad (joint1), more than 0.02; 0.005 m", False),
         ((0.01, -0.02, 0.1, 0), "0.02 m (rail), more than 0.01; ", False),
-        ((0.01, 0.005, 0.1, 90), "90 steps (valve), which is held against nothing", True),
+        ((0.01, 0.005, 0.1, 90), "90 steps (valve), which is held against nothing", False),
+        ((float("nan"), 0.005, 0.1, 0), "inf rad (joint1), more than 0.02", False),
     ],
 )
 def test_units_are_never_compared_with_each_other(off, said, there):
@@ -58,6 +59,12 @@ def test_units_are_never_compared_with_each_other(off, said, there):
     text, near = compare_pose(pose, [0.0] * 4, OF_UNITS, GateSettings())
     assert said in text
     assert near == there
+
+
+def test_a_joint_that_is_no_number_is_not_there_whatever_the_others_are():
+    form = PlanFormat(("joint1", "joint2"), ("rad", "rad"), 0.01)
+    for pose in ({"joint1": float("nan"), "joint2": 0.0}, {"joint1": 0.0, "joint2": float("nan")}):
+        assert not compare_pose(pose, [0.0, 0.0], form, GateSettings())[1]
 
 
 def test_a_unit_may_be_given_its_own_error():

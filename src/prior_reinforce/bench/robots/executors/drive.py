@@ -197,6 +197,8 @@ class _Prepared:
 
 def _prepare(executor: Executor, plan: Plan, request: Request) -> _Prepared:
     arm, pose = executor.describe(), executor.where()
+    if missing := [n for n, q in zip(arm.columns, pose, strict=True) if not math.isfinite(q)]:
+        raise ConfigurationError(f"{arm.model} does not say where {', '.join(missing)} stands")
     channels = arms_columns(plan.format, arm)
     frames = np.tile(pose, (plan.horizon, 1))
     frames[:, channels] = plan.actions

@@ -222,6 +222,10 @@ class LeRobotArm(Executor):
                 asked = dict(zip(self._columns, (goal / self._sizes).tolist(), strict=True))
                 said = self._ask("move", goal=asked)
                 here = self._vector(said["measured"])
+                if not np.isfinite(here).all():  # nor is it known where to hold the arm then
+                    name = self._columns[int(np.isfinite(here).argmin())]
+                    fault = f"LeRobot does not say where {name} is"
+                    break
                 times.append((time.monotonic() - start if wall else due) - shift)
                 path.append(here)
                 worst = max(asked, key=lambda name: abs(said["sent"][name] - asked[name]))
@@ -234,7 +238,7 @@ class LeRobotArm(Executor):
                 if astray.max() > _ASTRAY:
                     name = self._columns[int(astray.argmax())]
                     fault = f"{name} is {astray.max():.2f} rad from where it should be"
-            if fault and path:
+            if fault and path:  # held where it was seen last
                 held = dict(zip(self._columns, (path[-1] / self._sizes).tolist(), strict=True))
                 self._ask("move", goal=held)
         except ConfigurationError as error:

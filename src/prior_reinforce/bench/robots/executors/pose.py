@@ -94,7 +94,8 @@ def compare_pose(
         pose: As `read_pose` returns it.
         first: The frame, shape (D,), in the plan's units.
         form: Of the plan.
-        settings: How far it may be off (`errors_of`); a unit of which they say nothing is named.
+        settings: How far it may be off (`errors_of`); a unit of which they say nothing is named,
+            and must not be off at all.
 
     Returns:
         What is off most in each unit, in words; and whether all is near enough.
@@ -102,13 +103,16 @@ def compare_pose(
     worst: dict[str, tuple[float, str]] = {}
     for name, unit, q in zip(form.names, form.units, first, strict=True):
         if name in pose:
-            worst[unit] = max((abs(pose[name] - q), name), worst.get(unit, (0.0, name)))
+            off = abs(pose[name] - q)  # what is no number may be anywhere
+            off = math.inf if math.isnan(off) else off
+            worst[unit] = max((off, name), worst.get(unit, (0.0, name)))
     said, there = [], True
     for unit, (distance, name) in worst.items():
         allowed = settings.errors_of(unit)
         text = f"{distance:.3g} {unit} ({name})"
         if allowed is None:
             text += f", which is held against nothing: add {unit} to errors in [gate]"
+            there = there and distance == 0
         elif distance > allowed[0]:
             text, there = f"{text}, more than {allowed[0]:g}", False
         said.append(text)
