@@ -10,7 +10,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from prior_reinforce.bench.robots.executors.lock import executing_lock
+from prior_reinforce.bench.robots.executors.lock import executing_lock, stop_executing
 from prior_reinforce.bench.robots.gate import GateSettings
 from prior_reinforce.bench.robots.report import LimitReport
 from prior_reinforce.bench.workspace import workspace as workspace_module
@@ -562,6 +562,26 @@ def test_each_motion_is_confirmed_and_none_is_made_unasked(run, arm, folder, mon
         "the arm will move (trial 1 at full speed, 0.5 s)",
     ]
     assert toy_arm.motions(toy) == 1
+    assert trials_in(folder)[0].stage is Stage.ASKED
+
+
+@pytest.mark.parametrize(("after", "motions"), [("look_at_arm", 0), ("execute", 1)])
+def test_a_stop_between_two_motions_lets_no_other_begin(
+    run, arm, folder, monkeypatch, after, motions
+):
+    toy, plain = arm(), getattr(Workspace, after)
+    (toy / "pose").write_text("0.0 0.3")
+
+    def then_stopped(workspace, *args, **kwargs):
+        result = plain(workspace, *args, **kwargs)
+        stop_executing(Path(folder))
+        return result
+
+    monkeypatch.setattr(Workspace, after, then_stopped)
+    status, _, err = run("ask", folder, "--yes", "--approach", *ON_ARM)
+    assert status == 1
+    assert "somebody pressed Stop since this was asked for" in err
+    assert toy_arm.motions(toy) == motions
     assert trials_in(folder)[0].stage is Stage.ASKED
 
 

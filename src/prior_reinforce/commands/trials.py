@@ -12,6 +12,7 @@ import tyro
 from msgspec import to_builtins
 
 from prior_reinforce.bench.robots.executors.base import ArmDescription, ArmSettings, Motion
+from prior_reinforce.bench.robots.executors.lock import last_stop
 from prior_reinforce.bench.robots.plan_files import check_plan_path, write_plan
 from prior_reinforce.bench.robots.report import LimitReport
 from prior_reinforce.bench.workspace.records import AskRecord, trial_records
@@ -96,8 +97,9 @@ class Ask(OnWorkspace):
 
     def run_on(self, workspace: Workspace, words: Sequence[str]) -> int:
         """Show the plan, write it, execute it."""
+        stop_seen = last_stop(workspace.folder)
         with silent(self.json):
-            status = self._ask(workspace)
+            status = self._ask(workspace, stop_seen)
         if self.json:
             print_json(self._record(workspace))
         return status
@@ -118,7 +120,7 @@ class Ask(OnWorkspace):
             next=next_step(workspace),
         )
 
-    def _ask(self, workspace: Workspace) -> int:
+    def _ask(self, workspace: Workspace, stop_seen: int) -> int:
         session = workspace.session(self.generator, self.adapter)
         self._check_out(workspace.state)
         if self.goal is not None:
@@ -143,7 +145,7 @@ class Ask(OnWorkspace):
         if trial.stage is Stage.EXECUTED and not (self.run_command or self.execute):
             print("it was executed already")
         elif self.execute and trial.stage is not Stage.EXECUTED:
-            return self._on_arm(workspace, trial)
+            return self._on_arm(workspace, trial, stop_seen)
         elif trial.stage is not Stage.EXECUTED:
             command = None if self.check else self.run_command
             unchecked = _unchecked(workspace, trial, where=self.where is not None)
@@ -154,7 +156,7 @@ class Ask(OnWorkspace):
             if self.where is not None and not self._is_there(workspace, trial):
                 return 1
             if command is not None:
-                return self._execute(workspace, trial.number, command)
+                return self._execute(workspace, trial.number, command, stop_seen)
             print(
                 "checked; nothing moved"
                 if self.check
@@ -165,7 +167,7 @@ class Ask(OnWorkspace):
         print_next(workspace)
         return 0
 
-    def _on_arm(self, workspace: Workspace, trial: Trial) -> int:
+    def _on_arm(self, workspace: Workspace, trial: Trial, stop_seen: int) -> int:
         """Look at the arm, ask a person, and let its executor move it."""
         arm = arm_of(workspace, self.executor)
         if arm is None:
@@ -198,7 +200,7 @@ class Ask(OnWorkspace):
             if not self.yes and not _may_move(trial, (*look.arm.unchecked, *nobody), said):
                 print("nothing moved; ask again when it may")
                 return 1
-            status = self._execute(workspace, trial.number, arm, motion, share)
+            status = self._execute(workspace, trial.number, arm, stop_seen, motion, share)
             if status != 0:
                 break
         return status
@@ -300,6 +302,7 @@ class Ask(OnWorkspace):
         workspace: Workspace,
         number: int,
         command: str | ArmSettings,
+        stop_seen: int,
         motion: Motion = "trial",
         speed: float = 1.0,
     ) -> int:
@@ -310,6 +313,7 @@ class Ask(OnWorkspace):
             motion=motion,
             speed=speed,
             show=lambda text: print(text, end="", flush=True),
+            stop_seen=stop_seen,
         )
         if result.output_tail and not result.output_tail.endswith("\n"):
             print()

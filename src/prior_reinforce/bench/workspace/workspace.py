@@ -605,6 +605,7 @@ class Workspace:
         motion: Motion = "trial",
         speed: float = 1.0,
         show: Callable[[str], None] | None = None,
+        stop_seen: int | None = None,
     ) -> CommandResult:
         """Execute a trial's plan by a command or by the manifest's arm, once.
 
@@ -621,9 +622,10 @@ class Workspace:
             motion: An arm may also approach the plan's first frame, or rehearse it.
             speed: Share of the plan's own speed, of a rehearsal.
             show: Called with the command's output as it comes.
+            stop_seen: `last_stop` when it was asked for; after a stop since then, nothing begins.
 
         Raises:
-            TrialStateError: The trial was executed already, is not open, or another program
+            TrialStateError: It was stopped since, executed already, is not open, or another program
                 executes one.
             RobotLimitError: The plan breaks a limit of now; nothing moved.
             ConfigurationError: The command could not be started; nothing moved, and the journal
@@ -636,7 +638,7 @@ class Workspace:
             without_arguments,
         )
         from prior_reinforce.bench.robots.executors.command import execute_command
-        from prior_reinforce.bench.robots.executors.lock import executing_lock
+        from prior_reinforce.bench.robots.executors.lock import executing_lock, last_stop
         from prior_reinforce.bench.robots.executors.supervision import Interruptions
 
         if (speed != 1.0) != (motion == "rehearsal") or not 0 < speed <= 1:
@@ -661,6 +663,10 @@ class Workspace:
             if self.manifest.arm != arm or text != self._command(command, motion, speed):
                 raise ConfigurationError(
                     f"{self.folder / MANIFEST_FILE} names another arm since; ask again"
+                )
+            if stop_seen is not None and last_stop(self.folder) != stop_seen:
+                raise TrialStateError(
+                    f"somebody pressed Stop since this was asked for: no {motion} began; ask again"
                 )
             name = _kept(trial).file
             folder = self.store.make_execution_folder(

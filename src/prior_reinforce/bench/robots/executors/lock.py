@@ -32,6 +32,8 @@ MARK = "PRIOR_REINFORCE_EXECUTION"
 """Environment variable of what executes: the names of its locks."""
 GRACE = 2.0
 """Between asking a command to stop and killing it, in [s]: time to bring an arm to rest."""
+STOP_FILE = ".stopped"
+"""In a workspace; its time is that of the last stop."""
 _HANGS = 60.0
 """In [s]; ours: no computer takes so long to start a program, be it ever so busy."""
 # Ours: longer than a look at a lock ever holds it, shorter than any execution.
@@ -98,11 +100,42 @@ def is_executing(folder: Path) -> bool:
 def stop_executing(folder: Path) -> None:
     """Stop what executes a trial of a workspace, whoever started it, and wait for its end.
 
+    The stop is noted, so that what was asked for before begins no further motion (`last_stop`).
+
     Its supervisor is asked, which asks the command, once, kills it after the grace, and notes how
     it ended; or whatever is left of both is asked. What else runs after four times the grace is
     killed, and a supervisor that hangs, much later: on a busy computer it may only be slow.
     """
-    name, start = _name_of_folder(folder), time.monotonic()
+    try:
+        _note_stop(folder)
+    finally:  # what moves is stopped, whatever the disk says
+        _stop_what_runs(_name_of_folder(folder))
+
+
+def last_stop(folder: Path) -> int:
+    """When a workspace was stopped last, in [ns]; 0 if never. Another value is a stop since."""
+    try:
+        return os.lstat(folder / STOP_FILE).st_mtime_ns
+    except FileNotFoundError:
+        return 0
+
+
+def _note_stop(folder: Path) -> None:
+    flags = os.O_WRONLY | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK
+    try:
+        descriptor = os.open(folder / STOP_FILE, flags, 0o644)
+        try:
+            os.utime(descriptor, ns=(time.time_ns(),) * 2)
+        finally:
+            os.close(descriptor)
+    except OSError as error:
+        raise WorkspaceError(
+            f"{folder}: the stop cannot be noted ({error.strerror}); stop waiting commands too"
+        ) from error
+
+
+def _stop_what_runs(name: str) -> None:
+    start = time.monotonic()
     asked = marked(name)
     for pid in asked:
         with suppress(OSError):
