@@ -151,6 +151,13 @@ def test_alone_it_lists_the_commands_by_what_they_are_for(run, args):
     assert all(re.search(rf"^  {name} ", out, re.MULTILINE) for name in COMMANDS)
 
 
+def test_a_word_where_a_number_belongs_is_named(run, folder):
+    status, out, err = run("ask", folder, "--rate", "abc")
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert "--rate" in err
+    assert "'abc'" in err
+
+
 @pytest.mark.parametrize("option", ["--version", "-V"])
 def test_the_version_is_the_installed_one(run, option):
     assert run(option) == (0, f"prior-reinforce {version('prior-reinforce')}\n", "")

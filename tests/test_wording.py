@@ -441,3 +441,11 @@ def test_numbers_with_what_stands_behind_plus_minus():
     np.testing.assert_allclose([*place, sd], [0.8, 0.2, 0.05])
     with pytest.raises(InvalidFeedbackError, match="components of one unit"):
         read_uncertain_place("0.8 0.2 +- 0.1", XT, MIXED)
+
+
+def test_a_place_of_one_component_in_inches_is_said_in_words():
+    assert read_place("20in ahead", ["distance"], ["in"]) == pytest.approx([20.0])
+    assert read_place("20 behind", ["distance"], ["in"]) == pytest.approx([-20.0])
+    np.testing.assert_allclose(
+        read_place("50.8cm ahead, 2in left", ["x", "y"], ["in", "in"]), [20.0, 2.0]
+    )

@@ -171,7 +171,7 @@ def _in_one_line(name: str) -> Iterator[None]:
                 f"{name} --help"
             ) from None
         words = re.sub(r"\u256d.*|[\u2502\u2570\u256f\s]+", " ", box.getvalue())
-        parts = [" ".join(part.split()) for part in re.split("\u2500+", words)]
+        parts = [" ".join(part.split()) for part in re.split("\u2500+|-{9,}", words)]
         said = [part for part in parts if part and "helptext:" not in part]
         raise ConfigurationError("; ".join(said) or "wrong; see --help") from None
     except (ValueError, OverflowError) as error:  # numbers of hundreds of digits

@@ -191,6 +191,8 @@ def named_disk_errors(folder: Path) -> Iterator[None]:
         remedy = "make the folder writable, or choose another"
         if error.errno in (errno.ENOSPC, errno.EDQUOT):
             remedy = "free some disk space"
+        elif error.errno == errno.EFBIG:
+            remedy = "files may not grow as large here: raise the limit (ulimit -f), or ask for it"
         raise WorkspaceError(
             f"cannot write to {folder} ({error.strerror}); {remedy}; what was written before is "
             "safe"

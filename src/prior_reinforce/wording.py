@@ -175,6 +175,13 @@ def say_length(length: float, units: Sequence[str]) -> str:
     return f"{float(f'{length:.3g}'):g} {unit}".strip()
 
 
+def bare_units(units: Sequence[str]) -> str:
+    """Say what `from_words` takes a number without a unit for: `centimetres`, `inches`, `rad`."""
+    spelt = {"cm": "centimetres", "in": "inches"}
+    bare = [_bare(unit) for unit in units if unit in _METRES or len(units) == 1]
+    return " and ".join(dict.fromkeys(spelt.get(unit, unit) for unit in bare))
+
+
 def say_tolerance(
     tolerance: Sequence[float] | _Point, names: Sequence[str], units: Sequence[str]
 ) -> str:
@@ -351,7 +358,7 @@ def read_place(text: str, names: Sequence[str], units: Sequence[str]) -> _Point:
     k, expected = len(names), f"{len(names)} finite numbers: {', '.join(names)}"
     numbers = _numbers_with_units(text, units)
     if numbers is None:
-        if in_words(units):
+        if k <= len(WORDS) and set(units) <= set(_METRES):
             example = 'for instance "92cm ahead, 10cm left"'
             read = _read(_parts(text), text, PLACE_WORDS, names, units, example, sizes=True)
             place = np.zeros(k)

@@ -1,13 +1,15 @@
 """`import`, from the first command on."""
 
+import errno
 from collections import Counter
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from prior_reinforce.bench.importing import importer, inspection, npz
 from prior_reinforce.bench.workspace.workspace import Workspace
-from tests.bench.workspace.planar import demonstrations, recordings
+from tests.bench.workspace.planar import demonstrations, events_in, recordings
 
 T = np.arange(24) * 0.02
 NEW = (
@@ -286,3 +288,24 @@ def test_one_in_a_csv_is_named_too_although_it_is_not_read(run, folder, tmp_path
         (tmp_path / "some" / f"throw_{i}.csv").write_text("\n".join(lines))
     out = run("import", folder, "some", "--inspect")[1]
     assert "left out although it moves: gripper, 8 to 70 (take a gripper in: new" in out
+
+
+def test_a_picture_that_the_disk_refuses_is_a_remark(run, folder, tmp_path, monkeypatch):
+    """Nothing that was recorded depends on it."""
+
+    def refuse(figure, path, **how):
+        path.write_bytes(b"half")
+        raise OSError(errno.EFBIG, "File too large")
+
+    monkeypatch.setattr(Figure, "savefig", refuse)
+    recordings(tmp_path / "recorded")
+    status, out, err = run("import", folder, "recorded")
+    assert status == 0
+    assert "picture:" not in out
+    assert "next: prior-reinforce" in out
+    assert err.count("\n") == 1
+    assert "warning: no picture" in err
+    assert "File too large" in err
+    assert "ulimit -f" in err
+    assert not (tmp_path / "planar" / "demonstrations.png").exists()
+    assert events_in(folder)[-1].kind == "demonstrations_imported"

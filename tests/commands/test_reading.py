@@ -56,6 +56,8 @@ def test_an_error_can_be_told_in_many_ways(run, folder, said, seen):
         (("--error", "50m long"), "say it again, in cm"),
         (("--error", "0.05", "0", "--outcome", "0.9", "0"), "--error or --outcome"),
         (("--outcome", "0.9"), "needs 2 numbers"),
+        (("--outcome", "0.9+-0.1", "0.1+-0.1"), "is not 2 finite numbers"),
+        (("--outcome", "there"), "cannot read 'there'"),
         (("--hit", "--miss"), "one of those alone"),
     ],
 )
@@ -96,3 +98,26 @@ def test_a_direction_is_said_back_as_it_was_said(run, folder):
     run("ask", folder)
     assert "trial 1: long, somewhere\n" in run("tell", folder, 1, "long, somewhere")[1]
     assert "long, somewhere" in run("status", folder)[1]
+
+
+@pytest.mark.parametrize(
+    ("place", "seen"),
+    [
+        (("95cm", "3cm"), [0.05, -0.02]),
+        (("95cm 3cm",), [0.05, -0.02]),
+        (("95cm ahead, 3cm left",), [0.05, -0.02]),
+        (("190cm", "5cm"), [1.0, 0.0]),
+    ],
+)
+def test_where_it_ended_is_read_as_a_goal_is(run, folder, place, seen):
+    run("goal", folder, "0.9", "0.05")
+    run("ask", folder)
+    assert run("tell", folder, 1, "--outcome", *place)[0] == 0
+    np.testing.assert_allclose(trials_in(folder)[0].error_seen, seen, atol=1e-12)
+
+
+def test_where_it_ended_may_be_measured(run, folder):
+    run("goal", folder, "0.9", "0.05")
+    run("ask", folder)
+    assert run("tell", folder, 1, "--outcome", "95cm 3cm +- 2mm")[0] == 0
+    np.testing.assert_allclose(trials_in(folder)[0].reading.sd, [0.002, 0.002])

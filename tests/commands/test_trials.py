@@ -20,7 +20,7 @@ from prior_reinforce.commands.trials import _unchecked
 from prior_reinforce.session.session import Session
 from prior_reinforce.session.trials import Stage
 from tests.bench.robots.executors import toy_arm
-from tests.bench.workspace.planar import events_in, trials_in
+from tests.bench.workspace.planar import events_in, recordings, trials_in
 
 NARROW = (
     'model = "given"\njoint_names = ["joint1", "joint2"]\nlower = [-3, -3]\nupper = [3, 3]\n'
@@ -120,6 +120,36 @@ def test_what_was_told_is_repeated_as_it_was_understood(run, folder):
     assert "5 cm long, 2 cm left" in run("status", folder)[1]
     out = run("amend", folder, 1, "--error", "3 cm long, 2 cm left")[1]
     assert out.startswith("trial 1, corrected: 3 cm long, 2 cm left\n")
+
+
+@pytest.mark.parametrize(
+    ("unit", "action", "said", "spelt"),
+    [
+        ("in", "m", "2 long", "inches"),
+        ("rad", "m", "0.2 high", "rad"),
+    ],
+)
+def test_a_number_without_a_unit_is_said_to_be_in_the_tasks(
+    run, tmp_path, monkeypatch, unit, action, said, spelt
+):
+    monkeypatch.chdir(tmp_path)
+    slide(run, tmp_path, unit)
+    run("goal", "slide", "2")
+    run("ask", "slide")
+    status, out, _ = run("tell", "slide", "1", said)
+    assert status == 0
+    assert f"; numbers without a unit are {spelt}\n" in out
+
+
+def slide(run, folder, unit):
+    """A task of one component, learned."""
+    new = ("--outcome-names", "x", "--outcome-units", unit, "--tolerance", "0.1")
+    run("new", "slide", "--robot", "none", "--action-names", "joint1", "joint2", *new)
+    recordings(folder / "recorded")
+    table = "\n".join(["episode,x", *(f"{i},{1 + i / 2}" for i in range(4))])
+    (folder / "recorded" / "outcomes.csv").write_text(table)
+    assert run("import", "slide", "recorded")[0] == 0
+    assert run("learn", "slide", "--generator", "nearest")[0] == 0
 
 
 def test_after_three_poor_trials_it_is_said_what_would_help(run, folder):

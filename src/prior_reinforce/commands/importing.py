@@ -47,6 +47,7 @@ from prior_reinforce.errors import (
     ConfigurationError,
     InvalidDemonstrationsError,
     UnclearUnitsError,
+    WorkspaceError,
 )
 from prior_reinforce.files import check_path, named_disk_errors
 from prior_reinforce.wording import plain
@@ -147,9 +148,15 @@ class Import(OnWorkspace):
         if n_before:
             n = n_before + result.demonstrations.n
             print(f"appended    {n_before} demonstrations were there, now {n}")
-        with named_disk_errors(workspace.folder):
-            result.preview.draw(workspace.folder / _PICTURE)
-        print(f"picture: {workspace.folder / _PICTURE}  (look at it before you learn)")
+        picture = workspace.folder / _PICTURE
+        try:
+            with named_disk_errors(workspace.folder):
+                result.preview.draw(picture)
+            print(f"picture: {picture}  (look at it before you learn)")
+        except WorkspaceError as error:  # the demonstrations are taken in without it
+            with suppress(OSError):
+                picture.unlink()
+            print(f"prior-reinforce: warning: no picture: {error}", file=sys.stderr)
         if inspection.remedy:
             print(f"next: {self._command(inspection.remedy)}")
         else:

@@ -15,7 +15,7 @@ from prior_reinforce.commands.base import OnWorkspace, Words
 from prior_reinforce.errors import ConfigurationError, InvalidFeedbackError
 from prior_reinforce.readings import Reading
 from prior_reinforce.session.trials import Goal
-from prior_reinforce.wording import error_example, from_words, read_numbers
+from prior_reinforce.wording import error_example, from_words, read_numbers, read_uncertain_place
 
 _IMPLAUSIBLE = {"m": (1.0, "centimetres"), "rad": (np.pi, "degrees")}
 """Ours: bare numbers from there on are of another unit far more often than a miss by as much."""
@@ -32,8 +32,9 @@ class Seen(OnWorkspace):
     0.05+-0.003 0.02+-0.003."""
     error: Annotated[tuple[str, ...] | None, tyro.conf.arg(metavar="SEEN")] = None
     """What was seen, as a named option."""
-    outcome: Annotated[tuple[float, ...] | None, tyro.conf.arg(metavar="PLACE")] = None
-    """Or where the object ended, in the table frame, in the outcome's units."""
+    outcome: Annotated[tuple[str, ...] | None, tyro.conf.arg(metavar="PLACE")] = None
+    """Or where the object ended, in the table frame, said as a goal is: 0.92 0.10, 92cm 10cm,
+    "92cm ahead, 10cm left", or measured: "92cm 10cm +- 2mm"."""
     hit: bool = False
     """The goal was reached, whatever the distance says."""
     miss: bool = False
@@ -55,12 +56,7 @@ class Seen(OnWorkspace):
         hit = True if self.hit else False if self.miss else None
         goal = workspace.state.goal_of(workspace.state.trial(number))
         if self.outcome is not None:
-            if len(self.outcome) != len(goal.units):
-                raise InvalidFeedbackError(
-                    f"--outcome needs {len(goal.units)} numbers, got {len(self.outcome)}: "
-                    f"{', '.join(goal.names)}"
-                )
-            return plausible(np.array(self.outcome) - goal.goal, goal), hit
+            return read_landed(" ".join(self.outcome), goal), hit
         words = seen or self.error
         return (None if words is None else read_seen(" ".join(words), goal)), hit
 
@@ -88,6 +84,23 @@ def read_seen(text: str, goal: Goal) -> Reading | Point:
             f"{text!r} has +- for {len(sds)} of {k} numbers; give all or none"
         )
     return Reading.measured(as_error(error, k), np.array(sds))
+
+
+def read_landed(text: str, goal: Goal) -> Reading | Point:
+    """Read outcome minus goal, in the outcome's units, from where the object ended.
+
+    Raises:
+        InvalidFeedbackError: It is no place.
+    """
+    k, numbers = len(goal.units), read_numbers(text)
+    if numbers is not None and len(numbers) != k:
+        raise InvalidFeedbackError(
+            f"--outcome needs {k} numbers, got {len(numbers)}: {', '.join(goal.names)}"
+        )
+    if numbers is not None:
+        plausible(np.array([number for number, _ in numbers]) - goal.goal, goal)
+    place, sd = read_uncertain_place(text, goal.names, goal.units)
+    return Reading.measured(place - goal.goal, sd) if sd else place - goal.goal
 
 
 def plausible(error: Point, goal: Goal) -> Point:

@@ -42,7 +42,7 @@ from prior_reinforce.files import check_path
 from prior_reinforce.plans.motions import Plan
 from prior_reinforce.registry import own_class
 from prior_reinforce.session.trials import Stage, State, Trial
-from prior_reinforce.wording import say_place
+from prior_reinforce.wording import bare_units, say_place
 
 
 @dataclass(frozen=True)
@@ -473,7 +473,8 @@ def _say_told(workspace: Workspace, trial: Trial) -> str:
     said = say_trial(workspace, trial)
     typed = trial.reading.said if trial.reading is not None else ""
     no_unit = bool(typed) and typed not in said
-    return f"{said}; numbers without a unit are centimetres" if no_unit else said
+    bare = bare_units(workspace.manifest.outcome_units)
+    return f"{said}; numbers without a unit are {bare}" if no_unit else said
 
 
 def _warn_of_its_execution(workspace: Workspace, number: int) -> None:

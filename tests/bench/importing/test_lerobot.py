@@ -55,3 +55,15 @@ def test_lerobot_whose_recorder_was_not_finalized(tmp_path):
     path.write_bytes(path.read_bytes()[:-5000])  # its footer was never written
     with pytest.raises(FileFormatError, match=r"file-000\.parquet .* called finalize\(\)"):
         import_demonstrations(folder, joints=JOINTS)
+
+
+@pytest.mark.parametrize("table", [True, False])
+def test_the_folder_above_a_data_set_names_it(tmp_path, table):
+    above = tmp_path / "above"
+    write_lerobot(above / "throws")
+    if table:  # which alone looks like a folder of CSV
+        write_outcomes(above)
+    with pytest.raises(FileFormatError) as refused:
+        import_demonstrations(above)
+    assert "say its format" not in str(refused.value)
+    assert f"name {above / 'throws'}, which looks like lerobot" in str(refused.value)

@@ -337,3 +337,11 @@ def test_a_thousand_that_may_be_one_and_a_half_is_doubted(tmp_path, rows, doubte
         return
     with pytest.raises(FileFormatError, match=r"line 2: x \[mm\] is '1.488' beside '902'.*1.4880"):
         read_outcomes(path)
+
+
+def test_a_column_may_end_in_inches_where_the_task_has_that_name(tmp_path):
+    (tmp_path / "outcomes.csv").write_text("episode,distance_in,plug_in\n0,10,1\n1,12,2\n")
+    found = read_outcomes(tmp_path / "outcomes.csv", ["distance"])
+    np.testing.assert_allclose(found.values, [[0.254], [0.3048]])
+    assert found.units == ("m",)
+    assert read_outcomes(tmp_path / "outcomes.csv").names == ("distance_in", "plug_in")

@@ -41,7 +41,7 @@ def test_the_hull_has_its_area(folder):
     area = 0.5 * abs(sum(x[i - 1] * y[i] - x[i] * y[i - 1] for i in range(4)))
     text = import_demonstrations(folder).preview.text
     assert f"hull in x and y of {area:.3g} m^2 by 4 of 6" in text
-    assert "nearest two are throw_0 and throw_2, 0.102 apart" in text
+    assert "nearest two are throw_0 and throw_2, 0.102 m apart" in text
 
 
 def test_the_picture_is_drawn(folder, tmp_path):

@@ -373,6 +373,13 @@ def detect_format(source: Path) -> str:
     found = [name for name, format in FORMATS.items() if format.recognises(source)]
     found = [name for name in found if FORMATS[name].whole] or found
     if len(found) != 1:
+        for folder in sorted(source.iterdir()) if source.is_dir() and not found else ():
+            within = [name for name in FORMATS if FORMATS[name].recognises(folder)]
+            if folder.is_dir() and within:
+                raise FileFormatError(
+                    f"{source} itself holds no recordings; name {folder}, which looks like "
+                    f"{' or '.join(within)}"
+                )
         raise FileFormatError(
             f"{source} looks like {' and '.join(found) or 'no format that can be read'}; say its "
             f"format, one of {', '.join(FORMATS)}"

@@ -228,6 +228,9 @@ def read_outcomes(
         raise FileFormatError(f"no table at {path}; give the path of a table {example}")
     table = read_tables(path, head=index)[0]
     split = [split_any_unit(name) for name in table.names]
+    # `distance_in` is in inches where there is a `distance`; elsewhere `plug_in` is no length.
+    wanted = {f"{name}_in": (name, "in") for name in names or ()}
+    split = [wanted.get(name, (name, unit)) for name, unit in split]
     lower = [name.lower() for name, _ in split]
     key = next((i for i, name in enumerate(lower) if name in index), None)
     other = (*_NOT_COMPONENTS, *index, *texts)

@@ -134,9 +134,9 @@ class Preview:
         gaps = np.linalg.norm(points[:, None] - points[None], axis=-1)
         gaps[np.diag_indices(demos.n)] = np.inf
         i, j = np.unravel_index(int(np.argmin(gaps)), gaps.shape)
-        nearest = (
-            f"nearest two are {self.episodes[i]} and {self.episodes[j]}, {gaps[i, j]:.3g} apart"
-        )
+        one_unit = f" {demos.outcome_units[0]}" * (len(set(demos.outcome_units)) == 1)
+        pair = f"{self.episodes[i]} and {self.episodes[j]}"
+        nearest = f"nearest two are {pair}, {gaps[i, j]:.3g}{one_unit} apart"
         if demos.outcome_dim == 1:
             return nearest
         corners = hull_corners(points[:, :2])
