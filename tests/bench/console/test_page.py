@@ -111,6 +111,8 @@ def touch(page: Page, place, svg="map"):
 
 def shot(page: Page, name: str, tmp_path: Path):
     folder = Path(os.environ.get("PRIOR_REINFORCE_SCREENSHOTS", tmp_path))
+    if folder != tmp_path:
+        page.wait_for_timeout(1200)  # what moves the arm cannot be pressed at once
     page.screenshot(path=folder / f"{name}.png")
 
 
