@@ -4,6 +4,7 @@ import matplotlib
 import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from prior_reinforce.report.style import (
     HIT,
@@ -50,6 +51,28 @@ def test_pictures_are_the_same_bytes_whatever_matplotlib_is_set_to(kind, tmp_pat
         second = save_figure(draw(), tmp_path / f"second.{kind}")
         assert matplotlib.rcParams["font.size"] == 30
     assert first.read_bytes() == second.read_bytes()
+
+
+@pytest.mark.parametrize("kind", ["png", "svg"])
+def test_pictures_are_the_same_bytes_whatever_the_last_digit_of_their_layout(kind, tmp_path):
+    class Rounds(ConstrainedLayoutEngine):
+        def execute(self, fig):
+            super().execute(fig)
+            for axes in fig.axes:
+                axes._set_position(np.array(axes.get_position(original=True).bounds) * (1 + 4e-16))
+
+    @drawing()
+    def draw(engine):
+        figure = new_figure(2, 1)
+        figure.set_layout_engine(engine)
+        for axes in figure.subplots(1, 2):
+            axes.plot([0, 1], [1, 0])
+            axes.set_aspect("equal")
+        return figure
+
+    exact = save_figure(draw(ConstrainedLayoutEngine()), tmp_path / f"exact.{kind}")
+    rounded = save_figure(draw(Rounds()), tmp_path / f"rounded.{kind}")
+    assert exact.read_bytes() == rounded.read_bytes()
 
 
 def test_a_picture_that_cannot_be_drawn_leaves_the_one_before(tmp_path, monkeypatch):

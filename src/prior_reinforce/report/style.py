@@ -12,6 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -32,6 +33,9 @@ _TRIAL_LAST = "#16406f"
 
 PICTURE_DPI = 200
 """Twice a screen's resolution; sharp on paper at the size drawn."""
+
+_PLACE_DIGITS = 9
+"""Of a figure's width: far below a pixel, far above rounding."""
 
 _RC: Any = {  # matplotlib releases differ in how they type this
     "font.family": "DejaVu Sans",  # comes with matplotlib, so pictures look alike everywhere
@@ -114,10 +118,16 @@ def add_legend(
 
 
 def lay_out(figure: Figure) -> None:
-    """Compute the layout once and freeze it; `savefig` would draw everything twice."""
+    """Compute the layout once and freeze it; `savefig` would draw everything twice.
+
+    Places are rounded: the solver orders its variables by where they lie in memory, so its last
+    digits differ from one time to the next, and an SVG names its clip paths by all of them.
+    """
     engine = figure.get_layout_engine()
     if engine is not None:
         engine.execute(figure)
+        for axes in figure.axes:
+            axes.set_position(np.round(axes.get_position(original=True).bounds, _PLACE_DIGITS))
         with rc_context({"figure.autolayout": False, "figure.constrained_layout.use": False}):
             figure.set_layout_engine(None)  # "none" would be drawn twice as well
 
