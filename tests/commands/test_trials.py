@@ -6,17 +6,13 @@ import sqlite3
 import sys
 from collections import Counter
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 
 from prior_reinforce.bench.robots.executors.lock import executing_lock, stop_executing
-from prior_reinforce.bench.robots.gate import GateSettings
-from prior_reinforce.bench.robots.report import LimitReport
 from prior_reinforce.bench.workspace import workspace as workspace_module
 from prior_reinforce.bench.workspace.log import Executing
 from prior_reinforce.bench.workspace.workspace import Workspace
-from prior_reinforce.commands.trials import _unchecked
 from prior_reinforce.session.session import Session
 from prior_reinforce.session.trials import Stage
 from tests.bench.robots.executors import toy_arm
@@ -565,16 +561,6 @@ def test_an_arm_that_checks_its_range_alone_has_not_checked_its_limits(
     arm(checks="the range of every joint")
     asked = asked_at(run, folder, monkeypatch, *ON_ARM)[0]
     assert "NOT checked: self-collision, the arm's limits, the table; " in asked
-
-
-@pytest.mark.parametrize("gated", [True, False])
-def test_the_box_for_the_tool_tip_holds_for_a_plan_that_the_gate_saw_and_no_approach(gated):
-    gate = GateSettings(box_low=(0.2, -0.6, 0.05), box_high=(0.9, 0.6, 1.2))
-    workspace = SimpleNamespace(manifest=SimpleNamespace(gate=gate))
-    trial = SimpleNamespace(verdict=LimitReport("fr3", "any", "", ()) if gated else None)
-    said = "the table, but for the tool tip" if gated else "the table"
-    assert _unchecked(workspace, trial, where=True)[-1] == said
-    assert _unchecked(workspace, trial, where=True, box=False)[-1] == "the table"
 
 
 def test_each_motion_is_confirmed_and_none_is_made_unasked(run, arm, folder, monkeypatch):

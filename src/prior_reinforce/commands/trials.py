@@ -11,16 +11,17 @@ from typing import Annotated
 import tyro
 from msgspec import to_builtins
 
-from prior_reinforce.bench.robots.executors.base import ArmDescription, ArmSettings, Motion
+from prior_reinforce.bench.robots.executors.base import ArmSettings, Motion
 from prior_reinforce.bench.robots.executors.lock import last_stop
 from prior_reinforce.bench.robots.plan_files import check_plan_path, write_plan
-from prior_reinforce.bench.robots.report import LimitReport
 from prior_reinforce.bench.workspace.records import AskRecord, trial_records
 from prior_reinforce.bench.workspace.status import (
     OUTDATED,
+    ask_to_move,
     execution_warning,
     next_step,
     say_expectation,
+    say_look,
     say_trial,
 )
 from prior_reinforce.bench.workspace.workspace import Workspace
@@ -148,8 +149,9 @@ class Ask(OnWorkspace):
             return self._on_arm(workspace, trial, stop_seen)
         elif trial.stage is not Stage.EXECUTED:
             command = None if self.check else self.run_command
-            unchecked = _unchecked(workspace, trial, where=self.where is not None)
-            if command is not None and not self.yes and not _may_move(trial, unchecked):
+            where = self.where is not None
+            asks = command is not None and not self.yes
+            if asks and not _says_yes(ask_to_move(workspace, trial, where=where)):
                 print("nothing moved; ask again when it may")
                 return 1
             # Last: the arm may be moved by hand while a person is asked.
@@ -177,7 +179,7 @@ class Ask(OnWorkspace):
             )
         speed = 1.0 if self.rehearse is None else self.rehearse
         look = workspace.look_at_arm(trial.number, arm, speed=speed)
-        print(f"{_say_arm(look.arm)}: {look.said}")
+        print(say_look(look))
         if look.refused:
             print(f"prior-reinforce: {look.refused}; nothing moved", file=sys.stderr)
             return 1
@@ -188,16 +190,12 @@ class Ask(OnWorkspace):
         if self.check:
             print("checked; nothing moved")
             return 0
-        limits = any("velocity" in check for check in look.arm.checked)
         motions: list[Motion] = [] if look.there else ["approach"]
         motions.append("trial" if self.rehearse is None else "rehearsal")
         for motion in motions:
             share = speed if motion == "rehearsal" else 1.0
-            seconds = look.approach if motion == "approach" else _seconds(trial, workspace) / share
-            said = f"{_SAID[motion].format(trial.number, 100 * share)}, {seconds:.1f} s"
-            approaches = motion == "approach"
-            nobody = _unchecked(workspace, trial, where=True, limits=limits, box=not approaches)
-            if not self.yes and not _may_move(trial, (*look.arm.unchecked, *nobody), said):
+            question = ask_to_move(workspace, trial, look, motion, share)
+            if not self.yes and not _says_yes(question):
                 print("nothing moved; ask again when it may")
                 return 1
             status = self._execute(workspace, trial.number, arm, stop_seen, motion, share)
@@ -346,7 +344,7 @@ class Ask(OnWorkspace):
 
     def _voids(self, number: int) -> bool:
         """Whether a person says that an aborted trial is no data."""
-        return sys.stdin.isatty() and _says_yes(f"void trial {number}? (yes/no) ")
+        return sys.stdin.isatty() and _says_yes(f"void trial {number}?")
 
 
 @dataclass(frozen=True)
@@ -496,19 +494,6 @@ def _print_outdated(workspace: Workspace) -> None:
         print(f"trial {trial.number} was {OUTDATED}")
 
 
-_SAID: dict[Motion, str] = {
-    "trial": "trial {} at full speed",
-    "rehearsal": "a rehearsal of trial {} at {:g} % of its speed",
-    "approach": "slowly to where trial {} begins",
-}
-
-
-def _seconds(trial: Trial, workspace: Workspace) -> float:
-    """How long a trial's plan takes at its own speed."""
-    assert trial.plan is not None
-    return (len(trial.plan) - 1) * workspace.manifest.format.dt
-
-
 def arm_of(workspace: Workspace, own: str | None) -> ArmSettings | None:
     """The arm that the manifest names; None where it names none.
 
@@ -530,42 +515,9 @@ def arm_of(workspace: Workspace, own: str | None) -> ArmSettings | None:
     return arm
 
 
-def _say_arm(arm: ArmDescription) -> str:
-    return f"{arm.model}{f', firmware {arm.firmware}' if arm.firmware else ''}"
-
-
-def _unchecked(
-    workspace: Workspace, trial: Trial, *, where: bool, limits: bool = False, box: bool = True
-) -> tuple[str, ...]:
-    """What nobody looked at, for the line that asks whether the arm may move.
-
-    Args:
-        workspace: The trial's.
-        trial: Whose plan it is.
-        where: Whether the arm was asked where it stands.
-        limits: Whether the arm held the plan against velocities of its own.
-        box: Whether the motion is the one that the gate saw; an approach is not.
-    """
-    gate, verdict = workspace.manifest.gate, trial.verdict
-    found = [] if where else ["where the arm stands"]
-    if not limits and (not isinstance(verdict, LimitReport) or "velocity" in verdict.unchecked):
-        found.append("the arm's limits")
-    found.append("self-collision")
-    box = box and gate.box_low is not None and verdict is not None
-    found.append("the table, but for the tool tip" if box else "the table")
-    return tuple(found)
-
-
-def _may_move(trial: Trial, unchecked: Sequence[str], said: str = "") -> bool:
-    """Whether a person says that the arm may move now."""
-    said = said or f"trial {trial.number} at full speed"
-    missing = f"NOT checked: {', '.join(dict.fromkeys(unchecked))}; " if unchecked else ""
-    return _says_yes(f"the arm will move ({said}); {missing}is the area clear? (yes/no) ")
-
-
 def _says_yes(question: str) -> bool:
     try:
-        return answer_to(question).strip().lower() == "yes"
+        return answer_to(f"{question} (yes/no) ").strip().lower() == "yes"
     except EOFError:
         return False
 

@@ -1,8 +1,13 @@
 """Where a workspace stands, in words."""
 
+from types import SimpleNamespace
+
+import numpy as np
 import pytest
 
-from prior_reinforce.bench.workspace.status import describe
+from prior_reinforce.bench.robots.gate import GateSettings
+from prior_reinforce.bench.robots.report import LimitReport
+from prior_reinforce.bench.workspace.status import ask_to_move, describe
 from tests.bench.workspace.planar import amend, ask, tell
 
 
@@ -49,3 +54,18 @@ def test_a_goal_far_outside_may_be_refused_and_a_nearer_one_is_named(workspace):
     assert "if it refuses, a goal nearer" in describe(workspace).splitlines()[-1]
     ask(workspace)  # nothing refused it
     assert "nearer" not in describe(workspace)
+
+
+@pytest.mark.parametrize("gated", [True, False])
+def test_the_box_for_the_tool_tip_holds_for_a_plan_that_the_gate_saw_and_no_approach(gated):
+    gate = GateSettings(box_low=(0.2, -0.6, 0.05), box_high=(0.9, 0.6, 1.2))
+    verdict = LimitReport("fr3", "any", "", ()) if gated else None
+    workspace = SimpleNamespace(
+        manifest=SimpleNamespace(gate=gate),
+        plan=lambda trial: SimpleNamespace(actions=np.zeros((2, 7))),
+        gate=lambda frames: verdict,
+    )
+    trial = SimpleNamespace(number=1)
+    said = "the table, but for the tool tip; is" if gated else "the table; is"
+    assert said in ask_to_move(workspace, trial, where=True)
+    assert "the table; is" in ask_to_move(workspace, trial, motion="approach", where=True)

@@ -4,15 +4,20 @@ from __future__ import annotations
 
 import shlex
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from prior_reinforce.bench.robots.executors.base import Motion
 from prior_reinforce.bench.workspace.log import Executed, Executing, NotExecuted, WorkspaceState
 from prior_reinforce.bench.workspace.manifest import UNKNOWN
 from prior_reinforce.bench.workspace.workspace import Workspace, workspace_around
 from prior_reinforce.registry import own_class
 from prior_reinforce.session.trials import Goal, Stage, Trial
 from prior_reinforce.wording import error_example, plain, say_place, say_reading, say_tolerance
+
+if TYPE_CHECKING:
+    from prior_reinforce.bench.robots.executors.drive import Look
 
 _TRIALS_SHOWN = 3
 _POOR_TRIALS = 3
@@ -21,6 +26,12 @@ _POOR_CHANCE = 0.35
 by eye leave a chance of a half where all else is known."""
 OUTDATED = "planned before a correction: unless it was thrown, void it and ask again"
 """What to do about a trial whose plan knows nothing of what was amended or voided since."""
+
+_MOTIONS: dict[Motion, str] = {
+    "trial": "trial {} at full speed",
+    "rehearsal": "a rehearsal of trial {} at {:g} % of its speed",
+    "approach": "slowly to where trial {} begins",
+}
 
 
 def describe(workspace: Workspace) -> str:
@@ -116,6 +127,48 @@ def execution_warning(workspace: Workspace, trial: Trial) -> str:
             if allowed is not None and distance > allowed[which]:
                 warnings.append(says.format(f"{distance:.3g} {unit}", allowed[which]))
     return plain("; ".join(warnings))
+
+
+def say_look(look: Look) -> str:
+    """Say which arm it is, and where it stands: `fr3, firmware 5.9: the arm is there`."""
+    firmware = f", firmware {look.arm.firmware}" if look.arm.firmware else ""
+    return plain(f"{look.arm.model}{firmware}: {look.said}")
+
+
+def ask_to_move(
+    workspace: Workspace,
+    trial: Trial,
+    look: Look | None = None,
+    motion: Motion = "trial",
+    speed: float = 1.0,
+    *,
+    where: bool = False,
+) -> str:
+    """What a person is asked before the arm moves: how it will, and what nobody checked.
+
+    Args:
+        workspace: The trial's.
+        trial: Whose plan it is.
+        look: What the arm said before; None where a command moves it.
+        motion: What it is to be moved for.
+        speed: Share of the plan's own speed, of a rehearsal.
+        where: Whether a command was asked where the arm stands.
+    """
+    plan, said = workspace.plan(trial), _MOTIONS[motion].format(trial.number, 100 * speed)
+    gate, verdict = workspace.manifest.gate, workspace.gate(plan.actions)
+    unchecked, limits = [] if where else ["where the arm stands"], False
+    if look is not None:
+        seconds = look.approach if motion == "approach" else plan.times[-1] / speed
+        said, unchecked = f"{said}, {seconds:.1f} s", [*look.arm.unchecked]
+        limits = any("velocity" in check for check in look.arm.checked)
+    if not limits and (verdict is None or "velocity" in verdict.unchecked):
+        unchecked.append("the arm's limits")
+    unchecked.append("self-collision")
+    # The gate holds the tool tip against its box on the plan, not on the way to its start.
+    boxed = gate.box_low is not None and verdict is not None and motion != "approach"
+    unchecked.append("the table, but for the tool tip" if boxed else "the table")
+    missing = ", ".join(dict.fromkeys(unchecked))
+    return plain(f"the arm will move ({said}); NOT checked: {missing}; is the area clear?")
 
 
 def call(workspace: Workspace, command: str, *words: object) -> str:
