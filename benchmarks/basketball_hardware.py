@@ -1,6 +1,6 @@
 """What V1's demonstrations do on the other hardware of Basketball Shot.
 
-    python benchmarks/basketball_hardware.py [--repetitions 32] [--seed 0] [--picture three.png]
+    python -m benchmarks.basketball_hardware [--repetitions 32] [--seed 0] [--picture three.png]
 
 prints, for V1, V2 and V3: how far the twelve plans of both prior sets land from where they land on
 V1 (undisturbed), how far the same plan, repeated with disturbances, spreads, and how many balls are
@@ -21,9 +21,9 @@ import mujoco
 import numpy as np
 from PIL import Image, ImageDraw
 
+from demonstrations import basketball as making
 from prior_reinforce.environment import Rollout
 from prior_reinforce.lab.tasks.basketball import HARDWARE, BasketballShot
-from prior_reinforce.lab.tasks.demonstrations import basketball as making
 
 DRAWN = 5
 """The demonstration of set A that the picture shows: one to the middle of the region."""

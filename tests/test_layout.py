@@ -13,16 +13,15 @@ TESTED_ELSEWHERE = {
     "adapters/base": "what the base does for all is in testing/test_adapters",
     "bench/robots/executors/base": "an interface, held to in bench/robots/executors/test_drive",
     "perception/base": "an interface, held to in testing/test_perception",
-    "lab/tasks/demonstrations/basketball": "made again in lab/tasks/demonstrations/test_init",
-    "lab/tasks/demonstrations/curling": "made again in lab/tasks/demonstrations/test_init",
-    "lab/tasks/demonstrations/fishing": "made again in lab/tasks/demonstrations/test_init",
-    "lab/tasks/demonstrations/so101": "made again in lab/tasks/demonstrations/test_init",
 }
 """Modules without a test file of their own, and where they are tested instead."""
 
 OF_THE_WHOLE = {
     "attacks/attacks": "generated attacks of every class: one table",
     "bench/console/page": "the page in a browser, from recordings to a hit",
+    "demonstrations/curling_round": "round the stone, by either side",
+    "demonstrations/init": "every shipped set is made again",
+    "demonstrations/teleoperation": "how a recorded motion differs from the one meant",
     "dependencies": "floors of libraries, and calls that would run code from data",
     "documentation": "what the docs show, run as it stands",
     "examples": "the examples as a reader runs them",

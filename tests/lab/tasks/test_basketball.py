@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from demonstrations import basketball as making
 from prior_reinforce.errors import ConfigurationError, InvalidGoalError
 from prior_reinforce.lab.tasks import panda
 from prior_reinforce.lab.tasks.basketball import (
@@ -16,7 +17,6 @@ from prior_reinforce.lab.tasks.basketball import (
     BasketballDisturbances,
     BasketballShot,
 )
-from prior_reinforce.lab.tasks.demonstrations import basketball as making
 
 GRAVITY = 9.81
 

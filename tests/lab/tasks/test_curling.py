@@ -4,6 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from demonstrations import curling as making
 from prior_reinforce.lab.tasks import panda
 from prior_reinforce.lab.tasks.curling import (
     FRICTION,
@@ -13,7 +14,6 @@ from prior_reinforce.lab.tasks.curling import (
     Curling,
     CurlingDisturbances,
 )
-from prior_reinforce.lab.tasks.demonstrations import curling as making
 from prior_reinforce.lab.tasks.inverse_kinematics import joint_paths
 from prior_reinforce.lab.tasks.panda_task import ArmDisturbances
 

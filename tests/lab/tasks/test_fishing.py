@@ -4,8 +4,8 @@ import mujoco
 import numpy as np
 import pytest
 
+from demonstrations import fishing as making
 from prior_reinforce.lab.tasks import panda
-from prior_reinforce.lab.tasks.demonstrations import fishing as making
 from prior_reinforce.lab.tasks.fishing import HOOK_RADIUS, TABLE, Fishing, FishingDisturbances
 from prior_reinforce.lab.tasks.panda_task import ArmDisturbances
 

@@ -32,7 +32,7 @@ from prior_reinforce.lab.arms.feetech import (
     Servo,
     ServoBus,
 )
-from prior_reinforce.lab.tasks.demonstrations.teleoperation import smoothstep
+from prior_reinforce.lab.tasks.following import smoothstep
 from prior_reinforce.lab.tasks.panda import STEP, setpoints
 from prior_reinforce.lab.tasks.panda_task import first_descent
 from prior_reinforce.lab.tasks.so101 import (

@@ -3,7 +3,7 @@ import pytest
 
 from prior_reinforce.errors import RenderingUnavailableError
 from prior_reinforce.lab.tasks import make_task
-from prior_reinforce.lab.tasks.demonstrations.teleoperation import follow
+from prior_reinforce.lab.tasks.following import follow
 from prior_reinforce.lab.tasks.zoo.pushes import Slide
 
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from prior_reinforce.arrays import Frames, Point, as_plans
 from prior_reinforce.environment import Rollout, Task
-from prior_reinforce.lab.tasks.demonstrations.teleoperation import follow
+from prior_reinforce.lab.tasks.following import follow
 from prior_reinforce.lab.tasks.zoo.human import Strategy, demonstrate
 from prior_reinforce.plans.motions import Demonstrations
 

@@ -22,7 +22,7 @@ from jaxtyping import Float
 
 from prior_reinforce.arrays import Frames, Point, Points
 from prior_reinforce.errors import ConfigurationError
-from prior_reinforce.lab.tasks.demonstrations.teleoperation import smoothstep
+from prior_reinforce.lab.tasks.following import smoothstep
 from prior_reinforce.plans.motions import Demonstrations
 
 if TYPE_CHECKING:

@@ -1,4 +1,7 @@
-"""The shipped prior sets; `python -m prior_reinforce.lab.tasks.demonstrations.NAME` made each."""
+"""How the shipped prior sets were made: `make demonstrations` makes them again, bit for bit.
+
+One module a task; `python -m demonstrations.NAME` makes its sets.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +9,7 @@ import argparse
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
+import prior_reinforce.lab.tasks as tasks
 from prior_reinforce.plans.motions import Demonstrations
 
 
@@ -14,7 +18,8 @@ def write_sets(
 ) -> None:
     """Make prior sets, and write them as `<recordings>_<set>.npz` where the command line says."""
     parser = argparse.ArgumentParser(description=about)
-    parser.add_argument("--folder", type=Path, default=Path(__file__).parent)
+    shipped = Path(tasks.__file__).parent / "demonstrations"
+    parser.add_argument("--folder", type=Path, default=shipped)
     folder = parser.parse_args().folder
     for name in names:
         make(name).save(folder / f"{recordings}_{name}.npz")

@@ -1,6 +1,6 @@
 """Make the prior sets of SO-101 Shot.
 
-    python -m prior_reinforce.lab.tasks.demonstrations.so101
+    python -m demonstrations.so101
 
 As for Basketball Shot: one motion pattern, with differences such as a person's repetitions have,
 solved in simulation for the reach and the direction that land the ball near a designed point. The
@@ -13,9 +13,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.special import betainc
 
+from demonstrations import write_sets
+from demonstrations.basketball import Knobs, ThrowVariation, aim
 from prior_reinforce.arrays import Plans, Points
-from prior_reinforce.lab.tasks.demonstrations import write_sets
-from prior_reinforce.lab.tasks.demonstrations.basketball import Knobs, ThrowVariation, aim
 from prior_reinforce.lab.tasks.so101 import SO101Shot
 from prior_reinforce.plans.motions import Demonstrations
 

@@ -1,8 +1,8 @@
-"""The chain from hand to recorded pose: filter, tracker, tremor."""
+"""The chain from hand to recorded pose: tracker, tremor."""
 
 import numpy as np
 
-from prior_reinforce.lab.tasks.demonstrations.teleoperation import Teleoperation, record, smoothstep
+from demonstrations.teleoperation import Teleoperation, record
 
 DT = 0.0125
 STILL = np.tile([0.4, 0.1, 0.3, 0.0, 0.2, -0.1], (140, 1))
@@ -12,19 +12,6 @@ def test_a_still_hand_of_a_perfect_tracker_records_what_was_meant():
     perfect = Teleoperation(tremor=0.0, tremor_angle=0.0, resolution=1e-9, resolution_angle=1e-9)
     recorded = record(STILL, DT, perfect, np.random.default_rng(0))
     np.testing.assert_allclose(recorded, STILL, atol=2e-9)
-
-
-def test_the_follower_answers_a_step_like_a_critically_damped_filter():
-    """1 - (1 + w t) exp(-w t), for the bilinear rule at 80 Hz and 2 Hz."""
-    hand = Teleoperation(
-        tremor=0.0, tremor_angle=0.0, resolution=1e-9, resolution_angle=1e-9, bandwidth=2.0
-    )
-    step = STILL.copy()
-    step[1:, 0] += 1.0
-    recorded = record(step, DT, hand, np.random.default_rng(0))[:, 0] - STILL[0, 0]
-    t = (np.arange(140) - 0.5) * DT
-    w = 2 * np.pi * 2.0
-    np.testing.assert_allclose(recorded[1:], (1 - (1 + w * t) * np.exp(-w * t))[1:], atol=5e-3)
 
 
 def test_tremor_is_slow_small_and_absent_at_both_ends():
@@ -40,9 +27,3 @@ def test_tremor_is_slow_small_and_absent_at_both_ends():
     spectrum = np.abs(np.fft.rfft(window * (middle - middle.mean(axis=1)[:, None]), axis=1)) ** 2
     frequency = np.fft.rfftfreq(60, DT)
     assert spectrum[:, frequency > 5].sum() < 0.05 * spectrum.sum()
-
-
-def test_smoothstep_is_the_minimum_jerk_course():
-    np.testing.assert_allclose(smoothstep(np.array([-1.0, 0.0, 0.5, 1.0, 2.0])), [0, 0, 0.5, 1, 1])
-    slope = np.gradient(smoothstep(np.linspace(0, 1, 1001)), 1e-3)
-    assert abs(slope.max() - 15 / 8) < 1e-4

@@ -1,6 +1,6 @@
 """Make the prior sets of `curling-round`: the bar goes round the stone, to its left or its right.
 
-    python -m prior_reinforce.lab.tasks.demonstrations.curling_round
+    python -m demonstrations.curling_round
 
 The hand begins beyond the stone and has to get behind it before it can push. Some go round by the
 left, some by the right, in no order; half-way between the two the bar sweeps the stone away. Ours.
@@ -13,15 +13,16 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
-from prior_reinforce.lab.tasks.curling import STONE_START, CurlingRound
-from prior_reinforce.lab.tasks.demonstrations import write_sets
-from prior_reinforce.lab.tasks.demonstrations.curling import (
+from demonstrations import write_sets
+from demonstrations.curling import (
     STROKE_TIME,
     PushVariation,
     push,
     speed_for,
 )
-from prior_reinforce.lab.tasks.demonstrations.teleoperation import record, smoothstep
+from demonstrations.teleoperation import record
+from prior_reinforce.lab.tasks.curling import STONE_START, CurlingRound
+from prior_reinforce.lab.tasks.following import smoothstep
 from prior_reinforce.lab.tasks.inverse_kinematics import joint_paths
 from prior_reinforce.plans.motions import Demonstrations
 

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
-from scipy.signal import cont2discrete, lfilter, lfiltic
+
+from prior_reinforce.lab.tasks.following import follow, smoothstep
 
 _Poses = Float[np.ndarray, "H 6"]
 
@@ -62,12 +63,6 @@ def _engaged(times: Float[np.ndarray, " H"]) -> Float[np.ndarray, "H 1"]:
     return (smoothstep(rising) * smoothstep(falling))[:, None]
 
 
-def smoothstep(part: Float[np.ndarray, "*s"]) -> Float[np.ndarray, "*s"]:
-    """From 0 to 1 along a minimum-jerk time course: 10 p^3 - 15 p^4 + 6 p^5."""
-    part = np.clip(part, 0.0, 1.0)
-    return part**3 * (10.0 - 15.0 * part + 6.0 * part**2)
-
-
 def _tremor(
     times: Float[np.ndarray, " H"], band: tuple[float, float], rng: np.random.Generator
 ) -> _Poses:
@@ -77,27 +72,3 @@ def _tremor(
     phases = rng.uniform(0.0, 2 * np.pi, (n_sines, 6))
     waves = np.sin(2 * np.pi * frequencies * times[:, None, None] + phases)
     return waves.sum(axis=1) * np.sqrt(2.0 / n_sines)
-
-
-def follow(path: Float[np.ndarray, "H D"], dt: float, bandwidth: float) -> Float[np.ndarray, "H D"]:
-    """Low-pass a path with a critically damped second-order filter, from rest.
-
-    Args:
-        path: What is to be followed, a row a frame.
-        dt: Time between frames, in [s].
-        bandwidth: Of the filter, in [Hz].
-    """
-    w = 2 * np.pi * bandwidth
-    numerator, denominator, _ = cont2discrete(([w * w], [1.0, 2 * w, w * w]), dt, method="bilinear")
-    numerator = numerator.ravel()
-    return np.column_stack(
-        [
-            lfilter(
-                numerator,
-                denominator,
-                axis,
-                zi=lfiltic(numerator, denominator, [axis[0]] * 2, [axis[0]] * 2),
-            )[0]
-            for axis in path.T
-        ]
-    )

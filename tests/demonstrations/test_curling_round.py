@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from demonstrations import curling_round as making
 from prior_reinforce.lab.tasks import make_task
 from prior_reinforce.lab.tasks.curling import STONE_START
-from prior_reinforce.lab.tasks.demonstrations import curling_round as making
 
 
 def test_the_two_ways_are_mirror_images_that_begin_beyond_the_push_and_end_at_it():

@@ -1,4 +1,4 @@
-"""Make Curling's prior sets: `python -m prior_reinforce.lab.tasks.demonstrations.curling`.
+"""Make Curling's prior sets: `python -m demonstrations.curling`.
 
 As in the paper, the demonstrations are tele-operated. The operator sets the bar behind the stone,
 turns it to the direction in which the stone shall go, and pushes in one stroke while tipping the
@@ -13,9 +13,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from jaxtyping import Float
 
+from demonstrations import write_sets
+from demonstrations.teleoperation import Teleoperation, record
 from prior_reinforce.lab.tasks.curling import FRICTION, STONE_RADIUS, STONE_START, Curling
-from prior_reinforce.lab.tasks.demonstrations import write_sets
-from prior_reinforce.lab.tasks.demonstrations.teleoperation import Teleoperation, record, smoothstep
+from prior_reinforce.lab.tasks.following import smoothstep
 from prior_reinforce.lab.tasks.inverse_kinematics import joint_paths, to_rotation_vector
 from prior_reinforce.plans.motions import Demonstrations
 

@@ -3,14 +3,8 @@
 import numpy as np
 import pytest
 
+from demonstrations import basketball, curling, curling_round, fishing, so101
 from prior_reinforce.lab.tasks import make_task
-from prior_reinforce.lab.tasks.demonstrations import (
-    basketball,
-    curling,
-    curling_round,
-    fishing,
-    so101,
-)
 
 MAKING = {
     "basketball-v1": basketball.make,

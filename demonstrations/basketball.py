@@ -1,6 +1,6 @@
 """Make the prior sets of Basketball Shot V1.
 
-    python -m prior_reinforce.lab.tasks.demonstrations.basketball
+    python -m demonstrations.basketball
 
 As in the paper, the demonstrations are found in simulation and spread over the reachable region.
 All are one motion pattern, with differences such as a person's repetitions have: when it starts,
@@ -18,10 +18,10 @@ import numpy as np
 from jaxtyping import Float
 from scipy.special import betainc
 
+from demonstrations import write_sets
 from prior_reinforce.arrays import Plans, Points
 from prior_reinforce.lab.tasks.basketball import BasketballShot
 from prior_reinforce.lab.tasks.basketball_fr3 import BasketballFR3
-from prior_reinforce.lab.tasks.demonstrations import write_sets
 from prior_reinforce.plans.motions import Demonstrations
 
 HORIZON = 140

@@ -1,4 +1,4 @@
-"""Make Fishing's prior sets: `python -m prior_reinforce.lab.tasks.demonstrations.fishing`.
+"""Make Fishing's prior sets: `python -m demonstrations.fishing`.
 
 As in the paper, the demonstrations are tele-operated. The operator faces the magnet, raises the rod
 behind, and casts forward and down so that the hook swings out ahead of the rod's tip; to cast
@@ -14,9 +14,10 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
-from prior_reinforce.lab.tasks.demonstrations import write_sets
-from prior_reinforce.lab.tasks.demonstrations.teleoperation import Teleoperation, record, smoothstep
+from demonstrations import write_sets
+from demonstrations.teleoperation import Teleoperation, record
 from prior_reinforce.lab.tasks.fishing import Fishing
+from prior_reinforce.lab.tasks.following import smoothstep
 from prior_reinforce.plans.motions import Demonstrations
 
 HORIZON = 140

@@ -1,0 +1,37 @@
+"""Time courses of a motion from rest to rest, and of an arm that follows another motion."""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Float
+from scipy.signal import cont2discrete, lfilter, lfiltic
+
+
+def smoothstep(part: Float[np.ndarray, "*s"]) -> Float[np.ndarray, "*s"]:
+    """From 0 to 1 along a minimum-jerk time course: 10 p^3 - 15 p^4 + 6 p^5."""
+    part = np.clip(part, 0.0, 1.0)
+    return part**3 * (10.0 - 15.0 * part + 6.0 * part**2)
+
+
+def follow(path: Float[np.ndarray, "H D"], dt: float, bandwidth: float) -> Float[np.ndarray, "H D"]:
+    """Low-pass a path with a critically damped second-order filter, from rest.
+
+    Args:
+        path: What is to be followed, a row a frame.
+        dt: Time between frames, in [s].
+        bandwidth: Of the filter, in [Hz].
+    """
+    w = 2 * np.pi * bandwidth
+    numerator, denominator, _ = cont2discrete(([w * w], [1.0, 2 * w, w * w]), dt, method="bilinear")
+    numerator = numerator.ravel()
+    return np.column_stack(
+        [
+            lfilter(
+                numerator,
+                denominator,
+                axis,
+                zi=lfiltic(numerator, denominator, [axis[0]] * 2, [axis[0]] * 2),
+            )[0]
+            for axis in path.T
+        ]
+    )
