@@ -27,6 +27,7 @@ from .bench.robots.plan_files import read_plan as read_plan
 from .bench.robots.plan_files import write_plan as write_plan
 from .bench.robots.presets import robot_limits as robot_limits
 from .bench.robots.report import LimitReport as LimitReport
+from .bench.workspace.manifest import NewWorkspace as NewWorkspace
 from .bench.workspace.records import AdviceRecord as AdviceRecord
 from .bench.workspace.records import AskRecord as AskRecord
 from .bench.workspace.records import GoalRecord as GoalRecord

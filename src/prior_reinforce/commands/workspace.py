@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -15,6 +15,7 @@ from prior_reinforce.adapters import ADAPTERS, DEFAULT_ADAPTER
 from prior_reinforce.arrays import Point
 from prior_reinforce.bench.robots import RobotLimits
 from prior_reinforce.bench.robots.presets import PRESETS
+from prior_reinforce.bench.workspace.manifest import NewWorkspace
 from prior_reinforce.bench.workspace.records import status_record, trial_records, trials_table
 from prior_reinforce.bench.workspace.status import describe, say_trial
 from prior_reinforce.bench.workspace.workspace import Workspace
@@ -28,8 +29,8 @@ from prior_reinforce.files import check_path
 from prior_reinforce.wording import read_place, say_place, say_tolerance
 
 
-@dataclass(frozen=True)
-class New:
+@dataclass(frozen=True, kw_only=True)
+class New(NewWorkspace):
     """Make a workspace: a folder with a commented manifest.
 
     For example:
@@ -40,38 +41,18 @@ class New:
 
     folder: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="WORKSPACE")]
     """Folder to make."""
-    name: str | None = None
-    """Name of the task; the folder's name if not given."""
-    action_names: tuple[str, ...] | None = None
-    """Names of the action dimensions; the robot's joints if not given, with --robot none those that
-    the first import has."""
-    action_units: tuple[str, ...] = ("rad",)
-    """Unit of each action dimension; a single one holds for all."""
-    gripper: str | None = None
-    """Unit of a gripper's opening, one more dimension: percent, m, steps, ..., or none; an SO-101
-    has one in percent if not given."""
-    dt: float = 0.0125
-    """Time between two frames of a plan, in seconds."""
-    outcome_names: tuple[str, ...] = ("x", "y")
-    """Names of the outcome's components."""
-    outcome_units: tuple[str, ...] = ("m",)
-    """Unit of each component; a single one holds for all."""
-    tolerance: tuple[float, ...] = (0.015,)
-    """Largest distance from the goal that counts as reached, in the outcome's units: one number,
-    or one for each component, which mixed units need."""
     robot: Annotated[
         str,
         tyro.conf.arg(
             help=f"Whose limits hold: {', '.join(PRESETS)}, the path of a .urdf, or none."
         ),
     ] = "panda"
-    tip: str | None = None
-    """Link of the URDF that is the flange; tool0, flange or the last that turns if not given."""
+    tolerance: tuple[float, ...] = (0.015,)
 
     def run(self) -> None:
         """Write the folder."""
-        settings = {each.name: getattr(self, each.name) for each in fields(self)}
-        with Workspace.create(**settings) as workspace:
+        text = self.manifest(self.folder.resolve().name)
+        with Workspace.create(self.folder, text) as workspace:
             print(f"workspace made in {self.folder}; look through {self.folder / 'workspace.toml'}")
             if workspace.manifest.robot is not None:
                 print(_say_robot(workspace.manifest.robot))

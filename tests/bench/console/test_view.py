@@ -7,7 +7,7 @@ from prior_reinforce.bench.console.view import motion_of, state_of, step_of
 from prior_reinforce.bench.robots import robot_limits
 from prior_reinforce.bench.robots.kinematics import tool_tip
 from prior_reinforce.bench.workspace.log import Moved, Moving
-from prior_reinforce.bench.workspace.manifest import new_manifest
+from prior_reinforce.bench.workspace.manifest import NewWorkspace
 from prior_reinforce.bench.workspace.workspace import Workspace
 from prior_reinforce.errors import TrialStateError
 from prior_reinforce.lab.tasks import make_task
@@ -88,7 +88,7 @@ def panda(tmp_path_factory):
     task = make_task("basketball-v1")
     demos = task.demonstrations("A")
     names, dt = demos.format.names, demos.format.dt
-    text = new_manifest("shot", robot="panda", action_names=names, dt=dt)
+    text = NewWorkspace(robot="panda", action_names=names, dt=dt).manifest("shot")
     with Workspace.create(tmp_path_factory.mktemp("panda") / "w", text) as workspace:
         workspace.import_demonstrations(demos, "A")
         workspace.learn("interpolation")

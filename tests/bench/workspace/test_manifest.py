@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from prior_reinforce.bench.robots import robot_limits
 from prior_reinforce.bench.robots.kinematics import tool_tip
-from prior_reinforce.bench.workspace.manifest import new_manifest, parse_manifest, read_manifest
+from prior_reinforce.bench.workspace.manifest import NewWorkspace, parse_manifest, read_manifest
 from prior_reinforce.errors import ConfigurationError, FileFormatError
 from tests.bench.workspace.planar import manifest
 
@@ -100,7 +100,7 @@ def test_acceleration_and_jerk_may_be_left_out_and_then_are_not_known(tmp_path):
 def test_an_arm_that_is_written_out_is_read_back(tmp_path, robot):
     arm = robot_limits(robot)
     own = replace(arm, robot="my own")
-    text = new_manifest("own", dt=0.01, outcome_names=["x"], tolerance=0.01, robot=own)
+    text = NewWorkspace(dt=0.01, outcome_names=["x"], tolerance=0.01, robot=own).manifest("own")
     again = load_manifest(write(tmp_path, text)).robot
     assert again.source == arm.source
     for key in ("lower", "upper", "velocity", "acceleration", "jerk"):

@@ -148,55 +148,77 @@ _LENGTH_OF_AXIS = 1e-3
 """By how much an axis may differ from length 1: three written digits."""
 
 
-def new_manifest(
-    name: str,
-    *,
-    robot: str | RobotLimits = "panda",
-    tip: str | None = None,
-    action_names: Sequence[str] | None = None,
-    action_units: Sequence[str] = ("rad",),
-    gripper: str | None = None,
-    dt: float = 0.0125,
-    outcome_names: Sequence[str] = ("x", "y"),
-    outcome_units: Sequence[str] = ("m",),
-    tolerance: float | Sequence[float] = 0.015,
-) -> str:
-    """Return the text of a manifest; arguments and errors as in `Workspace.create`."""
-    known = robot if isinstance(robot, str) else robot.robot
-    is_file = known.lower().endswith((".urdf", ".xml", ".xacro"))
-    if tip is not None and not is_file:
-        raise ConfigurationError(f"--tip is a link of a URDF, and --robot is {known}; drop it")
-    if isinstance(robot, str) and robot != "none":
-        robot = read_urdf(Path(robot), tip) if is_file else robot_limits(robot)
-    own, unit = GRIPPERS.get(known.lower(), ("gripper", "none"))
-    unit = gripper or (unit if action_names is None else "none")
-    names = action_names
-    if names is None:
-        names = UNKNOWN if isinstance(robot, str) else robot.joint_names
-    if tuple(names) == UNKNOWN and unit != "none":
-        raise ConfigurationError(
-            "--gripper adds a column to an arm's joints, and --robot is none; name all columns "
-            "with --action-names, or drop it: the first import then takes what was recorded"
+@dataclass(frozen=True, kw_only=True)
+class NewWorkspace:
+    """What a new workspace is about."""
+
+    name: str | None = None
+    """Name of the task; the folder's name if not given."""
+    robot: str | RobotLimits = "panda"
+    """Whose limits hold: a preset, the path of a .urdf, limits, or none."""
+    tip: str | None = None
+    """Link of the URDF that is the flange; tool0, flange or the last that turns if not given."""
+    action_names: tuple[str, ...] | None = None
+    """Names of the action dimensions; the robot's joints if not given, with no robot those that
+    the first import has."""
+    action_units: tuple[str, ...] = ("rad",)
+    """Unit of each action dimension; a single one holds for all."""
+    gripper: str | None = None
+    """Unit of a gripper's opening, one more dimension: percent, m, steps, ..., or none; an SO-101
+    has one in percent if not given."""
+    dt: float = 0.0125
+    """Time between two frames of a plan, in seconds."""
+    outcome_names: tuple[str, ...] = ("x", "y")
+    """Names of the outcome's components."""
+    outcome_units: tuple[str, ...] = ("m",)
+    """Unit of each component; a single one holds for all."""
+    tolerance: float | Sequence[float] = 0.015
+    """Largest distance from the goal that counts as reached, in the outcome's units: one number,
+    or one for each component, which mixed units need."""
+
+    def manifest(self, folder: str) -> str:
+        """Return the text of its manifest; the folder's name is the task's if it has none.
+
+        Raises:
+            ConfigurationError: A setting that has no use, or an unknown robot.
+            FileFormatError: The URDF cannot be read.
+        """
+        robot = self.robot
+        known = robot if isinstance(robot, str) else robot.robot
+        is_file = known.lower().endswith((".urdf", ".xml", ".xacro"))
+        if self.tip is not None and not is_file:
+            raise ConfigurationError(f"--tip is a link of a URDF, and --robot is {known}; drop it")
+        if isinstance(robot, str) and robot != "none":
+            robot = read_urdf(Path(robot), self.tip) if is_file else robot_limits(robot)
+        own, unit = GRIPPERS.get(known.lower(), ("gripper", "none"))
+        unit = self.gripper or (unit if self.action_names is None else "none")
+        names: Sequence[str] | None = self.action_names
+        if names is None:
+            names = UNKNOWN if isinstance(robot, str) else robot.joint_names
+        if tuple(names) == UNKNOWN and unit != "none":
+            raise ConfigurationError(
+                "--gripper adds a column to an arm's joints, and --robot is none; name all columns "
+                "with --action-names, or drop it: the first import then takes what was recorded"
+            )
+        units = _spread(self.action_units, len(names))
+        if unit != "none":
+            names, units = (*names, own), (*units, unit)
+        given = robot if isinstance(robot, RobotLimits) and robot.robot not in PRESETS else None
+        numbers = np.atleast_1d(self.tolerance).tolist()
+        text = TEMPLATE.format(
+            name=_quoted(self.name or folder)[1:-1],
+            names=_list(names),
+            units=_list(units),
+            dt=self.dt,
+            outcome_names=_list(self.outcome_names),
+            outcome_units=_list(_spread(self.outcome_units, len(self.outcome_names))),
+            tolerance=numbers[0] if len(numbers) == 1 else numbers,
+            robot="given" if given is not None else known,
         )
-    units = _spread(action_units, len(names))
-    if unit != "none":
-        names, units = (*names, own), (*units, unit)
-    given = robot if isinstance(robot, RobotLimits) and robot.robot not in PRESETS else None
-    numbers = np.atleast_1d(tolerance).tolist()
-    text = TEMPLATE.format(
-        name=_quoted(name)[1:-1],
-        names=_list(names),
-        units=_list(units),
-        dt=dt,
-        outcome_names=_list(outcome_names),
-        outcome_units=_list(_spread(outcome_units, len(outcome_names))),
-        tolerance=numbers[0] if len(numbers) == 1 else numbers,
-        robot="given" if given is not None else known,
-    )
-    if given is None:
-        return text
-    start, end = text.index("# joint_names ="), text.index("# The program's own lines")
-    return text[:start] + _written_out(given) + "\n" + text[end:]
+        if given is None:
+            return text
+        start, end = text.index("# joint_names ="), text.index("# The program's own lines")
+        return text[:start] + _written_out(given) + "\n" + text[end:]
 
 
 def with_columns(text: str, names: Sequence[str], units: Sequence[str]) -> str:

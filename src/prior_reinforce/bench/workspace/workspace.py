@@ -46,7 +46,7 @@ from prior_reinforce.bench.workspace.manifest import (
     MANIFEST_FILE,
     UNKNOWN,
     Manifest,
-    new_manifest,
+    NewWorkspace,
     parse_manifest,
     read_manifest,
     with_columns,
@@ -71,7 +71,6 @@ from prior_reinforce.wording import as_html
 if TYPE_CHECKING:
     from prior_reinforce.adapters.base import Adapter
     from prior_reinforce.bench.importing import ImportResult, Preprocessing
-    from prior_reinforce.bench.robots import RobotLimits
     from prior_reinforce.bench.robots.executors.command import CommandResult
     from prior_reinforce.bench.robots.executors.drive import Look
     from prior_reinforce.bench.robots.report import LimitReport
@@ -134,40 +133,14 @@ class Workspace:
 
     @classmethod
     def create(
-        cls,
-        folder: str | os.PathLike[str],
-        manifest: str | None = None,
-        *,
-        name: str | None = None,
-        robot: str | RobotLimits = "panda",
-        tip: str | None = None,
-        action_names: Sequence[str] | None = None,
-        action_units: Sequence[str] = ("rad",),
-        gripper: str | None = None,
-        dt: float = 0.0125,
-        outcome_names: Sequence[str] = ("x", "y"),
-        outcome_units: Sequence[str] = ("m",),
-        tolerance: float | Sequence[float] = 0.015,
+        cls, folder: str | os.PathLike[str], manifest: str | None = None, **settings: Any
     ) -> Self:
         """Make a workspace, as `prior-reinforce new` does; nothing is made if a value is wrong.
 
         Args:
             folder: Folder to make.
-            manifest: Text of its manifest, in place of all that follows.
-            name: Of the task; the folder's name if not given.
-            robot: Whose limits hold: a preset (`robots.presets.PRESETS`), the path of a .urdf,
-                limits, or `none`.
-            tip: Link of the URDF that is the flange; tool0, flange or the last that turns if not
-                given.
-            action_names: Of the action dimensions; the robot's joints if not given, with no robot
-                those that the first import has.
-            action_units: Of each action dimension; a single one holds for all.
-            gripper: Unit of a gripper's opening, one more dimension, or `none`; a preset's own if
-                not given.
-            dt: Time between two frames of a plan, in [s].
-            outcome_names: Of the outcome's components.
-            outcome_units: Of each component; a single one holds for all.
-            tolerance: epsilon: one number, or one for each component, in its unit.
+            manifest: Text of its manifest, in place of settings.
+            settings: Fields of `NewWorkspace`: `robot="ur5e"`, `dt=0.01`, ...
 
         Raises:
             WorkspaceError: The folder holds something already, or cannot be written.
@@ -175,20 +148,7 @@ class Workspace:
             ConfigurationError: A wrong value.
         """
         folder = Path(folder)
-        text = manifest
-        if text is None:
-            text = new_manifest(
-                name or folder.resolve().name,
-                robot=robot,
-                tip=tip,
-                action_names=action_names,
-                action_units=action_units,
-                gripper=gripper,
-                dt=dt,
-                outcome_names=outcome_names,
-                outcome_units=outcome_units,
-                tolerance=tolerance,
-            )
+        text = manifest or NewWorkspace(**settings).manifest(folder.resolve().name)
         parse_manifest(text, folder / MANIFEST_FILE)
         with named_disk_errors(folder):
             sweep(folder)

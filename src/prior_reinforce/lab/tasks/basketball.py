@@ -61,11 +61,11 @@ HARDWARE = {
 
 
 @dataclass(frozen=True)
-class BasketballDisturbances:
+class ShotDisturbances:
     """What differs between two executions of one plan; standard deviations, ours.
 
-    Together they spread the landing point of a repeated plan by about half a centimetre along
-    each axis (docs/tasks/basketball.md), which is what a good throwing arm does.
+    Together these of Basketball Shot spread the landing point of a repeated plan by about half a
+    centimetre along each axis (docs/tasks/basketball.md), which is what a good throwing arm does.
     """
 
     pose: float = 0.003
@@ -73,24 +73,63 @@ class BasketballDisturbances:
     servo: float = 0.06
     """Relative error of every joint's servo stiffness and damping."""
     ball: float = 0.001
-    """Where the ball is put in the spoon, along each of the bowl's two axes, in [m]."""
+    """Where the ball is put in the bowl, along each of the bowl's two axes, in [m]."""
     friction: float = 0.10
-    """Relative error of the friction between ball and spoon."""
+    """Relative error of the friction between ball and bowl."""
 
 
-class BasketballShot(PandaTask):
+class Shot(PandaTask):
+    """A ball that lies in a bowl on the arm is thrown through the plane of a rim on the table."""
+
+    scene: TableScene
+    lead_in = 0.2  # the ball settles in the bowl
+    lead_out = 0.9  # the longest fall takes 0.5 s
+    batch = 64  # 40 MB of recorded states
+
+    def __init__(self, disturbances: ShotDisturbances) -> None:
+        """Compile the scene."""
+        self.disturbances = disturbances
+        super().__init__()
+        self._bowl = np.flatnonzero(self.model.geom_bodyid == self.model.body("tool/bowl").id)
+        self.ball = int(self.model.jnt_qposadr[self.model.joint("ball").id])
+        """Where the ball's position begins in the state `qpos`."""
+
+    def _draw(self, n: int, rng: np.random.Generator) -> Draws:
+        size = self.disturbances
+        pose = rng.normal(0.0, size.pose, (n, self.format.action_dim))
+        ball = rng.normal(0.0, size.ball, (n, 2))
+        servo = 1.0 + rng.normal(0.0, size.servo, (n, self.format.action_dim))
+        return Draws(pose, servo, 1.0 + rng.normal(0.0, size.friction, (n, 1)), ball)
+
+    def _disturb(self, model: mujoco.MjModel, scene: Float[np.ndarray, "1"]) -> None:
+        model.geom_friction[self._bowl, 0] *= scene[0]
+
+    def _place(self, data: mujoco.MjData, start: Float[np.ndarray, "2"] | None) -> None:
+        """The ball lies in the bowl."""
+        seat = data.site("tool/seat")
+        offset = 0.0 if start is None else seat.xmat.reshape(3, 3)[:, :2] @ start
+        data.qpos[self.ball : self.ball + 3] = seat.xpos + offset
+
+    def _result(
+        self, states: Float[np.ndarray, "steps s"], sensors: Float[np.ndarray, "steps m"]
+    ) -> Rollout:
+        """Where the ball's centre first falls through the rim's plane, nothing in the way."""
+        descent = first_descent(states[:, 1 + self.ball : 4 + self.ball], self.scene.plane_height)
+        if descent is None:
+            return self._lost(states)
+        row, part, place = descent
+        # State k of a rollout is the one after k + 1 steps.
+        return Rollout(place, True, self._key_frame(states[row + 1], row + 1 + part))
+
+
+class BasketballShot(Shot):
     """Basketball Shot (paper, Section III and Figure 3), in MuJoCo."""
 
     format = PlanFormat(JOINT_NAMES, ("rad",) * N_JOINTS, 0.0125)
     region = np.array([[0.92, -0.26], [1.18, 0.26]])
     recordings = "basketball"
-    lead_in = 0.2  # the ball settles in the spoon
-    lead_out = 0.9  # the longest fall takes 0.5 s
-    batch = 64  # 40 MB of recorded states
 
-    def __init__(
-        self, hardware: str = "v1", disturbances: BasketballDisturbances | None = None
-    ) -> None:
+    def __init__(self, hardware: str = "v1", disturbances: ShotDisturbances | None = None) -> None:
         """Compile the scene.
 
         Args:
@@ -107,34 +146,4 @@ class BasketballShot(PandaTask):
         self.name = f"basketball-{hardware}"
         self.xml, self.tolerance = HARDWARE[hardware].xml, HARDWARE[hardware].tolerance
         self.scene = HARDWARE[hardware].scene
-        self.disturbances = disturbances or BasketballDisturbances()
-        super().__init__()
-        self._bowl = np.flatnonzero(self.model.geom_bodyid == self.model.body("tool/bowl").id)
-        self._ball = self.model.jnt_qposadr[self.model.joint("ball").id]
-
-    def _draw(self, n: int, rng: np.random.Generator) -> Draws:
-        size = self.disturbances
-        pose = rng.normal(0.0, size.pose, (n, N_JOINTS))
-        ball = rng.normal(0.0, size.ball, (n, 2))
-        servo = 1.0 + rng.normal(0.0, size.servo, (n, N_JOINTS))
-        return Draws(pose, servo, 1.0 + rng.normal(0.0, size.friction, (n, 1)), ball)
-
-    def _disturb(self, model: mujoco.MjModel, scene: Float[np.ndarray, "1"]) -> None:
-        model.geom_friction[self._bowl, 0] *= scene[0]
-
-    def _place(self, data: mujoco.MjData, start: Float[np.ndarray, "2"] | None) -> None:
-        """The ball lies in the spoon."""
-        seat = data.site("tool/seat")
-        offset = 0.0 if start is None else seat.xmat.reshape(3, 3)[:, :2] @ start
-        data.qpos[self._ball : self._ball + 3] = seat.xpos + offset
-
-    def _result(
-        self, states: Float[np.ndarray, "steps s"], sensors: Float[np.ndarray, "steps m"]
-    ) -> Rollout:
-        """Where the ball's centre first falls through the rim's plane, the hoop out of the way."""
-        descent = first_descent(states[:, 1 + self._ball : 4 + self._ball], RIM_HEIGHT)
-        if descent is None:
-            return self._lost(states)
-        row, part, place = descent
-        # State k of a rollout is the one after k + 1 steps.
-        return Rollout(place, True, self._key_frame(states[row + 1], row + 1 + part))
+        super().__init__(disturbances or ShotDisturbances())

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from prior_reinforce.lab.tasks.basketball import BasketballDisturbances, BasketballShot
+from prior_reinforce.lab.tasks.basketball import BasketballShot, ShotDisturbances
 
 _STIFFNESS = np.array([4500.0, 4500.0, 3500.0, 3500.0, 2000.0, 2000.0, 2000.0])
 """Of each joint's servo, in [Nm/rad]: the position actuators of MuJoCo Menagerie's FR3 (fr3v2), as
@@ -23,7 +23,7 @@ class BasketballFR3(BasketballShot):
 
     recordings = "basketball_fr3"
 
-    def __init__(self, disturbances: BasketballDisturbances | None = None) -> None:
+    def __init__(self, disturbances: ShotDisturbances | None = None) -> None:
         """Compile the scene; argument as in `BasketballShot`."""
         super().__init__("v1", disturbances)
         self.name = "basketball-fr3"

@@ -8,15 +8,12 @@ scene is in `so101.xml`, the arm in `so101_arm.xml`; lengths in [m], table frame
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
-import mujoco
 import numpy as np
 from jaxtyping import Float
 
-from prior_reinforce.environment import Rollout, SeenObject, TableScene
+from prior_reinforce.environment import SeenObject, TableScene
+from prior_reinforce.lab.tasks.basketball import Shot, ShotDisturbances
 from prior_reinforce.lab.tasks.panda import STEP
-from prior_reinforce.lab.tasks.panda_task import Draws, PandaTask, first_descent
 from prior_reinforce.plans.interpolation import join_frames
 from prior_reinforce.plans.motions import PlanFormat
 
@@ -52,22 +49,11 @@ def servo_speed(
     return np.clip((goal - position) / lag, -SPEED, SPEED)
 
 
-@dataclass(frozen=True)
-class SO101Disturbances:
-    """What differs between two executions of one plan; standard deviations, ours."""
-
-    pose: float = 0.003
-    """Offset of every joint, kept through the execution: play of the gears, a step of the encoder
-    is 1.5 mrad, in [rad]."""
-    servo: float = 0.05
-    """Relative error of the position loop's stiffness and damping."""
-    ball: float = 0.0005
-    """Where the ball is put in the scoop, along each of the bowl's two axes, in [m]."""
-    friction: float = 0.10
-    """Relative error of the friction between ball and scoop."""
+DISTURBANCES = ShotDisturbances(pose=0.003, servo=0.05, ball=0.0005, friction=0.10)
+"""Ours; of the pose, play of the gears: a step of the encoder is 1.5 mrad."""
 
 
-class SO101Shot(PandaTask):
+class SO101Shot(Shot):
     """SO-101 Shot (ours), in MuJoCo."""
 
     name = "so101"
@@ -83,21 +69,10 @@ class SO101Shot(PandaTask):
     xml = "so101.xml"
     flange = "arm/gripper"
     recordings = "so101"
-    lead_in = 0.2  # the ball settles in the scoop
-    lead_out = 0.9  # the longest fall takes 0.4 s
-    batch = 64
 
-    def __init__(self, disturbances: SO101Disturbances | None = None) -> None:
-        """Compile the scene.
-
-        Args:
-            disturbances: How repeated executions differ; the documented ones when not given.
-        """
-        self.disturbances = disturbances or SO101Disturbances()
-        super().__init__()
-        self._bowl = np.flatnonzero(self.model.geom_bodyid == self.model.body("tool/bowl").id)
-        self.ball = int(self.model.jnt_qposadr[self.model.joint("ball").id])
-        """Where the ball's position begins in the state `qpos`."""
+    def __init__(self, disturbances: ShotDisturbances = DISTURBANCES) -> None:
+        """Compile the scene; repeated executions differ as documented unless told."""
+        super().__init__(disturbances)
         self.feed_forward = -self.model.actuator_biasprm[:, 2] / self.model.actuator_gainprm[:, 0]
         """What the model's own servos are told ahead by, in [s], so that they are where they should
         be; see `panda.servo_controls`."""
@@ -118,29 +93,3 @@ class SO101Shot(PandaTask):
             controls[:, step] = position + self.feed_forward * speed
             position += STEP * speed
         return controls
-
-    def _draw(self, n: int, rng: np.random.Generator) -> Draws:
-        size = self.disturbances
-        pose = rng.normal(0.0, size.pose, (n, 5))
-        ball = rng.normal(0.0, size.ball, (n, 2))
-        servo = 1.0 + rng.normal(0.0, size.servo, (n, 5))
-        return Draws(pose, servo, 1.0 + rng.normal(0.0, size.friction, (n, 1)), ball)
-
-    def _disturb(self, model: mujoco.MjModel, scene: Float[np.ndarray, "1"]) -> None:
-        model.geom_friction[self._bowl, 0] *= scene[0]
-
-    def _place(self, data: mujoco.MjData, start: Float[np.ndarray, "2"] | None) -> None:
-        """The ball lies in the scoop."""
-        seat = data.site("tool/seat")
-        offset = 0.0 if start is None else seat.xmat.reshape(3, 3)[:, :2] @ start
-        data.qpos[self.ball : self.ball + 3] = seat.xpos + offset
-
-    def _result(
-        self, states: Float[np.ndarray, "steps s"], sensors: Float[np.ndarray, "steps m"]
-    ) -> Rollout:
-        """Where the ball's centre first falls through the rim's plane, the cup out of the way."""
-        descent = first_descent(states[:, 1 + self.ball : 4 + self.ball], RIM_HEIGHT)
-        if descent is None:
-            return self._lost(states)
-        row, part, place = descent
-        return Rollout(place, True, self._key_frame(states[row + 1], row + 1 + part))
