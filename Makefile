@@ -51,7 +51,7 @@ $(VENV)/.core: pyproject.toml constraints.txt
 	touch $@
 
 $(VENV)/.all: $(VENV)/.core
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[diffusion,lab,dev,baselines,vlm,lerobot,hdf5,ros,zarr,excel,ray,fr3,console,camera]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[diffusion,lab,dev,baselines,vlm,lerobot,hdf5,ros,zarr,excel,ray,fr3,ur,console,camera]'
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps franka-sim==1.1.7
 	touch $@
 

@@ -31,6 +31,8 @@ EXTRA_OF = {
     "numcodecs": "zarr",
     "python_calamine": "excel",
     "pylibfranka": "fr3",
+    "rtde_control": "ur",
+    "rtde_receive": "ur",
     "starlette": "console",
     "uvicorn": "console",
     "anyio": "console",

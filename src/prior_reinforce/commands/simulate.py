@@ -22,6 +22,8 @@ from prior_reinforce.wording import say_reading
 
 if TYPE_CHECKING:
     from prior_reinforce.environment import Rollout, Task
+    from prior_reinforce.lab.arms.fr3 import SimulatedFR3
+    from prior_reinforce.lab.arms.ur import SimulatedUR
     from prior_reinforce.lab.tasks.panda_task import PandaTask
 
 
@@ -34,8 +36,9 @@ class Simulate:
         prior-reinforce simulate so101 --hand
     """
 
-    arm: Annotated[Literal["fr3", "so101"], tyro.conf.Positional]
-    """Which: fr3 (Franka Research 3, for libfranka's clients), so101 (for LeRobot)."""
+    arm: Annotated[Literal["fr3", "so101", "ur"], tyro.conf.Positional]
+    """Which: fr3 (Franka Research 3, for libfranka's clients), so101 (for LeRobot), ur (UR5e, for
+    ur_rtde, with no object before it)."""
     task: TaskChoice = ""
     host: str = "127.0.77.1"
     """Address of this computer to serve on; each simulated arm needs its own."""
@@ -56,6 +59,13 @@ class Simulate:
 
     def run(self) -> None:
         """Serve, or write."""
+        if self.arm == "ur":
+            if self.task or self.goal or self.recordings is not None:
+                raise ConfigurationError("no object lies before a simulated ur; give --host alone")
+            from prior_reinforce.lab.arms.ur import SimulatedUR
+
+            self._serve(SimulatedUR(self.host, lambda said: print(said, flush=True)), "a UR5e")
+            return
         from prior_reinforce.lab.tasks.panda_task import PandaTask
 
         usual = {"fr3": "basketball-fr3", "so101": "so101"}[self.arm]
@@ -75,17 +85,18 @@ class Simulate:
         from prior_reinforce.lab.arms.fr3 import SimulatedFR3
 
         arm = SimulatedFR3(task, self.host, lambda rollout: self._say(task, rollout))
+        self._serve(arm, task.name)
+
+    def _serve(self, arm: SimulatedFR3 | SimulatedUR, what: str) -> None:
+        """Serve at an address until Ctrl-C."""
 
         def stop(*_: object) -> None:
             arm.running = False
 
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, stop)
-        arm.serve(
-            lambda: print(
-                f"{self.arm} serves {task.name} at {self.host}; Ctrl-C ends it", flush=True
-            )
-        )
+        ready = f"{self.arm} serves {what} at {self.host}; Ctrl-C ends it"
+        arm.serve(lambda: print(ready, flush=True))
 
     def _serve_so101(self, task: Task) -> None:
         from prior_reinforce.lab.arms.so101 import manifest_section, serve

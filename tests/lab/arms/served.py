@@ -1,4 +1,4 @@
-"""A simulated FR3 in a process of its own, at an address of its own."""
+"""A simulated FR3 or UR in a process of its own, at an address of its own."""
 
 from __future__ import annotations
 
@@ -12,11 +12,16 @@ import threading
 _next = iter(range(1, 255))
 
 
-@contextlib.contextmanager
 def fr3(*args):
-    """Serve one; `.host`, and `.said()` for the next line that it prints."""
+    """Serve an FR3; `.host`, and `.said()` for the next line that it prints."""
+    return arm("fr3", *args)
+
+
+@contextlib.contextmanager
+def arm(kind, *args):
+    """Likewise, `fr3` or `ur`."""
     host = f"127.0.{100 + os.getpid() % 100}.{next(_next)}"
-    words = [sys.executable, "-m", "prior_reinforce.cli", "simulate", "fr3", "--host", host, *args]
+    words = [sys.executable, "-m", "prior_reinforce.cli", "simulate", kind, "--host", host, *args]
     program = subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
     lines: queue.Queue[str] = queue.Queue()
     threading.Thread(

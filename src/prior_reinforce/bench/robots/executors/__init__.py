@@ -11,5 +11,6 @@ EXECUTORS: Registry[Executor] = Registry(
     {
         "fr3": Member(f"{_HERE}.fr3:FR3", "Franka Research 3"),
         "lerobot": Member(f"{_HERE}.lerobot:LeRobotArm", "any arm that LeRobot drives"),
+        "ur": Member(f"{_HERE}.ur:UR", "Universal Robots' UR5e and UR10e"),
     },
 )
