@@ -24,7 +24,12 @@ from prior_reinforce.bench.robots.executors.drive import (
 )
 from prior_reinforce.bench.robots.gate import GateSettings
 from prior_reinforce.bench.robots.plan_files import write_plan
-from prior_reinforce.errors import ConfigurationError, FileFormatError, InvalidPlanError
+from prior_reinforce.errors import (
+    ConfigurationError,
+    FileFormatError,
+    InvalidPlanError,
+    MissingExtraError,
+)
 from prior_reinforce.plans.motions import Plan, PlanFormat
 from tests.attacks.harness import wait_until
 from tests.bench.robots.executors import toy_arm
@@ -232,6 +237,13 @@ def test_settings_are_held_against_their_types(arm):
         make_executor(ArmSettings(TOY, {"folder": "x", "fastest": "quick"}))
     with pytest.raises(ConfigurationError, match="no executor 'r2d2'"):
         make_executor(ArmSettings("r2d2"))
+
+
+@pytest.mark.parametrize(("name", "library"), [("fr3", "pylibfranka"), ("ur", "rtde_receive")])
+def test_a_library_that_is_missing_is_named_with_its_extra(name, library, monkeypatch):
+    monkeypatch.setitem(sys.modules, library, None)
+    with pytest.raises(MissingExtraError, match=rf"pip install 'prior-reinforce\[{name}\]'"):
+        make_executor(ArmSettings(name, {"host": "127.0.99.9"}))
 
 
 def test_a_request_survives_its_way_through_the_command_line(arm):

@@ -47,6 +47,7 @@ from prior_reinforce.errors import (
     InvalidPlanError,
     PriorReinforceError,
 )
+from prior_reinforce.extras import missing_extra
 from prior_reinforce.plans.motions import Plan, PlanFormat
 from prior_reinforce.registry import build
 
@@ -116,7 +117,10 @@ def make_executor(settings: ArmSettings) -> Executor:
         MissingExtraError: Its library is not installed.
     """
     kind, config = _class_and_config(settings)
-    return kind(config)
+    try:
+        return kind(config)
+    except ImportError as error:
+        raise missing_extra(error) or error from error
 
 
 def guiding_of(settings: ArmSettings) -> Guiding:
