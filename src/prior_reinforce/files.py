@@ -17,7 +17,7 @@ import tempfile
 import unicodedata
 import zipfile
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -32,7 +32,6 @@ from prior_reinforce.errors import (
 _PREFIX = ".unfinished-"
 _CLAIM = ".prior-reinforce"
 """In every folder of results: what is in it may be replaced."""
-_RESULTS = ("report.html", "evidence.html", "evidence.md", "config.json", "model/config.json")
 _MARK_WITHIN = 200_000
 """Bytes of a file that are searched for a mark: a page's styles stand before its words."""
 _LARGEST_NPZ = 4_000_000_000
@@ -228,24 +227,14 @@ def claim_folder(folder: Path) -> None:
         WorkspaceError: It holds what this program did not write, or cannot be written to.
     """
     with named_disk_errors(folder):
-        if folder.is_dir() and any(folder.iterdir()) and not _holds_results(folder):
+        claimed = (folder / _CLAIM).exists()
+        if not claimed and folder.is_dir() and any(folder.iterdir()):
             raise WorkspaceError(
                 f"{folder} holds files that this program did not write and might replace; choose "
                 "an empty or a new folder"
             )
         folder.mkdir(parents=True, exist_ok=True)
         (folder / _CLAIM).touch()
-
-
-def _holds_results(folder: Path) -> bool:
-    """Whether a folder was claimed, or looks like one of ours of before folders were."""
-    if (folder / _CLAIM).exists():
-        return True
-    for name in _RESULTS:
-        with suppress(OSError), (folder / name).open("rb") as file:
-            if b"prior-reinforce" in file.read(_MARK_WITHIN):
-                return True
-    return all((folder / name).is_dir() for name in ("units", "failures"))
 
 
 def check_path(path: Path) -> Path:

@@ -22,11 +22,11 @@ from tests.attacks.classes import CLASSES, Attack
 from tests.attacks.harness import HELD, prepare, where
 
 ATTACKS: dict[str, tuple[Attack, int]] = {
-    **{name: (attack, 40) for name, attack in CLASSES.items()},
-    "recordings": (CLASSES["recordings"], 120),  # there are twenty kinds
-    "files": (CLASSES["files"], 30),
-    "motions": (execution.attack, 90),
-    "arms": (arms.attack, 12),
+    **{name: (attack, 20) for name, attack in CLASSES.items()},
+    "recordings": (CLASSES["recordings"], 60),  # there are twenty kinds
+    "files": (CLASSES["files"], 20),
+    "motions": (execution.attack, 40),
+    "arms": (arms.attack, 8),
     **{
         f"{how}: {name}": (partial(interruptions.attack, how, name), 1)
         for how in interruptions.HOW

@@ -2,10 +2,12 @@
 
 import re
 
+from prior_reinforce.commands import advice
 from tests.bench.workspace.planar import events_in
 
 
-def test_advice_names_places_and_draws_the_region(run, folder):
+def test_advice_names_places_and_draws_the_region(run, folder, monkeypatch):
+    monkeypatch.setattr(advice, "_ACROSS", 6)  # goals a side; all 25 take seconds
     run("goal", folder, "0.9", "0.05")
     run("ask", folder)
     run("tell", folder, 1, "5 cm long")

@@ -15,6 +15,7 @@ from prior_reinforce.bench.workspace.records import (
     StatusRecord,
     TrialRecord,
 )
+from prior_reinforce.commands import advice
 from tests.bench.workspace.planar import recordings
 
 
@@ -30,7 +31,8 @@ def afternoon(run, folder):
     return folder
 
 
-def test_every_json_is_as_its_schema_says(run, afternoon, tmp_path):
+def test_every_json_is_as_its_schema_says(run, afternoon, tmp_path, monkeypatch):
+    monkeypatch.setattr(advice, "_ACROSS", 4)  # goals a side; all 25 take ten seconds
     recordings(tmp_path / "more")
     for args, kind in [
         (("status", afternoon), StatusRecord),
