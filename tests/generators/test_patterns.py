@@ -55,6 +55,17 @@ def test_two_ways_are_told_apart_by_what_each_tells_of_its_own(name):
     )
 
 
+@pytest.mark.parametrize("name", ["A", "B"])
+def test_two_ways_round_that_end_alike_are_told_apart_by_how_they_move(name):
+    """Where they move differs more by how far they push than by the way round."""
+    demos = make_task("curling-round").demonstrations(name)
+    one, other = patterns(demos)
+    assert len(one) == len(other) == 6
+    side = demos.plans[:, :, 0] - demos.plans[:, :1, 0]  # the base turns to the side gone round
+    far = side[np.arange(12), np.abs(side).argmax(axis=1)]
+    assert len({np.sign(far[list(one)]).sum(), -np.sign(far[list(other)]).sum()}) == 1
+
+
 def test_what_does_not_move_is_one_pattern():
     still = Demonstrations(
         np.ones((6, 20, 2)), OUTCOMES, PlanFormat(("a", "b"), ("rad",) * 2, 0.02)

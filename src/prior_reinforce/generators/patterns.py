@@ -30,13 +30,15 @@ _MAX_UNEXPLAINED = 0.3
 of their variance. Ours: it leaves 0.08 to 0.26 on our own tasks; up to 0.92 in the zoo, where all
 motions agree in direction as well."""
 
-_TOLD_APART = 0.25
+_TOLD_APART = 0.35
 """Demonstrations are of two ways if, left out one by one, they are missed in their own half by less
-than this part of the squared error that all leave. Ours: 0.34 or more on the zoo's development
-tasks, two manners and outliers among them, which are better mixed; 0.01 to 0.17 on 13 of 14 sets
-of `zoo.SEVERAL_WAYS`, seeds from 100 on."""
-_FEWEST = 3
-"""Demonstrations of a half: with fewer, what they tell of a left-out one is nothing."""
+than this part of the squared error that all leave. Ours: 0.01 to 0.26 on 13 of 14 sets of
+`zoo.SEVERAL_WAYS`, seeds from 100 on; of the zoo's development tasks, sets of eight or more below
+it gain by being parted (docs/decisions-generator.md)."""
+_FEWEST_BY_PLACE, _FEWEST_BY_DIRECTION = 3, 4
+"""Demonstrations of a half, halved by where they move or by the direction they move in: with fewer,
+what they tell of a left-out one is nothing. Ours: three that moved in another direction were mostly
+a manner, of which the rest learned no better alone (docs/decisions-generator.md)."""
 
 _Motions = Float[np.ndarray, "N F"]
 """Channels over a common phase, in a row each; every unit counts alike."""
@@ -67,7 +69,7 @@ def patterns(demonstrations: Demonstrations) -> tuple[tuple[int, ...], ...]:
     found = [
         tuple(way.tolist())
         for label in np.unique(labels)
-        for way in _ways(np.flatnonzero(labels == label), motions, outcomes)
+        for way in _ways(np.flatnonzero(labels == label), motions, unit_vectors, outcomes)
     ]
     return tuple(sorted(found, key=lambda members: (-len(members), members)))
 
@@ -97,30 +99,35 @@ def _pooled(
 
 
 def _ways(
-    members: Int[np.ndarray, " n"], motions: _Motions, outcomes: Float[np.ndarray, "N k"]
+    members: Int[np.ndarray, " n"],
+    motions: _Motions,
+    directions: _Motions,
+    outcomes: Float[np.ndarray, "N k"],
 ) -> list[Int[np.ndarray, " _"]]:
-    """Halve demonstrations by how they move, as long as the halves are told apart."""
+    """Halve demonstrations by where they move or by how, as long as the halves are told apart."""
     from scipy.cluster.hierarchy import fcluster, linkage
 
-    if len(members) < 2 * _FEWEST:
+    if len(members) < 2 * _FEWEST_BY_PLACE:
         return [members]
-    labels = fcluster(linkage(motions[members], "ward"), 2, "maxclust")
-    halves = [members[labels == label] for label in (1, 2)]
-    if min(map(len, halves)) < _FEWEST:
-        return [members]
-    apart = sum(_left_out(motions[half], outcomes[half]) for half in halves)
+    apart, halves = float("inf"), [members]
+    for vectors, fewest in ((motions, _FEWEST_BY_PLACE), (directions, _FEWEST_BY_DIRECTION)):
+        labels = fcluster(linkage(vectors[members], "ward"), 2, "maxclust")
+        halving = [members[labels == label] for label in (1, 2)]
+        missed = sum(_left_out(motions[half], outcomes[half]) for half in halving)
+        if min(map(len, halving)) >= fewest and missed < apart:
+            apart, halves = missed, halving
     if not apart < _TOLD_APART * _left_out(motions[members], outcomes[members]):
         return [members]
-    return [way for half in halves for way in _ways(half, motions, outcomes)]
+    return [way for half in halves for way in _ways(half, motions, directions, outcomes)]
 
 
 def _left_out(motions: _Motions, outcomes: Float[np.ndarray, "N k"]) -> float:
-    """Squared error of motions that are interpolated from the others; nan where that cannot be."""
+    """Squared error of motions that are interpolated from the others; inf where that cannot be."""
     squares = 0.0
     for i in range(len(motions)):
         others = np.delete(np.arange(len(motions)), i)
-        if np.any(np.ptp(outcomes[others], axis=0) == 0.0):
-            return float("nan")
+        if len(others) == 0 or np.any(np.ptp(outcomes[others], axis=0) == 0.0):
+            return float("inf")
         weights = smooth_weights(outcomes[others], kernel="linear")(outcomes[i : i + 1])
         squares += float(np.sum((weights @ motions[others] - motions[i]) ** 2))
     return squares
