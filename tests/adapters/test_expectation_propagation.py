@@ -1,11 +1,13 @@
 """Held against closed forms, numerical integration and sampling."""
 
+import itertools
+
 import numpy as np
 import pytest
 from scipy.integrate import quad
 from scipy.stats import multivariate_normal, norm
 
-from prior_reinforce.adapters.expectation_propagation import Readings, infer, tilted
+from prior_reinforce.adapters.expectation_propagation import Readings, _rest, infer, tilted
 
 INF = np.inf
 
@@ -143,3 +145,51 @@ def test_beginning_with_what_was_known_ends_at_the_same_posterior():
     means = (np.einsum("mij,mkj->mki", K, posterior.weights) for posterior in (again, afresh))
     np.testing.assert_allclose(*means, atol=0.01 * sds.min())
     np.testing.assert_allclose(again.log_evidence, afresh.log_evidence, atol=0.05)
+
+
+def contradicting(seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Covariance, and numbers of which half lie at -8 and half at 1.4, nearer than 0.3 together."""
+    rng = np.random.default_rng(seed)
+    at = np.sort(rng.uniform(0, 0.3, 12))
+    numbers = np.where(rng.uniform(size=12) < 0.5, -8.0, 1.4) + 0.3 * rng.normal(size=12)
+    return covariance(at, 2.5, 10.0) + 1e-5 * np.eye(12), numbers
+
+
+def evidence_by_enumeration(K: np.ndarray, y: np.ndarray, variance: float, e: float, width: float):
+    """Log evidence, summed over which readings say something."""
+    logs = []
+    for said in itertools.product((False, True), repeat=len(y)):
+        some = np.flatnonzero(said)
+        C = K[np.ix_(some, some)] + variance * np.eye(len(some))
+        fit = multivariate_normal.logpdf(y[some], np.zeros(len(some)), C) if len(some) else 0.0
+        log_odds = len(some) * np.log(1 - e) + (len(y) - len(some)) * np.log(e / width)
+        logs.append(fit + log_odds)
+    return np.logaddexp.reduce(logs)
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_readings_that_contradict_each_other_have_no_evidence_that_diverges(seed):
+    K, y = contradicting(seed)
+    variance, e, width = 4e-6, 0.002, 8.0
+    readings = Readings(y[None], y[None], np.full((1, 12), variance), e, width)
+    posterior = infer(K[None], readings)
+    assert np.all(np.isfinite(posterior.weights))
+    assert np.all(np.isfinite(posterior.precision))
+    nothing_said = len(y) * np.log(e / width)
+    at_most = len(y) * np.log((1 - e) / np.sqrt(2 * np.pi * variance) + e / width)
+    assert nothing_said - 20.0 < posterior.log_evidence[0, 0] < at_most
+
+
+@pytest.mark.parametrize("seed", [16, 22, 40])
+def test_their_evidence_is_near_the_one_by_enumeration(seed):
+    K, y = contradicting(seed)
+    readings = Readings(y[None], y[None], np.full((1, 12), 4e-6), 0.002, 8.0)
+    exact = evidence_by_enumeration(K, y, 4e-6, 0.002, 8.0)
+    assert infer(K[None], readings).log_evidence[0, 0] == pytest.approx(exact, abs=15.0)
+
+
+def test_where_updates_swing_a_latent_without_its_site_keeps_a_variance():
+    mean, variance, tau, nu = np.reshape([0.3, 0.1, 12.0, 5.0], (4, 1, 1, 1))
+    rest_tau, rest_mean = _rest(mean, variance, tau, nu)
+    assert rest_tau > 0
+    assert rest_mean == mean

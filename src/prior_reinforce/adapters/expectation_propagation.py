@@ -11,8 +11,13 @@ with those of the true one under the other sites' distribution. The tilted momen
 a truncated normal, mixed with the distribution before the reading. All sites are updated at once,
 damped, for all models in one batch.
 
+Readings that contradict each other have several modes, and the updates may then swing for ever; the
+evidence of such sites is off by any amount. There each reading is taken in once instead, in order:
+assumed-density filtering, whose evidence is a product of predictive densities and cannot diverge.
+
 Source: Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, Section 3.6 and eqs.
-3.65 to 3.74, for sites, predictions and log evidence; the intervals and the mixture are ours.
+3.65 to 3.74, for sites, predictions and log evidence; Minka, A family of algorithms for approximate
+Bayesian inference, 2001, Section 3.1, for the filtering; the intervals and the mixture are ours.
 """
 
 from __future__ import annotations
@@ -29,6 +34,9 @@ _DAMPING = 0.8
 """Share of each update that is taken (ours): undamped, parallel updates may swing."""
 _SETTLED = 1e-2
 """Change of every posterior mean, in posterior standard deviations, that ends the updates."""
+_SWINGING = 0.5
+"""Change of a posterior mean by the last update, in posterior standard deviations, that tells sites
+which do not settle (ours)."""
 _LEAST_PRECISION = 1e-8
 """A site that would have less says nothing (ours); prior variances are about 0.1."""
 _FARTHEST = 37.0
@@ -119,6 +127,7 @@ def infer(
         share = 1.0 if sweep == 0 and start is None else _DAMPING
         tau, nu = tau + share * (new_tau - tau), nu + share * (new_nu - nu)
     mean, variance, precision = _latent(prior, tau, nu)
+    settled = np.all(np.abs(mean - before) < _SWINGING * np.sqrt(variance), axis=-1)
     rest_tau, rest_mean = _rest(mean, variance, tau, nu)
     log_z, _, _ = tilted(rest_mean, 1.0 / rest_tau, readings)
     both = rest_tau + tau
@@ -130,9 +139,49 @@ def infer(
     )
     log_determinant = np.linalg.slogdet(_whitened(prior, tau))[1]
     evidence = of_sites.sum(axis=-1) - 0.5 * log_determinant
+    settled &= evidence <= _greatest_evidence(readings)
+    if not np.all(settled):
+        filtered = _filtered(prior, readings)
+        tau = np.where(settled[..., None], tau, filtered[0])
+        nu = np.where(settled[..., None], nu, filtered[1])
+        evidence = np.where(settled, evidence, filtered[2])
+        _, _, precision = _latent(prior, tau, nu)
     evidence += np.reshape(log_prior, (-1, 1))
     weights = nu - (precision @ (prior @ nu[..., None]))[..., 0]
     return Posterior(tau, nu, weights, precision, evidence)
+
+
+def _greatest_evidence(readings: Readings) -> Float[np.ndarray, " k"]:
+    """Log evidence of a latent that is what was read: no prior has more."""
+    e, number = readings.outlier, readings.high <= readings.low
+    density = 1.0 / np.sqrt(2.0 * math.pi * readings.variance)
+    likelihood = np.where(number, (1.0 - e) * density + e / readings.width, 1.0)
+    return np.asarray(np.log(likelihood).sum(axis=-1))
+
+
+def _filtered(
+    prior: Float[np.ndarray, "m 1 n n"], readings: Readings
+) -> tuple[Float[np.ndarray, "m k n"], Float[np.ndarray, "m k n"], Float[np.ndarray, "m k"]]:
+    """Sites and log evidence where each reading is taken in once, in order."""
+    m, (k, n) = len(prior), readings.low.shape
+    covariance = np.broadcast_to(prior, (m, k, n, n)).copy()
+    mean, tau, nu = np.zeros((3, m, k, n))
+    evidence = np.zeros((m, k))
+    for i in range(n):
+        one = (of[:, i, None] for of in (readings.low, readings.high, readings.variance))
+        at, variance = mean[..., i, None], np.maximum(covariance[..., i, i, None], 1e-12)
+        log_z, told_mean, told_variance = tilted(
+            at, variance, Readings(*one, readings.outlier, readings.width)
+        )
+        evidence += log_z[..., 0]
+        site = np.clip(1.0 / told_variance - 1.0 / variance, _LEAST_PRECISION, 1e10)
+        told_mean = np.where(site > _LEAST_PRECISION, told_mean, at)
+        both, gain = 1.0 / variance + site, covariance[..., i] / variance
+        tau[..., i, None], nu[..., i, None] = site, both * told_mean - at / variance
+        mean += gain * (told_mean - at)
+        less = (variance - 1.0 / both)[..., None]
+        covariance -= less * gain[..., :, None] * gain[..., None, :]
+    return tau, nu, evidence
 
 
 def _rest(
