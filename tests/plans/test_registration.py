@@ -135,3 +135,12 @@ def test_a_gripper_that_keeps_to_a_clock_is_no_start():
     found = decompose(demos, "start")
     off = found.numbers[:, 0] - STARTS
     np.testing.assert_allclose(off, off.mean(), atol=0.05)
+
+
+@pytest.mark.parametrize("size", [0.1, 2.0, 5.0])
+def test_a_channel_that_moves_as_it_likes_does_not_time_the_others_whatever_its_unit(size):
+    frames, at_will = np.arange(90.0), np.array([28.0, 6.0, 33.0, 11.0])
+    turn = np.array([1.0, -0.8, 0.9, 1.2])[:, None] * stroke(frames, at_will[:, None], 40)
+    plans = np.dstack([swings()[:, :, 0], size * turn])
+    starts = decompose(demonstrations(plans), "start").numbers[:, 0]
+    np.testing.assert_allclose(starts - starts.mean(), STARTS - STARTS.mean(), atol=0.3)
