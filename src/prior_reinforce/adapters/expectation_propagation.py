@@ -23,7 +23,7 @@ Bayesian inference, 2001, Section 3.1, for the filtering; the intervals and the 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -168,11 +168,14 @@ def _filtered(
     mean, tau, nu = np.zeros((3, m, k, n))
     evidence = np.zeros((m, k))
     for i in range(n):
-        one = (of[:, i, None] for of in (readings.low, readings.high, readings.variance))
-        at, variance = mean[..., i, None], np.maximum(covariance[..., i, i, None], 1e-12)
-        log_z, told_mean, told_variance = tilted(
-            at, variance, Readings(*one, readings.outlier, readings.width)
+        one = replace(
+            readings,
+            low=readings.low[:, i, None],
+            high=readings.high[:, i, None],
+            variance=readings.variance[:, i, None],
         )
+        at, variance = mean[..., i, None], np.maximum(covariance[..., i, i, None], 1e-12)
+        log_z, told_mean, told_variance = tilted(at, variance, one)
         evidence += log_z[..., 0]
         site = np.clip(1.0 / told_variance - 1.0 / variance, _LEAST_PRECISION, 1e10)
         told_mean = np.where(site > _LEAST_PRECISION, told_mean, at)
