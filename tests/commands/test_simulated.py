@@ -68,7 +68,7 @@ def typed(monkeypatch):
 def test_the_demo_says_what_the_network_learned_and_needs_it(tmp_path, capsys, steps):
     """Nothing else reaches the goals: with an untrained network in its place the demo fails."""
     choice = f"diffusion,training_steps={steps}"
-    arguments = ["demo", "--goals", "2", "--generator", choice, "--no-film", "--out"]
+    arguments = ["demo", "--goals", "1", "--generator", choice, "--no-film", "--out"]
     assert main([*arguments, str(tmp_path / "demo")]) == (0 if steps else 1)
     (line,) = re.findall(r"learned: .*", capsys.readouterr().out.replace("\n", " "))
     missed, untrained = (float(x) for x in re.findall(r"by ([\d.]+)%", line))
