@@ -275,11 +275,12 @@ def test_the_period_snaps_to_a_whole_rate():
 
 
 @pytest.mark.parametrize(
-    "values", [{"dt": 0.0}, {"dt": float("nan")}, {"horizon": 1}, {"margin": -0.1}, {"smooth": 0.0}]
+    ("name", "value"),
+    [("dt", 0.0), ("dt", float("nan")), ("horizon", 1), ("margin", -0.1), ("smooth", 0.0)],
 )
-def test_settings_are_checked(values):
-    with pytest.raises(ConfigurationError, match="must be"):
-        Preprocessing(**values)
+def test_settings_are_checked(name, value):
+    with pytest.raises(ConfigurationError, match=f"{name}: Expected .*, got {value}"):
+        Preprocessing(**{name: value})
 
 
 def test_a_tiny_time_step_is_refused_before_it_fills_the_memory():

@@ -6,9 +6,11 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import IntEnum, auto
+from typing import Annotated
 
 import numpy as np
 from jaxtyping import Float
+from msgspec import Meta
 
 from prior_reinforce.arrays import Frames, Plans, Point
 from prior_reinforce.bench.importing.clock import LONGEST
@@ -17,6 +19,7 @@ from prior_reinforce.bench.importing.units import say_names
 from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
 from prior_reinforce.plans.signals import Signals, analyse, moving_ends, moving_rows
 from prior_reinforce.plans.speeds import Channels
+from prior_reinforce.settings import Checked, NonNegative, Positive
 
 _ON_GRID = 0.02
 """A frame within this share of a time step of where it should be is taken as recorded. Ours: at
@@ -40,40 +43,23 @@ _MOST_FRAMES = 100_000
 
 
 @dataclass(frozen=True)
-class Preprocessing:
+class Preprocessing(Checked):
     """How recordings become plans. Time is never stretched: a retimed throw is another throw."""
 
-    dt: float | None = None
+    dt: Positive | None = None
     """Time between two frames of a plan, in [s]; None takes the recordings' median period."""
-    horizon: int | None = None
+    horizon: Annotated[int, Meta(ge=2)] | None = None
     """Frames of every plan; None takes the longest recording's. Shorter ones hold their last pose;
     a longer one is an error, never cut."""
     trim: bool = True
     """Drop the still time before the first and after the last movement of each recording."""
-    smooth: float | None = None
+    smooth: Positive | None = None
     """Frequency above which plans are smoothed, in [Hz]: a Butterworth filter of order 2, run
     forwards and backwards, so that nothing is delayed. Steps and switches, such as grippers, are
     left alone. None keeps every frame as recorded."""
-    margin: float = 0.1
+    margin: NonNegative = 0.1
     """Still time that trimming keeps at either end, in [s]. Ours: enough for the plan to start
     and end at rest at 30 frames a second."""
-
-    def __post_init__(self) -> None:
-        """Check the settings.
-
-        Raises:
-            ConfigurationError: A value outside its range.
-        """
-        if self.dt is not None and not (math.isfinite(self.dt) and self.dt > 0):
-            raise ConfigurationError(f"dt must be a positive number of seconds, got {self.dt}")
-        if self.horizon is not None and self.horizon < 2:
-            raise ConfigurationError(f"horizon must be at least 2 frames, got {self.horizon}")
-        if self.smooth is not None and not (math.isfinite(self.smooth) and self.smooth > 0):
-            raise ConfigurationError(
-                f"smooth must be a positive frequency in Hz, got {self.smooth}"
-            )
-        if not (math.isfinite(self.margin) and self.margin >= 0):
-            raise ConfigurationError(f"margin must be 0 s or more, got {self.margin}")
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,7 +14,6 @@ from jaxtyping import Float, Int
 from prior_reinforce.bench.importing.inspection import Inspection, in_rows, say_small
 from prior_reinforce.plans.events import find_transitions
 from prior_reinforce.plans.motions import Demonstrations
-from prior_reinforce.plans.signals import analyse
 from prior_reinforce.wording import plain
 
 if TYPE_CHECKING:
@@ -176,7 +175,7 @@ class Preview:
     def _changes(self, channel: int) -> Float[np.ndarray, " n"]:
         """When a step or a gripper changes, in [s]; empty for other channels."""
         demos, form = self.demonstrations, self.demonstrations.format
-        steps = find_transitions(demos.plans, analyse(demos.plans, form.units, form.dt))
+        steps = find_transitions(demos.plans, demos.signals)
         times = np.ravel(steps.get(channel, ())) * form.dt
         values = demos.plans[:, :, channel]
         if times.size or form.units[channel] in ("rad", "m") or not np.ptp(values):
