@@ -6,6 +6,8 @@ import os
 
 os.environ.setdefault("MUJOCO_GL", "egl")
 
+from contextlib import closing
+
 import mujoco
 import numpy as np
 import pytest
@@ -15,7 +17,6 @@ from prior_reinforce.environment import (
     SeenObject,
     Task,
     make_renderer,
-    open_renderer,
 )
 from prior_reinforce.errors import ConfigurationError, RenderingUnavailableError
 from prior_reinforce.generators.interpolation import SmoothInterpolation
@@ -111,7 +112,7 @@ def small_scene():
 def test_a_picture_has_the_size_asked_for_and_the_scene_stays_as_it_was(small_scene):
     data = mujoco.MjData(small_scene)
     mujoco.mj_forward(small_scene, data)
-    with open_renderer(small_scene, 320, 200) as renderer:
+    with closing(make_renderer(small_scene, 320, 200)) as renderer:
         renderer.update_scene(data)
         picture = renderer.render()
     assert picture.shape == (200, 320, 3)

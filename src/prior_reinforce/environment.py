@@ -10,7 +10,6 @@ from __future__ import annotations
 import copy
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -209,13 +208,3 @@ def make_renderer(model: mujoco.MjModel, width: int, height: int) -> mujoco.Rend
             f"no picture can be drawn, OpenGL is not available ({error}); on a machine without a "
             "display set MUJOCO_GL=egl and install libegl1 (or MUJOCO_GL=osmesa and libosmesa6)"
         ) from error
-
-
-@contextmanager
-def open_renderer(model: mujoco.MjModel, width: int, height: int) -> Iterator[mujoco.Renderer]:
-    """A renderer for the length of a block; arguments and errors as in `make_renderer`."""
-    renderer = make_renderer(model, width, height)
-    try:
-        yield renderer
-    finally:
-        renderer.close()

@@ -13,12 +13,11 @@ import imageio_ffmpeg
 import numpy as np
 import pytest
 
-from prior_reinforce import environment
 from prior_reinforce.cli import main
 from prior_reinforce.environment import make_renderer
 from prior_reinforce.generators import make_generator
 from prior_reinforce.lab.experiments.learned import save_learned
-from prior_reinforce.lab.tasks import make_task
+from prior_reinforce.lab.tasks import make_task, panda_task
 from prior_reinforce.plans.motions import Demonstrations
 from tests.perception.vision_server import VisionServer
 
@@ -184,7 +183,7 @@ def test_one_command_makes_a_tasks_film(tmp_path, capsys, monkeypatch):
         model.vis.quality.shadowsize = 0
         return make_renderer(model, width, height)
 
-    monkeypatch.setattr(environment, "make_renderer", without_shadows)
+    monkeypatch.setattr(panda_task, "make_renderer", without_shadows)
     film = tmp_path / "slide.mp4"
     # Seed 2 disturbs this one by 2 mm, within curling's tolerance of 1 cm.
     throw = ["--task", "curling", "--demonstration", "5", "--seed", "2"]

@@ -20,13 +20,8 @@ GeneratorChoice = Annotated[
 
 
 @dataclass(frozen=True)
-class Learn(OnWorkspace):
-    """Learn outcome -> plan from the demonstrations of a workspace (Stage 1).
-
-    For example:
-        prior-reinforce learn hoop
-        prior-reinforce learn hoop --generator diffusion --seed 1
-    """
+class Fitting:
+    """How a generator is fitted."""
 
     generator: GeneratorChoice = "auto"
     align: bool = False
@@ -36,20 +31,31 @@ class Learn(OnWorkspace):
     device: str = "cpu"
     """Where a network is trained: cpu, or cuda for a GPU."""
 
+    @property
+    def choice(self) -> str:
+        """The generator, timed as wanted; auto's is closed form then."""
+        if not self.align:
+            return self.generator
+        return f"{'interpolation' if self.generator == 'auto' else self.generator},timing=align"
+
+
+@dataclass(frozen=True)
+class Learn(Fitting, OnWorkspace):
+    """Learn outcome -> plan from the demonstrations of a workspace (Stage 1).
+
+    For example:
+        prior-reinforce learn hoop
+        prior-reinforce learn hoop --generator diffusion --seed 1
+    """
+
     def run_on(self, workspace: Workspace, words: Sequence[str]) -> None:
         """Fit, and put in use."""
-        choice = aligned(self.generator, self.align)
-        make_generator(choice, device=self.device)  # a wrong setting is reported first
+        make_generator(self.choice, device=self.device)  # a wrong setting is reported first
         with fit_progress(Console()) as progress:
-            learned = workspace.learn(choice, seed=self.seed, device=self.device, progress=progress)
+            learned = workspace.learn(
+                self.choice, seed=self.seed, device=self.device, progress=progress
+            )
         for remark in learned.remarks:
             print(remark)
         print(f"model {learned.model} is in use")
         print_next(workspace)
-
-
-def aligned(generator: str, align: bool) -> str:
-    """Return a choice of a generator with its demonstrations aligned, if so; auto's closed form."""
-    if not align:
-        return generator
-    return f"{'interpolation' if generator == 'auto' else generator},timing=align"

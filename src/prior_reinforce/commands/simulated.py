@@ -12,7 +12,7 @@ from rich.console import Console
 
 from prior_reinforce.adapters import ADAPTERS, DEFAULT_ADAPTER, make_adapter
 from prior_reinforce.arrays import Frames, Point, Points
-from prior_reinforce.commands.learning import GeneratorChoice, aligned
+from prior_reinforce.commands.learning import Fitting, GeneratorChoice
 from prior_reinforce.commands.live import LiveView, asking, fit_progress, say, trials_by_goal
 from prior_reinforce.errors import ConfigurationError, FileFormatError, InvalidGoalError
 from prior_reinforce.files import claim_folder
@@ -89,28 +89,21 @@ def learn(
 
 
 @dataclass(frozen=True)
-class Train(OnTask):
+class Train(Fitting, OnTask):
     """Learn outcome -> plan from a simulated task's demonstrations (Stage 1), for `--model`.
 
     For example:
         prior-reinforce train --task curling --generator diffusion --out runs/curling
     """
 
-    generator: GeneratorChoice = "auto"
-    align: bool = False
-    """Align the demonstrations in time first; short for the generator's setting timing=align."""
-    seed: int = 0
-    """Seed of the training."""
-    device: str = "cpu"
-    """Where a network is trained: cpu, or cuda for a GPU."""
     out: Path = Path("runs/model")
     """Folder for the model."""
 
     def run(self) -> None:
         """Fit and save."""
         console = Console()
-        choice = aligned(self.generator, self.align)
-        generator = make_generator(choice, device=self.device)  # a wrong setting is reported first
+        # Made first: a wrong setting is reported before anything is read.
+        generator = make_generator(self.choice, device=self.device)
         _, demonstrations = self.open()
         claim_folder(self.out)
         learn(demonstrations, self.out, generator, seed=self.seed, console=console)

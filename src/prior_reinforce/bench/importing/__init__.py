@@ -1,34 +1,16 @@
 """Demonstrations from the format they were recorded in: read, trim, resample, look at, use."""
 
-from prior_reinforce.bench.importing.importer import (
-    FORMATS,
-    ImportResult,
-    Recordings,
-    appended,
-    import_demonstrations,
-    inspect_recordings,
-    read,
-    read_recordings,
-)
-from prior_reinforce.bench.importing.inspection import Inspection, inspect
-from prior_reinforce.bench.importing.options import ReadOptions
-from prior_reinforce.bench.importing.preprocessing import Preprocessing
-from prior_reinforce.bench.importing.preview import Preview
-from prior_reinforce.bench.importing.recording import Recording
-
-__all__ = [
-    "FORMATS",
-    "ImportResult",
-    "Inspection",
-    "Preprocessing",
-    "Preview",
-    "ReadOptions",
-    "Recording",
-    "Recordings",
-    "appended",
-    "import_demonstrations",
-    "inspect",
-    "inspect_recordings",
-    "read",
-    "read_recordings",
-]
+from prior_reinforce.bench.importing.importer import FORMATS as FORMATS
+from prior_reinforce.bench.importing.importer import ImportResult as ImportResult
+from prior_reinforce.bench.importing.importer import Recordings as Recordings
+from prior_reinforce.bench.importing.importer import appended as appended
+from prior_reinforce.bench.importing.importer import import_demonstrations as import_demonstrations
+from prior_reinforce.bench.importing.importer import inspect_recordings as inspect_recordings
+from prior_reinforce.bench.importing.importer import read as read
+from prior_reinforce.bench.importing.importer import read_recordings as read_recordings
+from prior_reinforce.bench.importing.inspection import Inspection as Inspection
+from prior_reinforce.bench.importing.inspection import inspect as inspect
+from prior_reinforce.bench.importing.options import ReadOptions as ReadOptions
+from prior_reinforce.bench.importing.preprocessing import Preprocessing as Preprocessing
+from prior_reinforce.bench.importing.preview import Preview as Preview
+from prior_reinforce.bench.importing.recording import Recording as Recording

@@ -10,6 +10,7 @@ import copy
 from abc import abstractmethod
 from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,7 +22,7 @@ from jaxtyping import Float
 from numpy.typing import ArrayLike
 
 from prior_reinforce.arrays import Plans, as_goal, as_plans
-from prior_reinforce.environment import KeyFrame, Picture, Rollout, Task, open_renderer
+from prior_reinforce.environment import KeyFrame, Picture, Rollout, Task, make_renderer
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.lab.tasks.panda import N_JOINTS, STEP, build_scene, servo_controls
 from prior_reinforce.plans.motions import Demonstrations
@@ -163,7 +164,7 @@ class PandaTask(Task):
         mujoco.mj_setState(model, data, states[0], _FULL)
         data.mocap_pos[model.body("goal").mocapid[0]] = [*goal, 0.0]
         mujoco.mj_forward(model, data)
-        with open_renderer(model, width, height) as renderer:
+        with closing(make_renderer(model, width, height)) as renderer:
             n_pictures = 0
             for control in controls[0]:
                 if data.time * frames_per_second >= n_pictures:
