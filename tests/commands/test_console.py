@@ -2,8 +2,7 @@ import re
 import socket
 
 import pytest
-
-from prior_reinforce.bench.console import server
+import uvicorn
 
 
 @pytest.fixture
@@ -17,10 +16,10 @@ def opened(monkeypatch):
     """What would be served; nothing is."""
     served = []
 
-    def serve(app, listening):
-        served.append((app, listening.getsockname()))
+    def run(server, sockets):
+        served.append((server.config, sockets[0].getsockname()))
 
-    monkeypatch.setattr(server, "serve", serve)
+    monkeypatch.setattr(uvicorn.Server, "run", run)
     return served
 
 
@@ -45,9 +44,25 @@ def test_the_same_link_again(folder, run, port, opened):
     assert run("console", folder, "--port", port) == run("console", folder, "--port", port)
 
 
+def test_with_a_certificate_it_answers_by_https(
+    folder, run, port, opened, certificate, monkeypatch
+):
+    monkeypatch.setattr("prior_reinforce.commands.console._own_address", lambda: "192.168.1.5")
+    pair = ["--certificate", certificate[0], "--key", certificate[1]]
+    status, out, _ = run("console", folder, "--host", "0.0.0.0", "--port", port, *pair)
+    assert status == 0
+    assert f"https://192.168.1.5:{port}/#" in out
+    assert "only over https" not in out
+    opened[0][0].load()
+    assert opened[0][0].is_ssl
+
+
 @pytest.mark.parametrize(
     ("given", "said"),
     [
+        (["--key", "key.pem"], "--key is of a --certificate"),
+        (["--certificate", "nowhere.pem"], "No such file"),
+        (["--certificate", "planar/workspace.toml"], "give a certificate and its key as PEM"),
         (["--host", "203.0.113.7"], "cannot listen"),
         (["--port", "99999999"], "cannot listen"),
         (["--run", "mycontroller"], "{plan}"),

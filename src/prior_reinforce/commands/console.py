@@ -7,6 +7,7 @@ import socket
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from ssl import PROTOCOL_TLS_SERVER, SSLContext
 from typing import Annotated
 
 import tyro
@@ -44,6 +45,11 @@ class Console(OnWorkspace):
     """The generator that the model was learned by, where it is your own: module:Class."""
     adapter: str | None = None
     """The adapter that the goal was set with, where it is your own: module:Class."""
+    certificate: Path | None = None
+    """Certificate by which to answer over https, so that a tablet's camera works (PEM; mkcert
+    makes one)."""
+    key: Path | None = None
+    """Its key, where that is a file of its own."""
     vlm: VisionLanguageModelConfig = field(default_factory=VisionLanguageModelConfig)
     """Endpoint and model that find objects in pictures (docs/perception.md)."""
 
@@ -51,45 +57,43 @@ class Console(OnWorkspace):
         """Serve until interrupted."""
         check_installed("uvicorn")
         from prior_reinforce.bench.console.guard import report_path, token_of
-        from prior_reinforce.bench.console.server import Events, application, serve
-        from prior_reinforce.bench.console.verbs import Execute, Verbs
-        from prior_reinforce.bench.robots.executors.arguments import (
-            check_command,
-            without_arguments,
-        )
+        from prior_reinforce.bench.console.server import Events, application, server_of
+        from prior_reinforce.bench.console.verbs import Verbs
+        from prior_reinforce.bench.robots.executors.arguments import check_command
 
-        limit, by, name = self.time_limit, self.run_command, ""
-        arm, folder = arm_of(workspace, self.executor), workspace.folder
+        self._check_certificate()
+        arm, by = arm_of(workspace, self.executor), self.run_command
         if by is not None:
-            check_command(by, time_limit=limit)
-            arm, name = None, without_arguments(by)
-        elif arm is not None:
-            name = arm.executor
-
-        def execute(workspace: Workspace, body: Execute) -> object:
-            how = by or arm
-            assert how is not None
-            return workspace.execute(
-                body.trial, how, time_limit=limit, motion=body.motion, speed=body.speed
-            )
-
+            check_command(by, time_limit=self.time_limit)
         with self._listening() as listening:
-            token, events = token_of(folder), Events()
+            token, events = token_of(workspace.folder), Events()
             verbs = Verbs(
-                folder,
-                execute=execute if name else None,
-                executor=name,
-                approaches=arm is not None,
+                workspace.folder,
+                moved_by=by or arm,
+                time_limit=self.time_limit,
                 own=self.generator,
                 own_adapter=self.adapter,
                 report=report_path(token),
                 publish=events.publish,
             )
             try:
-                self._say(folder, token)
-                serve(application(verbs, events, token, self.host, self.vlm), listening)
+                self._say(workspace.folder, token)
+                app = application(verbs, events, token, self.host, self.vlm)
+                server_of(app, self.certificate, self.key).run([listening])
             finally:
                 verbs.close()
+
+    def _check_certificate(self) -> None:
+        if self.certificate is None and self.key is not None:
+            raise ConfigurationError("--key is of a --certificate; give both, or drop it")
+        if self.certificate is not None:
+            try:
+                SSLContext(PROTOCOL_TLS_SERVER).load_cert_chain(self.certificate, self.key)
+            except OSError as error:  # a wrong one, too
+                raise ConfigurationError(
+                    f"cannot use {self.certificate} ({error}); give a certificate and its key as "
+                    "PEM, for instance those that mkcert makes"
+                ) from error
 
     def _listening(self) -> socket.socket:
         if not 0 <= self.port < 2**16:
@@ -106,17 +110,21 @@ class Console(OnWorkspace):
         host = self.host
         if host in ("0.0.0.0", "::"):
             host = _own_address()
-        link = f"http://{host}:{self.port}/#{token}"
+        secure = self.certificate is not None
+        link = f"http{'s' * secure}://{host}:{self.port}/#{token}"
         print(f"console of {folder}: {link}", flush=True)
         if not _is_loopback(host):
             import segno
 
             segno.make(link).terminal(compact=True)
-            print(
-                "whoever has this link can move the arm; a browser gives its camera to this "
-                "address only over https (docs: console)",
-                flush=True,
+            camera = (
+                ""
+                if secure
+                else (
+                    "; a browser gives its camera to this address only over https (docs: console)"
+                )
             )
+            print(f"whoever has this link can move the arm{camera}", flush=True)
 
 
 def _own_address() -> str:

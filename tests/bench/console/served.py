@@ -1,4 +1,4 @@
-"""A console that runs as a program of its own, and a browser at it."""
+"""A console, as a program of its own or in a thread of the tests, for a browser to look at."""
 
 from __future__ import annotations
 
@@ -9,9 +9,17 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 import urllib.request
 from pathlib import Path
+
+from prior_reinforce.bench.console.guard import report_path, token_of
+from prior_reinforce.bench.console.server import Events, application, server_of
+from prior_reinforce.bench.console.verbs import Verbs
+from prior_reinforce.bench.robots.executors.base import ArmSettings
+from prior_reinforce.bench.workspace.workspace import Workspace
+from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
 
 ARM = Path(__file__).with_name("simulated_arm.py")
 CHROMIUM = "/usr/bin/chromium"
@@ -20,21 +28,20 @@ CHROMIUM = "/usr/bin/chromium"
 class Served:
     """`prior-reinforce console`, to be killed and started again at the same address."""
 
-    def __init__(
-        self, folder: Path, task: str = "planar", seconds: float = 0.0, *more: str
-    ) -> None:
+    def __init__(self, folder: Path, task: str = "planar", seconds: float = 0.0) -> None:
         self.folder, self.truths = folder, folder.parent / f"{folder.name}.truths"
         with socket.create_server(("127.0.0.1", 0)) as probe:
             self.port = probe.getsockname()[1]
-        arm = f"{sys.executable} {ARM} {task} {{plan}} {self.truths} {seconds}"
-        self._options = ["--run", arm]
+        self.moved_by: str | ArmSettings | None = (
+            f"{sys.executable} {ARM} {task} {{plan}} {self.truths} {seconds}"
+        )
         self.start()
 
     def start(self) -> None:
         program = [sys.executable, "-m", "prior_reinforce.cli", "console", str(self.folder)]
         with (self.folder.parent / "console.log").open("a") as log:
             self.process = subprocess.Popen(
-                [*program, "--port", str(self.port), *self._options],
+                [*program, "--port", str(self.port), "--run", str(self.moved_by)],
                 stdout=log,
                 stderr=log,
                 start_new_session=True,
@@ -77,3 +84,48 @@ class Served:
         """Where the object ended in each execution so far."""
         lines = self.truths.read_text().splitlines() if self.truths.exists() else []
         return [json.loads(line) for line in lines]
+
+
+class Here(Served):
+    """The same in a thread: it cannot be killed, and starts at once."""
+
+    certificate: tuple[Path, Path] | tuple[()] = ()
+
+    def start(self) -> None:
+        token, events = token_of(self.folder), Events()
+        self.verbs = Verbs(
+            self.folder,
+            moved_by=self.moved_by,
+            report=report_path(token),
+            publish=events.publish,
+        )
+        app = application(self.verbs, events, token, "127.0.0.1", VisionLanguageModelConfig())
+        self._server = server_of(app, *self.certificate)
+        listening = socket.create_server(("127.0.0.1", self.port))
+        self._thread = threading.Thread(target=self._server.run, args=([listening],), daemon=True)
+        self._thread.start()
+
+    def end(self) -> None:
+        self._server.should_exit = True
+        self._thread.join()
+
+
+class OnArm(Here):
+    """The same, moved by the arm that the manifest names."""
+
+    def start(self) -> None:
+        with Workspace(self.folder) as workspace:
+            self.moved_by = workspace.manifest.driven_by
+        super().start()
+
+
+class Secure(Here):
+    """The same by https."""
+
+    def __init__(self, folder: Path, certificate: tuple[Path, Path]) -> None:
+        self.certificate = certificate
+        super().__init__(folder)
+
+    @property
+    def address(self) -> str:
+        return f"https://127.0.0.1:{self.port}"

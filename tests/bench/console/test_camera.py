@@ -1,4 +1,6 @@
 import io
+import re
+from importlib import resources
 
 import numpy as np
 import pytest
@@ -9,7 +11,7 @@ from prior_reinforce.bench.console.verbs import Ask, SetGoal
 from prior_reinforce.errors import ConfigurationError, FileFormatError, PerceptionFailedError
 from prior_reinforce.perception.vlm import CAMERA_SD
 from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
-from tests.bench.console.pictures import SIZE, jpeg, pixel
+from tests.bench.console.pictures import jpeg, pixel
 
 KNOWN = [[0.6, 0.4], [0.6, 0.0], [0.6, -0.4], [1.2, -0.4], [1.2, 0.0], [1.2, 0.4]]
 
@@ -47,7 +49,6 @@ def test_before_anything_there_are_places_to_begin_with(pictures):
 
 def test_a_calibration_maps_pixels_to_the_table_and_is_kept(pictures, verbs):
     camera = calibrated(pictures)
-    assert (camera.width, camera.height) == SIZE
     for place in ([0.7, 0.3], [1.1, -0.35]):
         np.testing.assert_allclose(to_table(camera, pixel(place)), place, atol=1e-6)
     assert Pictures(verbs, VisionLanguageModelConfig()).look_up().to_table == camera.to_table
@@ -75,25 +76,35 @@ def test_points_that_fix_no_plane_are_refused(pictures, points):
 def test_printed_tags_on_the_known_points_are_found_at_their_centres(pictures):
     pictures.keep(jpeg(tags=KNOWN))
     tags = pictures.tags()
-    assert [tag.number for tag in tags] == [1, 2, 3, 4, 5, 6]
-    touched = [tag.pixel for tag in tags]
+    assert [*sorted(tags)] == [1, 2, 3, 4, 5, 6]
+    touched = [tags[number] for number in sorted(tags)]
     np.testing.assert_allclose(touched, [pixel(point) for point in KNOWN], atol=1.0)
     camera = pictures.calibrate(Calibrate(KNOWN, touched))
     assert camera.sd < 0.004
     np.testing.assert_allclose(to_table(camera, pixel([0.8, 0.2])), [0.8, 0.2], atol=0.002)
 
 
-def test_the_sheet_that_is_printed_has_these_tags(pictures):
-    sheet = Image.open(pictures.sheet())
+def test_the_sheet_that_is_printed_has_these_tags_with_their_centres_where_they_are(pictures):
+    """At 10 px a millimetre; each tag is a path of rectangles of so many modules."""
+    drawn = resources.files("prior_reinforce.bench.console").joinpath("tags.svg").read_text()
+    sheet = np.full((2100, 1900), 255, np.uint8)
+    centres = []
+    for left, top, path in re.findall(r'translate\((\d+) (\d+)\)"><path.* d="(.*?)"', drawn):
+        for column, row, wide in re.findall(r"M(\d) (\d)h(\d)v1", path):
+            u, v = (10 * (int(at) + 5 * int(k)) for at, k in ((left, column), (top, row)))
+            sheet[v : v + 50, u : u + 50 * int(wide)] = 0
+        centres.append([10 * int(left) + 200, 10 * int(top) + 200])
     encoded = io.BytesIO()
-    sheet.convert("RGB").save(encoded, "PNG")
+    Image.fromarray(sheet).save(encoded, "PNG")
     pictures.keep(encoded.getvalue())
-    assert [tag.number for tag in pictures.tags()] == [1, 2, 3, 4, 5, 6]
+    tags = pictures.tags()
+    assert [*sorted(tags)] == [1, 2, 3, 4, 5, 6]
+    np.testing.assert_allclose([tags[number] for number in sorted(tags)], centres, atol=2)
 
 
 def test_no_tag_is_no_error(pictures):
     pictures.keep(jpeg())
-    assert pictures.tags() == []
+    assert pictures.tags() == {}
 
 
 def test_the_ball_is_found_by_its_colour(pictures):
@@ -115,7 +126,7 @@ def test_the_ball_is_found_by_its_colour(pictures):
 def test_a_picture_is_of_the_trial_that_waits(pictures, verbs):
     pictures.keep(jpeg())
     assert pictures.file().name == "table.jpg"
-    state = verbs.set_goal(SetGoal(seen=verbs.state().id, goal=[0.9, 0.0]))
+    state = verbs.goal(SetGoal(seen=verbs.state().id, goal=[0.9, 0.0]))
     verbs.ask(Ask(seen=state.id))
     pictures.keep(jpeg())
     assert pictures.file().name == "trial-001.jpg"

@@ -32,7 +32,7 @@ def test_a_secret_that_is_a_link_is_not_followed(tmp_path):
 
 def test_the_page_is_for_everyone_and_the_workspace_for_who_has_the_link(client):
     stranger = TestClient(client.app, base_url="http://127.0.0.1:8750")
-    for path in ("/", "/console.js", "/console.css", "/icon.svg"):
+    for path in ("/", "/console.js", "/console.css", "/icon.svg", "/tags.svg"):
         assert stranger.get(path).status_code == 200
     for route in client.app._app.routes:
         path = re.sub(r"\{\w+:int\}", "1", route.path).replace("{ticket}", "0")
@@ -78,7 +78,7 @@ def test_no_script_but_ours_no_cookie_no_frame(client):
 
 
 def test_the_report_is_read_at_an_address_that_cannot_be_guessed(client):
-    client.verbs.set_goal(SetGoal(seen=2, goal=[0.9, 0.05]))
+    client.verbs.goal(SetGoal(seen=2, goal=[0.9, 0.05]))
     client.verbs.ask(Ask(seen=3))
     stranger = TestClient(client.app, base_url="http://127.0.0.1:8750")
     answer = stranger.get(report_path(TOKEN))

@@ -10,6 +10,7 @@ from prior_reinforce.errors import (
     InvalidDemonstrationsError,
     InvalidFeedbackError,
     TrialStateError,
+    UnclearUnitsError,
 )
 from tests.bench.workspace.planar import demonstrations, manifest, recordings
 
@@ -37,10 +38,10 @@ def touch_all(imports):
 def test_recordings_are_looked_through_touched_and_taken_in(dropped):
     found = dropped.look()
     assert (found.files, found.problem, found.questions) == (4, "", [])
-    assert [(e.name, e.outcome) for e in found.episodes] == [(f"throw_{i}", None) for i in range(4)]
+    assert found.episodes == {f"throw_{i}": None for i in range(4)}
     assert "joint1" in found.text
     found = touch_all(dropped)
-    assert [e.outcome for e in found.episodes] == demonstrations().outcomes_seen.tolist()
+    assert [*found.episodes.values()] == demonstrations().outcomes_seen.tolist()
     state = dropped.take(Take(seen=dropped.verbs.state().id))
     assert state.step == "learn"
     taken = dropped.verbs.workspace.demonstrations
@@ -52,11 +53,21 @@ def test_recordings_are_looked_through_touched_and_taken_in(dropped):
 def test_a_touch_is_on_disk_before_it_is_answered_and_can_be_corrected(dropped):
     dropped.place(Place(episode="throw_1", outcome=[0.7, 0.1]))
     again = Imports(dropped.verbs).look()
-    assert [e.outcome for e in again.episodes] == [None, [0.7, 0.1], None, None]
+    assert [*again.episodes.values()] == [None, [0.7, 0.1], None, None]
     corrected = dropped.place(Place(episode="throw_1", outcome=[0.8, 0.2]))
-    assert corrected.episodes[1].outcome == [0.8, 0.2]
+    assert corrected.episodes["throw_1"] == [0.8, 0.2]
     forgotten = dropped.place(Place(episode="throw_1", outcome=None))
-    assert forgotten.episodes[1].outcome is None
+    assert forgotten.episodes["throw_1"] is None
+
+
+def test_a_picture_that_fails_takes_nothing_back(dropped):
+    touch_all(dropped)
+    (dropped.verbs.folder / "demonstrations.png").mkdir()
+    heard = []
+    dropped.verbs.publish = heard.append
+    assert dropped.take(Take(seen=0)).step == "learn"
+    assert any("there is no picture" in message.get("error", "") for message in heard)
+    assert dropped.verbs.workspace.demonstrations.n == 4
 
 
 def test_recordings_without_an_outcome_are_left_out(dropped):
@@ -74,7 +85,7 @@ def test_a_table_that_was_dropped_beside_them_serves(tmp_path):
     imports = Imports(verbs)
     for path in (tmp_path / "recorded").iterdir():
         imports.drop(f"recorded/{path.name}", path.read_bytes())
-    assert [e.outcome for e in imports.look().episodes] == demonstrations().outcomes_seen.tolist()
+    assert [*imports.look().episodes.values()] == demonstrations().outcomes_seen.tolist()
     assert imports.take(Take(seen=0)).step == "learn"
     verbs.close()
 
@@ -103,7 +114,7 @@ def test_guesses_are_for_a_person_to_confirm(tmp_path):
         imports.drop(path.name, path.read_bytes())
     (question,) = imports.look().questions
     assert "looks like cm" in question
-    with pytest.raises(InvalidDemonstrationsError, match="looks like cm"):
+    with pytest.raises(UnclearUnitsError, match="looks like cm"):
         imports.take(Take(seen=0))
     imports.take(Take(seen=0, confirmed=True))
     np.testing.assert_allclose(
@@ -166,7 +177,7 @@ def test_nothing_is_taken_in_while_a_trial_waits_or_by_a_stale_tab(dropped):
         dropped.take(Take(seen=0))
     verbs = dropped.verbs
     verbs.workspace.learn("interpolation")
-    verbs.set_goal(SetGoal(seen=verbs.state().id, goal=[0.9, 0.0]))
+    verbs.goal(SetGoal(seen=verbs.state().id, goal=[0.9, 0.0]))
     verbs.workspace.session().ask()
     with pytest.raises(TrialStateError, match="waits to be told"):
         dropped.take(Take(seen=verbs.state().id))

@@ -1,12 +1,14 @@
-"""The page in a real browser, at a console that runs as a program of its own.
+"""The page in a real browser, at a console: a program of its own where it is to be killed.
 
 With PRIOR_REINFORCE_SCREENSHOTS=docs/images/console it writes the documentation's pictures.
 """
 
 from __future__ import annotations
 
+import itertools
 import os
 import random
+import re
 import shutil
 import time
 from collections import Counter
@@ -15,13 +17,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 from axe_playwright_python.sync_playwright import Axe
-from playwright.sync_api import Browser, Error, Page, expect, sync_playwright
+from playwright.sync_api import Error, Page, expect, sync_playwright
 
 from prior_reinforce.bench.workspace.workspace import Workspace
 from prior_reinforce.lab.tasks import make_task
+from prior_reinforce.plans.motions import Demonstrations
 from tests.bench.console.pictures import SIZE, homography, jpeg, pixel
-from tests.bench.console.served import CHROMIUM, Served
-from tests.bench.workspace.planar import demonstrations, events_in, manifest, recordings
+from tests.bench.console.served import CHROMIUM, Here, OnArm, Secure, Served
+from tests.bench.robots.executors import toy_arm
+from tests.bench.workspace.planar import FORMAT, demonstrations, events_in, manifest, recordings
 
 # Where tests of the page must run, as in CI, a browser that is missing is a failure.
 pytestmark = pytest.mark.skipif(
@@ -63,13 +67,14 @@ def serve(tmp_path, learned_folder):
     """Serve a copy of a small workspace, fresh or with a model."""
     started = []
 
-    def start(*, fresh=False, **how) -> Served:
-        folder = tmp_path / f"planar-{len(started)}"
-        if fresh:
-            Workspace.create(folder, manifest()).close()
-        else:
-            shutil.copytree(learned_folder, folder)
-        started.append(Served(folder, **how))
+    def learned(folder):
+        shutil.copytree(learned_folder, folder)
+
+    def start(kind=Here, *, prepare=learned, folder=None, **how) -> Served:
+        if folder is None:
+            folder = tmp_path / f"planar-{len(started)}"
+            prepare(folder)
+        started.append(kind(folder, **how))
         return started[-1]
 
     yield start
@@ -77,16 +82,29 @@ def serve(tmp_path, learned_folder):
         each.end()
 
 
-def opened(browser: Browser, served: Served, size=PHONE, **how) -> Page:
-    context = browser.new_context(viewport={"width": size[0], "height": size[1]}, **how)
-    context.set_default_timeout(60_000)
-    page = context.new_page()
-    page.faults = []
-    page.on("pageerror", lambda error: page.faults.append(str(error)))
-    page.goto(served.link)
-    expect(page.locator("#now")).not_to_have_text("Connecting")
-    expect(page.locator("#now")).not_to_have_text("Connection lost")
-    return page
+def fresh(folder):
+    Workspace.create(folder, manifest()).close()
+
+
+@pytest.fixture
+def at(browser, serve):
+    """Open a page at a console; closed before that ends, or it asks on and on."""
+    contexts = []
+
+    def open_(served: Served, size=PHONE, **how) -> Page:
+        contexts.append(browser.new_context(viewport={"width": size[0], "height": size[1]}, **how))
+        contexts[-1].set_default_timeout(60_000)
+        page = contexts[-1].new_page()
+        page.faults = []
+        page.on("pageerror", lambda error: page.faults.append(str(error)))
+        page.goto(served.link)
+        expect(page.locator("#now")).not_to_have_text("Connecting")
+        expect(page.locator("#now")).not_to_have_text("Connection lost")
+        return page
+
+    yield open_
+    for each in contexts:
+        each.close()
 
 
 def on_screen(page: Page, place, svg="map"):
@@ -140,10 +158,10 @@ def touch_until_it_hits(page: Page, served: Served, each=lambda step: None) -> i
     raise AssertionError("never hit")
 
 
-def test_from_recordings_to_a_hit_on_a_fresh_workspace(browser, serve, tmp_path):
-    served = serve(fresh=True, seconds=1.5)
+def test_from_recordings_to_a_hit_on_a_fresh_workspace(at, serve, tmp_path):
+    served = serve(prepare=fresh, seconds=1.5)
     recordings(tmp_path / "recorded", outcomes=())
-    page = opened(browser, served)
+    page = at(served)
     accessible(page)
     shot(page, "fresh", tmp_path)
     page.set_input_files("#files", sorted((tmp_path / "recorded").iterdir()))
@@ -184,7 +202,7 @@ def test_from_recordings_to_a_hit_on_a_fresh_workspace(browser, serve, tmp_path)
 
 
 @pytest.mark.slow
-def test_six_recordings_of_a_panda_and_a_throw_in_contact_physics(browser, tmp_path):
+def test_six_recordings_of_a_panda_and_a_throw_in_contact_physics(at, tmp_path):
     demos = make_task("basketball-v1").demonstrations("A")
     form, folder = demos.format, tmp_path / "basketball"
     Workspace.create(folder, robot="panda", action_names=form.names, dt=form.dt).close()
@@ -195,14 +213,12 @@ def test_six_recordings_of_a_panda_and_a_throw_in_contact_physics(browser, tmp_p
         np.savez(path, t=t, q=plan, joint_names=np.array(form.names))
     served = Served(folder, "basketball-v1", 1.0)
     try:
-        page = opened(browser, served, TABLET)
-        shot(page, "panda-fresh", tmp_path)
+        page = at(served, TABLET)
         page.set_input_files("#files", sorted((tmp_path / "recorded").iterdir()))
         for i, place in enumerate(demos.outcomes_seen.tolist()):
             expect(page.locator("#now")).to_have_text(f"Where did throw_{i} land?")
             touch(page, place)
             page.click("#place")
-        shot(page, "panda-recordings", tmp_path)
         page.click("#import")
         page.click("#learn")
         expect(page.locator("#now")).to_have_text("Touch a goal")
@@ -227,19 +243,17 @@ def test_six_recordings_of_a_panda_and_a_throw_in_contact_physics(browser, tmp_p
             shot(page, f"panda-{step}", tmp_path)
 
         touch_until_it_hits(page, served, each)
-        page.evaluate("window.scrollTo(0, 0)")
-        shot(page, "panda-reached", tmp_path)
         assert not page.faults
     finally:
         served.end()
 
 
 @pytest.mark.parametrize("seed", range(RUNS))
-def test_nothing_is_lost_or_executed_twice_whatever_happens(browser, serve, seed):
+def test_nothing_is_lost_or_executed_twice_whatever_happens(at, serve, seed):
     """Reloads, killed consoles, two tabs that press at once, lost connections."""
     rng = random.Random(seed)
-    served = serve(seconds=0.3)
-    pages = [opened(browser, served) for _ in range(2)]
+    served = serve(Served, seconds=0.3)
+    pages = [at(served) for _ in range(2)]
     touch(pages[0], [0.9, 0.05])
     pages[0].click("#goal")
     told = 0
@@ -294,9 +308,9 @@ def test_nothing_is_lost_or_executed_twice_whatever_happens(browser, serve, seed
         assert not page.faults
 
 
-def test_two_tabs_see_the_same_and_the_late_one_is_told(browser, serve):
+def test_two_tabs_see_the_same_and_the_late_one_is_told(at, serve):
     served = serve()
-    first, second = (opened(browser, served) for _ in range(2))
+    first, second = (at(served) for _ in range(2))
     touch(first, [0.9, 0.05])
     first.click("#goal")
     expect(second.locator("#execute")).to_be_visible()
@@ -308,18 +322,24 @@ def test_two_tabs_see_the_same_and_the_late_one_is_told(browser, serve):
     assert len(served.landed()) == 1
 
 
-def test_a_second_tap_meant_for_the_button_before_moves_nothing(browser, serve):
-    served = serve()
-    page = opened(browser, served)
+def tapped_at_once(page: Page, button: str):
+    """Press a button as soon as it is there."""
     page.evaluate(
-        """() => new MutationObserver((_, watch) => {
-            const button = document.getElementById("execute");
-            if (!button) return;
+        """(button) => new MutationObserver((_, watch) => {
+            const found = document.getElementById(button);
+            if (!found) return;
             watch.disconnect();
-            button.click();
+            found.click();
             document.body.id = "tapped";
-        }).observe(document.getElementById("act"), { childList: true })"""
+        }).observe(document.getElementById("act"), { childList: true })""",
+        button,
     )
+
+
+def test_a_second_tap_meant_for_the_button_before_moves_nothing(at, serve):
+    served = serve()
+    page = at(served)
+    tapped_at_once(page, "execute")
     touch(page, [0.9, 0.05])
     page.click("#goal")
     expect(page.locator("#tapped")).to_be_visible()
@@ -329,17 +349,17 @@ def test_a_second_tap_meant_for_the_button_before_moves_nothing(browser, serve):
     assert len(served.landed()) == 1
 
 
-def test_stop_stops_before_anything_is_known(browser, serve):
-    page = opened(browser, serve())
+def test_stop_stops_before_anything_is_known(at, serve):
+    page = at(serve())
     page.route("**/api/state", lambda route: route.abort())
     page.reload()
     with page.expect_request("**/api/stop"):
         page.click("#stop")
 
 
-def test_stop_is_always_there_and_stops(browser, serve, tmp_path):
+def test_stop_is_always_there_and_stops(at, serve, tmp_path):
     served = serve(seconds=60)
-    page = opened(browser, served)
+    page = at(served)
     touch(page, [0.9, 0.05])
     page.click("#goal")
     page.click("#execute")
@@ -356,41 +376,21 @@ def test_stop_is_always_there_and_stops(browser, serve, tmp_path):
     assert not served.landed()
 
 
-def test_what_the_command_line_does_is_seen(browser, serve):
+def test_what_the_command_line_does_is_seen_and_names_are_text(at, serve):
     served = serve()
-    page = opened(browser, served)
+    page = at(served)
     with Workspace(served.folder) as workspace:
-        workspace.set_goal([0.9, 0.05])
+        workspace.set_goal([0.9, 0.05], new_hardware="<img src=x onerror=window.hurt=1>")
         workspace.session().ask()
         expect(page.locator("#now")).to_have_text("Trial 1 is ready")
         workspace.session().tell(1, "5cm long")
-    expect(page.locator("#history")).to_contain_text("5cm long")
+        expect(page.locator("#history")).to_contain_text("5cm long")
+        workspace.session().void(1, "<script>window.hurt=1</script>")
+    expect(page.locator("#history")).to_contain_text("<script>")
+    assert page.evaluate("window.hurt") is None
 
 
-def test_a_correction_and_a_void(browser, serve, tmp_path):
-    served = serve()
-    with Workspace(served.folder) as workspace:
-        workspace.set_goal([0.9, 0.05])
-        workspace.session().ask()
-        workspace.session().tell(1, "20cm long")
-        workspace.session().ask()
-    page = opened(browser, served)
-    page.click("#amend-1")
-    touch(page, [0.95, 0.05])
-    accessible(page)
-    shot(page, "correct", tmp_path)
-    page.click("#tell")
-    expect(page.locator("#history")).not_to_contain_text("20cm long")
-    with Workspace(served.folder) as workspace:
-        seen = workspace.state.trials[0].reading.error_seen
-        np.testing.assert_allclose(seen, [0.05, 0.0], atol=0.003)
-    expect(page.locator("#act")).to_contain_text("Planned before a correction")
-    page.click("#undo-1")
-    page.click("#void-0")
-    expect(page.locator("#history")).to_contain_text("void: it slipped")
-
-
-def test_a_surprise_is_questioned(browser, serve, tmp_path):
+def test_a_surprise_is_questioned(at, serve, tmp_path):
     served = serve()
     with Workspace(served.folder) as workspace:
         workspace.set_goal([0.9, 0.05])
@@ -399,7 +399,7 @@ def test_a_surprise_is_questioned(browser, serve, tmp_path):
             session.tell(session.ask().number, seen, hit=False)
         workspace.session().ask()
         assert workspace.state.trials[-2].surprise
-    page = opened(browser, served)
+    page = at(served)
     expect(page.locator("#surprise")).to_contain_text("Mistyped?")
     accessible(page)
     shot(page, "surprise", tmp_path)
@@ -407,10 +407,9 @@ def test_a_surprise_is_questioned(browser, serve, tmp_path):
     expect(page.locator("#history")).to_contain_text("changed, as a surprise showed")
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_by_the_keyboard_alone(browser, serve, tmp_path, scheme):
+def test_by_the_keyboard_alone_in_the_dark(at, serve, tmp_path):
     served = serve()
-    page = opened(browser, served, TABLET, color_scheme=scheme)
+    page = at(served, TABLET, color_scheme="dark")
     page.focus("#map")
     page.keyboard.press("ArrowUp")  # a mark, where nothing is known in the middle
     for _ in range(3):
@@ -423,15 +422,15 @@ def test_by_the_keyboard_alone(browser, serve, tmp_path, scheme):
         np.testing.assert_allclose(workspace.state.goals[0].goal, [0.83, 0.001], atol=1e-9)
     expect(page.locator("#live")).to_have_text("Trial 1 is ready. ")
     accessible(page)
-    shot(page, f"tablet-{scheme}", tmp_path)
+    shot(page, "tablet-dark", tmp_path)
 
 
-@pytest.mark.parametrize("size", [PHONE, TABLET, SCREEN])
-def test_a_touch_is_within_three_millimetres_over_the_table(browser, serve, size):
+def test_a_touch_is_within_three_millimetres_over_the_table(at, serve):
     served = serve()
-    page = opened(browser, served, size, has_touch=True)
-    for zoom in (1, 4):
-        if zoom == 4:
+    for size, zoom in itertools.product((PHONE, TABLET, SCREEN), (1, 4)):
+        if zoom == 1:
+            page = at(served, size, has_touch=True)
+        else:
             page.click("#nearer")
             page.click("#nearer")
         left, top, right, bottom = page.evaluate(
@@ -453,9 +452,9 @@ def test_a_touch_is_within_three_millimetres_over_the_table(browser, serve, size
                 np.testing.assert_allclose(page.evaluate("L.mark"), place, atol=0.003)
 
 
-def test_words_for_who_measures_by_eye(browser, serve, tmp_path):
+def test_words_by_eye_then_a_correction_and_a_void(at, serve, tmp_path):
     served = serve()
-    page = opened(browser, served)
+    page = at(served)
     touch(page, [0.9, 0.05])
     page.click("#goal")
     page.click("#execute")
@@ -466,13 +465,27 @@ def test_words_for_who_measures_by_eye(browser, serve, tmp_path):
     shot(page, "by-eye", tmp_path)
     page.click("#say")
     expect(page.locator("#history")).to_contain_text("5cm long, 2cm right")
+    expect(page.locator("#execute")).to_be_visible()
     with Workspace(served.folder) as workspace:
         assert workspace.state.trials[0].reading.said == "5cm long, 2cm right"
+    page.click("#amend-1")
+    touch(page, [0.95, 0.05])
+    accessible(page)
+    shot(page, "correct", tmp_path)
+    page.click("#tell")
+    expect(page.locator("#history")).not_to_contain_text("2cm right")
+    with Workspace(served.folder) as workspace:
+        seen = workspace.state.trials[0].reading.error_seen
+        np.testing.assert_allclose(seen, [0.05, 0.0], atol=0.003)
+    expect(page.locator("#act")).to_contain_text("Planned before a correction")
+    page.click("#undo-1")
+    page.click("#void-0")
+    expect(page.locator("#history")).to_contain_text("void: it slipped")
 
 
-def test_the_camera_from_calibration_to_a_reading(browser, serve, tmp_path):
+def test_the_camera_from_calibration_to_a_reading(at, serve, tmp_path):
     served = serve()
-    page = opened(browser, served, TABLET, permissions=["camera"])
+    page = at(served, TABLET, permissions=["camera"])
     touch(page, [0.9, 0.05])
     page.click("#goal")
     page.click("#execute")
@@ -509,34 +522,197 @@ def test_the_camera_from_calibration_to_a_reading(browser, serve, tmp_path):
     assert not page.faults
 
 
-def test_names_are_text_wherever_they_are_shown(browser, serve, tmp_path):
-    served = serve()
-    with Workspace(served.folder) as workspace:
-        workspace.set_goal([0.9, 0.05], new_hardware="<img src=x onerror=window.hurt=1>")
-        workspace.session().ask()
-        workspace.session().void(1, "<script>window.hurt=1</script>")
-    page = opened(browser, served)
-    expect(page.locator("#history")).to_contain_text("<script>")
-    assert page.evaluate("window.hurt") is None
-
-
-def test_without_the_link_there_is_nothing_to_see(browser, serve):
-    served = serve()
-    page = browser.new_context().new_page()
-    page.goto(served.address)
-    expect(page.locator("#alert")).to_contain_text("open the one that the terminal shows")
-    assert page.locator("#act button").count() == 0
-
-
-def test_a_lost_console_is_said_and_comes_back(browser, serve, tmp_path):
-    served = serve()
-    page = opened(browser, served)
+def test_a_console_that_is_lost_comes_back_and_shows_nothing_without_the_link(
+    at, serve, browser, tmp_path
+):
+    served = serve(Served)
+    page = at(served)
     served.kill()
     expect(page.locator("#now")).to_have_text("Connection lost")
     accessible(page)
     shot(page, "lost", tmp_path)
     served.start()
     expect(page.locator("#now")).to_have_text("Touch a goal")
+    stranger = browser.new_context().new_page()
+    stranger.goto(served.address)
+    expect(stranger.locator("#alert")).to_contain_text("open the one that the terminal shows")
+    assert stranger.locator("#act button").count() == 0
+    stranger.context.close()
+
+
+@pytest.fixture
+def on_arm(serve, learned_folder, tmp_path, monkeypatch):
+    """A console whose manifest names a toy arm."""
+    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parents[3]))
+
+    def start(**options):
+        def prepare(folder):
+            shutil.copytree(learned_folder, folder)
+            toy_arm.name_arm(folder, tmp_path / "arm", **options)
+
+        return serve(OnArm, prepare=prepare), tmp_path / "arm"
+
+    return start
+
+
+def test_an_arm_is_asked_a_person_confirms_and_a_second_console_stops_it(
+    at, on_arm, serve, tmp_path
+):
+    served, arm = on_arm(seconds=4)
+    (arm / "pose").write_text("0.0 0.3")
+    page = at(served)
+    touch(page, [0.9, 0.05])
+    page.click("#goal")
+    tapped_at_once(page, "execute")
+    page.click("#prepare")
+    expect(page.locator("#question")).to_have_text(
+        "The arm will move (slowly to where trial 1 begins, 1.9 s); NOT checked: self-collision, "
+        "the table; is the area clear?"
+    )
+    accessible(page)
+    shot(page, "arm-approach", tmp_path)
+    expect(page.locator("#tapped")).to_be_visible()
+    assert toy_arm.motions(arm) == 0
+    page.click("#execute")
+    expect(page.locator(".output")).to_contain_text("toy moves for 1.88 s")
+    page.click("#prepare")
+    expect(page.locator("#question")).to_have_text(
+        "The arm will move (trial 1 at full speed, 0.5 s); NOT checked: self-collision, the "
+        "table; is the area clear?"
+    )
+    expect(page.locator("#act")).to_contain_text("toy, firmware 1.0: the arm is off it by up to")
+    accessible(page)
+    shot(page, "arm-question", tmp_path)
+    expect(page.locator("#execute")).to_have_text("Yes: execute trial 1")
+    page.click("#execute")
+    second = at(serve(OnArm, folder=served.folder))
+    expect(second.locator(".output")).to_contain_text("toy moves for 0.46 s")
+    second.keyboard.press("Escape")
+    for each in (page, second):
+        expect(each.locator("#now")).to_have_text("Did the arm move?")
+        expect(each.locator("#act")).to_contain_text("stopped by a signal")
+    page.click("#spoiled")
+    expect(second.locator("#history")).to_contain_text("void: the command was stopped by a signal")
+    assert toy_arm.motions(arm) == 2
+    assert not page.faults + second.faults
+
+
+def test_a_fault_of_the_arm_voids_the_trial_after_a_question(at, on_arm, tmp_path):
+    served, _ = on_arm(kind="faults")
+    page = at(served)
+    touch(page, [0.9, 0.05])
+    page.click("#goal")
+    page.click("#prepare")
+    page.click("#execute")
+    expect(page.locator("#act")).to_contain_text(f"but aborted: {toy_arm.FAULT}")
+    accessible(page)
+    shot(page, "arm-fault", tmp_path)
+    assert kinds(served.folder)["voided"] == 0
+    page.click("#spoiled")
+    expect(page.locator("#history")).to_contain_text(f"void: {toy_arm.FAULT}")
+
+
+def of_outcomes(names, units, tolerance, outcomes):
+    """Make a workspace with a model, whose outcomes are other numbers than two lengths."""
+
+    def prepare(folder):
+        made = Workspace.create(
+            *(folder,), robot="none", action_names=FORMAT.names, dt=FORMAT.dt,
+            outcome_names=names, outcome_units=units, tolerance=tolerance,
+        )  # fmt: skip
+        with made as workspace:
+            seen = np.array(outcomes)
+            plans = demonstrations().plans[: len(seen)]
+            demos = Demonstrations(plans, seen, FORMAT, tuple(names), tuple(units))
+            workspace.import_demonstrations(demos, "made up")
+            workspace.learn("interpolation")
+
+    return prepare
+
+
+def on_ruler(page: Page, number: int, value: float):
+    """Touch a ruler where a value is."""
+    x = page.evaluate("([i, value]) => rulers.find((r) => r.i === i).at(value)", [number, value])
+    page.locator(f"#ruler-{number}").click(position={"x": x, "y": 58})
+
+
+def test_one_number_has_a_ruler(at, serve, tmp_path):
+    page = at(serve(prepare=of_outcomes(["distance"], ["m"], 0.02, [[0.8], [1.0], [1.2], [1.4]])))
+    assert page.locator("#map").is_hidden()
+    on_ruler(page, 0, 1.1)
+    accessible(page)
+    expect(page.locator("#goal")).to_have_text(re.compile(r"Aim at (109|110|111)(\.\d)? cm ahead"))
+    page.keyboard.press("Shift+ArrowRight")
+    page.click("#sum-fields")
+    page.fill("#field-0", "110,5")
+    page.keyboard.press("Tab")
+    page.click("#goal")
+    expect(page.locator("#execute")).to_be_visible()
+    page.click("#sum-other")
+    page.click("#by-hand")
+    on_ruler(page, 0, 1.16)
+    accessible(page)
+    shot(page, "ruler", tmp_path)
+    page.click("#tell")
+    expect(page.locator("#history")).to_contain_text("cm long")
+    seen = page.evaluate("[S.goals[0].goal, S.trials[0].outcome]")
+    np.testing.assert_allclose(seen, [[1.105], [1.16]], atol=0.003)
+    assert not page.faults
+
+
+def test_lengths_are_on_the_map_and_a_time_beside_it(at, serve, tmp_path):
+    outcomes = [[0.8, -0.2, 0.4], [0.8, 0.2, 0.45], [1.0, -0.2, 0.5], [1.0, 0.2, 0.6]]
+    names, units, tolerance = ["x", "y", "arrival"], ["m", "m", "s"], [0.02, 0.02, 0.02]
+    page = at(serve(prepare=of_outcomes(names, units, tolerance, outcomes)), TABLET)
+    touch(page, [0.9, 0.05])
+    expect(page.locator("#goal")).to_have_text("Say the arrival")
+    expect(page.locator("#goal")).to_be_disabled()
+    on_ruler(page, 2, 0.5)
+    page.click("#goal")
+    expect(page.locator("#execute")).to_be_visible()
+    page.click("#sum-other")
+    page.click("#by-hand")
+    touch(page, [0.95, 0.05])
+    on_ruler(page, 2, 0.52)
+    accessible(page)
+    shot(page, "mixed", tmp_path)
+    page.click("#sum-eye")
+    for number, size in enumerate((5, -2, 20)):
+        page.locator(f"#eye-{number}-{size}").check(force=True)
+    expect(page.locator("#say")).to_have_text("Say: 5cm long, 2cm right, 20ms late")
+    page.click("#say")
+    expect(page.locator("#history")).to_contain_text("5cm long, 2cm right, 20ms late")
+    assert not page.faults
+
+
+def test_a_folder_that_is_dropped_is_walked(at, serve, tmp_path):
+    page = at(serve(prepare=fresh))
+    recordings(tmp_path / "recorded")
+    (tmp_path / "recorded" / "outcomes.csv").rename(tmp_path / "outcomes.csv")
+    for name, hidden in (("throws", "throw_0.npz"), ("more", ".DS_Store")):
+        (tmp_path / "recorded" / name).mkdir()
+        (tmp_path / "recorded" / name / hidden).touch()
+    (tmp_path / "recorded" / "throws" / "throw_0.npz").unlink()
+    x, y = (int(v) for v in page.evaluate(
+        "(({x, y, width, height}) => [x + width / 2, y + height / 2])"
+        "(document.getElementById('drop').getBoundingClientRect())"
+    ))  # fmt: skip
+    files = {"items": [], "files": [str(tmp_path / "recorded")], "dragOperationsMask": 1}
+    devtools = page.context.new_cdp_session(page)
+    for kind in ("dragEnter", "dragOver", "drop"):
+        devtools.send("Input.dispatchDragEvent", {"type": kind, "x": x, "y": y, "data": files})
+    expect(page.locator("#now")).to_have_text("Where did throw_0 land?")
+    assert page.evaluate("R.files") == 4
+
+
+def test_over_https_a_page_has_a_camera_at_every_address(at, browser, serve, certificate):
+    served = serve(Secure, certificate=certificate)
+    page = at(served, ignore_https_errors=True)
+    touch(page, [0.9, 0.05])
+    page.click("#goal")
+    expect(page.locator("#execute")).to_be_visible()
+    with pytest.raises(Error, match="ERR_CERT_AUTHORITY_INVALID"):
+        at(served)
 
 
 def test_the_fake_camera_shows_the_table():

@@ -45,13 +45,13 @@ def test_the_state_is_the_journal_s(workspace):
     ask(workspace)
     state = state_of(workspace)
     assert state.id == workspace.events[-1].id
-    assert [d.outcome for d in state.demonstrations] == demonstrations().outcomes_seen.tolist()
+    assert state.demonstrations == demonstrations().outcomes_seen.tolist()
     first, second, third = state.trials
-    assert (first.stage, first.said, first.hit) == ("told", "5cm long, 2cm left", False)
+    assert (first.stage, first.line, first.hit) == ("told", "5cm long, 2cm left", False)
     np.testing.assert_allclose(first.outcome, [0.95, 0.07])
-    assert (second.stage, second.outcome, second.said) == ("voided", None, "void: slipped <b>")
+    assert (second.stage, second.outcome, second.line) == ("voided", None, "void: slipped <b>")
     assert state.open == third.number == 3
-    assert third.plan == workspace.state.trial(3).kept.sha256
+    assert third.sha256 == workspace.state.trial(3).kept.sha256
     assert state.goals[0].told == 1
     assert state.goals[0].tolerance == [0.015, 0.015]
 
@@ -73,14 +73,35 @@ def test_what_was_seen_without_a_number_has_no_place(workspace):
     assert state_of(workspace).trials[0].outcome is None
 
 
-def test_a_surprise_names_its_trial(workspace):
-    for error in ([0.01, 0.0], [0.0, 0.01], [0.4, -0.3]):
-        tell(workspace, ask(workspace).number, error)
-    ask(workspace)
-    third, fourth = state_of(workspace).trials[2:]
-    assert (third.surprising, third.surprise) == (None, "")
-    assert fourth.surprising == 3
-    assert fourth.surprise.endswith("sd from what was expected of it")
+_X, _Y, _Z = ("cm", 0, "long"), ("cm", 1, "left"), ("cm", 2, "high")
+_TWO_OF_EACH = {"cm": 2, "ms": 20, "deg": np.rad2deg(0.02), "in": 0.02}
+
+
+@pytest.mark.parametrize(
+    ("names", "units", "said"),
+    [
+        (("x", "y"), ("m", "m"), [_X, _Y]),
+        (("y",), ("m",), [_Y]),
+        (("angle",), ("rad",), [("deg", 3, "long")]),
+        (("a", "b", "at"), ("m", "m", "s"), [_X, _Y, ("ms", 3, "late")]),
+        (("distance",), ("in",), [("in", 3, "long")]),
+        (("x", "y", "z", "more"), ("m",) * 4, [_X, _Y, _Z, ("cm", 3, None)]),
+    ],
+)
+def test_each_number_of_an_outcome_is_said_in_its_own_words_and_unit(tmp_path, names, units, said):
+    made = Workspace.create(
+        tmp_path / "w",
+        robot="none",
+        outcome_names=names,
+        outcome_units=units,
+        tolerance=[0.02] * len(names),
+    )
+    with made as workspace:
+        found = state_of(workspace).components
+    assert [(c.shown, c.axis, (*c.words, None)[0]) for c in found] == said
+    for component in found:
+        shown = component.factor * component.tolerance
+        assert shown == pytest.approx(_TWO_OF_EACH[component.shown])
 
 
 @pytest.fixture(scope="module")
@@ -103,7 +124,7 @@ def test_the_motion_is_the_plan_s_with_the_arm_s_places_and_limits(panda):
     assert motion.times[0] == 0
     assert motion.times[-1] == pytest.approx(plan.times[-1])
     for j, column in enumerate(motion.columns):
-        assert (column.low, column.high) == (limits.lower[j], limits.upper[j])
+        assert column.limits == (limits.lower[j], limits.upper[j])
         assert column.values[-1] == pytest.approx(plan.actions[-1, j], abs=1e-5)
     tip = tool_tip(limits.chain, plan.actions[[0, -1]])
     np.testing.assert_allclose(np.array(motion.links)[[0, -1], -1], tip, atol=1e-4)
@@ -116,7 +137,7 @@ def test_without_a_robot_there_is_neither_arm_nor_limit(workspace):
     ask(workspace)
     motion = motion_of(workspace, 1)
     assert motion.links == []
-    assert motion.columns[0].low is None
+    assert motion.columns[0].limits is None
     assert "no limits checked" in motion.verdict
     with pytest.raises(TrialStateError):
         motion_of(workspace, 2)

@@ -1,5 +1,7 @@
 """A picture of the table: calibrated by known points, and where the object lies in it.
 
+Tags to be printed, of 40 mm (`tags.svg`), are OpenCV's AprilTags of the family 36h11.
+
 Files in the workspace: `camera.json`, the calibration; `pictures/table.jpg` and
 `pictures/trial-003.jpg`, the latest picture of the table and of a trial. A picture comes from any
 camera, and the page sends it: what shows the table to the browser is none of our business.
@@ -8,14 +10,14 @@ camera, and the page sends it: what shows the table to the browser is none of ou
 from __future__ import annotations
 
 import io
-import threading
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 from msgspec import Struct
 
 from prior_reinforce.bench.console.verbs import Verbs
+from prior_reinforce.bench.console.view import State
 from prior_reinforce.environment import Picture, SeenObject, TableScene
 from prior_reinforce.errors import ConfigurationError, FileFormatError, PerceptionFailedError
 from prior_reinforce.files import named_disk_errors, require_inside, sha256, write
@@ -24,31 +26,23 @@ from prior_reinforce.perception.colour_camera import ColourClient
 from prior_reinforce.perception.vlm import CAMERA_SD, VisionLanguageModel
 from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
 
-if TYPE_CHECKING:
-    import cv2
-
 LARGEST_PICTURE = 12_000_000
 """Bytes; ours: a photograph of a telephone."""
 _MOST_PIXELS = 50_000_000
-_TAG_SIDE_PX, _TAG_MARGIN_PX = 320, 90
-"""Of a tag on the sheet that is printed: 40 mm at 200 px an inch, with its caption."""
 
 
 class Camera(Struct):
     """What is known of the camera."""
 
-    picture: str
-    """Hash of the latest picture; empty where there is none."""
-    width: int
-    height: int
-    """Of that picture, in [px]."""
-    to_table: list[list[float]] | None
-    """Homography from its pixels to the table, in [m]; None until it is calibrated."""
-    summary: str
-    sd: float
-    """Of each component of a place that is touched in the picture, in [m]."""
     points: list[list[float]]
     """Known points (x, y) of the last calibration, or places to begin with, in [m]."""
+    picture: str = ""
+    """Hash of the latest picture; empty where there is none."""
+    to_table: list[list[float]] | None = None
+    """Homography from its pixels to the table, in [m]; None until it is calibrated."""
+    summary: str = ""
+    sd: float = CAMERA_SD
+    """Of each component of a place that is touched in the picture, in [m]."""
 
 
 class Calibrate(Struct, forbid_unknown_fields=True):
@@ -58,14 +52,6 @@ class Calibrate(Struct, forbid_unknown_fields=True):
     """(x, y), in [m]."""
     pixels: list[tuple[float, float]]
     """(u, v), in [px] from the picture's top left corner."""
-
-
-class Tag(Struct):
-    """A printed tag in the picture; tag k lies with its centre on known point k."""
-
-    number: int
-    pixel: list[float]
-    """Its centre."""
 
 
 class Look(Struct, forbid_unknown_fields=True):
@@ -92,27 +78,20 @@ class Pictures:
 
     def __init__(self, verbs: Verbs, vlm: VisionLanguageModelConfig) -> None:
         """Work on the workspace of these verbs; `vlm` says which model looks."""
-        self._verbs, self._vlm, self._lock = verbs, vlm, threading.Lock()
+        self._verbs, self._vlm = verbs, vlm
         self._folder = verbs.folder / "pictures"
 
     def look_up(self) -> Camera:
         """Say what is known of the camera."""
-        calibration, path = self._calibration(), self._latest()
-        demonstrations = [d.outcome for d in self._verbs.state().demonstrations]
-        points = _around(np.array(demonstrations)) if demonstrations else _PLACES
-        sd = CAMERA_SD
-        if calibration is not None:
-            sd = max(sd, calibration.left_out_error or 0.0)
-        width, height = _size(path.read_bytes()) if path is not None else (0, 0)
-        return Camera(
-            "" if path is None else sha256(path.read_bytes())[:16],
-            width,
-            height,
-            None if calibration is None else np.linalg.inv(calibration.homography).tolist(),
-            "" if calibration is None else calibration.summary(),
-            sd,
-            points,
-        )
+        path = self._latest()
+        camera = Camera(_known_points(self._verbs.state()))
+        if path is not None:
+            camera.picture = sha256(path.read_bytes())[:16]
+        if (calibration := self._calibration()) is not None:
+            camera.to_table = np.linalg.inv(calibration.homography).tolist()
+            camera.summary = calibration.summary()
+            camera.sd = max(camera.sd, calibration.left_out_error or 0.0)
+        return camera
 
     def keep(self, content: bytes) -> Camera:
         """Keep a picture of the table, or of the trial that waits to be told."""
@@ -143,41 +122,17 @@ class Pictures:
         self._verbs.publish({"camera": "calibrated"})
         return self.look_up()
 
-    def tags(self) -> list[Tag]:
-        """Find printed tags in the latest picture."""
+    def tags(self) -> dict[int, list[float]]:
+        """Find printed tags: pixel of the centre of each, tag k lying on known point k."""
         import cv2
 
-        grey = cv2.cvtColor(self._picture(), cv2.COLOR_RGB2GRAY)
-        corners, numbers, _ = cv2.aruco.ArucoDetector(_tags()).detectMarkers(grey)
+        grey = cv2.cvtColor(_decoded(self.file().read_bytes()), cv2.COLOR_RGB2GRAY)
+        family = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_APRILTAG_36h11)
+        corners, numbers, _ = cv2.aruco.ArucoDetector(family).detectMarkers(grey)
         if numbers is None:
-            return []
-        # Where its diagonals meet is the centre in any perspective; the mean of the corners is not.
-        return sorted(
-            (
-                Tag(int(number) + 1, _crossing(four.reshape(4, 2)))
-                for number, four in zip(numbers.ravel(), corners, strict=True)
-            ),
-            key=lambda tag: tag.number,
-        )
-
-    def sheet(self) -> Path:
-        """Return a sheet with tags to print, for six known points."""
-        import cv2
-
-        side, margin = _TAG_SIDE_PX, _TAG_MARGIN_PX
-        sheet = np.full((3 * (side + 2 * margin), 2 * (side + 2 * margin)), 255, np.uint8)
-        for number in range(6):
-            top = (number // 2) * (side + 2 * margin) + margin
-            left = (number % 2) * (side + 2 * margin) + margin
-            sheet[top : top + side, left : left + side] = cv2.aruco.generateImageMarker(
-                _tags(), number, side
-            )
-            caption = (f"point {number + 1}", (left, top + side + 50))
-            cv2.putText(sheet, *caption, cv2.FONT_HERSHEY_SIMPLEX, 1.0, (0,), 2)
-        path = require_inside(self._folder / "tags.png", self._verbs.folder)
-        with named_disk_errors(self._folder):
-            write(path, cv2.imencode(".png", sheet)[1].tobytes())
-        return path
+            return {}
+        found = zip(numbers.ravel(), corners, strict=True)
+        return {int(number) + 1: _crossing(four.reshape(4, 2)) for number, four in found}
 
     def find(self, body: Look) -> Found:
         """Find an object in the latest picture, by its colour or by a vision-language model."""
@@ -188,25 +143,18 @@ class Pictures:
         scene = TableScene(wanted, wanted, plane_height=calibration.height)
         client = ColourClient(self._vlm.family) if body.by == "colour" else None
         with VisionLanguageModel(scene, self._vlm, client=client, calibration=calibration) as model:
-            sighting = model.find(wanted, self._picture())
+            sighting = model.find(wanted, _decoded(self.file().read_bytes()))
         if sighting.box is None or sighting.place is None:
             raise PerceptionFailedError(f"{sighting.problem}; touch it in the picture")
         return Found([*sighting.box], sighting.place.tolist())
 
     def _calibration(self) -> TableCalibration | None:
-        path = self._verbs.folder / "camera.json"
-        return (
-            TableCalibration.load(require_inside(path, self._verbs.folder))
-            if path.is_file()
-            else None
-        )
+        path = require_inside(self._verbs.folder / "camera.json", self._verbs.folder)
+        return TableCalibration.load(path) if path.is_file() else None
 
     def _latest(self) -> Path | None:
         taken = (p for p in self._folder.glob("*.jpg") if not p.is_symlink())
         return max(taken, key=lambda path: path.stat().st_mtime_ns, default=None)
-
-    def _picture(self) -> Picture:
-        return _decoded(self.file().read_bytes())
 
 
 _PLACES = [[0.6, 0.3], [0.6, 0.0], [0.6, -0.3], [1.2, -0.3], [1.2, 0.0], [1.2, 0.3]]
@@ -215,10 +163,13 @@ any one left out, the others fix the plane, so each tells how good the calibrati
 and their middle do not: a corner left out, the others have three on a line."""
 
 
-def _around(places: np.ndarray) -> list[list[float]]:
-    """Six points around places, on a grid of 10 cm that is easy to measure."""
-    low, high = np.floor(places[:, :2].min(0) * 10) / 10, np.ceil(places[:, :2].max(0) * 10) / 10
-    (a, b), (c, d) = low.tolist(), high.tolist()
+def _known_points(state: State) -> list[list[float]]:
+    """Six points around the demonstrations, on a grid of 10 cm that is easy to measure."""
+    axes = [component.axis for component in state.components]
+    if not state.demonstrations or not {0, 1} <= {*axes}:
+        return _PLACES
+    places = 10 * np.array(state.demonstrations)[:, [axes.index(0), axes.index(1)]]
+    (a, b), (c, d) = np.floor(places.min(0)) / 10, np.ceil(places.max(0)) / 10
     middle = (b + d) / 2
     six = [[a, d], [a, middle], [a, b], [c, b], [c, middle], [c, d]]
     return np.round(six, 2).tolist()
@@ -229,31 +180,16 @@ def _decoded(content: bytes) -> Picture:
     from PIL import Image, ImageOps
 
     try:
-        _size(content)
         with Image.open(io.BytesIO(content), formats=("PNG", "JPEG")) as image:
+            if image.width * image.height > _MOST_PIXELS:  # before any is read
+                raise ValueError("too many pixels")
             return np.asarray(ImageOps.exif_transpose(image).convert("RGB"))
     except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
         raise FileFormatError("that is no picture; send a PNG or a JPEG") from error
 
 
-def _size(content: bytes) -> tuple[int, int]:
-    """Width and height of a picture, of which no pixel is read."""
-    from PIL import Image
-
-    with Image.open(io.BytesIO(content), formats=("PNG", "JPEG")) as image:
-        if image.width * image.height > _MOST_PIXELS:
-            raise ValueError("too many pixels")
-        return image.size
-
-
 def _crossing(corners: np.ndarray) -> list[float]:
-    """Where the diagonals of four corners in turn meet."""
+    """Where the diagonals of four corners meet: the centre of a square, however it is seen."""
     one, other = (np.cross([*corners[i], 1.0], [*corners[i + 2], 1.0]) for i in (0, 1))
     u, v, w = np.cross(one, other)
     return [float(u / w), float(v / w)]
-
-
-def _tags() -> cv2.aruco.Dictionary:
-    import cv2
-
-    return cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_APRILTAG_36h11)

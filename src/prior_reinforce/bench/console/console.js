@@ -1,10 +1,10 @@
 // The page over a workspace. It holds nothing: `S` is what the console last said, `L` what this tab
 // is about to do (a mark that was not told yet, a zoom). After every verb and every event it asks for
-// the state anew and draws all of it. Lengths are metres, as everywhere; the map is in millimetres.
+// the state anew and draws all of it. Numbers are in the outcome's units; the map is in millimetres.
 "use strict";
 
 let S = null;
-const L = { mark: null, zoom: 1, amending: 0, byHand: 0, voiding: 0, words: {}, open: {}, connected: false, busy: false, episode: "" };
+const L = { mark: null, zoom: 1, amending: 0, byHand: 0, voiding: 0, words: {}, open: {}, skipped: [], connected: false, busy: false, episode: "", question: null };
 let motion = null;
 let playing = { at: 0, on: false };
 
@@ -41,6 +41,7 @@ async function get(path) {
 async function verb(name, body = {}) {
   if (L.busy && name !== "stop") return false;
   L.busy = name !== "stop";
+  complain(""); // what comes from now on, by an answer or an event, is of this
   draw();
   try {
     const answer = await request(`/api/${name}`, {
@@ -54,7 +55,6 @@ async function verb(name, body = {}) {
       await refresh();
       return false;
     }
-    complain("");
     take(await answer.json());
     return true;
   } catch {
@@ -69,6 +69,10 @@ async function verb(name, body = {}) {
 // the button that stood in its place.
 const CALM = 1000;
 let calmAt = 0;
+function calm() {
+  calmAt = performance.now() + CALM;
+  setTimeout(draw, CALM + 20);
+}
 
 async function refresh() {
   const answer = await get("/api/state");
@@ -79,17 +83,18 @@ function take(state) {
   if (S && state.id < S.id && state.name === S.name) return;
   const before = S;
   S = state;
-  if (!before || before.id !== S.id) {
-    calmAt = performance.now() + CALM;
-    setTimeout(draw, CALM + 20);
+  if (!before || before.id !== S.id || before.stopped !== S.stopped) {
+    calm();
     L.voiding = 0;
+    L.question = null;
     if (before && (before.open !== S.open || before.goals.length !== S.goals.length)) { L.mark = null; L.byHand = 0; L.words = {}; }
     const told = L.amending && S.trials[L.amending - 1];
     if (told && told.stage !== "told") L.amending = 0;
   }
   const trial = openTrial();
   if (!trial) motion = null;
-  else if (!motion || motion.plan !== trial.plan) fetchMotion(trial.number);
+  else if (!motion || motion.sha256 !== trial.sha256) fetchMotion(trial.number);
+  if (S.step === "execute" && S.executor && !S.looks && !L.question) askToMove("trial");
   draw();
 }
 
@@ -147,27 +152,35 @@ function heard(message) {
   if ("learning" in message) { S.learning = message.learning; if (message.learning) draw(); else refresh(); }
   if ("recordings" in message && !L.uploading) { clearTimeout(L.later); L.later = setTimeout(fetchRecordings, 300); }
   if ("camera" in message) fetchCamera();
-  if ("id" in message && message.id !== S.id) refresh();
+  if ("id" in message && (message.id !== S.id || message.stopped !== S.stopped)) refresh();
 }
 
 // --- words ------------------------------------------------------------------------------------
 
 const $ = (id) => document.getElementById(id);
-const WORDS = [["long", "short"], ["left", "right"], ["high", "low"]];
-const PLACES = [["ahead", "behind"], ["left", "right"], ["up", "down"]];
-const cm = (length) => `${Math.round(Math.abs(length) * 1000) / 10} cm`;
-const terms = (values, words) => values.map((v, i) => `${cm(v)} ${words[i][Math.round(v * 1000) >= 0 ? 0 : 1]}`);
-const units = (values) => values.map((v, i) => `${S.outcome_names[i]} ${+v.toPrecision(4)} ${S.outcome_units[i]}`).join(", ");
-const sayPlace = (place) => (S.in_words ? terms(place, PLACES).join(", ") : units(place));
-const sayError = (error) => {
-  if (!S.in_words) return units(error);
-  return terms(error, WORDS).filter((term) => !term.startsWith("0 ")).join(", ") || "on the goal";
+// A number as a person says it: in cm, ms, degrees, to a tenth of what counts as reached or finer.
+const digit = (c) => (c.unit === "m" ? 0.1 : 10 ** (Math.floor(Math.log10(c.tolerance * c.factor)) - 1));
+const number = (c, value) => +(Math.round((value * c.factor) / digit(c)) * digit(c)).toFixed(9);
+const term = (c, value, words) => {
+  const size = number(c, value);
+  return words.length ? `${Math.abs(size)} ${c.shown} ${words[size >= 0 ? 0 : 1]}` : `${c.name} ${size} ${c.shown}`;
 };
+const sayPlace = (place) => S.components.map((c, i) => term(c, place[i], c.places)).join(", ");
+const sayError = (error) =>
+  S.components.filter((c, i) => number(c, error[i])).map((c) => term(c, error[S.components.indexOf(c)], c.words)).join(", ") || "on the goal";
 const minus = (a, b) => a.map((v, i) => v - b[i]);
 const openTrial = () => (S && S.open ? S.trials[S.open - 1] : null);
 const goalNow = () => (S && S.goals.length ? S.goals[S.goals.length - 1] : null);
 const goalOf = (trial) => S.goals[trial.goal - 1];
-const mapped = () => S && S.in_words && S.outcome_names.length >= 2;
+// Lengths along x and y are on the map; each other number of an outcome has a ruler of its own.
+const axis = (k) => (S ? S.components.findIndex((c) => c.axis === k) : -1);
+const mapped = () => axis(0) >= 0 && axis(1) >= 0;
+const ruled = () => (S ? S.components.map((_, i) => i).filter((i) => !mapped() || S.components[i].axis > 1) : []);
+const xy = (outcome) => [outcome[axis(0)], outcome[axis(1)]];
+// A mark may lack a number that nobody gave yet.
+const missing = () => S.components.filter((_, i) => !L.mark || L.mark[i] === null);
+const marked = () => missing().length === 0;
+const touchFirst = (what) => (mapped() && !(L.mark && L.mark[axis(0)] !== null) ? `Touch the table where ${what}` : `Say the ${missing().map((c) => c.name).join(", ")}`);
 
 // What a touch of the table means now.
 function touching() {
@@ -257,15 +270,17 @@ function draw() {
   document.title = `${title()} · ${S.name}`;
   $("now").textContent = title();
   const goal = goalNow();
-  $("task").textContent = goal ? `${S.name} · goal ${goal.number}: ${goal.said}` : S.name;
+  $("task").textContent = goal ? `${S.name} · goal ${goal.number}: ${sayPlace(goal.goal)}` : S.name;
   $("stop").classList.toggle("armed", S.step === "executing");
-  $("table").hidden = !mapped();
+  $("stage").hidden = !mapped();
   const pictured = L.view === "picture" && C;
   $("map").toggleAttribute("hidden", Boolean(pictured));
   $("picture").toggleAttribute("hidden", !pictured || Boolean(stream));
   $("video").hidden = !pictured || !stream;
   announce(`${title()}. ${said()}`);
   drawMap();
+  drawRulers();
+  drawBar();
   drawAct();
   drawPlan();
   drawHistory();
@@ -275,7 +290,7 @@ function draw() {
 }
 
 const said = () => {
-  if (!L.mark) return "";
+  if (!marked()) return "";
   const goal = touchedGoal();
   return goal ? sayError(minus(L.mark, goal.goal)) : sayPlace(L.mark);
 };
@@ -289,9 +304,7 @@ function fitMap() {
   const box = $("map").getBoundingClientRect();
   if (!box.width || !box.height) return;
   const goal = touchedGoal() || goalNow();
-  const points = shownDemonstrations().map((d) => d.outcome);
-  for (const each of S.goals) points.push(each.goal);
-  for (const trial of S.trials) if (trial.outcome && (trial.goal === S.goals.length || trial.number === L.amending)) points.push(trial.outcome);
+  const points = shownOutcomes().map(xy);
   if (L.zoom === 0 || points.length < 2) points.push([0, 0], [0.6, 0.4], [0.6, -0.4], [1.2, 0]);
   let [low, high] = [[Infinity, Infinity], [-Infinity, -Infinity]];
   for (const [x, y] of points) {
@@ -303,7 +316,7 @@ function fitMap() {
   let middle = [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2];
   let size = [high[0] - low[0] + 2 * margin, high[1] - low[1] + 2 * margin];
   if (L.zoom > 1) {
-    const centre = goal ? goal.goal : middle;
+    const centre = goal ? xy(goal.goal) : middle;
     middle = [0, 1].map((i) => centre[i] + (middle[i] - centre[i]) / L.zoom ** 2);
     size = size.map((s) => s / L.zoom);
   }
@@ -335,29 +348,30 @@ function drawMap() {
     parts.push(g("text", { class: "ruler", x: view.x + 4 * px, y: v - 4 * px, size: 12 * px }, `${-v / 10} cm`));
   }
   for (const { outcome, name } of shownDemonstrations()) {
-    const [u, v] = uv(outcome);
+    const [u, v] = uv(xy(outcome));
     parts.push(g("rect", { class: "demo", x: u - 6 * px, y: v - 6 * px, width: 12 * px, height: 12 * px }));
     if (name) parts.push(g("text", { class: "ruler", x: u + 10 * px, y: v + 4 * px, size: 12 * px }, name));
   }
   for (const goal of S.goals) {
     const now = goal.number === S.goals.length;
     if (!now && S.goals.length - goal.number > 30) continue;
-    const [u, v] = uv(goal.goal);
-    if (now) parts.push(g("ellipse", { class: "goal ring", cx: u, cy: v, rx: 1000 * goal.tolerance[1], ry: 1000 * goal.tolerance[0] }));
+    const [u, v] = uv(xy(goal.goal));
+    const [along, across] = xy(goal.tolerance);
+    if (now) parts.push(g("ellipse", { class: "goal ring", cx: u, cy: v, rx: 1000 * across, ry: 1000 * along }));
     const r = (now ? 14 : 7) * px;
     parts.push(g("path", { class: now ? "goal" : "goal old", d: `M${u - r} ${v}H${u + r}M${u} ${v - r}V${v + r}` }));
   }
   const current = S.trials.filter((trial) => trial.outcome && trial.goal === S.goals.length).length;
   for (const trial of S.trials) {
     if (!trial.outcome) continue;
-    const [u, v] = uv(trial.outcome);
+    const [u, v] = uv(xy(trial.outcome));
     const old = trial.goal !== S.goals.length;
     parts.push(g("circle", { class: `trial${old ? " old" : ""}${trial.hit ? " landed" : ""}`, cx: u, cy: v, r: (old ? 4 : 11) * px }));
     if (!old) parts.push(g("text", { class: "on", x: u, y: v + 5 * px, size: 13 * px }, `${trial.number}`));
   }
   const waiting = openTrial();
   if (waiting && waiting.stage !== "executed") {
-    const [u, v] = uv(waiting.condition);
+    const [u, v] = uv(xy(waiting.condition));
     parts.push(g("circle", { class: "aim", cx: u, cy: v, r: 18 * px }));
   }
   if (motion && motion.links.length && waiting) {
@@ -366,41 +380,119 @@ function drawMap() {
     parts.push(g("polyline", { class: "arm", points: links.join(" ") }));
     for (const [u, v] of links) parts.push(g("circle", { class: "joint", cx: u, cy: v, r: 4 * px }));
   }
-  if (L.mark) {
-    const [u, v] = uv(L.mark);
+  if (L.mark && L.mark[axis(0)] !== null) {
+    const [u, v] = uv(xy(L.mark));
     const goal = touchedGoal();
-    if (goal) { const [a, b] = uv(goal.goal); parts.push(g("line", { class: "mark", x1: a, y1: b, x2: u, y2: v })); }
+    if (goal) { const [a, b] = uv(xy(goal.goal)); parts.push(g("line", { class: "mark", x1: a, y1: b, x2: u, y2: v })); }
     parts.push(g("circle", { class: "mark", cx: u, cy: v, r: 22 * px }));
     parts.push(g("path", { class: "mark", d: `M${u - 34 * px} ${v}h${22 * px}M${u + 12 * px} ${v}h${22 * px}M${u} ${v - 34 * px}v${22 * px}M${u} ${v + 12 * px}v${22 * px}` }));
     parts.push(g("circle", { class: "mark dot", cx: u, cy: v, r: 3 * px }));
   }
   map.replaceChildren(...parts);
   map.classList.toggle("touch", Boolean(touching()));
-  const what2 = { goal: "the goal", tell: "where it landed", amend: "where it landed", episode: "where it landed" }[touching()];
   map.setAttribute("aria-label", `Table from above, ${S.demonstrations.length} demonstrations, ${current} trials of this goal told. ` +
-    (what2 ? `Arrow keys move the mark of ${what2} by a centimetre, with Shift by a millimetre; Enter places it. ${said()}` : ""));
-  const legend = ["☐ demonstrations"];
+    (touching() ? `Arrow keys move the mark of ${touched()} by a centimetre, with Shift by a millimetre; Enter places it. ${said()}` : ""));
+}
+const touched = () => (touching() === "goal" ? "the goal" : "where it landed");
+
+// A ruler for each number that is on no map: demonstrations, goal, trials and mark as they are there.
+const HIGH = 116; // [px]
+let rulers = [];
+function drawRulers() {
+  if (!rulers.length && ruled().length) {
+    rulers = ruled().map((i) => ({ i, svg: g("svg", { class: "gauge", id: `ruler-${i}`, tabindex: 0, role: "application", "aria-roledescription": "ruler" }) }));
+    $("rulers").append(...rulers.map(({ i, svg }) => h("div", {}, h("p", { class: "soft" }, `${S.components[i].name} [${S.components[i].shown}]`), svg)));
+    for (const ruler of rulers) {
+      const c = S.components[ruler.i];
+      surface(ruler.svg, {
+        active: () => Boolean(touching()),
+        get: () => L.mark && L.mark[ruler.i] !== null && [ruler.at(L.mark[ruler.i]), HIGH / 2],
+        set: (u) => setNumber(ruler.i, ruler.low + (u / ruler.svg.clientWidth) * ruler.span),
+        begin: () => [ruler.at((touchedGoal() || goalNow() || { goal: shownOutcomes()[0] }).goal[ruler.i]), HIGH / 2],
+        step: () => ((10 * digit(c)) / c.factor / ruler.span) * ruler.svg.clientWidth,
+      });
+    }
+  }
+  for (const ruler of rulers) drawRuler(ruler);
+}
+function drawRuler(ruler) {
+  const [c, svg, i] = [S.components[ruler.i], ruler.svg, ruler.i];
+  const width = svg.clientWidth;
+  if (!width) return;
+  const values = shownOutcomes().map((outcome) => outcome[i]);
+  if (!values.length) values.push(0);
+  const goal = touchedGoal() || goalNow();
+  let [low, high] = [Math.min(...values), Math.max(...values)];
+  const margin = 0.2 * (high - low) + 4 * c.tolerance;
+  [low, high] = [low - margin, high + margin];
+  if (L.zoom > 1 && goal) [low, high] = [low, high].map((end) => goal.goal[i] + (end - goal.goal[i]) / L.zoom);
+  if (L.zoom === 0) [low, high] = [low - margin, high + margin];
+  Object.assign(ruler, { low, span: high - low, at: (value) => ((value - low) / (high - low)) * width });
+  const [at, middle] = [ruler.at, HIGH / 2];
+  const parts = [g("line", { class: "grid axis", x1: 0, x2: width, y1: middle, y2: middle })];
+  const ten = 10 ** Math.floor(Math.log10(((high - low) * c.factor * 44) / width));
+  const step = [1, 2, 5, 10].map((k) => k * ten).find((s) => (s / c.factor / (high - low)) * width > 44);
+  for (let k = Math.ceil((low * c.factor) / step); k * step < high * c.factor; k += 1) {
+    const x = at((k * step) / c.factor);
+    parts.push(g("line", { class: "grid", x1: x, x2: x, y1: middle - 8, y2: HIGH - 18 }), g("text", { class: "ruler number", x, y: HIGH - 4, size: 13 }, +(k * step).toFixed(6)));
+  }
+  for (const { outcome } of shownDemonstrations()) parts.push(g("rect", { class: "demo", x: at(outcome[i]) - 6, y: middle - 6, width: 12, height: 12 }));
+  if (goalNow()) {
+    const { goal: place, tolerance } = goalNow();
+    const x = at(place[i]);
+    parts.push(g("rect", { class: "goal ring", x: at(place[i] - tolerance[i]), y: 14, width: Math.max(1, at(2 * tolerance[i]) - at(0)), height: HIGH - 44 }), g("path", { class: "goal", d: `M${x} 14V${HIGH - 30}` }));
+  }
+  for (const trial of S.trials) {
+    if (!trial.outcome || trial.goal !== S.goals.length) continue;
+    parts.push(g("circle", { class: `trial${trial.hit ? " landed" : ""}`, cx: at(trial.outcome[i]), cy: middle, r: 11 }), g("text", { class: "on", x: at(trial.outcome[i]), y: middle + 5, size: 13 }, `${trial.number}`));
+  }
+  const waiting = openTrial();
+  if (waiting && waiting.stage !== "executed") parts.push(g("circle", { class: "aim", cx: at(waiting.condition[i]), cy: middle, r: 18 }));
+  if (L.mark && L.mark[i] !== null) {
+    const x = at(L.mark[i]);
+    parts.push(g("circle", { class: "mark", cx: x, cy: middle, r: 22 }), g("path", { class: "mark", d: `M${x} 0v${middle - 12}M${x} ${middle + 12}V${HIGH}` }));
+  }
+  svg.setAttribute("viewBox", `0 0 ${width} ${HIGH}`);
+  svg.replaceChildren(...parts);
+  svg.classList.toggle("touch", Boolean(touching()));
+  svg.setAttribute("aria-label", `${c.name} in ${c.shown}. ` + (touching() ? `Arrow keys move the mark of ${touched()} by ${number(c, (10 * digit(c)) / c.factor)} ${c.shown}, with Shift by a tenth of that; Enter places it. ${said()}` : ""));
+}
+function drawBar() {
+  const waiting = openTrial();
+  const legend = S.demonstrations.length ? ["☐ demonstrations"] : [];
   if (S.goals.length) legend.push("✛ goal, its tolerance around it");
-  if (current) legend.push("● trials by number, green where they hit");
+  if (S.trials.some((trial) => trial.outcome && trial.goal === S.goals.length)) legend.push("● trials by number, green where they hit");
   if (waiting && waiting.stage !== "executed") legend.push("dashed: where the next plan aims");
   $("legend").textContent = legend.join(" · ");
   fill("mapbar",
-    C && (C.picture || stream || C.to_table) && button("view", L.view === "picture" ? "Map" : "Picture", () => { L.view = L.view === "picture" ? "map" : "picture"; draw(); }),
+    mapped() && C && (C.picture || stream || C.to_table) && button("view", L.view === "picture" ? "Map" : "Picture", () => { L.view = L.view === "picture" ? "map" : "picture"; draw(); }),
     button("nearer", "+", () => { L.zoom = Math.min(8, L.zoom ? L.zoom * 2 : 1); draw(); }, "", { "aria-label": "Nearer", disabled: L.zoom >= 8 }),
     button("farther", "−", () => { L.zoom = L.zoom > 1 ? L.zoom / 2 : 0; draw(); }, "", { "aria-label": "Farther", disabled: L.zoom === 0 }));
 }
+// All outcomes that have to be seen now.
+const shownOutcomes = () => [
+  ...shownDemonstrations().map(({ outcome }) => outcome),
+  ...S.goals.map(({ goal }) => goal),
+  ...S.trials.filter((trial) => trial.outcome && (trial.goal === S.goals.length || trial.number === L.amending)).map(({ outcome }) => outcome),
+];
 
-const rest = () => { // further components of an outcome, such as its height
-  const from = L.mark || (touchedGoal() || goalNow() || S.demonstrations.map((d) => ({ goal: d.outcome }))[0] || { goal: [] }).goal;
-  return S.outcome_names.slice(2).map((_, i) => from[i + 2] || 0);
-};
-function setMark(place, measured = 0) {
+const anyMark = () => (L.mark ? [...L.mark] : S.components.map(() => null));
+function setMark([x, y], measured = 0) {
+  const mark = anyMark();
+  [mark[axis(0)], mark[axis(1)]] = [x, y].map((v) => Math.round(v * 2000) / 2000);
   L.measured = measured;
-  L.mark = [...place.slice(0, 2).map((v) => Math.round(v * 2000) / 2000), ...(place.length > 2 ? place.slice(2) : rest())];
+  L.mark = mark;
+  draw();
+}
+function setNumber(i, value) {
+  const c = S.components[i];
+  L.mark = anyMark();
+  L.mark[i] = number(c, value) / c.factor;
+  L.measured = 0;
   draw();
 }
 // A mark that is set by touching, dragged by the finger or moved by the keyboard, in an SVG's units.
-function surface(svg, { active, get, set, step }) {
+function surface(svg, { active, get, set, begin, step }) {
   const at = (event) => new DOMPoint(event.clientX, event.clientY).matrixTransform(svg.getScreenCTM().inverse());
   let hold = null;
   svg.addEventListener("pointerdown", (event) => {
@@ -432,16 +524,15 @@ function surface(svg, { active, get, set, step }) {
     event.preventDefault();
     const mark = get();
     const size = step() * (event.shiftKey ? 0.1 : 1);
-    if (!mark) set(...(svg.id === "map" ? uv((touchedGoal() || goalNow() || { goal: [0.8, 0] }).goal) : [C.width / 2, C.height / 2]));
+    if (!mark) set(...begin());
     else if (way) set(mark[0] + size * way[0], mark[1] + size * way[1]);
     else if (document.querySelector("#act .big")) document.querySelector("#act .big").focus();
   });
-  new ResizeObserver(() => { if (S) { fitted = ""; drawMap(); drawPicture(); } }).observe(svg);
+  new ResizeObserver(() => { if (S) { fitted = ""; drawMap(); drawRulers(); drawPicture(); } }).observe(svg);
 }
 
 // --- the action -------------------------------------------------------------------------------
 
-const sdOf = () => (L.measured ? { sd: L.measured } : {});
 const telling = () => (L.amending ? "amend" : "tell");
 const tellingOf = () => L.amending || S.open;
 
@@ -484,39 +575,47 @@ function chance(trial) {
   return h("p", { class: "chance", id: "chance" }, `${Math.round(100 * trial.p_hit)} % chance to hit `, h("small", {}, togo));
 }
 function surprise(trial) {
-  if (!trial.surprise) return null;
-  const about = trial.surprising;
-  return h("div", { class: "ask", id: "surprise" }, `${about ? `Trial ${about} is ` : ""}${trial.surprise}. Mistyped? Or did the table, the ball or the arm change?`,
+  const before = S.trials.slice(0, trial.number - 1).reverse().find((each) => each.stage === "told");
+  if (!before || !before.surprise) return null;
+  return h("div", { class: "ask", id: "surprise" }, `Trial ${before.number} is ${before.surprise.split("; mistyped")[0]}. Mistyped? Or did the table, the ball or the arm change?`,
     h("div", { class: "row" },
-      about && button("mistyped", `Mistyped: correct trial ${about}`, () => { L.amending = about; L.mark = null; draw(); }),
+      button("mistyped", `Mistyped: correct trial ${before.number}`, () => { L.amending = before.number; L.mark = null; draw(); }),
       button("changed", "Something changed", () => changed(trial.number))));
 }
 function fields() {
-  const factor = S.in_words ? 100 : 1;
-  const unit = (i) => (S.in_words ? "cm" : S.outcome_units[i]);
-  const words = (i) => (S.in_words ? ["ahead of the base", "left of the base", "up"][i] : S.outcome_names[i]);
-  const inputs = S.outcome_names.map((_, i) => h("input", {
-    id: `field-${i}`, type: "text", inputmode: "decimal", autocomplete: "off",
-    value: L.mark ? `${Math.round(L.mark[i] * factor * 100) / 100}` : "",
-    onchange: () => {
-      const values = inputs.map((input) => parseFloat(input.value.replace(",", ".")) / factor);
-      if (values.every(Number.isFinite)) { L.mark = values; draw(); }
+  const ahead = ["ahead of the base", "left of the base", "up"];
+  return h("div", { class: "fields" }, S.components.map((c, i) => h("label", {}, `${c.axis < 3 ? ahead[c.axis] : c.name} [${c.shown}]`, h("input", {
+    id: `field-${i}`, type: "text", inputmode: "decimal", autocomplete: "off", value: L.mark && L.mark[i] !== null ? number(c, L.mark[i]) : "",
+    onchange: (event) => {
+      const value = parseFloat(event.target.value.replace(",", "."));
+      if (Number.isFinite(value)) { L.mark = anyMark(); L.mark[i] = value / c.factor; L.measured = 0; draw(); }
     },
-  }));
-  return h("div", { class: "fields" }, inputs.map((input, i) => h("label", {}, `${words(i)} [${unit(i)}]`, input)));
+  }))));
 }
-const SIZES = [-20, -10, -5, -2, 0, 2, 5, 10, 20];
+// The paper's words: what an observer says of an error, by eye.
+const SPOKEN = ["cm", "mm", "in", "ms", "deg"];
+const spoken = () => S.components.every((c) => c.words.length && (SPOKEN.includes(c.shown) || S.components.length === 1));
+const sizes = (c) => {
+  const some = c.unit === "m" ? [2, 5, 10, 20] : [1, 2, 5, 10].map((k) => k * 10 * digit(c));
+  return [...some.map((size) => -size).reverse(), 0, ...some];
+};
+const word = (c, size) => `${Math.abs(size)}${SPOKEN.includes(c.shown) ? c.shown : ""} ${c.words[size > 0 ? 0 : 1]}`;
 function byEye() {
-  const rows = S.outcome_names.map((name, i) => h("fieldset", {}, h("legend", {}, { 0: "Short or long", 1: "Left or right", 2: "Low or high" }[i] + " of the goal, in cm"),
-    h("div", { class: "scale" }, (i === 1 ? [...SIZES].reverse() : SIZES).map((size) => h("label", {}, `${Math.abs(size)}`,
-      h("input", { type: "radio", name: `eye-${i}`, id: `eye-${i}-${size}`, "aria-label": size ? `${Math.abs(size)} cm ${WORDS[i][size > 0 ? 0 : 1]}` : "neither",
-        checked: L.words[i] === size, onchange: () => { L.words[i] = size; draw(); } })))),
-    h("div", { class: "ends" }, h("span", {}, WORDS[i][i === 1 ? 0 : 1]), h("span", {}, WORDS[i][i === 1 ? 1 : 0]))));
-  const said = S.outcome_names.map((_, i) => L.words[i]);
-  const words = said.map((size, i) => size && `${Math.abs(size)}cm ${WORDS[i][size > 0 ? 0 : 1]}`).filter(Boolean).join(", ");
+  if (!spoken()) return h("div", { class: "row" }, button("missed", "Missed, not seen by how much", () => tell({ hit: false })));
+  const rows = S.components.map((c, i) => {
+    const turned = c.axis === 1; // left is to the left
+    const ends = turned ? c.words : [...c.words].reverse();
+    return h("fieldset", {}, h("legend", {}, `${ends[0]} or ${ends[1]} of the goal, in ${c.shown}`),
+      h("div", { class: "scale" }, (turned ? sizes(c).reverse() : sizes(c)).map((size) => h("label", {}, `${Math.abs(size)}`,
+        h("input", { type: "radio", name: `eye-${i}`, id: `eye-${i}-${size}`, "aria-label": size ? word(c, size) : "neither",
+          checked: L.words[i] === size, onchange: () => { L.words[i] = size; draw(); } })))),
+      h("div", { class: "ends" }, ends.map((end) => h("span", {}, end))));
+  });
+  const said = S.components.map((_, i) => L.words[i]);
+  const words = S.components.map((c, i) => said[i] && word(c, said[i])).filter(Boolean).join(", ");
   const complete = said.every((size) => size !== undefined) && words;
   return details("eye", "By eye, in words", rows, h("div", { class: "row" },
-    button("say", complete ? `Say: ${words}` : "Choose one in each row", () => tell({ words }), "", { disabled: !complete }),
+    button("say", complete ? `Say: ${words}` : "Choose one in each row", () => tell({ error: words }), "", { disabled: !complete }),
     button("missed", "Missed, not seen by how much", () => tell({ hit: false }))));
 }
 function voider(number, word) {
@@ -533,14 +632,15 @@ function confirmVoid(number) {
 function tellPanel() {
   const number = tellingOf();
   const trial = S.trials[number - 1];
-  const told = L.mark && sayError(minus(L.mark, goalOf(trial).goal));
+  const error = marked() && minus(L.mark, goalOf(trial).goal);
+  const told = error && sayError(error);
   return [
     trial.warning && h("p", { class: "ask" }, `Executed, ${trial.warning}. If that spoiled it, it slipped.`),
-    button("tell", told ? `${L.amending ? `Trial ${number} was` : "It landed"} ${told}` : "Touch the table where it landed", () => tell({ outcome: L.mark, ...sdOf() }), "big", { disabled: !L.mark || L.busy }),
+    button("tell", told ? `${L.amending ? `Trial ${number} was` : "It landed"} ${told}` : touchFirst("it landed"), () => tell({ error: L.measured ? { error, sd: L.measured } : error }), "big", { disabled: !told || L.busy }),
     h("div", { class: "row" }, button("hit", "Hit", () => tell({ hit: true }), "hit", { disabled: L.busy }), voider(number, L.amending ? "Void it" : "Slipped"),
       L.amending ? button("cancel", "Leave it as it is", () => { L.amending = 0; L.mark = null; draw(); }) : null),
     confirmVoid(number),
-    S.in_words && byEye(),
+    byEye(),
     details("fields", "Type the place", fields()),
   ];
 }
@@ -562,26 +662,56 @@ function drawAct() {
   else if (touching() === "goal") parts.push(...goalPanel(off));
   else if (S.step === "ask") parts.push(button("ask", "Get the next plan", () => verb("ask"), "big", off));
   else if (S.step === "execute") {
-    parts.push(chance(trial), surprise(trial), old(trial), trial.warning && h("p", { class: "ask" }, `Last time ${trial.warning}.`),
-      button("execute", `Execute trial ${trial.number}`, () => verb("execute", { trial: trial.number, plan: trial.plan }), "big", still),
-      h("p", { class: "soft" }, "The arm moves at once: keep clear, and the stop button in your hand."),
+    parts.push(chance(trial), surprise(trial), old(trial), trial.warning && h("p", { class: "ask" }, `Last time ${trial.warning}.`), ...executePanel(trial, off),
       details("other", "Another way", h("div", { class: "row" },
-        S.approaches && button("approach", "Go to its start, slowly", () => verb("execute", { trial: trial.number, plan: trial.plan, motion: "approach" }), "", still),
-        S.approaches && button("rehearse", "Rehearse at 20 % of its speed", () => verb("execute", { trial: trial.number, plan: trial.plan, motion: "rehearsal", speed: 0.2 }), "", still),
+        S.looks && button("rehearse", "Rehearse at 20 % of its speed", () => askToMove("rehearsal", 0.2), "", off),
         button("download", "Download the plan", () => download(trial)),
         button("by-hand", "It was executed otherwise", () => { L.byHand = trial.number; draw(); }), voider(trial.number, "Void it")), confirmVoid(trial.number)));
   } else if (S.step === "executing") {
     parts.push(h("pre", { class: "output", tabindex: "0", "aria-label": "what the executor says" }, S.output || "started"),
       button("stop-2", "Stop the arm", () => verb("stop"), "big stop"));
   } else if (S.step === "settle") {
-    parts.push(h("p", {}, trial.warning ? `Trial ${trial.number} was executed, ${trial.warning}.` : `Nobody wrote down how trial ${trial.number} ended. Look at the arm.`),
+    parts.push(h("p", { class: "ask" }, trial.warning ? `Trial ${trial.number} was executed, ${trial.warning}.` : `Nobody wrote down how trial ${trial.number} ended. Look at the arm.`),
       h("div", { class: "row" },
         button("moved", "It moved, and the object flew", () => { L.amending = 0; S.step = "tell"; draw(); }),
-        button("spoiled", "It moved: void the trial", () => voidTrial(trial.number, "the execution was cut off"), "bad"),
+        button("spoiled", "It moved: void the trial", () => voidTrial(trial.number, trial.warning.replace("but aborted: ", "") || "the execution was cut off"), "bad"),
         button("still", "Nothing moved", () => verb("ask", { arm_did_not_move: true }))));
   }
   $("act").classList.toggle("tall", S.step === "import" && !L.episode);
   fill("act", h("h2", { class: "unseen" }, "What to do"), ...parts);
+}
+// Before an arm moves, it is asked where it stands, and a person is asked what the command line asks.
+async function askToMove(motion, speed = 1) {
+  const trial = openTrial();
+  const asked = { seen: S.id, stopped: S.stopped, trial: trial.number, sha256: trial.sha256, motion, speed };
+  if (S.looks) { L.busy = true; draw(); }
+  const question = await send("/api/question", "POST", JSON.stringify(asked));
+  L.busy = false;
+  if (question && asked.seen === S.id && asked.stopped === S.stopped) {
+    L.question = { ...question, asked: { ...asked, motion: question.motion, speed: question.motion === "rehearsal" ? speed : 1 } };
+    if (S.looks) calm();
+  }
+  draw();
+}
+const MOVES = { trial: "execute trial", rehearsal: "rehearse trial", approach: "go slowly to the start of trial" };
+function executePanel(trial, off) {
+  const question = L.question;
+  if (S.looks && (!question || question.refused)) {
+    return [
+      question && h("p", { class: "ask" }, `${question.arm}. It refuses the plan: ${question.refused}.`),
+      button("prepare", L.busy ? "Asking the arm where it stands" : question ? "Ask the arm again" : `Prepare trial ${trial.number}`, () => askToMove("trial"), "big", off),
+      h("p", { class: "soft" }, "The arm is asked where it stands, and whether it takes the plan. Nothing moves yet."),
+    ];
+  }
+  const still = { disabled: off.disabled || !question || performance.now() < calmAt };
+  const moves = `${MOVES[question ? question.motion : "trial"]} ${trial.number}`;
+  return [
+    question && question.arm && h("p", {}, question.arm),
+    h("p", { class: "ask", id: "question" }, question ? `${question.question[0].toUpperCase()}${question.question.slice(1)}` : ""),
+    button("execute", S.looks ? `Yes: ${moves}` : `${moves[0].toUpperCase()}${moves.slice(1)}`, () => verb("execute", question.asked), "big", still),
+    S.looks && h("div", { class: "row" }, button("not-now", "No, not now", () => { L.question = null; draw(); })),
+    h("p", { class: "soft" }, "The arm moves at once: keep clear, and the stop button in your hand."),
+  ];
 }
 const old = (trial) => trial.outdated && h("p", { class: "ask" }, "Planned before a correction: unless it was thrown, void it, and a newer plan comes.");
 
@@ -589,8 +719,8 @@ function goalPanel(off) {
   const goal = goalNow();
   return [
     S.step === "reached" && h("p", { class: "chance hit" }, `Goal ${goal.number} is reached: N = ${S.demonstrations.length} + ${goal.told}.`),
-    button("goal", L.mark ? `Aim at ${sayPlace(L.mark)}` : S.step === "reached" ? "Touch the next goal" : "Touch the table where it shall land",
-      () => setGoal({ goal: L.mark, new_hardware: L.changed || null }), "big", { disabled: !L.mark || off.disabled }),
+    button("goal", marked() ? `Aim at ${sayPlace(L.mark)}` : S.step === "reached" && !L.mark ? "Touch the next goal" : touchFirst("it shall land"),
+      () => setGoal({ goal: L.mark, new_hardware: L.changed || null }), "big", { disabled: !marked() || off.disabled }),
     S.step === "reached" && h("div", { class: "row" }, button("again", "Throw at it once more", () => verb("ask"), "", off)),
     details("fields", "Type the place", fields()),
     S.goals.length > 0 && details("changed", "Something changed since the last trial", h("label", {}, "What: another ball, a new gripper",
@@ -633,10 +763,10 @@ function side() {
 }
 function joint(column) {
   const [low, high] = [Math.min(...column.values), Math.max(...column.values)];
-  const ends = column.low === null ? [low - 0.1 * (high - low) - 1e-6, high + 0.1 * (high - low) + 1e-6] : [column.low, column.high];
+  const ends = column.limits || [low - 0.1 * (high - low) - 1e-6, high + 0.1 * (high - low) + 1e-6];
   const x = (value) => (100 * (value - ends[0])) / (ends[1] - ends[0]);
   const svg = g("svg", { viewBox: "0 0 100 10", preserveAspectRatio: "none", role: "img",
-    "aria-label": `${column.name} from ${low.toFixed(2)} to ${high.toFixed(2)} ${column.unit}` + (column.low === null ? "" : `, limits ${column.low.toFixed(2)} to ${column.high.toFixed(2)}`) });
+    "aria-label": `${column.name} from ${low.toFixed(2)} to ${high.toFixed(2)} ${column.unit}` + (column.limits ? `, limits ${column.limits.map((end) => end.toFixed(2)).join(" to ")}` : "") });
   svg.append(g("rect", { class: "limit", x: 0, y: 4, width: 100, height: 2 }), g("rect", { class: "range", x: x(low), y: 2, width: Math.max(0.6, x(high) - x(low)), height: 6 }),
     g("rect", { class: "pose", x: x(column.values[frameAt()]) - 0.5, y: 0, width: 1, height: 10 }));
   const value = column.values[frameAt()];
@@ -655,7 +785,7 @@ function drawPlan() {
       h("span", {}, `${motion.times[frameAt()].toFixed(2)} s`)),
     details("joints", "Joints beside their limits", h("div", { class: "joints" }, motion.columns.map(joint))),
     motion.checks.length ? details("gate", "What the gate says", h("ul", { class: "checks" }, motion.checks.map((line) => h("li", {}, h("b", { class: line.status }, MARKS[line.status]), h("span", {}, `${line.check}: ${line.text}`))))) : null,
-    h("p", { class: "soft" }, `Plan ${motion.plan.slice(0, 12)}`));
+    h("p", { class: "soft" }, `Plan ${motion.sha256.slice(0, 12)}`));
 }
 
 // --- the history ------------------------------------------------------------------------------
@@ -665,13 +795,13 @@ function drawHistory() {
   if (!S.trials.length) { fill("history"); return; }
   const trials = [...S.trials].reverse();
   const row = (trial) => h("li", {}, h("div", { class: "entry" }, h("b", {}, `${trial.number}`),
-    h("span", { class: trial.hit ? "hit" : "" }, `${trial.hit ? "✓ hit · " : ""}${trial.said}${trial.p_hit !== null && trial.stage === "told" ? ` · ${Math.round(100 * trial.p_hit)} % was said` : ""}`),
-    trial.stage === "told" && button(`amend-${trial.number}`, "Correct", () => { L.amending = trial.number; L.mark = trial.outcome; draw(); $("map").focus(); }, "plain", { "aria-label": `Correct trial ${trial.number}` }),
+    h("span", { class: trial.hit ? "hit" : "" }, `${trial.hit ? "✓ hit · " : ""}${trial.line}${trial.p_hit !== null && trial.stage === "told" ? ` · ${Math.round(100 * trial.p_hit)} % was said` : ""}`),
+    trial.stage === "told" && button(`amend-${trial.number}`, "Correct", () => { L.amending = trial.number; L.mark = trial.outcome; draw(); (mapped() ? $("map") : rulers[0].svg).focus(); }, "plain", { "aria-label": `Correct trial ${trial.number}` }),
     trial.stage === "told" && L.voiding !== trial.number && button(`undo-${trial.number}`, "Void", () => { L.voiding = trial.number; draw(); }, "plain", { "aria-label": `Void trial ${trial.number}` })),
     trial.stage === "told" && !L.amending && confirmVoid(trial.number));
   const goals = (list) => list.flatMap((trial, i) => {
     const first = i === 0 || list[i - 1].goal !== trial.goal;
-    return [first && h("li", { class: "soft" }, `Goal ${trial.goal}: ${goalOf(trial).said}${goalOf(trial).new_hardware ? ` (changed: ${goalOf(trial).new_hardware})` : ""}`), row(trial)];
+    return [first && h("li", { class: "soft" }, `Goal ${trial.goal}: ${sayPlace(goalOf(trial).goal)}${goalOf(trial).new_hardware ? ` (changed: ${goalOf(trial).new_hardware})` : ""}`), row(trial)];
   });
   fill("history", h("h2", { id: "history-title" }, "What happened"), h("ul", {}, goals(trials.slice(0, SHOWN))),
     trials.length > SHOWN && (L.open.all ? h("ul", {}, goals(trials.slice(SHOWN))) : button("all", `${trials.length - SHOWN} earlier trials`, () => { L.open.all = true; draw(); }, "plain")),
@@ -685,19 +815,36 @@ async function fetchRecordings() {
   const answer = await get("/api/recordings");
   if (answer) { R = await answer.json(); draw(); }
 }
+const episodes = () => (R ? Object.entries(R.episodes).map(([name, outcome]) => ({ name, outcome })) : []);
 const shownDemonstrations = () => {
-  const touched = R && (L.episode || S.step === "import") ? R.episodes.filter((e) => e.outcome) : [];
-  return touched.length || L.episode ? touched : S.demonstrations;
+  const placed = L.episode || S.step === "import" ? episodes().filter((e) => e.outcome) : [];
+  return placed.length || L.episode ? placed : S.demonstrations.map((outcome) => ({ outcome }));
 };
-const unplaced = () => (R ? R.episodes.filter((e) => !e.outcome && !(L.skipped || []).includes(e.name)) : []);
+const unplaced = () => episodes().filter((e) => !e.outcome && !L.skipped.includes(e.name));
+// The files of a folder that was dropped, with those of the folders in it; nothing hidden.
+async function walk(entry, path = "") {
+  if (entry.name.startsWith(".")) return [];
+  if (entry.isFile) return [[path + entry.name, await new Promise((done, failed) => entry.file(done, failed))]];
+  const [reader, found] = [entry.createReader(), []];
+  for (let some = [0]; some.length;) {
+    some = await new Promise((done, failed) => reader.readEntries(done, failed)); // a hundred at a time
+    for (const each of some) found.push(...await walk(each, `${path}${entry.name}/`));
+  }
+  return found;
+}
+async function dropped(items) {
+  try {
+    const entries = [...items].map((item) => item.webkitGetAsEntry()).filter(Boolean); // at once: the items are gone later
+    await upload((await Promise.all(entries.map((entry) => walk(entry)))).flat());
+  } catch (error) { complain(`the browser does not read what was dropped (${error.message}); choose the files instead`); }
+}
 async function upload(files) {
-  for (const file of files) {
-    if (file.size > 64e6) { complain(`${file.name} is larger than the page takes (64 MB); use: prior-reinforce import`); return; }
-    L.uploading = file.name;
+  for (const [name, file] of files) {
+    if (file.size > 64e6) { complain(`${name} is larger than the page takes (64 MB); use: prior-reinforce import`); return; }
+    L.uploading = name;
     draw();
-    const name = file.webkitRelativePath || file.name;
     const answer = await request(`/api/recordings?name=${encodeURIComponent(name)}`, { method: "PUT", body: file }).catch(() => null);
-    if (!answer || !answer.ok) { L.uploading = ""; complain(answer ? await problemOf(answer) : `${file.name} did not arrive; drop it again`); draw(); return; }
+    if (!answer || !answer.ok) { L.uploading = ""; complain(answer ? await problemOf(answer) : `${name} did not arrive; drop it again`); draw(); return; }
   }
   L.uploading = "";
   complain("");
@@ -706,47 +853,47 @@ async function upload(files) {
 }
 function nextEpisode() {
   const next = unplaced()[0];
-  L.episode = next && mapped() ? next.name : "";
+  L.episode = next ? next.name : "";
   L.mark = null;
   draw();
 }
 async function placeEpisode(name, outcome) {
-  const body = JSON.stringify({ episode: name, outcome, sd: outcome ? L.measured || 0.02 : 0 });
-  const answer = await request("/api/outcome", { method: "POST", body, headers: { "content-type": "application/json" } }).catch(() => null);
-  if (!answer || !answer.ok) { complain(answer ? await problemOf(answer) : "no answer came; touch it again"); return; }
-  R = await answer.json();
+  const lengths = S.components.every((c) => c.unit === "m"); // one sd is of one unit
+  const placed = await send("/api/place", "POST", JSON.stringify({ episode: name, outcome, sd: lengths ? L.measured || 0.02 : 0 }));
+  if (!placed) return;
+  R = placed;
   nextEpisode();
 }
 function importPanel() {
   const zone = h("label", { class: "drop", id: "drop" }, L.uploading ? `Receiving ${L.uploading}` : "Drop recordings here, or choose them",
     h("span", { class: "soft" }, "NPZ, CSV, Excel, LeRobot, HDF5, ROS bags, and outcomes.csv if you have one"),
-    h("input", { type: "file", multiple: true, id: "files", onchange: (event) => upload([...event.target.files]) }));
+    h("input", { type: "file", multiple: true, id: "files", onchange: (event) => upload([...event.target.files].map((file) => [file.name, file])) }));
   zone.addEventListener("dragover", (event) => { event.preventDefault(); zone.classList.add("over"); });
   zone.addEventListener("dragleave", () => zone.classList.remove("over"));
-  zone.addEventListener("drop", (event) => { event.preventDefault(); upload([...event.dataTransfer.files]); });
+  zone.addEventListener("drop", (event) => { event.preventDefault(); dropped(event.dataTransfer.items); });
   if (!R || !R.files) return [zone];
-  const placed = R.episodes.filter((e) => e.outcome).length;
+  const [all, placed] = [episodes(), episodes().filter((e) => e.outcome).length];
   return [
     R.problem && h("p", { class: "ask" }, R.problem),
     R.questions.length > 0 && h("div", { class: "ask" }, R.questions.map((what) => h("p", {}, what)),
       h("label", {}, h("input", { type: "checkbox", id: "confirmed", checked: L.confirmed, onchange: (event) => { L.confirmed = event.target.checked; draw(); } }), " Yes, so it is")),
-    R.episodes.length > 0 && button("import", placed === R.episodes.length ? `Import ${placed} recordings` : `Import the ${placed} of ${R.episodes.length} that have an outcome`,
+    all.length > 0 && button("import", placed === all.length ? `Import ${placed} recordings` : `Import the ${placed} of ${all.length} that have an outcome`,
       takeIn, "big", { disabled: !placed || (R.questions.length > 0 && !L.confirmed) || !L.connected || L.busy }),
-    R.episodes.length > 0 && h("ul", {}, R.episodes.map((e) => h("li", { class: "entry" }, h("span", {}, `${e.name}: ${e.outcome ? sayPlace(e.outcome) : "not touched yet"}`),
-      mapped() && button(`place-${e.name}`, e.outcome ? "Correct" : "Touch", () => { L.episode = e.name; L.mark = e.outcome; draw(); }, "plain", { "aria-label": `Touch where ${e.name} landed` })))),
+    all.length > 0 && h("ul", {}, all.map((e) => h("li", { class: "entry" }, h("span", {}, `${e.name}: ${e.outcome ? sayPlace(e.outcome) : "not touched yet"}`),
+      button(`place-${e.name}`, e.outcome ? "Correct" : "Touch", () => { L.episode = e.name; L.mark = e.outcome; draw(); }, "plain", { "aria-label": `Touch where ${e.name} landed` })))),
     R.text && details("preview", "What the recordings hold", h("pre", { class: "output", tabindex: "0" }, R.text)),
     zone, button("discard", "Forget these files", async () => { L.skipped = []; if (await send("/api/recordings", "DELETE")) fetchRecordings(); }, "plain"),
   ];
 }
 async function takeIn() {
-  if (await verb("import", { confirmed: Boolean(L.confirmed) })) { L.confirmed = false; L.open.recordings = false; L.picture = Date.now(); draw(); }
+  if (await verb("take", { confirmed: Boolean(L.confirmed) })) { L.confirmed = false; L.open.recordings = false; draw(); }
 }
 function episodePanel() {
   const name = L.episode;
   return [
-    button("place", L.mark ? `It landed ${sayPlace(L.mark)}` : "Touch the table where it landed", () => placeEpisode(name, L.mark), "big", { disabled: !L.mark }),
-    h("p", { class: "soft" }, `${unplaced().length} of ${R.episodes.length} recordings have no outcome yet.`),
-    h("div", { class: "row" }, button("skip", "Leave it out", () => { L.skipped = [...(L.skipped || []), name]; nextEpisode(); }),
+    button("place", marked() ? `It landed ${sayPlace(L.mark)}` : touchFirst("it landed"), () => placeEpisode(name, L.mark), "big", { disabled: !marked() }),
+    h("p", { class: "soft" }, `${unplaced().length} of ${episodes().length} recordings have no outcome yet.`),
+    h("div", { class: "row" }, button("skip", "Leave it out", () => { L.skipped.push(name); nextEpisode(); }),
       button("later", "Back to the list", () => { L.episode = ""; L.mark = null; draw(); })),
     details("fields", "Type the place", fields()),
   ];
@@ -778,7 +925,9 @@ async function seen(camera) {
     if (answer) {
       if (pictureUrl) URL.revokeObjectURL(pictureUrl);
       pictureUrl = URL.createObjectURL(await answer.blob());
-      box = null;
+      const image = h("img", { src: pictureUrl });
+      await image.decode();
+      [L.wide, L.tall, box] = [image.naturalWidth, image.naturalHeight, null];
     }
   }
   draw();
@@ -799,7 +948,7 @@ function inverse([[a, b, c], [d, e, f], [p, q, r]]) {
 const toPixel = (place) => times(inverse(C.to_table), place);
 const pixelOfMark = () => {
   if (L.calibrating) return L.pixels[L.at] || null;
-  return L.mark && C.to_table ? toPixel(L.mark) : null;
+  return L.mark && L.mark[axis(0)] !== null && C.to_table ? toPixel(xy(L.mark)) : null;
 };
 function touchPixel(u, v) {
   if (L.calibrating) { L.pixels[L.at] = [u, v]; draw(); } else { box = box && moved(box, u, v); setMark(times(C.to_table, [u, v]), C.sd); }
@@ -809,14 +958,14 @@ function drawPicture() {
   const svg = $("picture");
   if (!C || !pictureUrl || svg.hasAttribute("hidden")) return;
   const zoom = Math.max(1, L.zoom);
-  const middle = pixelOfMark() || (C.to_table && goalNow() ? toPixel(goalNow().goal) : [C.width / 2, C.height / 2]);
+  const middle = pixelOfMark() || (C.to_table && goalNow() ? toPixel(xy(goalNow().goal)) : [L.wide / 2, L.tall / 2]);
   if (!L.window || L.window.zoom !== zoom || L.window.of !== C.picture) {
-    const at = [0, 1].map((i) => Math.min(Math.max(middle[i] - [C.width, C.height][i] / zoom / 2, 0), [C.width, C.height][i] * (1 - 1 / zoom)));
-    L.window = { zoom, of: C.picture, box: `${at[0]} ${at[1]} ${C.width / zoom} ${C.height / zoom}` };
+    const at = [0, 1].map((i) => Math.min(Math.max(middle[i] - [L.wide, L.tall][i] / zoom / 2, 0), [L.wide, L.tall][i] * (1 - 1 / zoom)));
+    L.window = { zoom, of: C.picture, box: `${at[0]} ${at[1]} ${L.wide / zoom} ${L.tall / zoom}` };
   }
   svg.setAttribute("viewBox", L.window.box);
-  const px = C.width / zoom / Math.max(1, svg.clientWidth);
-  const parts = [g("image", { href: pictureUrl, width: C.width, height: C.height })];
+  const px = L.wide / zoom / Math.max(1, svg.clientWidth);
+  const parts = [g("image", { href: pictureUrl, width: L.wide, height: L.tall })];
   const cross = ([u, v], kind, r) => g("path", { class: kind, d: `M${u - r} ${v}H${u + r}M${u} ${v - r}V${v + r}` });
   if (L.calibrating) {
     L.points.forEach((_, i) => {
@@ -826,8 +975,9 @@ function drawPicture() {
   } else if (C.to_table) {
     const goal = touchedGoal() || goalNow();
     if (goal) {
-      const ring = [...Array(25).keys()].map((i) => toPixel([goal.goal[0] + goal.tolerance[0] * Math.cos(i * Math.PI / 12), goal.goal[1] + goal.tolerance[1] * Math.sin(i * Math.PI / 12)]));
-      parts.push(g("polygon", { class: "goal ring", points: ring.join(" ") }), cross(toPixel(goal.goal), "goal", 10 * px));
+      const [[x, y], [a, b]] = [xy(goal.goal), xy(goal.tolerance)];
+      const ring = [...Array(25).keys()].map((i) => toPixel([x + a * Math.cos(i * Math.PI / 12), y + b * Math.sin(i * Math.PI / 12)]));
+      parts.push(g("polygon", { class: "goal ring", points: ring.join(" ") }), cross(toPixel([x, y]), "goal", 10 * px));
     }
     const mark = pixelOfMark();
     if (box) parts.push(g("rect", { class: "box", x: box[0], y: box[1], width: box[2] - box[0], height: box[3] - box[1] }));
@@ -868,8 +1018,8 @@ async function sendPicture(blob) {
 async function findTags() {
   const tags = await send("/api/tags", "GET");
   if (!tags) return;
-  for (const tag of tags) if (tag.number <= L.points.length) L.pixels[tag.number - 1] = tag.pixel;
-  if (!tags.length) complain("no tag is seen in the picture");
+  for (const [number, pixel] of Object.entries(tags)) if (number <= L.points.length) L.pixels[number - 1] = pixel;
+  if (!Object.keys(tags).length) complain("no tag is seen in the picture");
   draw();
 }
 async function calibrate() {
@@ -912,7 +1062,7 @@ function drawCamera() {
         h("span", { class: "fields" }, [0, 1].map((j) => h("label", {}, ["ahead [cm]", "left [cm]"][j], h("input", { type: "text", inputmode: "decimal", id: `known-${i}-${j}`, value: Math.round(point[j] * 1000) / 10,
           onchange: (event) => { const value = parseFloat(event.target.value.replace(",", ".")); if (Number.isFinite(value)) L.points[i][j] = value / 100; } }))))))),
       h("div", { class: "row" }, button("more", "One more point", () => { L.points.push([0, 0]); L.at = L.points.length - 1; draw(); }), button("tags", "Find printed tags", findTags),
-        button("sheet", "Tags to print", async () => { const answer = await get("/api/tags/sheet"); if (answer) h("a", { href: URL.createObjectURL(await answer.blob()), download: "tags.png" }).click(); })),
+        h("a", { class: "button", href: "/tags.svg", target: "_blank", rel: "noopener" }, "Tags to print")),
       button("fit", known < 4 ? `${4 - known} more points` : `Keep the calibration of ${known} points`, calibrate, "big", { disabled: known < 4 }),
       button("no-calibration", "Leave it as it is", () => { L.calibrating = false; draw(); }, "plain"));
   }
@@ -924,7 +1074,8 @@ function drawCamera() {
 document.addEventListener("DOMContentLoaded", () => {
   $("stop").addEventListener("click", () => verb("stop"));
   document.addEventListener("keydown", (event) => { if (event.key === "Escape") { event.preventDefault(); verb("stop"); } });
-  surface($("map"), { active: () => Boolean(touching()), get: () => L.mark && uv(L.mark), set: (u, v) => setMark([-v / 1000, -u / 1000]), step: () => 10 });
-  surface($("picture"), { active: () => Boolean(L.calibrating || (C && C.to_table && touching())), get: pixelOfMark, set: touchPixel, step: () => 10 });
+  const begin = () => uv(xy((touchedGoal() || goalNow() || { goal: S.components.map((c) => [0.8, 0][c.axis]) }).goal));
+  surface($("map"), { active: () => Boolean(touching()), get: () => L.mark && L.mark[axis(0)] !== null && uv(xy(L.mark)), set: (u, v) => setMark([-v / 1000, -u / 1000]), begin, step: () => 10 });
+  surface($("picture"), { active: () => Boolean(L.calibrating || (C && C.to_table && touching())), get: pixelOfMark, set: touchPixel, begin: () => [L.wide / 2, L.tall / 2], step: () => 10 });
   listen();
 });

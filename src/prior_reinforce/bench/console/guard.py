@@ -22,8 +22,14 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from prior_reinforce.files import require_inside, write
 
 TOKEN_FILE = ".console-token"
-_PUBLIC = ("/", "/console.js", "/console.css", "/icon.svg")
-"""The page itself, which holds nothing of the workspace."""
+PUBLIC = {
+    "/": "text/html",
+    "/console.js": "text/javascript",
+    "/console.css": "text/css",
+    "/icon.svg": "image/svg+xml",
+    "/tags.svg": "image/svg+xml",
+}
+"""The page itself, which holds nothing of the workspace: path and media type."""
 _SELF_ONLY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:; media-src "
     "blob:; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
@@ -38,6 +44,11 @@ _HEADERS = {
     "permissions-policy": "camera=(self), microphone=(), geolocation=()",
     "cache-control": "no-store",
 }
+
+
+def problem(status: int, error: str) -> JSONResponse:
+    """Answer why something is not done."""
+    return JSONResponse({"error": error}, status)
 
 
 def token_of(folder: Path) -> str:
@@ -95,29 +106,21 @@ class Guard:
         """Why a request is not answered; None if it is."""
         host, path = request.headers.get("host", ""), request.url.path
         if not self._is_here(host):
-            return _refuse(403, f"{host[:80]!r} is no name of this computer; open the link again")
+            return problem(403, f"{host[:80]!r} is no name of this computer; open the link again")
         origin = request.headers.get("origin")
         if origin is not None and urlsplit(origin).netloc != host:
-            return _refuse(403, "a page of another site asks; open the console's own link")
-        if path in _PUBLIC or path == report_path(self._token):
+            return problem(403, "a page of another site asks; open the console's own link")
+        if path in PUBLIC or path == report_path(self._token):
             return None
         given = request.headers.get("authorization", "").removeprefix("Bearer ")
         if not secrets.compare_digest(given.encode(), self._token.encode()):
-            return _refuse(401, "the link is incomplete; open the one that the terminal shows")
+            return problem(401, "the link is incomplete; open the one that the terminal shows")
         return None
 
     def _is_here(self, host: str) -> bool:
         """Whether a Host header names this computer: an address, or a name that it has itself."""
         try:
             name = urlsplit(f"//{host}").hostname or ""
+            return name in self._names or bool(ipaddress.ip_address(name).compressed)
         except ValueError:
             return False
-        try:
-            ipaddress.ip_address(name)
-        except ValueError:
-            return name in self._names
-        return True
-
-
-def _refuse(status: int, why: str) -> JSONResponse:
-    return JSONResponse({"error": why}, status)

@@ -9,11 +9,13 @@ from __future__ import annotations
 import re
 import shutil
 import threading
-from pathlib import Path
+from contextlib import suppress
+from dataclasses import dataclass
 
-from msgspec import Struct, structs
+from msgspec import Struct
 
-from prior_reinforce.bench.console.verbs import Console, Seen, Verbs
+from prior_reinforce.bench.console.verbs import Seen, Verbs
+from prior_reinforce.bench.console.view import State
 from prior_reinforce.bench.importing import Preprocessing, ReadOptions, Recordings, inspect, read
 from prior_reinforce.bench.importing.outcomes import (
     OUTCOMES_FILE,
@@ -26,12 +28,13 @@ from prior_reinforce.bench.importing.outcomes import (
 )
 from prior_reinforce.bench.importing.selection import Selection
 from prior_reinforce.bench.importing.units import Ambiguity
-from prior_reinforce.bench.workspace.manifest import UNKNOWN, Manifest
+from prior_reinforce.bench.workspace.manifest import UNKNOWN
 from prior_reinforce.errors import (
     FileFormatError,
     InvalidDemonstrationsError,
     InvalidFeedbackError,
     PriorReinforceError,
+    WorkspaceError,
 )
 from prior_reinforce.files import named_disk_errors, require_inside, write
 
@@ -43,24 +46,18 @@ _PART = re.compile(r"\w[\w .()+=-]{0,99}")
 _DEEPEST = 6
 
 
-class Episode(Struct):
-    """A recording, and where its object landed, if that is known."""
-
-    name: str
-    outcome: list[float] | None
-
-
 class Dropped(Struct):
     """What was dropped, and what an import would make of it."""
 
     files: int
-    text: str
+    text: str = ""
     """What it holds, as `import --inspect` says."""
-    problem: str
+    problem: str = ""
     """Why it cannot be read; empty where it can."""
-    questions: list[str]
+    questions: list[str] = []
     """What is only guessed of its units, for a person to confirm."""
-    episodes: list[Episode]
+    episodes: dict[str, list[float] | None] = {}
+    """The recordings, and where the object of each landed, if that is known."""
 
 
 class Place(Struct, forbid_unknown_fields=True):
@@ -78,6 +75,28 @@ class Take(Seen):
 
     confirmed: bool = False
     """A person said that the guesses are right."""
+
+
+@dataclass(frozen=True)
+class _Found:
+    """The recordings as they are read now."""
+
+    recordings: Recordings
+    selection: Selection
+    known: Outcomes
+    unclear: tuple[Ambiguity, ...]
+    """What is only guessed of their units."""
+
+    @property
+    def rows(self) -> dict[str, tuple[float, ...]]:
+        """Outcome and its standard deviation by episode, where they are known."""
+        missing = missing_outcomes(self.selection.episodes, self.known)
+        there = [episode for episode in self.selection.episodes if episode not in missing]
+        if not there:
+            return {}
+        places, sds = outcomes_of(there, self.known, partial=True)
+        pairs = zip(there, places.tolist(), sds.tolist(), strict=True)
+        return {episode: (*place, sd[0]) for episode, place, sd in pairs}
 
 
 class Imports:
@@ -104,7 +123,7 @@ class Imports:
             with named_disk_errors(self._folder):
                 write(path, content)
         self._verbs.publish({"recordings": len(there) + 1})
-        return Dropped(len(there) + 1, "", "", [], [])
+        return Dropped(len(there) + 1)
 
     def look(self) -> Dropped:
         """Say what the recordings hold, and what an import would make of them."""
@@ -113,45 +132,44 @@ class Imports:
 
     def place(self, body: Place) -> Dropped:
         """Write down where a recording's object landed."""
-        names, units = self._manifest.outcome_names, self._manifest.outcome_units
+        manifest = self._workspace.manifest
+        names, units = manifest.outcome_names, manifest.outcome_units
         with self._lock:
-            recordings, selection = self._read()
-            if body.episode not in selection.episodes:
+            found = self._read()
+            if body.episode not in found.selection.episodes:
                 raise InvalidDemonstrationsError(f"there is no recording {body.episode[:80]!r}")
             if body.outcome is not None and len(body.outcome) != len(names):
                 wanted = f"an outcome is {len(names)} numbers: {', '.join(names)}"
                 raise InvalidFeedbackError(wanted)
-            rows = dict(self._places(recordings, selection))
+            rows = found.rows
             rows.pop(body.episode, None)
             if body.outcome is not None:
                 rows[body.episode] = (*body.outcome, body.sd)
             cells = {episode: tuple(map(repr, row)) for episode, row in rows.items()}
-            table = recordings.outcome_places[0] / OUTCOMES_FILE
+            table = found.recordings.outcome_places[0] / OUTCOMES_FILE
             with named_disk_errors(self._folder):
                 write_outcome_table(table, cells, (*names, SD), (*units, units[0]))
             self._verbs.publish({"recordings": len(rows)})
             return self._look()
 
-    def take(self, body: Take) -> Console:
+    def take(self, body: Take) -> State:
         """Take the recordings with a known outcome in, as `prior-reinforce import` does."""
-        manifest = self._manifest
         with self._lock, self._verbs.as_seen(body.seen):
-            recordings, selection = self._read()
-            known, unclear = self._known(recordings)
-            unclear += recordings.ambiguities + selection.ambiguities
-            if unclear and not body.confirmed:
-                raise InvalidDemonstrationsError(f"{unclear[0].what}; say whether it is so")
-            selection = selection.without(missing_outcomes(selection.episodes, known))
-            if not selection.recordings:
+            found = self._read()
+            missing = missing_outcomes(found.selection.episodes, found.known)
+            if len(missing) == len(found.selection.episodes):
                 raise InvalidDemonstrationsError("no outcome is known yet; touch where they landed")
-            inspection = inspect(
-                selection, Preprocessing(manifest.format.dt), manifest.robot, manifest.gate
+            result = self._workspace.import_recordings(
+                found.recordings.source, leave_out=missing, take_guesses=body.confirmed
             )
-            names, units = manifest.outcome_names, manifest.outcome_units
-            result = recordings.demonstrations(inspection, known, names, units, partial=True)
-            self._workspace.import_demonstrations(result.demonstrations, str(self._source))
-            with named_disk_errors(self._verbs.folder):
-                result.preview.draw(self._verbs.folder / "demonstrations.png")
+            picture = self._verbs.folder / "demonstrations.png"
+            try:
+                with named_disk_errors(self._verbs.folder):
+                    result.preview.draw(picture)
+            except WorkspaceError as error:  # the demonstrations are taken in without it
+                with suppress(OSError):
+                    picture.unlink()
+                self._verbs.publish({"error": f"taken in, but there is no picture: {error}"})
         return self._verbs.state()
 
     def discard(self) -> Dropped:
@@ -162,69 +180,44 @@ class Imports:
             self._verbs.publish({"recordings": 0})
             return self._look()
 
-    @property
-    def _manifest(self) -> Manifest:
-        return self._workspace.manifest
-
-    @property
-    def _source(self) -> Path:
-        """The recordings: what was dropped, or the one folder that was."""
-        there = [path for path in self._folder.iterdir() if path.name != OUTCOMES_FILE]
-        return there[0] if len(there) == 1 and there[0].is_dir() else self._folder
-
-    def _read(self) -> tuple[Recordings, Selection]:
+    def _read(self) -> _Found:
         if not self._folder.is_dir():
             raise InvalidDemonstrationsError("no recordings are here yet; drop some on the page")
-        form = self._manifest.format
-        source = require_inside(self._source, self._verbs.folder)
-        if form.names == UNKNOWN:  # the first import takes what was recorded
-            recordings = read(source)
-            return recordings, recordings.select()
-        recordings = read(source, ReadOptions(joints=form.names))
-        return recordings, recordings.select(form.names, form.units)
-
-    def _known(self, recordings: Recordings) -> tuple[Outcomes, tuple[Ambiguity, ...]]:
-        names = self._manifest.outcome_names
+        there = [path for path in self._folder.iterdir() if path.name != OUTCOMES_FILE]
+        # A folder that was dropped alone is the recordings.
+        source = there[0] if len(there) == 1 and there[0].is_dir() else self._folder
+        manifest = self._workspace.manifest
+        form, names = manifest.format, manifest.outcome_names
+        own = () if form.names == UNKNOWN else (form.names, form.units)  # else as recorded
+        recordings = read(
+            require_inside(source, self._verbs.folder), ReadOptions(joints=own[0] if own else None)
+        )
+        selection = recordings.select(*own)
         try:
-            found = recordings.outcomes(None, names)
+            known = recordings.outcomes(None, names)
         except InvalidDemonstrationsError:
-            found = Outcomes.none(names)
-        return in_units(found, self._manifest.outcome_units, None)
-
-    def _places(self, recordings: Recordings, selection: Selection) -> dict[str, tuple[float, ...]]:
-        """Outcome and its standard deviation by episode, where they are known."""
-        known, _ = self._known(recordings)
-        missing = missing_outcomes(selection.episodes, known)
-        there = [episode for episode in selection.episodes if episode not in missing]
-        if not there:
-            return {}
-        places, sds = outcomes_of(there, known, partial=True)
-        pairs = zip(there, places.tolist(), sds.tolist(), strict=True)
-        return {episode: (*place, sd[0]) for episode, place, sd in pairs}
+            known = Outcomes.none(names)
+        known, unclear = in_units(known, manifest.outcome_units, None)
+        unclear += recordings.ambiguities + selection.ambiguities
+        return _Found(recordings, selection, known, unclear)
 
     def _look(self) -> Dropped:
         files = sum(path.is_file() for path in self._folder.rglob("*"))
-        found = Dropped(files, "", "", [], [])
         if not files:
-            return found
-        manifest = self._manifest
+            return Dropped(0)
+        manifest = self._workspace.manifest
         try:
-            recordings, selection = self._read()
-            _, unclear = self._known(recordings)
-            places = self._places(recordings, selection)
-            inspection = inspect(
-                selection, Preprocessing(manifest.format.dt), manifest.robot, manifest.gate
-            )
+            found = self._read()
+            rows, preprocessing = found.rows, Preprocessing(manifest.format.dt)
+            inspection = inspect(found.selection, preprocessing, manifest.robot, manifest.gate)
         except PriorReinforceError as error:
-            return structs.replace(found, problem=str(error))
-        unclear += recordings.ambiguities + selection.ambiguities
+            return Dropped(files, problem=str(error))
         return Dropped(
             files,
             inspection.text,
-            "",
-            [one.what for one in unclear],
-            [
-                Episode(name, [*places[name][:-1]] if name in places else None)
-                for name in selection.episodes
-            ],
+            questions=[one.what for one in found.unclear],
+            episodes={
+                name: [*rows[name][:-1]] if name in rows else None
+                for name in found.selection.episodes
+            },
         )

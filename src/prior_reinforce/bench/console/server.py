@@ -7,12 +7,11 @@ sentence, for the person at the page.
 from __future__ import annotations
 
 import asyncio
-import socket
-import threading
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from functools import partial
+from http import HTTPStatus
 from importlib import resources
 from pathlib import Path
 from typing import Any, get_type_hints
@@ -28,7 +27,7 @@ from starlette.routing import Route
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from prior_reinforce.bench.console.camera import LARGEST_PICTURE, Pictures
-from prior_reinforce.bench.console.guard import Guard, report_path
+from prior_reinforce.bench.console.guard import PUBLIC, Guard, problem, report_path
 from prior_reinforce.bench.console.imports import LARGEST_FILE, Imports
 from prior_reinforce.bench.console.verbs import Verbs
 from prior_reinforce.errors import PriorReinforceError, TrialStateError, WorkspaceError
@@ -44,21 +43,23 @@ _QUEUE = 200
 """Messages that a tab may lag behind before it is told to ask again."""
 _BEAT = 5.0
 """Between signs of life, in [s], by which a page knows that what it shows is of now."""
-_STATUSES = {
-    400: "Not what the interface expects; the message says what is wrong.",
-    401: "Without the secret of the link.",
-    403: "From another site, or for another computer.",
-    404: "There is no such thing.",
-    405: "Another method.",
-    408: "The request took too long.",
-    409: "Not done: the workspace has gone on, or cannot do that now.",
-    413: "Too large.",
-    422: "Not done: what was given cannot be used.",
-    429: "Too many tabs.",
+_STATUS_OF: dict[type[Exception], int] = {
+    TrialStateError: 409,
+    WorkspaceError: 409,
+    PriorReinforceError: 422,
+    msgspec.MsgspecError: 400,
+    UnicodeDecodeError: 400,
+    ClientDisconnect: 400,
 }
+_REFUSALS = (400, 401, 403, 404, 405, 408, 409, 413, 422, 429)
 _FOR_STOP = anyio.CapacityLimiter(8)
 """Threads that only stop the arm: whatever else is asked at the same time, some are free."""
-Problem = msgspec.defstruct("Problem", [("error", str)])
+
+
+class Problem(msgspec.Struct):
+    """Why something was not done."""
+
+    error: str
 
 
 @dataclass(frozen=True)
@@ -79,19 +80,8 @@ class Endpoint:
 
     @property
     def takes(self) -> dict[str, Any]:
-        """Type of each argument."""
-        hints = get_type_hints(self.call)
-        return {name: kind for name, kind in hints.items() if name != "return"}
-
-    @property
-    def body(self) -> Any:
-        """Type of the body; None where there is none."""
-        return next((kind for kind in self.takes.values() if kind not in (int, str)), None)
-
-    @property
-    def answers(self) -> Any:
-        """Type of the answer."""
-        return get_type_hints(self.call)["return"]
+        """Type of each argument, and of the answer as `return`."""
+        return get_type_hints(self.call)
 
 
 _STOP, _RECORDINGS = "/api/stop", "/api/recordings"
@@ -104,39 +94,28 @@ _PARAMETERS = {
 
 def endpoints(verbs: Verbs, imports: Imports, pictures: Pictures) -> list[Endpoint]:
     """Everything that can be asked, but for the stream of events."""
+    posted: list[Callable[..., Any]] = [
+        *(verbs.goal, verbs.ask, verbs.question, verbs.execute, verbs.stop, verbs.tell),
+        *(verbs.amend, verbs.void, verbs.learn, imports.place, imports.take),
+        *(pictures.calibrate, pictures.find),
+    ]
     return [
+        *(Endpoint("POST", f"/api/{call.__name__}", call) for call in posted),
         Endpoint("GET", "/api/state", verbs.state),
-        Endpoint("POST", "/api/goal", verbs.set_goal),
-        Endpoint("POST", "/api/ask", verbs.ask),
-        Endpoint("POST", "/api/execute", verbs.execute),
-        Endpoint("POST", _STOP, verbs.stop),
-        Endpoint("POST", "/api/tell", verbs.tell),
-        Endpoint("POST", "/api/amend", verbs.amend),
-        Endpoint("POST", "/api/void", verbs.void),
-        Endpoint("POST", "/api/learn", verbs.learn),
         Endpoint("GET", _PLAN, verbs.motion),
         Endpoint("GET", f"{_PLAN}/file", verbs.plan_file),
         Endpoint("GET", _RECORDINGS, imports.look),
         Endpoint("PUT", _RECORDINGS, imports.drop, LARGEST_FILE),
         Endpoint("DELETE", _RECORDINGS, imports.discard),
-        Endpoint("POST", "/api/outcome", imports.place),
-        Endpoint("POST", "/api/import", imports.take),
         Endpoint("GET", "/api/camera", pictures.look_up),
         Endpoint("GET", "/api/picture", pictures.file, media="image/jpeg"),
         Endpoint("PUT", "/api/picture", pictures.keep, LARGEST_PICTURE),
-        Endpoint("POST", "/api/calibrate", pictures.calibrate),
         Endpoint("GET", "/api/tags", pictures.tags),
-        Endpoint("GET", "/api/tags/sheet", pictures.sheet, media="image/png"),
-        Endpoint("POST", "/api/find", pictures.find),
     ]
 
 
 def application(
-    verbs: Verbs,
-    events: Events,
-    token: str,
-    host: str,
-    vlm: VisionLanguageModelConfig,
+    verbs: Verbs, events: Events, token: str, host: str, vlm: VisionLanguageModelConfig
 ) -> Guard:
     """Make the console, an ASGI application.
 
@@ -148,29 +127,17 @@ def application(
         vlm: Which model finds objects in pictures.
     """
     table = endpoints(verbs, Imports(verbs), Pictures(verbs, vlm))
-    page = resources.files(__package__)
+    schema = openapi(table)
 
-    def static(name: str, kind: str) -> Route:
-        content = page.joinpath(name).read_bytes()
-        path = "/" if name == "page.html" else f"/{name}"
-        return Route(path, lambda _: Response(content, media_type=kind), methods=["GET"])
+    def static(path: str, kind: str) -> Route:
+        name = path.removeprefix("/") or "page.html"
+        content = resources.files(__package__).joinpath(name).read_bytes()
+        return Route(path, lambda _: Response(content, media_type=kind))
 
     async def report(request: Request) -> Response:
         if request.url.path != report_path(token):
             raise HTTPException(404)
         return FileResponse(await anyio.to_thread.run_sync(verbs.write_report))
-
-    schema = openapi(table)
-    routes = [
-        static("page.html", "text/html"),
-        static("console.js", "text/javascript"),
-        static("console.css", "text/css"),
-        static("icon.svg", "image/svg+xml"),
-        Route("/report/{ticket}", _told(report)),
-        Route("/api/events", events.stream),
-        Route("/api/openapi.json", lambda _: _json(schema)),
-        *(Route(e.path, _told(partial(_answer, e)), methods=[e.method]) for e in table),
-    ]
 
     @asynccontextmanager
     async def lifespan(_: Starlette) -> AsyncIterator[None]:
@@ -178,10 +145,16 @@ def application(
         yield
         await anyio.to_thread.run_sync(verbs.close)
 
-    handlers = {HTTPException: lambda _, error: _problem(error.status_code, str(error.detail))}
-    return Guard(
-        Starlette(routes=routes, lifespan=lifespan, exception_handlers=handlers), token, host
-    )
+    routes = [
+        *(static(path, kind) for path, kind in PUBLIC.items()),
+        Route("/report/{ticket}", report),
+        Route("/api/events", events.stream),
+        Route("/api/openapi.json", lambda _: _json(schema)),
+        *(Route(e.path, partial(_answer, e), methods=[e.method]) for e in table),
+    ]
+    handlers = dict.fromkeys((HTTPException, ImportError, *_STATUS_OF), _refuse)
+    app = Starlette(routes=routes, lifespan=lifespan, exception_handlers=handlers)
+    return Guard(app, token, host)
 
 
 async def _answer(endpoint: Endpoint, request: Request) -> Response:
@@ -191,7 +164,7 @@ async def _answer(endpoint: Endpoint, request: Request) -> Response:
             if name not in said:
                 raise HTTPException(400, f"say {name}")
             given[name] = said[name]
-        else:
+        elif name != "return":
             content = await _read(request, endpoint.largest)
             given[name] = content if kind is bytes else msgspec.json.decode(content, type=kind)
     threads = _FOR_STOP if endpoint.path == _STOP else None
@@ -204,8 +177,9 @@ async def _answer(endpoint: Endpoint, request: Request) -> Response:
 async def _read(request: Request, largest: int) -> bytes:
     """A request's body, if it is small enough and comes in time."""
     said = request.headers.get("content-length", "0")
+    too_large = HTTPException(413, f"at most {largest / 1e6:g} MB are taken")
     if not said.isdecimal() or len(said) > 12 or int(said) > largest:
-        raise HTTPException(413, f"at most {largest / 1e6:g} MB are taken")
+        raise too_large
     content = bytearray()
     stream = request.stream()
     try:
@@ -213,42 +187,27 @@ async def _read(request: Request, largest: int) -> bytes:
             with anyio.fail_after(_LONGEST_WAIT):
                 content += await anext(stream)
             if len(content) > largest:
-                raise HTTPException(413, f"at most {largest / 1e6:g} MB are taken")
+                raise too_large
     except StopAsyncIteration:
         return bytes(content)
     except TimeoutError:
         raise HTTPException(408, "the request took too long; send it again") from None
 
 
-def _told(answer: Callable[[Request], Any]) -> Callable[[Request], Any]:
-    """Answer, or say in one sentence why not."""
-
-    async def told(request: Request) -> Response:
-        try:
-            return await answer(request)
-        except (TrialStateError, WorkspaceError) as error:
-            return _problem(409, str(error))
-        except PriorReinforceError as error:
-            return _problem(422, str(error))
-        except ImportError as error:
-            missing = missing_extra(error)
-            if missing is None:
-                raise
-            return _problem(422, str(missing))
-        except (msgspec.DecodeError, msgspec.ValidationError, UnicodeDecodeError) as error:
-            return _problem(400, f"{error}")
-        except ClientDisconnect:
-            return _problem(400, "the client left")
-
-    return told
+def _refuse(_: Request, error: Exception) -> Response:
+    """Say in one sentence why not."""
+    if isinstance(error, HTTPException):
+        return problem(error.status_code, error.detail)
+    if isinstance(error, ImportError):
+        error = missing_extra(error) or error
+    for kind in type(error).__mro__:
+        if kind in _STATUS_OF:
+            return problem(_STATUS_OF[kind], str(error))
+    raise error
 
 
-def _json(answer: Any, status: int = 200) -> Response:
-    return Response(msgspec.json.encode(answer), status, media_type="application/json")
-
-
-def _problem(status: int, error: str) -> Response:
-    return _json(Problem(error), status)
+def _json(answer: Any) -> Response:
+    return Response(msgspec.json.encode(answer), media_type="application/json")
 
 
 class Events:
@@ -277,7 +236,7 @@ class Events:
     async def stream(self, request: Request) -> Response:
         """Send them until the tab is closed."""
         if len(self._tabs) >= _MOST_TABS:
-            return _problem(429, f"{_MOST_TABS} tabs are open; close some")
+            return problem(429, f"{_MOST_TABS} tabs are open; close some")
         return StreamingResponse(self._lines(), media_type="text/event-stream")
 
     async def _lines(self) -> AsyncIterator[bytes]:
@@ -296,8 +255,8 @@ class Events:
 
 def openapi(table: list[Endpoint]) -> dict[str, Any]:
     """What the interface says of itself, OpenAPI 3.1."""
-    kinds = dict.fromkeys(kind for e in table for kind in (e.body, e.answers))
-    types = [Problem, *(kind for kind in kinds if kind not in (None, bytes, Path))]
+    kinds = dict.fromkeys([Problem, *(kind for e in table for kind in e.takes.values())])
+    types = [kind for kind in kinds if kind not in (bytes, Path, *_PARAMETERS)]
     shapes, components = msgspec.json.schema_components(
         types, ref_template="#/components/schemas/{name}"
     )
@@ -308,37 +267,35 @@ def openapi(table: list[Endpoint]) -> dict[str, Any]:
             return {"application/json": {"schema": shape[kind]}}
         return {media: {"schema": {"type": "string", "format": "binary"}}}
 
-    problems = {
-        str(status): {"description": said, "content": content(Problem)}
-        for status, said in _STATUSES.items()
+    refusals = {
+        str(status): {"description": HTTPStatus(status).phrase, "content": content(Problem)}
+        for status in _REFUSALS
     }
     paths: dict[str, Any] = {}
     for e in table:
-        path = e.path.replace(":int}", "}")
-        done = {"description": "Done.", "content": content(e.answers, e.media)}
-        operation: dict[str, Any] = {
+        takes, path = e.takes, e.path.replace(":int}", "}")
+        done = {"description": "Done.", "content": content(takes.pop("return"), e.media)}
+        operation = paths.setdefault(path, {})[e.method.lower()] = {
             "summary": (e.call.__doc__ or "").partition("\n")[0],
             "operationId": e.call.__name__,
-            "responses": {"200": done, **problems},
+            "responses": {"200": done, **refusals},
             "parameters": [
                 {"name": name, "in": "path" if f"{{{name}}}" in path else "query", "required": True}
                 | {"schema": _PARAMETERS[kind]}
-                for name, kind in e.takes.items()
+                for name, kind in takes.items()
                 if kind in _PARAMETERS
             ],
         }
-        if e.body is not None:
-            operation["requestBody"] = {"required": True, "content": content(e.body)}
-        paths.setdefault(path, {})[e.method.lower()] = operation
+        for kind in takes.values():
+            if kind not in _PARAMETERS:
+                operation["requestBody"] = {"required": True, "content": content(kind)}
+    schemes = {"link": {"type": "http", "scheme": "bearer"}}
     return {
         "openapi": "3.1.0",
         "info": {"title": "prior-reinforce console", "version": "1"},
         "security": [{"link": []}],
         "paths": paths,
-        "components": {
-            "schemas": components,
-            "securitySchemes": {"link": {"type": "http", "scheme": "bearer"}},
-        },
+        "components": {"schemas": components, "securitySchemes": schemes},
     }
 
 
@@ -354,19 +311,22 @@ class _Impatient(H11Protocol):
             self.transport.close()
 
 
-def serve(app: Guard, listening: socket.socket) -> None:
-    """Answer at a socket until the program is interrupted."""
-    config = uvicorn.Config(
-        app,
-        http=_Impatient,
-        ws="none",
-        log_level="warning",
-        access_log=False,
-        server_header=False,
-        timeout_keep_alive=30,
-        timeout_graceful_shutdown=1,
-        h11_max_incomplete_event_size=16_384,
+def server_of(
+    app: Guard, certificate: Path | None = None, key: Path | None = None
+) -> uvicorn.Server:
+    """What answers at sockets until the program is interrupted, by https with a certificate."""
+    return uvicorn.Server(
+        uvicorn.Config(
+            app,
+            http=_Impatient,
+            ws="none",
+            log_level="warning",
+            access_log=False,
+            server_header=False,
+            timeout_keep_alive=30,
+            timeout_graceful_shutdown=1,
+            h11_max_incomplete_event_size=16_384,
+            ssl_certfile=certificate,
+            ssl_keyfile=key,
+        )
     )
-    server = uvicorn.Server(config)
-    assert threading.current_thread() is threading.main_thread()
-    server.run([listening])

@@ -11,17 +11,16 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import Future
-from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from msgspec import Struct, to_builtins
+from msgspec import Struct, structs, to_builtins
 
 from prior_reinforce.adapters import DEFAULT_ADAPTER
 from prior_reinforce.bench.console.view import (
+    Learning,
     MotionView,
     State,
     motion_of,
@@ -29,20 +28,23 @@ from prior_reinforce.bench.console.view import (
     state_of,
     step_of,
 )
-from prior_reinforce.bench.robots.executors.base import Motion
-from prior_reinforce.bench.robots.executors.lock import stop_executing
-from prior_reinforce.bench.workspace.report import report_workspace
+from prior_reinforce.bench.robots.executors.arguments import without_arguments
+from prior_reinforce.bench.robots.executors.base import ArmSettings, Motion
+from prior_reinforce.bench.robots.executors.lock import is_executing, last_stop, stop_executing
+from prior_reinforce.bench.workspace.status import ask_to_move, say_look
 from prior_reinforce.bench.workspace.workspace import Workspace
-from prior_reinforce.errors import InvalidFeedbackError, PriorReinforceError, TrialStateError
+from prior_reinforce.errors import PriorReinforceError, TrialStateError
 from prior_reinforce.generators.base import FitProgress
 from prior_reinforce.readings import Reading
-from prior_reinforce.session.session import Session
 from prior_reinforce.session.trials import Stage, Trial
 
 _LOOK = 0.05
 """How often the journal is looked at for what others did, in [s]."""
 _SOMETIMES = 0.5
 """How often to look whether what executes has ended, in [s]: that reads all of /proc."""
+_STARTING = 10.0
+"""How long Stop waits for what another program is about to start, in [s]; ours: a busy computer
+starts a program in that."""
 
 
 class Seen(Struct, forbid_unknown_fields=True):
@@ -72,25 +74,50 @@ class Execute(Seen):
     """Execute a plan, once."""
 
     trial: int
-    plan: str
-    """SHA-256 of the plan that the person saw."""
+    sha256: str
+    """Of the plan that the person saw."""
+    stopped: str
+    """`State.stopped` of that state: after a Stop since then, nothing begins."""
     motion: Motion = "trial"
-    """An arm of the manifest may also approach its start, or rehearse it."""
+    """What a person was asked for (`Question.motion`)."""
     speed: float = 1.0
     """Share of the plan's own speed, of a rehearsal."""
 
 
+class Question(Struct):
+    """What a person is asked before the arm moves."""
+
+    question: str
+    """How it will move, and what nobody checked."""
+    arm: str = ""
+    """Which arm it is, and where it stands; empty where a command moves it, which is not asked."""
+    motion: Motion = "trial"
+    """What it is asked for: an arm that stands elsewhere approaches the plan's start first."""
+    refused: str = ""
+    """Why the arm refuses the plan; empty if it does not."""
+
+
+class Measured(Struct, forbid_unknown_fields=True):
+    """An error that was measured, and the standard deviation of each component."""
+
+    error: list[float]
+    sd: float
+
+
 class Tell(Seen):
-    """Say what was seen of a trial, or correct what was said: one of outcome, words and hit."""
+    """Say what was seen of a trial, or correct what was said."""
 
     trial: int
-    outcome: list[float] | None = None
-    """Where the object ended, in the outcomes' units."""
-    sd: float | None = None
-    """Standard deviation of each component of a measured outcome; without it, it is an estimate."""
-    words: str | None = None
-    """For instance `5cm long, 2cm left`."""
+    error: list[float] | str | Measured | None = None
+    """Outcome minus goal: as estimated by eye, in words (`5cm long, 2cm left`), or as measured."""
     hit: bool | None = None
+
+    @property
+    def reading(self) -> Reading | str | list[float] | None:
+        """The error for the session."""
+        if isinstance(self.error, Measured):
+            return Reading.measured(self.error.error, self.error.sd)
+        return self.error
 
 
 class Void(Seen):
@@ -100,35 +127,6 @@ class Void(Seen):
     reason: str = ""
 
 
-class Learning(Struct):
-    """How far a training is."""
-
-    done: float
-    """Share, 0 to 1."""
-    seconds_left: float
-
-
-class Console(State):
-    """What the page shows: the workspace, and what this program is doing."""
-
-    executor: str
-    """What executes a plan; empty where the plan is to be downloaded."""
-    approaches: bool
-    """Whether it can also go to the plan's start, and rehearse."""
-    learning: Learning | None
-    report: str
-    """Path of the report; empty before the first trial."""
-
-
-@dataclass
-class Execution:
-    """What executes, in a thread of its own."""
-
-    body: Execute
-    ended: Future[None]
-    stopped: bool = False
-
-
 class Verbs:
     """A workspace that several tabs work on. Threads may share it."""
 
@@ -136,9 +134,8 @@ class Verbs:
         self,
         folder: Path,
         *,
-        execute: Callable[[Workspace, Execute], object] | None = None,
-        executor: str = "",
-        approaches: bool = False,
+        moved_by: str | ArmSettings | None = None,
+        time_limit: float = 120.0,
         own: str | None = None,
         own_adapter: str | None = None,
         report: str = "",
@@ -148,9 +145,8 @@ class Verbs:
 
         Args:
             folder: Of the workspace.
-            execute: Executes a trial's plan; None where nothing can.
-            executor: What that is called.
-            approaches: See `Console`.
+            moved_by: The command or the arm that executes plans; None where nothing can.
+            time_limit: How long that may take, in [s].
             own: See `Workspace.session`.
             own_adapter: Likewise.
             report: Path at which the report is read.
@@ -161,15 +157,18 @@ class Verbs:
         """
         self.folder = folder
         self.workspace = Workspace(folder)
-        self._session: Session = self.workspace.session(own, own_adapter)
+        self._session = self.workspace.session(own, own_adapter)
         self._lock = threading.RLock()
-        self._execute, self._executor = execute, executor
+        self._moved_by, self._time_limit, self._report = moved_by, time_limit, report
+        self._executor = without_arguments(moved_by) if isinstance(moved_by, str) else ""
+        if isinstance(moved_by, ArmSettings):
+            self._executor = moved_by.executor
         self.publish = publish
         """Tells all tabs something, in any thread."""
-        self._approaches, self._report = approaches, report
-        self._execution: Execution | None = None
+        self._threads = ThreadPoolExecutor(thread_name_prefix="execution")
+        self._execution: Future[None] | None = None
         self._learning: Learning | None = None
-        self._shown_for: tuple[int, str] = (-1, "")
+        self._shown_for: tuple[object, ...] = ()
         self._shown: State
         self._closed = threading.Event()
         self._watcher = threading.Thread(target=self._watch, name="journal", daemon=True)
@@ -181,24 +180,27 @@ class Verbs:
             return
         self._closed.set()
         self._watcher.join()
-        if self._execution is not None and not self._execution.ended.done():
-            self.stop()
-            self._execution.ended.exception()
+        if self._execution is not None and not self._execution.done():
+            self._halt()
+        self._threads.shutdown()
         self.workspace.close()
 
-    def state(self) -> Console:
+    def state(self) -> State:
         """What the page shows."""
         with self._lock:
-            state = self._state()
-            return Console(
-                **{name: getattr(state, name) for name in State.__struct_fields__},
+            entries, step = self.workspace.events, step_of(self.workspace)
+            now = (len(entries), step, last_stop(self.folder))
+            if now != self._shown_for or step == "executing" or not entries:
+                self._shown, self._shown_for = state_of(self.workspace), now
+            return structs.replace(
+                self._shown,  # computed once for all tabs that ask after an event
                 executor=self._executor,
-                approaches=self._approaches,
+                looks=isinstance(self._moved_by, ArmSettings),
                 learning=self._learning,
-                report=self._report if state.trials else "",
+                report=self._report if self._shown.trials else "",
             )
 
-    def set_goal(self, body: SetGoal) -> Console:
+    def goal(self, body: SetGoal) -> State:
         """Set a goal, and get its first plan."""
         with self.as_seen(body.seen):
             goals = self.workspace.state.goals
@@ -210,66 +212,68 @@ class Verbs:
             )
         return self.state()
 
-    def ask(self, body: Ask) -> Console:
+    def ask(self, body: Ask) -> State:
         """Get the next plan; the same one until it is told."""
         with self.as_seen(body.seen):
             self.workspace.recover()
             self._session.ask(arm_did_not_move=body.arm_did_not_move)
         return self.state()
 
-    def execute(self, body: Execute) -> Console:
+    def question(self, body: Execute) -> Question:
+        """Say what nobody checked of a motion, and where the arm stands; nothing moves."""
+        with self.as_seen(body.seen):
+            trial, by = self._seen_trial(body)
+        with Workspace(self.folder) as workspace:  # an arm may take long to answer
+            if isinstance(by, str):
+                return Question(ask_to_move(workspace, trial))
+            look = workspace.look_at_arm(trial.number, by, speed=body.speed)
+            motion = body.motion if look.there else "approach"
+            question = ask_to_move(workspace, trial, look, motion, body.speed)
+            return Question(question, say_look(look), motion, look.refused)
+
+    def execute(self, body: Execute) -> State:
         """Begin to execute the plan that was seen; returns once the journal says so."""
         with self.as_seen(body.seen):
-            trial = self.workspace.state.trial(body.trial)
-            if self._execute is None:
-                raise TrialStateError("nothing executes plans here; download it instead")
-            if trial.kept is None or trial.kept.sha256 != body.plan:
-                raise TrialStateError(f"trial {trial.number} has another plan; look again")
+            trial, by = self._seen_trial(body)
             if trial.stage is not Stage.ASKED or self._is_running():
                 raise TrialStateError(f"trial {trial.number} is {trial.stage.value} already")
-            running = self._execution = Execution(body, Future())
-            threading.Thread(target=self._run, args=(running,), name="execution").start()
-            began = len(self.workspace.events)
-        while not running.ended.done():
+            stop_seen, began = last_stop(self.folder), len(self.workspace.events)
+            if body.stopped != str(stop_seen):
+                raise TrialStateError("somebody pressed Stop since; look again")
+            running = self._execution = self._threads.submit(self._run, body, by, stop_seen)
+        while not running.done():
             with self._lock:
                 if len(self.workspace.events) > began:
                     break
             time.sleep(_LOOK / 5)
         else:
-            running.ended.result()
+            running.result()
         return self.state()
 
-    def stop(self) -> Console:
+    def stop(self) -> State:
         """Stop what moves the arm for this workspace, whoever started it; it may be nothing."""
-        running = self._execution
-        if running is not None:
-            running.stopped = True
-        while True:  # what is about to be started, too
-            stop_executing(self.folder)
-            if running is None or running.ended.done():
-                break
-            time.sleep(_LOOK)
+        self._halt()
         return self.state()
 
-    def tell(self, body: Tell) -> Console:
+    def tell(self, body: Tell) -> State:
         """Say what was seen of a trial."""
         with self.as_seen(body.seen):
-            self._session.tell(body.trial, self._reading(body), hit=body.hit)
+            self._session.tell(body.trial, body.reading, hit=body.hit)
         return self.state()
 
-    def amend(self, body: Tell) -> Console:
+    def amend(self, body: Tell) -> State:
         """Correct what was said of a trial."""
         with self.as_seen(body.seen):
-            self._session.amend(body.trial, self._reading(body), hit=body.hit)
+            self._session.amend(body.trial, body.reading, hit=body.hit)
         return self.state()
 
-    def void(self, body: Void) -> Console:
+    def void(self, body: Void) -> State:
         """Declare that a trial is not data."""
         with self.as_seen(body.seen):
             self._session.void(body.trial, body.reason)
         return self.state()
 
-    def learn(self, body: Seen) -> Console:
+    def learn(self, body: Seen) -> State:
         """Begin to learn from the demonstrations in use; an error of it goes to all tabs."""
         with self.as_seen(body.seen):
             if self._learning is not None:
@@ -297,15 +301,7 @@ class Verbs:
     def write_report(self) -> Path:
         """Write the report of now; return its page."""
         with Workspace(self.folder) as workspace:
-            return report_workspace(workspace, self.folder / "report")
-
-    def _state(self) -> State:
-        """The workspace; computed once for all tabs that ask after an event."""
-        entries, step = self.workspace.events, step_of(self.workspace)
-        now = (len(entries), step)
-        if now != self._shown_for or step == "executing" or not entries:
-            self._shown, self._shown_for = state_of(self.workspace), now
-        return self._shown
+            return workspace.report()
 
     @contextmanager
     def as_seen(self, seen: int) -> Iterator[None]:
@@ -324,32 +320,40 @@ class Verbs:
                 raise TrialStateError(f"not done, since meanwhile: {said}; look again")
             yield
 
-    def _reading(self, body: Tell) -> Reading | str | np.ndarray | None:
-        if body.words is not None and body.outcome is not None:
-            raise InvalidFeedbackError("give words or an outcome, not both")
-        if body.outcome is None:
-            return body.words
-        goal = self.workspace.state.goal_of(self.workspace.state.trial(body.trial)).goal
-        if len(body.outcome) != goal.size:
-            raise InvalidFeedbackError(f"an outcome is {goal.size} numbers")
-        error = np.array(body.outcome) - goal
-        return error if body.sd is None else Reading.measured(error, body.sd)
+    def _seen_trial(self, body: Execute) -> tuple[Trial, str | ArmSettings]:
+        """The trial whose plan was seen, and what executes it."""
+        trial = self.workspace.state.trial(body.trial)
+        if self._moved_by is None:
+            raise TrialStateError("nothing executes plans here; download it instead")
+        if trial.kept is None or trial.kept.sha256 != body.sha256:
+            raise TrialStateError(f"trial {trial.number} has another plan; look again")
+        return trial, self._moved_by
+
+    def _halt(self) -> None:
+        deadline = time.monotonic() + _STARTING
+        stop_executing(self.folder)
+        while is_executing(self.folder) and time.monotonic() < deadline:
+            time.sleep(_LOOK)
+            stop_executing(self.folder)  # what was about to be started, too
 
     def _is_running(self) -> bool:
-        return self._execution is not None and not self._execution.ended.done()
+        return self._execution is not None and not self._execution.done()
 
-    def _run(self, running: Execution) -> None:
+    def _run(self, body: Execute, by: str | ArmSettings, stop_seen: int) -> None:
         """Execute in a workspace of its own, so that everything else goes on."""
         try:
             with Workspace(self.folder) as workspace:
-                if not running.stopped:
-                    assert self._execute is not None
-                    self._execute(workspace, running.body)
+                workspace.execute(
+                    body.trial,
+                    by,
+                    time_limit=self._time_limit,
+                    motion=body.motion,
+                    speed=body.speed,
+                    stop_seen=stop_seen,
+                )
         except BaseException as error:
-            running.ended.set_exception(error)
-            self.publish({"error": f"trial {running.body.trial}: {error}"})
-        else:
-            running.ended.set_result(None)
+            self.publish({"error": f"trial {body.trial}: {error}"})
+            raise
 
     def _learn(self) -> None:
         def progress(fit: FitProgress) -> None:
@@ -367,12 +371,14 @@ class Verbs:
 
     def _watch(self) -> None:
         """Tell all tabs what happens in the journal, whoever writes it, and what executions say."""
-        last, shown, looked = -1, "", 0.0
+        last: tuple[int, int] | None = None
+        shown, looked = "", 0.0
         while not self._closed.wait(_LOOK):
             try:
                 with self._lock:
                     entries, trial = self.workspace.events, self.workspace.state.open_trial
-                    output = "" if trial is None else self._output(trial)
+                    now = len(entries), last_stop(self.folder)
+                    output = "" if trial is None else output_of(self.workspace, trial)
                     left = trial is not None and trial.stage is Stage.EXECUTING
                     left = left and not self._is_running()
                     if left and time.monotonic() > looked + _SOMETIMES:
@@ -382,17 +388,12 @@ class Verbs:
                 self.publish({"error": str(error)})
                 self._closed.wait(1.0)
                 continue
-            if len(entries) != last:
-                last = len(entries)
-                self.publish({"id": entries[-1].id if entries else 0})
+            if now != last:
+                last = now
+                self.publish({"id": entries[-1].id if entries else 0, "stopped": str(now[1])})
             if output != shown:
                 shown = output
                 self.publish({"output": output})
-
-    def _output(self, trial: Trial) -> str:
-        with suppress(OSError):
-            return output_of(self.workspace, trial)
-        return ""
 
 
 def _say(event: dict[str, Any]) -> str:

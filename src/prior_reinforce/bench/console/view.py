@@ -2,104 +2,117 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
-from msgspec import Struct
+from msgspec import Struct, convert, structs
 
 from prior_reinforce.arrays import Frames
+from prior_reinforce.bench.robots.executors.lock import last_stop
 from prior_reinforce.bench.robots.kinematics import link_places
 from prior_reinforce.bench.robots.limits import match_joints
+from prior_reinforce.bench.robots.report import LimitLine, LimitReport
 from prior_reinforce.bench.workspace.log import (
     Executed,
     Executing,
     Moved,
     Moving,
     NotExecuted,
-    WorkspaceState,
+)
+from prior_reinforce.bench.workspace.manifest import Manifest
+from prior_reinforce.bench.workspace.records import (
+    GoalRecord,
+    TrialRecord,
+    goal_record,
+    trial_records,
 )
 from prior_reinforce.bench.workspace.status import execution_warning, say_trial
 from prior_reinforce.bench.workspace.workspace import Workspace
 from prior_reinforce.session.events import Event
-from prior_reinforce.session.trials import Goal, Stage, Trial
-from prior_reinforce.wording import in_words, say_place, say_reading
+from prior_reinforce.session.trials import Stage, Trial
+from prior_reinforce.wording import PLACE_WORDS, axes_of, error_words, say_reading
 
 Step = Literal[
     "import", "learn", "goal", "ask", "execute", "executing", "settle", "tell", "reached"
 ]
+_SHOWN = {"m": ("cm", 100.0), "s": ("ms", 1000.0), "rad": ("deg", 180 / np.pi)}
+"""The unit that a person says, and how many of it are one of the outcome's."""
 _SAMPLES = 120
 """Of a motion that is played: more cannot be told apart on a screen."""
 _OUTPUT = 20_000
 """Bytes of an execution's output that are shown, from its end."""
 
 
-class Demonstration(Struct):
-    """Where a demonstration's object ended."""
+class Component(Struct):
+    """One number of an outcome."""
 
-    outcome: list[float]
+    name: str
+    unit: str
+    """All numbers on this interface are in it."""
+    shown: str
+    """Unit in which a person reads and types it."""
+    factor: float
+    """How many of those are one `unit`."""
+    axis: int
+    """0, 1, 2 where it is a length along x, y, z, which a map shows; 3 where it is none."""
+    words: tuple[str, ...]
+    """Of an error: where it is positive, where it is negative; empty where there are none."""
+    places: tuple[str, ...]
+    """The same of a place."""
+    tolerance: float
 
 
-class TrialView(Struct):
+class TrialView(TrialRecord, frozen=True, kw_only=True):
     """A trial as it stands."""
 
-    number: int
-    goal: int
-    condition: list[float]
-    stage: Literal["asked", "executing", "executed", "told", "voided"]
-    said: str
-    """What became of it, in a line."""
+    line: str
+    """What became of it."""
     outcome: list[float] | None
     """Where the object ended, as far as that was told."""
-    hit: bool
-    p_hit: float | None
-    expected_trials: float | None
-    surprising: int | None
-    """The trial whose reading surprised when this one was planned."""
-    surprise: str
-    outdated: bool
     warning: str
     """Why a reading of it might mislead."""
-    plan: str
-    """SHA-256 of its plan."""
-    time: str
-    """When it was asked for, ISO 8601, UTC."""
+    sha256: str
+    """Of its plan."""
 
 
-class GoalView(Struct):
-    """A goal, and how many told trials it took."""
+class Learning(Struct):
+    """How far a training is."""
 
-    number: int
-    goal: list[float]
-    said: str
-    tolerance: list[float]
-    """Of each component."""
-    told: int
-    reached: bool
-    new_hardware: str | None
+    done: float
+    """Share, 0 to 1."""
+    seconds_left: float
 
 
 class State(Struct):
-    """Everything that the page shows of a workspace, but for the motion of a plan."""
+    """Everything that the page shows, but for the motion of a plan."""
 
     id: int
     """Of the latest event; a verb that was meant for an earlier one is refused."""
+    stopped: str
+    """When Stop was pressed last; what was asked for before then begins no motion."""
     name: str
-    outcome_names: list[str]
-    outcome_units: list[str]
-    in_words: bool
-    """Whether outcomes are lengths ahead and to the left, which a map shows."""
+    components: list[Component]
     step: Step
     """What comes next."""
     model: str
     remarks: list[str]
     """What the model could not do, as `learn` says."""
-    demonstrations: list[Demonstration]
-    goals: list[GoalView]
+    demonstrations: list[list[float]]
+    """Where each one's object ended."""
+    goals: list[GoalRecord]
     trials: list[TrialView]
     open: int | None
     """The trial that waits to be told."""
     output: str
     """The end of what its execution wrote."""
+    executor: str = ""
+    """What this program can execute a plan by; empty where the plan is to be downloaded."""
+    looks: bool = False
+    """Whether that says where the arm stands, and can also go to the plan's start, and rehearse."""
+    learning: Learning | None = None
+    """What this program is doing beside."""
+    report: str = ""
+    """Path of the report; empty before the first trial."""
 
 
 def state_of(workspace: Workspace) -> State:
@@ -109,27 +122,44 @@ def state_of(workspace: Workspace) -> State:
         WorkspaceError, ConfigurationError: See `Workspace.state`.
         FileFormatError: The demonstrations are damaged.
     """
-    entries, state, manifest = workspace.events, workspace.state, workspace.manifest
+    entries, state = workspace.events, workspace.state
     shown = np.empty((0, 0))
     if state.demonstrations is not None:
         shown = workspace.demonstrations.outcomes_seen
-    asked = {getattr(e.event, "trial", 0): e.time for e in entries if e.kind == "asked"}
     training, waiting = state.training, state.open_trial
+    pairs = zip(state.trials, trial_records(workspace), strict=True)
     return State(
         id=entries[-1].id if entries else 0,
-        name=manifest.name,
-        outcome_names=[*manifest.outcome_names],
-        outcome_units=[*manifest.outcome_units],
-        in_words=in_words(manifest.outcome_units),
+        stopped=str(last_stop(workspace.folder)),
+        name=workspace.manifest.name,
+        components=components_of(workspace.manifest),
         step=step_of(workspace),
         model="" if training is None else training.generator,
         remarks=[] if training is None else [*training.remarks],
-        demonstrations=[Demonstration(outcome) for outcome in shown.tolist()],
-        goals=[_goal(workspace, state, goal) for goal in state.goals],
-        trials=[_trial(workspace, state, trial, asked[trial.number]) for trial in state.trials],
+        demonstrations=shown.tolist(),
+        goals=[goal_record(workspace, goal) for goal in state.goals],
+        trials=[_trial(workspace, trial, record) for trial, record in pairs],
         open=None if waiting is None else waiting.number,
         output="" if waiting is None else output_of(workspace, waiting),
     )
+
+
+def components_of(manifest: Manifest) -> list[Component]:
+    """Return what an outcome's numbers are."""
+    names, units = manifest.outcome_names, manifest.outcome_units
+    axes = [a if u == "m" else 3 for a, u in zip(axes_of(names, units), units, strict=True)]
+    return [
+        Component(
+            name,
+            unit,
+            *_SHOWN.get(unit, (unit, 1.0)),
+            axes[i],
+            error_words(names, units)[i] or (),
+            PLACE_WORDS[axes[i]] if axes[i] < 3 else (),
+            manifest.tolerance[i],
+        )
+        for i, (name, unit) in enumerate(zip(names, units, strict=True))
+    ]
 
 
 def step_of(workspace: Workspace) -> Step:
@@ -175,46 +205,20 @@ def _latest(workspace: Workspace, trial: Trial) -> Event | None:
     return next((event for event in moves if event.trial == trial.number), None)
 
 
-def _goal(workspace: Workspace, state: WorkspaceState, goal: Goal) -> GoalView:
-    told = [t for t in state.trials_of(goal.number) if t.stage is Stage.TOLD]
-    manifest = workspace.manifest
-    return GoalView(
-        number=goal.number,
-        goal=goal.goal.tolist(),
-        said=say_place(goal.goal, manifest.outcome_names, manifest.outcome_units),
-        tolerance=goal.tolerance.tolist(),
-        told=len(told),
-        reached=any(trial.hit for trial in told),
-        new_hardware=goal.new_hardware,
-    )
-
-
-def _trial(workspace: Workspace, state: WorkspaceState, trial: Trial, asked: str) -> TrialView:
-    manifest, outcome = workspace.manifest, None
-    if trial.reading is not None and trial.reading.has_number:
-        outcome = (state.goal_of(trial).goal + trial.reading.error_seen).tolist()
-    earlier = reversed(state.trials[: trial.number - 1])
-    before = next((t for t in earlier if t.stage is Stage.TOLD), None)
-    surprise = "" if before is None else before.surprise.partition("; mistyped")[0]
-    told = trial.reading is not None
+def _trial(workspace: Workspace, trial: Trial, record: TrialRecord) -> TrialView:
+    manifest, reading, outcome = workspace.manifest, trial.reading, None
+    if reading is None:
+        line = say_trial(workspace, trial)
+    else:
+        line = say_reading(reading, manifest.outcome_names, manifest.outcome_units)
+        if reading.has_number:
+            outcome = (workspace.state.goal_of(trial).goal + reading.error_seen).tolist()
     return TrialView(
-        number=trial.number,
-        goal=trial.goal_number,
-        condition=trial.condition.tolist(),
-        stage=trial.stage.value,
-        said=say_reading(trial.reading, manifest.outcome_names, manifest.outcome_units)
-        if trial.reading is not None
-        else say_trial(workspace, trial),
+        **structs.asdict(record),
+        line=line,
         outcome=outcome,
-        hit=trial.hit,
-        p_hit=trial.p_hit,
-        expected_trials=trial.expected_trials,
-        surprising=before.number if before is not None and surprise else None,
-        surprise=surprise,
-        outdated=trial.outdated,
-        warning="" if told else _warning(workspace, trial),
-        plan="" if trial.kept is None else trial.kept.sha256,
-        time=asked,
+        warning=_warning(workspace, trial) if reading is None else "",
+        sha256="" if trial.kept is None else trial.kept.sha256,
     )
 
 
@@ -234,36 +238,25 @@ class Column(Struct):
 
     name: str
     unit: str
-    low: float | None
-    """Least position that the robot's limits allow; None where none is known."""
-    high: float | None
+    limits: tuple[float, float] | None
+    """Least and greatest position that the robot allows; None where that is not known."""
     values: list[float]
     """At the times of the motion that is played."""
-
-
-class Check(Struct):
-    """A line of the gate's report."""
-
-    check: str
-    status: Literal["pass", "warn", "refuse", "unchecked"]
-    text: str
 
 
 class MotionView(Struct):
     """A plan to be played."""
 
     trial: int
-    plan: str
-    """SHA-256 of its file."""
-    file: str
+    sha256: str
     times: list[float]
     """[s]."""
     columns: list[Column]
     links: list[list[list[float]]]
     """Base, joints and flange at these times, [m]; empty where the kinematics are not known."""
-    robot: str
     verdict: str
-    checks: list[Check]
+    checks: list[LimitLine]
+    """What the gate said when it was asked for."""
 
 
 def motion_of(workspace: Workspace, number: int) -> MotionView:
@@ -277,40 +270,26 @@ def motion_of(workspace: Workspace, number: int) -> MotionView:
     trial = workspace.state.trial(number)
     plan, robot = workspace.plan(trial), workspace.manifest.robot
     chosen = np.unique(np.linspace(0, plan.horizon - 1, _SAMPLES).round().astype(int))
-    frames, bounds, links = plan.actions[chosen], {}, None
+    frames, bounds, links = plan.actions[chosen], {}, []
     if robot is not None:
         joints = match_joints(plan.format, robot)
         bounds = {c: (float(robot.lower[j]), float(robot.upper[j])) for j, c in joints.items()}
         if robot.chain is not None and len(joints) == len(robot.joint_names):
             ordered: Frames = frames[:, [joints[j] for j in range(len(joints))]]
-            links = link_places(robot.chain, ordered).round(4)
-    gate: dict[str, Any] = trial.gate or {}
-    lines = [Check(x["check"], x["status"], x["text"]) for x in gate.get("lines", ())]
+            links = link_places(robot.chain, ordered).round(4).tolist()
+    gate = None if trial.gate is None else convert(trial.gate, LimitReport)
+    verdict = "no robot in the manifest, no limits checked"
+    if gate is not None:
+        verdict = gate.text().partition("\n")[0].removeprefix("plan ")
     return MotionView(
         trial=number,
-        plan="" if trial.kept is None else trial.kept.sha256,
-        file=workspace.plan_path(trial).name,
+        sha256="" if trial.kept is None else trial.kept.sha256,
         times=(chosen * plan.format.dt).tolist(),
         columns=[
-            Column(
-                name=name,
-                unit=plan.format.units[i],
-                low=bounds[i][0] if i in bounds else None,
-                high=bounds[i][1] if i in bounds else None,
-                values=frames[:, i].round(5).tolist(),
-            )
-            for i, name in enumerate(plan.format.names)
+            Column(name, unit, bounds.get(i), frames[:, i].round(5).tolist())
+            for i, (name, unit) in enumerate(zip(plan.format.names, plan.format.units, strict=True))
         ],
-        links=[] if links is None else links.tolist(),
-        robot="" if robot is None else robot.robot,
-        verdict=_verdict(gate),
-        checks=lines,
+        links=links,
+        verdict=verdict,
+        checks=[] if gate is None else [*gate.lines],
     )
-
-
-def _verdict(gate: dict[str, Any]) -> str:
-    if not gate:
-        return "no robot in the manifest, no limits checked"
-    said = "passes with warnings" if gate["warned"] else "passes"
-    missing = ", ".join(gate["unchecked"])
-    return f"{said} the limits of {gate['robot']}" + (f"; not looked at: {missing}" * bool(missing))
