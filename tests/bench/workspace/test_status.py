@@ -57,7 +57,7 @@ def test_a_goal_far_outside_may_be_refused_and_a_nearer_one_is_named(workspace):
 
 
 @pytest.mark.parametrize("gated", [True, False])
-def test_the_box_for_the_tool_tip_holds_for_a_plan_that_the_gate_saw_and_no_approach(gated):
+def test_the_box_for_the_tool_tip_holds_for_a_plan_and_its_approach_where_the_gate_saw_them(gated):
     gate = GateSettings(box_low=(0.2, -0.6, 0.05), box_high=(0.9, 0.6, 1.2))
     verdict = LimitReport("fr3", "any", "", ()) if gated else None
     workspace = SimpleNamespace(
@@ -68,4 +68,4 @@ def test_the_box_for_the_tool_tip_holds_for_a_plan_that_the_gate_saw_and_no_appr
     trial = SimpleNamespace(number=1)
     said = "the table, but for the tool tip; is" if gated else "the table; is"
     assert said in ask_to_move(workspace, trial, where=True)
-    assert "the table; is" in ask_to_move(workspace, trial, motion="approach", where=True)
+    assert said in ask_to_move(workspace, trial, motion="approach", where=True)

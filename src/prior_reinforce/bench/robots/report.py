@@ -123,7 +123,13 @@ class LimitReport:
     @property
     def refused(self) -> bool:
         """Whether any line refuses the plan."""
-        return any(line.status == "refuse" for line in self.lines)
+        return bool(self.refusals)
+
+    @property
+    def refusals(self) -> str:
+        """What the lines that refuse it say, one after the other."""
+        lines = (f"{line.check}: {line.text}" for line in self.lines if line.status == "refuse")
+        return "; ".join(lines)
 
     @property
     def warned(self) -> bool:
@@ -166,10 +172,9 @@ class LimitReport:
         Raises:
             RobotLimitError: The plan is refused; the message names check, joint, time and margin.
         """
-        refusals = [f"{line.check}: {line.text}" for line in self.lines if line.status == "refuse"]
-        if refusals:
+        if self.refusals:
             raise RobotLimitError(
-                f"plan refused for {self.robot}: " + "; ".join(refusals) + ". It is never clamped "
-                "or retimed: choose another goal, learn another way (another --generator or "
-                "--seed), or demonstrate gentler motions"
+                f"plan refused for {self.robot}: {self.refusals}. It is never clamped or retimed: "
+                "choose another goal, learn another way (another --generator or --seed), or "
+                "demonstrate gentler motions"
             )

@@ -164,8 +164,7 @@ def ask_to_move(
     if not limits and (verdict is None or "velocity" in verdict.unchecked):
         unchecked.append("the arm's limits")
     unchecked.append("self-collision")
-    # The gate holds the tool tip against its box on the plan, not on the way to its start.
-    boxed = gate.box_low is not None and verdict is not None and motion != "approach"
+    boxed = gate.box_low is not None and verdict is not None
     unchecked.append("the table, but for the tool tip" if boxed else "the table")
     missing = ", ".join(dict.fromkeys(unchecked))
     return plain(f"the arm will move ({said}); NOT checked: {missing}; is the area clear?")

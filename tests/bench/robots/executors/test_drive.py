@@ -23,6 +23,8 @@ from prior_reinforce.bench.robots.executors.drive import (
     read_look,
 )
 from prior_reinforce.bench.robots.gate import GateSettings
+from prior_reinforce.bench.robots.kinematics import Chain
+from prior_reinforce.bench.robots.limits import RobotLimits
 from prior_reinforce.bench.robots.plan_files import write_plan
 from prior_reinforce.errors import (
     ConfigurationError,
@@ -51,9 +53,11 @@ def arm(tmp_path, monkeypatch):
     class Arm:
         folder = tmp_path / "arm"
 
+        gate, limits = GateSettings(), None
+
         def request(self, motion="trial", speed=1.0, **options):
             settings = ArmSettings(TOY, {"folder": str(self.folder)} | options)
-            return Request(settings, GateSettings(), motion, speed)
+            return Request(settings, self.gate, motion, speed, self.limits)
 
         def drive(self, motion="trial", plan=PLAN, speed=1.0, **options):
             self.result = tmp_path / f"result-{len(list(tmp_path.iterdir()))}"
@@ -244,6 +248,44 @@ def test_a_library_that_is_missing_is_named_with_its_extra(name, library, monkey
     monkeypatch.setitem(sys.modules, library, None)
     with pytest.raises(MissingExtraError, match=rf"pip install 'prior-reinforce\[{name}\]'"):
         make_executor(ArmSettings(name, {"host": "127.0.99.9"}))
+
+
+ONE = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+LINKS = Chain(((0.0,) * 6, ONE), ((0.0, 0.0, 1.0),) * 2, ONE)
+"""Two links of a metre in the plane: with joint 2 at 0 they are stretched."""
+IN_PLANE = RobotLimits(
+    "toy", "1.0", "ours", ("joint1", "joint2"), [-3.1] * 2, [3.1] * 2, [3.0] * 2, chain=LINKS
+)
+BOX = GateSettings(box_low=(-2.1, -0.5, -0.1), box_high=(2.1, 2.1, 0.1), tool_tip=(0.0, 0.0, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("pose", "says"),
+    [
+        ((0.0, -3.0), "box: tool tip at y"),  # both ends are in the box, and not what is between
+        ((-1.2, 0.0), "box: tool tip at y"),
+        ((0.0, 3.2), "position: joint2 at 3.200"),
+    ],
+)
+def test_the_way_to_the_start_is_held_against_the_gate(arm, pose, says, tmp_path):
+    arm.gate, arm.limits = BOX, IN_PLANE
+    arm.stands(*pose)
+    assert arm.drive("look").reason == ""
+    look = read_look(arm.result)
+    assert says in look.approach_refused
+    assert not look.refused
+    result = arm.drive("approach")
+    assert result.outcome == "not_moved"
+    assert result.reason.startswith("the way from where the arm stands to the plan's first frame: ")
+    assert says in result.reason
+    assert arm.motions() == 0
+    arm.stands(0.5, 0.1)
+    file = write_plan(PLAN, tmp_path / "plan.npz")
+    command = drive_command(arm.request("approach"))  # limits and box travel with it
+    assert run_command(command, file, time_limit=60).outcome == "done"
+    arm.stands(*pose)
+    again = run_command(command, file, time_limit=60)
+    assert (again.outcome, again.reason) == ("not_moved", result.reason)
 
 
 def test_a_request_survives_its_way_through_the_command_line(arm):

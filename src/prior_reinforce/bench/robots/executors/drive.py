@@ -14,7 +14,7 @@ import math
 import shlex
 import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -38,14 +38,15 @@ from prior_reinforce.bench.robots.executors.result import (
     RESULT_FILE,
     DriverResult,
 )
-from prior_reinforce.bench.robots.gate import GateSettings
-from prior_reinforce.bench.robots.limits import is_joint
+from prior_reinforce.bench.robots.gate import GateSettings, check_plan
+from prior_reinforce.bench.robots.limits import RobotLimits, is_joint
 from prior_reinforce.bench.robots.plan_files import read_plan
 from prior_reinforce.errors import (
     ConfigurationError,
     FileFormatError,
     InvalidPlanError,
     PriorReinforceError,
+    RobotLimitError,
 )
 from prior_reinforce.extras import missing_extra
 from prior_reinforce.plans.motions import Plan, PlanFormat
@@ -69,10 +70,12 @@ class Request(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     arm: ArmSettings
     gate: GateSettings
-    """How far the arm may stand from the plan's first frame."""
+    """How far the arm may stand from the plan's first frame, and the box for its tool tip."""
     motion: Motion | Literal["look"]
     speed: float = 1.0
     """Share of the plan's own speed."""
+    limits: RobotLimits | None = None
+    """Of the workspace's robot; the way to the plan's first frame is held against them too."""
 
 
 class Look(msgspec.Struct, frozen=True):
@@ -89,11 +92,14 @@ class Look(msgspec.Struct, frozen=True):
     """How long a slow approach takes, in [s]."""
     refused: str = ""
     """Why this arm refuses the plan; empty if it does not."""
+    approach_refused: str = ""
+    """Why the gate refuses the slow approach."""
 
 
 def drive_command(request: Request) -> str:
     """The command that fulfils a request, with `{plan}` and `{result}` to be filled in."""
-    words = [sys.executable, "-c", _START, msgspec.json.encode(request).decode()]
+    text = msgspec.json.encode(request, enc_hook=lambda array: array.tolist()).decode()
+    words = [sys.executable, "-c", _START, text]
     return f"{shlex.join(words)} {{plan}} {{result}}"
 
 
@@ -198,6 +204,24 @@ class _Prepared:
     def to_start(self) -> Plan:
         return approach(self.pose, self.plan.actions[0], self.arm)
 
+    def check_way(self, names: tuple[str, ...], request: Request) -> None:
+        """Hold the way to the start against the gate, box and all; in the plan's own columns.
+
+        Raises:
+            RobotLimitError: It is refused.
+        """
+        if request.limits is None:
+            return
+        way, units = self.to_start, tuple(self.arm.units[channel] for channel in self.channels)
+        form = PlanFormat(names, units, way.format.dt)
+        own = Plan(way.actions[:, self.channels], form)
+        refused = check_plan(own, request.limits, settings=request.gate).refusals
+        if refused:
+            raise RobotLimitError(
+                f"the way from where the arm stands to the plan's first frame: {refused}; move it "
+                "nearer by hand or with its own program, then ask again"
+            )
+
 
 def _prepare(executor: Executor, plan: Plan, request: Request) -> _Prepared:
     arm, pose = executor.describe(), executor.where()
@@ -214,11 +238,11 @@ def _prepare(executor: Executor, plan: Plan, request: Request) -> _Prepared:
 
 def look(executor: Executor, plan: Plan, request: Request) -> Look:
     """How the arm stands to a plan; nothing moves."""
-    prepared, refused = _prepare(executor, plan, request), ""
-    try:
-        executor.check(prepared.plan)
-    except PriorReinforceError as error:
-        refused = str(error)
+    prepared = _prepare(executor, plan, request)
+    refused = [
+        _refusal(lambda: executor.check(prepared.plan)),
+        _refusal(lambda: prepared.check_way(plan.format.names, request)),
+    ]
     pose = prepared.pose[prepared.channels].tolist()
     return Look(
         arm=prepared.arm,
@@ -226,8 +250,17 @@ def look(executor: Executor, plan: Plan, request: Request) -> Look:
         there=prepared.there,
         said=prepared.said,
         approach=float(prepared.to_start.times[-1]),
-        refused=refused,
+        refused=refused[0],
+        approach_refused=refused[1],
     )
+
+
+def _refusal(check: Callable[[], None]) -> str:
+    try:
+        check()
+    except PriorReinforceError as error:
+        return str(error)
+    return ""
 
 
 class _Stop:
@@ -260,6 +293,8 @@ def drive(request: Request, plan: Plan, folder: Path) -> DriverResult:
                 return DriverResult("done")
             prepared = _prepare(executor, plan, request)
             motions = _motions(prepared, request)
+            if prepared.plan is not motions[0]:
+                prepared.check_way(plan.format.names, request)
             for motion in motions:
                 executor.check(motion)
             for motion in motions:
@@ -302,7 +337,9 @@ def _write(path: Path, content: Any) -> None:
 
 def main() -> None:
     """Fulfil the request of the command line."""
-    request = msgspec.json.decode(sys.argv[1], type=Request)
+    request = msgspec.json.decode(
+        sys.argv[1], type=Request, dec_hook=lambda _, numbers: np.array(numbers)
+    )
     result = drive(request, read_plan(sys.argv[2]), Path(sys.argv[3]))
     if result.reason:
         print(result.reason, file=sys.stderr)
