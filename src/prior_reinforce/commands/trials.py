@@ -82,7 +82,7 @@ class Ask(OnWorkspace):
     """Ask this command first where the arm stands, and compare: its last line is JSON such as
     {"joint1": 0.1}, with every joint, in the plan's units. It must move nothing."""
     time_limit: float = 120.0
-    """Seconds that the command may take."""
+    """Seconds that the command may take; with --execute, beyond the plan's own duration."""
     arm_did_not_move: bool = False
     """After a crash while executing, or a command that failed: a person saw that nothing moved."""
     generator: str | None = None
@@ -180,8 +180,9 @@ class Ask(OnWorkspace):
         speed = 1.0 if self.rehearse is None else self.rehearse
         look = workspace.look_at_arm(trial.number, arm, speed=speed)
         print(say_look(look))
-        if look.refused:
-            print(f"prior-reinforce: {look.refused}; nothing moved", file=sys.stderr)
+        approaches = self.approach and not look.there
+        if refused := look.refused or (look.approach_refused if approaches else ""):
+            print(f"prior-reinforce: {refused}; nothing moved", file=sys.stderr)
             return 1
         if not look.there and not self.approach:
             why = "move it there, or ask again with --approach"

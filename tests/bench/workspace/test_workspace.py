@@ -17,8 +17,8 @@ import pytest
 
 from prior_reinforce.adapters.bayesian import BayesianAdapter
 from prior_reinforce.adapters.proportional import ProportionalAdapter
-from prior_reinforce.bench.robots.executors import supervision
-from prior_reinforce.bench.robots.executors.lock import executing_lock
+from prior_reinforce.bench.robots.executors import command, supervision
+from prior_reinforce.bench.robots.executors.lock import executing_lock, stop_executing
 from prior_reinforce.bench.workspace.log import Executing
 from prior_reinforce.bench.workspace.status import describe
 from prior_reinforce.bench.workspace.workspace import Workspace
@@ -481,6 +481,34 @@ def test_what_is_raised_while_the_arm_moves_is_no_sign_that_it_did_not(workspace
     assert trials(workspace)[0].stage is Stage.EXECUTED
     assert workspace.state.executions[number].outcome == "aborted"
     assert not workspace.log.is_executing()
+
+
+def test_a_stop_as_the_motion_begins_ends_it(workspace, monkeypatch):
+    """Nothing bears a mark yet that whoever stops could find."""
+    begin = Workspace._begin
+
+    def stopped(self, event):
+        begin(self, event)
+        stop_executing(self.folder)
+
+    monkeypatch.setattr(Workspace, "_begin", stopped)
+    result = workspace.execute(ask(workspace).number, "sh -c 'sleep 5' {plan}", time_limit=60)
+    assert (result.outcome, result.interrupted) == ("aborted", True)
+
+
+def test_the_time_limit_of_an_arm_is_beyond_the_plans_own_duration(arm, monkeypatch):
+    workspace, limits = arm(), []
+
+    def executed(*args, time_limit, **more):
+        limits.append(time_limit)
+        raise ConfigurationError("nothing is started here")
+
+    monkeypatch.setattr(command, "execute_command", executed)
+    settings, seconds = workspace.manifest.driven_by, workspace.plan(trials(workspace)[0]).times[-1]
+    for motion, speed in (("trial", 1.0), ("rehearsal", 0.05)):
+        with pytest.raises(ConfigurationError, match="nothing is started"):
+            workspace.execute(1, settings, time_limit=2.0, motion=motion, speed=speed)
+    assert limits == pytest.approx([2.0 + seconds, 2.0 + 20 * seconds])
 
 
 def test_nothing_moves_where_an_interruption_came_first(workspace, tmp_path, monkeypatch):

@@ -578,11 +578,12 @@ class Workspace:
         Args:
             number: The open trial.
             command: For instance `mycontroller {plan} {result}`; or the arm, as a person saw it.
-            time_limit: Of the command, in [s].
+            time_limit: Of the command, in [s]; of an arm, beyond the plan's own duration.
             motion: An arm may also approach the plan's first frame, or rehearse it.
             speed: Share of the plan's own speed, of a rehearsal.
             show: Called with the command's output as it comes.
             stop_seen: `last_stop` when it was asked for; after a stop since then, nothing begins.
+                Now if not given.
 
         Raises:
             TrialStateError: It was stopped since, executed already, is not open, or another program
@@ -598,7 +599,7 @@ class Workspace:
             without_arguments,
         )
         from prior_reinforce.bench.robots.executors.command import execute_command
-        from prior_reinforce.bench.robots.executors.lock import executing_lock, last_stop
+        from prior_reinforce.bench.robots.executors.lock import executing_lock
         from prior_reinforce.bench.robots.executors.supervision import Interruptions
 
         if (speed != 1.0) != (motion == "rehearsal") or not 0 < speed <= 1:
@@ -611,20 +612,23 @@ class Workspace:
         self._read_manifest()
         arm = self.manifest.arm
         with (
-            executing_lock(self.folder, arm) as lock,
+            executing_lock(self.folder, arm, stop_seen) as lock,
             Interruptions() as interruptions,
         ):
             self._note_unknown_execution(self.state.trial(number))
             trial = self.to_execute(number)
-            verdict = self.gate(self.plan(trial).actions)
+            plan = self.plan(trial)
+            verdict = self.gate(plan.actions)
             if verdict is not None:
                 verdict.require()
+            if isinstance(command, ArmSettings):
+                time_limit += float(plan.times[-1]) / speed
             # The gate has read it again; a person said yes to what it said before.
             if self.manifest.arm != arm or text != self._command(command, motion, speed):
                 raise ConfigurationError(
                     f"{self.folder / MANIFEST_FILE} names another arm since; ask again"
                 )
-            if stop_seen is not None and last_stop(self.folder) != stop_seen:
+            if lock.revoked():
                 raise TrialStateError(
                     f"somebody pressed Stop since this was asked for: no {motion} began; ask again"
                 )
@@ -713,7 +717,8 @@ class Workspace:
             raise ConfigurationError(
                 f"{self.folder / MANIFEST_FILE} names another arm since; ask again"
             )
-        return drive_command(Request(command, self.manifest.gate, motion, speed))
+        known = self.manifest
+        return drive_command(Request(command, known.gate, motion, speed, known.robot))
 
     def recover(self) -> Trial | None:
         """Note how an execution ended whose program was killed, where its supervisor wrote it down.

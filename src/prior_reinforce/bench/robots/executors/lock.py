@@ -19,7 +19,7 @@ import signal
 import socket
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -49,16 +49,21 @@ class ExecutingLock:
     """To keep open: as long as anything does, the lock is held."""
     names: tuple[str, ...]
     """To be marked with."""
+    revoked: Callable[[], bool]
+    """Whether the workspace was stopped since this was asked for: nothing begins or goes on."""
 
 
 @contextmanager
-def executing_lock(folder: Path | None = None, arm: str = "") -> Iterator[ExecutingLock]:
+def executing_lock(
+    folder: Path | None = None, arm: str = "", stop_seen: int | None = None
+) -> Iterator[ExecutingLock]:
     """Hold the right to move an arm, and to execute a trial of a workspace.
 
     Args:
         folder: The workspace's, if it is a workspace's trial.
         arm: Name of the arm; without one, what PRIOR_REINFORCE_ARM says, or the one arm that all
             without a name share.
+        stop_seen: `last_stop` of the workspace when the motion was asked for; now if not given.
 
     Raises:
         TrialStateError: Somebody else holds it, or something that was executed still runs.
@@ -66,6 +71,7 @@ def executing_lock(folder: Path | None = None, arm: str = "") -> Iterator[Execut
     """
     deadline = time.monotonic() + _WAIT_S
     name = _name_of_arm(arm)
+    seen = last_stop(folder) if stop_seen is None else stop_seen
     with ExitStack() as stack:
         names, descriptors = [name], []
         if folder is not None:
@@ -84,7 +90,7 @@ def executing_lock(folder: Path | None = None, arm: str = "") -> Iterator[Execut
             descriptors.append(owner.fileno())
         while any(map(marked, names)):
             _wait(deadline, busy)
-        yield ExecutingLock(tuple(descriptors), tuple(names))
+        yield ExecutingLock(tuple(descriptors), tuple(names), lambda: last_stop(folder) != seen)
 
 
 def is_executing(folder: Path) -> bool:
@@ -112,10 +118,10 @@ def stop_executing(folder: Path) -> None:
         _stop_what_runs(_name_of_folder(folder))
 
 
-def last_stop(folder: Path) -> int:
+def last_stop(folder: Path | None) -> int:
     """When a workspace was stopped last, in [ns]; 0 if never. Another value is a stop since."""
     try:
-        return os.lstat(folder / STOP_FILE).st_mtime_ns
+        return 0 if folder is None else os.lstat(folder / STOP_FILE).st_mtime_ns
     except FileNotFoundError:
         return 0
 

@@ -101,7 +101,9 @@ def supervise(
                                 env=os.environ | {MARK: " ".join((*names, run))},
                             )
                     while supervisor.poll() is None:
-                        if (interruptions.came or raised is not None) and not asked:
+                        # Who stops a workspace finds nothing to stop if this begins just then.
+                        revoked = lock is not None and lock.revoked()
+                        if (interruptions.came or revoked or raised is not None) and not asked:
                             supervisor.send_signal(signal.SIGTERM)
                             asked = True
                         time.sleep(_LOOK)
