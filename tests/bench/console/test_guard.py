@@ -1,4 +1,6 @@
+import os
 import re
+from pathlib import Path
 
 import pytest
 from starlette.testclient import TestClient
@@ -20,6 +22,21 @@ def test_the_secret_is_kept_for_pages_that_are_open_and_read_by_nobody_else(tmp_
     assert len(token) >= 32
     assert token_of(tmp_path) == token
     assert (tmp_path / TOKEN_FILE).stat().st_mode & 0o077 == 0
+
+
+def test_the_secret_is_never_there_for_others_to_read(tmp_path, monkeypatch):
+    modes = []
+
+    def look(path, mode):
+        modes.append(path.stat().st_mode & 0o777)
+
+    monkeypatch.setattr(Path, "chmod", look)
+    before = os.umask(0)
+    try:
+        token_of(tmp_path)
+    finally:
+        os.umask(before)
+    assert modes == [0o600]
 
 
 def test_a_secret_that_is_a_link_is_not_followed(tmp_path):

@@ -19,7 +19,7 @@ from starlette.requests import Request
 from starlette.responses import JSONResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from prior_reinforce.files import require_inside, write
+from prior_reinforce.files import in_place, require_inside
 
 TOKEN_FILE = ".console-token"
 PUBLIC = {
@@ -59,7 +59,9 @@ def token_of(folder: Path) -> str:
     """
     path = require_inside(folder / TOKEN_FILE, folder)
     if not path.is_file() or not path.read_text(encoding="ascii").strip():
-        write(path, secrets.token_urlsafe(24))
+        with in_place(path) as unfinished:
+            unfinished.touch(0o600)  # before it holds the secret, and has its name
+            unfinished.write_text(secrets.token_urlsafe(24), encoding="ascii")
     path.chmod(0o600)
     return path.read_text(encoding="ascii").strip()
 
