@@ -85,6 +85,8 @@ class SimulatedSO101:
         self._hand = np.empty((0, 5)) if demonstrations is None else _guided(demonstrations)
         self._guided, self._still, self._thrown = 0, 0.0, True  # the ball lies on the table
         self._remember()
+        for servo in self.servos.values():
+            servo.write_word(GOAL_POSITION, servo.word(PRESENT_POSITION))
 
     def advance(self, duration: float) -> None:
         """Let time pass, in [s]."""
@@ -140,13 +142,11 @@ class SimulatedSO101:
         return goals, np.array([servo.memory[TORQUE_ENABLE] == 1 for servo in servos])
 
     def _remember(self) -> None:
-        """What the encoders say, and a goal that is there while nobody gave another one."""
+        """What the encoders say. A goal stays what it was given last, without torque too."""
         measured = self._data.qpos[:5] * _STEPS + self._middle
         steps = np.round(np.append(measured, self._position[5] * _STEPS + _GRIPPER[0]))
         for servo, value in zip(self.servos.values(), steps.astype(int), strict=True):
             servo.write_word(PRESENT_POSITION, int(value))
-            if not servo.memory[TORQUE_ENABLE]:
-                servo.write_word(GOAL_POSITION, int(value))
 
     def calibration(self) -> dict[str, dict[str, int]]:
         """What LeRobot's calibration wrote down of these servos: the content of its file."""

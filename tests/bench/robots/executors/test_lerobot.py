@@ -12,6 +12,7 @@ from prior_reinforce.bench.robots.executors.base import ArmSettings
 from prior_reinforce.bench.robots.executors.drive import guiding_of, make_executor
 from prior_reinforce.bench.robots.executors.lerobot import LeRobotArm, LeRobotConfig
 from prior_reinforce.errors import ConfigurationError, RobotLimitError
+from prior_reinforce.lab.arms.feetech import GOAL_POSITION, PRESENT_POSITION, TORQUE_ENABLE
 from prior_reinforce.lab.arms.so101 import Port, SimulatedSO101
 from prior_reinforce.lab.tasks.so101 import LAG, SO101Shot
 from prior_reinforce.plans.motions import Plan, PlanFormat
@@ -254,6 +255,25 @@ def test_lerobots_own_so101_class_throws_as_the_task_does(serve, tmp_path):
     (throw,) = landed
     expected = task.rollout(frames[None], None)[0].outcome
     assert throw.outcome == pytest.approx(expected, abs=0.005)
+
+
+def _steps(arm):
+    return [servo.word(PRESENT_POSITION) for servo in arm.servos.values()]
+
+
+@pytest.mark.slow
+def test_an_arm_does_not_jump_to_an_old_goal_when_its_torque_comes_on(serve, tmp_path):
+    arm = serve()
+    for servo in arm.servos.values():
+        servo.write_word(GOAL_POSITION, servo.word(PRESENT_POSITION) + 200)
+    before, client = _steps(arm), so101(tmp_path)
+    try:
+        for _ in range(50):  # half a second of the arm's time
+            client.where()
+        assert all(servo.memory[TORQUE_ENABLE] for servo in arm.servos.values())
+    finally:
+        client.close()
+    assert _steps(arm) == pytest.approx(before, abs=3)
 
 
 @pytest.mark.slow

@@ -79,8 +79,16 @@ class Bridge:
         _check_calibrated(self.robot)
 
     def _configure_once(self) -> None:
-        """LeRobot lets go of an arm to configure it; one that holds its pose is configured."""
-        if self.bus is None or not all(self.bus.sync_read("Torque_Enable").values()):
+        """LeRobot lets go of an arm to configure it; one that holds its pose is configured.
+
+        It gives the servos torque again, which then go to the goal that they were given last: they
+        are told to stay before.
+        """
+        if self.bus is None:
+            self._configure()
+        elif not all(self.bus.sync_read("Torque_Enable").values()):
+            here = self.bus.sync_read("Present_Position", normalize=False)
+            self.bus.sync_write("Goal_Position", here, normalize=False)
             self._configure()
 
     def describe(self) -> dict[str, Any]:
