@@ -120,6 +120,14 @@ def test_a_place_has_no_spread_and_no_mere_direction():
 
 
 @pytest.mark.parametrize(
+    "text", ["0.92+-0.01 0.1", "0.92 +- 0.01 0.1", "92cm ± 1cm, 10cm", "92 +/- 1 cm ahead"]
+)
+def test_a_place_with_a_spread_is_refused_rather_than_read_without_it(text):
+    with pytest.raises(InvalidFeedbackError, match=r"leave out the \+-"):
+        read_place(text, XY, METRES)
+
+
+@pytest.mark.parametrize(
     ("reading", "said"),
     [
         (from_words("long, somewhere", XY, METRES), "long, somewhere"),

@@ -353,8 +353,10 @@ def read_place(text: str, names: Sequence[str], units: Sequence[str]) -> _Point:
         units: Units of the components.
 
     Raises:
-        InvalidFeedbackError: It is none of these, or farther than any arm throws.
+        InvalidFeedbackError: It is none of these, has a `+-`, or is farther than any arm throws.
     """
+    if re.search(_PLUS_MINUS, text):
+        raise InvalidFeedbackError(f"cannot read {text!r} as one place; leave out the +-")
     k, expected = len(names), f"{len(names)} finite numbers: {', '.join(names)}"
     numbers = _numbers_with_units(text, units)
     if numbers is None:
