@@ -229,7 +229,8 @@ class Verbs:
             look = workspace.look_at_arm(trial.number, by, speed=body.speed)
             motion = body.motion if look.there else "approach"
             question = ask_to_move(workspace, trial, look, motion, body.speed)
-            return Question(question, say_look(look), motion, look.refused)
+            refused = look.refused or (look.approach_refused if motion == "approach" else "")
+            return Question(question, say_look(look), motion, refused)
 
     def execute(self, body: Execute) -> State:
         """Begin to execute the plan that was seen; returns once the journal says so."""
