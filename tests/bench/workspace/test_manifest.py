@@ -289,7 +289,7 @@ def test_frames_closer_than_an_arms_cycle_are_refused_before_anything_is_recorde
         ('executor = "fr3"\nhost = 5', "Expected `str`, got `int`"),
         ('executor = "fr3"\nhost = "a"\nhots = "b"', "no setting 'hots'; it has host"),
         ('executor = "fr3"\nhost = "a"\nfirmware = "4.2"', "no limits for fr3 with firmware"),
-        ('executor = "fr3"\nhost = "a"\ncontact = [20, -1]', "Expected `float` > 0"),
+        ('executor = "fr3"\nhost = "a"\ncollision_thresholds = [20, -1]', "Expected `float` > 0"),
     ],
 )
 def test_what_drives_the_arm_is_held_against_its_executor(tmp_path, lines, message):

@@ -6,6 +6,7 @@ import re
 import signal
 
 import numpy as np
+import pylibfranka
 import pytest
 
 from prior_reinforce.bench.robots import robot_limits
@@ -58,7 +59,12 @@ def go_to(arm, place):
 
 
 @pytest.mark.parametrize(
-    "options", [{"host": 5}, {"host": "a", "contact": (20.0, 0.0)}, {"host": "a", "firmware": "4"}]
+    "options",
+    [
+        {"host": 5},
+        {"host": "a", "collision_thresholds": (20.0, 0.0)},
+        {"host": "a", "firmware": "4"},
+    ],
 )
 def test_settings_are_checked(options):
     with pytest.raises(ConfigurationError):
@@ -142,6 +148,29 @@ def _stops(arm):
     assert path.fault == "stopped on request"
     assert path.t[-1] < 4.0
     assert path.moved == (np.abs(path.q - READY).max() > 0.002)
+
+
+@pytest.mark.parametrize("kind", ["works", "trips"])
+def test_collision_thresholds_hold_for_a_motion_and_are_set_back_after_it(
+    server, monkeypatch, kind
+):
+    thresholds = []
+
+    class Robot(pylibfranka.Robot):
+        def set_collision_behavior(self, *given):
+            thresholds.append([values[0] for values in given])
+            super().set_collision_behavior(*given)
+
+    monkeypatch.setattr(pylibfranka, "Robot", Robot)
+    arm = FR3(FR3Config(server.host, collision_thresholds=(60.0, 80.0)))
+    try:
+        here = arm.where()
+        assert thresholds == []  # who only looks sets nothing
+        path = arm.run(swing(here, 0.1, 1.0) if kind == "works" else swing(here, -0.6, 0.45))
+    finally:
+        arm.close()
+    assert (path.fault == "") == (kind == "works")
+    assert thresholds == [[60.0, 60.0, 80.0, 80.0], [20.0] * 4]
 
 
 def test_a_connection_that_dies_in_mid_swing_is_a_fault_of_a_motion():

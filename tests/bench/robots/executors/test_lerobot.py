@@ -109,10 +109,18 @@ def test_what_goes_wrong_in_mid_swing_is_a_fault(toy, kind, said):
         raise AssertionError(path.fault)
 
 
-def test_a_goal_that_comes_late_ends_the_motion(toy):
-    path = toy("slow", clock="wall").run(swing(0.1))
+def test_a_goal_that_comes_late_in_a_swing_ends_the_motion(toy):
+    path = toy("slow", clock="wall").run(swing(1.0))
     assert "ms late" in path.fault
     assert path.moved
+
+
+def test_a_late_goal_that_leaves_out_little_does_not_and_what_is_overdue_is_not_sent(toy, tmp_path):
+    path = toy("slow", clock="wall").run(swing(0.09))
+    assert path.fault == ""
+    assert path.q[-1, 0] == pytest.approx(0.09)
+    assert len(sent(tmp_path)) == len(path.t) < 71 - 25  # of which 0.3 s came too late
+    assert np.diff(path.t).min() > 0
 
 
 def test_to_stop_is_to_hold_where_the_arm_is(toy, tmp_path):

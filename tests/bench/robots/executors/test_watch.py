@@ -95,5 +95,6 @@ def test_the_lag_of_a_take_is_found_to_a_millisecond(take):
 
 
 def test_what_is_not_behind_lags_by_nothing():
-    path = np.sin(np.arange(100) / 20)[:, None]
-    assert lag_behind(path, path, 0.01) == 0.0
+    t = np.arange(100) / 100
+    path = np.sin(5 * t)[:, None]
+    assert lag_behind(t, path, path) == 0.0

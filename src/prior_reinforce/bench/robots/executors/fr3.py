@@ -46,6 +46,8 @@ off, and the whole of what a path may be off its plan."""
 _MOVED = 0.002
 """Distance of a joint from where it stood that counts as having moved, in [rad]. Ours: ten times
 what a joint that is held shows."""
+_USUAL_THRESHOLDS = 20.0, 20.0
+"""In [Nm] and [N]: `setDefaultBehavior` of libfranka's examples."""
 _NOTHING = np.empty(0), np.empty((0, 7))
 _REALTIME = Path("/sys/kernel/realtime")
 """Says 1 on a kernel with PREEMPT_RT, which is what libfranka looks at."""
@@ -59,10 +61,10 @@ class FR3Config(Checked):
     """Address of the robot's controller."""
     firmware: str = "any"
     """Of its system image, `>=5.9` or `<5.9`; `any` holds plans against the narrower of both."""
-    contact: tuple[Positive, Positive] | None = None
+    collision_thresholds: tuple[Positive, Positive] | None = None
     """External torque of any joint in [Nm], and force of the end effector in [N], at which the arm
-    stops; None leaves what is set on the robot. A fast swing with a tool that the robot does not
-    know trips the usual 20."""
+    stops in a motion; libfranka's usual 20 are set after it, since what was set cannot be read.
+    None leaves what is set. A fast swing with a tool that the robot does not know trips 20."""
 
     def __post_init__(self) -> None:
         """Check the settings."""
@@ -88,9 +90,6 @@ class FR3(Executor):
             self._robot = pylibfranka.Robot(
                 config.host, kind.kEnforce if self._enforced else kind.kIgnore
             )
-            if config.contact is not None:
-                torques, forces = [config.contact[0]] * 7, [config.contact[1]] * 6
-                self._robot.set_collision_behavior(torques, torques, forces, forces)
         except self._errors as error:
             raise ConfigurationError(
                 f"cannot reach the robot at {config.host} ({_line(error)}); unlock its joints, "
@@ -131,6 +130,7 @@ class FR3(Executor):
         gc.collect()
         gc.disable()  # a collection takes longer than a cycle
         try:
+            self._set_collision_thresholds(self._config.collision_thresholds)
             fault = self._stream(set_points.tolist(), rows)
         except self._errors as error:
             fault = _line(error)
@@ -140,6 +140,8 @@ class FR3(Executor):
         q = np.array([q for _, q in rows]).reshape(len(rows), 7)
         try:
             after = np.array(self._recover().q)
+            if self._config.collision_thresholds is not None:
+                self._set_collision_thresholds(_USUAL_THRESHOLDS)
             moved = bool(np.abs(np.vstack([q, after]) - before).max() > _MOVED)
         except self._errors as error:
             fault, moved = f"{fault}; then {_line(error)}".removeprefix("; "), True
@@ -162,6 +164,11 @@ class FR3(Executor):
             k = min(k + round(passed.to_sec() * RATE), last)
         self._robot.stop()
         return "stopped on request"
+
+    def _set_collision_thresholds(self, thresholds: tuple[float, float] | None) -> None:
+        if thresholds is not None:
+            torques, forces = [thresholds[0]] * 7, [thresholds[1]] * 6
+            self._robot.set_collision_behavior(torques, torques, forces, forces)
 
     def stop(self) -> None:
         """See `Executor`: the robot brakes by itself."""

@@ -156,22 +156,20 @@ def read_path(
 
 
 def lag_behind(
-    goals: Float[np.ndarray, "T d"], measured: Float[np.ndarray, "T d"], period: float
+    t: Float[np.ndarray, " T"], goals: Float[np.ndarray, "T d"], measured: Float[np.ndarray, "T d"]
 ) -> float:
     """How far a measured motion is behind what was asked for, in [s], to a millisecond.
 
     The shift of the goals in time, up to 0.3 s, that fits best (least squares).
 
     Args:
-        goals: What was asked for, a row a cycle.
+        t: When, in [s].
+        goals: What was asked for then.
         measured: What was measured then, in the same units.
-        period: Time between two cycles, in [s].
     """
-    t = np.arange(len(goals)) * period
-    shifts = np.arange(301) * 1e-3
 
     def misfit(shift: float) -> float:
         later = np.array([np.interp(t - shift, t, column) for column in goals.T]).T
         return float(np.sum((measured - later) ** 2))
 
-    return float(min(shifts, key=misfit))
+    return float(min(np.arange(301) * 1e-3, key=misfit))

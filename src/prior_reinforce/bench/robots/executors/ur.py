@@ -142,7 +142,7 @@ class UR(Executor):
         t, q = _path(rows)
         if not fault and len(t):
             sent = np.array([np.interp(t, fine.t, column) for column in goals.T]).T
-            behind = lag_behind(sent, q, 1 / _RATE)
+            behind = lag_behind(t, sent, q)
             print(f"the arm followed its set points {behind * 1e3:.0f} ms behind", flush=True)
         moved = bool(np.abs(np.vstack([q, after]) - before).max() > _MOVED)
         return MeasuredPath(t, q, fault, moved)

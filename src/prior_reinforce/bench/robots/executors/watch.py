@@ -71,10 +71,8 @@ class Take:
 
     def lag(self, channels: list[int]) -> float:
         """How far the measured motion is behind the commanded one, in [s]."""
-        period = float(self.t[-1]) / max(len(self.states) - 1, 1)
-        return lag_behind(
-            self.motion("commanded", channels), self.motion("measured", channels), period
-        )
+        commanded, measured = self.motion("commanded", channels), self.motion("measured", channels)
+        return lag_behind(self.t, commanded, measured)
 
     def save(self, folder: Path, form: PlanFormat, channels: list[int], kind: str) -> Path:
         """Write it as `NAME.npz`, as `import` reads it; both motions are in it, `q` is learned."""
