@@ -58,7 +58,7 @@ _SLOW = {"rad": 0.3, "m": 0.1, "deg": 17.0, "percent": 50.0}
 FR3 do, at which a person steps back in time."""
 _APPROACH_DT, _SHORTEST = 0.02, 0.5
 """Between frames of an approach, and its shortest duration, in [s]."""
-_CLOSE = {"rad": 0.002, "m": 0.0005, "deg": 0.1, "percent": 0.5}
+_START_TOLERANCE = {"rad": 0.002, "m": 0.0005, "deg": 0.1, "percent": 0.5}
 """Distance from the first frame by unit up to which an executor takes a plan as beginning where the
 arm stands; what is left beyond it is closed slowly first. Ours: what a servo at rest is off."""
 # Without the folder that the user happens to stand in: nothing there may be taken for a module.
@@ -327,7 +327,9 @@ def _motions(prepared: _Prepared, request: Request) -> Sequence[Plan]:
     if not prepared.there:
         raise ConfigurationError(f"{prepared.said}; move it there, or ask again with --approach")
     far = np.abs(prepared.plan.actions[0] - prepared.pose)
-    near = all(d <= _CLOSE.get(u, 0.0) for d, u in zip(far, prepared.arm.units, strict=True))
+    near = all(
+        d <= _START_TOLERANCE.get(u, 0.0) for d, u in zip(far, prepared.arm.units, strict=True)
+    )
     return [prepared.plan] if near else [to_start, prepared.plan]
 
 

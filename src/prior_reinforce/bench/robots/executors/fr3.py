@@ -40,7 +40,7 @@ rest in it. Ours; the simulated arm needs a tenth of it."""
 _BLEND = 0.2
 """Within this time, in [s], the stream goes from the pose that the robot holds over to the plan: it
 refuses set points that do not begin there exactly. Of the 2 mrad that may be left, 0.3 rad/s^2."""
-_FARTHEST = 0.005
+_START_TOLERANCE = 0.005
 """From the plan's first frame at which a motion is begun, in [rad]; ours: what a servo at rest is
 off, and the whole of what a path may be off its plan."""
 _MOVED = 0.002
@@ -123,7 +123,7 @@ class FR3(Executor):
         rows: list[tuple[float, list[float]]] = []
         state = self._ready()
         before, offset = np.array(state.q), np.array(state.q_d) - plan.actions[0]
-        if (far := np.abs(offset).max()) > _FARTHEST:
+        if (far := np.abs(offset).max()) > _START_TOLERANCE:
             return MeasuredPath(*_NOTHING, f"it stands {far:.4f} rad off the plan", moved=False)
         s = np.clip(fine.t / _BLEND, 0, 1)[:, None]
         set_points = fine.q + offset * (1 - s**3 * (10 - 15 * s + 6 * s**2))

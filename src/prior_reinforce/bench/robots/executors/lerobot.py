@@ -44,7 +44,7 @@ lost its power."""
 _CLIPPED = 1e-3
 """Difference of the goal that LeRobot sent from the one that was given, beyond which it clipped it,
 in LeRobot's units (degrees, per cent)."""
-_TELLING = 0.2
+_LEAST_TRAVEL = 0.2
 """Travel of a joint from which on a motion tells how much the arm lags, in [rad]. Ours: a hundred
 steps of an SO-101's encoder."""
 _SETTLE = 0.3
@@ -253,7 +253,7 @@ class LeRobotArm(Executor):
         except ConfigurationError as error:
             fault = str(error) if not fault else f"{fault}; {error}"
         q = np.array(path) if path else np.empty((0, len(self._columns)))
-        if not fault and np.ptp(goals[:, joints], axis=0).max() > _TELLING:
+        if not fault and np.ptp(goals[:, joints], axis=0).max() > _LEAST_TRAVEL:
             behind = lag_behind(np.array(times), np.array(sent)[:, joints], q[:, joints])
             print(f"the arm followed its goals {behind * 1e3:.0f} ms behind", flush=True)
         return MeasuredPath(np.array(times), q, fault, moved)
