@@ -19,6 +19,7 @@ Source: ours; starts maximise pairwise correlations, tempos compare square-root 
 
 from __future__ import annotations
 
+import math
 from typing import Literal
 
 import numpy as np
@@ -147,6 +148,8 @@ def _scaled_by_agreement(profiles: Profiles) -> Profiles:
         return -0.5 * float(np.log(np.maximum(apart, _AGREED)).sum())
 
     best, most = profiles, likelihood(size[moving]) + _CLEARLY
+    if most >= -0.5 * own.shape[2] * math.log(_AGREED):
+        return profiles  # they agree in all channels already
     for weights in (size[moving], *alone):
         for _ in range(_REWEIGHTED):
             weighted = _unit_energy(own * weights)
