@@ -30,16 +30,15 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
         for name in arguments.recipes:
-            recipe = RECIPES[name].measurement
-            trainings = recipe.trainings(scale)
+            run, planned = Run(folder, workers), RECIPES[name].units(scale, ())
             start = time.perf_counter()
-            Run(folder, scale, workers).learn(trainings)
+            run.prepare([unit for unit, _ in planned])
             learned = time.perf_counter()
-            recipe.run(Run(folder, scale, workers))
+            run.rows(planned)
             done = time.perf_counter()
             print(
                 f"{name:14} {done - learned:7.1f} s, after {learned - start:7.1f} s of learning "
-                f"({len(trainings)} generators, those not learned before)",
+                "what was not learned before",
                 flush=True,
             )
 

@@ -13,14 +13,12 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from prior_reinforce.lab.experiments.evaluation import Training, Trials
-from prior_reinforce.lab.experiments.recipes.base import Run, Scale
-from prior_reinforce.lab.experiments.statistics import (
-    SHARE,
-    bootstrap_mean,
-    reached_by,
-    trials_counted,
-)
+import pandas as pd
+
+from prior_reinforce.lab.experiments.evaluation import Trials
+from prior_reinforce.lab.experiments.recipes import Run, Scale
+from prior_reinforce.lab.experiments.recipes.base import Planned
+from prior_reinforce.lab.experiments.results import FIRST, TRIALS, Results
 from prior_reinforce.lab.experiments.units import Workers
 
 
@@ -34,22 +32,18 @@ def main() -> None:
     arguments = parser.parse_args()
 
     scale = Scale(goals=arguments.goals)
-    run = Run(arguments.folder, scale, Workers(arguments.workers))
+    run = Run(arguments.folder, Workers(arguments.workers))
     for task in arguments.tasks:
         for way, seen_by in (("exact", None), ("by eye", "eye")):
-            trainings = [
-                Training(task, name, "diffusion", seed, perception=seen_by)
-                for name in scale.sets
-                for seed in scale.seeds
-            ]
-            run.learn(trainings)
+            trainings = scale.trainings("diffusion", task, perception=seen_by)
             for perception in ("eye", "exact"):
-                units = [Trials(t, task, "gp", perception, scale.goals) for t in trainings]
-                solved = run.solved_at(units)
+                units: list[Planned] = [
+                    (Trials(t, task, "gp", perception, scale.goals), {}) for t in trainings
+                ]
+                results = Results(pd.DataFrame(run.rows(units)), {})
                 print(
                     f"{task:14} demonstrations {way:11} trials {perception:5}: "
-                    f"{bootstrap_mean(trials_counted(solved, scale.rounds))} trials, first hits "
-                    f"{bootstrap_mean(reached_by(solved, 1), within=SHARE)}",
+                    f"{results.mean(TRIALS)} trials, first hits {results.mean(FIRST)}",
                     flush=True,
                 )
 

@@ -18,10 +18,11 @@ import numpy as np
 from jaxtyping import Float
 from scipy.special import betainc
 
-from demonstrations import write_sets
+from demonstrations import DRAWN, seed_and_aims, warps, write_sets
 from prior_reinforce.arrays import Plans, Points
 from prior_reinforce.lab.tasks.basketball import BasketballShot
 from prior_reinforce.lab.tasks.basketball_fr3 import BasketballFR3
+from prior_reinforce.lab.tasks.following import warped
 from prior_reinforce.plans.motions import Demonstrations
 
 HORIZON = 140
@@ -44,6 +45,7 @@ DESIGNED = {
 Knobs = Float[np.ndarray, "n 2"]
 """Reach and direction of each throw, in [rad]."""
 SEEDS = {"A": 1, "B": 2}
+_STEADY = np.zeros(1)
 
 
 @dataclass(frozen=True)
@@ -66,6 +68,7 @@ def throw(
     travel: Float[np.ndarray, "7"],
     posture: Float[np.ndarray, "7"],
     dt: float,
+    warp: Float[np.ndarray, " w"] = _STEADY,
 ) -> Float[np.ndarray, "H 7"]:
     """One throw as a plan: from rest to rest along a quintic (minimum-jerk) time course.
 
@@ -75,20 +78,21 @@ def throw(
         travel: Travel of each joint, in [rad].
         posture: Joint positions before the throw, in [rad].
         dt: Time between frames, in [s].
+        warp: Of its pace; see `following.warped`.
 
     Returns:
         Plan of `HORIZON` frames, in [rad].
     """
     part = np.clip((np.arange(HORIZON) * dt - start) * tempo / DURATION, 0.0, 1.0)
-    return posture + travel * betainc(3, 3, part)[:, None]
+    return posture + travel * betainc(3, 3, warped(part, warp))[:, None]
 
 
 def make(name: str, task: BasketballShot | None = None) -> Demonstrations:
-    """Make the prior set `name` ("A" or "B") of V1, or of another task, the same every time."""
+    """Make the prior set `name` (A, B or drawn) of V1, or of another task, the same every time."""
     size = ThrowVariation()
     task = task or BasketballShot()
-    rng = np.random.default_rng(SEEDS[name])
-    designed = np.array(DESIGNED[name])
+    seed, designed = seed_and_aims(name, SEEDS, DESIGNED)
+    rng = np.random.default_rng(seed)
     n, dt = len(designed), task.format.dt
     starts = rng.permutation(np.linspace(*size.start, n))
     tempi = 1.0 + rng.normal(0.0, size.tempo, n)
@@ -100,7 +104,12 @@ def make(name: str, task: BasketballShot | None = None) -> Demonstrations:
         base = reach * LEAN + direction * np.eye(7)[0]
         travel = (1.0 + SWING_PER_REACH * reach) * amplitudes * SWING
         return np.stack(
-            [throw(*one, dt) for one in zip(starts, tempi, travel, postures + base, strict=True)]
+            [
+                throw(start, tempo, swing, posture, dt, warp)
+                for start, tempo, swing, posture, warp in zip(
+                    starts, tempi, travel, postures + base, warps(name, n), strict=True
+                )
+            ]
         )
 
     def land(knobs: Knobs) -> Points:
@@ -127,6 +136,6 @@ def aim(land: Callable[[Knobs], Points], targets: Points, tolerance: float = 4e-
 
 
 if __name__ == "__main__":
-    write_sets(make, DESIGNED, "basketball", __doc__)
+    write_sets(make, (*DESIGNED, *DRAWN), "basketball", __doc__)
     on_fr3 = BasketballFR3()
     write_sets(lambda name: make(name, task=on_fr3), DESIGNED, "basketball_fr3", __doc__)

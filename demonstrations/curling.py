@@ -13,10 +13,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from jaxtyping import Float
 
-from demonstrations import write_sets
+from demonstrations import DRAWN, seed_and_aims, warps, write_sets
 from demonstrations.teleoperation import Teleoperation, record
 from prior_reinforce.lab.tasks.curling import FRICTION, STONE_RADIUS, STONE_START, Curling
-from prior_reinforce.lab.tasks.following import smoothstep
+from prior_reinforce.lab.tasks.following import smoothstep, warped
 from prior_reinforce.lab.tasks.inverse_kinematics import joint_paths, to_rotation_vector
 from prior_reinforce.plans.motions import Demonstrations
 
@@ -42,6 +42,7 @@ AIMED = {
 }
 """Where the operator aims, (x, y) in [m]."""
 SEEDS = {"A": 1, "B": 2}
+_STEADY = np.zeros(1)
 
 
 @dataclass(frozen=True)
@@ -72,6 +73,7 @@ def push(
     tilt: float,
     dt: float,
     horizon: int = HORIZON,
+    warp: Float[np.ndarray, " w"] = _STEADY,
 ) -> Float[np.ndarray, "H 6"]:
     """Flange poses that carry the bar through one push, as meant.
 
@@ -85,8 +87,10 @@ def push(
         tilt: Added to the handle's tilt throughout, in [rad].
         dt: Time between frames, in [s].
         horizon: H, frames.
+        warp: Of its pace; see `following.warped`.
     """
-    part = smoothstep((np.arange(horizon) * dt - start) / duration)
+    part = np.clip((np.arange(horizon) * dt - start) / duration, 0.0, 1.0)
+    part = smoothstep(warped(part, warp))
     length = speed * duration / 1.875  # a minimum-jerk stroke's peak is 15/8 of its mean speed
     forward = np.array([np.cos(heading), np.sin(heading), 0.0])
     left = np.array([-np.sin(heading), np.cos(heading), 0.0])
@@ -109,16 +113,15 @@ def speed_for(distance: float) -> float:
 
 
 def make(name: str) -> Demonstrations:
-    """Make the prior set `name` ("A" or "B"), the same every time on the same machine."""
+    """Make the prior set `name` (A, B or drawn), the same every time on the same machine."""
     size = PushVariation()
     task = Curling()
-    rng = np.random.default_rng(SEEDS[name])
-    dt, aimed = task.format.dt, AIMED[name]
+    seed, aimed = seed_and_aims(name, SEEDS, AIMED)
+    rng, dt = np.random.default_rng(seed), task.format.dt
     recorded = []
-    for aim, start in zip(
-        aimed, rng.permutation(np.linspace(*size.start, len(aimed))), strict=True
-    ):
-        way = np.array(aim) - STONE_START
+    starts = rng.permutation(np.linspace(*size.start, len(aimed)))
+    for aim, start, warp in zip(aimed, starts, warps(name, len(aimed)), strict=True):
+        way = aim - STONE_START
         meant = push(
             heading=float(np.arctan2(way[1], way[0])),
             speed=speed_for(float(np.linalg.norm(way))),
@@ -128,6 +131,7 @@ def make(name: str) -> Demonstrations:
             aside=rng.normal(0.0, size.aside),
             tilt=rng.normal(0.0, size.tilt),
             dt=dt,
+            warp=warp,
         )
         recorded.append(record(meant, dt, size.hand, rng))
     plans = np.round(joint_paths(np.array(recorded), dt), 6)  # as the arm's encoders would
@@ -136,4 +140,4 @@ def make(name: str) -> Demonstrations:
 
 
 if __name__ == "__main__":
-    write_sets(make, AIMED, "curling", __doc__)
+    write_sets(make, (*AIMED, *DRAWN), "curling", __doc__)

@@ -14,10 +14,10 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
-from demonstrations import write_sets
+from demonstrations import DRAWN, seed_and_aims, warps, write_sets
 from demonstrations.teleoperation import Teleoperation, record
 from prior_reinforce.lab.tasks.fishing import Fishing
-from prior_reinforce.lab.tasks.following import smoothstep
+from prior_reinforce.lab.tasks.following import smoothstep, warped
 from prior_reinforce.plans.motions import Demonstrations
 
 HORIZON = 140
@@ -69,6 +69,7 @@ def cast(
     start: float,
     durations: Float[np.ndarray, "2"],
     dt: float,
+    warp: Float[np.ndarray, " w"],
 ) -> Float[np.ndarray, "H 6"]:
     """Flange poses of one cast, as meant, `HORIZON` frames.
 
@@ -78,10 +79,11 @@ def cast(
         start: When the hand begins to rise, in [s].
         durations: Of raising and of casting, in [s].
         dt: Time between frames, in [s].
+        warp: Of the pace of both; see `following.warped`.
     """
     times = np.arange(HORIZON) * dt - start
     raised, thrown = (
-        smoothstep(part)[:, None]
+        smoothstep(warped(np.clip(part, 0.0, 1.0), warp))[:, None]
         for part in (times / durations[0], (times - durations[0]) / durations[1])
     )
     distance, height, tilt = (
@@ -96,24 +98,24 @@ def cast(
 
 
 def make(name: str) -> Demonstrations:
-    """Make the prior set `name` ("A" or "B"), the same every time on the same machine."""
+    """Make the prior set `name` (A, B or drawn), the same every time on the same machine."""
     size = CastVariation()
     task = Fishing()
-    rng = np.random.default_rng(SEEDS[name])
-    dt, aimed = task.format.dt, np.array(AIMED[name])
+    seed, aimed = seed_and_aims(name, SEEDS, AIMED)
+    rng, dt = np.random.default_rng(seed), task.format.dt
     plans = []
     starts = rng.permutation(np.linspace(*size.start, len(aimed)))
-    for aim, start in zip(aimed, starts, strict=True):
+    for aim, start, warp in zip(aimed, starts, warps(name, len(aimed)), strict=True):
         reach = (np.hypot(*aim) - NEAR) / (FAR - NEAR)
         hand = np.stack([READY, RAISED, CAST])
         hand[:, 0] += reach * FURTHER
         hand += rng.normal(0.0, [size.place, size.place, size.tilt], (3, 3))
         durations = np.array([RAISE_TIME, CAST_TIME]) * (1.0 + rng.normal(0.0, size.tempo, 2))
-        meant = cast(float(np.arctan2(aim[1], aim[0])), hand, float(start), durations, dt)
+        meant = cast(float(np.arctan2(aim[1], aim[0])), hand, float(start), durations, dt, warp)
         plans.append(record(meant, dt, size.hand, rng))
     outcomes = [rollout.outcome for rollout in task.rollout(np.array(plans), rng)]
     return Demonstrations(np.array(plans), np.array(outcomes), task.format)
 
 
 if __name__ == "__main__":
-    write_sets(make, AIMED, "fishing", __doc__)
+    write_sets(make, (*AIMED, *DRAWN), "fishing", __doc__)

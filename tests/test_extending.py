@@ -18,9 +18,7 @@ from prior_reinforce.bench.robots.executors.drive import Request, drive
 from prior_reinforce.bench.robots.executors.result import measure_tracking
 from prior_reinforce.cli import main
 from prior_reinforce.generators import GENERATORS, Timed, load_generator, make_generator
-from prior_reinforce.lab.experiments.recipes import RECIPES, Run, Scale
-from prior_reinforce.lab.experiments.recipes.adapters import Adapters
-from prior_reinforce.lab.experiments.recipes.generators import Generators, Method
+from prior_reinforce.lab.experiments.recipes import RECIPES, Run, Scale, adapters
 from prior_reinforce.lab.tasks import TASKS, make_task
 from prior_reinforce.perception import PERCEPTIONS, make_perception
 from prior_reinforce.plans.motions import Plan, PlanFormat
@@ -139,17 +137,19 @@ def test_a_saved_generator_is_found_by_its_name(added, choice, tmp_path):
 def test_an_adapter_joins_the_comparison_of_adapters(added, tmp_path):
     choices = ("drift", "drift:Drift,gain=0.5")
     assert RECIPES["adapters"].joining(("affine", *choices)) == choices
-    figures = Adapters(generator="nearest").run(Run(tmp_path, FEW, include=choices))
-    assert {"gp", *choices} <= set(figures["success"])
+    planned = adapters.units(FEW, choices, generator="nearest")
+    planned = [(unit, names) for unit, names in planned if unit.adapter in ("gp", *choices)]
+    rows = Run(tmp_path).rows(planned)
+    assert {row["adapter"] for row in rows} == {"gp", *choices}
 
 
 @pytest.mark.slow
 def test_a_generator_joins_the_comparison_of_generators(added, tmp_path):
     choices = ("affine", "affine:Affine,timing=align")
     assert RECIPES["generators"].joining(("drift", *choices)) == choices
-    nearest = Method("nearest", "nearest", kind="method")
-    figures = Generators((nearest,)).run(Run(tmp_path, FEW, include=choices))
-    assert [row["generator"] for row in figures["rows"]] == ["nearest", *choices]
+    planned = [p for p in RECIPES["generators"].units(FEW, choices) if p[1]["method"] in choices]
+    rows = Run(tmp_path).rows(planned)
+    assert list(dict.fromkeys(row["generator"] for row in rows)) == list(choices)
 
 
 def test_all_four_go_through_trials_together(added, tmp_path, capsys):

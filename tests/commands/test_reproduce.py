@@ -1,9 +1,9 @@
 """The command `reproduce`, as a user types it."""
 
 import io
-import json
 import shlex
 from dataclasses import dataclass
+from pathlib import Path
 
 import pytest
 import tyro
@@ -11,26 +11,57 @@ from rich.console import Console
 
 from prior_reinforce.cli import main
 from prior_reinforce.commands.reproduce import Reproduce, _terminal
-from prior_reinforce.lab.experiments.evaluation import Training
-from prior_reinforce.lab.experiments.recipes import RECIPES, Measurement, Recipe, Run, Scale, Table
+from prior_reinforce.lab.experiments.evaluation import Training, Trials
+from prior_reinforce.lab.experiments.recipes import RECIPES, Recipe, Scale, Table
+from prior_reinforce.lab.experiments.results import raw_path, read_results
 from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
 
 GENERATOR = "prior_reinforce.generators.interpolation:SmoothInterpolation"
 ADAPTER = "prior_reinforce.adapters.frozen:FrozenAdapter"
 
 
-def test_a_recipe_leaves_figures_and_a_page(tmp_path, capsys):
+def test_a_recipe_leaves_rows_and_a_page_that_is_made_again_from_them(tmp_path, capsys):
     tmp_path = tmp_path / ("deep" * 20)  # its name is longer than a line of the terminal
     assert main(["reproduce", "alignment", "--quick", "--out", str(tmp_path)]) == 0
-    figures = json.loads((tmp_path / "alignment.json").read_text())
-    assert figures["scale"]["seeds"] == [0]
-    assert figures["commit"]
+    results = read_results(tmp_path)
+    assert results.made_by == {"alignment": "prior-reinforce reproduce alignment --quick"}
+    assert set(results.frame["set"]) == {"A"}
     assert "Timeline alignment" in (tmp_path / "evidence.html").read_text()
     assert (tmp_path / "pictures" / "alignment.png").is_file()
     printed = capsys.readouterr().out
     assert "0.28" in printed  # shipped throws were moved by up to that many seconds
     assert str(tmp_path / "evidence.html") in printed
     assert "[ms]" in printed  # rich would take it for a style
+    # The rows alone, elsewhere, give the same bytes; and so do the units.
+    rows = tmp_path / "alone"
+    (rows / "raw").mkdir(parents=True)
+    (rows / "raw" / "alignment.csv.gz").write_bytes(raw_path(tmp_path, "alignment").read_bytes())
+    made = {}
+    for name, source in (("rows", rows), ("units", tmp_path)):
+        out = tmp_path / f"from {name}"
+        command = ["reproduce", "all", "--quick", "--from", str(source), "--out", str(out)]
+        assert main(command) == 0
+        made[name] = [(out / "evidence.md").read_bytes(), raw_path(out, "alignment").read_bytes()]
+    assert made["rows"] == made["units"]
+    assert made["rows"][0] == (tmp_path / "evidence.md").read_bytes()
+
+
+def test_what_is_taken_up_is_not_run(tmp_path, capsys):
+    (tmp_path / "units").mkdir()
+    assert main(["reproduce", "all", "--from", str(tmp_path), "--out", str(tmp_path / "o")]) == 2
+    assert "run a recipe first" in capsys.readouterr().err
+    assert not list((tmp_path / "units").iterdir())
+
+
+def test_tables_of_a_page_are_filled_where_they_are_marked(tmp_path):
+    page = tmp_path / "page.md"
+    page.write_text("before\n<!-- table trials -->\nold\n<!-- end -->\nafter\n")
+    arguments = ["--quick", "--out", str(tmp_path / "run"), "--fill", str(page)]
+    assert main(["reproduce", "alignment", *arguments]) == 0
+    text = page.read_text()
+    assert text.startswith("before\n<!-- table trials -->\n\n| task |")
+    assert text.endswith("<!-- end -->\nafter\n")
+    assert "old" not in text
 
 
 @pytest.mark.parametrize(
@@ -62,42 +93,42 @@ def test_wrong_input_is_one_line_and_writes_nothing(tmp_path, capsys, arguments,
     assert not folder.exists()
 
 
-def test_a_model_reads_the_pictures_of_the_table_of_trials_alone():
+def test_all_leaves_out_what_takes_hours_and_more_is_that():
+    named = {name: {r.name for r in Reproduce(name)._recipes()} for name in ("all", "more")}
+    assert named["more"] == {"sets", "sets-network", "adaptation-network", "papers-form"}
+    assert named["all"] == set(RECIPES) - named["more"]
+    assert {r.name for r in Reproduce("all", taken_from=Path("x"))._recipes()} == set(RECIPES)
+
+
+def test_a_model_reads_the_pictures_of_the_table_of_trials():
     model = VisionLanguageModelConfig(model="mine")
-    recipes = {r.name: r for r in Reproduce("all", reader="vlm", vlm=model)._recipes()}
-    assert list(recipes) == list(RECIPES)
-    assert recipes["trials"].measurement.model is model
-    assert all(recipes[name] is RECIPES[name] for name in recipes if name != "trials")
-    assert Reproduce("trials")._recipes() == [RECIPES["trials"]]
+    assert Reproduce("all", reader="vlm", vlm=model)._scale.model is model
+    assert Reproduce("all")._scale == Scale()
 
 
-def test_figures_name_the_command_that_makes_them_again(tmp_path):
+def test_rows_name_the_command_that_makes_them_again():
     model = VisionLanguageModelConfig(model="my model", votes=1, enable_thinking=True)
     reproduce = Reproduce("all", goals=7, seeds=(0, 3), reader="vlm", vlm=model)
-    commands = {
-        recipe.name: reproduce._command(
-            recipe, Run(tmp_path, Scale(), include=(GENERATOR,) if i == 0 else ())
-        )
-        for i, recipe in enumerate(reproduce._recipes())
-    }
-    assert commands["zero-shot"] == (
+    zero_shot = reproduce._command(RECIPES["zero-shot"], (GENERATOR,))
+    trials = reproduce._command(RECIPES["trials"], ())
+    assert zero_shot == (
         f"prior-reinforce reproduce zero-shot --goals 7 --seeds 0 3 --include {GENERATOR}"
     )
-    assert commands["trials"] == (
+    assert trials == (
         "prior-reinforce reproduce trials --goals 7 --seeds 0 3 --reader vlm "
         "--vlm.model 'my model' --vlm.enable-thinking --vlm.votes 1"
     )
-    for name in ("zero-shot", "trials"):
-        again = tyro.cli(Reproduce, args=shlex.split(commands[name])[2:])
+    for command in (zero_shot, trials):
+        again = tyro.cli(Reproduce, args=shlex.split(command)[2:])
         assert again.goals == 7
         assert again.seeds == (0, 3)
     assert again.vlm == model
     half = Reproduce("variation", sets=("A",))
-    assert half._scale().sets == ("A",)
-    assert half._command(RECIPES["variation"], Run(tmp_path, half._scale())) == (
+    assert half._scale.sets == ("A",)
+    assert half._command(RECIPES["variation"], ()) == (
         "prior-reinforce reproduce variation --goals 100 --seeds 0 1 2 --sets A"
     )
-    quick = Reproduce("all", quick=True)._command(RECIPES["adapters"], Run(tmp_path, Scale()))
+    quick = Reproduce("all", quick=True)._command(RECIPES["adapters"], ())
     assert quick == "prior-reinforce reproduce adapters --quick"
 
 
@@ -107,20 +138,16 @@ class BrokenTraining(Training):
         raise ValueError("no such luck")
 
 
-@dataclass(frozen=True)
-class Broken(Measurement):
-    def trainings(self, scale, include=()):
-        return [BrokenTraining("basketball-v1", "A", "nearest", 0)]
-
-    def run(self, run):
-        run.learn(self.trainings(run.scale))
-        raise AssertionError("what failed was not told")
-
-
-BROKEN = Recipe("broken", "Broken", "none", Broken(), table=lambda figures: None)
+BROKEN = Recipe(
+    "broken", "Broken", "none",
+    lambda scale, include: [
+        (Trials(BrokenTraining("basketball-v1", "A", "nearest", 0), "curling", "gp", "eye", 1), {})
+    ],
+    table=lambda results: None,
+)  # fmt: skip
 
 
-def test_a_recipe_that_fails_costs_no_other_its_figures(tmp_path, capsys, monkeypatch):
+def test_a_recipe_that_fails_costs_no_other_its_rows(tmp_path, capsys, monkeypatch):
     recipes = {"broken": BROKEN, "alignment": RECIPES["alignment"]}
     monkeypatch.setattr("prior_reinforce.commands.reproduce.RECIPES", recipes)
     assert main(["reproduce", "all", "--quick", "--out", str(tmp_path)]) == 2

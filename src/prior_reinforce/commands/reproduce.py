@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import tyro
 from rich import box
@@ -22,16 +22,20 @@ from prior_reinforce.errors import ConfigurationError, UnitFailedError
 from prior_reinforce.extras import check_installed
 from prior_reinforce.files import claim_folder, write
 from prior_reinforce.generators import make_generator
-from prior_reinforce.lab.experiments.evidence import claims_table, write_evidence
+from prior_reinforce.lab.experiments.evaluation import Training
+from prior_reinforce.lab.experiments.evidence import fill_tables, write_evidence
 from prior_reinforce.lab.experiments.recipes import QUICK, RECIPES, Recipe, Run, Scale, Table
+from prior_reinforce.lab.experiments.recipes.base import Planned
 from prior_reinforce.lab.experiments.recipes.base import Progress as OnProgress
-from prior_reinforce.lab.experiments.recipes.base import to_json
-from prior_reinforce.lab.experiments.recipes.trials import TrialsTable
+from prior_reinforce.lab.experiments.results import (
+    INCOMPLETE,
+    raw_path,
+    read_results,
+    write_rows,
+)
 from prior_reinforce.lab.experiments.units import Workers
 from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
 
-_SLOWEST = "diffusion-paper"
-"""Takes forty times as long to learn as the next."""
 _WIDEST = 28
 """Characters of a cell before it is wrapped."""
 _BORDER = 3
@@ -44,19 +48,21 @@ class Reproduce:
 
     For example:
         prior-reinforce reproduce trials --quick
+        prior-reinforce reproduce all --from results
     """
 
     recipe: Annotated[str, tyro.conf.Positional]
-    """Which recipe, or all."""
-    out: Path = Path("runs/reproduce")
-    """Folder for results, and for the units that they are made of."""
+    """Which recipe; `all`, but for those that take hours; or `more`, which are these."""
+    out: Path | None = None
+    """Folder for rows, tables and pictures, and for the units that they are made of: without it
+    runs/reproduce, or that of --from."""
     goals: int = 100
     """Goals a training."""
     seeds: tuple[int, ...] = (0, 1, 2)
     """Training seeds."""
     sets: tuple[Literal["A", "B"], ...] = ("A", "B")
     """Sets of demonstrations that generators learn from; one is half of the work, and decides
-    less. `robustness` and `variation` have their own."""
+    less. Some recipes have their own."""
     quick: bool = False
     """Ten goals, one training a method, no variants, no rows of the VLM: decides no claim."""
     reader: Literal["camera", "vlm"] = "camera"
@@ -71,6 +77,11 @@ class Reproduce:
     include: tuple[str, ...] = ()
     """Generators or adapters beside ours: your own as module:Class, or ours with other settings,
     each as NAME,setting=value."""
+    taken_from: Annotated[Path | None, tyro.conf.arg(name="from")] = None
+    """Run nothing: take the units that are found in this folder, or where it has none its rows,
+    and make tables, verdicts and pictures of them."""
+    fill: tuple[Path, ...] = ()
+    """Markdown pages whose tables of results are made anew, between `<!-- table NAME -->` lines."""
 
     def run(self) -> None:
         """Run, save, print, and write the page of evidence."""
@@ -78,65 +89,66 @@ class Reproduce:
         recipes = self._recipes()
         included = {recipe.name: self._joining(recipe) for recipe in recipes}
         self._check()
-        scale = QUICK if self.quick else self._scale()
-        workers = Workers(self.workers, self.ray)
+        planned = {r.name: r.units(self._scale, included[r.name]) for r in recipes}
         console = Console()
-        self._learn(recipes, included, scale, workers, console)
+        if self.taken_from is None:
+            self._prepare(planned, console)
+        claim_folder(self._out)
         failures: list[UnitFailedError] = []
         for recipe in recipes:
             try:
-                with _progress(console, recipe.name) as show:
-                    run = Run(self.out, scale, workers, show, included[recipe.name])
-                    figures = recipe.measurement.run(run)
+                command = self._command(recipe, included[recipe.name])
+                self._write_rows(recipe, planned[recipe.name], command, console)
             except UnitFailedError as error:
                 failures.append(error)  # the other recipes do not need it
                 say(console, f"{recipe.name}: {error}")
-            else:
-                self._keep(recipe, run, figures, console)
         if len(failures) < len(recipes):
-            page, _ = write_evidence(self.out)
+            page, _, sections = write_evidence(self._out)
+            for section in sections:
+                if section.recipe in recipes:
+                    for part in _terminal(section.table, section.recipe.title, console.width):
+                        console.print(part)
+            for filled in self.fill:
+                fill_tables(filled, read_results(self._out))
             say(console, f"evidence: {page}")
         if failures:
             raise failures[0]
 
-    def _learn(
-        self,
-        recipes: Sequence[Recipe],
-        included: Mapping[str, tuple[str, ...]],
-        scale: Scale,
-        workers: Workers,
-        console: Console,
-    ) -> None:
-        """Learn all that the recipes need, the slowest before the rest.
-
-        So no core waits for the last training.
-        """
-        wanted = dict.fromkeys(
-            training
-            for recipe in recipes
-            for training in recipe.measurement.trainings(scale, included[recipe.name])
-        )
-        trainings = sorted(wanted, key=lambda t: _SLOWEST not in t.generator)
-        for choice in dict.fromkeys(training.generator for training in trainings):
+    def _prepare(self, planned: Mapping[str, Sequence[Planned]], console: Console) -> None:
+        """Run what units of all recipes need, so that recipes share it."""
+        units = [unit for of_recipe in planned.values() for unit, _ in of_recipe]
+        needed = [need for unit in units for need in (unit, *unit.needs)]
+        for choice in dict.fromkeys(t.generator for t in needed if isinstance(t, Training)):
             make_generator(choice)  # a library that is not installed is told now, not in an hour
-        claim_folder(self.out)
-        if trainings:
-            # What fails here fails again in the recipes that need it, and is told there.
-            with suppress(UnitFailedError), _progress(console, "learn") as show:
-                Run(self.out, scale, workers, show).learn(trainings)
+        claim_folder(self._out)
+        # What fails here fails again in the recipes that need it, and is told there.
+        with suppress(UnitFailedError), _progress(console, "learn") as show:
+            Run(self._out, Workers(self.workers, self.ray), show).prepare(units)
 
-    def _keep(self, recipe: Recipe, run: Run, figures: Mapping[str, Any], console: Console) -> None:
-        """Write a recipe's figures down and print them."""
-        made_by = run.made_by(self._command(recipe, run))
-        write(self.out / f"{recipe.name}.json", to_json({**made_by, **figures}))
-        for part in _terminal(recipe.table(figures), recipe.title, console.width):
-            console.print(part)
-        if claims := recipe.claims(figures):
-            for part in _terminal(claims_table(claims), f"{recipe.title}: claims", console.width):
-                console.print(part)
-        if len(run.commits) > 1:
-            commits = ", ".join(sorted(run.commits))
-            say(console, f"made by different code: {commits}; in a fresh --out all of it runs anew")
+    def _write_rows(
+        self, recipe: Recipe, planned: Sequence[Planned], command: str, console: Console
+    ) -> None:
+        """Run a recipe's units, or take them up, and write their rows."""
+        source = self._out if self.taken_from is None else self.taken_from
+        if self.taken_from is not None and not (source / "units").is_dir():
+            path = raw_path(source, recipe.name)
+            if path.is_file() and source.resolve() != self._out.resolve():
+                write(raw_path(self._out, recipe.name), path.read_bytes())
+            return
+        with _progress(console, recipe.name) as show:
+            workers = Workers(self.workers, self.ray)
+            run = Run(source, workers, show, self.taken_from is not None)
+            rows, found = run.rows(planned), len(run.found(planned))
+        if found < len(planned):
+            command += f"{INCOMPLETE}{found} of {len(planned)}"
+        if rows:
+            write_rows(self._out, recipe.name, rows, command)
+        commits = sorted({row["commit"] for row in rows})
+        if len(commits) > 1:
+            say(
+                console,
+                f"made by different code: {', '.join(commits)}; in a fresh --out all runs anew",
+            )
 
     def _check(self) -> None:
         """Refuse settings out of range, and those that would be passed over in silence."""
@@ -146,7 +158,7 @@ class Reproduce:
             raise ConfigurationError("--seeds must be different and not negative")
         if not self.sets or len(set(self.sets)) < len(self.sets):
             raise ConfigurationError("--sets must be A, B, or both")
-        if self.quick and self._scale() != Scale():
+        if self.quick and replace(self, quick=False, reader="camera")._scale != Scale():
             raise ConfigurationError("--quick has its own goals, seeds and sets; leave out either")
         asked = self.reader == "vlm"
         if asked and (self.quick or self.recipe not in ("trials", "all")):
@@ -154,25 +166,33 @@ class Reproduce:
         if self.vlm != VisionLanguageModelConfig() and not asked:
             raise ConfigurationError("--vlm.* say whom to ask with --reader vlm; give that as well")
 
+    @property
+    def _out(self) -> Path:
+        """Folder that is written to."""
+        return self.out or self.taken_from or Path("runs/reproduce")
+
+    @property
     def _scale(self) -> Scale:
         """How much is asked for."""
-        return Scale(goals=self.goals, seeds=self.seeds, sets=self.sets)
+        model = self.vlm if self.reader == "vlm" else None
+        if self.quick:
+            return QUICK
+        return Scale(goals=self.goals, seeds=self.seeds, sets=self.sets, model=model)
 
-    def _command(self, recipe: Recipe, run: Run) -> str:
-        """What makes the figures of one recipe again."""
+    def _command(self, recipe: Recipe, include: Sequence[str]) -> str:
+        """What makes the rows of one recipe again."""
         words = ["prior-reinforce", "reproduce", recipe.name]
         if self.quick:
             words.append("--quick")
         else:
             words += ["--goals", str(self.goals), "--seeds", *map(str, self.seeds)]
             words += ["--sets", *self.sets] if self.sets != Scale().sets else []
-        for own in run.include:
+        for own in include:
             words += ["--include", own]
-        measurement = recipe.measurement
-        if isinstance(measurement, TrialsTable) and measurement.model is not None:
+        if self._scale.model is not None and recipe.name == "trials":
             words += ["--reader", "vlm"]
-            for setting in fields(measurement.model):
-                value = getattr(measurement.model, setting.name)
+            for setting in fields(self.vlm):
+                value = getattr(self.vlm, setting.name)
                 flag = setting.name.replace("_", "-")
                 if isinstance(value, bool):
                     words += [f"--vlm.{flag}"] if value else []
@@ -181,23 +201,19 @@ class Reproduce:
         return shlex.join(words)
 
     def _recipes(self) -> Sequence[Recipe]:
-        if self.recipe not in (*RECIPES, "all"):
+        if self.recipe in ("all", "more"):
+            apart = self.recipe == "more"
+            found = self.taken_from is not None and not apart  # takes what there is of any
+            return [r for r in RECIPES.values() if found or r.apart == apart]
+        if self.recipe not in RECIPES:
             raise ConfigurationError(
-                f"no recipe {self.recipe!r}; recipes are {', '.join(RECIPES)}, or all"
+                f"no recipe {self.recipe!r}; recipes are {', '.join(RECIPES)}, all, or more"
             )
-        chosen = [recipe for name, recipe in RECIPES.items() if self.recipe in (name, "all")]
-        if self.reader == "camera":
-            return chosen
-        return [
-            replace(recipe, measurement=replace(recipe.measurement, model=self.vlm))
-            if isinstance(recipe.measurement, TrialsTable)
-            else recipe
-            for recipe in chosen
-        ]
+        return [RECIPES[self.recipe]]
 
     def _joining(self, recipe: Recipe) -> tuple[str, ...]:
         joining = recipe.joining(self.include)
-        if self.recipe != "all" and joining != self.include:
+        if self.recipe in RECIPES and joining != self.include:
             stranger = next(name for name in self.include if name not in joining)
             fitting = [other.name for other in RECIPES.values() if other.joining([stranger])]
             raise ConfigurationError(

@@ -3,18 +3,13 @@
 import numpy as np
 import pytest
 
-from prior_reinforce.lab.experiments.claims import Verdict, above
 from prior_reinforce.lab.experiments.statistics import (
     SHARE,
-    Interval,
     bootstrap_difference,
     bootstrap_mean,
-    difference_curve,
-    difference_of_tasks,
-    mean_of_tasks,
-    mean_success_difference,
+    mean_of_groups,
+    p_above,
     reached_by,
-    success_curve,
     trials_counted,
 )
 
@@ -64,7 +59,6 @@ def test_one_goal_that_differs_leaves_open_which_is_above():
     a[0, 0] = 0.0
     difference = bootstrap_difference(a, np.ones((6, 100)), within=SHARE)
     assert difference.low < difference.value < 0.0 < difference.high
-    assert above(difference, 0.0, 6) is Verdict.OPEN
 
 
 def test_a_paired_difference_does_not_know_what_both_share():
@@ -79,40 +73,35 @@ def test_goals_that_were_never_reached_count_as_missed():
     np.testing.assert_array_equal(trials_counted(np.array([0, 1, 3]), 10), [11.0, 1.0, 3.0])
 
 
-def test_curves_of_a_worked_example():
-    solved = np.array([[1, 2, 0, 3]])
-    assert [point.value for point in success_curve(solved, 3)] == [0.25, 0.5, 0.75]
-    other = np.array([[1, 0, 0, 1]])
-    assert [point.value for point in difference_curve(solved, other, 3)] == [-0.25, 0.0, 0.25]
-    assert mean_success_difference(solved, other, 3).value == pytest.approx(0.0)
-
-
-def test_a_difference_of_curves_is_paired():
-    solved = np.tile([1, 0], (3, 20))
-    (point,) = difference_curve(solved, solved, 1)
-    assert point == Interval(0.0, 0.0, 0.0)
-
-
-def test_tasks_weigh_alike_however_many_trainings_they_have():
+def test_groups_weigh_as_they_are_told_however_many_trainings_they_have():
     few, many = np.full((2, 5), 1.0), np.full((8, 5), 3.0)
-    assert mean_of_tasks([few, many]).value == 2.0
-    assert mean_of_tasks([few, many], within=(1, 2.5)).high <= 2.5
+    assert mean_of_groups([few, many]).value == 2.0
+    assert mean_of_groups([few, many], [3, 1]).value == 1.5
+    assert mean_of_groups([few, many], within=(1, 2.5)).high <= 2.5
 
 
-def test_the_interval_over_tasks_holds_the_truth():
+def test_the_interval_over_groups_holds_the_truth():
     rng = np.random.default_rng(0)
     held = 0
     for number in range(200):
         rows = [rng.normal(0.0, 0.15, (m, 1)) + rng.normal(0.0, 0.4, (m, 20)) for m in (4, 3, 4)]
-        interval = mean_of_tasks(rows, seed=number)
+        interval = mean_of_groups(rows, seed=number)
         held += interval.low <= 0.0 <= interval.high
     assert held >= 0.92 * 200
 
 
-def test_a_difference_over_tasks_is_of_the_trainings_that_both_have():
-    rng = np.random.default_rng(0)
-    a = [rng.normal(size=(4, 6)) for _ in range(3)]
-    b = [of[:2] - 0.5 for of in a]
-    interval = difference_of_tasks(a, b)
-    assert interval.value == pytest.approx(0.5)
-    assert interval.high - interval.low < 1e-9
+def test_the_p_value_is_below_two_and_a_half_percent_where_the_interval_is_above_the_bound():
+    rng = np.random.default_rng(4)
+    for _ in range(50):
+        values = rng.normal(rng.uniform(-0.5, 0.5), 0.4, (6, 20))
+        interval = bootstrap_mean(values)
+        p = p_above([values], 0.0)
+        assert abs(p - 0.025) < 1e-3 or (p < 0.025) == (interval.low > 0.0)
+
+
+def test_p_values_of_what_is_not_so_are_spread_evenly():
+    """Under no effect, one in twenty is below 5 %, or fewer."""
+    rng = np.random.default_rng(5)
+    p = [p_above([rng.normal(0.0, 0.4, (6, 1)) + rng.normal(0, 0.4, (6, 20))], 0.0)
+         for _ in range(300)]  # fmt: skip
+    assert np.mean(np.array(p) < 0.05) <= 0.07

@@ -22,6 +22,7 @@ from prior_reinforce.lab.experiments.protocol import (
     run_goals,
     unseen_goals,
 )
+from prior_reinforce.lab.experiments.results import as_text
 from prior_reinforce.lab.experiments.units import Unit, digest_of, result_of
 from prior_reinforce.lab.tasks import make_task
 from prior_reinforce.perception import make_perception
@@ -80,6 +81,21 @@ class PerceivedDemonstrations(Unit):
         seen = {name: getattr(perceived, name).tolist() for name in _SEEN}
         return {**seen, "failed_readings": len(failures)}
 
+    def rows(self, result: Mapping[str, Any]) -> list[dict[str, Any]]:
+        """A row a demonstration."""
+        return [
+            {
+                "learned_on": self.task,
+                "set": self.demonstrations,
+                "seed": self.seed,
+                "perception": self.perception,
+                "demonstration": i,
+                "seen": as_text(seen),
+                "failed_readings": result["failed_readings"] if i == 0 else 0,
+            }
+            for i, seen in enumerate(result["outcomes_seen"])
+        ]
+
 
 @dataclass(frozen=True, eq=False)
 class LearnedGenerator:
@@ -124,6 +140,23 @@ class Training(Unit):
         return PerceivedDemonstrations(
             self.task, self.demonstrations, self.perception, self.seed, self.model
         )
+
+    @property
+    def needs(self) -> tuple[Unit, ...]:
+        """The demonstrations as perceived."""
+        return () if self.perceived is None else (self.perceived,)
+
+    @property
+    def columns(self) -> dict[str, Any]:
+        """What rows of the table of raw results say of it."""
+        return {
+            "learned_on": self.task,
+            "set": self.demonstrations,
+            "seed": self.seed,
+            "count": None if self.subset is None else len(self.subset),
+            "generator": self.generator,
+            "labels": self.perception or "exact",
+        }
 
     def run(self, folder: Path) -> Mapping[str, Any]:
         """Learn; the model itself is the result.
@@ -204,7 +237,30 @@ class Trials(Unit):
             "first_error": [float(np.linalg.norm(result.errors[0])) for result in results],
             "lost": [sum(not rollout.valid for rollout in result.rollouts) for result in results],
             "failed_readings": [result.failed_readings for result in results],
+            "p_hit": [[trial.p_hit for trial in result.trials] for result in results],
         }
+
+    def rows(self, result: Mapping[str, Any]) -> list[dict[str, Any]]:
+        """A row a goal; results of before P(hit) was kept leave its cell empty."""
+        said = result.get("p_hit", [[None]] * len(result["goals"]))
+        return [
+            {
+                **self.training.columns,
+                "task": self.task,
+                "adapter": self.adapter,
+                "perception": self.perception,
+                "unseen": self.unseen,
+                "rounds": self.rounds,
+                "goal": i,
+                "place": as_text(place),
+                "solved_at": result["solved_at"][i],
+                "first_error": round(result["first_error"][i], 5),
+                "lost": result["lost"][i],
+                "failed_readings": result["failed_readings"][i],
+                "p_hit": None if said[i][0] is None else as_text(said[i], 3),
+            }
+            for i, place in enumerate(result["goals"])
+        ]
 
     def learned(self, folder: Path) -> LearnedGenerator:
         """What is tried: from the folder's models, or learned now."""
@@ -277,6 +333,15 @@ class ZeroShot(Unit):
             ),
             "grid_lost": float(np.mean([not rollout.valid for rollout in rollouts])),
         }
+
+    def rows(self, result: Mapping[str, Any]) -> list[dict[str, Any]]:
+        """A row a quantity, of a demonstration or of the grid."""
+        told = {**self.training.columns, "task": self.training.task}
+        return [
+            {**told, "quantity": name, "demonstration": i, "value": value}
+            for name, values in result.items()
+            for i, value in enumerate(values if isinstance(values, list) else [values])
+        ]
 
 
 def is_aligned(choice: str) -> bool:

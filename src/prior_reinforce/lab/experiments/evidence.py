@@ -1,27 +1,41 @@
-"""The page of evidence: every recipe's figures beside what the paper says, in HTML and Markdown.
+"""Everything that is made of the raw rows: page, Markdown, pictures, and tables in other pages.
 
-It is made from the figures on disk alone, so it holds whatever recipes were run in a folder, each
-with the scale, seeds, version and commit of its own run.
+A recipe whose rows are not there is listed as not run. Rows carry the commit that made them, and
+each recipe's file the command.
 """
 
 from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from prior_reinforce.errors import ConfigurationError, FileFormatError, RenderingUnavailableError
 from prior_reinforce.files import write
-from prior_reinforce.lab.experiments.claims import Claim, Verdict
+from prior_reinforce.lab.experiments.claims import OBSERVATIONS, Judged, judge
+from prior_reinforce.lab.experiments.evaluation import GOAL_SEED
 from prior_reinforce.lab.experiments.recipes import RECIPES, Picture, Recipe, Table
-from prior_reinforce.lab.experiments.recipes.base import Figures, from_json
+from prior_reinforce.lab.experiments.recipes.adaptation import later
+from prior_reinforce.lab.experiments.recipes.trials import told
+from prior_reinforce.lab.experiments.results import (
+    FIRST,
+    INCOMPLETE,
+    TRIALS,
+    Results,
+    reached,
+    read_results,
+)
 from prior_reinforce.report.html import data_uri, render
 
 _PACKAGE = "prior_reinforce.lab.experiments"
 _TITLE = "The paper's evidence, measured on our tasks"
 _NO_BREAK = "\N{NO-BREAK SPACE}"
+_FILLED = re.compile(r"(<!-- table (?P<name>[\w-]+) -->\n).*?(<!-- end -->)", re.DOTALL)
 
 
 @dataclass(frozen=True)
@@ -30,94 +44,177 @@ class Section:
 
     recipe: Recipe
     made_by: str
-    """The command with its scale, the code that ran it, and its version, in one line; and a note
-    where what it measured is called otherwise now."""
+    """The command with its scale, and the code that ran it, in one line."""
     table: Table
-    claims: list[Claim]
     remarks: list[str]
     pictures: list[Picture]
 
 
-def write_evidence(folder: Path) -> tuple[Path, Path]:
-    """Draw all figures found in a folder and write `evidence.html` and `evidence.md` there.
-
-    Args:
-        folder: Holds a `<recipe>.json` for each recipe that was run; pictures go to `pictures/`.
+def write_evidence(folder: Path) -> tuple[Path, Path, list[Section]]:
+    """Make everything from the rows in a folder: `evidence.html`, `evidence.md`, `pictures/`.
 
     Returns:
-        Paths of the page, which is whole in one file, and of the Markdown.
+        Paths of the page, which is whole in one file, and of the Markdown; and what is shown there.
 
     Raises:
-        ConfigurationError: There are no figures in the folder.
-        FileFormatError: Figures are damaged, or of another version's form.
+        ConfigurationError: There are no rows.
+        FileFormatError: Rows are damaged, or of another version's form.
     """
-    sections = [
-        _section(recipe, path, folder / "pictures")
-        for recipe in RECIPES.values()
-        if (path := folder / f"{recipe.name}.json").is_file()
-    ]
-    if not sections:
+    results = read_results(folder)
+    recipes = {name: results.where(recipe=name) for name in RECIPES if name in results.made_by}
+    if not recipes:
         raise ConfigurationError(
-            f"no figures in {folder}; expected one of "
-            f"{', '.join(f'{name}.json' for name in RECIPES)}: run a recipe first"
+            f"no rows in {folder / 'raw'}; expected one of "
+            f"{', '.join(f'{name}.csv.gz' for name in RECIPES)}: run a recipe first"
         )
-    counts = Counter(claim.verdict for section in sections for claim in section.claims)
+    drawn = {name: _section(RECIPES[name], of, folder / "pictures") for name, of in recipes.items()}
+    sections = [section for section in drawn.values() if section is not None]
+    judged = judge(results)
+    missing = [recipe.title for name, recipe in RECIPES.items() if drawn.get(name) is None]
     page = render(
         "evidence.html",
         package=_PACKAGE,
         title=_TITLE,
-        counts={verdict.value: counts[verdict] for verdict in Verdict},
+        counts=_counts(judged),
+        claims=claims_table(judged),
+        observations=observations_table(results),
         sections=sections,
+        missing=missing,
         unbroken=_unbroken,
         source=data_uri,
     )
-    markdown = _markdown(sections, _summary(counts), folder)
-    return write(folder / "evidence.html", page), write(folder / "evidence.md", markdown)
+    markdown = _markdown(sections, judged, results, missing, folder)
+    html, plain = write(folder / "evidence.html", page), write(folder / "evidence.md", markdown)
+    return html, plain, sections
 
 
-def claims_table(claims: Sequence[Claim]) -> Table:
-    """Claims as rows of text."""
-    return Table(
-        ("the paper says", "we measured", "verdict"),
-        tuple((claim.paper, claim.measured, claim.verdict.value) for claim in claims),
+def claims_table(judged: Sequence[Judged]) -> Table:
+    """A row a claim that was tested: of the paper's form, of ours, and with a control for ours."""
+    by_claim: dict[str, dict[str, Judged]] = {}
+    for one in judged:
+        if one.verdict == "not run":
+            continue
+        form = "ours" if one.claim.form == "baselines" else one.claim.form
+        by_claim.setdefault(one.claim.says, {})[form] = one
+    columns: dict[str, Callable[[tuple[str, dict[str, Judged]]], object]] = {
+        "the paper says": lambda row: row[0],
+        "the paper's form": lambda row: _measured(row[1].get("the paper's form")),
+        "verdict": lambda row: _verdict(row[1].get("the paper's form")),
+        "ours": lambda row: _measured(row[1].get("ours")),
+        "control": lambda row: _control(row[1].get("ours")),
+        "verdict ": lambda row: _verdict(row[1].get("ours")),
+    }
+    return Table.of(list(by_claim.items()), columns)
+
+
+def _measured(of: Judged | None) -> str:
+    """A quantity with its interval, trainings, and p-values alone and among all tests."""
+    if of is None or np.isnan(of.measured.value):
+        return ""
+    sign = "" if of.claim.b is None else "+"
+    return (
+        f"{of.measured:{sign}.2f}; {of.trainings} trainings; p {of.p:.4f}, Holm {of.p_of_all:.4f}"
     )
 
 
-def _section(recipe: Recipe, path: Path, pictures: Path) -> Section:
+def _control(of: Judged | None) -> str:
+    return "" if of is None or of.control is None else f"untrained or unadapted: {of.control}"
+
+
+def _verdict(of: Judged | None) -> str:
+    return "not run" if of is None else of.verdict
+
+
+def observations_table(results: Results) -> Table:
+    """What stands beside the paper's numbers without a verdict, where it was measured."""
+    measured = [(of, of.of(results)) for of in OBSERVATIONS]
+    columns: dict[str, Callable[[Any], object]] = {
+        "quantity": lambda row: row[0].says,
+        "paper": lambda row: row[0].paper,
+        "we measured": lambda row: row[1],
+    }
+    return Table.of([row for row in measured if row[1]], columns)
+
+
+def headlines(results: Results) -> Mapping[str, Table]:
+    """Tables that other pages show, by name: README's, and those of docs/evidence.md."""
+    of = {name: results.where(recipe=name) for name in ("trials", "generators", "adapters")}
+    after = later(results.where(recipe="adaptation"))
+    trials: dict[str, Callable[[Any], object]] = {
+        "task": lambda row: row[0].title,
+        "perception": lambda row: "camera" if row[0].by_model else "eye",
+        "first trials that hit": lambda row: f"{row[1].where(unseen=False).mean(FIRST).value:.2f}",
+        "trials, simulated": lambda row: f"{row[1].where(unseen=False).mean(TRIALS):.1f}",
+        "trials, paper (real arm)": lambda row: (
+            f"{row[0].trials:.1f} ± {row[0].sd:.1f}" + (" (VLM)" if row[0].by_model else "")
+        ),
+    }
+    four: dict[str, Callable[[Any], object]] = {
+        "behind or before": lambda row: row[0],
+        "method": lambda row: row[1],
+        "first trials that hit": lambda row: row[2].mean(FIRST),
+        "reached within 4 trials": lambda row: row[2].mean(reached(4)),
+        "trials": lambda row: row[2].mean(TRIALS),
+        "trainings": lambda row: row[2].trainings,
+    }
+    afternoon: dict[str, Callable[[Any], object]] = {
+        "adapter": lambda row: row[0],
+        "trials a goal": lambda row: row[1].mean(TRIALS),
+    }
+    methods = [
+        (recipe, name, rows)
+        for recipe in ("generators", "adapters")
+        for name, rows in of[recipe].by("method").items()
+    ]
+    return {
+        "trials": Table.of(told(of["trials"]), trials),
+        "methods": Table.of(methods, four),
+        "afternoon": Table.of(list(after.by("method").items()), afternoon),
+    }
+
+
+def fill_tables(page: Path, results: Results) -> None:
+    """Make the tables of a Markdown page anew, each between `<!-- table NAME -->` and the end."""
+    tables = headlines(results)
+
+    def filled(found: re.Match[str]) -> str:
+        table = "\n".join(_rows(tables[found["name"]]))
+        return f"{found[1]}\n{table}\n{found[3]}"
+
+    write(page, _FILLED.sub(filled, page.read_text(encoding="utf-8")))
+
+
+def _section(recipe: Recipe, results: Results, pictures: Path) -> Section | None:
+    """A recipe's part of the page; None where too few of its units were run to show anything."""
     try:
-        figures = from_json(path.read_text(encoding="utf-8"))
-        remarks = recipe.remarks(figures)
+        remarks = recipe.remarks(results)
         try:
-            drawn = recipe.draw(figures, pictures)
+            drawn = recipe.draw(results, pictures)
         except RenderingUnavailableError as error:
             drawn, remarks = [], [*remarks, f"{recipe.title}: {error}."]
+        commits = ", ".join(sorted(set(results.frame["commit"])))
         return Section(
             recipe=recipe,
-            made_by=_made_by(figures),
-            table=recipe.table(figures),
-            claims=recipe.claims(figures),
+            made_by=f"{results.made_by[recipe.name]}; goals of seed {GOAL_SEED}; commit {commits}",
+            table=recipe.table(results),
             remarks=remarks,
             pictures=drawn,
         )
-    except (KeyError, IndexError, TypeError, ValueError) as error:
+    except (KeyError, IndexError, TypeError, ValueError, AttributeError, StopIteration) as error:
+        if INCOMPLETE in results.made_by[recipe.name]:
+            return None
         raise FileFormatError(
-            f"{path} holds no figures of this version ({error!r}); "
+            f"the rows of {recipe.name} are not of this version ({error!r}); "
             f"run `prior-reinforce reproduce {recipe.name}` again"
         ) from error
 
 
-def _made_by(figures: Figures) -> str:
-    return (
-        f"{figures['command']}; goals of seed {figures['goal_seed']}; version "
-        f"{figures['version']}, commit {figures['commit']}"
-        + (f". {figures['note']}" if "note" in figures else "")
-    )
-
-
-def _summary(counts: Counter[Verdict]) -> str:
-    """How many claims came out how, in a sentence."""
-    counted = ", ".join(f"{counts[verdict]} {verdict.value}" for verdict in Verdict)
-    return f"Of {counts.total()} tests of the paper's claims: {counted}."
+def _counts(judged: Sequence[Judged]) -> dict[str, dict[str, int]]:
+    """How many tests of each form came out how."""
+    counts: dict[str, Counter[str]] = {}
+    for one in judged:
+        counts.setdefault(one.claim.form, Counter())[one.verdict] += 1
+    return {form: dict(of.most_common()) for form, of in counts.items()}
 
 
 def _unbroken(text: str) -> str:
@@ -125,15 +222,24 @@ def _unbroken(text: str) -> str:
     return re.sub(r"\[[^\]]*\]|\d %", lambda match: match[0].replace(" ", _NO_BREAK), text)
 
 
-def _markdown(sections: Sequence[Section], summary: str, folder: Path) -> str:
-    claims = [claim for section in sections for claim in section.claims]
-    lines = [f"# {_TITLE}", "", summary, ""]
-    if claims:
-        lines += _rows(claims_table(claims))
-    for section in sections:
-        lines += [remark for text in section.remarks for remark in (text, "")]
+def _markdown(
+    sections: Sequence[Section],
+    judged: Sequence[Judged],
+    results: Results,
+    missing: Sequence[str],
+    folder: Path,
+) -> str:
+    lines = [f"# {_TITLE}", ""]
+    for form, counts in _counts(judged).items():
+        said = ", ".join(f"{n} {verdict}" for verdict, n in counts.items())
+        lines.append(f"- Tests of {form}: {said}.")
+    lines += ["", *_rows(claims_table(judged))]
+    lines += ["## Beside the paper's numbers", "", *_rows(observations_table(results))]
+    if missing:
+        lines += [f"Not run: {', '.join(missing)}.", ""]
     for section in sections:
         lines += [f"## {section.recipe.title}", "", f"Paper: {section.recipe.paper}.", ""]
+        lines += [remark for text in section.remarks for remark in (text, "")]
         for picture in section.pictures:
             place = picture.path.relative_to(folder).as_posix()
             lines += [f"![{section.recipe.title}]({place})", "", picture.caption, ""]

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from prior_reinforce.adapters import make_adapter
 from prior_reinforce.lab.experiments.evaluation import GOAL_SEED, Training
 from prior_reinforce.lab.experiments.fields import Change, Conditions, FieldTask, MeasuredField
 from prior_reinforce.lab.experiments.protocol import GoalTrials, run_sequences
+from prior_reinforce.lab.experiments.results import as_text
 from prior_reinforce.lab.experiments.units import Unit
 from prior_reinforce.lab.tasks import make_task
 from prior_reinforce.perception import make_perception
@@ -71,6 +73,10 @@ class Afternoons(Unit):
             )
         return _kept(results)
 
+    def rows(self, result: Mapping[str, Any]) -> list[dict[str, Any]]:
+        """A row a goal."""
+        return _rows({**self.training.columns, "task": self.task}, self, result)
+
 
 @dataclass(frozen=True)
 class FieldAfternoons(Unit):
@@ -118,6 +124,16 @@ class FieldAfternoons(Unit):
             )
         return _kept(results)
 
+    def rows(self, result: Mapping[str, Any]) -> list[dict[str, Any]]:
+        """A row a goal."""
+        of = self.measured
+        told = {
+            "learned_on": of.learned_on, "set": of.demonstrations, "seed": of.labels,
+            "count": of.count or None, "generator": of.generator, "labels": of.perception,
+            "task": of.task,
+        }  # fmt: skip
+        return _rows(told, self, result)
+
 
 def _kept(results: Sequence[Sequence[GoalTrials]]) -> dict[str, Any]:
     """Which trial reached each goal, and what was said before each trial and came of it."""
@@ -125,4 +141,31 @@ def _kept(results: Sequence[Sequence[GoalTrials]]) -> dict[str, Any]:
     return {
         "solved_at": [[goal.solved_at or 0 for goal in of_one] for of_one in results],
         "expected": [[trial.p_hit, trial.hit] for trial in trials if trial.p_hit is not None],
+        "first_error": [[float(np.linalg.norm(g.errors[0])) for g in of_one] for of_one in results],
     }
+
+
+def _rows(
+    told: Mapping[str, Any], unit: Afternoons | FieldAfternoons, result: Mapping[str, Any]
+) -> list[dict[str, Any]]:
+    """A row a goal; results of before first errors were kept leave their cells empty."""
+    said, rows = iter(result["expected"]), []
+    for i, of_one in enumerate(result["solved_at"]):
+        for j, solved_at in enumerate(of_one):
+            before = [p for p, _ in islice(said, solved_at or unit.rounds)]
+            off = result["first_error"][i][j] if "first_error" in result else None
+            rows.append(
+                {
+                    **told,
+                    "adapter": unit.adapter,
+                    "remembers": unit.carry_over,
+                    "perception": unit.perception,
+                    "rounds": unit.rounds,
+                    "sequence": i,
+                    "goal": j,
+                    "solved_at": solved_at,
+                    "first_error": None if off is None else round(off, 5),
+                    "p_hit": as_text(before, 3) if before else None,
+                }
+            )
+    return rows

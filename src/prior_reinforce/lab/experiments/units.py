@@ -44,9 +44,19 @@ class Unit(ABC):
         own = [source_digest(part) for part in parts if isinstance(part, str)]
         return (*own, *(s for part in parts if isinstance(part, Unit) for s in part.own_sources))
 
+    @property
+    def needs(self) -> tuple[Unit, ...]:
+        """Units whose results or models it takes, to be run first."""
+        parts = [getattr(self, field.name) for field in fields(self)]
+        return tuple(part for part in parts if isinstance(part, Unit))
+
     @abstractmethod
     def run(self, folder: Path) -> Mapping[str, Any]:
         """Do it and return a JSON-able result; `folder` holds models shared between units."""
+
+    def rows(self, result: Mapping[str, Any]) -> list[dict[str, Any]]:
+        """What it gave, as rows of the table of raw results (`results.py`)."""
+        return []
 
 
 _Outcome = tuple[Unit, str | None]

@@ -13,6 +13,15 @@ def smoothstep(part: Float[np.ndarray, "*s"]) -> Float[np.ndarray, "*s"]:
     return part**3 * (10.0 - 15.0 * part + 6.0 * part**2)
 
 
+def warped(part: Float[np.ndarray, " t"], warp: Float[np.ndarray, " w"]) -> Float[np.ndarray, " t"]:
+    """A map of [0, 1] onto itself, by sine waves of these relative changes of pace.
+
+    It is monotone where their absolute values sum up to less than 1.
+    """
+    waves = np.pi * np.arange(1, len(warp) + 1)
+    return np.asarray(part + np.sin(part[:, None] * waves) @ (warp / waves))
+
+
 def follow(path: Float[np.ndarray, "H D"], dt: float, bandwidth: float) -> Float[np.ndarray, "H D"]:
     """Low-pass a path with a critically damped second-order filter, from rest.
 

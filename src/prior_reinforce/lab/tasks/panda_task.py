@@ -7,6 +7,7 @@ outcome is read from the recorded path; see `curling.py`.
 from __future__ import annotations
 
 import copy
+import re
 from abc import abstractmethod
 from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -28,6 +29,7 @@ from prior_reinforce.lab.tasks.panda import N_JOINTS, STEP, build_scene, servo_c
 from prior_reinforce.plans.motions import Demonstrations
 
 _FOLDER = Path(__file__).parent
+_DRAWN = re.compile(r"v\d\d")
 _FULL = mujoco.mjtState.mjSTATE_FULLPHYSICS
 _Batch = tuple[list[mujoco.MjModel], Float[np.ndarray, "n s"], Float[np.ndarray, "n steps d"]]
 """Models (one, or one an execution), initial full physics states, and controls in [rad]."""
@@ -137,13 +139,14 @@ class PandaTask(Task):
         return results
 
     def demonstrations(self, name: str) -> Demonstrations:
-        """See `Task.demonstrations`."""
-        if name not in self.demonstration_sets:
+        """See `Task.demonstrations`; sets that are drawn are shipped as well: v00 to v19."""
+        path = _FOLDER / "demonstrations" / f"{self.recordings}_{name}.npz"
+        if name not in self.demonstration_sets and not (_DRAWN.fullmatch(name) and path.is_file()):
             raise ConfigurationError(
                 f"{self.name} has no demonstration set {name!r}; use one of "
                 f"{', '.join(self.demonstration_sets)}"
             )
-        return Demonstrations.load(_FOLDER / "demonstrations" / f"{self.recordings}_{name}.npz")
+        return Demonstrations.load(path)
 
     def film(
         self,

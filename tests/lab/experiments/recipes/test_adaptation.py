@@ -1,57 +1,69 @@
 """Afternoons in the mean, and what was said of P(hit)."""
 
-import numpy as np
+import pandas as pd
 import pytest
+from gathered import gather
 
-from prior_reinforce.lab.experiments.recipes import Run, Scale
+from prior_reinforce.lab.experiments.recipes import RECIPES, Scale
 from prior_reinforce.lab.experiments.recipes.adaptation import (
+    OURS,
+    OURS_ALONE,
     RECIPE,
-    Adaptation,
+    afternoons,
+    later,
     reliability,
     said_and_came,
 )
-from prior_reinforce.lab.experiments.recipes.base import from_json, to_json
+from prior_reinforce.lab.experiments.results import TRIALS, Results
 
 SMALL = Scale(goals=8, seeds=(0,), sets=("A",), rounds=2)
-
-
-def test_reliability_by_hand():
-    found = reliability(np.array([[0.2, 0, 3], [0.2, 0, 2], [0.2, 1, 1], [0.8, 1, 1]], dtype=float))
-    assert found["brier"] == pytest.approx((0.04 + 0.04 + 0.64 + 0.04) / 4)
-    assert found["base_rate"] == 0.25
-    assert [b["n"] for b in found["bins"]] == [3, 1]
-    assert found["bins"][0]["hit"] == pytest.approx(1 / 3)
-    assert [b["to_go"] for b in found["bins"]] == [2.0, 1.0]
+SAID = [
+    {"solved_at": 2, "rounds": 3, "p_hit": "0.3 0.5"},
+    {"solved_at": 0, "rounds": 3, "p_hit": "0.2 0.1 0.1"},
+    {"solved_at": 1, "rounds": 3, "p_hit": None},  # by an adapter that says nothing
+]
 
 
 def test_trials_to_go_of_a_goal_that_was_reached_and_of_one_that_was_not():
-    said = [[0.3, False], [0.5, True], [0.2, False], [0.1, False], [0.1, False]]
-    result = {"solved_at": [[2, 0]], "expected": said}  # three trials at most
-    rows = said_and_came(result, rounds=3)
-    assert [to_go for _, _, to_go in rows] == [2.0, 1.0, 4.0, 3.0, 2.0]
-    assert [p for p, _, _ in rows] == [p for p, _ in said]
-    assert [hit for _, hit, _ in rows] == [0.0, 1.0, 0.0, 0.0, 0.0]
+    said = said_and_came(Results(pd.DataFrame(SAID), {}))
+    assert said["to_go"].tolist() == [2.0, 1.0, 4.0, 3.0, 2.0]
+    assert said["p_hit"].tolist() == [0.3, 0.5, 0.2, 0.1, 0.1]
+    assert said["hit"].tolist() == [False, True, False, False, False]
+
+
+def test_reliability_by_hand():
+    told = reliability(Results(pd.DataFrame(SAID), {}))
+    brier = (0.3**2 + 0.5**2 + 0.2**2 + 0.1**2 + 0.1**2) / 5
+    assert f"5 trials: Brier score {brier:.3f}, that of the base rate 0.160." in told
+    assert "0.13: 0.00 of 3, 3.00" in told
+    assert "0.50: 1.00 of 1, 1.00" in told
 
 
 @pytest.mark.slow
 def test_one_afternoon_of_every_rule_gives_table_picture_and_remark(tmp_path):
-    measurement = Adaptation(tasks=("basketball-v3",), seed=3001)
-    figures = from_json(to_json(measurement.run(Run(tmp_path, SMALL, include=("gp",)))))
-    table = RECIPE.table(figures)
-    assert table.rows[0][0] == "Bayesian, earlier goals too"
+    planned = [p for p in RECIPE.units(SMALL, ("gp",)) if p[0].task == "basketball-v3"]
+    results = gather(tmp_path, planned, "adaptation")
+    table = RECIPE.table(results)
+    assert table.header == ("adapter", "basketball-v3", "mean", "ours minus it, mean")
+    assert table.rows[0][0] == OURS
     assert table.rows[-1][0] == "gp"  # the one that was included
     assert table.rows[0][-1] == ""
-    frozen = figures["trials"]["no adapter"]["mean"].value
-    assert figures["trials"]["Bayesian, earlier goals too"]["mean"].value < frozen
-    (picture,) = RECIPE.draw(figures, tmp_path)
+    methods = later(results).by("method")
+    assert methods[OURS].n == 7  # of eight
+    assert methods[OURS].mean(TRIALS).value < methods["no adapter"].mean(TRIALS).value
+    (picture,) = RECIPE.draw(results, tmp_path)
     assert picture.path.is_file()
-    alone, said = RECIPE.remarks(figures)
+    alone, said = RECIPE.remarks(results)
     assert "Brier" in said
     assert "no adapter -" in alone  # fewer trials than without
     assert "earlier goals" not in alone
-    minus = figures["alone_minus"]["GP, m = 2, each goal alone"].value
-    ours, theirs = (
-        figures["trials"][f"{name}, each goal alone"]["mean"].value
-        for name in ("Bayesian", "GP, m = 2")
-    )
-    assert minus == pytest.approx(ours - theirs)
+    minus = methods[OURS_ALONE].minus(methods["GP, m = 2, each goal alone"], TRIALS).value
+    assert f"GP, m = 2, each goal alone {minus:+.2f}" in alone
+
+
+def test_behind_a_network_the_rules_are_the_same():
+    labels = {names["method"] for _, names in RECIPES["adaptation-network"].units(SMALL, ())}
+    assert labels == {names["method"] for _, names in RECIPE.units(SMALL, ())}
+    units = [unit for unit, _ in RECIPES["adaptation-network"].units(SMALL, ())]
+    assert {unit.training.generator for unit in units} == {"diffusion"}
+    assert len(afternoons(Scale(), [("bayes", True, "x")])) == 5 * 6

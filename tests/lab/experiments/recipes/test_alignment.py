@@ -1,19 +1,19 @@
 """Timeline alignment: what it moves, and how alike starts are afterwards."""
 
-import numpy as np
+from gathered import gather
 
-from prior_reinforce.lab.experiments.recipes import Run, Scale
-from prior_reinforce.lab.experiments.recipes.alignment import RECIPE, AlignmentShifts
+from prior_reinforce.lab.experiments.recipes import Scale
+from prior_reinforce.lab.experiments.recipes.alignment import RECIPE
 
 
 def test_alignment_brings_starts_and_middles_together(tmp_path):
-    figures = AlignmentShifts().run(Run(tmp_path, Scale(sets=("A",))))
-    assert [row["task"] for row in figures["rows"]] == ["basketball-v1", "curling", "fishing"]
-    for row in figures["rows"]:
-        for before, after in (row["start_sd_s"], row["middle_sd_s"]):
-            assert after < 0.5 * before
-    before, after = (np.array(figures["shown"][when]) for when in ("before", "after"))
-    assert len(before) == len(after)
-    assert after.shape[1] >= before.shape[1]
-    (picture,) = RECIPE.draw(figures, tmp_path)
+    results = gather(tmp_path, RECIPE.units(Scale(sets=("A",)), ()), "alignment")
+    table = RECIPE.table(results)
+    assert [row[0] for row in table.rows] == ["basketball-v1", "curling", "fishing"]
+    for row in table.rows:
+        before_start, start, before_middle, middle = map(float, row[3:])
+        assert start < 0.5 * before_start
+        assert middle < 0.5 * before_middle
+    assert table.rows[0][2] == "0.28"  # [s]
+    (picture,) = RECIPE.draw(results, tmp_path)
     assert picture.path.read_bytes().startswith(b"\x89PNG")

@@ -1,19 +1,17 @@
-"""Who joins which comparison, and what made the figures."""
+"""Who joins which comparison, what is run before what, and rows of what was found."""
+
+import json
 
 import pytest
 
 from prior_reinforce.errors import ConfigurationError
+from prior_reinforce.lab.experiments.evaluation import Training, Trials
 from prior_reinforce.lab.experiments.recipes import RECIPES, Run, Scale
-from prior_reinforce.lab.experiments.recipes.base import (
-    family_of,
-    from_json,
-    table_by_round,
-    to_json,
-)
-from prior_reinforce.lab.experiments.statistics import Interval
+from prior_reinforce.lab.experiments.recipes.base import family_of
 
 GENERATOR = "prior_reinforce.generators.interpolation:SmoothInterpolation"
 ADAPTER = "prior_reinforce.adapters.frozen:FrozenAdapter"
+TRAINING = Training("basketball-v1", "A", "nearest", 0, perception="eye")
 
 
 @pytest.mark.parametrize(
@@ -55,26 +53,29 @@ def test_every_recipe_goes_by_its_name():
     assert [recipe.name for recipe in RECIPES.values()] == list(RECIPES)
 
 
-def test_figures_tell_what_made_them(tmp_path):
-    made_by = Run(tmp_path, Scale(goals=7), commits={"b", "a"}).made_by("this command")
-    assert made_by["command"] == "this command"
-    assert made_by["commit"] == "a, b"
-    assert made_by["scale"]["goals"] == 7
-    assert made_by["goal_seed"] == 100
+def test_no_recipe_runs_a_unit_twice_under_one_name():
+    for recipe in RECIPES.values():
+        planned = [(unit, *names.items()) for unit, names in recipe.units(Scale(), ()) if names]
+        assert len(set(planned)) == len(planned), recipe.name
 
 
-def test_figures_come_back_from_json_with_their_intervals():
-    interval = Interval(0.1 + 0.2, 1 / 3, 1.0)
-    figures = {"rows": [{"label": "gp", "success": [interval]}], "p_hit": {"n": 3, "brier": 0.2}}
-    assert from_json(to_json(figures)) == figures
+def test_what_a_unit_needs_runs_first_and_its_rows_name_the_code(tmp_path):
+    unit = Trials(TRAINING, "basketball-v1", "frozen", "eye", goals=2, rounds=1)
+    ran = []
+    rows = Run(tmp_path, progress=lambda done, total, label: ran.append(label)).rows(
+        [(unit, {"method": "none"})]
+    )
+    order = [label.split()[0] for label in ran if label and "found" not in label]
+    assert order == ["perceive", "learn", "basketball-v1:"]
+    assert len(rows) == 2
+    kept = json.loads(next(tmp_path.glob("units/trials-*.json")).read_text())
+    for i, row in enumerate(rows):
+        assert (row["method"], row["commit"], row["goal"]) == ("none", kept["commit"], i)
+        assert row["solved_at"] == kept["result"]["solved_at"][i]
 
 
-def test_a_table_by_round_shows_some_rounds_and_how_far_ours_is_above():
-    success = {name: [Interval(r / 10, 0.0, 1.0) for r in range(1, 6)] for name in ("ours", "it")}
-    minus = {"it": [Interval(r / 10, -0.1, 0.9) for r in range(5)]}
-    table = table_by_round("adapter", success, "ours", minus)
-    assert table.header == (
-        "adapter", "by round 1", "by round 2", "by round 4", "ours minus it, round 4",
-    )  # fmt: skip
-    assert table.rows[0][1:] == ("0.10 [0.00, 1.00]", "0.20 [0.00, 1.00]", "0.40 [0.00, 1.00]", "")
-    assert table.rows[1][-1] == "+0.30 [-0.10, +0.90]"
+def test_what_is_only_found_is_not_run(tmp_path):
+    (tmp_path / "units").mkdir()
+    unit = Trials(TRAINING, "basketball-v1", "frozen", "eye", goals=2, rounds=1)
+    assert Run(tmp_path, only_found=True).rows([(unit, {})]) == []
+    assert not list((tmp_path / "units").iterdir())

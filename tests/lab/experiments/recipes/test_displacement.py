@@ -2,52 +2,48 @@
 
 import numpy as np
 import pytest
+from gathered import gather
 
-from prior_reinforce.lab.experiments.claims import Verdict
-from prior_reinforce.lab.experiments.recipes import Run, Scale
-from prior_reinforce.lab.experiments.recipes.base import from_json, to_json
+from prior_reinforce.lab.experiments.recipes import Scale
 from prior_reinforce.lab.experiments.recipes.displacement import (
     RECIPE,
-    DisplacementFields,
+    Displacement,
+    measure,
     measures,
+    summed,
+    units,
     widest_three,
 )
 
-X, Y = np.linspace(0.0, 1.0, 11), np.linspace(0.0, 2.0, 21)
+GRID = np.stack(np.meshgrid(np.linspace(0, 1, 11), np.linspace(0, 2, 21), indexing="ij"), axis=-1)
 REGION = np.array([[0.0, 0.0], [1.0, 2.0]])
 CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 
 
-def field(displacement):
-    grid = np.stack(np.meshgrid(X, Y, indexing="ij"), axis=-1)
-    return {"axes_m": [X.tolist(), Y.tolist()], "displacements_m": displacement(grid).tolist()}
-
-
 def test_a_constant_field_has_no_steepness_and_one_error():
-    found = measures(field(lambda grid: np.full_like(grid, 0.03)), CORNERS, REGION)
+    found = measures(GRID, np.full_like(GRID, 0.03), CORNERS, REGION)
     assert found["steepness"] == pytest.approx(0.0)
-    assert found["mean_m"] == pytest.approx(0.03 * np.sqrt(2))
+    assert found["mean"] == pytest.approx(3 * np.sqrt(2))  # cm
     assert found["high_error_area"] == 0.0
 
 
 def test_a_linear_field_is_as_steep_as_its_factor():
-    found = measures(field(lambda grid: 0.4 * grid), CORNERS, REGION)
-    assert found["steepness"] == pytest.approx(0.4)
+    assert measures(GRID, 0.4 * GRID, CORNERS, REGION)["steepness"] == pytest.approx(0.4)
 
 
 def test_errors_inside_the_hull_are_told_from_those_outside():
     # No error up to y = 1, where the hull ends, and 0.1 m along x beyond it.
-    step = field(lambda grid: np.stack([0.1 * (grid[..., 1] > 1.0), 0 * grid[..., 1]], axis=-1))
-    found = measures(step, CORNERS, REGION)
-    assert found["inside_m"] == pytest.approx(0.0)
-    assert found["outside_m"] == pytest.approx(0.1)
+    step = np.stack([0.1 * (GRID[..., 1] > 1.0), 0 * GRID[..., 1]], axis=-1)
+    found = measures(GRID, step, CORNERS, REGION)
+    assert found["inside"] == pytest.approx(0.0)
+    assert found["outside"] == found["outside_minus_inside"] == pytest.approx(10.0)
     assert found["high_error_area"] == pytest.approx(10 / 21)
 
 
 def test_only_the_reachable_region_counts():
-    beyond = field(lambda grid: np.where(grid[..., 1:] > 1.5, 9.0, 0.01) * np.array([1.0, 0.0]))
-    found = measures(beyond, CORNERS, np.array([[0.0, 0.0], [1.0, 1.4]]))
-    assert found["mean_m"] == pytest.approx(0.01)
+    beyond = np.where(GRID[..., 1:] > 1.5, 9.0, 0.01) * np.array([1.0, 0.0])
+    found = measures(GRID, beyond, CORNERS, np.array([[0.0, 0.0], [1.0, 1.4]]))
+    assert found["mean"] == pytest.approx(1.0)
     assert found["steepness"] == pytest.approx(0.0)
 
 
@@ -58,18 +54,20 @@ def test_the_three_kept_span_the_largest_triangle():
 
 
 @pytest.mark.slow
-def test_the_recipe_runs_from_throws_to_claims_and_picture(tmp_path):
-    figures = DisplacementFields(generator="dmp", spacing=0.06).run(
-        Run(tmp_path, Scale(seeds=(0,), sets=("A",)))
-    )
-    figures = from_json(to_json(figures))
-    assert [row["demonstrations"] for row in figures["rows"]] == [6, 3]
-    assert figures["fields"][1]["training"]["subset"] is not None
+def test_the_recipe_runs_from_throws_to_table_and_picture(tmp_path):
+    planned = [
+        (Displacement(unit.training, spacing=0.06), names)
+        for unit, names in units(Scale(seeds=(0,), sets=("A",)), generator="dmp")
+    ]
+    results = gather(tmp_path, planned, "displacement")
+    six, three = summed(results).by("method").values()
     # Six throws of one pattern pin a segmented DMP down to less than half a centimetre or so.
-    assert figures["rows"][0]["inside_m"].value < 0.01
-    assert figures["three_minus_six"]["mean_m"].value > 0
-    assert all(claim.verdict is Verdict.OPEN for claim in RECIPE.claims(figures))
-    table = RECIPE.table(figures)
+    assert six.mean(measure("inside")).value < 1.0
+    assert three.minus(six, measure("mean")).value > 0
+    table = RECIPE.table(results)
+    assert [row[0] for row in table.rows] == [
+        "all demonstrations", "three demonstrations", "difference",
+    ]  # fmt: skip
     assert {len(row) for row in table.rows} == {len(table.header)}
-    (picture,) = RECIPE.draw(figures, tmp_path)
+    (picture,) = RECIPE.draw(results, tmp_path)
     assert picture.path.read_bytes().startswith(b"\x89PNG")

@@ -1,32 +1,28 @@
 """Rules beside one another in conditions, on fields by hand and one that was measured."""
 
-import json
-
 import numpy as np
 import pytest
+from gathered import gather
 
 from prior_reinforce.lab.experiments import fields
 from prior_reinforce.lab.experiments.fields import Change, Field, MeasuredField
-from prior_reinforce.lab.experiments.recipes import Run, Scale
-from prior_reinforce.lab.experiments.recipes.base import from_json, to_json
+from prior_reinforce.lab.experiments.recipes import Scale
+from prior_reinforce.lab.experiments.recipes.adaptation import later
 from prior_reinforce.lab.experiments.recipes.robustness import (
     CONDITIONS,
     RECIPE,
     RULES,
     Condition,
-    Robustness,
+    Rule,
     draws,
+    tried,
 )
-from prior_reinforce.lab.experiments.statistics import Interval
+from prior_reinforce.lab.experiments.results import TRIALS
 
 FIELDS = [[MeasuredField("basketball-v1", "basketball-v1", name, 0) for name in "A"]]
 OBSERVERS = "prior_reinforce.lab.experiments.observers"
-SMALL = Robustness(
-    conditions=(
-        Condition("by eye", FIELDS),
-        Condition("turned away", FIELDS, Change(shift=(-0.1, 0.05)), f"{OBSERVERS}:ErringEye"),
-    )
-)
+TURNED = Change(shift=(-0.1, 0.05))
+FROZEN = Rule("frozen", "frozen", carry_over=True)
 
 
 @pytest.fixture
@@ -48,49 +44,48 @@ def by_hand(monkeypatch):
 
 
 def test_conditions_give_table_picture_and_remarks(by_hand, tmp_path):
-    run = Run(tmp_path, Scale(rounds=4), include=("frozen",))
-    figures = from_json(to_json(SMALL.run(run)))
-    table = RECIPE.table(figures)
+    conditions = [
+        Condition("by eye", FIELDS),
+        Condition("turned away", FIELDS, TURNED, f"{OBSERVERS}:ErringEye"),
+    ]
+    planned = [unit for c in conditions for unit in tried(c, [*RULES, FROZEN], rounds=4)]
+    results = gather(tmp_path, planned, "robustness")
+    table = RECIPE.table(results)
     assert table.header[2] == "Bayesian, earlier goals too"
     assert table.header[-1] == "frozen"  # the one that was included
     assert "CMA-ES" not in table.header  # which searches, and these conditions ask for none
     assert [row[:2] for row in table.rows] == [("by eye", "7"), ("turned away", "7")]
-    for condition in figures["conditions"]:
-        of = {label: rule["mean"].value for label, rule in condition["rules"].items()}
-        assert of["Bayesian, earlier goals too"] < of["frozen"] == 5.0  # 3 cm off is never a hit
-        assert condition["rules"]["Bayesian, earlier goals too"]["ours_minus"].value == 0.0
-    (picture,) = RECIPE.draw(figures, tmp_path)
+    for of in later(results).by("condition").values():
+        methods = of.by("method")
+        ours = methods["Bayesian, earlier goals too"].mean(TRIALS).value
+        assert ours < methods["frozen"].mean(TRIALS).value == 5.0  # 3 cm off is never a hit
+    (picture,) = RECIPE.draw(results, tmp_path)
     assert picture.path.is_file()
-    assert "Brier" in RECIPE.remarks(figures)[-1]
+    assert "Brier" in RECIPE.remarks(results)[-1]
 
 
 def test_where_goals_are_tried_alone_nothing_is_remembered_and_ours_is_alone_too(by_hand, tmp_path):
-    alone = Robustness(conditions=(Condition("by eye, alone", FIELDS, goals=2, alone=True),))
-    run = Run(tmp_path, Scale(rounds=4), include=("frozen",))
-    figures = from_json(to_json(alone.run(run)))
-    table = RECIPE.table(figures)
+    alone = Condition("by eye, alone", FIELDS, goals=3, alone=True)
+    planned = tried(alone, [*RULES, Rule("frozen", "frozen")], rounds=4)
+    assert not any(unit.carry_over for unit, _ in planned)
+    table = RECIPE.table(gather(tmp_path, planned, "robustness"))
     assert table.header[2] == "Bayesian, each goal alone"
     assert not any("earlier goals too" in label for label in table.header)
     assert "(" not in table.rows[0][2]  # not compared with itself
-    assert "(" in table.rows[0][3]
-    kept = [json.loads(path.read_text())["unit"] for path in tmp_path.glob("units/*")]
-    assert not any(unit["carry_over"] for unit in kept if "carry_over" in unit)
-    rules = figures["conditions"][0]["rules"]
-    assert rules["Bayesian, each goal alone"]["ours_minus"].value == 0.0
-    assert rules["frozen"]["ours_minus"].value < 0.0
+    assert "(-" in table.rows[0][-1]  # with fewer trials than no adapter
 
 
 def test_who_is_ahead_of_ours_is_named(by_hand, tmp_path):
-    figures = SMALL.run(Run(tmp_path, Scale(rounds=2)))
-    figures["conditions"][0]["rules"]["mean offset"]["ours_minus"] = Interval(0.5, 0.4, 0.6)
-    assert "mean offset in 'by eye'" in RECIPE.remarks(figures)[0]
+    swapped = [FROZEN, Rule("Bayesian", "bayes", carry_over=True)]
+    results = gather(tmp_path, tried(Condition("by eye", FIELDS), swapped, rounds=2), "robustness")
+    assert "Bayesian in 'by eye' (+" in RECIPE.remarks(results)[0]
 
 
-def test_a_quick_run_is_one_condition_on_one_field(by_hand, tmp_path):
-    quick = Scale(rounds=2, variants=False)
-    (condition,) = Robustness().run(Run(tmp_path, quick))["conditions"]
-    assert condition["goals"] == 7
-    assert len(condition["rules"]) == 7
+def test_a_quick_run_is_one_condition_on_one_field():
+    planned = RECIPE.units(Scale(rounds=2, variants=False), ())
+    assert {names["condition"] for _, names in planned} == {"by eye"}
+    assert len({unit.measured for unit, _ in planned}) == 1
+    assert len(planned) == 7
 
 
 def test_every_draw_is_another_and_every_rule_has_its_own_name():
@@ -99,7 +94,7 @@ def test_every_draw_is_another_and_every_rule_has_its_own_name():
     assert len({rule.label for rule in RULES}) == len(RULES)
     assert len({condition.label for condition in CONDITIONS}) == len(CONDITIONS)
     assert all(c.alone == c.label.endswith(", alone") for c in CONDITIONS)
-    assert sum(c.alone for c in CONDITIONS) == 10
+    assert {"exact, alone", "labels exact, alone"} <= {c.label for c in CONDITIONS}
 
 
 def test_a_field_of_a_draw_is_measured_once_and_kept(monkeypatch, tmp_path):

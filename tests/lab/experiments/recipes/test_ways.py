@@ -1,11 +1,12 @@
-"""Generators on demonstrations of two ways: what is like no demonstration, and the figures."""
+"""Generators on demonstrations of two ways: what is like no demonstration, and the table."""
 
 import numpy as np
 import pytest
+from gathered import gather
 
-from prior_reinforce.lab.experiments.recipes import Run, Scale
-from prior_reinforce.lab.experiments.recipes.base import from_json, to_json
-from prior_reinforce.lab.experiments.recipes.ways import GENERATORS, RECIPE, SETS, Ways, unlike
+from prior_reinforce.lab.experiments.recipes import Scale, ways
+from prior_reinforce.lab.experiments.recipes.ways import GENERATORS, RECIPE, SETS, units, unlike
+from prior_reinforce.lab.experiments.results import FIRST
 from prior_reinforce.lab.tasks import make_task
 
 
@@ -21,19 +22,20 @@ def test_half_of_each_way_is_like_no_demonstration():
 def test_the_network_and_its_untrained_self_learn_from_every_set():
     choices = [choice for _, choice in GENERATORS]
     assert choices[1] == f"{choices[0]},training_steps=0"
-    trainings = Ways().trainings(Scale())
+    trainings = {unit.training for unit, _ in units(Scale())}
     assert len(trainings) == len(GENERATORS) * sum(map(len, SETS.values()))
 
 
 @pytest.mark.slow
-def test_closed_form_within_each_way_is_above_one_of_all(tmp_path):
+def test_closed_form_within_each_way_is_above_one_of_all(tmp_path, monkeypatch):
     """Also what the table shows, of quick generators."""
     quick = tuple(GENERATORS[i] for i in (3, 2))
-    measurement = Ways({"zoo-overarm": ("ways-8-100", "ways-8-101")}, quick)
-    figures = from_json(to_json(measurement.run(Run(tmp_path, Scale(goals=10, rounds=3)))))
-    within, of_all = (row["tasks"]["zoo-overarm"] for row in figures["rows"])
-    assert within["first"].value > 0.5 > of_all["first"].value
-    assert within["unlike"] < 0.2 < of_all["unlike"]
-    table = RECIPE.table(figures)
+    monkeypatch.setattr(ways, "GENERATORS", quick)
+    monkeypatch.setattr(ways, "SETS", {"zoo-overarm": ("ways-8-100", "ways-8-101")})
+    results = gather(tmp_path, units(Scale(goals=10, rounds=3)), "ways")
+    tried = [of.where(adapter="bayes").mean(FIRST) for of in results.by("method").values()]
+    assert tried[0].value > 0.5 > tried[1].value
+    table = RECIPE.table(results)
     assert {len(row) for row in table.rows} == {len(table.header)}
     assert [row[1] for row in table.rows] == [label for label, _ in quick]
+    assert float(table.rows[0][-1]) < 0.2 < float(table.rows[1][-1])  # like no demonstration

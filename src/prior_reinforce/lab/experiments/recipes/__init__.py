@@ -10,8 +10,10 @@ from prior_reinforce.lab.experiments.recipes import (
     alignment,
     displacement,
     generators,
+    papers_form,
     process,
     robustness,
+    sets,
     trials,
     variation,
     ways,
@@ -19,7 +21,6 @@ from prior_reinforce.lab.experiments.recipes import (
 )
 from prior_reinforce.lab.experiments.recipes.base import (
     QUICK,
-    Measurement,
     Picture,
     Recipe,
     Run,
@@ -28,21 +29,25 @@ from prior_reinforce.lab.experiments.recipes.base import (
 )
 
 RECIPES: Mapping[str, Recipe] = {
-    module.RECIPE.name: module.RECIPE
-    for module in (
-        zero_shot,
-        generators,
-        adapters,
-        alignment,
-        displacement,
-        trials,
-        process,
-        adaptation,
-        robustness,
-        variation,
-        ways,
+    recipe.name: recipe
+    for recipe in (
+        zero_shot.RECIPE,
+        generators.RECIPE,
+        adapters.RECIPE,
+        alignment.RECIPE,
+        displacement.RECIPE,
+        trials.RECIPE,
+        process.RECIPE,
+        adaptation.RECIPE,
+        robustness.RECIPE,
+        variation.RECIPE,
+        ways.RECIPE,
+        sets.RECIPE,
+        adaptation.NETWORK,
+        papers_form.RECIPE,
+        sets.NETWORK,
     )
 }
 """Every recipe by its name, in the order of the evidence page."""
 
-__all__ = ["QUICK", "RECIPES", "Measurement", "Picture", "Recipe", "Run", "Scale", "Table"]
+__all__ = ["QUICK", "RECIPES", "Picture", "Recipe", "Run", "Scale", "Table"]

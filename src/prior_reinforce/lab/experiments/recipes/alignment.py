@@ -6,7 +6,7 @@ shows the joint that moves most, which here is another.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,13 +15,14 @@ import numpy as np
 
 from prior_reinforce.lab.experiments.recipes.base import (
     TASK,
-    Figures,
-    Measurement,
     Picture,
+    Planned,
     Recipe,
-    Run,
+    Scale,
     Table,
 )
+from prior_reinforce.lab.experiments.results import Results
+from prior_reinforce.lab.experiments.units import Unit
 from prior_reinforce.lab.tasks import make_task
 from prior_reinforce.plans.alignment import align
 from prior_reinforce.plans.motions import Demonstrations
@@ -32,78 +33,95 @@ _TASKS = (TASK, "curling", "fishing")
 
 
 @dataclass(frozen=True)
-class AlignmentShifts(Measurement):
-    """When the demonstrations' motions begin, before and after alignment."""
+class Aligned(Unit):
+    """When the motions of a shipped prior set begin, before and after alignment."""
 
-    def run(self, run: Run) -> dict[str, Any]:
-        """Align every shipped prior set."""
-        sets = run.scale.sets
-        shown = make_task(TASK).demonstrations(sets[0])
-        joint = int(np.argmax(np.ptp(shown.plans, axis=1).mean(axis=0)))
+    task: str
+    """Whose demonstrations."""
+    demonstrations: str
+    """Prior set."""
+
+    @property
+    def label(self) -> str:
+        """What it is, for a progress line."""
+        return f"align {self.task} {self.demonstrations}"
+
+    def run(self, folder: Path) -> Mapping[str, Any]:
+        """Align it."""
+        recorded = make_task(self.task).demonstrations(self.demonstrations)
+        alignment = align(recorded)
+        both = recorded, alignment.demonstrations
         return {
-            "rows": [_row(task, name) for task in _TASKS for name in sets],
-            "shown": {
-                "set": sets[0],
-                "joint": shown.format.names[joint],
-                "unit": shown.format.units[joint],
-                "dt_s": shown.format.dt,
-                "before": shown.plans[:, :, joint].tolist(),
-                "after": align(shown).demonstrations.plans[:, :, joint].tolist(),
-            },
+            "shift_s": alignment.shifts.tolist(),
+            "start_s": [_moments(onset, demonstrations) for demonstrations in both],
+            "middle_s": [_moments(middle, demonstrations) for demonstrations in both],
         }
 
+    def rows(self, result: Mapping[str, Any]) -> list[dict[str, Any]]:
+        """A row a demonstration."""
+        (starts, aligned_starts), (middles, aligned_middles) = result["start_s"], result["middle_s"]
+        columns = {
+            "shift_s": result["shift_s"],
+            "start_s": starts,
+            "aligned_start_s": aligned_starts,
+            "middle_s": middles,
+            "aligned_middle_s": aligned_middles,
+        }
+        told = {"learned_on": self.task, "set": self.demonstrations}
+        return [
+            {**told, "demonstration": i, **dict(zip(columns, values, strict=True))}
+            for i, values in enumerate(zip(*columns.values(), strict=True))
+        ]
 
-def _row(task: str, name: str) -> dict[str, Any]:
-    recorded = make_task(task).demonstrations(name)
-    alignment = align(recorded)
-    both = recorded, alignment.demonstrations
-    return {
-        "task": task,
-        "set": name,
-        "shifts_s": alignment.shifts.tolist(),
-        "start_sd_s": [_spread(onset, demonstrations) for demonstrations in both],
-        "middle_sd_s": [_spread(middle, demonstrations) for demonstrations in both],
-    }
 
-
-def _spread(moment: Callable[[Any], float], demonstrations: Demonstrations) -> float:
-    """Standard deviation over demonstrations of a moment of their motion, in [s]."""
+def _moments(moment: Callable[[Any], float], demonstrations: Demonstrations) -> list[float]:
+    """A moment of each demonstration's motion, in [s]."""
     speeds = recorded_speeds(demonstrations.plans, demonstrations.format.units)
-    moments = [moment(speed) for speed in speeds]
-    return float(np.std(moments) * demonstrations.format.dt)
+    return [round(float(moment(speed) * demonstrations.format.dt), 5) for speed in speeds]
 
 
-def table(figures: Figures) -> Table:
-    """One row a prior set."""
+def units(scale: Scale, include: Sequence[str] = ()) -> list[Planned]:
+    """Every shipped prior set."""
+    return [(Aligned(task, name), {}) for task in _TASKS for name in scale.sets]
+
+
+def table(results: Results) -> Table:
+    """One row a prior set; standard deviations over its demonstrations."""
+
+    def sd(name: str) -> Callable[[Any], str]:
+        return lambda row: f"{1000 * row[1][name].std(ddof=0):.0f}"
+
     columns = {
-        "task": lambda row: row["task"],
-        "set": lambda row: row["set"],
-        "moved by up to [s]": lambda row: f"{max(map(abs, row['shifts_s'])):.2f}",
-        "starts, sd [ms]": lambda row: f"{1000 * row['start_sd_s'][0]:.0f}",
-        "aligned": lambda row: f"{1000 * row['start_sd_s'][1]:.0f}",
-        "middles, sd [ms]": lambda row: f"{1000 * row['middle_sd_s'][0]:.0f}",
-        "aligned ": lambda row: f"{1000 * row['middle_sd_s'][1]:.0f}",
+        "task": lambda row: row[0][0],
+        "set": lambda row: row[0][1],
+        "moved by up to [s]": lambda row: f"{row[1]['shift_s'].abs().max():.2f}",
+        "starts, sd [ms]": sd("start_s"),
+        "aligned": sd("aligned_start_s"),
+        "middles, sd [ms]": sd("middle_s"),
+        "aligned ": sd("aligned_middle_s"),
     }
-    return Table.of(figures["rows"], columns)
+    return Table.of(list(results.frame.groupby(["learned_on", "set"], sort=False)), columns)
 
 
-def draw(figures: Figures, folder: Path) -> list[Picture]:
-    """Draw one joint of all demonstrations, before and after."""
+def draw(results: Results, folder: Path) -> list[Picture]:
+    """Draw one joint of the shipped demonstrations, before and after."""
     from prior_reinforce.lab.experiments.recipes.charts import draw_alignment
 
-    shown = figures["shown"]
+    name = results.frame["set"].iloc[0]
+    shown = make_task(TASK).demonstrations(name)
+    joint = int(np.argmax(np.ptp(shown.plans, axis=1).mean(axis=0)))
     path = draw_alignment(
-        np.array(shown["before"]),
-        np.array(shown["after"]),
-        f"{shown['joint']} [{shown['unit']}]",
-        shown["dt_s"],
+        shown.plans[:, :, joint],
+        align(shown).demonstrations.plans[:, :, joint],
+        f"{shown.format.names[joint]} [{shown.format.units[joint]}]",
+        shown.format.dt,
         folder / "alignment.png",
     )
     caption = (
-        f"{shown['joint']} of all demonstrations of {TASK}, set {shown['set']}: as recorded (top) "
-        "and aligned in time (bottom). A line is a demonstration."
+        f"{shown.format.names[joint]} of all demonstrations of {TASK}, set {name}: as recorded "
+        "(top) and aligned in time (bottom). A line is a demonstration."
     )
     return [Picture(path, caption)]
 
 
-RECIPE = Recipe("alignment", "Timeline alignment", "Figure 6", AlignmentShifts(), table, draw)
+RECIPE = Recipe("alignment", "Timeline alignment", "Figure 6", units, table, draw)

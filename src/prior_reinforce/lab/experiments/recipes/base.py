@@ -1,34 +1,31 @@
-"""What a recipe is: a measurement that gives figures, and what is made of the figures.
+"""What a recipe is: which units it runs, and what is made of their rows.
 
-Figures are one dict of plain values and intervals, kept as JSON. Table, pictures and claims are
-functions of the figures alone, so a page can be drawn again from the files of a run that took an
-hour.
+Table, pictures and remarks are functions of the raw rows alone, so that they are made again in
+seconds from the table of a run that took an hour.
 """
 
 from __future__ import annotations
 
-import json
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
-from importlib.metadata import version
+from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal
-
-import numpy as np
-from jaxtyping import Int
 
 from prior_reinforce.adapters import ADAPTERS, make_adapter
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.generators import GENERATORS, make_generator
-from prior_reinforce.lab.experiments.claims import Claim
-from prior_reinforce.lab.experiments.evaluation import GOAL_SEED, Training, Trials
-from prior_reinforce.lab.experiments.statistics import Curve, Interval
-from prior_reinforce.lab.experiments.units import Unit, Workers, commit, run_units
+from prior_reinforce.lab.experiments.evaluation import Training
+from prior_reinforce.lab.experiments.results import ROUNDS, TRIALS, Measure, Results, Row, reached
+from prior_reinforce.lab.experiments.statistics import Interval
+from prior_reinforce.lab.experiments.units import Unit, Workers, result_path, run_units
+from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
 
 TASK = "basketball-v1"
 """The task of all comparisons of methods, as in the paper."""
 _ROUNDS_SHOWN = (1, 2, 4, 8, 10)
+_SLOWEST = "diffusion-paper"
+"""Takes forty times as long to learn as the next."""
 
 Family = Literal["generator", "adapter"]
 _COMPARED: tuple[tuple[Family, Callable[[str], Any], Callable[[str], Any]], ...] = (
@@ -36,8 +33,9 @@ _COMPARED: tuple[tuple[Family, Callable[[str], Any], Callable[[str], Any]], ...]
     ("adapter", ADAPTERS.resolve, make_adapter),
 )
 
-Figures = Mapping[str, Any]
 Progress = Callable[[int, int, str], None]
+Planned = tuple[Unit, Mapping[str, str]]
+"""A unit, and columns that name its place in a recipe: `method`, `condition`."""
 
 
 @dataclass(frozen=True)
@@ -50,17 +48,24 @@ class Scale:
     """Training seeds."""
     sets: tuple[str, ...] = ("A", "B")
     """Prior sets."""
-    rounds: int = 10
+    rounds: int = ROUNDS
     """Trials a goal at most."""
     variants: bool = True
     """Whether what the paper does not compare is run beside it."""
     read_pictures: bool = True
     """Whether rows are run whose trials are read from pictures: they take long."""
+    model: VisionLanguageModelConfig | None = None
+    """Endpoint that reads the pictures; None for the camera that finds objects by colour."""
 
-    @property
-    def trainings(self) -> int:
-        """Trainings of a method: what the intervals resample besides goals."""
-        return len(self.seeds) * len(self.sets)
+    def trainings(
+        self, generator: str, task: str = TASK, *, perception: str | None = None
+    ) -> list[Training]:
+        """One training for each prior set and seed; `perception` sees the demonstrations."""
+        return [
+            Training(task, name, generator, seed, perception=perception)
+            for name in self.sets
+            for seed in self.seeds
+        ]
 
 
 QUICK = Scale(goals=10, seeds=(0,), sets=("A",), variants=False, read_pictures=False)
@@ -69,51 +74,41 @@ QUICK = Scale(goals=10, seeds=(0,), sets=("A",), variants=False, read_pictures=F
 
 @dataclass(frozen=True)
 class Run:
-    """One execution of a recipe."""
+    """Where and how units run."""
 
     folder: Path
     """Where units and models lie; a killed run goes on from there."""
-    scale: Scale
-    """How much is run."""
     workers: Workers = field(default_factory=Workers)
     """Where units run."""
     progress: Progress = lambda done, total, label: None
     """Called with units done, units in all, and the label of the last one."""
-    include: tuple[str, ...] = ()
-    """Choices of the recipe's family that are put beside ours."""
-    commits: set[str] = field(default_factory=lambda: {commit()})
-    """What made the figures: this code, and whatever ran units that were found on disk."""
+    only_found: bool = False
+    """Whether nothing is run: units that are not on disk give no rows."""
 
-    def learn(self, trainings: Sequence[Training]) -> int:
-        """Learn what is not learned yet, from demonstrations that are perceived first and once.
+    def prepare(self, units: Sequence[Unit]) -> None:
+        """Run what units need, before all that need it; the slowest first, so no core waits."""
+        level, levels = list(units), []
+        while level := list(dict.fromkeys(need for unit in level for need in unit.needs)):
+            levels.append(sorted(level, key=lambda unit: _SLOWEST not in unit.label))
+        for needed in reversed(levels):
+            run_units(needed, self.folder, self.workers, self.progress)
 
-        Returns:
-            How many demonstrations perception gave up on, so that they were judged by eye.
-        """
-        perceived = dict.fromkeys(t.perceived for t in trainings if t.perceived is not None)
-        seen = self.results(list(perceived))
-        self.results(trainings)
-        return sum(result["failed_readings"] for result in seen)
+    def found(self, planned: Sequence[Planned]) -> list[Planned]:
+        """Those whose results are on disk."""
+        return [p for p in planned if result_path(self.folder, p[0]).is_file()]
 
-    def results(self, units: Sequence[Unit]) -> list[Mapping[str, Any]]:
-        """Run units that are not done yet; every unit's result, in order."""
-        rows = run_units(units, self.folder, self.workers, self.progress)
-        self.commits.update(row.get("commit", "unknown") for row in rows)
-        return [row["result"] for row in rows]
-
-    def solved_at(self, units: Sequence[Trials]) -> Int[np.ndarray, "units goals"]:
-        """Trial that reached each goal, 0 where none did."""
-        return np.array([result["solved_at"] for result in self.results(units)])
-
-    def made_by(self, command: str) -> dict[str, Any]:
-        """What makes the figures again: version, commits of the units, scale and seeds."""
-        return {
-            "command": command,
-            "version": version("prior-reinforce"),
-            "commit": ", ".join(sorted(self.commits)),
-            "scale": asdict(self.scale),
-            "goal_seed": GOAL_SEED,
-        }
+    def rows(self, planned: Sequence[Planned]) -> list[Row]:
+        """Run what is not done yet; the rows of all, each with the commit that made it."""
+        if self.only_found:
+            planned = self.found(planned)
+        else:
+            self.prepare([unit for unit, _ in planned])
+        kept = run_units([unit for unit, _ in planned], self.folder, self.workers, self.progress)
+        return [
+            {**names, **row, "commit": of_unit.get("commit", "unknown")}
+            for (unit, names), of_unit in zip(planned, kept, strict=True)
+            for row in unit.rows(of_unit["result"])
+        ]
 
 
 @dataclass(frozen=True)
@@ -140,40 +135,28 @@ class Picture:
     """What is seen, in a sentence or two; read aloud where the picture cannot be seen."""
 
 
-class Measurement(ABC):
-    """What a recipe measures: a frozen dataclass of settings."""
-
-    def trainings(self, scale: Scale, include: Sequence[str] = ()) -> Sequence[Training]:
-        """What is to be learned first, so that recipes can share it and learn side by side."""
-        return ()
-
-    @abstractmethod
-    def run(self, run: Run) -> dict[str, Any]:
-        """Run what is not done yet, and return the figures."""
-
-
 @dataclass(frozen=True)
 class Recipe:
     """One figure or table of the paper."""
 
     name: str
-    """On the command line, and of its file of figures."""
+    """On the command line, and of its file of rows."""
     title: str
     """Heading of its section."""
     paper: str
     """The figure or table of the paper that it answers."""
-    measurement: Measurement
-    """What is run."""
-    table: Callable[[Figures], Table]
-    """Puts the figures into rows."""
-    draw: Callable[[Figures, Path], list[Picture]] = lambda figures, folder: []
-    """Draws the figures as PNGs in a folder."""
-    claims: Callable[[Figures], list[Claim]] = lambda figures: []
-    """Holds what the paper says against what was measured."""
-    remarks: Callable[[Figures], list[str]] = lambda figures: []
+    units: Callable[[Scale, Sequence[str]], list[Planned]]
+    """What is run at a scale, with choices of the recipe's family put beside ours."""
+    table: Callable[[Results], Table]
+    """Puts the recipe's rows into a table."""
+    draw: Callable[[Results, Path], list[Picture]] = lambda results, folder: []
+    """Draws them as PNGs in a folder."""
+    remarks: Callable[[Results], list[str]] = lambda results: []
     """Says in sentences what was measured besides the claims and must not be missed."""
     family: Family | None = None
     """Which family's members `--include` puts beside ours; None where none can join."""
+    apart: bool = False
+    """Whether it is run by its name, or with `more`, and not with `all`: it takes hours."""
 
     def joining(self, include: Sequence[str]) -> tuple[str, ...]:
         """Which of some choices belong to the family that is compared here.
@@ -204,51 +187,24 @@ def family_of(choice: str) -> Family:
     )
 
 
-def trainings_of(scale: Scale, generator: str, *, perception: str | None = None) -> list[Training]:
-    """One training for each prior set and seed; `perception` sees the demonstrations."""
-    return [
-        Training(TASK, name, generator, seed, perception=perception)
-        for name in scale.sets
-        for seed in scale.seeds
-    ]
-
-
-def table_by_round(
-    head: str, success: Mapping[str, Curve], ours: str, ours_minus: Mapping[str, Curve]
-) -> Table:
-    """One row a method: shares reached by some rounds, and how far ours is above it.
+def table_by_round(methods: Mapping[str, Results], head: str, ours: str) -> Table:
+    """One row a method: shares reached by some rounds, trials, and how many fewer ours needs.
 
     Args:
+        methods: Rows by what each method is called.
         head: Of the first column.
-        success: By what each method is called.
-        ours: What ours is called in the head of the last column.
-        ours_minus: Ours minus each other method.
+        ours: Which of them ours is.
     """
-    rounds = len(next(iter(success.values())))
-    shown = [r for r in _ROUNDS_SHOWN if r <= rounds]
-    at = 4 if 4 in shown else shown[-1]
-    rows = (
-        (
-            name,
-            *(str(curve[r - 1]) for r in shown),
-            f"{ours_minus[name][at - 1]:+.2f}" if name in ours_minus else "",
-        )
-        for name, curve in success.items()
+    columns: dict[str, Callable[[str], object]] = {head: lambda name: name}
+    for by in _ROUNDS_SHOWN:
+        columns[f"by round {by}"] = partial(_reached, methods, reached(by))
+    columns["trials"] = lambda name: methods[name].mean(TRIALS)
+    columns[f"{ours} minus it, trials"] = lambda name: (
+        f"{methods[ours].minus(methods[name], TRIALS):+.2f}" if name != ours in methods else ""
     )
-    header = (head, *(f"by round {r}" for r in shown), f"{ours} minus it, round {at}")
-    return Table(header, tuple(rows))
+    columns["trainings"] = lambda name: methods[name].trainings
+    return Table.of(list(methods), columns)
 
 
-def to_json(figures: Figures) -> str:
-    """Figures as they are kept."""
-    return json.dumps(figures, indent=1, default=asdict) + "\n"
-
-
-def from_json(text: str) -> Figures:
-    """Figures as they were before they became JSON."""
-
-    def revived(values: dict[str, Any]) -> Any:
-        return Interval(**values) if values.keys() == {"value", "low", "high"} else values
-
-    figures: Figures = json.loads(text, object_hook=revived)
-    return figures
+def _reached(methods: Mapping[str, Results], measure: Measure, name: str) -> Interval:
+    return methods[name].mean(measure)

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -18,7 +17,8 @@ from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.patches import Rectangle
 
-from prior_reinforce.lab.experiments.statistics import Curve, Interval
+from prior_reinforce.lab.experiments.results import ROUNDS, Results, reached
+from prior_reinforce.lab.experiments.statistics import Interval
 from prior_reinforce.report.style import (
     INK,
     INK_SOFT,
@@ -46,12 +46,19 @@ class Line:
     """One method."""
 
     label: str
-    curve: Curve
+    curve: Sequence[Interval]
+    """An interval a point."""
     place: int
     """Which colour and marker; the same method has the same in every panel."""
     dashed: bool = False
     each: Sequence[Sequence[float]] = ()
     """What each point of the curve is the mean of, where that is drawn instead of intervals."""
+
+
+def curve(results: Results, minus: Results | None = None) -> list[Interval]:
+    """Share of goals reached within 1, 2, ... rounds; or how far it is above another."""
+    measures = [reached(by) for by in range(1, ROUNDS + 1)]
+    return [results.mean(m) if minus is None else results.minus(minus, m) for m in measures]
 
 
 @dataclass(frozen=True)
@@ -140,13 +147,15 @@ def draw_kinds(kinds: Sequence[str], panels: Mapping[str, Sequence[Line]], path:
 
 @drawing()
 def draw_fields(
-    fields: Sequence[Mapping[str, Any]], region: Float[np.ndarray, "2 2"], path: Path
+    fields: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray]],
+    region: Float[np.ndarray, "2 2"],
+    path: Path,
 ) -> Path:
     """Draw displacement fields one above the other, y to the left and x upwards.
 
     Args:
-        fields: Each with the grid's `axes_m`, its `displacements_m` and the `outcomes_m` of the
-            demonstrations.
+        fields: Each with its conditions and displacements, (nx, ny, 2), and the demonstrations'
+            outcomes, (N, 2), all in [m].
         region: Reachable region, lower and upper corner, [m].
         path: PNG to write.
     """
@@ -155,8 +164,8 @@ def draw_fields(
         figure.subplots(len(fields), 1, squeeze=False)[:, 0], fields, strict=True
     ):
         calm_axes(axes, grid=False)
-        x, y = (100 * np.array(axis) for axis in field["axes_m"])
-        arrows, outcomes = (100 * np.array(field[key]) for key in ("displacements_m", "outcomes_m"))
+        grid, arrows, outcomes = (100 * of for of in field)
+        x, y = grid[:, 0, 0], grid[0, :, 1]
         colours = axes.pcolormesh(
             y,
             x,

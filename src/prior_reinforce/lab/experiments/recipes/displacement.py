@@ -8,34 +8,27 @@ that is kindest to three. It gives no number for "high error" either.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from itertools import combinations
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from jaxtyping import Bool, Float
 
 from prior_reinforce.arrays import Points
-from prior_reinforce.lab.experiments.claims import Claim, above
 from prior_reinforce.lab.experiments.evaluation import Training
 from prior_reinforce.lab.experiments.recipes.base import (
     TASK,
-    Figures,
-    Measurement,
     Picture,
+    Planned,
     Recipe,
-    Run,
     Scale,
     Table,
-    trainings_of,
 )
-from prior_reinforce.lab.experiments.statistics import (
-    SHARE,
-    Interval,
-    bootstrap_difference,
-    bootstrap_mean,
-)
+from prior_reinforce.lab.experiments.results import Measure, Results
+from prior_reinforce.lab.experiments.statistics import SHARE
 from prior_reinforce.lab.experiments.units import Unit
 from prior_reinforce.lab.tasks import make_task
 
@@ -76,61 +69,25 @@ class Displacement(Unit):
             "lost": sum(not rollout.valid for rollout in rollouts),
         }
 
-
-@dataclass(frozen=True)
-class DisplacementFields(Measurement):
-    """Arrows from condition to landing, learned from six and from three demonstrations."""
-
-    generator: str = "diffusion"
-    """Generator whose conditions are laid out."""
-    spacing: float = 0.025
-    """Spacing of the grid of conditions, in [m]."""
-
-    def trainings(self, scale: Scale, include: Sequence[str] = ()) -> Sequence[Training]:
-        """The generator from all demonstrations of each set, then from three."""
-        full = trainings_of(scale, self.generator)
-        return [*full, *(replace(t, subset=widest_three(t.recorded().outcomes_seen)) for t in full)]
-
-    def run(self, run: Run) -> dict[str, Any]:
-        """Throw once for every condition of a grid."""
-        trainings = self.trainings(run.scale)
-        run.learn(trainings)
-        results = run.results([Displacement(training, self.spacing) for training in trainings])
-        region = make_task(TASK).region
-        n = run.scale.trainings
-        outcomes = [training.learned(run.folder).prior.outcomes_seen for training in trainings]
-        summed = [
-            measures(result, landed, region)
-            for landed, result in zip(outcomes, results, strict=True)
+    def rows(self, result: Mapping[str, Any]) -> list[dict[str, Any]]:
+        """A row a condition: where it is, and where the throw landed from there, in [m]."""
+        x, y = result["axes_m"]
+        told = {**self.training.columns, "task": self.training.task}
+        return [
+            {**told, "x": round(a, 5), "y": round(b, 5), "dx": off[0], "dy": off[1]}
+            for a, line in zip(x, result["displacements_m"], strict=True)
+            for b, off in zip(y, line, strict=True)
         ]
-        # The grid is the same for all, so only trainings are resampled.
-        by_name = {name: np.array([m[name] for m in summed]).reshape(2, n, 1) for name in summed[0]}
-        return {
-            "trainings": n,
-            "high_error_m": HIGH_ERROR,
-            "region_m": region.tolist(),
-            "rows": [
-                {
-                    "demonstrations": len(outcomes[i * n]),
-                    **{
-                        name: bootstrap_mean(v[i], within=_within(name))
-                        for name, v in by_name.items()
-                    },
-                }
-                for i in range(2)
-            ],
-            "three_minus_six": {
-                name: bootstrap_difference(v[1], v[0], within=_within(name))
-                for name, v in by_name.items()
-            },
-            "outside_minus_inside_m": bootstrap_difference(
-                by_name["outside_m"][0], by_name["inside_m"][0]
-            ),
-            "fields": [
-                {**results[i], "outcomes_m": outcomes[i].tolist(), "training": asdict(trainings[i])}
-                for i in (0, n)
-            ],
-        }
+
+
+def units(scale: Scale, include: Sequence[str] = (), generator: str = "diffusion") -> list[Planned]:
+    """A grid of conditions, learned from all demonstrations of each set, and from three."""
+    full = scale.trainings(generator)
+    few = [replace(t, subset=widest_three(t.recorded().outcomes_seen)) for t in full]
+    return [
+        *((Displacement(t), {"method": "all demonstrations"}) for t in full),
+        *((Displacement(t), {"method": "three demonstrations"}) for t in few),
+    ]
 
 
 def widest_three(outcomes: Float[np.ndarray, "N 2"]) -> tuple[int, ...]:
@@ -143,27 +100,46 @@ def widest_three(outcomes: Float[np.ndarray, "N 2"]) -> tuple[int, ...]:
     return max(combinations(range(len(outcomes)), 3), key=doubled_area)
 
 
-def measures(
-    result: Mapping[str, Any], outcomes: Points, region: Float[np.ndarray, "2 2"]
-) -> dict[str, float]:
-    """Sum a field up.
+def summed(results: Results) -> Results:
+    """A row a training, with the measures of its field as columns.
 
-    Args:
-        result: Of a `Displacement` unit.
-        outcomes: Where the demonstrations landed, [m].
-        region: Lower and upper corner of the reachable region, [m].
-
-    Returns:
-        `high_error_area`, a share of the reachable region; `mean_m`, the mean error in it, [m];
-        `inside_m` and `outside_m`, mean errors of the whole grid inside and outside the hull of
-        the outcomes, [m]; `steepness`, the mean change of the displacement from a point of the
-        reachable region to the next, for each unit of their distance.
+    `high_error_area`, a share of the reachable region; `mean`, the mean error in it, [cm];
+    `inside` and `outside`, mean errors of the whole grid inside and outside the hull of the
+    demonstrations' outcomes, [cm]; `outside_minus_inside`; `steepness`, the mean change of the
+    displacement from a point of the reachable region to the next, for each unit of their distance.
     """
+    if results.empty:
+        return results
+    rows = []
+    by = ["method", "learned_on", "set", "seed"]
+    for names, field in results.frame.groupby(by, sort=False):
+        told = dict(zip(by, names, strict=True))
+        task = make_task(told["learned_on"])
+        outcomes = task.demonstrations(told["set"]).outcomes_seen
+        if field["count"].notna().all():
+            outcomes = outcomes[list(widest_three(outcomes))]
+        # The grid is the same for all, so only trainings are resampled.
+        found = measures(*_grid(field), outcomes, task.region)
+        rows.append({**told, "task": TASK, "goal": 0, **found})
+    return Results(pd.DataFrame(rows), results.made_by)
+
+
+def _grid(field: pd.DataFrame) -> tuple[np.ndarray, np.ndarray]:
+    """Conditions and displacements of a field's rows, [m], shape (nx, ny, 2) each."""
+    shape = field["x"].nunique(), field["y"].nunique(), 2
+    return tuple(field[list(of)].to_numpy().reshape(shape) for of in (("x", "y"), ("dx", "dy")))
+
+
+def measures(
+    conditions: Float[np.ndarray, "nx ny 2"],
+    displacements: Float[np.ndarray, "nx ny 2"],
+    outcomes: Points,
+    region: Float[np.ndarray, "2 2"],
+) -> dict[str, float]:
+    """Sum a field up; `outcomes` are where the demonstrations landed, `region` is reachable."""
     from scipy.spatial import Delaunay
 
-    x, y = (np.array(axis) for axis in result["axes_m"])
-    displacements = np.array(result["displacements_m"])
-    conditions = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1)
+    x, y = conditions[:, 0, 0], conditions[0, :, 1]
     reachable = np.all((conditions > region[0] - 1e-9) & (conditions < region[1] + 1e-9), axis=-1)
     errors = np.linalg.norm(displacements, axis=-1)
     hull = Delaunay(outcomes).find_simplex(conditions) >= 0
@@ -171,18 +147,15 @@ def measures(
         np.linalg.norm(np.diff(displacements, axis=a), axis=-1)[_both(reachable, a)] / np.diff(v)[0]
         for a, v in ((0, x), (1, y))
     ]
+    inside, outside = 100 * np.mean(errors[hull]), 100 * np.mean(errors[~hull])
     return {
         "high_error_area": float(np.mean(errors[reachable] > HIGH_ERROR)),
-        "mean_m": float(np.mean(errors[reachable])),
-        "inside_m": float(np.mean(errors[hull])),
-        "outside_m": float(np.mean(errors[~hull])),
+        "mean": float(100 * np.mean(errors[reachable])),
+        "inside": float(inside),
+        "outside": float(outside),
+        "outside_minus_inside": float(outside - inside),
         "steepness": float(np.mean(np.concatenate(steps))),
     }
-
-
-def _within(name: str) -> tuple[float, float]:
-    """What one of the `measures` can be."""
-    return SHARE if name == "high_error_area" else (0.0, np.inf)
 
 
 def _both(mask: Bool[np.ndarray, "nx ny"], axis: int) -> Bool[np.ndarray, "mx my"]:
@@ -190,76 +163,52 @@ def _both(mask: Bool[np.ndarray, "nx ny"], axis: int) -> Bool[np.ndarray, "mx my
     return np.asarray(np.delete(mask, 0, axis) & np.delete(mask, -1, axis))
 
 
-def table(figures: Figures) -> Table:
+def measure(name: str) -> Measure:
+    """One of the measures of `summed`."""
+    within = {"high_error_area": SHARE, "outside_minus_inside": (-np.inf, np.inf)}
+    return Measure(lambda rows: rows[name].to_numpy(), within.get(name, (0.0, np.inf)))
+
+
+def table(results: Results) -> Table:
     """One row a number of demonstrations, and their difference."""
-    off = f"share of the region off by over {figures['high_error_m'] * 100:.0f} cm"
-    rows = [(f"{row['demonstrations']} demonstrations", row, ".2f") for row in figures["rows"]]
-    rows.append(("difference", figures["three_minus_six"], "+.2f"))
-    columns = {
-        "learned from": lambda row: row[0],
-        off: lambda row: format(row[1]["high_error_area"], row[2]),
-        "mean error [cm]": lambda row: format(_cm(row[1]["mean_m"]), row[2]),
-        "inside the demonstrations' hull [cm]": lambda row: format(_cm(row[1]["inside_m"]), row[2]),
-        "outside it [cm]": lambda row: format(_cm(row[1]["outside_m"]), row[2]),
-        "steepness of the field [cm/cm]": lambda row: format(row[1]["steepness"], row[2]),
+    by = summed(results).by("method")
+    heads = {
+        f"share of the region off by over {HIGH_ERROR * 100:.0f} cm": measure("high_error_area"),
+        "mean error [cm]": measure("mean"),
+        "inside the demonstrations' hull [cm]": measure("inside"),
+        "outside it [cm]": measure("outside"),
+        "steepness of the field [cm/cm]": measure("steepness"),
     }
-    return Table.of(rows, columns)
+    cells = [(name, *(str(of.mean(m)) for m in heads.values())) for name, of in by.items()]
+    if len(by) == 2:
+        full, few = by.values()
+        cells.append(("difference", *(f"{few.minus(full, m):+.2f}" for m in heads.values())))
+    return Table(("learned from", *heads), tuple(cells))
 
 
-def draw(figures: Figures, folder: Path) -> list[Picture]:
+def draw(results: Results, folder: Path) -> list[Picture]:
     """Two fields, one above the other, of the first prior set and seed."""
     from prior_reinforce.lab.experiments.recipes.charts import draw_fields
 
-    path = draw_fields(
-        figures["fields"], np.array(figures["region_m"]), folder / "displacement.png"
-    )
-    training = figures["fields"][0]["training"]
+    one = results.frame.iloc[0]
+    shown = results.where(set=one["set"], seed=one["seed"])
+    task = make_task(TASK)
+    outcomes = task.demonstrations(one["set"]).outcomes_seen
+    landed = {"three demonstrations": outcomes[list(widest_three(outcomes))]}
+    fields = [
+        (*_grid(of.frame), landed.get(name, outcomes)) for name, of in shown.by("method").items()
+    ]
+    path = draw_fields(fields, task.region, folder / "displacement.png")
     caption = (
         "Each arrow leads from the goal that was asked for to where the throw landed, without any "
         "trial; the colour is how far that is. Yellow: where the demonstrations landed. Dashed: "
-        "the reachable region, seen from behind the robot. Prior set "
-        f"{training['demonstrations']}, seed {training['seed']}."
+        f"the reachable region, seen from behind the robot. Prior set {one['set']}, seed "
+        f"{one['seed']}."
     )
     return [Picture(path, caption)]
 
 
-def claims(figures: Figures) -> list[Claim]:
-    """Small inside, larger outside; three demonstrations widen and disorder it."""
-    trainings, difference = figures["trainings"], figures["three_minus_six"]
-    outside = _cm(figures["outside_minus_inside_m"])
-    area = difference["high_error_area"]
-    steepness = difference["steepness"]
-    six, three = figures["rows"]
-    return [
-        Claim(
-            "With six demonstrations errors are small within the demonstrated region and "
-            "grow towards the boundary (here: larger outside the hull than inside).",
-            f"mean error inside {_cm(six['inside_m'])} cm, outside {_cm(six['outside_m'])} cm; "
-            f"difference {outside:+.2f} cm",
-            above(outside, 0.0, trainings),
-        ),
-        Claim(
-            "With three demonstrations high-error regions expand.",
-            f"share of the region off by over {figures['high_error_m'] * 100:.0f} cm: "
-            f"{three['high_error_area']} against "
-            f"{six['high_error_area']}; difference {area:+.2f}",
-            above(area, 0.0, trainings),
-        ),
-        Claim(
-            "With three demonstrations the field becomes less structured.",
-            f"neighbouring displacements differ by {three['steepness']} cm a cm "
-            f"against {six['steepness']}; difference {steepness:+.2f}",
-            above(steepness, 0.0, trainings),
-        ),
-    ]
-
-
-def _cm(metres: Interval) -> Interval:
-    """An interval in [m], in [cm]."""
-    return Interval(100 * metres.value, 100 * metres.low, 100 * metres.high)
-
-
 RECIPE = Recipe(
     "displacement", "Displacement fields with six and with three demonstrations", "Figure 8",
-    DisplacementFields(), table, draw, claims,
+    units, table, draw,
 )  # fmt: skip

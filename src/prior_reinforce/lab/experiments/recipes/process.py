@@ -11,15 +11,8 @@ import numpy as np
 
 from prior_reinforce.lab.experiments.evaluation import Training, Trials
 from prior_reinforce.lab.experiments.protocol import GoalTrials
-from prior_reinforce.lab.experiments.recipes.base import (
-    Figures,
-    Measurement,
-    Picture,
-    Recipe,
-    Run,
-    Scale,
-    Table,
-)
+from prior_reinforce.lab.experiments.recipes.base import Picture, Planned, Recipe, Scale, Table
+from prior_reinforce.lab.experiments.results import Results, as_text
 from prior_reinforce.lab.experiments.units import Unit
 from prior_reinforce.wording import to_words
 
@@ -65,36 +58,23 @@ class Process(Unit):
         )
         return {"goals": [_kept(result) for result in trials.trials(folder)]}
 
-
-@dataclass(frozen=True)
-class ProcessPictures(Measurement):
-    """The trials of one goal of each task."""
-
-    tasks: tuple[str, ...] = tuple(TASKS)
-    """Which of `TASKS`."""
-    generator: str = "diffusion"
-    """What is learned."""
-
-    def trainings(self, scale: Scale, include: Sequence[str] = ()) -> Sequence[Training]:
-        """One a task: the first set and seed."""
-        first = scale.sets[0], self.generator, scale.seeds[0]
-        return [Training(task, *first, perception="eye") for task in self.tasks]
-
-    def run(self, run: Run) -> dict[str, Any]:
-        """Try the unseen goals of each task, and choose one of them."""
-        trainings = self.trainings(run.scale)
-        run.learn(trainings)
-        results = run.results([Process(t, rounds=run.scale.rounds) for t in trainings])
-        return {
-            "rows": [
-                {
-                    "task": training.task,
-                    "demonstrated": training.learned(run.folder).prior.outcomes_seen.tolist(),
-                    **_chosen(result["goals"]),
-                }
-                for training, result in zip(trainings, results, strict=True)
-            ]
-        }
+    def rows(self, result: Mapping[str, Any]) -> list[dict[str, Any]]:
+        """A row a trial."""
+        told = {**self.training.columns, "task": self.training.task, "perception": self.perception}
+        return [
+            {
+                **told,
+                "goal": i,
+                "place": as_text(goal["goal"]),
+                "trial": j,
+                "seen": as_text(trial["error_seen"]),
+                "outcome": as_text(trial["outcome"]),
+                "hit": trial["hit"],
+                "key_state": as_text(trial["key_state"]),
+            }
+            for i, goal in enumerate(result["goals"])
+            for j, trial in enumerate(goal["trials"], start=1)
+        ]
 
 
 def _kept(result: GoalTrials) -> dict[str, Any]:
@@ -114,34 +94,64 @@ def _kept(result: GoalTrials) -> dict[str, Any]:
     return {"goal": result.goal.tolist(), "trials": trials}
 
 
-def _chosen(goals: Sequence[Mapping[str, Any]]) -> Mapping[str, Any]:
-    """The first goal that was reached in a number of trials nearest to `_SHOWN`."""
-    reached = [goal for goal in goals if goal["trials"][-1]["hit"]] or list(goals)
-    return min(reached, key=lambda goal: abs(len(goal["trials"]) - _SHOWN))
+def units(scale: Scale, include: Sequence[str] = ()) -> list[Planned]:
+    """The unseen goals of each task, of the first set and seed, and what was seen before."""
+    learned = [
+        Training(task, scale.sets[0], "diffusion", scale.seeds[0], perception="eye")
+        for task in TASKS
+    ]
+    tried = [Process(training, rounds=scale.rounds) for training in learned]
+    return [(unit, {}) for unit in (*(t.perceived for t in learned if t.perceived), *tried)]
 
 
-def table(figures: Figures) -> Table:
+def shown(results: Results) -> dict[str, dict[str, Any]]:
+    """Of each task the goal that is shown, with its trials; see `_SHOWN`."""
+    chosen = {}
+    for task, of_task in results.by("task").items():
+        goals = [goal.frame for goal in of_task.by("goal").values()]
+        reached = [goal for goal in goals if goal["hit"].iloc[-1]] or goals
+        goal = min(reached, key=lambda goal: abs(len(goal) - _SHOWN))
+        one = results.where(learned_on=task)
+        prior = Results(one.frame[one.frame["demonstration"].notna()], {})
+        chosen[task] = {
+            "task": task,
+            "goal": np.array(goal["place"].iloc[0].split(), dtype=float),
+            "demonstrated": np.array(list(prior.texts("seen"))),
+            "trials": [
+                {
+                    "error_seen": np.array(trial["seen"].split(), dtype=float),
+                    "outcome": np.array(trial["outcome"].split(), dtype=float),
+                    "key_state": np.array(trial["key_state"].split(), dtype=float),
+                    "hit": bool(trial["hit"]),
+                }
+                for _, trial in goal.iterrows()
+            ],
+        }
+    return chosen
+
+
+def table(results: Results) -> Table:
     """What was seen of each trial."""
     return Table(
         ("task", "trial", "seen by eye", "truly off by"),
         tuple(
             (
-                TASKS[row["task"]] if number == 1 else "",
+                TASKS[task] if number == 1 else "",
                 str(number),
                 "hit" if trial["hit"] else to_words(trial["error_seen"]),
-                f"{100 * np.linalg.norm(np.subtract(trial['outcome'], row['goal'])):.1f} cm",
+                f"{100 * np.linalg.norm(trial['outcome'] - row['goal']):.1f} cm",
             )
-            for row in figures["rows"]
+            for task, row in shown(results).items()
             for number, trial in enumerate(row["trials"], start=1)
         ),
     )
 
 
-def draw(figures: Figures, folder: Path) -> list[Picture]:
+def draw(results: Results, folder: Path) -> list[Picture]:
     """Draw the key frames from above, with arrows."""
     from prior_reinforce.lab.experiments.recipes.key_frames import draw_process
 
-    rows = {TASKS[row["task"]]: row for row in figures["rows"]}
+    rows = {TASKS[task]: row for task, row in shown(results).items()}
     caption = (
         "From above, one goal of each task: the whole table with the demonstrations as they were "
         "seen, then every trial's key frame close up. The arrow is the error as it was seen by "
@@ -151,4 +161,4 @@ def draw(figures: Figures, folder: Path) -> list[Picture]:
     return [Picture(draw_process(rows, folder / "process.png"), caption)]
 
 
-RECIPE = Recipe("process", "The process of adaptation", "Figure 3", ProcessPictures(), table, draw)
+RECIPE = Recipe("process", "The process of adaptation", "Figure 3", units, table, draw)

@@ -8,36 +8,15 @@ same afternoons of goals; goals 2 to the last count. Sets are A, B and draws fro
 from __future__ import annotations
 
 import string
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
-import numpy as np
-
-from prior_reinforce.lab.experiments.evaluation import GOAL_SEED
 from prior_reinforce.lab.experiments.fields import Change, MeasuredField
-from prior_reinforce.lab.experiments.recipes.adaptation import (
-    TASKS,
-    reliability,
-    reliability_in_words,
-    said_and_came,
-)
-from prior_reinforce.lab.experiments.recipes.base import (
-    Figures,
-    Measurement,
-    Picture,
-    Recipe,
-    Run,
-    Scale,
-    Table,
-)
+from prior_reinforce.lab.experiments.recipes.adaptation import RIDGE, TASKS, later, reliability
+from prior_reinforce.lab.experiments.recipes.base import Picture, Planned, Recipe, Scale, Table
+from prior_reinforce.lab.experiments.results import TRIALS, Results
 from prior_reinforce.lab.experiments.sequences import FieldAfternoons
-from prior_reinforce.lab.experiments.statistics import (
-    difference_of_tasks,
-    mean_of_tasks,
-    trials_counted,
-)
 
 _RIVALS = "prior_reinforce.lab.experiments.rivals"
 _OBSERVERS = "prior_reinforce.lab.experiments.observers"
@@ -70,6 +49,7 @@ RULES = (
     Rule("Broyden, 0.8", "broyden"),
     Rule("Newton on an interpolator", f"{_RIVALS}:NewtonAdapter"),
     Rule("norm-optimal learning control", f"{_RIVALS}:NormOptimalAdapter"),
+    Rule("ridge on the spline's weights, earlier goals too", RIDGE, carry_over=True),
     Rule("CMA-ES", f"{_RIVALS}:CmaEsAdapter", search=True),
     Rule("Bayesian optimisation", f"{_RIVALS}:BayesianOptimisationAdapter", search=True),
 )
@@ -163,7 +143,7 @@ _AFTERNOONS = (
 _TRIED_ALONE = (
     "by eye", "amplified noise", "an eye that errs", "5 % of trials lost",
     "5 % of trials misread", "shifted by 6 cm", "stretched by 1.15", "shifted and stretched",
-    "3 demonstrations", "4 demonstrations",
+    "3 demonstrations", "4 demonstrations", "exact", "labels exact",
 )  # fmt: skip
 _GOALS_ALONE = 100
 """On each field: rules that know one goal differ by less than those that remember."""
@@ -177,104 +157,59 @@ CONDITIONS = (
 )
 
 
-@dataclass(frozen=True)
-class Robustness(Measurement):
-    """Trials a goal of every rule in every condition."""
-
-    conditions: tuple[Condition, ...] = CONDITIONS
-    """What is tried."""
-    seed: int = GOAL_SEED
-    """Of the goals."""
-
-    def run(self, run: Run) -> dict[str, Any]:
-        """Measure the fields, and work through the same afternoons with every rule."""
-        scale = run.scale
-        tried = self._shown(scale)
-        fields = dict.fromkeys(f for condition in tried for row in condition.fields for f in row)
-        run.results(list(fields))
-        shown = []
-        for condition in tried:
-            known = RULES if scale.variants else RULES[:_QUICK_RULES]
-            included = [Rule(choice, choice, not condition.alone) for choice in run.include]
-            rules = [rule for rule in (*known, *included) if condition.tries(rule)]
-            shown.append(self._compared(run, condition, rules))
-        return {"conditions": shown}
-
-    def _shown(self, scale: Scale) -> tuple[Condition, ...]:
-        """The conditions of a scale: a quick one has the first, of one field."""
-        if scale.variants:
-            return self.conditions
-        first = self.conditions[0]
-        return (replace(first, fields=[first.fields[0][:1]], searches=False),)
-
-    def _compared(self, run: Run, condition: Condition, rules: Sequence[Rule]) -> dict[str, Any]:
-        """One condition: every rule's mean with its interval, and ours minus it."""
-        units = {
-            rule.label: [
-                [
-                    FieldAfternoons(
-                        of, rule.adapter, rule.carry_over, condition.change, condition.perception,
-                        condition.goals, rounds=run.scale.rounds, seed=self.seed,
-                    )
-                    for of in (row[:2] if rule.search else row)
-                ]
-                for row in condition.fields
-            ]
-            for rule in rules
-        }  # fmt: skip
-        flat = [unit for rows in units.values() for row in rows for unit in row]
-        results = dict(zip(flat, run.results(flat), strict=True))
-        trials = {
-            label: [
-                np.array([_trials(results[unit], run.scale.rounds) for unit in row]) for row in rows
-            ]
-            for label, rows in units.items()
-        }
-        ours = trials[rules[0].label]
-        of_ours = [unit for row in units[rules[0].label] for unit in row]
-        said = [row for unit in of_ours for row in said_and_came(results[unit], run.scale.rounds)]
-        bounds = (1, run.scale.rounds + 1)
-        return {
-            "label": condition.label,
-            "tasks": [row[0].task for row in condition.fields],
-            "goals": sum(row.size for row in ours),
-            "rules": {
-                label: {
-                    "each": [float(row.mean()) for row in rows],
-                    "mean": mean_of_tasks(rows, within=bounds),
-                    "ours_minus": difference_of_tasks(ours, rows),
-                }
-                for label, rows in trials.items()
-            },
-            "p_hit": reliability(np.array(said)),
-        }
+def units(scale: Scale, include: Sequence[str] = ()) -> list[Planned]:
+    """The same afternoons with every rule; a quick run has one condition, of one field."""
+    conditions = CONDITIONS
+    if not scale.variants:
+        first = CONDITIONS[0]
+        conditions = (replace(first, fields=[first.fields[0][:1]], searches=False),)
+    known = RULES if scale.variants else RULES[:_QUICK_RULES]
+    return [
+        unit
+        for condition in conditions
+        for unit in tried(
+            condition,
+            [*known, *(Rule(choice, choice, not condition.alone) for choice in include)],
+            scale.rounds,
+        )
+    ]
 
 
-def _trials(result: Mapping[str, Any], rounds: int) -> np.ndarray:
-    """Trials on the goals that count of one field."""
-    return trials_counted(np.array(result["solved_at"])[:, 1:], rounds).ravel()
+def tried(condition: Condition, rules: Sequence[Rule], rounds: int) -> list[Planned]:
+    """One condition, with the rules that it tries."""
+    c = condition
+    return [
+        (
+            FieldAfternoons(
+                of, rule.adapter, rule.carry_over, c.change, c.perception, c.goals, rounds
+            ),
+            {"condition": c.label, "method": rule.label},
+        )
+        for rule in rules
+        if c.tries(rule)
+        for row in c.fields
+        for of in (row[:2] if rule.search else row)
+    ]
 
 
-def table(figures: Figures) -> Table:
+def table(results: Results) -> Table:
     """One row a condition, one column a rule: the mean, and ours minus it, which stands first."""
-    labels = dict.fromkeys(label for c in figures["conditions"] for label in c["rules"])
+    conditions = {name: of.by("method") for name, of in later(results).by("condition").items()}
+    labels = dict.fromkeys(label for rules in conditions.values() for label in rules)
 
-    def cell(condition: Mapping[str, Any], label: str) -> str:
-        if label not in condition["rules"]:
+    def cell(rules: dict[str, Results], label: str) -> str:
+        if label not in rules:
             return ""
-        of = condition["rules"][label]
-        mean = of["mean"]
-        if label == next(iter(condition["rules"])):
-            return str(mean)
-        return f"{mean.value:.2f} ({of['ours_minus']:+.2f})"
+        ours, of = next(iter(rules.values())), rules[label]
+        if of is ours:
+            return str(of.mean(TRIALS))
+        return f"{of.mean(TRIALS).value:.2f} ({ours.minus(of, TRIALS):+.2f})"
 
-    return Table(
-        ("condition", "goals", *labels),
-        tuple(
-            (c["label"], str(c["goals"]), *(cell(c, label) for label in labels))
-            for c in figures["conditions"]
-        ),
+    rows = tuple(
+        (name, str(next(iter(rules.values())).n), *(cell(rules, label) for label in labels))
+        for name, rules in conditions.items()
     )
+    return Table(("condition", "goals", *labels), rows)
 
 
 _DRAWN = {
@@ -287,23 +222,23 @@ _DRAWN = {
 """Marks of the rules in the picture, which has room for few."""
 
 
-def draw(figures: Figures, folder: Path) -> list[Picture]:
+def draw(results: Results, folder: Path) -> list[Picture]:
     """Trials a goal by condition, a row each, with intervals."""
     from prior_reinforce.lab.experiments.recipes.charts import COLOURS, Mark, draw_rows
     from prior_reinforce.report.style import GOAL
 
-    of = {c["label"]: c["rules"] for c in figures["conditions"]}
+    conditions = {name: of.by("method") for name, of in later(results).by("condition").items()}
     colours = [GOAL, *(colour for colour in COLOURS if colour != GOAL)]
     marks = {
         label: Mark(
             shape,
             colour,
-            [rules[label]["mean"] if label in rules else None for rules in of.values()],
+            [of[label].mean(TRIALS) if label in of else None for of in conditions.values()],
         )
         for (label, shape), colour in zip(_DRAWN.items(), colours, strict=False)
     }
     label = "trials a goal, with 95 % intervals over sets of demonstrations and goals"
-    path = draw_rows(list(of), marks, label, folder / "robustness.png")
+    path = draw_rows(list(conditions), marks, label, folder / "robustness.png")
     caption = (
         "Trials a goal on goals 2 to the last of an afternoon, a row a condition, on displacement "
         "fields measured in physics; the lines are 95 % intervals over sets and goals. Alone: "
@@ -312,16 +247,17 @@ def draw(figures: Figures, folder: Path) -> list[Picture]:
     return [Picture(path, caption)]
 
 
-def remarks(figures: Figures) -> list[str]:
+def remarks(results: Results) -> list[str]:
     """Which rules took fewer trials than ours, and how far what ours says can be trusted."""
-    behind = [
-        f"{label} in {condition['label']!r} ({of['ours_minus']:+.2f})"
-        for condition in figures["conditions"]
-        for label, of in condition["rules"].items()
-        if of["ours_minus"].value > 0
-    ]
-    first = figures["conditions"][0]
-    said = f"On fields, {first['label']}: {reliability_in_words(first['p_hit'])}"
+    behind = []
+    for condition, of in later(results).by("condition").items():
+        (_, ours), *others = of.by("method").items()
+        for rule, rows in others:
+            minus = ours.minus(rows, TRIALS)
+            behind += [f"{rule} in {condition!r} ({minus:+.2f})"] if minus.value > 0 else []
+    condition, first = next(iter(results.by("condition").items()))
+    ours = next(iter(first.by("method").values()))
+    said = f"On fields, {condition}: {reliability(ours)}"
     if not behind:
         return [said]
     return [f"With fewer trials than ours (ours minus it): {'; '.join(behind)}.", said]
@@ -329,5 +265,5 @@ def remarks(figures: Figures) -> list[str]:
 
 RECIPE = Recipe(
     "robustness", "Trials where something is wrong, changed, or scarce", "not in the paper",
-    Robustness(), table, draw, remarks=remarks, family="adapter",
+    units, table, draw, remarks, family="adapter",
 )  # fmt: skip

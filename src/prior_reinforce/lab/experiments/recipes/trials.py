@@ -9,34 +9,14 @@ more than there were rounds: never flattering.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-import numpy as np
-from jaxtyping import Int
-
-from prior_reinforce.lab.experiments.claims import Claim, Verdict, above, all_of, at_most
 from prior_reinforce.lab.experiments.evaluation import Training, Trials
-from prior_reinforce.lab.experiments.recipes.base import (
-    Figures,
-    Measurement,
-    Picture,
-    Recipe,
-    Run,
-    Scale,
-    Table,
-)
-from prior_reinforce.lab.experiments.statistics import (
-    SHARE,
-    Interval,
-    Values,
-    bootstrap_difference,
-    bootstrap_mean,
-    reached_by,
-    trials_counted,
-)
+from prior_reinforce.lab.experiments.recipes.base import Picture, Planned, Recipe, Scale, Table
+from prior_reinforce.lab.experiments.results import FIRST, TRIALS, Results
+from prior_reinforce.lab.experiments.statistics import Interval
 from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
 
 CAMERA = "camera"
@@ -48,8 +28,6 @@ _PICTURE_SEEDS = 2
 """Most uniformly drawn goals, and training seeds a prior set, where trials are seen in pictures
 (ours): drawing and reading one takes ten times as long as simulating a throw, and what is learned
 from demonstrations seen in pictures serves these rows alone."""
-_HALF = 0.5
-"""Ours: the paper says "often" without a number."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +45,16 @@ class PaperRow:
     trials: float
     sd: float
 
+    def sense(self, model: VisionLanguageModelConfig | None) -> str:
+        """How it is seen; the camera stands in where no model is asked."""
+        if not self.by_model:
+            return "eye"
+        return f"VLM ({model.model})" if model else "camera (objects found by colour)"
+
+    def perception(self, model: VisionLanguageModelConfig | None) -> str:
+        """The same as a choice of perception."""
+        return "eye" if not self.by_model else "vlm" if model else CAMERA
+
 
 ROWS = (
     PaperRow("Basketball Shot", "basketball-v1", "basketball-v1", False, 6, 2.9, 0.9),
@@ -79,284 +67,139 @@ ROWS = (
 )
 """Table II of the paper, in its order."""
 
-_Solved = Mapping[tuple[PaperRow, str], tuple[Int[np.ndarray, "n few"], Int[np.ndarray, "n many"]]]
-"""By row and adapter: in which trial each unseen goal and each of the many was reached, a row a
-training."""
 
-
-@dataclass(frozen=True)
-class TrialsTable(Measurement):
-    """Stage-2 trials of every row."""
-
-    rows: tuple[PaperRow, ...] = ROWS
-    """Which rows."""
-    generator: str = "diffusion"
-    """What is learned."""
-    model: VisionLanguageModelConfig | None = None
-    """Endpoint that reads the pictures; None for the camera that finds objects by colour."""
-
-    def trainings(self, scale: Scale, include: Sequence[str] = ()) -> Sequence[Training]:
-        """One for each task with demonstrations, sense, prior set and seed."""
-        rows = self._rows(scale)
-        return list(dict.fromkeys(t for row in rows for t in self._trainings(row, scale)))
-
-    def run(self, run: Run) -> dict[str, Any]:
-        """Try the paper's number of goals, and many, through every sense."""
-        scale = run.scale
-        rows = self._rows(scale)
-        judged_by_eye = run.learn(self.trainings(scale))
-        tried = [(row, adapter) for row in rows for adapter in ("gp", *run.include)]
-        units = {
-            (row, adapter, unseen): self._units(row, adapter, scale, unseen=unseen)
-            for row, adapter in tried
-            for unseen in (True, False)
-        }
-        # All at once, so that no core waits for one row's last unit.
-        results = iter(run.results([unit for some in units.values() for unit in some]))
-        got = {key: [next(results) for _ in some] for key, some in units.items()}
-        at = {key: np.array([r["solved_at"] for r in some]) for key, some in got.items()}
-        solved = {(row, a): (at[row, a, True], at[row, a, False]) for row, a in tried}
-        by_eye = {row.task: row for row in rows if not row.by_model}
-        return {
-            "rounds": scale.rounds,
-            "generator": self.generator,
-            "model": CAMERA if self.model is None else self.model.model,
-            "readings_judged_by_eye": judged_by_eye
-            + sum(sum(result["failed_readings"]) for some in got.values() for result in some),
-            "rows": [
-                {
-                    **asdict(row),
-                    "adapter": adapter,
-                    "trainings": len(many),
-                    "unseen": _summary(unseen, scale.rounds),
-                    "many": _summary(many, scale.rounds),
-                    "first_throws": first_throws_that_hit(many),
-                }
-                for (row, adapter), (unseen, many) in solved.items()
-            ],
-            "eye_minus_model": {
-                row.task: self._eye_minus_model(by_eye[row.task], row, solved, scale)
-                for row in rows
-                if row.by_model and row.task in by_eye
-            },
-        }
-
-    def _rows(self, scale: Scale) -> list[PaperRow]:
-        return [row for row in self.rows if scale.read_pictures or not row.by_model]
-
-    def _seen_by(self, row: PaperRow) -> tuple[str, VisionLanguageModelConfig | None]:
-        """Perception of a row, and the endpoint that it asks."""
-        if not row.by_model:
-            return "eye", None
-        return (CAMERA if self.model is None else "vlm"), self.model
-
-    def _trainings(self, row: PaperRow, scale: Scale) -> list[Training]:
-        perception, model = self._seen_by(row)
-        return [
-            Training(row.learned_on, name, self.generator, seed, perception=perception, model=model)
-            for name in scale.sets
-            for seed in scale.seeds[: _PICTURE_SEEDS if row.by_model else None]
-        ]
-
-    def _units(self, row: PaperRow, adapter: str, scale: Scale, *, unseen: bool) -> list[Trials]:
-        """One row's units, one a training."""
-        perception, model = self._seen_by(row)
+def units(scale: Scale, include: Sequence[str] = (), generator: str = "diffusion") -> list[Planned]:
+    """The paper's number of goals, and many, through every sense."""
+    planned: list[Planned] = []
+    for row in ROWS:
+        if row.by_model and not scale.read_pictures:
+            continue
+        learned = trainings(row, scale, generator)
         goals = min(scale.goals, _PICTURE_GOALS) if row.by_model else scale.goals
-        return [
-            Trials(
-                training,
-                row.task,
-                adapter,
-                perception,
-                _UNSEEN_GOALS if unseen else goals,
-                unseen=unseen,
-                rounds=scale.rounds,
-                model=model,
+        sense = row.perception(scale.model)
+        planned += [(t.perceived, {}) for t in learned if t.perceived and t.task == row.task]
+        planned += [
+            (
+                Trials(
+                    training,
+                    row.task,
+                    adapter,
+                    sense,
+                    _UNSEEN_GOALS if unseen else goals,
+                    unseen=unseen,
+                    rounds=scale.rounds,
+                    model=training.model,
+                ),
+                {"method": adapter, "condition": f"{row.title}, {row.sense(scale.model)}"},
             )
-            for training in self._trainings(row, scale)
+            for adapter in ("gp", *include)
+            for unseen in (True, False)
+            for training in learned
         ]
+    return planned  # fmt: skip
 
-    def _eye_minus_model(
-        self, eye: PaperRow, model: PaperRow, solved: _Solved, scale: Scale
-    ) -> Interval:
-        """How many more trials it takes by eye, for the prior sets, seeds and goals of both.
 
-        Goals are drawn one after another from one seed, so the smaller sample begins the larger.
-        """
-        by_eye = self._trainings(eye, scale)
-        same = [
-            by_eye.index(replace(training, perception="eye", model=None))
-            for training in self._trainings(model, scale)
-        ]
-        read = solved[model, "gp"]
-        judged = solved[eye, "gp"][0][same], solved[eye, "gp"][1][same, : read[1].shape[1]]
-        return bootstrap_difference(
-            trials_counted(np.hstack(judged), scale.rounds),
-            trials_counted(np.hstack(read), scale.rounds),
+def trainings(row: PaperRow, scale: Scale, generator: str) -> list[Training]:
+    """What a row's trials start from, its demonstrations perceived as the trials are."""
+    model = scale.model if row.by_model else None
+    return [
+        Training(
+            row.learned_on, name, generator, seed, perception=row.perception(scale.model),
+            model=model,
         )
+        for name in scale.sets
+        for seed in scale.seeds[: _PICTURE_SEEDS if row.by_model else None]
+    ]  # fmt: skip
 
 
-def first_throws_that_hit(solved_at: Values) -> Interval:
-    """Share of the goals that the first trial reached.
-
-    Nothing was told before it: its condition is the goal itself, to half a millimetre that the
-    Gaussian process makes of the demonstrations (docs/evidence.md).
-    """
-    return bootstrap_mean(reached_by(solved_at, 1), within=SHARE)
-
-
-def _summary(solved_at: Values, rounds: int) -> dict[str, Any]:
-    trials = trials_counted(solved_at, rounds)
-    return {
-        "goals": int(solved_at.size),
-        "trials": bootstrap_mean(trials, within=(1, rounds + 1)),
-        "sd": float(trials.std(ddof=1)),
-        "not_reached": int(np.sum(solved_at == 0)),
-    }
+def told(results: Results, method: str = "gp") -> list[tuple[PaperRow, Results]]:
+    """The paper's rows that were run, each with its trials."""
+    of = results.where(method=method)
+    by_sense = [
+        (row, of.where(task=row.task, perception=("camera", "vlm") if row.by_model else "eye"))
+        for row in ROWS
+    ]
+    return [(row, rows) for row, rows in by_sense if not rows.empty]
 
 
-def _sense(row: Figures, figures: Figures) -> str:
-    """How a row was seen."""
-    if not row["by_model"]:
-        return "eye"
-    by_colour = figures["model"] == CAMERA
-    return "camera (objects found by colour)" if by_colour else f"VLM ({figures['model']})"
-
-
-def table(figures: Figures) -> Table:
+def table(results: Results) -> Table:
     """The paper's columns, its own numbers beside them."""
+    methods = list(results.by("method"))
+    rows = [(row, of, method) for method in methods for row, of in told(results, method)]
 
-    def missed(row: Figures) -> str:
-        n, goals = (row["unseen"][key] + row["many"][key] for key in ("not_reached", "goals"))
-        return f"{n} of {row['unseen']['goals']} + {goals - row['unseen']['goals']}"
+    def few(of: Results) -> Results:
+        return of.where(unseen=True)
+
+    def many(of: Results) -> Results:
+        return of.where(unseen=False)
+
+    def ten(of: Results) -> str:
+        trials = TRIALS.of(few(of).where(seed=of.frame["seed"].min()).frame)
+        return f"{trials.mean():.1f} ± {trials.std(ddof=1):.1f} ({len(trials)})"
 
     columns = {
-        "task": lambda row: row["title"],
-        "sense": lambda row: (
-            _sense(row, figures) + ("" if row["adapter"] == "gp" else f", {row['adapter']}")
+        "task": lambda r: r[0].title,
+        "sense": lambda r: (
+            r[1].frame["condition"].iloc[0].removeprefix(f"{r[0].title}, ")
+            + ("" if r[2] == "gp" else f", {r[2]}")
         ),
-        "prior": lambda row: row["prior"],
-        "trials, unseen goals": lambda row: _trials(row["unseen"]),
-        "trials, many goals": lambda row: _trials(row["many"]),
-        "total": lambda row: f"{row['prior'] + row['many']['trials'].value:.1f}",
-        "not reached": missed,
-        "first throws that hit, many goals": lambda row: row["first_throws"],
-        "paper: trials (total)": lambda row: (
-            f"{row['trials']:.1f} ± {row['sd']:.1f} ({row['prior'] + row['trials']:.1f})"
+        "prior": lambda r: r[0].prior,
+        "the paper's procedure: mean ± sd (runs)": lambda r: ten(r[1]),
+        "trials, unseen goals": lambda r: few(r[1]).mean(TRIALS),
+        "trials, uniform goals": lambda r: many(r[1]).mean(TRIALS),
+        "total": lambda r: f"{r[0].prior + many(r[1]).mean(TRIALS).value:.1f}",
+        "not reached": lambda r: f"{(r[1].frame['solved_at'] == 0).sum()} of {r[1].n}",
+        "first trials that hit, uniform goals": lambda r: many(r[1]).mean(FIRST),
+        "paper: trials (total)": lambda r: (
+            f"{r[0].trials:.1f} ± {r[0].sd:.1f} ({r[0].prior + r[0].trials:.1f})"
         ),
     }
-    return Table.of(figures["rows"], columns)
+    return Table.of(rows, columns)
 
 
-def _trials(summary: Figures) -> str:
-    interval = summary["trials"]
-    return f"{interval.value:.1f} ± {summary['sd']:.1f} [{interval.low:.2f}, {interval.high:.2f}]"
-
-
-def draw(figures: Figures, folder: Path) -> list[Picture]:
+def draw(results: Results, folder: Path) -> list[Picture]:
     """All rows beside the paper's."""
     from prior_reinforce.lab.experiments.recipes.charts import COLOURS, Mark, draw_rows
     from prior_reinforce.report.style import GOAL
 
-    rows = [row for row in figures["rows"] if row["adapter"] == "gp"]
-    paper = [(row["trials"], row["sd"]) for row in rows]
-    many, unseen = ([row[goals]["trials"] for row in rows] for goals in ("many", "unseen"))
+    rows = told(results)
+    few, many = (
+        [of.where(unseen=unseen).mean(TRIALS) for _, of in rows] for unseen in (True, False)
+    )
+    papers = [Interval(row.trials, row.trials - row.sd, row.trials + row.sd) for row, _ in rows]
     marks = {
-        "paper, real arm (standard deviation)": Mark(
-            "D", GOAL, [Interval(mean, mean - sd, mean + sd) for mean, sd in paper]
-        ),
-        "ours, many goals (95 % interval)": Mark("o", COLOURS[0], many),
-        "ours, five unseen goals a set (95 % interval)": Mark("s", COLOURS[5], unseen),
+        "paper, real arm (standard deviation)": Mark("D", GOAL, papers),
+        "ours, uniform goals (95 % interval)": Mark("o", COLOURS[0], many),
+        "ours, five unseen goals a set (95 % interval)": Mark("s", COLOURS[5], few),
     }
-    labels = [f"{row['title']}, {_sense(row, figures)}" for row in rows]
-    label = "Stage-2 trials to the first hit"
-    path = draw_rows(labels, marks, label, folder / "trials.png")
+    labels = [of.frame["condition"].iloc[0] for _, of in rows]
+    path = draw_rows(labels, marks, "Stage-2 trials to the first hit", folder / "trials.png")
     caption = (
         "Mean Stage-2 trials to the first hit, with 95 % intervals over trainings and goals, "
         "beside the paper's mean and standard deviation on a real arm."
     )
-    if _read(figures) and figures["model"] == CAMERA:
-        caption += (
-            " The camera's rows find objects by colour in the very pictures that a model would be "
-            "sent."
-        )
+    if not results.where(perception=CAMERA).empty:
+        caption += " The camera finds objects by colour; its rows are no evidence about VLMs."
     return [Picture(path, caption)]
 
 
-def claims(figures: Figures) -> list[Claim]:
-    """Each mean is at most the paper's; first throws miss; a VLM needs fewer trials than an eye."""
-    rows = [row for row in figures["rows"] if row["adapter"] == "gp"]
-    return [
-        *(_claim_of_mean(row, figures) for row in rows),
-        *(_claim_of_first_throws(row, figures) for row in rows),
-        *_claim_of_model(figures),
-    ]
-
-
-def _claim_of_mean(row: Figures, figures: Figures) -> Claim:
-    # The paper's goals lie far from the demonstrations; a mean has to hold there and everywhere.
-    unseen, many = (row[goals]["trials"] for goals in ("unseen", "many"))
-    n = _speaking(row, figures)
-    return Claim(
-        f"{row['title']}, {_sense(row, figures)}: {row['trials']:.1f} trials on average (here: at "
-        "most).",
-        f"{unseen} on {row['unseen']['goals']} unseen goals, {many} on {row['many']['goals']} "
-        "uniform ones",
-        all_of([at_most(mean, row["trials"], n) for mean in (unseen, many)]),
-    )
-
-
-def _claim_of_first_throws(row: Figures, figures: Figures) -> Claim:
-    hit = row["first_throws"]
-    return Claim(
-        "The goal itself as the condition often leads to inaccurate outcomes (here: the first "
-        f"trial, in more than half of the cases; {row['title']}, {_sense(row, figures)}).",
-        f"share reached at the first trial: {hit}",
-        at_most(hit, _HALF, _speaking(row, figures)),
-    )
-
-
-def _claim_of_model(figures: Figures) -> list[Claim]:
-    fewer = {task: value for task, value in figures["eye_minus_model"].items()}
-    if not fewer:
-        return []
-    n = min(_speaking(row, figures) for row in figures["rows"] if row["task"] in fewer)
-    verdicts = [above(interval, 0.0, n) for interval in fewer.values()]
-    # Of "in some tasks" one is enough.
-    some = Verdict.CONFIRMED if Verdict.CONFIRMED in verdicts else Verdict.OPEN
-    if all(verdict is Verdict.NOT_CONFIRMED for verdict in verdicts):
-        some = Verdict.NOT_CONFIRMED
-    said = "; ".join(f"{task} {interval:+.2f}" for task, interval in fewer.items())
-    measured = f"eye minus {figures['model']}, same goals: {said}"
-    return [Claim("Seeing by a VLM slightly reduces the trials in some tasks.", measured, some)]
-
-
-def _speaking(row: Figures, figures: Figures) -> int:
-    """How many trainings speak for a row: none for a VLM's whose pictures the camera read."""
-    return 0 if row["by_model"] and figures["model"] == CAMERA else int(row["trainings"])
-
-
-def _read(figures: Figures) -> bool:
-    """Whether there are rows whose trials were read from pictures."""
-    return any(row["by_model"] for row in figures["rows"])
-
-
-def remarks(figures: Figures) -> list[str]:
+def remarks(results: Results) -> list[str]:
     """Who read the pictures."""
-    if not _read(figures):
+    read = results.where(perception=(CAMERA, "vlm"))
+    if read.empty:
         return []
-    reader = figures["model"]
-    if reader == CAMERA:
-        reader = "a camera that finds objects by colour to a centimetre, not by a model"
+    reader = "a camera that finds objects by colour to a centimetre, not a model"
+    if CAMERA not in set(read.frame["perception"]):
+        reader = "the model that its rows name"
     return [
-        f"The pictures of the VLM rows were read by {reader}; "
-        f"{figures['readings_judged_by_eye']} of them could not be read and were judged by "
+        f"The pictures of rows not seen by eye were read by {reader}; "
+        f"{read.frame['failed_readings'].sum():.0f} of them could not be read and were judged by "
         f"eye. Drawing them takes long, so these rows have at most {_PICTURE_GOALS} uniformly "
         f"drawn goals a training, and {_PICTURE_SEEDS} training seeds a prior set."
     ]
 
 
 RECIPE = Recipe(
-    "trials", "Trials to reach a new goal", "Table II",
-    TrialsTable(), table, draw, claims, remarks, family="adapter",
+    "trials", "Trials to reach a new goal", "Table II", units, table, draw, remarks,
+    family="adapter",
 )  # fmt: skip

@@ -8,151 +8,87 @@ makes of the demonstrations.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from prior_reinforce.lab.experiments.evaluation import Training, Trials
-from prior_reinforce.lab.experiments.recipes.base import (
-    Figures,
-    Measurement,
-    Picture,
-    Recipe,
-    Run,
-    Scale,
-    Table,
-)
-from prior_reinforce.lab.experiments.statistics import bootstrap_mean, trials_counted
+from prior_reinforce.lab.experiments.recipes.base import Picture, Planned, Recipe, Scale, Table
+from prior_reinforce.lab.experiments.results import FIRST, TRIALS, Results
 
-GENERATORS = (
+GENERATORS: tuple[tuple[str, str], ...] = (
     ("auto", "auto"),
     ("diffusion", "diffusion"),
     ("aligned thin-plate spline", "interpolation,kernel=thin-plate,timing=align"),
     ("diffusion, untrained", "diffusion,training_steps=0"),
 )
 """What is compared is called, and its choice."""
-TASKS = ("zoo-drag", "zoo-hoop", "zoo-arrival", "zoo-curl")
+TASKS: tuple[str, ...] = ("zoo-drag", "zoo-hoop", "zoo-arrival", "zoo-curl")
 """Tasks of the zoo's reported half, without a clock and of at most 100 frames: a network learns
 them in a minute."""
-SETS = ("clean-8", "mixed-4", "mixed-12", "styles-9")
+SETS: tuple[str, ...] = ("clean-8", "mixed-4", "mixed-12", "styles-9")
 """Kind and number of the demonstrations (docs/tasks/zoo.md)."""
 _QUICK_SETS, _QUICK_TASKS, _QUICK_GENERATORS, _GOALS = 1, 1, 3, 30
 
 
-@dataclass(frozen=True)
-class GeneratorsByVariation(Measurement):
-    """First throws and trials of every generator on every kind of set."""
-
-    tasks: tuple[str, ...] = TASKS
-    """Where it is tried."""
-    sets: tuple[str, ...] = SETS
-    """`KIND-COUNT`; the set's own seed is 0."""
-    generators: tuple[tuple[str, str], ...] = GENERATORS
-    """What is compared."""
-
-    def trainings(self, scale: Scale, include: Sequence[str] = ()) -> Sequence[Training]:
-        """Every generator on every set of every task."""
-        tasks, sets = self._shown(scale)
-        return [
-            Training(task, f"{name}-0", choice, seed=0)
-            for _, choice in self._compared(scale, include)
-            for name in sets
-            for task in tasks
-        ]
-
-    def run(self, run: Run) -> dict[str, Any]:
-        """Try the same goals with every generator."""
-        scale, (tasks, sets) = run.scale, self._shown(run.scale)
-        goals = min(scale.goals, _GOALS)
-        trainings = self.trainings(scale, run.include)
-        run.learn(trainings)
-        units = [Trials(t, t.task, "bayes", "exact", goals, rounds=scale.rounds) for t in trainings]
-        labels = [label for label, _ in self._compared(scale, run.include)]
-        solved = run.solved_at(units).reshape(len(labels), len(sets), len(tasks), goals)
-        took = trials_counted(solved, scale.rounds)
-        return {
-            "tasks": list(tasks),
-            "sets": list(sets),
-            "goals": goals,
-            "rows": [
-                {
-                    "label": label,
-                    "first": [
-                        bootstrap_mean((of_set == 1).astype(float), within=(0, 1))
-                        for of_set in solved[i]
-                    ],
-                    "trials": [
-                        bootstrap_mean(of_set, within=(1, scale.rounds + 1)) for of_set in took[i]
-                    ],
-                    "first_of_each": (solved[i] == 1).mean(axis=2).tolist(),
-                    "trials_of_each": took[i].mean(axis=2).tolist(),
-                }
-                for i, label in enumerate(labels)
-            ],
-        }
-
-    def _compared(self, scale: Scale, include: Sequence[str]) -> tuple[tuple[str, str], ...]:
-        """Label and choice of each generator of a scale."""
-        known = self.generators if scale.variants else self.generators[:_QUICK_GENERATORS]
-        return (*known, *((choice, choice) for choice in include))
-
-    def _shown(self, scale: Scale) -> tuple[tuple[str, ...], tuple[str, ...]]:
-        """Tasks and sets of a scale."""
-        if scale.variants:
-            return self.tasks, self.sets
-        return self.tasks[:_QUICK_TASKS], self.sets[:_QUICK_SETS]
-
-
-def table(figures: Figures) -> Table:
-    """One row a kind of set, then one a task; first throws that hit, and trials."""
-    rows = figures["rows"]
-    by_set = [
+def units(scale: Scale, include: Sequence[str] = ()) -> list[Planned]:
+    """The same goals with every generator on every set of every task; a quick run on one."""
+    known, sets, tasks = GENERATORS, SETS, TASKS
+    if not scale.variants:
+        known, sets, tasks = known[:_QUICK_GENERATORS], sets[:_QUICK_SETS], tasks[:_QUICK_TASKS]
+    goals = min(scale.goals, _GOALS)
+    return [
         (
-            name,
-            *(f"{r['first'][i]}; {r['trials'][i]}" for r in rows),
-        )
-        for i, name in enumerate(figures["sets"])
-    ]
-    by_task = [
-        (
-            name,
-            *(
-                f"{_of_task(r['first_of_each'], i)}; {_of_task(r['trials_of_each'], i)}"
-                for r in rows
+            Trials(
+                Training(task, f"{name}-0", choice, seed=0), task, "bayes", "exact", goals,
+                rounds=scale.rounds,
             ),
+            {"method": label, "condition": name},
         )
-        for i, name in enumerate(figures["tasks"])
-    ]
-    return Table(("demonstrations", *(row["label"] for row in rows)), (*by_set, *by_task))
+        for label, choice in (*known, *((choice, choice) for choice in include))
+        for name in sets
+        for task in tasks
+    ]  # fmt: skip
 
 
-def draw(figures: Figures, folder: Path) -> list[Picture]:
+def table(results: Results) -> Table:
+    """One row a kind of set, then one a task; first throws that hit, and trials."""
+    methods = results.by("method")
+
+    def cells(**of: str) -> list[str]:
+        rows = [method.where(**of) for method in methods.values()]
+        return [f"{row.mean(FIRST).value:.2f}; {row.mean(TRIALS).value:.2f}" for row in rows]
+
+    rows = [(name, *cells(condition=name)) for name in results.by("condition")]
+    rows += [(task, *cells(task=task)) for task in results.by("task")]
+    return Table(("demonstrations", *methods), tuple(rows))
+
+
+def draw(results: Results, folder: Path) -> list[Picture]:
     """First throws on the left, trials on the right, over the kinds of sets."""
     from prior_reinforce.lab.experiments.recipes.charts import Line, draw_kinds
 
-    lines = {
-        key: [
-            Line(row["label"], row[key], place, each=row[f"{key}_of_each"])
-            for place, row in enumerate(figures["rows"])
+    kinds = list(results.by("condition"))
+    panels = {}
+    for label, measure in (("first throws that hit", FIRST), ("trials to a hit", TRIALS)):
+        panels[label] = [
+            Line(
+                method,
+                [rows.where(condition=kind).mean(measure) for kind in kinds],
+                place,
+                each=[
+                    [of.mean(measure).value for of in of_kind.by("task").values()]
+                    for of_kind in rows.by("condition").values()
+                ],
+            )
+            for place, (method, rows) in enumerate(results.by("method").items())
         ]
-        for key in ("first", "trials")
-    }
-    path = draw_kinds(
-        [_in_words(name) for name in figures["sets"]],
-        {"first throws that hit": lines["first"], "trials to a hit": lines["trials"]},
-        folder / "variation.png",
-    )
+    path = draw_kinds([_in_words(kind) for kind in kinds], panels, folder / "variation.png")
     caption = (
-        f"Large: means over {len(figures['tasks'])} tasks on which nothing was chosen, by what "
+        f"Large: means over {len(results.by('task'))} tasks on which nothing was chosen, by what "
         "differs between the demonstrations and how many there are. Small: each task, "
-        f"{figures['goals']} goals. The Bayesian adapter sees trials exactly."
+        f"{results.frame['goal'].max() + 1} goals. The Bayesian adapter sees trials exactly. One "
+        "set a task and kind: no intervals."
     )
     return [Picture(path, caption)]
-
-
-def _of_task(cells: Sequence[Sequence[float]], i: int) -> str:
-    """Mean over the sets of a task."""
-    return f"{sum(of_set[i] for of_set in cells) / len(cells):.2f}"
 
 
 def _in_words(name: str) -> str:
@@ -162,6 +98,6 @@ def _in_words(name: str) -> str:
 
 
 RECIPE = Recipe(
-    "variation", "When is diffusion needed?", "not in the paper", GeneratorsByVariation(), table,
-    draw, family="generator",
+    "variation", "When is diffusion needed?", "not in the paper", units, table, draw,
+    family="generator",
 )  # fmt: skip

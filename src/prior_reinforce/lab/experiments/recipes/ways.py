@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -19,20 +19,8 @@ import numpy as np
 from prior_reinforce.arrays import LARGEST, Plans
 from prior_reinforce.generators.patterns import motion_vectors
 from prior_reinforce.lab.experiments.evaluation import GOAL_SEED, Training, Trials
-from prior_reinforce.lab.experiments.recipes.base import (
-    Figures,
-    Measurement,
-    Recipe,
-    Run,
-    Scale,
-    Table,
-)
-from prior_reinforce.lab.experiments.statistics import (
-    SHARE,
-    bootstrap_difference,
-    bootstrap_mean,
-    trials_counted,
-)
+from prior_reinforce.lab.experiments.recipes.base import Planned, Recipe, Scale, Table
+from prior_reinforce.lab.experiments.results import FIRST, TRIALS, Results
 from prior_reinforce.lab.experiments.units import Unit
 from prior_reinforce.lab.tasks import make_task
 from prior_reinforce.lab.tasks.zoo import SEVERAL_WAYS
@@ -75,6 +63,11 @@ class Unlike(Unit):
         goals = task.sample_goals(self.goals, np.random.default_rng(GOAL_SEED))
         return {"unlike": unlike(learned.prior, learned.generator.generate(goals)).tolist()}
 
+    def rows(self, result: Mapping[str, Any]) -> list[dict[str, Any]]:
+        """A row a goal."""
+        told = {**self.training.columns, "task": self.training.task}
+        return [{**told, "goal": i, "unlike": bool(is_)} for i, is_ in enumerate(result["unlike"])]
+
 
 def unlike(demonstrations: Demonstrations, plans: Plans) -> np.ndarray:
     """Whether plans are farther from every demonstration than any of these from its nearest.
@@ -103,95 +96,42 @@ def unlike(demonstrations: Demonstrations, plans: Plans) -> np.ndarray:
     return far | ran_away
 
 
-@dataclass(frozen=True)
-class Ways(Measurement):
-    """First throws, trials, lost objects and plans that are neither way."""
-
-    sets: Mapping[str, tuple[str, ...]] = field(default_factory=lambda: SETS)
-    """Sets of demonstrations of each task."""
-    generators: tuple[tuple[str, str], ...] = GENERATORS
-    """What is compared; the first is the network."""
-
-    def _sets(self, scale: Scale) -> Mapping[str, tuple[str, ...]]:
-        """All, or the first of each task in a quick run."""
-        return self.sets if scale.variants else {task: of[:1] for task, of in self.sets.items()}
-
-    def trainings(self, scale: Scale, include: Sequence[str] = ()) -> Sequence[Training]:
-        """Every generator on every set of every task."""
-        choices = [choice for _, choice in self.generators] + list(include)
-        return [
-            Training(task, name, choice, seed=0)
-            for choice in choices
-            for task, names in self._sets(scale).items()
-            for name in names
-        ]
-
-    def run(self, run: Run) -> dict[str, Any]:
-        """Try the same goals with every generator."""
-        goals, rounds = min(run.scale.goals, _GOALS), run.scale.rounds
-        sets, trainings = self._sets(run.scale), self.trainings(run.scale, run.include)
-        run.learn(trainings)
-        tried = run.results(
-            [Trials(t, t.task, "bayes", "exact", goals, rounds=rounds) for t in trainings]
-        )
-        looked = run.results([Unlike(t, goals) for t in trainings])
-        labels = [label for label, _ in self.generators] + list(run.include)
-        tasks = [t.task for t in trainings[: sum(map(len, sets.values()))]]
-        shape = len(labels), len(tasks), goals
-        solved = np.array([result["solved_at"] for result in tried]).reshape(shape)
-        values = {
-            "first": (solved == 1).astype(float),
-            "trials": trials_counted(solved, rounds),
-            "lost": np.array([result["lost"] for result in tried]).reshape(shape),
-            "unlike": np.array([result["unlike"] for result in looked]).reshape(shape),
-        }
-        places = {task: [i for i, t in enumerate(tasks) if t == task] for task in sets}
-        return {
-            "sets": {task: list(names) for task, names in sets.items()},
-            "goals": goals,
-            "rows": [
-                {
-                    "label": label,
-                    "tasks": {
-                        task: {
-                            "first": bootstrap_mean(values["first"][i, at], within=SHARE),
-                            "network_minus": bootstrap_difference(
-                                values["first"][0, at], values["first"][i, at], within=SHARE
-                            ),
-                            "trials": bootstrap_mean(
-                                values["trials"][i, at], within=(1, rounds + 1)
-                            ),
-                            "lost": float(values["lost"][i, at].mean()),
-                            "unlike": float(values["unlike"][i, at].mean()),
-                        }
-                        for task, at in places.items()
-                    },
-                    "solved_at": [" ".join(map(str, row)) for row in solved[i]],
-                }
-                for i, label in enumerate(labels)
-            ],
-        }
+def units(scale: Scale, include: Sequence[str] = ()) -> list[Planned]:
+    """The same goals with every generator on every set; a quick run on the first of each task."""
+    goals = min(scale.goals, _GOALS)
+    planned: list[Planned] = []
+    for label, choice in (*GENERATORS, *((choice, choice) for choice in include)):
+        for task, names in SETS.items():
+            for name in names if scale.variants else names[:1]:
+                learned = Training(task, name, choice, seed=0)
+                tried = Trials(learned, task, "bayes", "exact", goals, rounds=scale.rounds)
+                planned += [(unit, {"method": label}) for unit in (tried, Unlike(learned, goals))]
+    return planned
 
 
-def table(figures: Figures) -> Table:
+def table(results: Results) -> Table:
     """One row a task and generator."""
+    tried = Results(results.frame[results.frame["solved_at"].notna()], results.made_by)
     rows = [
-        {"task": task, "label": row["label"], **row["tasks"][task]}
-        for task in figures["sets"]
-        for row in figures["rows"]
+        (task, method, of, of_task.where(method=GENERATORS[0][0]))
+        for task, of_task in tried.by("task").items()
+        for method, of in of_task.by("method").items()
     ]
     columns = {
-        "task": lambda row: row["task"],
-        "generator": lambda row: row["label"],
-        "first throws that hit": lambda row: row["first"],
-        "the network minus it": lambda row: f"{row['network_minus']:+.2f}",
-        "trials": lambda row: row["trials"],
-        "lost a goal": lambda row: f"{row['lost']:.2f}",
-        "plans like no demonstration": lambda row: f"{row['unlike']:.2f}",
+        "task": lambda row: row[0],
+        "generator": lambda row: row[1],
+        "first throws that hit": lambda row: row[2].mean(FIRST),
+        "the network minus it": lambda row: f"{row[3].minus(row[2], FIRST):+.2f}",
+        "trials": lambda row: row[2].mean(TRIALS),
+        "network minus it, trials": lambda row: f"{row[3].minus(row[2], TRIALS):+.2f}",
+        "lost a goal": lambda row: f"{row[2].frame['lost'].mean():.2f}",
+        "plans like no demonstration": lambda row: (
+            f"{results.where(task=row[0], method=row[1]).frame['unlike'].astype(float).mean():.2f}"
+        ),
     }
     return Table.of(rows, columns)
 
 
 RECIPE = Recipe(
-    "ways", "Demonstrations of two ways", "not in the paper", Ways(), table, family="generator"
+    "ways", "Demonstrations of two ways", "not in the paper", units, table, family="generator"
 )

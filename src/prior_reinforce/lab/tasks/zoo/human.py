@@ -22,7 +22,7 @@ from jaxtyping import Float
 
 from prior_reinforce.arrays import Frames, Point, Points
 from prior_reinforce.errors import ConfigurationError
-from prior_reinforce.lab.tasks.following import smoothstep
+from prior_reinforce.lab.tasks.following import smoothstep, warped
 from prior_reinforce.plans.motions import Demonstrations
 
 if TYPE_CHECKING:
@@ -185,7 +185,7 @@ class Manner:
 
         times = np.arange(task.horizon) * task.format.dt
         part = np.clip((times - begins) / takes, 0.0, 1.0)
-        phase = duration * self._warped(part)
+        phase = duration * warped(part, self.warp)
         fine = np.linspace(0.0, 1.0, 501)
         when = begins + takes * fine
         home, taken_up = self.posture
@@ -193,17 +193,12 @@ class Manner:
         for number, move in enumerate(moves):
             change = np.array(move.change) + (taken_up if number == 0 else 0.0)
             if move.by_hardware:
-                start = np.interp(move.start, duration * self._warped(fine), when)
+                start = np.interp(move.start, duration * warped(fine, self.warp), when)
                 progress = (times - start) / move.duration
             else:
                 progress = (phase - move.start) / move.duration
             path += smoothstep(progress)[:, None] * change
         return path + self.noise
-
-    def _warped(self, part: Float[np.ndarray, " t"]) -> Float[np.ndarray, " t"]:
-        """A monotone map of [0, 1] onto itself."""
-        waves = np.pi * np.arange(1, len(self.warp) + 1)
-        return part + np.sin(part[:, None] * waves) @ (self.warp / waves)
 
 
 def demonstrate(task: ZooTask, name: str) -> Demonstrations:

@@ -1,0 +1,45 @@
+"""The paper's form behind the adapters: what is run, and its table from rows."""
+
+import numpy as np
+import pandas as pd
+
+from prior_reinforce.lab.experiments.recipes import RECIPES, Scale
+from prior_reinforce.lab.experiments.recipes.adapters import ADAPTERS
+from prior_reinforce.lab.experiments.recipes.generators import METHODS, PAPERS_FORM
+from prior_reinforce.lab.experiments.recipes.papers_form import RECIPE, units
+from prior_reinforce.lab.experiments.results import Results
+
+
+def test_one_training_a_set_and_seed_serves_everything():
+    planned = units(Scale())
+    trainings = {unit.training for unit, _ in planned}
+    assert {t.generator for t in trainings} == {PAPERS_FORM}
+    assert len(trainings) == 6
+    assert [unit.training.seed for unit, _ in planned] == sorted(
+        unit.training.seed for unit, _ in planned
+    )  # a run that is stopped has whole seeds
+
+
+def test_the_comparison_of_generators_shares_its_units():
+    of_generators = {
+        unit
+        for unit, names in RECIPES["generators"].units(Scale(), ())
+        if names["method"] == METHODS[1].label
+    }
+    assert of_generators <= {unit for unit, _ in units(Scale())}
+
+
+def test_a_row_a_condition_and_adapter():
+    rng = np.random.default_rng(0)
+    rows = [
+        {"condition": condition, "method": name, "learned_on": "t", "task": condition, "set": "A",
+         "seed": seed, "goal": j, "rounds": 10, "solved_at": rng.integers(1, 4)}
+        for condition in ("amplified noise", "V1, by eye") for name in list(ADAPTERS)[:2]
+        for seed in range(3) for j in range(5)
+    ]  # fmt: skip
+    table = RECIPE.table(Results(pd.DataFrame(rows), {}))
+    assert [row[0] for row in table.rows] == [
+        "GP, m = 2, amplified noise", "GP, no forgetting, amplified noise",
+        "GP, m = 2, V1, by eye", "GP, no forgetting, V1, by eye",
+    ]  # fmt: skip
+    assert {len(row) for row in table.rows} == {len(table.header)}
