@@ -17,7 +17,7 @@ from tests.attacks.harness import program
 
 WRITING = 0.02
 """Seconds that every write takes at least, so that a kill within one does not depend on luck."""
-KILLS = 8
+KILLS = 4
 WORKERS = (1, 1, 1, 2)  # A new worker takes seconds to start, so most runs do without.
 
 
