@@ -154,7 +154,7 @@ def test_stop_waits_for_nothing_else(client, monkeypatch):
 def test_every_tab_hears_and_one_that_lags_holds_nobody_up():
     async def listening():
         events = Events()
-        events.begin()
+        events.loop = asyncio.get_running_loop()
         quick, slow = events._lines(), events._lines()
         assert await anext(quick) == await anext(slow) == b"data: {}\n\n"
         for number in range(3 * module._QUEUE):

@@ -1,5 +1,4 @@
 import os
-import signal
 import subprocess
 import sys
 import threading
@@ -246,7 +245,7 @@ def test_stop_stops_and_a_person_says_what_moved(folder, tmp_path):
     state = aimed(verbs)
     state = verbs.execute(execution(state))
     assert state.step == "executing"
-    wait_for(lambda: {"output": "moving\n"} in heard)
+    wait_for(lambda: any(message.get("output") == "moving\n" for message in heard))
     assert "moving" in verbs.state().output
     start = time.monotonic()
     state = verbs.stop()
@@ -283,7 +282,7 @@ def test_after_a_stop_nothing_begins_that_was_asked_for_before(folder, tmp_path)
     other.close()
     with pytest.raises(TrialStateError, match="somebody pressed Stop since"):
         verbs.execute(execution(state))
-    wait_for(lambda: {"id": state.id, "stopped": stopped} in heard)
+    wait_for(lambda: {"id": state.id, "stopped": stopped, "output": ""} in heard)
     verbs.execute(execution(verbs.state()))
     verbs.close()
     assert kinds(verbs.folder).count("executing") == 1
@@ -304,7 +303,7 @@ def test_stop_stops_what_another_program_is_about_to_start(verbs):
     held.wait()
     verbs.stop()
     starting.join()
-    assert ended == [-signal.SIGTERM]
+    assert ended[0] < 0  # by a signal
 
 
 @pytest.fixture
@@ -327,7 +326,7 @@ def on_arm(folder, tmp_path, monkeypatch):
 def test_an_arm_says_where_it_stands_and_a_person_is_asked_what_the_command_line_asks(on_arm):
     verbs, arm = on_arm()
     state = aimed(verbs)
-    assert (state.looks, state.executor) == (True, toy_arm.TOY)
+    assert state.moved_by == "arm"
     asked = verbs.question(execution(state))
     assert asked.question == (
         "the arm will move (trial 1 at full speed, 0.5 s); NOT checked: self-collision, the "
@@ -390,7 +389,7 @@ def test_everybody_hears_what_the_command_line_does(folder, tmp_path):
     verbs = executing(tmp_path / folder, SLOW, heard)
     with Workspace(tmp_path / folder) as workspace:
         workspace.set_goal([0.9, 0.0])
-    wait_for(lambda: {"id": 3, "stopped": "0"} in heard)
+    wait_for(lambda: {"id": 3, "stopped": "0", "output": ""} in heard)
     verbs.close()
 
 

@@ -1,10 +1,9 @@
 """A picture of the table: calibrated by known points, and where the object lies in it.
 
-Tags to be printed, of 40 mm (`tags.svg`), are OpenCV's AprilTags of the family 36h11.
-
 Files in the workspace: `camera.json`, the calibration; `pictures/table.jpg` and
 `pictures/trial-003.jpg`, the latest picture of the table and of a trial. A picture comes from any
-camera, and the page sends it: what shows the table to the browser is none of our business.
+camera, and the page sends it: what shows the table to the browser is none of our business. Tags to
+be printed (`tags.svg`, 40 mm wide) are OpenCV's AprilTags of the family 36h11.
 """
 
 from __future__ import annotations
@@ -83,9 +82,8 @@ class Pictures:
 
     def look_up(self) -> Camera:
         """Say what is known of the camera."""
-        path = self._latest()
         camera = Camera(_known_points(self._verbs.state()))
-        if path is not None:
+        if (path := self._latest()) is not None:
             camera.picture = sha256(path.read_bytes())[:16]
         if (calibration := self._calibration()) is not None:
             camera.to_table = np.linalg.inv(calibration.homography).tolist()
@@ -97,9 +95,8 @@ class Pictures:
         """Keep a picture of the table, or of the trial that waits to be told."""
         from PIL import Image
 
-        picture = _decoded(content)
         encoded = io.BytesIO()  # anew: nothing that a file hides goes into the workspace
-        Image.fromarray(picture).save(encoded, "JPEG", quality=92)
+        Image.fromarray(_decoded(content)).save(encoded, "JPEG", quality=92)
         number = self._verbs.state().open
         name = "table.jpg" if number is None else f"trial-{number:03d}.jpg"
         with named_disk_errors(self._folder):
@@ -109,8 +106,7 @@ class Pictures:
 
     def file(self) -> Path:
         """Return the latest picture."""
-        path = self._latest()
-        if path is None:
+        if (path := self._latest()) is None:
             raise PerceptionFailedError("there is no picture yet; take one")
         return path
 

@@ -94,7 +94,7 @@ function take(state) {
   const trial = openTrial();
   if (!trial) motion = null;
   else if (!motion || motion.sha256 !== trial.sha256) fetchMotion(trial.number);
-  if (S.step === "execute" && S.executor && !S.looks && !L.question) askToMove("trial");
+  if (S.step === "execute" && S.moved_by === "command" && !L.question) askToMove("trial");
   draw();
 }
 
@@ -190,7 +190,7 @@ function touching() {
   const trial = openTrial();
   if (S.step === "goal" || S.step === "reached") return "goal";
   if (S.step === "tell") return "tell";
-  if (S.step === "execute" && trial && (!S.executor || L.byHand === trial.number)) return "tell";
+  if (S.step === "execute" && trial && (!S.moved_by || L.byHand === trial.number)) return "tell";
   return "";
 }
 const touchedGoal = () => {
@@ -605,7 +605,7 @@ function byEye() {
   const rows = S.components.map((c, i) => {
     const turned = c.axis === 1; // left is to the left
     const ends = turned ? c.words : [...c.words].reverse();
-    return h("fieldset", {}, h("legend", {}, `${ends[0]} or ${ends[1]} of the goal, in ${c.shown}`),
+    return h("fieldset", {}, h("legend", {}, `${ends[0][0].toUpperCase()}${ends[0].slice(1)} or ${ends[1]} of the goal, in ${c.shown}`),
       h("div", { class: "scale" }, (turned ? sizes(c).reverse() : sizes(c)).map((size) => h("label", {}, `${Math.abs(size)}`,
         h("input", { type: "radio", name: `eye-${i}`, id: `eye-${i}-${size}`, "aria-label": size ? word(c, size) : "neither",
           checked: L.words[i] === size, onchange: () => { L.words[i] = size; draw(); } })))),
@@ -656,7 +656,7 @@ function drawAct() {
     if (trial && S.step === "execute" && !L.amending) parts.push(chance(trial), surprise(trial), old(trial), button("download", `Download the plan of trial ${trial.number}`, () => download(trial)));
     parts.push(...tellPanel());
   } else if (S.learning) {
-    parts.push(h("progress", { value: S.learning.done, max: 1, "aria-label": "learned so far" }), h("p", {}, `${Math.round(100 * S.learning.done)} %, ${Math.round(S.learning.seconds_left)} s left`));
+    parts.push(h("progress", { value: S.learning[0], max: 1, "aria-label": "learned so far" }), h("p", {}, `${Math.round(100 * S.learning[0])} %, ${Math.round(S.learning[1])} s left`));
   } else if (S.step === "import") parts.push(...importPanel());
   else if (S.step === "learn") parts.push(button("learn", `Learn from ${S.demonstrations.length} demonstrations`, () => verb("learn"), "big", off));
   else if (touching() === "goal") parts.push(...goalPanel(off));
@@ -664,7 +664,7 @@ function drawAct() {
   else if (S.step === "execute") {
     parts.push(chance(trial), surprise(trial), old(trial), trial.warning && h("p", { class: "ask" }, `Last time ${trial.warning}.`), ...executePanel(trial, off),
       details("other", "Another way", h("div", { class: "row" },
-        S.looks && button("rehearse", "Rehearse at 20 % of its speed", () => askToMove("rehearsal", 0.2), "", off),
+        S.moved_by === "arm" && button("rehearse", "Rehearse at 20 % of its speed", () => askToMove("rehearsal", 0.2), "", off),
         button("download", "Download the plan", () => download(trial)),
         button("by-hand", "It was executed otherwise", () => { L.byHand = trial.number; draw(); }), voider(trial.number, "Void it")), confirmVoid(trial.number)));
   } else if (S.step === "executing") {
@@ -684,19 +684,19 @@ function drawAct() {
 async function askToMove(motion, speed = 1) {
   const trial = openTrial();
   const asked = { seen: S.id, stopped: S.stopped, trial: trial.number, sha256: trial.sha256, motion, speed };
-  if (S.looks) { L.busy = true; draw(); }
+  if (S.moved_by === "arm") { L.busy = true; draw(); }
   const question = await send("/api/question", "POST", JSON.stringify(asked));
   L.busy = false;
   if (question && asked.seen === S.id && asked.stopped === S.stopped) {
     L.question = { ...question, asked: { ...asked, motion: question.motion, speed: question.motion === "rehearsal" ? speed : 1 } };
-    if (S.looks) calm();
+    if (S.moved_by === "arm") calm();
   }
   draw();
 }
 const MOVES = { trial: "execute trial", rehearsal: "rehearse trial", approach: "go slowly to the start of trial" };
 function executePanel(trial, off) {
   const question = L.question;
-  if (S.looks && (!question || question.refused)) {
+  if (S.moved_by === "arm" && (!question || question.refused)) {
     return [
       question && h("p", { class: "ask" }, `${question.arm}. It refuses the plan: ${question.refused}.`),
       button("prepare", L.busy ? "Asking the arm where it stands" : question ? "Ask the arm again" : `Prepare trial ${trial.number}`, () => askToMove("trial"), "big", off),
@@ -708,8 +708,8 @@ function executePanel(trial, off) {
   return [
     question && question.arm && h("p", {}, question.arm),
     h("p", { class: "ask", id: "question" }, question ? `${question.question[0].toUpperCase()}${question.question.slice(1)}` : ""),
-    button("execute", S.looks ? `Yes: ${moves}` : `${moves[0].toUpperCase()}${moves.slice(1)}`, () => verb("execute", question.asked), "big", still),
-    S.looks && h("div", { class: "row" }, button("not-now", "No, not now", () => { L.question = null; draw(); })),
+    button("execute", S.moved_by === "arm" ? `Yes: ${moves}` : `${moves[0].toUpperCase()}${moves.slice(1)}`, () => verb("execute", question.asked), "big", still),
+    S.moved_by === "arm" && h("div", { class: "row" }, button("not-now", "No, not now", () => { L.question = null; draw(); })),
     h("p", { class: "soft" }, "The arm moves at once: keep clear, and the stop button in your hand."),
   ];
 }
@@ -865,7 +865,7 @@ async function placeEpisode(name, outcome) {
   nextEpisode();
 }
 function importPanel() {
-  const zone = h("label", { class: "drop", id: "drop" }, L.uploading ? `Receiving ${L.uploading}` : "Drop recordings here, or choose them",
+  const zone = h("label", { class: "drop", id: "drop" }, L.uploading ? `Receiving ${L.uploading}` : "Drop recordings or their folder here, or choose files",
     h("span", { class: "soft" }, "NPZ, CSV, Excel, LeRobot, HDF5, ROS bags, and outcomes.csv if you have one"),
     h("input", { type: "file", multiple: true, id: "files", onchange: (event) => upload([...event.target.files].map((file) => [file.name, file])) }));
   zone.addEventListener("dragover", (event) => { event.preventDefault(); zone.classList.add("over"); });

@@ -75,13 +75,7 @@ class Guard:
     """Lets through what comes from the page, and adds the headers that keep it ours."""
 
     def __init__(self, app: ASGIApp, token: str, host: str) -> None:
-        """Guard an application.
-
-        Args:
-            app: What answers.
-            token: The secret.
-            host: Name or address that it was told to listen at.
-        """
+        """Guard an application that was told to listen at a host, for who has the token."""
         self._app, self._token = app, token
         self._names = {"localhost", host.lower(), socket.gethostname().lower()}
         self._names |= {f"{name}.local" for name in self._names}

@@ -10,8 +10,9 @@ import re
 import shutil
 import threading
 from contextlib import suppress
-from dataclasses import dataclass
+from typing import NamedTuple
 
+import numpy as np
 from msgspec import Struct
 
 from prior_reinforce.bench.console.verbs import Seen, Verbs
@@ -77,26 +78,15 @@ class Take(Seen):
     """A person said that the guesses are right."""
 
 
-@dataclass(frozen=True)
-class _Found:
+class _Found(NamedTuple):
     """The recordings as they are read now."""
 
     recordings: Recordings
     selection: Selection
-    known: Outcomes
+    rows: dict[str, list[float]]
+    """Outcome and its standard deviation by episode, where they are known."""
     unclear: tuple[Ambiguity, ...]
     """What is only guessed of their units."""
-
-    @property
-    def rows(self) -> dict[str, tuple[float, ...]]:
-        """Outcome and its standard deviation by episode, where they are known."""
-        missing = missing_outcomes(self.selection.episodes, self.known)
-        there = [episode for episode in self.selection.episodes if episode not in missing]
-        if not there:
-            return {}
-        places, sds = outcomes_of(there, self.known, partial=True)
-        pairs = zip(there, places.tolist(), sds.tolist(), strict=True)
-        return {episode: (*place, sd[0]) for episode, place, sd in pairs}
 
 
 class Imports:
@@ -106,7 +96,7 @@ class Imports:
         """Work on the workspace of these verbs."""
         self._verbs, self._workspace = verbs, verbs.workspace
         self._folder = verbs.folder / "recordings"
-        self._lock = threading.Lock()
+        self._lock = threading.RLock()
 
     def drop(self, name: str, content: bytes) -> Dropped:
         """Keep a file of the recordings; its name may have folders."""
@@ -117,8 +107,7 @@ class Imports:
             there = [path for path in self._folder.rglob("*") if path.is_file()]
             size = sum(path.stat().st_size for path in there) + len(content)
             if size > _LARGEST_ALL or len(there) >= _MOST_FILES:
-                more = "that is more than the page takes; use: prior-reinforce import"
-                raise FileFormatError(more)
+                raise FileFormatError("more than the page takes; use: prior-reinforce import")
             path = require_inside(self._folder / name, self._verbs.folder)
             with named_disk_errors(self._folder):
                 write(path, content)
@@ -128,7 +117,22 @@ class Imports:
     def look(self) -> Dropped:
         """Say what the recordings hold, and what an import would make of them."""
         with self._lock:
-            return self._look()
+            files = sum(path.is_file() for path in self._folder.rglob("*"))
+            manifest = self._workspace.manifest
+            if not files:
+                return Dropped(0)
+            try:
+                found, form = self._read(), Preprocessing(manifest.format.dt)
+                inspection = inspect(found.selection, form, manifest.robot, manifest.gate)
+            except PriorReinforceError as error:
+                return Dropped(files, problem=str(error))
+        places = {name: row[:-1] for name, row in found.rows.items()}
+        return Dropped(
+            files,
+            inspection.text,
+            questions=[one.what for one in found.unclear],
+            episodes={name: places.get(name) for name in found.selection.episodes},
+        )
 
     def place(self, body: Place) -> Dropped:
         """Write down where a recording's object landed."""
@@ -139,25 +143,24 @@ class Imports:
             if body.episode not in found.selection.episodes:
                 raise InvalidDemonstrationsError(f"there is no recording {body.episode[:80]!r}")
             if body.outcome is not None and len(body.outcome) != len(names):
-                wanted = f"an outcome is {len(names)} numbers: {', '.join(names)}"
-                raise InvalidFeedbackError(wanted)
+                raise InvalidFeedbackError(f"an outcome is numbers: {', '.join(names)}")
             rows = found.rows
             rows.pop(body.episode, None)
             if body.outcome is not None:
-                rows[body.episode] = (*body.outcome, body.sd)
+                rows[body.episode] = [*body.outcome, body.sd]
             cells = {episode: tuple(map(repr, row)) for episode, row in rows.items()}
             table = found.recordings.outcome_places[0] / OUTCOMES_FILE
             with named_disk_errors(self._folder):
                 write_outcome_table(table, cells, (*names, SD), (*units, units[0]))
             self._verbs.publish({"recordings": len(rows)})
-            return self._look()
+            return self.look()
 
     def take(self, body: Take) -> State:
         """Take the recordings with a known outcome in, as `prior-reinforce import` does."""
         with self._lock, self._verbs.as_seen(body.seen):
             found = self._read()
-            missing = missing_outcomes(found.selection.episodes, found.known)
-            if len(missing) == len(found.selection.episodes):
+            missing = [name for name in found.selection.episodes if name not in found.rows]
+            if not found.rows:
                 raise InvalidDemonstrationsError("no outcome is known yet; touch where they landed")
             result = self._workspace.import_recordings(
                 found.recordings.source, leave_out=missing, take_guesses=body.confirmed
@@ -178,7 +181,7 @@ class Imports:
             if self._folder.is_dir():
                 shutil.rmtree(require_inside(self._folder, self._verbs.folder))
             self._verbs.publish({"recordings": 0})
-            return self._look()
+            return self.look()
 
     def _read(self) -> _Found:
         if not self._folder.is_dir():
@@ -199,25 +202,8 @@ class Imports:
             known = Outcomes.none(names)
         known, unclear = in_units(known, manifest.outcome_units, None)
         unclear += recordings.ambiguities + selection.ambiguities
-        return _Found(recordings, selection, known, unclear)
-
-    def _look(self) -> Dropped:
-        files = sum(path.is_file() for path in self._folder.rglob("*"))
-        if not files:
-            return Dropped(0)
-        manifest = self._workspace.manifest
-        try:
-            found = self._read()
-            rows, preprocessing = found.rows, Preprocessing(manifest.format.dt)
-            inspection = inspect(found.selection, preprocessing, manifest.robot, manifest.gate)
-        except PriorReinforceError as error:
-            return Dropped(files, problem=str(error))
-        return Dropped(
-            files,
-            inspection.text,
-            questions=[one.what for one in found.unclear],
-            episodes={
-                name: [*rows[name][:-1]] if name in rows else None
-                for name in found.selection.episodes
-            },
-        )
+        missing = missing_outcomes(selection.episodes, known)
+        placed = [episode for episode in selection.episodes if episode not in missing]
+        places, sds = outcomes_of(placed, known, partial=True)
+        rows = dict(zip(placed, np.column_stack([places, sds[:, :1]]).tolist(), strict=True))
+        return _Found(recordings, selection, rows, unclear)

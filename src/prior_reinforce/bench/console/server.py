@@ -51,15 +51,10 @@ _STATUS_OF: dict[type[Exception], int] = {
     UnicodeDecodeError: 400,
     ClientDisconnect: 400,
 }
-_REFUSALS = (400, 401, 403, 404, 405, 408, 409, 413, 422, 429)
 _FOR_STOP = anyio.CapacityLimiter(8)
 """Threads that only stop the arm: whatever else is asked at the same time, some are free."""
 
-
-class Problem(msgspec.Struct):
-    """Why something was not done."""
-
-    error: str
+Problem = msgspec.defstruct("Problem", [("error", str)])
 
 
 @dataclass(frozen=True)
@@ -77,11 +72,6 @@ class Endpoint:
     largest: int = _LARGEST_BODY
     media: str = "application/octet-stream"
     """Of a file that is sent."""
-
-    @property
-    def takes(self) -> dict[str, Any]:
-        """Type of each argument, and of the answer as `return`."""
-        return get_type_hints(self.call)
 
 
 _STOP, _RECORDINGS = "/api/stop", "/api/recordings"
@@ -117,15 +107,7 @@ def endpoints(verbs: Verbs, imports: Imports, pictures: Pictures) -> list[Endpoi
 def application(
     verbs: Verbs, events: Events, token: str, host: str, vlm: VisionLanguageModelConfig
 ) -> Guard:
-    """Make the console, an ASGI application.
-
-    Args:
-        verbs: The workspace.
-        events: What `verbs` publishes to.
-        token: The secret.
-        host: Name or address that it is to listen at.
-        vlm: Which model finds objects in pictures.
-    """
+    """Make the console, an ASGI application that is to listen at `host`, for who has the token."""
     table = endpoints(verbs, Imports(verbs), Pictures(verbs, vlm))
     schema = openapi(table)
 
@@ -141,7 +123,7 @@ def application(
 
     @asynccontextmanager
     async def lifespan(_: Starlette) -> AsyncIterator[None]:
-        events.begin()
+        events.loop = asyncio.get_running_loop()
         yield
         await anyio.to_thread.run_sync(verbs.close)
 
@@ -159,7 +141,7 @@ def application(
 
 async def _answer(endpoint: Endpoint, request: Request) -> Response:
     said, given = {**request.query_params, **request.path_params}, {}
-    for name, kind in endpoint.takes.items():
+    for name, kind in get_type_hints(endpoint.call).items():
         if kind in _PARAMETERS:
             if name not in said:
                 raise HTTPException(400, f"say {name}")
@@ -169,9 +151,8 @@ async def _answer(endpoint: Endpoint, request: Request) -> Response:
             given[name] = content if kind is bytes else msgspec.json.decode(content, type=kind)
     threads = _FOR_STOP if endpoint.path == _STOP else None
     answer = await anyio.to_thread.run_sync(partial(endpoint.call, **given), limiter=threads)
-    if isinstance(answer, Path):
-        return FileResponse(answer, media_type=endpoint.media)
-    return _json(answer)
+    is_file = isinstance(answer, Path)
+    return FileResponse(answer, media_type=endpoint.media) if is_file else _json(answer)
 
 
 async def _read(request: Request, largest: int) -> bytes:
@@ -215,18 +196,15 @@ class Events:
 
     def __init__(self) -> None:
         """Nobody listens yet."""
-        self._loop: asyncio.AbstractEventLoop | None = None
+        self.loop: asyncio.AbstractEventLoop | None = None
+        """On which it publishes; nothing is published before."""
         self._tabs: set[asyncio.Queue[bytes]] = set()
-
-    def begin(self) -> None:
-        """Publish from now on, on the running loop."""
-        self._loop = asyncio.get_running_loop()
 
     def publish(self, message: dict[str, Any]) -> None:
         """Tell all tabs; called in any thread."""
         text = b"data: " + msgspec.json.encode(message) + b"\n\n"
-        if self._loop is not None and not self._loop.is_closed():
-            self._loop.call_soon_threadsafe(self._put, text)
+        if self.loop is not None and not self.loop.is_closed():
+            self.loop.call_soon_threadsafe(self._put, text)
 
     def _put(self, text: bytes) -> None:
         for tab in self._tabs:
@@ -255,8 +233,8 @@ class Events:
 
 def openapi(table: list[Endpoint]) -> dict[str, Any]:
     """What the interface says of itself, OpenAPI 3.1."""
-    kinds = dict.fromkeys([Problem, *(kind for e in table for kind in e.takes.values())])
-    types = [kind for kind in kinds if kind not in (bytes, Path, *_PARAMETERS)]
+    kinds = dict.fromkeys(kind for e in table for kind in get_type_hints(e.call).values())
+    types = [Problem, *(kind for kind in kinds if kind not in (bytes, Path, *_PARAMETERS))]
     shapes, components = msgspec.json.schema_components(
         types, ref_template="#/components/schemas/{name}"
     )
@@ -269,11 +247,11 @@ def openapi(table: list[Endpoint]) -> dict[str, Any]:
 
     refusals = {
         str(status): {"description": HTTPStatus(status).phrase, "content": content(Problem)}
-        for status in _REFUSALS
+        for status in (400, 401, 403, 404, 405, 408, 409, 413, 422, 429)
     }
     paths: dict[str, Any] = {}
     for e in table:
-        takes, path = e.takes, e.path.replace(":int}", "}")
+        takes, path = get_type_hints(e.call), e.path.replace(":int}", "}")
         done = {"description": "Done.", "content": content(takes.pop("return"), e.media)}
         operation = paths.setdefault(path, {})[e.method.lower()] = {
             "summary": (e.call.__doc__ or "").partition("\n")[0],
@@ -304,11 +282,7 @@ class _Impatient(H11Protocol):
 
     def connection_made(self, transport: Any) -> None:
         super().connection_made(transport)
-        self.loop.call_later(_LONGEST_WAIT, self._close_if_idle)
-
-    def _close_if_idle(self) -> None:
-        if self.cycle is None:
-            self.transport.close()
+        self.loop.call_later(_LONGEST_WAIT, lambda: self.cycle or transport.close())
 
 
 def server_of(

@@ -14,21 +14,21 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
+from types import NoneType
 from typing import Any
 
-from msgspec import Struct, structs, to_builtins
+from msgspec import Struct, structs
 
 from prior_reinforce.adapters import DEFAULT_ADAPTER
 from prior_reinforce.bench.console.view import (
-    Learning,
     MotionView,
+    Mover,
     State,
     motion_of,
     output_of,
     state_of,
     step_of,
 )
-from prior_reinforce.bench.robots.executors.arguments import without_arguments
 from prior_reinforce.bench.robots.executors.base import ArmSettings, Motion
 from prior_reinforce.bench.robots.executors.lock import is_executing, last_stop, stop_executing
 from prior_reinforce.bench.workspace.status import ask_to_move, say_look
@@ -38,13 +38,13 @@ from prior_reinforce.generators.base import FitProgress
 from prior_reinforce.readings import Reading
 from prior_reinforce.session.trials import Stage, Trial
 
+_KIND: dict[type, Mover] = {NoneType: "", str: "command", ArmSettings: "arm"}
 _LOOK = 0.05
 """How often the journal is looked at for what others did, in [s]."""
 _SOMETIMES = 0.5
 """How often to look whether what executes has ended, in [s]: that reads all of /proc."""
 _STARTING = 10.0
-"""How long Stop waits for what another program is about to start, in [s]; ours: a busy computer
-starts a program in that."""
+"""For what another program is about to start, in [s]; ours: what a busy computer takes for it."""
 
 
 class Seen(Struct, forbid_unknown_fields=True):
@@ -160,14 +160,11 @@ class Verbs:
         self._session = self.workspace.session(own, own_adapter)
         self._lock = threading.RLock()
         self._moved_by, self._time_limit, self._report = moved_by, time_limit, report
-        self._executor = without_arguments(moved_by) if isinstance(moved_by, str) else ""
-        if isinstance(moved_by, ArmSettings):
-            self._executor = moved_by.executor
         self.publish = publish
         """Tells all tabs something, in any thread."""
         self._threads = ThreadPoolExecutor(thread_name_prefix="execution")
         self._execution: Future[None] | None = None
-        self._learning: Learning | None = None
+        self._learning: tuple[float, float] | None = None
         self._shown_for: tuple[object, ...] = ()
         self._shown: State
         self._closed = threading.Event()
@@ -194,14 +191,13 @@ class Verbs:
                 self._shown, self._shown_for = state_of(self.workspace), now
             return structs.replace(
                 self._shown,  # computed once for all tabs that ask after an event
-                executor=self._executor,
-                looks=isinstance(self._moved_by, ArmSettings),
+                moved_by=_KIND[type(self._moved_by)],
                 learning=self._learning,
                 report=self._report if self._shown.trials else "",
             )
 
     def goal(self, body: SetGoal) -> State:
-        """Set a goal, and get its first plan."""
+        """Set a goal, as the one before was set."""
         with self.as_seen(body.seen):
             goals = self.workspace.state.goals
             self.workspace.set_goal(
@@ -281,7 +277,7 @@ class Verbs:
                 raise TrialStateError("it is learning already; wait for it")
             self.workspace.state.refuse_open_trial("learning")
             self.workspace.demonstrations  # noqa: B018  (there are some)
-            self._learning = Learning(0.0, 0.0)
+            self._learning = (0.0, 0.0)
             threading.Thread(target=self._learn, name="learning", daemon=True).start()
         return self.state()
 
@@ -317,7 +313,10 @@ class Verbs:
                 raise TrialStateError("the journal has fewer events than the page; look again")
             since = [entry for entry in entries if entry.id > seen]
             if since:
-                said = ", ".join(_say(to_builtins(entry.event)) for entry in since[-3:])
+                last = [
+                    (e.kind.replace("_", " "), getattr(e.event, "trial", 0)) for e in since[-3:]
+                ]
+                said = ", ".join(f"{what} trial {n}" if n else what for what, n in last)
                 raise TrialStateError(f"not done, since meanwhile: {said}; look again")
             yield
 
@@ -358,8 +357,8 @@ class Verbs:
 
     def _learn(self) -> None:
         def progress(fit: FitProgress) -> None:
-            self._learning = Learning(fit.step / max(fit.n_steps, 1), fit.seconds_left)
-            self.publish({"learning": to_builtins(self._learning)})
+            self._learning = (fit.step / max(fit.n_steps, 1), fit.seconds_left)
+            self.publish({"learning": self._learning})
 
         try:
             with Workspace(self.folder) as workspace:
@@ -372,14 +371,16 @@ class Verbs:
 
     def _watch(self) -> None:
         """Tell all tabs what happens in the journal, whoever writes it, and what executions say."""
-        last: tuple[int, int] | None = None
-        shown, looked = "", 0.0
+        shown, looked = dict[str, Any](), 0.0
         while not self._closed.wait(_LOOK):
             try:
                 with self._lock:
                     entries, trial = self.workspace.events, self.workspace.state.open_trial
-                    now = len(entries), last_stop(self.folder)
-                    output = "" if trial is None else output_of(self.workspace, trial)
+                    now = {
+                        "id": entries[-1].id if entries else 0,
+                        "stopped": str(last_stop(self.folder)),
+                        "output": "" if trial is None else output_of(self.workspace, trial),
+                    }
                     left = trial is not None and trial.stage is Stage.EXECUTING
                     left = left and not self._is_running()
                     if left and time.monotonic() > looked + _SOMETIMES:
@@ -389,15 +390,6 @@ class Verbs:
                 self.publish({"error": str(error)})
                 self._closed.wait(1.0)
                 continue
-            if now != last:
-                last = now
-                self.publish({"id": entries[-1].id if entries else 0, "stopped": str(now[1])})
-            if output != shown:
-                shown = output
-                self.publish({"output": output})
-
-
-def _say(event: dict[str, Any]) -> str:
-    """What happened, in a few words."""
-    trial = f" trial {event['trial']}" if "trial" in event else ""
-    return f"{event['kind'].replace('_', ' ')}{trial}"
+            if now != shown:
+                shown = now
+                self.publish(now)

@@ -12,13 +12,7 @@ from prior_reinforce.bench.robots.executors.lock import last_stop
 from prior_reinforce.bench.robots.kinematics import link_places
 from prior_reinforce.bench.robots.limits import match_joints
 from prior_reinforce.bench.robots.report import LimitLine, LimitReport
-from prior_reinforce.bench.workspace.log import (
-    Executed,
-    Executing,
-    Moved,
-    Moving,
-    NotExecuted,
-)
+from prior_reinforce.bench.workspace.log import Executed, Executing, Moved, Moving, NotExecuted
 from prior_reinforce.bench.workspace.manifest import Manifest
 from prior_reinforce.bench.workspace.records import (
     GoalRecord,
@@ -35,6 +29,7 @@ from prior_reinforce.wording import PLACE_WORDS, axes_of, error_words, say_readi
 Step = Literal[
     "import", "learn", "goal", "ask", "execute", "executing", "settle", "tell", "reached"
 ]
+Mover = Literal["", "command", "arm"]
 _SHOWN = {"m": ("cm", 100.0), "s": ("ms", 1000.0), "rad": ("deg", 180 / np.pi)}
 """The unit that a person says, and how many of it are one of the outcome's."""
 _SAMPLES = 120
@@ -75,14 +70,6 @@ class TrialView(TrialRecord, frozen=True, kw_only=True):
     """Of its plan."""
 
 
-class Learning(Struct):
-    """How far a training is."""
-
-    done: float
-    """Share, 0 to 1."""
-    seconds_left: float
-
-
 class State(Struct):
     """Everything that the page shows, but for the motion of a plan."""
 
@@ -105,12 +92,11 @@ class State(Struct):
     """The trial that waits to be told."""
     output: str
     """The end of what its execution wrote."""
-    executor: str = ""
-    """What this program can execute a plan by; empty where the plan is to be downloaded."""
-    looks: bool = False
-    """Whether that says where the arm stands, and can also go to the plan's start, and rehearse."""
-    learning: Learning | None = None
-    """What this program is doing beside."""
+    moved_by: Mover = ""
+    """What executes a plan for this program; empty where it is to be downloaded. An arm also says
+    where it stands, goes to the plan's start, and rehearses."""
+    learning: tuple[float, float] | None = None
+    """Share that is done of a training that runs, and how many seconds are left."""
     report: str = ""
     """Path of the report; empty before the first trial."""
 
@@ -148,17 +134,10 @@ def components_of(manifest: Manifest) -> list[Component]:
     """Return what an outcome's numbers are."""
     names, units = manifest.outcome_names, manifest.outcome_units
     axes = [a if u == "m" else 3 for a, u in zip(axes_of(names, units), units, strict=True)]
+    found = zip(names, units, axes, error_words(names, units), manifest.tolerance, strict=True)
     return [
-        Component(
-            name,
-            unit,
-            *_SHOWN.get(unit, (unit, 1.0)),
-            axes[i],
-            error_words(names, units)[i] or (),
-            PLACE_WORDS[axes[i]] if axes[i] < 3 else (),
-            manifest.tolerance[i],
-        )
-        for i, (name, unit) in enumerate(zip(names, units, strict=True))
+        Component(name, u, *_SHOWN.get(u, (u, 1.0)), a, words or (), (*PLACE_WORDS, ())[a], epsilon)
+        for name, u, a, words, epsilon in found
     ]
 
 
