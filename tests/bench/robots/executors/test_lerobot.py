@@ -241,13 +241,23 @@ def line_to(arm, frame):
     return plan_of(here + (10 * s**3 - 15 * s**4 + 6 * s**5) * (frame - here), arm)
 
 
+def _steps(arm):
+    return [servo.word(PRESENT_POSITION) for servo in arm.servos.values()]
+
+
 @pytest.mark.slow
 def test_lerobots_own_so101_class_throws_as_the_task_does(serve, tmp_path):
     landed, task = [], SO101Shot()
-    serve(landed.append)
+    simulated = serve(landed.append)
     frames = task.demonstrations("A").plans[4]
-    arm = so101(tmp_path)
+    for servo in simulated.servos.values():  # goals of long ago
+        servo.write_word(GOAL_POSITION, servo.word(PRESENT_POSITION) + 200)
+    before, arm = _steps(simulated), so101(tmp_path)
     try:
+        for _ in range(50):  # half a second of the arm's time
+            arm.where()
+        assert all(servo.memory[TORQUE_ENABLE] for servo in simulated.servos.values())
+        assert _steps(simulated) == pytest.approx(before, abs=3)  # it did not jump there
         assert arm.describe().columns[:5] == task.format.names
         with pytest.raises(RobotLimitError, match="calibrated range"):
             arm.check(plan_of(frames - np.array([0, 0, 1.3, 0, 0]), arm))
@@ -263,25 +273,6 @@ def test_lerobots_own_so101_class_throws_as_the_task_does(serve, tmp_path):
     (throw,) = landed
     expected = task.rollout(frames[None], None)[0].outcome
     assert throw.outcome == pytest.approx(expected, abs=0.005)
-
-
-def _steps(arm):
-    return [servo.word(PRESENT_POSITION) for servo in arm.servos.values()]
-
-
-@pytest.mark.slow
-def test_an_arm_does_not_jump_to_an_old_goal_when_its_torque_comes_on(serve, tmp_path):
-    arm = serve()
-    for servo in arm.servos.values():
-        servo.write_word(GOAL_POSITION, servo.word(PRESENT_POSITION) + 200)
-    before, client = _steps(arm), so101(tmp_path)
-    try:
-        for _ in range(50):  # half a second of the arm's time
-            client.where()
-        assert all(servo.memory[TORQUE_ENABLE] for servo in arm.servos.values())
-    finally:
-        client.close()
-    assert _steps(arm) == pytest.approx(before, abs=3)
 
 
 @pytest.mark.slow
