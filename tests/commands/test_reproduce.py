@@ -59,7 +59,7 @@ def test_tables_of_a_page_are_filled_where_they_are_marked(tmp_path):
     arguments = ["--quick", "--out", str(tmp_path / "run"), "--fill", str(page)]
     assert main(["reproduce", "alignment", *arguments]) == 0
     text = page.read_text()
-    assert text.startswith("before\n<!-- table trials -->\n\n| task |")
+    assert text.startswith("before\n<!-- table trials -->\n\nNot run")
     assert text.endswith("<!-- end -->\nafter\n")
     assert "old" not in text
 

@@ -140,6 +140,8 @@ def headlines(results: Results) -> Mapping[str, Table]:
     """Tables that other pages show, by name: README's, and those of docs/evidence.md."""
     of = {name: results.where(recipe=name) for name in ("trials", "generators", "adapters")}
     after = later(results.where(recipe="adaptation"))
+    if INCOMPLETE in results.made_by.get("adaptation", ""):
+        after = after.where(recipe=())  # methods would be means of different tasks
     trials: dict[str, Callable[[Any], object]] = {
         "task": lambda row: row[0].title,
         "perception": lambda row: "camera" if row[0].by_model else "eye",
@@ -178,8 +180,9 @@ def fill_tables(page: Path, results: Results) -> None:
     tables = headlines(results)
 
     def filled(found: re.Match[str]) -> str:
-        table = "\n".join(_rows(tables[found["name"]]))
-        return f"{found[1]}\n{table}\n{found[3]}"
+        table = tables[found["name"]]
+        text = "\n".join(_rows(table)) if table.rows else "Not run since raw rows are kept.\n"
+        return f"{found[1]}\n{text}\n{found[3]}"
 
     write(page, _FILLED.sub(filled, page.read_text(encoding="utf-8")))
 
@@ -235,8 +238,6 @@ def _markdown(
         lines.append(f"- Tests of {form}: {said}.")
     lines += ["", *_rows(claims_table(judged))]
     lines += ["## Beside the paper's numbers", "", *_rows(observations_table(results))]
-    if missing:
-        lines += [f"Not run: {', '.join(missing)}.", ""]
     for section in sections:
         lines += [f"## {section.recipe.title}", "", f"Paper: {section.recipe.paper}.", ""]
         lines += [remark for text in section.remarks for remark in (text, "")]
@@ -244,6 +245,8 @@ def _markdown(
             place = picture.path.relative_to(folder).as_posix()
             lines += [f"![{section.recipe.title}]({place})", "", picture.caption, ""]
         lines += [*_rows(section.table), f"`{section.made_by}`", ""]
+    for title in missing:
+        lines += [f"## {title}", "", "Not run since raw rows are kept.", ""]
     return "\n".join(lines)
 
 
