@@ -5,6 +5,7 @@ import base64
 import jinja2
 import pytest
 
+from prior_reinforce.lab.experiments.recipes.base import Table
 from prior_reinforce.report.html import data_uri, render
 
 
@@ -24,8 +25,11 @@ def test_another_packages_page_extends_ours():
         "evidence.html",
         package="prior_reinforce.lab.experiments",
         title="Evidence",
-        counts={},
+        counts={"ours": {"open": 1}},
+        claims=Table(("the paper says", "verdict"), (("a claim", "open"),)),
+        observations=Table(("quantity",), ()),
         sections=[],
+        missing=[],
         unbroken=str,
         source=str,
     )

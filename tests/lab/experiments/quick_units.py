@@ -62,6 +62,9 @@ class Roots(Unit):
             "roots": np.linalg.svd(matrix)[1][:9].tolist(),
         }
 
+    def rows(self, result):
+        return [dict(result)]
+
 
 @dataclass(frozen=True)
 class Ends(Unit):

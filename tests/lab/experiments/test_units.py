@@ -8,7 +8,7 @@ from quick_units import Ends, Roots, real_units, results
 
 from prior_reinforce.errors import UnitFailedError
 from prior_reinforce.lab.experiments.evaluation import Training, Trials, ZeroShot
-from prior_reinforce.lab.experiments.recipes import Run, Scale
+from prior_reinforce.lab.experiments.recipes.base import Run
 from prior_reinforce.lab.experiments.recipes.displacement import Displacement
 from prior_reinforce.lab.experiments.recipes.process import Process
 from prior_reinforce.lab.experiments.units import Workers, commit, result_path, run_units
@@ -55,9 +55,9 @@ def test_what_other_code_made_is_kept_and_named(tmp_path):
     kept, _ = run_units(units, tmp_path, Workers(), silent)
     assert kept["commit"] == commit()
     result_path(tmp_path, units[0]).write_text(json.dumps({**kept, "commit": "of May"}))
-    run = Run(tmp_path, Scale())
-    assert run.results(units)[0] == kept["result"]
-    assert run.commits == {"of May", commit()}
+    rows = Run(tmp_path).rows([(unit, {"method": "roots"}) for unit in units])
+    assert rows[0] == {"method": "roots", **kept["result"], "commit": "of May"}
+    assert [row["commit"] for row in rows] == ["of May", commit()]
 
 
 def test_a_failing_unit_is_named_and_the_others_stay(tmp_path):

@@ -21,8 +21,9 @@ def casts(azimuths: list[float], reach: float = 0.4, start: float = 0.3) -> np.n
     hand = np.stack([making.READY, making.RAISED, making.CAST])
     hand[:, 0] += reach * making.FURTHER
     durations = np.array([making.RAISE_TIME, making.CAST_TIME])
+    even = np.zeros(1)  # pace
     return np.array(
-        [making.cast(azimuth, hand, start, durations, Fishing.format.dt) for azimuth in azimuths]
+        [making.cast(az, hand, start, durations, Fishing.format.dt, even) for az in azimuths]
     )
 
 

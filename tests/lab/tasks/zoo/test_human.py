@@ -5,6 +5,7 @@ import pytest
 
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.lab.tasks import make_task
+from prior_reinforce.lab.tasks.following import warped as pace
 from prior_reinforce.lab.tasks.zoo.human import KINDS, Manner, reach_and_strike
 
 SCOOP, LOB, GRIPPER = make_task("zoo-scoop"), make_task("zoo-lob"), make_task("zoo-gripper")
@@ -82,7 +83,7 @@ def test_a_warp_keeps_the_way_and_changes_the_pace():
     warped, straight = manner.path(SCOOP, aims), even.path(SCOOP, aims)
     np.testing.assert_allclose(warped[[0, -1]], straight[[0, -1]], atol=1e-9)
     assert np.abs(warped - straight).max() > 0.02
-    assert np.all(np.diff(manner._warped(np.linspace(0, 1, 200))) > 0)
+    assert np.all(np.diff(pace(np.linspace(0, 1, 200), waves)) > 0)
 
 
 def test_a_gripper_opens_in_six_frames_in_every_tempo():
