@@ -20,7 +20,7 @@ HEAVY = {
     "mink",
     "matplotlib",
     "joblib",
-    "imageio",
+    "imageio_ffmpeg",
     "openai",
     "scipy.interpolate",
     "scipy.special",

@@ -16,7 +16,6 @@ EXTRA_OF = {
     "mink": "lab",
     "joblib": "lab",
     "threadpoolctl": "lab",
-    "imageio": "lab",
     "imageio_ffmpeg": "lab",
     "openai": "vlm",
     "movement_primitives": "baselines",

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 
-import imageio.v3 as imageio
 import numpy as np
 import pytest
 from PIL import Image
@@ -27,7 +26,7 @@ def table(tmp_path_factory):
     task = make_task("basketball-v1")
     (rollout,) = task.rollout(task.demonstrations("A").plans[:1], None)
     camera = Camera()
-    imageio.imwrite(folder / "photo.png", camera.picture(rollout.key_frame, GOAL))
+    Image.fromarray(camera.picture(rollout.key_frame, GOAL)).save(folder / "photo.png")
     marks = np.array(SCENE.marks)
     pixels = camera.find_marks(rollout.key_frame.model, np.hstack([marks, np.zeros((9, 1))]))
     camera.close()
@@ -127,8 +126,9 @@ def test_a_photograph_tells_the_error(table, capsys):
 
 def test_the_photograph_is_taken_first(table, tmp_path, run):
     folder = table[0]
-    photo = imageio.imread(folder / "photo.png")[..., :3]
-    (tmp_path / "feed.mjpeg").write_bytes(imageio.imwrite("<bytes>", photo, extension=".jpg") * 3)
+    photo = Image.open(folder / "photo.png")
+    photo.save(tmp_path / "photo.jpg")
+    (tmp_path / "feed.mjpeg").write_bytes((tmp_path / "photo.jpg").read_bytes() * 3)
     status, _, err = run("calibrate", folder / "points.csv", "--out", folder / "table.json")
     assert (status, err) == (0, "")
     taken, feed = tmp_path / "taken.png", tmp_path / "feed.mjpeg"
@@ -137,7 +137,7 @@ def test_the_photograph_is_taken_first(table, tmp_path, run):
     nobody = "http://127.0.0.1:9/v1"  # the discard port: no model answers
     given = [*objects, "--vlm.base-url", nobody, "--vlm.max-retries", "0"]
     assert "cannot reach" in run("look", taken, "--camera", feed, *given)[2]
-    assert np.abs(imageio.imread(taken).astype(float) - photo).mean() < 3
+    assert np.abs(np.asarray(Image.open(taken), float) - photo).mean() < 3
     status, _, err = run("look", taken, "--camera", feed, *given)
     assert status == 2
     assert "is there already" in err

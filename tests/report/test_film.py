@@ -74,6 +74,20 @@ def test_a_film_that_fails_leaves_nothing(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+def test_an_ffmpeg_that_fails_is_quoted_and_leaves_nothing(tmp_path, monkeypatch):
+    """It ends at once, or after so many pictures that a pipe cannot hold."""
+    folder = tmp_path / "films"
+    failing = tmp_path / "ffmpeg"
+    monkeypatch.setenv("IMAGEIO_FFMPEG_EXE", str(failing))
+    for script in ("exit 1", "head -c 100 >/dev/null; echo no memory >&2; exit 1"):
+        failing.write_text(f"#!/bin/sh\n{script}\n")
+        failing.chmod(0o755)
+        said = "no memory" if "memory" in script else "status 1"
+        with pytest.raises(RenderingUnavailableError, match=said):
+            record_film(pictures(40, 48, 64), folder, "throw")
+        assert list(folder.iterdir()) == []
+
+
 @pytest.mark.parametrize(
     ("shown", "message"),
     [

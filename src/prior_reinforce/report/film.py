@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from itertools import chain, pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from subprocess import PIPE, Popen
+from typing import TYPE_CHECKING
 
 import numpy as np
 from jaxtyping import UInt8
 
-from prior_reinforce.errors import ConfigurationError
+from prior_reinforce.errors import ConfigurationError, RenderingUnavailableError
 from prior_reinforce.files import in_place
 from prior_reinforce.report.record import Film
 
@@ -43,6 +45,7 @@ def record_film(
 
     Raises:
         ConfigurationError: No pictures, or of wrong or different shape or type.
+        RenderingUnavailableError: ffmpeg failed; the message says what it said.
     """
     from prior_reinforce.report.style import save_figure
 
@@ -84,24 +87,26 @@ def key_moments(pictures: Sequence[_Picture], moments: int) -> list[int]:
 
 def _write_video(pictures: Iterator[_Picture], path: Path, fps: int) -> Path:
     """Write an mp4 (H.264, 4:2:0) that any browser plays, whole or not at all."""
-    import imageio.v2 as imageio
+    from imageio_ffmpeg import get_ffmpeg_exe
 
     first = next(pictures)
     height, width = first.shape[:2]
-    options: Any = {
-        "codec": "libx264",
-        "pixelformat": "yuv420p",
-        "macro_block_size": 1,
-        "ffmpeg_log_level": "error",
-        "output_params": ["-crf", "23", "-movflags", "+faststart"],
-    }
+    # 4:2:0 colour needs even sizes: an odd last row or column is repeated.
+    even = ((0, height % 2), (0, width % 2), (0, 0))
+    size = f"{width + width % 2}x{height + height % 2}"
+    raw = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", size, "-r", str(fps), "-i", "-"]
+    film = ["-c:v", "libx264", "-pix_fmt", "yuv420p", "-crf", "23", "-movflags", "+faststart"]
     with in_place(path) as unfinished:
-        writer: Any = imageio.get_writer(unfinished, "FFMPEG", mode="I", fps=fps, **options)
-        with writer:
-            for picture in chain([first], pictures):
-                # 4:2:0 colour needs even sizes: an odd last row or column is repeated.
-                even = ((0, height % 2), (0, width % 2), (0, 0))
-                writer.append_data(np.pad(picture, even, "edge"))
+        command = [get_ffmpeg_exe(), "-y", "-loglevel", "error", *raw, *film, str(unfinished)]
+        with Popen(command, stdin=PIPE, stderr=PIPE) as ffmpeg:
+            assert ffmpeg.stdin is not None
+            with suppress(BrokenPipeError):  # It has ended, and says below why.
+                for picture in chain([first], pictures):
+                    ffmpeg.stdin.write(np.pad(picture, even, "edge").tobytes())
+            _, said = ffmpeg.communicate()
+        if ffmpeg.returncode:
+            reason = said.decode(errors="replace").strip() or f"status {ffmpeg.returncode}"
+            raise RenderingUnavailableError(f"ffmpeg made no film: {reason}")
     return path
 
 
