@@ -917,19 +917,18 @@ async function fetchCamera() {
   const answer = await get("/api/camera");
   if (answer) seen(await answer.json());
 }
+// A picture is shown, and may be touched, once it is there whole: before, no touch has a place in it.
 async function seen(camera) {
-  const before = C;
-  C = camera;
-  if (C.picture && (!before || before.picture !== C.picture || !pictureUrl)) {
+  if (camera.picture && (camera.picture !== (C && C.picture) || !pictureUrl)) {
     const answer = await get("/api/picture");
-    if (answer) {
-      if (pictureUrl) URL.revokeObjectURL(pictureUrl);
-      pictureUrl = URL.createObjectURL(await answer.blob());
-      const image = h("img", { src: pictureUrl });
-      await image.decode();
-      [L.wide, L.tall, box] = [image.naturalWidth, image.naturalHeight, null];
-    }
+    if (!answer) return;
+    const url = URL.createObjectURL(await answer.blob());
+    const image = h("img", { src: url });
+    await image.decode();
+    if (pictureUrl) URL.revokeObjectURL(pictureUrl);
+    [pictureUrl, L.wide, L.tall, box] = [url, image.naturalWidth, image.naturalHeight, null];
   }
+  C = camera;
   draw();
 }
 async function send(path, method, body, type = "application/json") {
