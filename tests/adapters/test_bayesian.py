@@ -280,6 +280,16 @@ def test_what_the_demonstrations_hardware_did_is_no_shift():
     np.testing.assert_allclose(moved, shift, atol=0.025)
 
 
+def test_hardware_beforehand_moves_no_first_throw_but_what_is_said_of_it():
+    """Before any trial every model expects the same landing; sizes say only how surely."""
+    often, seldom = started(p_changed=0.2), started(p_changed=0.05)
+    goal = np.array([0.93, 0.04])
+    condition = often.propose(goal)
+    np.testing.assert_array_equal(seldom.propose(goal), condition)
+    said = [adapter.p_hit(condition[None], goal[None], 0.02)[0] for adapter in (often, seldom)]
+    assert said[1] > said[0] + 0.02
+
+
 def test_p_hit_of_one_component_by_hand():
     adapter = started(np.array([[0.0], [2.0], [1.0], [3.0]]))
     condition, goal = np.array([1.4]), np.array([1.5])
