@@ -3,7 +3,12 @@
 import numpy as np
 
 from prior_reinforce.environment import Rollout
-from prior_reinforce.lab.experiments.observers import ErringEye, MisreadingEye
+from prior_reinforce.lab.experiments.observers import (
+    BiasedModel,
+    ErringEye,
+    MisreadingEye,
+    ScatteredModel,
+)
 from prior_reinforce.perception import make_perception
 from prior_reinforce.perception.eye import Eye
 
@@ -30,6 +35,22 @@ def test_a_misreading_eye_takes_one_side_for_the_other_once_in_twenty():
     right = np.all(errors == Eye().perceive(Rollout(GOAL + error, True), GOAL, None).error_seen, 1)
     assert abs(np.mean(~right) - 0.05) < 0.015
     assert np.all(np.abs(errors) == [0.1, 0.2])
+
+
+def test_a_biased_model_is_off_by_as_much_each_time_and_says_3_mm():
+    error = np.array([0.1, -0.2])
+    np.testing.assert_allclose(seen(BiasedModel(), error, 3), [[0.12, -0.215]] * 3)
+    said = BiasedModel().perceive(Rollout(GOAL + error, True), GOAL, np.random.default_rng(0))
+    assert np.all(said.sd == 0.003)
+
+
+def test_a_scattered_model_is_right_in_the_mean_and_far_off_once_in_twenty():
+    error = np.array([0.1, -0.2])
+    errors = seen(ScatteredModel(), error, 4000) - error
+    assert np.all(np.abs(np.median(errors, axis=0)) < 0.003)
+    assert np.all(np.abs(np.quantile(np.abs(errors), 0.5, axis=0) / 0.6745 - 0.03) < 0.003)
+    far = np.abs(errors).max(axis=1) > 0.12
+    assert abs(np.mean(far) - 0.05 * (1 - 0.31**2)) < 0.01  # P(|n| < 0.4) = 0.31
 
 
 def test_they_are_made_by_name():
