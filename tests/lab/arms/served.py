@@ -20,7 +20,8 @@ def fr3(*args):
 @contextlib.contextmanager
 def arm(kind, *args):
     """Likewise, `fr3` or `ur`."""
-    host = f"127.0.{100 + os.getpid() % 100}.{next(_next)}"
+    high, low = divmod(os.getpid() % 2**15, 256)  # of nobody else who tests at the same time
+    host = f"127.{100 + high}.{low}.{next(_next)}"
     words = [sys.executable, "-m", "prior_reinforce.cli", "simulate", kind, "--host", host, *args]
     program = subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
     lines: queue.Queue[str] = queue.Queue()
