@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import random
 import shutil
+import tempfile
 from collections.abc import Callable
 from functools import cache, partial
 from pathlib import Path
@@ -153,12 +154,12 @@ def manifests(rng: random.Random, here: Path, asked: Path) -> str:
     return command(here, rng.choice(_READERS), "planar")
 
 
-def recordings(rng: random.Random, here: Path, asked: Path) -> str:
-    """Recordings of any format that were damaged or crafted."""
+def recordings(kind: str, rng: random.Random, here: Path, asked: Path) -> str:
+    """Recordings of a kind that were damaged or crafted."""
     shutil.copytree(asked.parent / "learned", here / "planar")
-    written, inside = _written(rng.choice(list(_WRITERS)), asked.parent)
+    whole, inside = written(kind, asked.parent)
     source = here / "source"
-    shutil.copytree(written, source)
+    shutil.copytree(whole, source)
     path = source / inside
     files = sorted(file for file in source.rglob("*") if file.is_file())
     for _ in range(rng.randrange(1, 3)):
@@ -186,7 +187,7 @@ def recordings(rng: random.Random, here: Path, asked: Path) -> str:
     return "recordings changed" if tree(source) != before else verdict
 
 
-_WRITERS: dict[str, Callable[[Path], Path]] = {
+WRITERS: dict[str, Callable[[Path], Path]] = {
     "npz": recorded.write_npz,
     "csv": recorded.write_csv,
     "hdf5": recorded.write_robomimic,
@@ -205,11 +206,10 @@ _YAML = (
 
 
 @cache
-def _written(kind: str, place: Path) -> tuple[Path, Path]:
-    """A folder of recordings, and what in it is imported."""
-    folder = place / f"recorded-{kind}"
-    folder.mkdir()
-    path = _WRITERS[kind](folder)
+def written(kind: str, place: Path) -> tuple[Path, Path]:
+    """A folder of recordings, of this process alone, and what in it is imported."""
+    folder = Path(tempfile.mkdtemp(prefix=f"recorded-{kind}-", dir=place))
+    path = WRITERS[kind](folder)
     count = 4 if kind.startswith("odd ") else recorded.N
     recorded.write_outcomes(folder, dict(list(recorded.OUTCOMES.items())[:count]))
     return folder, path.relative_to(folder)
@@ -409,7 +409,6 @@ _ALL = (
     goals,
     outcomes,
     manifests,
-    recordings,
     files,
     models,
     replies,

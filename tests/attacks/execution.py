@@ -89,13 +89,12 @@ jerk = [1000000, 1000000]
 """
 
 
-def attack(rng: random.Random, here: Path, asked: Path) -> str:
-    """One attack; `held`, or what went wrong."""
+def attack(kind: str, rng: random.Random, here: Path, asked: Path) -> str:
+    """One attack with a driver of a kind; `held`, or what went wrong."""
     folder, refused = here / "planar", False
     os.environ["PRIOR_REINFORCE_ARM"] = str(here)  # other attacks run at the same time
     shutil.copytree(asked, folder)
     (here / "driver.py").write_text(DRIVER)
-    kind = rng.choice(KINDS)
     wrapper = f"{sys.executable} -I -S -c '{WRAPPER}' " if rng.random() < 0.4 else ""
     driver = f"{sys.executable} -I -S {here}/driver.py {here} '{kind}' {{plan}} {{result}}"
     limit = 0.6 if kind in ("hangs", "will not stop", "stopped") else 20.0

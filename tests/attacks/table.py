@@ -18,14 +18,13 @@ from functools import partial
 from pathlib import Path
 
 from tests.attacks import arms, execution, interruptions, reviewed, runs, sessions
-from tests.attacks.classes import CLASSES, Attack
+from tests.attacks.classes import CLASSES, WRITERS, Attack, recordings
 from tests.attacks.harness import HELD, prepare, where
 
 ATTACKS: dict[str, tuple[Attack, int]] = {
     **{name: (attack, 20) for name, attack in CLASSES.items()},
-    "recordings": (CLASSES["recordings"], 60),  # there are twenty kinds
-    "files": (CLASSES["files"], 20),
-    "motions": (execution.attack, 40),
+    **{f"recordings: {kind}": (partial(recordings, kind), 2) for kind in WRITERS},
+    **{f"motions: {kind}": (partial(execution.attack, kind), 2) for kind in execution.KINDS},
     "arms": (arms.attack, 8),
     **{
         f"{how}: {name}": (partial(interruptions.attack, how, name), 1)

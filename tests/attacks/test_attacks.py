@@ -6,6 +6,7 @@ import sys
 
 import pytest
 
+from tests.attacks.classes import written
 from tests.attacks.harness import HELD, command, prepare
 from tests.attacks.table import ATTACKS, attack
 
@@ -30,6 +31,11 @@ def test_nothing_breaks(asked, name, part, count):
     seeds = [chance.randrange(2**32) for _ in range(count)]
     verdicts = {seed: attack(name, seed, asked) for seed in seeds}
     assert {seed: verdict for seed, verdict in verdicts.items() if verdict != HELD} == {}
+
+
+def test_processes_that_attack_at_once_have_recordings_of_their_own(tmp_path):
+    folders = {written.__wrapped__("csv", tmp_path)[0] for _ in range(2)}
+    assert len(folders) == 2
 
 
 def test_the_harness_sees_what_breaks(tmp_path, monkeypatch):
