@@ -146,7 +146,7 @@ def headlines(results: Results) -> Mapping[str, Table]:
         "task": lambda row: row[0].title,
         "perception": lambda row: "camera" if row[0].by_model else "eye",
         "first trials that hit": lambda row: f"{row[1].where(unseen=False).mean(FIRST).value:.2f}",
-        "trials, simulated": lambda row: f"{row[1].where(unseen=False).mean(TRIALS):.1f}",
+        "trials, simulated": lambda row: f"{row[1].where(unseen=False).mean(TRIALS):.2f}",
         "trials, paper (real arm)": lambda row: (
             f"{row[0].trials:.1f} ± {row[0].sd:.1f}" + (" (VLM)" if row[0].by_model else "")
         ),

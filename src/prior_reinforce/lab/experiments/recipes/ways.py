@@ -20,7 +20,7 @@ from prior_reinforce.arrays import LARGEST, Plans
 from prior_reinforce.generators.patterns import motion_vectors
 from prior_reinforce.lab.experiments.evaluation import GOAL_SEED, Training, Trials
 from prior_reinforce.lab.experiments.recipes.base import Planned, Recipe, Scale, Table
-from prior_reinforce.lab.experiments.results import FIRST, TRIALS, Results
+from prior_reinforce.lab.experiments.results import FIRST, TRIALS, Measure, Results
 from prior_reinforce.lab.experiments.units import Unit
 from prior_reinforce.lab.tasks import make_task
 from prior_reinforce.lab.tasks.zoo import SEVERAL_WAYS
@@ -121,15 +121,19 @@ def table(results: Results) -> Table:
         "task": lambda row: row[0],
         "generator": lambda row: row[1],
         "first throws that hit": lambda row: row[2].mean(FIRST),
-        "the network minus it": lambda row: f"{row[3].minus(row[2], FIRST):+.2f}",
+        "the network minus it": lambda row: _ahead(row[3], row[2], FIRST),
         "trials": lambda row: row[2].mean(TRIALS),
-        "network minus it, trials": lambda row: f"{row[3].minus(row[2], TRIALS):+.2f}",
-        "lost a goal": lambda row: f"{row[2].frame['lost'].mean():.2f}",
+        "network minus it, trials": lambda row: _ahead(row[3], row[2], TRIALS),
+        "objects lost, a goal": lambda row: f"{row[2].frame['lost'].mean():.2f}",
         "plans like no demonstration": lambda row: (
             f"{results.where(task=row[0], method=row[1]).frame['unlike'].astype(float).mean():.2f}"
         ),
     }
     return Table.of(rows, columns)
+
+
+def _ahead(network: Results, of: Results, quantity: Measure) -> str:
+    return "" if of.frame.equals(network.frame) else f"{network.minus(of, quantity):+.2f}"
 
 
 RECIPE = Recipe(
