@@ -128,7 +128,7 @@ def test_a_table_in_a_page_is_what_the_rows_say(tmp_path):
     results = read_results(tmp_path)
     fill_tables(page, results)
     filled = page.read_text()
-    assert f"| {results.where(adapter='gp').trainings} |" in filled
+    assert f"| {results.where(adapter='gp').trained} |" in filled
     fill_tables(page, results)
     assert page.read_text() == filled
 

@@ -82,6 +82,11 @@ def test_a_training_that_is_not_done_is_left_out():
     assert partly.trainings == 2
 
 
+def test_more_seeds_are_not_more_sets_of_demonstrations():
+    of = results(rows("gp", [[1], [3]]), rows("gp", [[5]], seed=1))
+    assert of.trained == "3 of 2 sets"
+
+
 def test_rows_are_told_apart_by_columns_in_their_order():
     both = results(rows("b", [[1]]), rows("a", [[2]]))
     assert list(both.by("method")) == ["b", "a"]

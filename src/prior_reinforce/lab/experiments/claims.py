@@ -87,7 +87,8 @@ class Judged:
 
     claim: Claim
     measured: Interval
-    trainings: int
+    trained: str
+    """How many trainings, and of how many sets."""
     p: float
     """One-sided, of this test alone."""
     p_of_all: float
@@ -109,12 +110,13 @@ def judge(results: Results, claims: Sequence[Claim] | None = None) -> list[Judge
         of_all[tests] = holm(p[tests])
     judged = []
     for i, claim in enumerate(claims):
-        n = min(results.where(**of).trainings for of in (claim.a, claim.b or claim.a))
-        verdict = decide(claim, measured[i], n, of_all[i]) if run[i] else "not run"
+        sides = [results.where(**of) for of in (claim.a, claim.b or claim.a)]
+        fewest = min(sides, key=lambda of: of.trainings)
+        verdict = decide(claim, measured[i], fewest.trainings, of_all[i]) if run[i] else "not run"
         control = None
         if run[i] and claim.control is not None:
             control = claim.quantity(results, claim.control)
-        judged.append(Judged(claim, measured[i], n, p[i], of_all[i], verdict, control))
+        judged.append(Judged(claim, measured[i], fewest.trained, p[i], of_all[i], verdict, control))
     return judged
 
 

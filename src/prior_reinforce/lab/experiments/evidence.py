@@ -112,9 +112,7 @@ def _measured(of: Judged | None) -> str:
     if of is None or np.isnan(of.measured.value):
         return ""
     sign = "" if of.claim.b is None else "+"
-    return (
-        f"{of.measured:{sign}.2f}; {of.trainings} trainings; p {of.p:.4f}, Holm {of.p_of_all:.4f}"
-    )
+    return f"{of.measured:{sign}.2f}; trainings: {of.trained}; p {of.p:.4f}, Holm {of.p_of_all:.4f}"
 
 
 def _control(of: Judged | None) -> str:
@@ -157,7 +155,7 @@ def headlines(results: Results) -> Mapping[str, Table]:
         "first trials that hit": lambda row: row[2].mean(FIRST),
         "reached within 4 trials": lambda row: row[2].mean(reached(4)),
         "trials": lambda row: row[2].mean(TRIALS),
-        "trainings": lambda row: row[2].trainings,
+        "trainings": lambda row: row[2].trained,
     }
     afternoon: dict[str, Callable[[Any], object]] = {
         "adapter": lambda row: row[0],

@@ -117,7 +117,16 @@ class Results:
     @cached_property
     def trainings(self) -> int:
         """How many trainings there are, counting those of each prior set and seed."""
-        return len(self.frame[[c for c in _TRAINING if c in self.frame]].drop_duplicates())
+        return self._distinct(_TRAINING)
+
+    @property
+    def trained(self) -> str:
+        """The same, and of how many sets of demonstrations: two sets stay two with more seeds."""
+        sets = self._distinct([c for c in _TRAINING if c != "seed"])
+        return f"{self.trainings} of {sets} {'set' if sets == 1 else 'sets'}"
+
+    def _distinct(self, columns: Sequence[str]) -> int:
+        return len(self.frame[[c for c in columns if c in self.frame]].drop_duplicates())
 
     def mean(self, measure: Measure) -> Interval:
         """Mean over tasks, trainings and goals; empty rows have none (NaN)."""

@@ -202,7 +202,7 @@ def table_by_round(methods: Mapping[str, Results], head: str, ours: str) -> Tabl
     columns[f"{ours} minus it, trials"] = lambda name: (
         f"{methods[ours].minus(methods[name], TRIALS):+.2f}" if name != ours in methods else ""
     )
-    columns["trainings"] = lambda name: methods[name].trainings
+    columns["trainings"] = lambda name: methods[name].trained
     return Table.of(list(methods), columns)
 
 

@@ -176,6 +176,8 @@ def draw(results: Results, folder: Path) -> list[Picture]:
         kind = KNOWN[name].kind if name in KNOWN else "other"
         beside = " (as recorded)" if aligned and name == OURS else ""
         dashed = kind in _NOT_THE_PAPERS
+        if methods[name].trainings < methods[OURS].trainings:
+            beside += f", {methods[name].trainings} trainings"
         return Line(plain + beside, curve(methods[name]), names.index(plain), dashed=dashed)
 
     panels = [
