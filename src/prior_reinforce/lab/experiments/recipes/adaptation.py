@@ -145,7 +145,7 @@ def draw(results: Results, folder: Path) -> list[Picture]:
         for name, of in methods.items()
     }
     with drawing():
-        figure = new_figure(10.5, 4.4)
+        figure = new_figure(10.5, 5.2)
         left, right = figure.subplots(1, 2, width_ratios=(1.4, 1.0))
         for axes in (left, right):
             calm_axes(axes)
@@ -169,9 +169,9 @@ def draw(results: Results, folder: Path) -> list[Picture]:
         left.minorticks_off()
         left.set_xlabel("trials a goal, goals 2 to 8, mean of the tasks")
         right.set_xticks(range(1, GOALS + 1))
-        right.legend(
-            frameon=False, fontsize=8.5, labelcolor=INK_SOFT, loc="lower left",
-            bbox_to_anchor=(0.0, 1.0),
+        figure.legend(
+            *right.get_legend_handles_labels(), frameon=False, fontsize=8.5, labelcolor=INK_SOFT,
+            loc="outside lower center", ncols=3, title="right", alignment="left",
         )  # fmt: skip
         right.set_xlabel("goal of the afternoon")
         right.set_ylabel("trials")

@@ -112,25 +112,24 @@ def _said(of: Results) -> str:
 
 
 def draw(results: Results, folder: Path) -> list[Picture]:
-    """Each set's own mean of a method, a dot, with the interval over sets."""
+    """A picture a condition: means of all sets, with their intervals."""
     from prior_reinforce.lab.experiments.recipes.charts import COLOURS, Mark, draw_rows
 
-    marks, labels = [], []
+    recipe = results.frame["recipe"].iloc[0]
+    pictures = []
     for condition, of in results.by("condition").items():
-        counted = later(of) if condition == _BY_EYE else of
-        for name, one in counted.by("method").items():
-            labels.append(name)
-            marks.append(one.mean(TRIALS))
-    name = results.frame["recipe"].iloc[0]
-    path = draw_rows(
-        labels, {"mean of the sets": Mark("o", COLOURS[0], marks)}, "trials a goal",
-        folder / f"{name}.png",
-    )  # fmt: skip
-    caption = (
-        f"Trials a goal over {results.where(task=TASK).trainings} drawn prior sets a task, with "
-        "95 % intervals over sets, seeds and goals."
-    )
-    return [Picture(path, caption)]
+        methods = (later(of) if condition == _BY_EYE else of).by("method")
+        mark = Mark("o", COLOURS[0], [one.mean(TRIALS) for one in methods.values()])
+        name = f"{recipe}-{'adapters' if condition == _BY_EYE else 'generators'}.png"
+        path = draw_rows(
+            list(methods), {"mean": mark}, f"trials a goal: {condition}", folder / name
+        )
+        caption = (
+            f"Trials a goal ({condition}) in the mean of {of.where(task=TASK).trainings} drawn "
+            "prior sets a task, with 95 % intervals over sets, seeds and goals."
+        )
+        pictures.append(Picture(path, caption))
+    return pictures
 
 
 def behind_networks(scale: Scale, include: Sequence[str] = ()) -> list[Planned]:
