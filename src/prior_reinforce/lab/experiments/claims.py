@@ -24,7 +24,7 @@ import numpy as np
 from jaxtyping import Float
 
 from prior_reinforce.lab.experiments.recipes import displacement
-from prior_reinforce.lab.experiments.recipes.generators import KNOWN, METHODS, OURS
+from prior_reinforce.lab.experiments.recipes.generators import FRESH, KNOWN, OURS
 from prior_reinforce.lab.experiments.recipes.trials import CAMERA, ROWS, PaperRow
 from prior_reinforce.lab.experiments.results import FIRST, TRIALS, Measure, Results, reached
 from prior_reinforce.lab.experiments.statistics import LEAST_TRAININGS, Interval
@@ -156,12 +156,11 @@ def _adapters(form: Form, method: str) -> Where:
 
 
 _FORMS: tuple[tuple[Form, str, str, str, str], ...] = (
-    ("the paper's form", METHODS[1].label, "GP, one term, m = 2", "GP, one term, no forgetting",
+    ("the paper's form", "GP, one term, m = 2", "GP, one term, no forgetting", FRESH,
      "papers-form"),
-    ("ours", OURS, "GP, m = 2", "GP, no forgetting", "trials"),
+    ("ours", "GP, m = 2", "GP, no forgetting", "no adapter", "trials"),
 )  # fmt: skip
-"""Form; its generator and its adapter, with and without forgetting; where its table of trials is.
-"""
+"""Form; its adapter, with and without forgetting, and without; where its table of trials is."""
 _BASELINES = [
     method.label
     for method in KNOWN.values()
@@ -171,11 +170,11 @@ _UNTRAINED = _generators("diffusion, untrained")
 _EYE = [row for row in ROWS if not row.by_model]
 
 
-def _of_form(form: Form, generator: str, adapter: str, keeps: str, table: str) -> list[Claim]:
+def _of_form(form: Form, adapter: str, keeps: str, without: str, table: str) -> list[Claim]:
     """Every claim, of one form."""
-    ours = _generators(generator) if form == "ours" else _adapters(form, "GP, m = 2")
+    ours = _generators(OURS) if form == "ours" else _adapters(form, "GP, m = 2")
     gp, all_, proportional, frozen = (
-        _adapters(form, name) for name in (adapter, keeps, "proportional, 0.8", "no adapter")
+        _adapters(form, name) for name in (adapter, keeps, "proportional, 0.8", without)
     )
     field = {"recipe": "displacement" if form == "ours" else "papers-form"}
     six = {**field, "method": "all demonstrations"}

@@ -61,7 +61,7 @@ def write_evidence(folder: Path) -> tuple[Path, Path, list[Section]]:
         FileFormatError: Rows are damaged, or of another version's form.
     """
     results = read_results(folder)
-    recipes = {name: results.where(recipe=name) for name in RECIPES if name in results.made_by}
+    recipes = {name: of.rows_of(results) for name, of in RECIPES.items() if name in results.made_by}
     if not recipes:
         raise ConfigurationError(
             f"no rows in {folder / 'raw'}; expected one of "
@@ -136,7 +136,7 @@ def observations_table(results: Results) -> Table:
 
 def headlines(results: Results) -> Mapping[str, Table]:
     """Tables that other pages show, by name: README's, and those of docs/evidence.md."""
-    of = {name: results.where(recipe=name) for name in ("trials", "generators", "adapters")}
+    of = {name: RECIPES[name].rows_of(results) for name in ("trials", "generators", "adapters")}
     after = later(results.where(recipe="adaptation"))
     if INCOMPLETE in results.made_by.get("adaptation", ""):
         after = after.where(recipe=())  # methods would be means of different tasks

@@ -6,7 +6,13 @@ import pytest
 from gathered import gather
 
 from prior_reinforce.lab.experiments.recipes import Scale, generators
-from prior_reinforce.lab.experiments.recipes.generators import METHODS, RECIPE, Method, units
+from prior_reinforce.lab.experiments.recipes.generators import (
+    METHODS,
+    RECIPE,
+    FreshNoiseTrials,
+    Method,
+    units,
+)
 from prior_reinforce.lab.experiments.results import TRIALS, Results
 
 SMALL = Scale(goals=5, seeds=(0,), sets=("A",), rounds=3)
@@ -73,15 +79,12 @@ def test_every_network_has_its_untrained_self_beside_it():
 def test_fresh_noise_is_another_plan_at_every_trial_and_pairs_with_ours(tmp_path):
     tiny = "diffusion,perceptron.width=8,perceptron.members=1,training_steps=2"
     scale = Scale(goals=3, seeds=(0, 1), sets=("A",), rounds=2)
-    ours, one, fresh = (
-        method.trials(scale)
-        for method in (
-            Method("ours", "nearest", "method"),
-            Method("one plan", tiny, "other", "frozen", one_seed=True),
-            Method("fresh", tiny, "other", "frozen", fresh=True, one_seed=True),
-        )
-    )
-    assert [len(trials) for trials in (ours, one, fresh)] == [2, 1, 1]
+    ours = Method("ours", "nearest", "method").trials(scale)
+    one = Method("one plan", tiny, "other", "frozen").trials(scale)[:1]
+    fresh = [
+        FreshNoiseTrials(t.training, t.task, t.adapter, t.perception, t.goals, rounds=t.rounds)
+        for t in one
+    ]
     results = gather(tmp_path, [(ours[0], {"method": "a"}), (ours[1], {"method": "a"}),
                                 (fresh[0], {"method": "b"})])  # fmt: skip
     assert results.where(noise="fresh").n == 3

@@ -5,7 +5,7 @@ import pandas as pd
 
 from prior_reinforce.lab.experiments.recipes import RECIPES, Scale
 from prior_reinforce.lab.experiments.recipes.adapters import ADAPTERS
-from prior_reinforce.lab.experiments.recipes.generators import METHODS, PAPERS_FORM
+from prior_reinforce.lab.experiments.recipes.generators import AMPLIFIED, FRESH, PAPERS_FORM
 from prior_reinforce.lab.experiments.recipes.papers_form import RECIPE, units
 from prior_reinforce.lab.experiments.results import Results
 
@@ -14,19 +14,32 @@ def test_one_training_a_set_and_seed_serves_everything():
     planned = units(Scale())
     trainings = {unit.training for unit, _ in planned}
     assert {t.generator for t in trainings} == {PAPERS_FORM}
-    assert len(trainings) == 6
+    whole = [t for t in trainings if t.task == "basketball-v1" and not t.subset]
+    assert (len(whole), len(trainings)) == (6, 6 + 4 + 8)  # three demonstrations; two more tasks
     assert [unit.training.seed for unit, _ in planned] == sorted(
         unit.training.seed for unit, _ in planned
     )  # a run that is stopped has whole seeds
 
 
-def test_the_comparison_of_generators_shares_its_units():
-    of_generators = {
-        unit
-        for unit, names in RECIPES["generators"].units(Scale(), ())
-        if names["method"] == METHODS[1].label
+def test_its_rows_stand_beside_other_generators():
+    rows = [
+        {"recipe": recipe, "method": name, "condition": condition, "learned_on": "t", "task": "t",
+         "set": "A", "seed": 0, "goal": 0, "rounds": 10, "solved_at": at}
+        for at, (recipe, name, condition) in enumerate((
+            ("generators", "diffusion", None), ("generators", "closed form", None),
+            ("papers-form", "GP, m = 2", AMPLIFIED), ("papers-form", FRESH, AMPLIFIED),
+            ("papers-form", "proportional, 0.8", AMPLIFIED),
+            ("papers-form", "GP, one term, m = 2", "V1, by eye"),
+        ), start=1)
+    ]  # fmt: skip
+    shown = RECIPES["generators"].rows_of(Results(pd.DataFrame(rows), {})).by("method")
+    assert {name: of.frame["solved_at"].tolist() for name, of in shown.items()} == {
+        "diffusion": [1],
+        "the paper's form of it": [3],
+        "the paper's form, no adapter, fresh noise": [4],
+        "closed form": [2],
     }
-    assert of_generators <= {unit for unit, _ in units(Scale())}
+    assert next(iter(shown)) == "diffusion"
 
 
 def test_a_row_a_condition_and_adapter():

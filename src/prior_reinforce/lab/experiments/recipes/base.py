@@ -155,8 +155,14 @@ class Recipe:
     """Says in sentences what was measured besides the claims and must not be missed."""
     family: Family | None = None
     """Which family's members `--include` puts beside ours; None where none can join."""
+    shown: Callable[[Results], Results] | None = None
+    """Takes rows of all recipes for what is shown of those that belong here; None: its own rows."""
     apart: bool = False
     """Whether it is run by its name, or with `more`, and not with `all`: it takes hours."""
+
+    def rows_of(self, results: Results) -> Results:
+        """The rows that table, pictures and remarks are made of."""
+        return self.shown(results) if self.shown else results.where(recipe=self.name)
 
     def joining(self, include: Sequence[str]) -> tuple[str, ...]:
         """Which of some choices belong to the family that is compared here.

@@ -3,8 +3,9 @@
 The paper does not say what its adapters see in this figure; here it is the amplified noise of its
 other one, for all alike. Beside the network stand its controls: the same network untrained, the
 closed form that `correction=spline` puts around it, and both together, so that what a network has
-learned can be told from what is around it. Diffusion runs on demonstrations as recorded only: ours
-finds the start times itself. Nothing random goes into fitting the nearest neighbours, DMPs and the
+learned can be told from what is around it. The paper's form takes hours to learn: `papers-form`
+runs it, and its rows are shown here. Diffusion runs on demonstrations as recorded only: ours finds
+the start times itself. Nothing random goes into fitting the nearest neighbours, DMPs and the
 closed form; their "seeds" differ in execution and perception.
 """
 
@@ -15,6 +16,8 @@ from copy import copy
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Literal
+
+import pandas as pd
 
 from prior_reinforce.arrays import Plans, Points
 from prior_reinforce.generators.base import Generator, OnProgress
@@ -42,6 +45,14 @@ _MINUTES = "network.widths=32:64:128,network.activation=silu,training_steps=2000
 """The paper's form at a size that a core learns in twenty minutes, with steps enough to come back
 to its demonstrations (docs/decisions-generator.md)."""
 PAPERS_FORM = f"diffusion-paper,{_MINUTES}"
+AMPLIFIED = "amplified noise"
+FRESH = "no adapter, fresh noise"
+_OF_PAPERS_FORM = {
+    "GP, m = 2": "the paper's form of it",
+    "no adapter": "the paper's form, no adapter",
+    FRESH: f"the paper's form, {FRESH}",
+}
+"""What rows of `papers-form` are called here."""
 
 
 @dataclass(frozen=True)
@@ -56,18 +67,12 @@ class Method:
     """The paper's method, one of its baselines, a control, or what the paper does not have."""
     adapter: str = "gp"
     """What corrects its conditions, by its choice."""
-    fresh: bool = False
-    """Whether noise is drawn anew for every trial, as in "repeatedly generating actions"."""
-    one_seed: bool = False
-    """Whether it is learned once a prior set only, since that takes long."""
 
     def trials(self, scale: Scale) -> list[Trials]:
         """Trials of one training for each prior set and seed."""
-        kind = FreshNoiseTrials if self.fresh else Trials
-        trainings = scale.trainings(self.generator)
         return [
-            kind(t, t.task, self.adapter, "amplified", scale.goals, rounds=scale.rounds)
-            for t in (trainings[:: len(scale.seeds)] if self.one_seed else trainings)
+            Trials(t, t.task, self.adapter, "amplified", scale.goals, rounds=scale.rounds)
+            for t in scale.trainings(self.generator)
         ]
 
 
@@ -99,7 +104,10 @@ class FreshNoise(Wrapper):
 
 @dataclass(frozen=True)
 class FreshNoiseTrials(Trials):
-    """Trials for each of which the network of a training is sampled anew."""
+    """Trials for each of which the network of a training is sampled anew.
+
+    "Repeatedly generating actions", as the paper has it without an adapter.
+    """
 
     def learned(self, folder: Path) -> LearnedGenerator:
         """What was learned, sampled anew for every trial."""
@@ -113,7 +121,6 @@ class FreshNoiseTrials(Trials):
 
 METHODS = (
     Method("diffusion", "diffusion", "method"),
-    Method("the paper's form of it", PAPERS_FORM, "method", one_seed=True),
     Method("diffusion, untrained", "diffusion,training_steps=0", "control"),
     Method("diffusion with correction", "diffusion,correction=spline", "other"),
     Method(
@@ -131,15 +138,24 @@ METHODS = (
     Method("U-Net regression, aligned", "regression,timing=align"),
     Method("closed form, aligned", "interpolation,timing=align", "control"),
     Method("diffusion, no adapter", "diffusion", "other", "frozen"),
-    Method("the paper's form, no adapter", PAPERS_FORM, "other", "frozen", one_seed=True),
-    Method("the paper's form, no adapter, fresh noise", PAPERS_FORM, "other", "frozen", True, True),
 )
-"""Ours, a network alone, and the paper's form; their controls; the paper's baselines; and diffusion
-with no adapter, which repeats one plan or, as in the paper, draws noise for every trial."""
+"""Ours, a network alone; its controls; the paper's baselines; and ours with no adapter."""
 
 
 KNOWN = {method.label: method for method in METHODS}
 OURS = METHODS[0].label
+
+
+def with_papers_form(results: Results) -> Results:
+    """Rows of this recipe, and those of the paper's form under the same conditions."""
+    own = results.where(recipe="generators")
+    theirs = results.where(
+        recipe="papers-form", condition=AMPLIFIED, method=tuple(_OF_PAPERS_FORM)
+    ).frame
+    renamed = theirs.assign(method=theirs["method"].map(_OF_PAPERS_FORM)) if len(theirs) else theirs
+    ours = own.frame["method"] == OURS
+    parts = [own.frame[ours], renamed, own.frame[~ours]]
+    return Results(pd.concat([of for of in parts if len(of)] or parts[:1]), results.made_by)
 
 
 def units(scale: Scale, include: Sequence[str] = ()) -> list[Planned]:
@@ -154,9 +170,15 @@ def units(scale: Scale, include: Sequence[str] = ()) -> list[Planned]:
 def table(results: Results) -> Table:
     """One row a method."""
     methods = results.by("method")
-    kinds = {name: KNOWN[name].kind if name in KNOWN else "other" for name in methods}
+    kinds = {name: _kind(name) for name in methods}
     named = {name + _NOT_THE_PAPERS.get(kinds[name], ""): of for name, of in methods.items()}
     return table_by_round(named, "generator", OURS)
+
+
+def _kind(name: str) -> str:
+    if name == _OF_PAPERS_FORM["GP, m = 2"]:
+        return "method"
+    return KNOWN[name].kind if name in KNOWN else "other"
 
 
 def draw(results: Results, folder: Path) -> list[Picture]:
@@ -173,9 +195,8 @@ def draw(results: Results, folder: Path) -> list[Picture]:
 
     def line(name: str, *, aligned: bool) -> Line:
         plain = name.removesuffix(", aligned")
-        kind = KNOWN[name].kind if name in KNOWN else "other"
         beside = " (as recorded)" if aligned and name == OURS else ""
-        dashed = kind in _NOT_THE_PAPERS
+        dashed = _kind(name) in _NOT_THE_PAPERS
         if methods[name].trainings < methods[OURS].trainings:
             beside += f", {methods[name].trainings} trainings"
         return Line(plain + beside, curve(methods[name]), names.index(plain), dashed=dashed)
@@ -214,5 +235,5 @@ def remarks(results: Results) -> list[str]:
 
 RECIPE = Recipe(
     "generators", "Generators, on demonstrations as recorded and aligned", "Figure 7a",
-    units, table, draw, remarks, family="generator",
+    units, table, draw, remarks, family="generator", shown=with_papers_form,
 )  # fmt: skip

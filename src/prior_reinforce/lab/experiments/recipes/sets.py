@@ -42,7 +42,7 @@ _SEQUENCES, _MOST_GOALS = 2, 30
 _DEMONSTRATED = tuple(task for task, learned_on in TASKS.items() if task == learned_on)
 """Basketball's other variants are learned from the same demonstrations."""
 _CLOSED = tuple(m for m in METHODS if not m.generator.startswith(("diffusion", "regression")))
-_NETWORKS = tuple(m for m in METHODS[:3] if not m.one_seed)
+_NETWORKS = tuple(m for m in METHODS[:2])
 
 
 def units(scale: Scale, include: Sequence[str] = ()) -> list[Planned]:
