@@ -13,6 +13,7 @@ from dataclasses import replace
 from prior_reinforce.lab.experiments.evaluation import Training, Trials
 from prior_reinforce.lab.experiments.recipes.adapters import ADAPTERS
 from prior_reinforce.lab.experiments.recipes.base import (
+    TASK,
     Planned,
     Recipe,
     Scale,
@@ -23,7 +24,12 @@ from prior_reinforce.lab.experiments.recipes.displacement import (
     Displacement,
     widest_three,
 )
-from prior_reinforce.lab.experiments.recipes.generators import PAPERS_FORM
+from prior_reinforce.lab.experiments.recipes.generators import (
+    AMPLIFIED,
+    FRESH,
+    PAPERS_FORM,
+    FreshNoiseTrials,
+)
 from prior_reinforce.lab.experiments.results import Results
 
 _OF_THE_PAPER = "GP, one term, m = 2"
@@ -37,28 +43,34 @@ _UNSEEN_GOALS = 5
 def units(scale: Scale, include: Sequence[str] = ()) -> list[Planned]:
     """Every adapter under amplified noise on V1; the paper's by eye on every task; fields."""
     planned: list[Planned] = []
-    full = sorted(scale.trainings(PAPERS_FORM), key=lambda t: t.seed)
-    for t in full:
-        adapters = {**ADAPTERS, **{choice: choice for choice in include}}
-        planned += [
-            (
-                Trials(t, t.task, adapter, "amplified", scale.goals, rounds=scale.rounds),
-                {"condition": "amplified noise", "method": label},
-            )
-            for label, adapter in adapters.items()
-        ]
-        for task, label in _V1.items():
-            planned += _by_eye(t, task, label, scale)
-        planned.append((Displacement(t), {"method": "all demonstrations"}))
-    seeds = scale.seeds[:_SEEDS]
-    for t in (t for t in full if t.seed in seeds):
-        few = replace(t, subset=widest_three(t.recorded().outcomes_seen))
-        planned.append((Displacement(few), {"method": "three demonstrations"}))
-    for task in _ELSEWHERE:
-        learned = sorted(scale.trainings(PAPERS_FORM, task), key=lambda t: t.seed)
-        for t in (t for t in learned if t.seed in seeds):
-            planned += _by_eye(t, task, task, scale)
+    for seed in scale.seeds:
+        one = replace(scale, seeds=(seed,))
+        planned += [p for t in one.trainings(PAPERS_FORM) for p in _on_v1(t, scale, include)]
+        if seed not in scale.seeds[:_SEEDS]:
+            continue
+        for t in one.trainings(PAPERS_FORM):
+            few = replace(t, subset=widest_three(t.recorded().outcomes_seen))
+            planned.append((Displacement(few), {"method": "three demonstrations"}))
+        for task in _ELSEWHERE:
+            for t in one.trainings(PAPERS_FORM, task):
+                planned += _by_eye(t, task, task, scale)
     return planned
+
+
+def _on_v1(training: Training, scale: Scale, include: Sequence[str]) -> list[Planned]:
+    kinds = [(label, adapter, Trials) for label, adapter in ADAPTERS.items()]
+    kinds.append((FRESH, "frozen", FreshNoiseTrials))
+    kinds += [(choice, choice, Trials) for choice in include]
+    planned: list[Planned] = [
+        (
+            kind(training, TASK, adapter, "amplified", scale.goals, rounds=scale.rounds),
+            {"condition": AMPLIFIED, "method": label},
+        )
+        for label, adapter, kind in kinds
+    ]
+    for task, label in _V1.items():
+        planned += _by_eye(training, task, label, scale)
+    return [*planned, (Displacement(training), {"method": "all demonstrations"})]
 
 
 def _by_eye(training: Training, task: str, label: str, scale: Scale) -> list[Planned]:
