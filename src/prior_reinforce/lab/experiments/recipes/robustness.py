@@ -266,5 +266,5 @@ def remarks(results: Results) -> list[str]:
 
 RECIPE = Recipe(
     "robustness", "Trials where something is wrong, changed, or scarce", "not in the paper",
-    units, table, draw, remarks, family="adapter",
+    units, table, draw, remarks, family="adapter", apart=True,
 )  # fmt: skip

@@ -99,5 +99,5 @@ def _in_words(name: str) -> str:
 
 RECIPE = Recipe(
     "variation", "When is diffusion needed?", "not in the paper", units, table, draw,
-    family="generator",
+    family="generator", apart=True,
 )  # fmt: skip
