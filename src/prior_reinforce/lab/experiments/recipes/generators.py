@@ -148,14 +148,16 @@ OURS = METHODS[0].label
 
 def with_papers_form(results: Results) -> Results:
     """Rows of this recipe, and those of the paper's form under the same conditions."""
-    own = results.where(recipe="generators")
-    theirs = results.where(
-        recipe="papers-form", condition=AMPLIFIED, method=tuple(_OF_PAPERS_FORM)
-    ).frame
-    renamed = theirs.assign(method=theirs["method"].map(_OF_PAPERS_FORM)) if len(theirs) else theirs
-    ours = own.frame["method"] == OURS
-    parts = [own.frame[ours], renamed, own.frame[~ours]]
-    return Results(pd.concat([of for of in parts if len(of)] or parts[:1]), results.made_by)
+    own = results.where(recipe="generators").by("method")
+    theirs = results.where(recipe="papers-form", condition=AMPLIFIED).by("method")
+    frames = {name: of.frame for name, of in own.items()}
+    papers = {
+        label: theirs[name].frame.assign(method=label)
+        for name, label in _OF_PAPERS_FORM.items()
+        if name in theirs
+    }
+    shown = [*list(frames.values())[:1], *papers.values(), *list(frames.values())[1:]]
+    return Results(pd.concat(shown) if shown else results.frame.iloc[:0], results.made_by)
 
 
 def units(scale: Scale, include: Sequence[str] = ()) -> list[Planned]:
