@@ -103,6 +103,19 @@ def test_one_camera_serves_scenes_in_turn(camera, table_model, frame_with_ball_a
     np.testing.assert_array_equal(camera.picture(frame, goal), first)
 
 
+def test_after_a_calibration_that_fails_a_picture_has_its_shadows(camera):
+    lit = mujoco.MjModel.from_xml_string(
+        '<mujoco><worldbody><camera name="birdseye" pos="0 0 2"/><light pos="1 0 2" dir="-1 0 -2"/>'
+        '<geom type="plane" size="1 1 1"/><geom type="box" size=".1 .1 .1" pos="0 0 .3"/>'
+        '<body name="goal" mocap="true"><geom size=".05"/></body></worldbody></mujoco>'
+    )
+    frame, goal = KeyFrame(lit, np.zeros(0), 0.0), np.zeros(2)
+    before = camera.picture(frame, goal)
+    with pytest.raises(ConfigurationError, match="not wholly"):
+        camera.find_marks(lit, np.array([[5.0, 0.0, 0.1]]))
+    np.testing.assert_array_equal(camera.picture(frame, goal), before)
+
+
 def test_what_the_scene_lacks_is_named(camera, table_model, frame_with_ball_at):
     with pytest.raises(ConfigurationError, match="no camera 'side'; its cameras are birdseye"):
         Camera(CameraConfig(name="side")).picture(frame_with_ball_at(0.8, 0), np.zeros(2))
