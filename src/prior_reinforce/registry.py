@@ -119,10 +119,6 @@ class Registry(Generic[T]):
             raise ConfigurationError(f"{name} must derive from {self._base.replace(':', '.')}")
         return kind
 
-    def owns(self, choice: str) -> bool:
-        """Whether a choice is one of ours, by name."""
-        return parse_choice(choice)[0] in self.members
-
     def name_of(self, made: T) -> str:
         """Return the name of a member's class, or `module:Class` where it is not ours."""
         target = f"{type(made).__module__}:{type(made).__qualname__}"

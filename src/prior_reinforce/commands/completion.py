@@ -48,12 +48,10 @@ class Completion:
         options = {name: _options(target) for name, target in COMMANDS.items()}
         if self.shell == "fish":
             for name, what in summaries.items():
-                print(
-                    f"complete -c prior-reinforce -n __fish_use_subcommand -fa {name} -d '{what}'"
-                )
+                print(f"{_FISH} __fish_use_subcommand -fa {name} -d '{what}'")
                 for option in options[name]:
                     seen = f"'__fish_seen_subcommand_from {name}'"
-                    print(f"complete -c prior-reinforce -n {seen} -l {option.removeprefix('--')}")
+                    print(f"{_FISH} {seen} -l {option.removeprefix('--')}")
             return
         if self.shell == "zsh":
             print("autoload -U +X bashcompinit && bashcompinit")
