@@ -201,8 +201,9 @@ def remarks(results: Results) -> list[str]:
 
 
 def behind_networks(scale: Scale, include: Sequence[str] = ()) -> list[Planned]:
-    """The same with a network, each learned once or shared with `trials`."""
-    return afternoons(scale, RULES, "diffusion")
+    """The rules that remember, and two of each goal alone, with a network shared with `trials`."""
+    rules = [rule for rule in RULES if rule[1] or rule[0] in ("bayes", "gp")]
+    return afternoons(scale, rules, "diffusion")
 
 
 RECIPE = Recipe(
