@@ -9,7 +9,8 @@ import pytest
 
 from prior_reinforce.errors import ConfigurationError, FileFormatError, RenderingUnavailableError
 from prior_reinforce.lab.experiments import recipes
-from prior_reinforce.lab.experiments.evidence import fill_tables, write_evidence
+from prior_reinforce.lab.experiments.claims import CLAIMS, judge
+from prior_reinforce.lab.experiments.evidence import claims_table, fill_tables, write_evidence
 from prior_reinforce.lab.experiments.recipes import Scale, alignment
 from prior_reinforce.lab.experiments.recipes.adapters import ADAPTERS
 from prior_reinforce.lab.experiments.recipes.base import Run
@@ -34,6 +35,16 @@ def adapters_rows(only=()):
 
 def put(folder, name="adapters", rows=None, command="prior-reinforce reproduce this"):
     write_rows(folder, name, adapters_rows() if rows is None else rows, command)
+
+
+def test_every_claim_has_a_verdict_for_each_form_that_it_speaks_of(tmp_path):
+    put(tmp_path)
+    rows = {row[0]: row for row in claims_table(judge(read_results(tmp_path))).rows}
+    assert set(rows) == {claim.says for claim in CLAIMS}
+    (alignment,) = (row for says, row in rows.items() if "alignment improves DMP" in says)
+    assert (alignment[2], alignment[-1]) == ("", "not run")  # of baselines: no form of ours
+    (unadapted,) = (row for says, row in rows.items() if "outperforms no adapter" in says)
+    assert (unadapted[2], unadapted[-1]) == ("not run", "confirmed")
 
 
 def test_the_page_holds_claims_tables_and_pictures_in_one_file(tmp_path):

@@ -89,11 +89,9 @@ def write_evidence(folder: Path) -> tuple[Path, Path, list[Section]]:
 
 
 def claims_table(judged: Sequence[Judged]) -> Table:
-    """A row a claim that was tested: of the paper's form, of ours, and with a control for ours."""
+    """A row a claim: of the paper's form and of ours, where it speaks of them, and a control."""
     by_claim: dict[str, dict[str, Judged]] = {}
     for one in judged:
-        if one.verdict == "not run":
-            continue
         form = "ours" if one.claim.form == "baselines" else one.claim.form
         by_claim.setdefault(one.claim.says, {})[form] = one
     columns: dict[str, Callable[[tuple[str, dict[str, Judged]]], object]] = {
@@ -120,7 +118,7 @@ def _control(of: Judged | None) -> str:
 
 
 def _verdict(of: Judged | None) -> str:
-    return "not run" if of is None else of.verdict
+    return "" if of is None else of.verdict
 
 
 def observations_table(results: Results) -> Table:
