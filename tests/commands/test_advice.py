@@ -7,7 +7,7 @@ from tests.bench.workspace.planar import events_in
 
 
 def test_advice_names_places_and_draws_the_region(run, folder, monkeypatch):
-    monkeypatch.setattr(advice, "_ACROSS", 6)  # goals a side; all 25 take seconds
+    monkeypatch.setattr(advice, "_ACROSS", 6)  # goals a side; all 15 take seconds
     run("goal", folder, "0.9", "0.05")
     run("ask", folder)
     run("tell", folder, 1, "5 cm long")
