@@ -56,7 +56,11 @@ GOAL_SEED = 3000
 ROUNDS = 10
 STREAM = 1e-3
 """Seconds between two samples that the arm gets."""
-FIGURES = ("first", "trials", "within_4")
+SAMPLED = (
+    "shared, none, gp", "shared, 100 Hz, gp", "shared, 5 Hz, gp", "own, none, gp", "own, 5 Hz, gp",
+    "own, none, frozen", "fresh, none, frozen",
+)  # fmt: skip
+"""Noise, filter and adapter."""
 
 
 class Filtered(Wrapper):
@@ -142,8 +146,8 @@ def trials(
     return {"solved_at": [result.solved_at or 0 for result in results]}
 
 
-def evaluate(folder: Path, name: str, n_goals: int) -> dict[str, object]:
-    """All figures of one model, or those that were measured before."""
+def evaluate(folder: Path, name: str, n_goals: int, sampled: Sequence[str]) -> None:
+    """Measure one model under each way of sampling that was not measured before."""
     path = folder / f"figures-{n_goals}.json"
     figures: dict[str, object] = json.loads(path.read_text()) if path.exists() else {}
     task = BasketballShot()
@@ -157,16 +161,8 @@ def evaluate(folder: Path, name: str, n_goals: int) -> dict[str, object]:
         "own": network.sampled(shared_noise=False),
         "fresh": FreshNoise(network),
     }
-    for noise, cutoff, adapter in (
-        ("shared", "none", "gp"),
-        ("shared", "100 Hz", "gp"),
-        ("shared", "5 Hz", "gp"),
-        ("own", "none", "gp"),
-        ("own", "5 Hz", "gp"),
-        ("own", "none", "frozen"),
-        ("fresh", "none", "frozen"),
-    ):
-        key = f"{noise}, {cutoff}, {adapter}"
+    for key in sampled:
+        noise, cutoff, adapter = key.split(", ")
         if key not in figures:
             generator = drawn[noise]
             if cutoff != "none":
@@ -176,7 +172,6 @@ def evaluate(folder: Path, name: str, n_goals: int) -> dict[str, object]:
                 **trials(task, generator, adapter, demos, goals),
             }
             path.write_text(json.dumps(figures))
-    return figures
 
 
 def collected(out: Path) -> list[dict[str, Any]]:
@@ -247,6 +242,7 @@ def main() -> None:
     parser.add_argument("--widths", default="32,64,128")
     parser.add_argument("--seeds", nargs="+", type=int, default=[0])
     parser.add_argument("--goals", type=int, default=40)
+    parser.add_argument("--sampled", nargs="+", default=SAMPLED, choices=SAMPLED)
     parser.add_argument("--device", default="cpu")
     parser.add_argument("--only-table", action="store_true")
     parser.add_argument("--save", type=Path, help="write all rows to this JSON file")
@@ -258,7 +254,7 @@ def main() -> None:
         for steps in options.steps:
             for name in options.sets:
                 folder = train(options.out, name, widths, steps, seed, options.device)
-                evaluate(folder, name, options.goals)
+                evaluate(folder, name, options.goals, options.sampled)
     rows = json.loads(options.rows.read_text()) if options.rows else collected(options.out)
     table(rows)
     if options.save:
