@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import os
 import shutil
+import signal
 import subprocess
 from collections.abc import Iterator
 
@@ -19,6 +20,8 @@ check_shapes("prior_reinforce")
 # Threads that wait for each other by spinning crawl on a busy machine; two test processes are one.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("MUJOCO_GL", "egl")
+# A shell's background job ignores interruptions, and so would all that these tests interrupt.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 # Other tests that run at the same time move other arms.
 os.environ["PRIOR_REINFORCE_ARM"] = f"tests-{os.getpid()}"
 

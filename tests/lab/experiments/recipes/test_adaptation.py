@@ -9,6 +9,7 @@ from prior_reinforce.lab.experiments.recipes.adaptation import (
     OURS,
     OURS_ALONE,
     RECIPE,
+    RULES,
     afternoons,
     later,
     reliability,
@@ -61,9 +62,10 @@ def test_one_afternoon_of_every_rule_gives_table_picture_and_remark(tmp_path):
     assert f"GP, m = 2, each goal alone {minus:+.2f}" in alone
 
 
-def test_behind_a_network_the_rules_are_the_same():
+def test_behind_a_network_stand_all_rules_that_remember_and_two_of_each_goal_alone():
     labels = {names["method"] for _, names in RECIPES["adaptation-network"].units(SMALL, ())}
-    assert labels == {names["method"] for _, names in RECIPE.units(SMALL, ())}
+    remember = {label for _, remembers, label in RULES if remembers}
+    assert labels == remember | {OURS_ALONE, "GP, m = 2, each goal alone"}
     units = [unit for unit, _ in RECIPES["adaptation-network"].units(SMALL, ())]
     assert {unit.training.generator for unit in units} == {"diffusion"}
     assert len(afternoons(Scale(), [("bayes", True, "x")])) == 5 * 6

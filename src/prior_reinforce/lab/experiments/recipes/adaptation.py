@@ -7,6 +7,7 @@ contact physics. Goals 2 to 8 count: before the first there is nothing to rememb
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import cycle
 from pathlib import Path
 
 import numpy as np
@@ -149,6 +150,7 @@ def draw(results: Results, folder: Path) -> list[Picture]:
         left, right = figure.subplots(1, 2, width_ratios=(1.4, 1.0))
         for axes in (left, right):
             calm_axes(axes)
+        dashes = cycle(_DASHES)
         for place, (name, of) in enumerate(methods.items()):
             mean, curve = later(of).mean(TRIALS), by_place[name]
             colour = GOAL if name == OURS else INK_SOFT
@@ -156,7 +158,7 @@ def draw(results: Results, folder: Path) -> list[Picture]:
             left.plot([mean.value], [place], "o", color=colour)
             places = range(1, GOALS + 1)
             if of.frame["remembers"].iloc[0]:
-                style = {"linewidth": 2.5} if name == OURS else {"linestyle": _DASHES[place % 3]}
+                style = {"linewidth": 2.5} if name == OURS else {"linestyle": next(dashes)}
                 right.plot(places, curve, color=colour, label=name, **style)
             elif min(curve) < 2 * min(by_place[OURS]):
                 first = not any(line.get_label() == _ALONE for line in right.lines)
@@ -165,7 +167,9 @@ def draw(results: Results, folder: Path) -> list[Picture]:
         left.set_yticks(range(len(methods)), list(methods))
         left.invert_yaxis()
         left.set_xscale("log")
-        left.set_xticks([1.5, 2, 3, 5, 10], ["1.5", "2", "3", "5", "10"])
+        most = max(later(of).mean(TRIALS).high for of in methods.values())
+        ticks = [tick for tick in (1.5, 2, 2.5, 3, 5, 10) if tick < 1.2 * most]
+        left.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
         left.minorticks_off()
         left.set_xlabel("trials a goal, goals 2 to 8, mean of the tasks")
         right.set_xticks(range(1, GOALS + 1))
