@@ -452,6 +452,82 @@ def test_a_touch_is_within_three_millimetres_over_the_table(at, serve):
                 np.testing.assert_allclose(page.evaluate("L.mark"), place, atol=0.003)
 
 
+def to_tell(page: Page):
+    """A goal, and a plan that was executed: the page asks where it landed."""
+    touch(page, [0.9, 0.05])
+    page.click("#goal")
+    page.click("#execute")
+    expect(page.locator("#tell")).to_be_visible()
+
+
+def test_what_was_unfolded_stays_so_whenever_the_page_is_drawn(at, serve):
+    page = at(serve())
+    to_tell(page)
+    unfolded = page.locator("details:has(#sum-eye)")
+    for state in (True, False):
+        page.evaluate("$('sum-eye').click(); draw()")
+        assert (unfolded.get_attribute("open") is not None) is state
+        page.wait_for_timeout(100)
+        page.evaluate("draw()")
+        assert (unfolded.get_attribute("open") is not None) is state
+
+
+def test_news_waits_for_the_finger_and_no_longer_than_two_seconds(at, serve):
+    served = serve()
+    page = at(served)
+    touch(page, [0.9, 0.05])
+    expect(page.locator("#goal")).to_be_enabled()
+    drawn = (
+        "() => { window.drawn = 0; const now = draw; draw = () => { window.drawn += 1; now(); }; }"
+    )
+    page.evaluate(drawn)
+    page.locator("#goal").hover()
+    page.mouse.down()
+    page.evaluate("heard({ output: 'said meanwhile' })")
+    page.wait_for_timeout(500)
+    assert page.evaluate("window.drawn") == 0
+    page.mouse.up()  # the button that was touched is still there
+    expect(page.locator("#execute")).to_be_enabled()
+    page.locator("#now").hover()
+    page.mouse.down()
+    with Workspace(served.folder) as workspace:
+        workspace.session().void(1, "nobody saw it")
+    expect(page.locator("#history")).to_contain_text("nobody saw it")
+    page.mouse.up()
+
+
+def test_a_button_tells_the_state_it_was_drawn_from(at, serve):
+    """A tap that news comes into is for what the page showed, and refused where that has passed."""
+    served = serve()
+    page = at(served)
+    to_tell(page)
+    page.locator("#hit").hover()
+    page.mouse.down()
+    seen = page.evaluate("S.id")
+    with Workspace(served.folder) as workspace:
+        workspace.session().tell(1, [0.2, 0.0])
+    page.wait_for_timeout(700)
+    assert page.evaluate("S.id") == seen
+    page.mouse.up()
+    expect(page.locator("#alert")).to_contain_text("meanwhile")
+    with Workspace(served.folder) as workspace:
+        assert not workspace.state.trials[0].reading.hit
+
+
+def test_an_event_is_drawn_once(at, serve):
+    served = serve()
+    page = at(served)
+    page.wait_for_timeout(1500)  # what the first state draws late
+    page.evaluate(
+        "() => { window.drawn = 0; const now = draw; draw = () => { window.drawn += 1; now(); }; }"
+    )
+    with Workspace(served.folder) as workspace:
+        workspace.set_goal([0.95, 0.0], adapter="proportional")
+    expect(page.locator("#task")).to_contain_text("goal 1")
+    page.wait_for_timeout(500)
+    assert page.evaluate("window.drawn") == 1
+
+
 def test_words_by_eye_then_a_correction_and_a_void(at, serve, tmp_path):
     served = serve()
     page = at(served)

@@ -71,12 +71,31 @@ const CALM = 1000;
 let calmAt = 0;
 function calm() {
   calmAt = performance.now() + CALM;
-  setTimeout(draw, CALM + 20);
+  setTimeout(drawNews, CALM + 20);
+}
+
+// A button that is drawn again between a finger's coming down and its going up is not pressed: news
+// waits until the finger is gone and its click has done what it does, or for two seconds.
+const HELD = 2000;
+let heldUntil = 0;
+async function free() {
+  while (performance.now() < heldUntil) await new Promise((go) => setTimeout(go, 20));
+}
+let drawing = false;
+async function drawNews() {
+  if (drawing) return;
+  drawing = true;
+  await free();
+  drawing = false;
+  draw();
 }
 
 async function refresh() {
   const answer = await get("/api/state");
-  if (answer) take(await answer.json());
+  if (!answer) return;
+  const state = await answer.json();
+  await free(); // a verb says which state its button was drawn from
+  take(state);
 }
 
 function take(state) {
@@ -103,14 +122,14 @@ async function fetchMotion(number) {
   if (!answer) return;
   motion = await answer.json();
   playing = { at: 0, on: false };
-  draw();
+  drawNews();
 }
 
 let beat = 0;
 function lost() {
   if (!L.connected) return;
   L.connected = false;
-  draw();
+  drawNews();
 }
 
 // Server-sent events, by fetch: EventSource can carry no header.
@@ -148,11 +167,13 @@ async function listen() {
 function heard(message) {
   if (!S) return;
   if ("error" in message) complain(message.error);
-  if ("output" in message) { S.output = message.output; draw(); }
-  if ("learning" in message) { S.learning = message.learning; if (message.learning) draw(); else refresh(); }
+  // Drawn only if no newer state follows, or everything would be drawn twice.
+  const stale = "id" in message && (message.id !== S.id || message.stopped !== S.stopped);
+  if ("output" in message && message.output !== S.output) { S.output = message.output; if (!stale) drawNews(); }
+  if ("learning" in message) { S.learning = message.learning; if (message.learning) drawNews(); else refresh(); }
   if ("recordings" in message && !L.uploading) { clearTimeout(L.later); L.later = setTimeout(fetchRecordings, 300); }
   if ("camera" in message) fetchCamera();
-  if ("id" in message && (message.id !== S.id || message.stopped !== S.stopped)) refresh();
+  if (stale) refresh();
 }
 
 // --- words ------------------------------------------------------------------------------------
@@ -233,9 +254,9 @@ function g(tag, props = {}, text = "") {
 }
 const button = (id, text, onclick, kind = "", props = {}) => h("button", { id, type: "button", class: kind, onclick, ...props }, text);
 function details(key, title, ...children) {
-  const element = h("details", { open: L.open[key] }, h("summary", { id: `sum-${key}` }, title), ...children);
-  element.addEventListener("toggle", () => { L.open[key] = element.open; });
-  return element;
+  // Kept at the click: `toggle` comes later, and what is drawn in between would be closed again.
+  const kept = (event) => { L.open[key] = !event.currentTarget.parentElement.open; };
+  return h("details", { open: L.open[key] }, h("summary", { id: `sum-${key}`, onclick: kept }, title), ...children);
 }
 // Replace what a place holds, and leave the focus where it was.
 function fill(id, ...children) {
@@ -691,7 +712,7 @@ async function askToMove(motion, speed = 1) {
     L.question = { ...question, asked: { ...asked, motion: question.motion, speed: question.motion === "rehearsal" ? speed : 1 } };
     if (S.moved_by === "arm") calm();
   }
-  draw();
+  drawNews();
 }
 const MOVES = { trial: "execute trial", rehearsal: "rehearse trial", approach: "go slowly to the start of trial" };
 function executePanel(trial, off) {
@@ -813,7 +834,7 @@ function drawHistory() {
 let R = null;
 async function fetchRecordings() {
   const answer = await get("/api/recordings");
-  if (answer) { R = await answer.json(); draw(); }
+  if (answer) { R = await answer.json(); drawNews(); }
 }
 const episodes = () => (R ? Object.entries(R.episodes).map(([name, outcome]) => ({ name, outcome })) : []);
 const shownDemonstrations = () => {
@@ -929,7 +950,7 @@ async function seen(camera) {
     [pictureUrl, L.wide, L.tall, box] = [url, image.naturalWidth, image.naturalHeight, null];
   }
   C = camera;
-  draw();
+  drawNews();
 }
 async function send(path, method, body, type = "application/json") {
   const answer = await request(path, { method, body, headers: { "content-type": type } }).catch(() => null);
@@ -1071,6 +1092,8 @@ function drawCamera() {
 // --- begin ------------------------------------------------------------------------------------
 
 document.addEventListener("DOMContentLoaded", () => {
+  addEventListener("pointerdown", () => { heldUntil = performance.now() + HELD; }, true);
+  for (const gone of ["pointerup", "pointercancel"]) addEventListener(gone, () => { heldUntil = performance.now() + 100; }, true);
   $("stop").addEventListener("click", () => verb("stop"));
   document.addEventListener("keydown", (event) => { if (event.key === "Escape") { event.preventDefault(); verb("stop"); } });
   const begin = () => uv(xy((touchedGoal() || goalNow() || { goal: S.components.map((c) => [0.8, 0][c.axis]) }).goal));
