@@ -94,8 +94,10 @@ def attack(rng: random.Random, here: Path, asked: Path) -> str:
     with Workspace(folder) as workspace:
         seen = workspace.manifest.driven_by
         first = workspace.plan(workspace.session().trial(1)).actions[0]
+    far = False
     if edit == "pose":
         away = rng.choice([0.99, 1.01, 10]) * TOLERANCE
+        far = away == 10 * TOLERANCE
         (here / "pose").write_text(" ".join(map(str, first + away)))
         refused = away > TOLERANCE and motion != "approach"
     folders = [folder] * rng.choice([1, 1, 2])
@@ -124,7 +126,10 @@ def attack(rng: random.Random, here: Path, asked: Path) -> str:
     try:
         verdict = judge(here, folders, programs, refused, motion)
         if verdict == HELD and signals == 0 and len(programs) == 1 and not refused:
-            verdict = ends_as_it_was(folder, kind, BUS if on_bus else OUTCOMES)
+            outcomes = BUS if on_bus else OUTCOMES
+            if motion == "approach" and not far:  # a servo that holds its place blocks nothing
+                outcomes = outcomes | {"blocked": {"aborted", "done"}}
+            verdict = ends_as_it_was(folder, kind, outcomes)
         return verdict
     finally:
         for program in programs:
