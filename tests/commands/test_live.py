@@ -12,7 +12,8 @@ from prior_reinforce.commands.live import LiveView, drawing_progress, fit_progre
 from prior_reinforce.generators.base import FitProgress
 from prior_reinforce.lab.experiments.protocol import GoalTrials
 
-TASK = SimpleNamespace(outcome_names=("x", "y"))
+DEMONSTRATIONS = SimpleNamespace(n=6, outcome_names=("x", "y"), outcome_units=("m", "m"))
+TIMED = SimpleNamespace(n=5, outcome_names=("x", "arrival"), outcome_units=("m", "s"))
 GOAL = np.array([1.0, 0.1])
 
 
@@ -36,7 +37,7 @@ TRIALS = (
 @pytest.fixture
 def view():
     console = Console(file=io.StringIO(), width=200)
-    return LiveView(console, TASK, n_demonstrations=6), console.file
+    return LiveView(console, DEMONSTRATIONS), console.file
 
 
 @pytest.mark.parametrize(
@@ -59,6 +60,17 @@ def test_a_trial_of_a_later_goal_is_counted_for_its_goal_and_tells_its_chance(vi
     shown.trial(GoalTrials(GOAL, (first,), ()))
     line = "trial 1  aim at the goal                      chance  52%  seen: 5 cm long"
     assert told.getvalue().strip() == line
+
+
+def test_a_time_is_no_length():
+    console = Console(file=io.StringIO(), width=200)
+    shown = LiveView(console, TIMED)
+    shown.goal(1, 1, GOAL)
+    shown.trial(GoalTrials(GOAL, (trial(1, [1.0, 0.1], [0.05, 0.3]),), ()))
+    assert console.file.getvalue().splitlines()[1:] == [
+        "goal: x 1 m, arrival 0.1 s",
+        "  trial 1  aim at the goal                      seen: x +0.05 m, arrival +0.3 s",
+    ]
 
 
 def test_the_papers_count_is_demonstrations_plus_trials(view):

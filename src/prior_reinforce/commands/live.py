@@ -17,13 +17,14 @@ from prior_reinforce.arrays import Point
 from prior_reinforce.commands.base import answer_to
 from prior_reinforce.errors import InvalidFeedbackError, PerceptionFailedError
 from prior_reinforce.readings import Reading
-from prior_reinforce.wording import from_words, plain, say_place, to_words
+from prior_reinforce.wording import error_example, from_words, plain, say_error, say_place
 
 if TYPE_CHECKING:
-    from prior_reinforce.environment import Rollout, Task
+    from prior_reinforce.environment import Rollout
     from prior_reinforce.generators.base import FitProgress
     from prior_reinforce.lab.experiments.protocol import FailedReading, GoalTrials
     from prior_reinforce.perception.base import Perception
+    from prior_reinforce.plans.motions import Demonstrations
 
 
 def say(console: Console, *parts: str | tuple[str, str]) -> None:
@@ -36,30 +37,29 @@ def say(console: Console, *parts: str | tuple[str, str]) -> None:
 class LiveView:
     """Prints goals and trials as they happen."""
 
-    def __init__(self, console: Console, task: Task, n_demonstrations: int) -> None:
-        """Remember where to print, and how many demonstrations count into N."""
-        self._say = partial(say, console)
-        self._task, self._n = task, n_demonstrations
+    def __init__(self, console: Console, demonstrations: Demonstrations) -> None:
+        """Remember where to print, and what an outcome is called."""
+        self._say, self._n = partial(say, console), demonstrations.n
+        self._about = demonstrations.outcome_names, demonstrations.outcome_units
 
     def goal(self, number: int, n_goals: int, goal: Point) -> None:
         """Announce a goal."""
         of_all = f" {number} of {n_goals}" if n_goals > 1 else ""
-        self._say((f"\ngoal{of_all}", "bold"), f": {place(self._task, goal)}")
+        self._say((f"\ngoal{of_all}", "bold"), f": {say_place(goal, *self._about)}")
 
     def trial(self, result: GoalTrials) -> None:
         """Print the latest trial: how the condition moved, what was seen, solved or not."""
-        trial, first = result.trials[-1], len(result.trials) == 1
+        trial, goal, before = result.trials[-1], result.goal, result.trials[-2:-1]
         assert trial.error_seen is not None
-        moved = to_words(trial.condition - (result.goal if first else result.trials[-2].condition))
-        aim = "aim at the goal" if moved == "on the goal" else f"aim {moved}"
-        if not first and moved != "on the goal":
-            aim = f"aim moved {moved}"
-        words = to_words(trial.error_seen)
-        seen = ("a near miss" if words == "on the goal" else words, "")
-        if trial.hit:
-            seen = ("HIT", "bold green")
+        aimed, moved = (before[0].condition, "moved ") if before else (goal, "")
+        nothing, off, seen = (
+            say_error(error, *self._about)
+            for error in (0.0 * goal, trial.condition - aimed, trial.error_seen)
+        )
+        aim = "aim at the goal" if off == nothing else f"aim {moved}{off}"
+        shown = ("HIT", "bold green") if trial.hit else "a near miss" if seen == nothing else seen
         chance = "" if trial.p_hit is None else f"chance {trial.p_hit:4.0%}  "
-        self._say(f"  trial {len(result.trials)}  {aim:<36} {chance}seen: ", seen)
+        self._say(f"  trial {len(result.trials)}  {aim:<36} {chance}seen: ", shown)
 
     def end(self, result: GoalTrials) -> None:
         """Print the paper's count for this goal."""
@@ -87,22 +87,20 @@ def trials_by_goal(results: Sequence[GoalTrials]) -> str:
     return ", ".join(str(r.solved_at or f"{len(r.trials)}+") for r in results)
 
 
-def place(task: Task, point: Point) -> str:
-    """Say a place of a simulated task, whose outcomes are lengths."""
-    return say_place(point, task.outcome_names, ("m",) * len(point))
-
-
-def asking(console: Console, task: Task, perception: Perception) -> FailedReading:
+def asking(
+    console: Console, demonstrations: Demonstrations, perception: Perception
+) -> FailedReading:
     """Fallback where perception fails: the person at the terminal.
 
     Args:
         console: Where to ask.
-        task: What an error is of.
+        demonstrations: What an outcome is called.
         perception: Whose latest picture to show, if it has one.
 
     Returns:
-        Asks for the error, in [m]; a PerceptionFailedError where there is no terminal or no answer.
+        Asks for the error; a PerceptionFailedError where there is no terminal or no answer.
     """
+    about = demonstrations.outcome_names, demonstrations.outcome_units
 
     def ask(failure: PerceptionFailedError, _: Rollout, goal: Point, __: object) -> Reading:
         if not sys.stdin.isatty():
@@ -113,13 +111,14 @@ def asking(console: Console, task: Task, perception: Perception) -> FailedReadin
         say(console, f"  not seen: {failure}")
         if (latest := getattr(perception, "latest", None)) is not None:
             say(console, f"  picture: {latest}")
+        example = f'"{said}", or ' if (said := error_example(*about)) else ""
         while True:
             try:
                 text = answer_to(
-                    f"  what was the error, seen from {place(task, goal)}? for instance "
-                    '"5cm long, 2cm left", or hit: '
+                    f"  what was the error, seen from {say_place(goal, *about)}? for instance "
+                    f"{example}hit: "
                 )
-                return from_words(text, task.outcome_names, ("m",) * len(goal))
+                return from_words(text, *about)
             except EOFError as error:
                 raise PerceptionFailedError(f"{failure}; no answer came") from error
             except InvalidFeedbackError as error:

@@ -196,7 +196,7 @@ class Adapt(OnTask):
 
         say(console, f"executing {recorded.n} demonstrations once, seen by {self.perception}")
         eyes = recording(perception, self.out / SEEN, "demonstration")
-        ask = asking(console, task, eyes)
+        ask = asking(console, recorded, eyes)
         demonstrations = perceive_demonstrations(
             task, recorded, eyes, seed=self.seed, on_failed_reading=ask
         )
@@ -223,7 +223,7 @@ class Adapt(OnTask):
         )
         from prior_reinforce.lab.experiments.protocol import reach_goals
 
-        view = LiveView(console, task, session.demonstrations.n)
+        view = LiveView(console, session.demonstrations)
         results: list[GoalTrials] = []
         films: list[FilmOrWhyNot] = []
         for i, goal in enumerate(goals, start=1):
@@ -238,7 +238,7 @@ class Adapt(OnTask):
                 rounds=self.rounds,
                 seed=seed,
                 on_round=lambda _, so_far: view.trial(so_far[0]),
-                on_failed_reading=asking(console, task, recorded),
+                on_failed_reading=asking(console, session.demonstrations, recorded),
             )
             view.end(result)
             results.append(result)
@@ -326,7 +326,7 @@ class Rollout(OnTask):
     condition: tuple[float, ...] | None = None
     """Condition to generate the plan for, in metres; needs --model."""
     model: Path | None = None
-    """Folder of a model made by `learn`."""
+    """Folder of a model made by `train`."""
     repeats: int = 1
     """How often to execute the plan."""
     film: Path | None = None
@@ -384,7 +384,7 @@ class Rollout(OnTask):
                 )
             return demonstrations.plans[number], demonstrations.outcomes_seen[number]
         if self.model is None:
-            raise ConfigurationError("--condition needs --model, a folder made by learn")
+            raise ConfigurationError("--condition needs --model, a folder made by train")
         condition = demonstrations.check_goal(self.condition or ())
         generator = load_learned(self.model, demonstrations)
         return generator.generate(condition[None])[0], condition
