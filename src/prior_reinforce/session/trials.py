@@ -1,7 +1,7 @@
 """What a session knows: its goals and trials, as the fold of a log of events.
 
-What stands is `State`, so a session can be brought back from its log alone. `MemoryLog` keeps the
-events in a list; a workspace keeps a journal on disk.
+What stands is `State`, so a session can be brought back from its log alone. `Log` keeps the events
+in a list; a workspace's keeps a journal on disk.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from prior_reinforce.errors import (
     TrialStateError,
     WorkspaceError,
 )
+from prior_reinforce.plans.motions import Plan
 from prior_reinforce.readings import Reading, in_tolerances
 from prior_reinforce.session.events import (
     Amended,
@@ -187,33 +188,6 @@ class AskedTrial(Trial):
     """A = pi(c); read-only."""
 
 
-class Log(Protocol):
-    """Where the events of a session are kept."""
-
-    def state(self) -> State:
-        """What happened so far, whoever wrote it."""
-
-    def exclusive(self) -> AbstractContextManager[object]:
-        """Hold the log for reading and then appending; what is appended is kept when it ends."""
-
-    def append(self, event: Event) -> None:
-        """Add an event; called within `exclusive`."""
-
-    def keep_plan(self, number: int, plan: Frames) -> KeptPlan | None:
-        """Keep a trial's plan, and return its file if it has one."""
-
-    def plan(self, trial: Trial) -> Frames:
-        """Return a plan that was kept."""
-
-    def settle(self, trial: Trial, *, arm_did_not_move: bool) -> None:
-        """Note that a trial may be executed after all; called within `exclusive`.
-
-        Raises:
-            TrialStateError: It is executing now, was executed to its end, or nobody has said
-                whether the arm moved.
-        """
-
-
 class State:
     """What the events of a log add up to."""
 
@@ -325,8 +299,7 @@ class State:
                     raise ValueError("a tolerance is not positive")
                 rest = (event.carry_over, event.adapter, event.new_hardware)
                 outcome = (tuple(event.names), tuple(event.units))
-                number = len(self.goals) + 1
-                self.goals.append(Goal(number, place, tolerance, *rest, *outcome))
+                self.goals.append(Goal(len(self.goals) + 1, place, tolerance, *rest, *outcome))
             case Asked():
                 if event.trial != len(self.trials) + 1 or self.open_trial is not None:
                     raise ValueError(f"trial {event.trial} after {len(self.trials)}")
@@ -384,42 +357,54 @@ class State:
             self.trials[waiting.number - 1] = replace(waiting, outdated=True)
 
 
-class MemoryLog:
-    """A log that lasts as long as the program."""
+class Log:
+    """Events of a session, and what they add up to; here, as long as the program lasts."""
 
     def __init__(self) -> None:
         """Start empty."""
         self._entries: list[Entry] = []
         self._state = State()
+        self._n_added = 0
 
     def entries(self) -> Sequence[Entry]:
-        """All events so far, in order."""
+        """All events so far, in order, whoever wrote them."""
         return self._entries
 
     def state(self) -> State:
-        """See `Log.state`."""
+        """What happened so far, whoever wrote it.
+
+        Raises:
+            WorkspaceError: The events do not fit together, or cannot be read.
+        """
+        for entry in self.entries()[self._n_added :]:
+            self._state.add(entry)
+            self._n_added += 1
         return self._state
 
     def exclusive(self) -> AbstractContextManager[object]:
-        """Nobody else can append."""
-        return nullcontext()
+        """Hold the log for reading and then appending; what is appended is kept when it ends."""
+        return nullcontext()  # nobody else can append
 
     def append(self, event: Event) -> None:
-        """See `Log.append`."""
-        entry = Entry(len(self._entries) + 1, event)
-        self._state.add(entry)
-        self._entries.append(entry)
+        """Add an event; called within `exclusive`."""
+        self._entries.append(Entry(len(self._entries) + 1, event))
 
-    def keep_plan(self, number: int, plan: Frames) -> None:
-        """See `Log.keep_plan`."""
-        self._state.plans[number] = _read_only(plan)
+    def keep_plan(self, number: int, plan: Plan) -> KeptPlan | None:
+        """Keep a trial's plan, and return its file if it has one."""
+        self._state.plans[number] = plan.actions
+        return None
 
     def plan(self, trial: Trial) -> Frames:
-        """See `Log.plan`."""
+        """Return a plan that was kept."""
         return self._state.plans[trial.number]
 
     def settle(self, trial: Trial, *, arm_did_not_move: bool) -> None:
-        """See `Log.settle`; nothing is executed from here."""
+        """Note that a trial may be executed after all; called within `exclusive`.
+
+        Raises:
+            TrialStateError: It is executing now, was executed to its end, or nobody has said
+                whether the arm moved.
+        """
         raise NotImplementedError("only a workspace executes trials")
 
 

@@ -21,6 +21,7 @@ import msgspec
 
 from prior_reinforce.errors import WorkspaceError
 from prior_reinforce.session.events import Entry, Event
+from prior_reinforce.session.trials import Log
 
 JOURNAL_FILE = "journal.sqlite"
 JOURNAL_VERSION = 3
@@ -39,6 +40,7 @@ BEGIN SELECT RAISE(ABORT, 'the journal is append-only'); END;
 CREATE TRIGGER IF NOT EXISTS events_are_never_deleted BEFORE DELETE ON events
 BEGIN SELECT RAISE(ABORT, 'the journal is append-only'); END;
 """
+_INSERT = "INSERT INTO events (time, event, digest) VALUES (?, ?, ?)"
 _HEADER_BYTES = 100
 """Of any SQLite file that has something in it (sqlite.org/fileformat.html, section 1.3)."""
 
@@ -53,8 +55,8 @@ class Row(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """JSON, to the byte."""
 
 
-class Journal:
-    """Events of one workspace."""
+class Journal(Log):
+    """Events of one workspace, on disk."""
 
     def __init__(self, path: Path, events: Any) -> None:
         """Open a journal; made if there is none.
@@ -66,15 +68,14 @@ class Journal:
         Raises:
             WorkspaceError: It cannot be opened, is damaged, or was written by a newer version.
         """
+        super().__init__()
         self._path = path
-        self._entries: list[Entry] = []
         self._last_digest = ""
         self._data_version: int | None = None
         self._decoder = msgspec.json.Decoder(events)
         self._lock = RLock()
         self.appended = False
         """Whether anything became durable since it was opened here."""
-        self._pending: list[tuple[Entry, str]] = []
         # SQLite takes a file of a few bytes for an empty one, and would write over it.
         if path.exists() and 0 < path.stat().st_size < _HEADER_BYTES:
             raise WorkspaceError(
@@ -172,22 +173,18 @@ class Journal:
         with self._lock:
             with self._named_errors():
                 self._connection.execute("BEGIN IMMEDIATE")
-            self._pending = []
             try:
                 self.entries()
                 yield
                 with self._named_errors():
                     self._connection.execute("COMMIT")
-                self._keep_pending()
-            except BaseException:
-                self._pending = []
+            finally:
                 if self._connection.in_transaction:
                     self._connection.execute("ROLLBACK")
-                else:  # committed and then interrupted, or rolled back already for a full disk
+                else:  # committed, maybe interrupted since; or rolled back for a full disk
                     n, self._data_version = len(self._entries), None
                     with suppress(WorkspaceError):
                         self.appended |= len(self.entries()) > n
-                raise
 
     def append(self, event: Event) -> None:
         """Add an event; call it inside `exclusive`.
@@ -196,23 +193,12 @@ class Journal:
             WorkspaceError: The disk is full, or the folder is read-only.
         """
         assert self._connection.in_transaction, "append inside Journal.exclusive"
-        before = self._pending[-1][1] if self._pending else self._last_digest
         now = datetime.now(timezone.utc).isoformat(timespec="milliseconds")
         text = msgspec.json.encode(event).decode()
-        digest = _digest(before, now, text)
         with self._named_errors():
-            added = self._connection.execute(
-                "INSERT INTO events (time, event, digest) VALUES (?, ?, ?)", (now, text, digest)
-            )
-        assert added.lastrowid is not None
-        self._pending.append((Entry(added.lastrowid, event, now), digest))
-
-    def _keep_pending(self) -> None:
-        """What was appended is durable now."""
-        for entry, digest in self._pending:
-            self._entries.append(entry)
-            self._last_digest, self.appended = digest, True
-        self._pending = []
+            last = self._connection.execute("SELECT digest FROM events ORDER BY id DESC").fetchone()
+            digest = _digest(last[0] if last else "", now, text)
+            self._connection.execute(_INSERT, (now, text, digest))
 
     @contextmanager
     def _named_errors(self) -> Iterator[None]:
@@ -243,8 +229,7 @@ def restore(path: Path, rows: Sequence[Row]) -> None:
     with journal._named_errors():
         journal._connection.execute("BEGIN IMMEDIATE")
         journal._connection.executemany(
-            "INSERT INTO events (time, event, digest) VALUES (?, ?, ?)",
-            ((row.time, bytes(row.event).decode(), row.digest) for row in rows),
+            _INSERT, ((row.time, bytes(row.event).decode(), row.digest) for row in rows)
         )
         journal._connection.execute("COMMIT")
     journal.close()

@@ -12,7 +12,7 @@ from prior_reinforce.bench.robots.executors.result import MotionResult, Outcome
 from prior_reinforce.bench.workspace.journal import JOURNAL_FILE, Journal
 from prior_reinforce.bench.workspace.store import Store
 from prior_reinforce.errors import TrialStateError, WorkspaceError
-from prior_reinforce.plans.motions import Plan, PlanFormat
+from prior_reinforce.plans.motions import Plan
 from prior_reinforce.registry import own_class
 from prior_reinforce.session.events import Event, KeptPlan, SessionEvent
 from prior_reinforce.session.trials import Stage, State, Trial
@@ -156,22 +156,23 @@ class WorkspaceState(State):
 
 
 class WorkspaceLog(Journal):
-    """The `Log` of a workspace's session (see `session.trials.Log`)."""
+    """The log of a workspace's session."""
 
-    def __init__(self, folder: Path, store: Store, format: PlanFormat) -> None:
-        """Open the journal in a folder; plans are kept in the store, in that format.
+    _state: WorkspaceState
+
+    def __init__(self, folder: Path, store: Store) -> None:
+        """Open the journal in a folder; plans are kept in the store.
 
         Raises:
             WorkspaceError: The journal cannot be used.
         """
-        self._folder, self._store, self._format = folder, store, format
-        self._state = WorkspaceState()
-        self._n_added = 0
+        self._folder, self._store = folder, store
         path = folder / JOURNAL_FILE
         # A new workspace's journal is empty until the first import has ended.
         if not path.exists() or path.stat().st_size == 0:
             self._refuse_files(("demonstrations", "models", "plans"))
         super().__init__(path, WorkspaceEvent)
+        self._state = WorkspaceState()
         try:
             if not self.entries():
                 self._refuse_files(("models", "plans"))
@@ -190,26 +191,19 @@ class WorkspaceLog(Journal):
                 )
 
     def state(self) -> WorkspaceState:
-        """What happened so far, in any program.
-
-        Raises:
-            WorkspaceError: The journal is damaged, or another version wrote it.
-        """
-        for entry in self.entries()[self._n_added :]:
-            self._state.add(entry)
-            self._n_added += 1
+        """See `Log.state`."""
+        super().state()
         return self._state
 
-    def keep_plan(self, number: int, plan: Frames) -> KeptPlan:
+    def keep_plan(self, number: int, plan: Plan) -> KeptPlan:
         """Write the plan's file, before the event that names it."""
         named = {trial.kept.file for trial in self._state.trials if trial.kept is not None}
-        file = self._store.save_plan(Plan(plan, self._format), number, named)
+        file = self._store.save_plan(plan, number, named)
         return KeptPlan(file.path.name, file.sha256)
 
     def plan(self, trial: Trial) -> Frames:
         """Read a trial's plan, checked against the hash in the journal."""
-        assert trial.kept is not None
-        return self._store.plan(trial.kept).actions
+        return self._store.plan(trial).actions
 
     def is_executing(self) -> bool:
         """Whether a trial is being executed right now, by any program."""

@@ -26,9 +26,26 @@ from msgspec.structs import replace
 from numpy.typing import ArrayLike
 from typing_extensions import Self
 
-from prior_reinforce.adapters import ADAPTERS, DEFAULT_ADAPTER
+from prior_reinforce.adapters import ADAPTERS, DEFAULT_ADAPTER, make_adapter
 from prior_reinforce.arrays import Frames
+from prior_reinforce.bench.robots.executors.arguments import (
+    check_command,
+    split_command,
+    without_arguments,
+)
 from prior_reinforce.bench.robots.executors.base import ArmSettings, Motion
+from prior_reinforce.bench.robots.executors.command import (
+    CommandResult,
+    execute_command,
+    read_ended,
+    was_executed,
+)
+from prior_reinforce.bench.robots.executors.drive import Look, Request, drive_command, read_look
+from prior_reinforce.bench.robots.executors.lock import executing_lock
+from prior_reinforce.bench.robots.executors.pose import ask_arm
+from prior_reinforce.bench.robots.executors.result import measure_tracking
+from prior_reinforce.bench.robots.executors.supervision import Interruptions
+from prior_reinforce.bench.robots.gate import check_plan
 from prior_reinforce.bench.robots.plan_files import PlanFile, write_plan
 from prior_reinforce.bench.workspace.journal import JOURNAL_FILE
 from prior_reinforce.bench.workspace.log import (
@@ -63,7 +80,7 @@ from prior_reinforce.errors import (
 from prior_reinforce.files import named_disk_errors, require_inside, sweep, write, write_once
 from prior_reinforce.plans.motions import Demonstrations, Plan, PlanFormat
 from prior_reinforce.registry import own_class
-from prior_reinforce.session.events import Entry, KeptPlan
+from prior_reinforce.session.events import Entry
 from prior_reinforce.session.session import Session
 from prior_reinforce.session.trials import Goal, Stage, Trial
 from prior_reinforce.wording import as_html
@@ -71,8 +88,6 @@ from prior_reinforce.wording import as_html
 if TYPE_CHECKING:
     from prior_reinforce.adapters.base import Adapter
     from prior_reinforce.bench.importing import ImportResult, Preprocessing
-    from prior_reinforce.bench.robots.executors.command import CommandResult
-    from prior_reinforce.bench.robots.executors.drive import Look
     from prior_reinforce.bench.robots.report import LimitReport
     from prior_reinforce.bench.workspace.records import StatusRecord
     from prior_reinforce.generators.base import FitProgress, Generator
@@ -125,10 +140,9 @@ class Workspace:
                 f"{folder} is not a workspace (it has no {MANIFEST_FILE}); make one with: "
                 f"prior-reinforce new {folder}"
             )
-        self._manifest_text: str | None = None
         self._read_manifest()
         self.store = Store(folder)
-        self.log = WorkspaceLog(folder, self.store, self.manifest.format)
+        self.log = WorkspaceLog(folder, self.store)
         self._read: dict[str, Demonstrations] = {}
 
     @classmethod
@@ -161,10 +175,7 @@ class Workspace:
     def _read_manifest(self) -> None:
         """Know what the manifest says now."""
         path = self.folder / MANIFEST_FILE
-        text = read_manifest(path)
-        if text != self._manifest_text:
-            self.manifest: Manifest = parse_manifest(text, path)
-            self._manifest_text = text
+        self.manifest: Manifest = parse_manifest(read_manifest(path), path)
 
     def __repr__(self) -> str:
         """The folder, and what it holds."""
@@ -306,8 +317,6 @@ class Workspace:
         self._read_manifest()
         if self.manifest.robot is None:
             return None
-        from prior_reinforce.bench.robots import check_plan
-
         training = self.state.training
         shown = self.demonstrations if training is None else self.demonstrations_of(training.model)
         plan = Plan(frames, shown.format)
@@ -315,7 +324,7 @@ class Workspace:
 
     def plan_path(self, trial: Trial) -> Path:
         """Where a trial's plan file is."""
-        return self.store.plan_path(_kept(trial).file)
+        return self.store.plan_file(trial).path
 
     def plan(self, trial: Trial) -> Plan:
         """A trial's plan, checked against the hash in the journal.
@@ -323,7 +332,7 @@ class Workspace:
         Raises:
             FileFormatError: The file is missing, or not what was written.
         """
-        return self.store.plan(_kept(trial))
+        return self.store.plan(trial)
 
     def export(
         self, number: int, path: str | os.PathLike[str], *, rate: float | None = None
@@ -438,17 +447,15 @@ class Workspace:
 
         self.state.refuse_open_trial("importing demonstrations")
         manifest, form = self.manifest, self.manifest.format
-        is_known = form.names != UNKNOWN
-        if is_known:
-            options = {"joints": form.names, **options}
+        if form.names != UNKNOWN:
+            meant = {"names": form.names, "plan_units": form.units}
+            options = {"joints": form.names, **options, **meant}
         result = import_demonstrations(
             source,
             outcomes=outcomes,
             outcome_names=manifest.outcome_names,
             outcome_units=manifest.outcome_units,
             outcome_unit=outcome_unit,
-            names=form.names if is_known else None,
-            plan_units=form.units if is_known else None,
             preprocessing=dataclasses.replace(preprocessing or Preprocessing(), dt=form.dt),
             robot=manifest.robot,
             gate=manifest.gate,
@@ -510,8 +517,6 @@ class Workspace:
         with named_disk_errors(self.folder):
             write(path, with_columns(read_manifest(path), form.names, form.units))
         self._read_manifest()
-        self.log.close()
-        self.log = WorkspaceLog(self.folder, self.store, self.manifest.format)
 
     def learn(
         self,
@@ -594,14 +599,6 @@ class Workspace:
             FileFormatError: The plan's file is not what was written; nothing moved.
             KeyboardInterrupt: Interrupted; the command was stopped, and the journal says so.
         """
-        from prior_reinforce.bench.robots.executors.arguments import (
-            check_command,
-            without_arguments,
-        )
-        from prior_reinforce.bench.robots.executors.command import execute_command
-        from prior_reinforce.bench.robots.executors.lock import executing_lock
-        from prior_reinforce.bench.robots.executors.supervision import Interruptions
-
         if (speed != 1.0) != (motion == "rehearsal") or not 0 < speed <= 1:
             raise ConfigurationError(
                 f"a rehearsal has a share of the plan's speed above 0 and below 1, and nothing "
@@ -617,7 +614,7 @@ class Workspace:
         ):
             self._note_unknown_execution(self.state.trial(number))
             trial = self.to_execute(number)
-            plan = self.plan(trial)
+            plan, file = self.plan(trial), self.store.plan_file(trial)
             verdict = self.gate(plan.actions)
             if verdict is not None:
                 verdict.require()
@@ -632,9 +629,8 @@ class Workspace:
                 raise TrialStateError(
                     f"somebody pressed Stop since this was asked for: no {motion} began; ask again"
                 )
-            name = _kept(trial).file
             folder = self.store.make_execution_folder(
-                name if motion == "trial" else f"{motion}-{name}"
+                file.path.name if motion == "trial" else f"{motion}-{file.path.name}"
             )
             who = command.executor if isinstance(command, ArmSettings) else without_arguments(text)
             self._begin(
@@ -645,7 +641,7 @@ class Workspace:
             try:
                 result, raised = execute_command(
                     text,
-                    self._plan_file(trial),
+                    file,
                     folder,
                     time_limit=time_limit,
                     lock=lock,
@@ -689,13 +685,8 @@ class Workspace:
             ConfigurationError: The arm does not answer, or is another one since.
             FileFormatError: The plan's file is not what was written.
         """
-        from prior_reinforce.bench.robots.executors.arguments import split_command
-        from prior_reinforce.bench.robots.executors.drive import read_look
-        from prior_reinforce.bench.robots.executors.lock import executing_lock
-        from prior_reinforce.bench.robots.executors.pose import ask_arm
-
         text = self._command(arm, "look", speed)
-        plan = self._plan_file(self.state.trial(number))
+        plan = self.store.plan_file(self.state.trial(number))
         with executing_lock(arm=self.manifest.arm), tempfile.TemporaryDirectory() as place:
             folder = Path(place)
             copy = write_once(folder / plan.path.name, plan.verify())
@@ -711,14 +702,13 @@ class Workspace:
             if motion != "trial":
                 raise ConfigurationError(f"a command makes no {motion}; name the arm in [arm]")
             return command
-        from prior_reinforce.bench.robots.executors.drive import Request, drive_command
-
         if self.manifest.driven_by != command:
             raise ConfigurationError(
                 f"{self.folder / MANIFEST_FILE} names another arm since; ask again"
             )
-        known = self.manifest
-        return drive_command(Request(command, known.gate, motion, speed, known.robot))
+        return drive_command(
+            Request(command, self.manifest.gate, motion, speed, self.manifest.robot)
+        )
 
     def recover(self) -> Trial | None:
         """Note how an execution ended whose program was killed, where its supervisor wrote it down.
@@ -726,8 +716,6 @@ class Workspace:
         Returns:
             The trial as it stands now; None where there is nothing to recover.
         """
-        from prior_reinforce.bench.robots.executors.command import read_ended
-
         trial = self.state.open_trial
         if trial is None or self.log.is_executing():
             return None
@@ -736,7 +724,7 @@ class Workspace:
         if not isinstance(began, Executing) or not began.command or not began.folder:
             return None  # a person has to say
         folder = self.store.execution_folder(began.folder)
-        result = read_ended(folder, began.command, self._plan_file(trial))
+        result = read_ended(folder, began.command, self.store.plan_file(trial))
         if result is None:
             return None
         self._record(result, trial, folder)
@@ -759,18 +747,12 @@ class Workspace:
 
         Such a journal was restored from a copy; a person has to say whether that was this trial.
         """
-        from prior_reinforce.bench.robots.executors.command import was_executed
-
         if trial.stage is Stage.ASKED:
-            folders = self.store.execution_folders(_kept(trial).file)
-            known = {e.event.folder for e in self.log.entries() if isinstance(e.event, Executing)}
-            for folder in folders:
+            known = {e.event.folder for e in self.events if isinstance(e.event, Executing)}
+            for folder in self.store.execution_folders(self.plan_path(trial).name):
                 if folder.name not in known and was_executed(folder):
                     self._begin(Executing(trial=trial.number, command="", folder=folder.name))
                     return
-
-    def _plan_file(self, trial: Trial) -> PlanFile:
-        return PlanFile(self.plan_path(trial), _kept(trial).sha256)
 
     def _record(
         self,
@@ -785,14 +767,11 @@ class Workspace:
         Returns:
             The result with that error.
         """
-        from prior_reinforce.bench.robots.executors.result import measure_tracking
-
         try:
             plan = self.plan(trial)
             slow = dataclasses.replace(plan.format, dt=plan.format.dt / speed)
             if motion != "approach":
-                measured = measure_tracking(folder, Plan(plan.actions, slow))
-                result = replace(result, **measured)
+                result = replace(result, **measure_tracking(folder, Plan(plan.actions, slow)))
         except FileFormatError as error:
             reasons = filter(None, [result.reason, str(error)])
             result = replace(result, reason="; ".join(reasons))
@@ -826,8 +805,6 @@ class Workspace:
 
     def _adapter(self, choice: str, own: str | None) -> Adapter:
         """The adapter that a goal was set with."""
-        from prior_reinforce.adapters import make_adapter
-
         choice = choice or DEFAULT_ADAPTER
         _require_own(own, choice, "adapter", "the goal was set with", "set the goal again")
         return make_adapter(choice)
@@ -864,9 +841,3 @@ def _require_own(given: str | None, choice: str, family: str, said: str, again: 
         if own is not None:
             remedy = f"name it, for the journal starts no code: --{family} {own}"
         raise ConfigurationError(f"{said} {choice}; {remedy}")
-
-
-def _kept(trial: Trial) -> KeptPlan:
-    """A trial's plan, which every trial of a workspace has."""
-    assert trial.kept is not None
-    return trial.kept
