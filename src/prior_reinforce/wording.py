@@ -151,9 +151,15 @@ def say_place(place: ArrayLike, names: Sequence[str], units: Sequence[str]) -> s
     return _components(place, names, units)
 
 
-def error_words(names: Sequence[str], units: Sequence[str]) -> list[tuple[str, str] | None]:
-    """For each component of an error the words where it is positive and negative; None: none."""
-    return _pairs(WORDS, names, units)
+def error_words(
+    names: Sequence[str], units: Sequence[str], words: Sequence[tuple[str, str]] = WORDS
+) -> list[tuple[str, str] | None]:
+    """For each component the words where it is positive and negative; None where it has none."""
+    pairs = [
+        _TIMES if unit in ("s", "ms") else words[axis] if axis < len(words) else None
+        for axis, unit in zip(axes_of(names, units), units, strict=True)
+    ]
+    return [pair if pairs.count(pair) == 1 else None for pair in pairs]
 
 
 def error_example(names: Sequence[str], units: Sequence[str]) -> str:
@@ -251,25 +257,23 @@ def from_words(
                 f"{'cm' if is_length[j] else 'deg'}, or void the trial if that is true"
             )
     seen = Reading.estimated(number, sds)
-    low, high, sd = seen.low.copy(), seen.high.copy(), seen.sd.copy()
+    bounds = np.array([seen.low, seen.high, seen.sd])  # of each component
     if np.any(is_length):
         eye = Reading.by_eye((number * metres)[is_length])
-        for ends, of in ((low, eye.low), (high, eye.high), (sd, eye.sd)):
-            ends[is_length] = of / metres[is_length]
+        bounds[:, is_length] = np.array([eye.low, eye.high, eye.sd]) / metres[is_length]
     if rest_unknown:
         unsaid = [j for j in range(k) if j not in said]
-        low[unsaid], high[unsaid], sd[unsaid] = -math.inf, math.inf, 0.0
+        bounds[:, unsaid] = [[-math.inf], [math.inf], [0.0]]
     for j, term in said.items():
         if term.size is None:
             nearest = EYE_BETWEEN[0] / metres[j] if is_length[j] else 0.0
-            low[j], high[j] = sorted((term.sign * nearest, term.sign * math.inf))
-            sd[j] = 0.0
+            bounds[:, j] = *sorted((term.sign * nearest, term.sign * math.inf)), 0.0
         elif term.least is not None:
-            low[j], high[j] = sorted((term.sign * term.least, number[j]))
-            number[j], sd[j] = 0.5 * (low[j] + high[j]), 0.0
+            low, high = sorted((term.sign * term.least, number[j]))
+            number[j], bounds[:, j] = 0.5 * (low + high), (low, high, 0.0)
         elif term.sd is not None:
-            low[j], high[j], sd[j] = number[j], number[j], term.sd
-    return Reading(number, low, high, sd, hit, text)
+            bounds[:, j] = number[j], number[j], term.sd
+    return Reading(number, *bounds, hit, text)
 
 
 def as_reading(
@@ -427,17 +431,6 @@ def _parts(text: str) -> list[str]:
     return [part.rstrip(".! ") for part in parts]
 
 
-def _pairs(
-    words: Sequence[tuple[str, str]], names: Sequence[str], units: Sequence[str]
-) -> list[tuple[str, str] | None]:
-    """The words of each component; None where it has none."""
-    pairs = [
-        _TIMES if unit in ("s", "ms") else words[axis] if axis < len(words) else None
-        for axis, unit in zip(axes_of(names, units), units, strict=True)
-    ]
-    return [pair if pairs.count(pair) == 1 else None for pair in pairs]
-
-
 def _with_units(text: str, names: Sequence[str], units: Sequence[str]) -> str:
     """Words with the unit that was understood where none was said: `5 cm long` for `5 long`."""
     said = []
@@ -472,7 +465,7 @@ def _read(
     sizes: bool,
 ) -> dict[int, _Term]:
     """Read the terms of a text by component; `sizes` wants a number for each, and no `+-`."""
-    pairs, k = _pairs(words, names, units), len(units)
+    pairs, k = error_words(names, units, words), len(units)
     known = {word: (j, pair) for j, pair in enumerate(pairs) if pair for word in pair}
     if k == 1 and units[0] not in _METRES:  # whatever is more of it
         known |= {word: (0, pair) for pair in (*words, _TIMES) for word in pair}
