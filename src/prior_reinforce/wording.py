@@ -8,8 +8,10 @@ An operator stands behind the robot and looks along x, from the robot's base ove
     z                 high or low                     up or down
     a time            late or early
 
-A component is x, y or z by its name, else by its position. An error is outcome minus goal. Lengths
-are said in centimetres, errors of other tasks by their names and units.
+`names` and `units` are those of the k components of an outcome. A component is x, y or z by its
+name, else by its position. An error is outcome minus goal. Lengths are said in centimetres, errors
+of other tasks by their names and units.
+
 Source: paper, Section IV, "Perception Process" (coarse human feedback); the words are ours.
 """
 
@@ -208,17 +210,18 @@ def say_tolerance(
 def from_words(
     text: str, names: Sequence[str], units: Sequence[str], least_sd: ArrayLike = 0.0
 ) -> Reading:
-    """Read an error from words.
+    """Read an error from words, for instance `5cm long, 2 cm left`, `20ms late`, `5-7 in short`.
+
+    A length without a unit is in centimetres, or in the outcome's inches; a component that is not
+    named is zero. 0, 2, 5 cm and tens are an observer's words (`Reading.by_eye`), other numbers
+    estimates (`Reading.estimated`), `5 +- 0.5 cm long` is a measurement. `long` means by 1 cm or
+    more, and leaves components that are not named unknown; so does `5 cm long, somewhere`. `hit`
+    and `miss` stand alone or beside terms.
 
     Args:
-        text: For instance `5cm long, 2 cm left`, `20ms late`, `5-7 in short`, `5 deg high`. A
-            length without a unit is in centimetres, or in the outcome's inches; a component that
-            is not named is zero. 0, 2, 5 cm and tens are an observer's words (`Reading.by_eye`),
-            other numbers estimates (`Reading.estimated`), `5 +- 0.5 cm long` is a measurement.
-            `long` means by 1 cm or more, and leaves components that are not named unknown; so does
-            `5 cm long, somewhere`. `hit` and `miss` stand alone or beside terms.
-        names: Names of the k components.
-        units: Units of the k components.
+        text: The words.
+        names: Of the k components.
+        units: Of the k components.
         least_sd: Least standard deviation of what is no length and was not measured, in `units`.
 
     Returns:
@@ -289,8 +292,8 @@ def as_reading(
         seen: A reading, words, or outcome minus goal as numbers of unknown origin, shape (k,); None
             if only `hit` is known.
         hit: Whether the goal was reached, if that was seen directly.
-        names: Names of the k components.
-        units: Units of the k components.
+        names: Of the k components.
+        units: Of the k components.
         least_sd: Least standard deviation of numbers of unknown origin, shape (k,), in `units`.
 
     Raises:
@@ -313,11 +316,7 @@ def as_reading(
 
 
 def read_numbers(text: str) -> list[tuple[float, float | None]] | None:
-    """Read numbers, each with the number after its `+-`; None if the text is anything else.
-
-    Args:
-        text: For instance `0.05+-0.003, -0.02 ± 0.001`.
-    """
+    """Read numbers, each with that after its `+-` (`0.05+-0.003, -0.02 ± 0.001`); None if none."""
     parts = re.sub(rf"\s*{_PLUS_MINUS}\s*", "±", text).replace(",", " ").split()
     try:
         split = [part.split("±") for part in parts]
@@ -329,12 +328,7 @@ def read_numbers(text: str) -> list[tuple[float, float | None]] | None:
 def read_uncertain_place(
     text: str, names: Sequence[str], units: Sequence[str]
 ) -> tuple[_Point, float]:
-    """Read a place as `read_place` does, and the standard deviation that may follow it.
-
-    Args:
-        text: For instance `92cm 10cm +- 2cm`.
-        names: Names of the components.
-        units: Units of the components.
+    """Read a place, and the standard deviation that may follow it: `92cm 10cm +- 2cm`.
 
     Raises:
         InvalidFeedbackError: As `read_place` does, or a `+-` for components of several units.
@@ -350,11 +344,8 @@ def read_uncertain_place(
 def read_place(text: str, names: Sequence[str], units: Sequence[str]) -> _Point:
     """Read a place from numbers in the outcome's units, numbers with a unit, or words.
 
-    Args:
-        text: For instance `0.92 0.10`, `92cm 10cm`, `92 10 cm`, or `92cm ahead, 10cm left`; beside
-            words, a length without one is the component in that position: `92cm, 10cm left`.
-        names: Names of the components.
-        units: Units of the components.
+    For instance `0.92 0.10`, `92cm 10cm`, `92 10 cm`, or `92cm ahead, 10cm left`; beside words, a
+    length without one is the component in that position: `92cm, 10cm left`.
 
     Raises:
         InvalidFeedbackError: It is none of these, has a `+-`, or is farther than any arm throws.

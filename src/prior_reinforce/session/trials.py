@@ -14,6 +14,7 @@ from numbers import Integral
 from typing import Any, Protocol
 
 import numpy as np
+from msgspec import structs
 
 from prior_reinforce.arrays import Frames, Point
 from prior_reinforce.errors import (
@@ -307,23 +308,13 @@ class State:
                     raise ValueError(f"there is no goal {event.goal}")
                 if len(event.condition) != self.goals[event.goal - 1].goal.size:
                     raise ValueError("the condition has another length than the goal")
-                plan = self.plans.get(event.trial)
+                known = structs.asdict(event)
+                for name in ("condition", "expected_error", "expected_sd"):
+                    known[name] = None if known[name] is None else _read_only(known[name])
+                number, goal, kept = (known.pop(name) for name in ("trial", "goal", "plan"))
+                plan = self.plans.get(number)
                 kind = Trial if plan is None else AskedTrial
-                self.trials.append(
-                    kind(
-                        event.trial,
-                        event.goal,
-                        _read_only(event.condition),
-                        plan,
-                        p_hit=event.p_hit,
-                        expected_trials=event.expected_trials,
-                        expected_error=_read_only_or_none(event.expected_error),
-                        expected_sd=_read_only_or_none(event.expected_sd),
-                        model=event.model,
-                        kept=event.plan,
-                        gate=event.gate,
-                    )
-                )
+                self.trials.append(kind(number, goal, plan=plan, kept=kept, **known))
             case Amended():
                 told = self._told(event)
                 self._outdate(told)
@@ -412,10 +403,6 @@ def _meaning(trial: Trial) -> object:
     """What was seen of a trial, in whatever words; None unless told."""
     reading = trial.reading
     return None if reading is None else (replace(reading, said="").record(), trial.hit)
-
-
-def _read_only_or_none(values: Any) -> np.ndarray | None:
-    return None if values is None else _read_only(values)
 
 
 def _read_only(values: Any) -> np.ndarray:

@@ -13,7 +13,6 @@ opened, and all is checked before a folder of the wanted name is there.
 
 from __future__ import annotations
 
-import hashlib
 import re
 import struct
 import zipfile
@@ -69,7 +68,10 @@ def pack(workspace: Workspace, path: Path) -> str:
         rows = workspace.log.rows()
         named = _named(entry.event for entry in workspace.events)
     manifest = without_arm(read_manifest(workspace.folder / MANIFEST_FILE))
-    contents = {MANIFEST_FILE: manifest.encode(), _EVENTS: b"\n".join([*map(_line, rows), b""])}
+    contents = {
+        MANIFEST_FILE: manifest.encode(),
+        _EVENTS: b"\n".join([*map(msgspec.json.encode, rows), b""]),
+    }
     for folder in (workspace.folder / name for name in named):
         for file in sorted(folder.iterdir()) if folder.is_dir() else [folder]:
             if not file.name.startswith("."):
@@ -87,7 +89,7 @@ def pack(workspace: Workspace, path: Path) -> str:
         with zipfile.ZipFile(unfinished, "w", zipfile.ZIP_STORED) as archive:
             for name, content in {_CONTENTS: described, **contents}.items():
                 archive.writestr(zipfile.ZipInfo(name), content)
-        return _sha256_of(unfinished)
+        return sha256(unfinished.read_bytes())
 
 
 def unpack(path: Path, folder: Path) -> str:
@@ -106,7 +108,7 @@ def unpack(path: Path, folder: Path) -> str:
                 with Workspace(unfinished) as workspace:
                     if workspace.state.demonstrations is not None:
                         workspace.demonstrations  # noqa: B018  (whether they are whole)
-        return _sha256_of(path)
+        return sha256(path.read_bytes())
     except FileNotFoundError:
         raise
     except (PriorReinforceError, *_DAMAGED) as error:
@@ -126,10 +128,6 @@ def _named(events: Iterable[object]) -> list[str]:
             case Asked(plan=kept) if kept is not None:
                 names.append(f"plans/{kept.file}")
     return list(dict.fromkeys(names))
-
-
-def _line(row: Row) -> bytes:
-    return msgspec.json.encode(row)
 
 
 def _checked(archive: zipfile.ZipFile, size: int) -> Pack:
@@ -177,11 +175,3 @@ def _write(archive: zipfile.ZipFile, about: Pack, folder: Path) -> None:
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_bytes(content)
     restore(folder / JOURNAL_FILE, rows)
-
-
-def _sha256_of(path: Path) -> str:
-    digest = hashlib.sha256()
-    with path.open("rb") as file:
-        while block := file.read(1 << 20):
-            digest.update(block)
-    return digest.hexdigest()

@@ -54,11 +54,6 @@ class Store:
         """A place in the workspace."""
         return require_inside(self._folder.joinpath(*parts), self._folder)
 
-    @property
-    def training(self) -> Path:
-        """Folder of what a training goes on from."""
-        return self.path(".training")
-
     def save_demonstrations(self, demonstrations: Demonstrations) -> None:
         """Keep demonstrations under their hash."""
         path = self.path("demonstrations", f"{demonstrations.sha256[:_DIGITS]}.npz")

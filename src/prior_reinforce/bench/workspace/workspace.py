@@ -546,7 +546,7 @@ class Workspace:
         self.state.refuse_open_trial("learning")
         demonstrations, known_as = self.demonstrations, self.state.demonstrations
         assert known_as is not None
-        made = make_generator(generator, device=device, states=self.store.training)
+        made = make_generator(generator, device=device, states=self.store.path(".training"))
         made.check_savable()
         fitted = made.fit(demonstrations, seed=seed, progress=progress)
         trained = ModelTrained(
