@@ -159,8 +159,6 @@ def write_once(path: Path, content: bytes) -> Path:
         FileFormatError: Another file is there already.
         WorkspaceError: The disk is full or the folder read-only; nothing is left behind.
     """
-    if not path.parent.is_dir():
-        raise WorkspaceError(f"cannot write {path}, there is no such folder; make the folder first")
     with named_disk_errors(path.parent), _unfinished(path) as unfinished:
         unfinished.write_bytes(content)
         unfinished.chmod(unfinished.stat().st_mode & 0o444)

@@ -244,8 +244,7 @@ def from_words(
     hit = hits.pop() if hits else None
     if hit is not None and not terms:
         return replace(Reading.only(hit, k), said=text)
-    example = f'for instance "{error_example(names, units)}", or "hit"'
-    said = _read(terms, text, WORDS, names, units, example, sizes=False)
+    said = _read(terms, text, names, units)
     rest_unknown |= any(term.size is None for term in said.values())
     metres = np.array([_METRES.get(unit, 0.0) for unit in units])
     is_length = metres > 0.0
@@ -276,7 +275,7 @@ def from_words(
             number[j], bounds[:, j] = 0.5 * (low + high), (low, high, 0.0)
         elif term.sd is not None:
             bounds[:, j] = number[j], number[j], term.sd
-    return Reading(number, *bounds, hit, text)
+    return Reading(number, bounds[0], bounds[1], bounds[2], hit, text)
 
 
 def as_reading(
@@ -356,10 +355,8 @@ def read_place(text: str, names: Sequence[str], units: Sequence[str]) -> _Point:
     numbers = _numbers_with_units(text, units)
     if numbers is None:
         if k <= len(WORDS) and set(units) <= set(_METRES):
-            example = 'for instance "92cm ahead, 10cm left"'
-            read = _read(_parts(text), text, PLACE_WORDS, names, units, example, sizes=True)
             place = np.zeros(k)
-            for j, term in read.items():
+            for j, term in _read(_parts(text), text, names, units, place=True).items():
                 place[j] = term.sign * (term.size or 0.0)
             return place
         raise InvalidFeedbackError(f"cannot read {text!r}; give {expected}")
@@ -446,17 +443,11 @@ def _bare(unit: str) -> str:
 
 
 def _read(
-    parts: Sequence[str],
-    text: str,
-    words: Sequence[tuple[str, str]],
-    names: Sequence[str],
-    units: Sequence[str],
-    example: str,
-    *,
-    sizes: bool,
+    parts: Sequence[str], text: str, names: Sequence[str], units: Sequence[str], place: bool = False
 ) -> dict[int, _Term]:
-    """Read the terms of a text by component; `sizes` wants a number for each, and no `+-`."""
-    pairs, k = error_words(names, units, words), len(units)
+    """Read the terms of a text by component; a place has a number for each, and no `+-`."""
+    words, k = PLACE_WORDS if place else WORDS, len(units)
+    pairs = error_words(names, units, words)
     known = {word: (j, pair) for j, pair in enumerate(pairs) if pair for word in pair}
     if k == 1 and units[0] not in _METRES:  # whatever is more of it
         known |= {word: (0, pair) for pair in (*words, _TIMES) for word in pair}
@@ -464,12 +455,12 @@ def _read(
     for turn, part in enumerate(parts):
         match, bare = _TERM.fullmatch(part), _BARE_TERM.fullmatch(part)
         told = {} if match is None else match.groupdict()
-        if bare is not None and sizes and len(parts) > 1 and turn < k:
+        if bare is not None and place and len(parts) > 1 and turn < k:
             told, j, pair, sign = bare.groupdict(), turn, pairs[turn], 1.0
         elif told.get("word") not in known or (
-            sizes and (not told["value"] or told["sd"] or told["least"])
+            place and (not told["value"] or told["sd"] or told["least"])
         ):
-            raise InvalidFeedbackError(_unread(part, text, [*known], example, sizes=sizes))
+            raise InvalidFeedbackError(_unread(part, text, [*known], names, units, place))
         else:
             j, pair = known[told["word"]]
             sign = -1.0 if told["word"] == pair[1] else 1.0
@@ -477,7 +468,6 @@ def _read(
             raise InvalidFeedbackError(
                 f"{text!r} names {' and '.join(pair or names[j])} twice; give each direction once"
             )
-
         numbers: list[float | None] = []
         for which in ("value", "least", "sd"):
             unit = told.get(f"{which}_unit") or told.get("unit") or told.get("sd_unit") or ""
@@ -487,15 +477,23 @@ def _read(
     return read
 
 
-def _unread(part: str, text: str, known: Sequence[str], example: str, *, sizes: bool) -> str:
-    from_base = _FROM_BASE.fullmatch(part) if sizes else None
-    if from_base is not None:
+def _unread(
+    part: str,
+    text: str,
+    known: Sequence[str],
+    names: Sequence[str],
+    units: Sequence[str],
+    place: bool,
+) -> str:
+    if place and (from_base := _FROM_BASE.fullmatch(part)):
         return (
             f"{part!r} may be straight to the place or along x only; measure along x and say "
             f"{from_base['length']} {known[0]}"
         )
+    example = '"92cm ahead, 10cm left"' if place else f'"{error_example(names, units)}", or "hit"'
     where = "" if part == text.strip().lower() else f" in {text!r}"
-    return f"cannot read {part!r}{where}; write a length and one of {', '.join(known)}, {example}"
+    said = f"cannot read {part!r}{where}; write a length and one of {', '.join(known)}"
+    return f"{said}, for instance {example}"
 
 
 def _in_unit(number: str, said: str, unit: str, k: int, part: str) -> float:

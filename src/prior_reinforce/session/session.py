@@ -326,7 +326,6 @@ class Session:
         return self.trial(number)
 
     def __repr__(self) -> str:
-        """The goal, and how far it is."""
         state = self.state
         if state.goal is None:
             return "Session(no goal)"

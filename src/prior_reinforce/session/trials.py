@@ -146,7 +146,6 @@ class Trial:
     """The gate's verdict of now, on a trial that `Session.ask` returned; None without a gate."""
 
     def __repr__(self) -> str:
-        """Number, what was asked for, and what was seen."""
         said = [f"{self.number} for goal {self.goal_number}", self.stage.value]
         said.append(f"condition {np.round(self.condition, 4).tolist()}")
         if self.error_seen is not None:
@@ -193,7 +192,6 @@ class State:
     """What the events of a log add up to."""
 
     def __init__(self) -> None:
-        """Nothing has happened."""
         self.goals: list[Goal] = []
         self.trials: list[Trial] = []
         self.plans: dict[int, Frames] = {}
@@ -352,7 +350,6 @@ class Log:
     """Events of a session, and what they add up to; here, as long as the program lasts."""
 
     def __init__(self) -> None:
-        """Start empty."""
         self._entries: list[Entry] = []
         self._state = State()
         self._n_added = 0

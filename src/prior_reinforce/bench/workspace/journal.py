@@ -106,11 +106,7 @@ class Journal(Log):
                 )
 
     def __reduce__(self) -> NoReturn:
-        """Refuse to be copied, with whatever holds it: what happened is in the folder.
-
-        Raises:
-            WorkspaceError: Always.
-        """
+        """Refuse to be copied, with whatever holds it: what happened is in the folder."""
         folder = str(self._path.parent)
         raise WorkspaceError(f"a workspace is not copied; open it again: Workspace({folder!r})")
 

@@ -102,7 +102,6 @@ class WorkspaceState(State):
     """What the events of a workspace add up to."""
 
     def __init__(self) -> None:
-        """Nothing has happened."""
         super().__init__()
         self.demonstrations: str | None = None
         """SHA-256 of the demonstrations in use; None before the first import."""

@@ -27,7 +27,7 @@ from prior_reinforce.bench.robots import (
 )
 from prior_reinforce.bench.robots.executors import EXECUTORS
 from prior_reinforce.bench.robots.executors.base import ArmSettings
-from prior_reinforce.bench.robots.kinematics import Chain
+from prior_reinforce.bench.robots.kinematics import Chain, Pose
 from prior_reinforce.bench.robots.presets import GRIPPERS, PRESETS
 from prior_reinforce.bench.robots.urdf import read_urdf
 from prior_reinforce.errors import ConfigurationError, FileFormatError, PriorReinforceError
@@ -80,7 +80,6 @@ class Manifest:
 _Texts = Annotated[tuple[str, ...], Meta(min_length=1)]
 _Numbers = Annotated[tuple[float, ...], Meta(min_length=1)]
 _Positive = Annotated[tuple[Annotated[float, Meta(gt=0)], ...], Meta(min_length=1)]
-_Six = tuple[float, float, float, float, float, float]
 _Nine = tuple[float, float, float, float, float, float, float, float, float]
 
 
@@ -114,7 +113,7 @@ class _Robot(_Section, frozen=True):
     acceleration: _Numbers | None = None
     jerk: _Numbers | None = None
     kinematics: Annotated[tuple[_Nine, ...], Meta(min_length=1)] | None = None
-    flange: _Six | None = None
+    flange: Pose | None = None
     source: str = ""
     arm: str = ""
 

@@ -113,7 +113,6 @@ class StatusRecord(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     """The same for a person, as `status` prints it."""
 
     def __repr__(self) -> str:
-        """As `status` prints it."""
         return self.text
 
     def _repr_html_(self) -> str:

@@ -47,7 +47,6 @@ class Store:
     """
 
     def __init__(self, folder: Path) -> None:
-        """Remember the workspace's folder."""
         self._folder = folder
 
     def path(self, *parts: str) -> Path:

@@ -122,16 +122,22 @@ def workspace_around(folder: Path, *, above: bool = True) -> Path | None:
 
 
 class Workspace:
-    """Trials of one task, on disk."""
+    """Trials of one task, on disk.
+
+    Opening one raises these, and so may every method, beside those that it names.
+
+    Raises:
+        WorkspaceError: There is no workspace; its journal is damaged, held by another program, or
+            of another version; or the disk refuses.
+        FileFormatError: A file that the journal names is missing, or not what was written; the
+            manifest is no TOML; or a part of the workspace is a link out of it.
+        ConfigurationError: The manifest holds a wrong value, or has another number of outcomes than
+            the goals so far.
+        InvalidDemonstrationsError: The manifest says otherwise since they were imported.
+    """
 
     def __init__(self, folder: str | os.PathLike[str]) -> None:
-        """Open a workspace that `create` made.
-
-        Raises:
-            WorkspaceError: There is none, or its journal cannot be used.
-            FileFormatError: Its manifest is no TOML, or a part of it is a link out of it.
-            ConfigurationError: Its manifest holds a wrong value.
-        """
+        """Open a workspace that `create` made."""
         self.folder = folder = Path(folder)
         for name in _OWN:
             require_inside(folder / name, folder)
@@ -178,7 +184,6 @@ class Workspace:
         self.manifest: Manifest = parse_manifest(read_manifest(path), path)
 
     def __repr__(self) -> str:
-        """The folder, and what it holds."""
         try:
             state = self.state
         except PriorReinforceError as error:
@@ -190,7 +195,6 @@ class Workspace:
         return as_html(self.status().text)
 
     def __reduce__(self) -> NoReturn:
-        """As its log."""
         self.log.__reduce__()
 
     def close(self) -> None:
@@ -198,7 +202,6 @@ class Workspace:
         self.log.close()
 
     def __enter__(self) -> Self:
-        """Use it for the length of a block."""
         return self
 
     def __exit__(self, _: object, error: BaseException | None, __: object) -> None:
@@ -211,17 +214,12 @@ class Workspace:
 
     @property
     def events(self) -> Sequence[Entry]:
-        """The journal; errors as `state`."""
+        """The journal."""
         return self.log.entries()
 
     @property
     def state(self) -> WorkspaceState:
-        """What the journal adds up to.
-
-        Raises:
-            WorkspaceError: The journal is damaged, or another version wrote it.
-            ConfigurationError: The manifest has another number of outcomes than the goals so far.
-        """
+        """What the journal adds up to."""
         state, k = self.log.state(), len(self.manifest.outcome_names)
         if any(goal.goal.size != k for goal in state.goals):
             raise ConfigurationError(
@@ -232,13 +230,7 @@ class Workspace:
 
     @property
     def demonstrations(self) -> Demonstrations:
-        """The demonstrations in use.
-
-        Raises:
-            WorkspaceError: None were imported yet.
-            FileFormatError: The file is damaged.
-            InvalidDemonstrationsError: The manifest says otherwise since they were imported.
-        """
+        """The demonstrations in use; a WorkspaceError if none were imported yet."""
         sha256 = self.state.demonstrations
         if sha256 is None:
             raise WorkspaceError(
@@ -248,11 +240,7 @@ class Workspace:
         return self._demonstrations(sha256)
 
     def demonstrations_of(self, model: str) -> Demonstrations:
-        """The demonstrations that a model was fitted to.
-
-        Raises:
-            FileFormatError: The file is missing or damaged.
-        """
+        """The demonstrations that a model was fitted to."""
         return self._demonstrations(self.state.trainings[model].demonstrations_sha256)
 
     def session(self, own: str | None = None, own_adapter: str | None = None) -> Session:
@@ -262,9 +250,6 @@ class Workspace:
             own: `module:Class` that the model was learned by, where it is one's own: nothing in the
                 folder may start code.
             own_adapter: `module:Class` that the goal was set with, likewise.
-
-        Raises:
-            WorkspaceError, ConfigurationError: See `state`.
         """
         goals = self.state.goals
         return Session(
@@ -308,11 +293,6 @@ class Workspace:
         """Hold a plan against the robot's limits of now; None where the manifest names no robot.
 
         The manifest is read again: a person may have narrowed the limits while this program waits.
-
-        Raises:
-            InvalidDemonstrationsError: The manifest says otherwise since they were imported.
-            ConfigurationError: The manifest holds a wrong value by now.
-            FileFormatError: The manifest is gone, or no TOML any more.
         """
         self._read_manifest()
         if self.manifest.robot is None:
@@ -327,11 +307,7 @@ class Workspace:
         return self.store.plan_file(trial).path
 
     def plan(self, trial: Trial) -> Plan:
-        """A trial's plan, checked against the hash in the journal.
-
-        Raises:
-            FileFormatError: The file is missing, or not what was written.
-        """
+        """A trial's plan, checked against the hash in the journal."""
         return self.store.plan(trial)
 
     def export(
@@ -347,7 +323,7 @@ class Workspace:
         Raises:
             RobotLimitError: The plan breaks a limit of now.
             TrialStateError: There is no such trial.
-            FileFormatError: The file is there already, or the plan is not what was written.
+            FileFormatError: The file is there already.
             ConfigurationError: Another kind of file, or an impossible rate.
         """
         plan = self.plan(self.state.trial(number))
@@ -366,8 +342,8 @@ class Workspace:
             Its SHA-256, for whoever gets it to compare.
 
         Raises:
-            FileFormatError: The file is there already, or a file of the workspace is missing.
-            WorkspaceError: A trial is executing, or the disk refuses.
+            FileFormatError: The file is there already.
+            WorkspaceError: A trial is executing.
         """
         from prior_reinforce.bench.workspace.packing import pack
 
@@ -379,7 +355,7 @@ class Workspace:
 
         Raises:
             FileFormatError: It is damaged, was changed, or holds what `pack` does not write.
-            WorkspaceError: The folder exists, or the disk refuses.
+            WorkspaceError: The folder exists.
         """
         from prior_reinforce.bench.workspace.packing import unpack
 
@@ -405,8 +381,7 @@ class Workspace:
             progress: Called with the number of goals drawn and of all goals.
 
         Raises:
-            WorkspaceError: There is nothing to report yet, or the folder cannot be written.
-            FileFormatError: The demonstrations are damaged.
+            WorkspaceError: There is nothing to report yet.
         """
         from prior_reinforce.bench.workspace.report import report_workspace
 
@@ -596,7 +571,6 @@ class Workspace:
             RobotLimitError: The plan breaks a limit of now; nothing moved.
             ConfigurationError: The command could not be started; nothing moved, and the journal
                 says so.
-            FileFormatError: The plan's file is not what was written; nothing moved.
             KeyboardInterrupt: Interrupted; the command was stopped, and the journal says so.
         """
         if (speed != 1.0) != (motion == "rehearsal") or not 0 < speed <= 1:
@@ -683,7 +657,6 @@ class Workspace:
         Raises:
             TrialStateError: It is moved or recorded right now: two programs on one bus clash.
             ConfigurationError: The arm does not answer, or is another one since.
-            FileFormatError: The plan's file is not what was written.
         """
         text = self._command(arm, "look", speed)
         plan = self.store.plan_file(self.state.trial(number))
@@ -790,15 +763,10 @@ class Workspace:
         """The model in use."""
         self.demonstrations  # noqa: B018  (whether there are any that fit the manifest)
         training = self.state.training
-        if training is None:
-            raise WorkspaceError(
-                f"nothing is learned yet; run: prior-reinforce learn {self.folder}"
-            )
-        if self.state.stale:
-            raise WorkspaceError(
-                "other demonstrations were imported since the model was learned; run: "
-                f"prior-reinforce learn {self.folder}"
-            )
+        if training is None or self.state.stale:
+            why = "other demonstrations were imported since the model was learned"
+            why = why if training is not None else "nothing is learned yet"
+            raise WorkspaceError(f"{why}; run: prior-reinforce learn {self.folder}")
         said = "the model was learned by"
         _require_own(own, training.generator, "generator", said, "learn again")
         return self.store.model(training.model, own)
