@@ -17,15 +17,17 @@ import re
 import struct
 import zipfile
 from collections.abc import Iterable
+from contextlib import closing
 from datetime import datetime, timezone
 from pathlib import Path
 
 import msgspec
 
 import prior_reinforce
-from prior_reinforce.bench.workspace.journal import JOURNAL_FILE, JOURNAL_VERSION, Row, restore
+from prior_reinforce.bench.workspace.journal import JOURNAL_VERSION, Journal, Row
 from prior_reinforce.bench.workspace.log import DemonstrationsImported, ModelTrained
 from prior_reinforce.bench.workspace.manifest import MANIFEST_FILE, read_manifest, without_arm
+from prior_reinforce.bench.workspace.store import Store
 from prior_reinforce.bench.workspace.workspace import Workspace
 from prior_reinforce.errors import FileFormatError, PriorReinforceError, WorkspaceError
 from prior_reinforce.files import in_place, named_disk_errors, sha256
@@ -162,16 +164,16 @@ def _checked(archive: zipfile.ZipFile, size: int) -> Pack:
 def _write(archive: zipfile.ZipFile, about: Pack, folder: Path) -> None:
     """Write every file of an archive whose hash is right, and the journal that its events make."""
     folder.mkdir()
-    rows: list[Row] = []
-    for name, digest in about.files.items():
-        content = archive.read(name)
-        if sha256(content) != digest:
-            raise FileFormatError(f"{name} is not what was packed; get it again")
-        if name == _EVENTS:
-            rows = [msgspec.json.decode(line, type=Row) for line in content.splitlines()]
-            continue
-        if name == MANIFEST_FILE and without_arm(content.decode()) != content.decode():
-            raise FileFormatError("its manifest names an [arm]; it was not packed by pack")
-        (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        (folder / name).write_bytes(content)
-    restore(folder / JOURNAL_FILE, rows)
+    with closing(Journal(folder, Store(folder))) as journal:  # while there are no files yet
+        for name, digest in about.files.items():
+            content = archive.read(name)
+            if sha256(content) != digest:
+                raise FileFormatError(f"{name} is not what was packed; get it again")
+            if name == _EVENTS:
+                rows = [msgspec.json.decode(line, type=Row) for line in content.splitlines()]
+                journal.restore(rows)
+                continue
+            if name == MANIFEST_FILE and without_arm(content.decode()) != content.decode():
+                raise FileFormatError("its manifest names an [arm]; it was not packed by pack")
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            (folder / name).write_bytes(content)

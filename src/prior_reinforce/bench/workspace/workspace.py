@@ -47,7 +47,7 @@ from prior_reinforce.bench.robots.executors.result import measure_tracking
 from prior_reinforce.bench.robots.executors.supervision import Interruptions
 from prior_reinforce.bench.robots.gate import check_plan
 from prior_reinforce.bench.robots.plan_files import PlanFile, write_plan
-from prior_reinforce.bench.workspace.journal import JOURNAL_FILE
+from prior_reinforce.bench.workspace.journal import JOURNAL_FILE, Journal
 from prior_reinforce.bench.workspace.log import (
     DemonstrationsImported,
     Executed,
@@ -56,7 +56,6 @@ from prior_reinforce.bench.workspace.log import (
     Moved,
     Moving,
     NotExecuted,
-    WorkspaceLog,
     WorkspaceState,
 )
 from prior_reinforce.bench.workspace.manifest import (
@@ -148,7 +147,7 @@ class Workspace:
             )
         self._read_manifest()
         self.store = Store(folder)
-        self.log = WorkspaceLog(folder, self.store)
+        self.log = Journal(folder, self.store)
         self._read: dict[str, Demonstrations] = {}
 
     @classmethod
