@@ -38,7 +38,7 @@ _LARGEST_NPZ = 4_000_000_000
 """Bytes of all arrays in a file; ours: an hour of an arm at 1 kHz is a tenth of it. A small file
 that unpacks to more is a trap."""
 
-_FORMULAS = "=+-@\t\r"
+_FORMULAS = ("=", "+", "-", "@", "\t", "\r")
 """What a spreadsheet takes for the start of a formula, which may run a program (OWASP, CSV
 injection)."""
 
@@ -98,12 +98,12 @@ def open_npz(path: Path, remedy: str, largest: int | None = None) -> Iterator[np
 
 def as_cell(text: str) -> str:
     """Return a text for a cell of a table, of which no spreadsheet makes a formula."""
-    return f"'{text}" if text[:1] in _FORMULAS and text[:1] else text
+    return f"'{text}" if text.startswith(_FORMULAS) else text
 
 
 def from_cell(text: str) -> str:
     """Return what `as_cell` was given."""
-    return text[1:] if text[:1] == "'" and text[1:2] in _FORMULAS and text[1:2] else text
+    return text[1:] if text[:1] == "'" and text[1:].startswith(_FORMULAS) else text
 
 
 def without_advice(error: BaseException) -> str:
@@ -293,8 +293,6 @@ def _link(finished: Path, path: Path) -> None:
     """
     try:
         os.link(finished, path)
-    except FileExistsError:
-        raise
     except OSError as error:
         # Memory sticks (FAT) have no links.
         if error.errno not in (errno.EPERM, errno.EOPNOTSUPP, errno.ENOSYS):
@@ -322,8 +320,6 @@ def _sync(path: Path) -> None:
 def _lives(pid: int) -> bool:
     try:
         os.kill(pid, 0)
-    except ProcessLookupError:
-        return False
-    except PermissionError:
-        pass
+    except OSError as error:
+        return not isinstance(error, ProcessLookupError)
     return True

@@ -285,18 +285,9 @@ def as_reading(
     units: Sequence[str],
     least_sd: _Point,
 ) -> Reading:
-    """Return what was seen of a trial as a reading.
+    """Return what was seen of a trial as a reading; `seen`, `hit` and errors as in `Session.tell`.
 
-    Args:
-        seen: A reading, words, or outcome minus goal as numbers of unknown origin, shape (k,); None
-            if only `hit` is known.
-        hit: Whether the goal was reached, if that was seen directly.
-        names: Of the k components.
-        units: Of the k components.
-        least_sd: Least standard deviation of numbers of unknown origin, shape (k,), in `units`.
-
-    Raises:
-        InvalidFeedbackError: Wrong shape, not finite, or words that cannot be read.
+    `least_sd`, shape (k,), in `units`, is the least sd of numbers of unknown origin.
     """
     if not (hit is None or isinstance(hit, (bool, np.bool_))):
         raise InvalidFeedbackError(f"hit must be True, False or None, got {hit!r}")
@@ -421,19 +412,18 @@ def _parts(text: str) -> list[str]:
 
 def _with_units(text: str, names: Sequence[str], units: Sequence[str]) -> str:
     """Words with the unit that was understood where none was said: `5 cm long` for `5 long`."""
+    pairs = zip(error_words(names, units), units, strict=True)
+    unit_of = {word: unit for pair, unit in pairs for word in pair or ()}
     said = []
     for part in _parts(text):
         term = _TERM.fullmatch(part)
         if term is None or not term["value"] or term["unit"] or term["sd_unit"]:
             said.append(part)
             continue
-        unit = next(
-            (u for pair, u in zip(error_words(names, units), units, strict=True)
-             if pair and term["word"] in pair), units[0]
-        )  # fmt: skip
+        unit = _bare(unit_of.get(term["word"], units[0]))
         least = f"{term['least']}-" if term["least"] else ""
         spread = f" +- {term['sd']}" if term["sd"] else ""
-        said.append(f"{least}{term['value']}{spread} {_bare(unit)} {term['word']}")
+        said.append(f"{least}{term['value']}{spread} {unit} {term['word']}")
     return text if said == _parts(text) else ", ".join(said)
 
 

@@ -29,20 +29,9 @@ from prior_reinforce.wording import say_reading
 def report_workspace(
     workspace: Workspace, folder: Path, progress: Callable[[int, int], None] | None = None
 ) -> Path:
-    """Write the page and its pictures.
+    """Write the page and its pictures; see `Workspace.report`.
 
-    Args:
-        workspace: With a goal that a trial was asked for.
-        folder: Where to write; made if need be.
-        progress: See `write_report`.
-
-    Returns:
-        Path of the page.
-
-    Raises:
-        WorkspaceError: There is nothing to report yet, or the folder cannot be written.
-        FileFormatError: The demonstrations are damaged. A plan that is lost or damaged stops
-            nothing: it is not drawn, and named.
+    A plan that is lost or damaged stops nothing: it is not drawn, and named.
     """
     state = workspace.state
     goals = [goal for goal in state.goals if state.trials_of(goal.number)]

@@ -268,20 +268,10 @@ class Workspace:
         adapter: str = DEFAULT_ADAPTER,
         new_hardware: str | None = None,
     ) -> Goal:
-        """Set the goal that the next trials are for.
+        """Set the goal that the next trials are for; arguments and errors as `Session.set_goal`.
 
-        Args:
-            goal: g, shape (k,), in the outcome's units.
-            carry_over: Let earlier goals' trials serve this one; by default where they serve the
-                adapter.
-            adapter: Choice of the adapter, for instance `gp` or `proportional,gain=0.6`.
-            new_hardware: What was changed on the hardware since the last trial; see
-                `Session.set_goal`.
-
-        Raises:
-            InvalidGoalError: Wrong shape, or not finite.
-            ConfigurationError: There is no such adapter.
-            TrialStateError: A trial for the goal before waits to be told.
+        `adapter` is any choice, for instance `gp` or `proportional,gain=0.6`; a ConfigurationError
+        if there is none.
         """
         ADAPTERS.check(adapter)
         return self.session().set_goal(
