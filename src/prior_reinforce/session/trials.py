@@ -314,18 +314,12 @@ class State:
                 kind = Trial if plan is None else AskedTrial
                 self.trials.append(kind(number, goal, plan=plan, kept=kept, **known))
             case Amended():
-                told = self._told(event)
-                self._outdate(told)
-                self.trials[event.trial - 1] = told
+                self._correct(self._told(event))
             case Told():
                 self.trials[event.trial - 1] = self._told(event)
             case Voided():
-                trial = self.trial(event.trial)
-                void = replace(
-                    trial, stage=Stage.VOIDED, reading=None, hit=False, note=event.reason
-                )
-                self._outdate(void)
-                self.trials[event.trial - 1] = void
+                void = replace(self.trial(event.trial), stage=Stage.VOIDED, note=event.reason)
+                self._correct(replace(void, reading=None, hit=False))
             case _:
                 raise ValueError("no event of a session")
 
@@ -336,14 +330,17 @@ class State:
             raise InvalidFeedbackError("the reading has another number of components than the goal")
         return replace(trial, stage=Stage.TOLD, reading=reading, hit=event.hit)
 
-    def _outdate(self, corrected: Trial) -> None:
-        """Mark the open trial if it was planned from a reading that is corrected now."""
+    def _correct(self, corrected: Trial) -> None:
+        """Replace a trial, and mark the open one if it was planned from what is corrected now."""
         before, waiting = self.trial(corrected.number), self.open_trial
-        if waiting is None or before.open or _meaning(before) == _meaning(corrected):
-            return
-        used = self.readings_for(self.goal_of(waiting), waiting.model)
-        if before.number in {reading.number for reading in used}:
+        if (
+            waiting is not None
+            and not before.open
+            and _meaning(before) != _meaning(corrected)
+            and before in self.readings_for(self.goal_of(waiting), waiting.model)
+        ):
             self.trials[waiting.number - 1] = replace(waiting, outdated=True)
+        self.trials[corrected.number - 1] = corrected
 
 
 class Log:

@@ -205,12 +205,12 @@ class NewWorkspace:
         given = robot if isinstance(robot, RobotLimits) and robot.robot not in PRESETS else None
         numbers = np.atleast_1d(self.tolerance).tolist()
         text = TEMPLATE.format(
-            name=_quoted(self.name or folder)[1:-1],
-            names=_list(names),
-            units=_list(units),
+            name=_toml(self.name or folder)[1:-1],
+            names=_toml(names),
+            units=_toml(units),
             dt=self.dt,
-            outcome_names=_list(self.outcome_names),
-            outcome_units=_list(_spread(self.outcome_units, len(self.outcome_names))),
+            outcome_names=_toml(self.outcome_names),
+            outcome_units=_toml(_spread(self.outcome_units, len(self.outcome_names))),
             tolerance=numbers[0] if len(numbers) == 1 else numbers,
             robot="given" if given is not None else known,
         )
@@ -225,7 +225,7 @@ def with_columns(text: str, names: Sequence[str], units: Sequence[str]) -> str:
     start = text.index("[plan]")
     head, plan = text[:start], text[start:]
     for key, values in (("names", names), ("units", units)):
-        said = f"{key} = {_list(values)}".replace("\\", r"\\")
+        said = f"{key} = {_toml(values)}".replace("\\", r"\\")
         plan = re.sub(rf"^[ \t]*{key}[ \t]*=[^\[]*\[[^\]]*\]", said, plan, count=1, flags=re.M)
     return head + plan
 
@@ -248,7 +248,7 @@ def _spread(values: Sequence[str], n: int) -> tuple[str, ...]:
 
 def _written_out(robot: RobotLimits) -> str:
     """An arm's numbers as lines of the manifest."""
-    lines = [f"source = {_quoted(robot.source)}", f"joint_names = {_list(robot.joint_names)}"]
+    lines = [f"source = {_toml(robot.source)}", f"joint_names = {_toml(robot.joint_names)}"]
     for key in _LISTS:
         values = getattr(robot, key)
         if values is None:
@@ -271,13 +271,9 @@ def _rounded(values: Iterable[float], digits: int) -> list[float]:
     return [float(f"{value:.{digits}g}") for value in values]
 
 
-def _quoted(text: str) -> str:
-    """A text in quotes, as TOML wants it: JSON's, but for one control character."""
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
-
-
-def _list(values: Sequence[str]) -> str:
-    return "[" + ", ".join(_quoted(value) for value in values) + "]"
+def _toml(value: str | Sequence[str]) -> str:
+    """A text, or a list of them, as TOML wants it: JSON's, but for one control character."""
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def read_manifest(path: Path) -> str:
