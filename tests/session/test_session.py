@@ -519,9 +519,8 @@ def test_a_goal_of_the_wrong_dimension_is_named():
 def test_a_log_that_does_not_fit_together_is_refused(session):
     session.tell(session.ask().number, [0.05, 0.0])
     log = Log()
-    log.append(session.log.entries()[-1].event)
     with pytest.raises(WorkspaceError, match="does not fit the ones before"):
-        log.state()
+        log.append(session.log.entries()[-1].event)
 
 
 def test_asking_many_sessions_calls_the_generator_once_and_agrees_with_asking_each():

@@ -372,7 +372,10 @@ class Log:
 
     def append(self, event: Event) -> None:
         """Add an event; called within `exclusive`."""
-        self._entries.append(Entry(len(self._entries) + 1, event))
+        entry = Entry(len(self._entries) + 1, event)
+        self._state.add(entry)  # which refuses what does not fit
+        self._entries.append(entry)
+        self._n_added += 1
 
     def keep_plan(self, number: int, plan: Plan) -> KeptPlan | None:
         """Keep a trial's plan, and return its file if it has one."""

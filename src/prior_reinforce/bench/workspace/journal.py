@@ -175,8 +175,7 @@ class Journal(Log):
         )
         for id_, time, text, written in rows:
             texts = isinstance(time, str) and isinstance(text, str)  # damaged, they may be none
-            digest = _digest(self._last_digest, time, text) if texts else None
-            if digest is None or digest != written:
+            if not texts or _digest(self._last_digest, time, text) != written:
                 raise WorkspaceError(
                     f"{self._path}: event {id_} is not what was written; restore the journal "
                     "from a copy"
@@ -189,7 +188,7 @@ class Journal(Log):
                     "wrote it, or restore the journal from a copy"
                 ) from error
             self._entries.append(Entry(id_, event, time))
-            self._last_digest = digest
+            self._last_digest = written
 
     @contextmanager
     def exclusive(self) -> Iterator[None]:
