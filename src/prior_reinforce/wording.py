@@ -231,21 +231,16 @@ def from_words(
         InvalidFeedbackError: Unknown words, or one direction named twice.
     """
     k, sds = len(units), np.broadcast_to(np.asarray(least_sd, dtype=np.float64), len(units))
-    hits, terms, rest_unknown = set(), [], False
-    for part in _parts(text):
-        if part in _HITS:
-            hits.add(_HITS[part])
-        elif part == _SOMEWHERE:
-            rest_unknown = True
-        elif part not in _ON_THE_GOAL:
-            terms.append(part)
+    parts = _parts(text)
+    hits = {_HITS[part] for part in parts if part in _HITS}
+    terms = [part for part in parts if part not in (*_HITS, _SOMEWHERE, *_ON_THE_GOAL)]
     if len(hits) > 1:
         raise InvalidFeedbackError(f"{text!r} says hit and miss; say one of them")
     hit = hits.pop() if hits else None
     if hit is not None and not terms:
         return replace(Reading.only(hit, k), said=text)
     said = _read(terms, text, names, units)
-    rest_unknown |= any(term.size is None for term in said.values())
+    rest_unknown = _SOMEWHERE in parts or any(term.size is None for term in said.values())
     metres = np.array([_METRES.get(unit, 0.0) for unit in units])
     is_length = metres > 0.0
     number = np.zeros(k)
