@@ -14,7 +14,7 @@ Notation (docs/notation.md):
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from functools import cached_property
 from threading import RLock
@@ -436,17 +436,17 @@ class Session:
             said += ", which lies far outside the demonstrations (choose one nearer to them)"
         return said
 
-    def _with_plan(self, number: int, verdict: Verdict | None) -> AskedTrial:
+    def _with_plan(self, number: int, fresh: Mapping[Session, Verdict | None]) -> AskedTrial:
         """A trial with its plan and the gate's verdict, unless the gate refuses it now.
 
-        `verdict` is that on a trial that was opened just now.
+        `fresh` has the verdicts on trials that were opened just now.
         """
         trial = self.trial(number)
         if not trial.open:
             raise TrialStateError(f"trial {number} was {trial.stage.value} meanwhile; ask again")
         plan = self.log.plan(trial)
         refusal = f"trial {number} may not be executed now, void it and ask again"
-        verdict = verdict or self._check(plan, refusal)
+        verdict = fresh[self] if self in fresh else self._check(plan, refusal)
         if isinstance(trial, AskedTrial) and verdict is None:
             return trial
         return AskedTrial(**{**vars(trial), "plan": plan, "verdict": verdict})
@@ -506,7 +506,7 @@ def ask_all(sessions: Sequence[Session], *, arm_did_not_move: bool = False) -> l
             for session, condition, plan in zip(new, conditions, plans, strict=True):
                 verdicts[session] = session._open(condition, plan)
     return [
-        session._with_plan(number, verdicts.get(session))
+        session._with_plan(number, verdicts)
         for session, number in zip(sessions, numbers, strict=True)
     ]
 

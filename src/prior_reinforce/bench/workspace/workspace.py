@@ -145,6 +145,7 @@ class Workspace:
                 f"{folder} is not a workspace (it has no {MANIFEST_FILE}); make one with: "
                 f"prior-reinforce new {folder}"
             )
+        self._manifest_text: str | None = None
         self._read_manifest()
         self.store = Store(folder)
         self.log = Journal(folder, self.store)
@@ -180,7 +181,10 @@ class Workspace:
     def _read_manifest(self) -> None:
         """Know what the manifest says now."""
         path = self.folder / MANIFEST_FILE
-        self.manifest: Manifest = parse_manifest(read_manifest(path), path)
+        text = read_manifest(path)
+        if text != self._manifest_text:
+            self.manifest: Manifest = parse_manifest(text, path)
+            self._manifest_text = text
 
     def __repr__(self) -> str:
         try:
