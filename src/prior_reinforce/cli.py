@@ -23,11 +23,10 @@ from typing import Protocol
 import tyro
 
 import prior_reinforce
-from prior_reinforce.commands import COMMANDS, GROUPS
+from prior_reinforce.commands import COMMANDS, GROUPS, complain, warn
 from prior_reinforce.errors import ConfigurationError, PriorReinforceError
 from prior_reinforce.extras import missing_extra
 from prior_reinforce.files import check_path
-from prior_reinforce.wording import RED, YELLOW, coloured, plain
 
 
 class Command(Protocol):
@@ -45,8 +44,15 @@ _EMPTY_DEFAULT = re.compile(
     r"(?:\x1b\[\d+m)*\(default:(?:[\s\u2502]|\x1b\[\d*m)*(?:None|True|False|)\)(?:\x1b\[\d*m)*"
 )
 _ONLY_BLANKED = re.compile(r"(?:[ \u2502]|\x1b\[\d*m)*\0(?:[\0 \u2502]|\x1b\[\d*m)*$")
-_LONGEST = 1000
-"""Characters of a message; ours: twelve lines of a terminal."""
+_HELP = """\
+usage: prior-reinforce [-h] [-V] [-q] COMMAND ...
+
+Hit a goal a robot arm has never hit, in about ten trials (simulated so far).
+
+{commands}
+WORKSPACE may be left out within its folder, and TRIAL for the one that waits.
+-q, --quiet prints warnings and errors only; -V, --version the version.
+examples: prior-reinforce COMMAND --help"""
 _NOBODY_READS = 141
 """Exit status where the reader of our output left before the end: a shell's for SIGPIPE (128 + 13),
 since what the command still had to do was not done."""
@@ -62,7 +68,7 @@ def main(args: Sequence[str] | None = None) -> int:
         The exit status: 0 done, 1 not all of it, 2 wrong input and nothing changed, 130
         interrupted, 141 nobody read on.
     """
-    warnings.showwarning = _print_warning
+    warnings.showwarning = warn
     _open_streams()
     try:
         given = list(sys.argv[1:] if args is None else args)
@@ -91,7 +97,7 @@ def main(args: Sequence[str] | None = None) -> int:
     except (MemoryError, RecursionError) as error:
         return _refuse(f"too much for this machine ({error or 'no memory'}); give less", error)
     except KeyboardInterrupt as error:
-        _complain(f"interrupted{f'; {error}' if error.args else ''}")
+        complain(f"interrupted{f'; {error}' if error.args else ''}")
         return 130
 
 
@@ -125,22 +131,11 @@ def _parse(args: list[str]) -> Command | None:
 
 def _help() -> str:
     """All commands, by what they are for."""
-    lines = [
-        "usage: prior-reinforce [-h] [-V] [-q] COMMAND ...",
-        "",
-        "Hit a goal a robot arm has never hit, in about ten trials (simulated so far).",
-    ]
+    groups = []
     for group, commands in GROUPS.items():
-        lines += ["", f"{group}:", *(f"  {name:<12}{what}" for name, (_, what) in commands.items())]
-    return "\n".join(
-        [
-            *lines,
-            "",
-            "WORKSPACE may be left out within its folder, and TRIAL for the one that waits.",
-            "-q, --quiet prints warnings and errors only; -V, --version the version.",
-            "examples: prior-reinforce COMMAND --help",
-        ]
-    )
+        lines = [f"  {name:<12}{what}" for name, (_, what) in commands.items()]
+        groups += [f"{group}:", *lines, ""]
+    return _HELP.format(commands="\n".join(groups))
 
 
 def _suggested(word: str, known: Iterable[str]) -> str:
@@ -224,20 +219,12 @@ def _open_streams() -> None:
 def _refuse(message: str, error: BaseException) -> int:
     """Print why nothing more is done; the exit status says whether something was before."""
     changed = getattr(error, "changed", False)
-    _complain(f"{message}{'; what was recorded before stays' if changed else ''}")
+    complain(f"{message}{'; what was recorded before stays' if changed else ''}")
     try:
         sys.stdout.flush()
     except OSError:  # a full disk: what Python would still write when it exits goes nowhere
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return 1 if changed else 2
-
-
-def _complain(message: str, colour: str = RED) -> None:
-    """One line on standard error that can be read, whatever names and reasons hold."""
-    line = plain(message)
-    if len(line) > _LONGEST:  # what is wrong stands at the beginning, the remedy at the end
-        line = f"{line[: _LONGEST // 2]} ... {line[-_LONGEST // 3 :]}"
-    print(f"{coloured('prior-reinforce:', colour, sys.stderr)} {line}", file=sys.stderr)
 
 
 def _flushed() -> bool:
@@ -258,10 +245,6 @@ def _reader_left() -> bool:
     poll = select.poll()
     poll.register(sys.stdout.fileno(), 0)
     return any(event & (select.POLLERR | select.POLLHUP) for _, event in poll.poll(0))
-
-
-def _print_warning(message: Warning | str, *_: object, **__: object) -> None:
-    _complain(f"warning: {message}", YELLOW)
 
 
 if __name__ == "__main__":

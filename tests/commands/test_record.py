@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from prior_reinforce.bench.workspace.workspace import Workspace
+from prior_reinforce.commands.importing import Import
 from tests.bench.robots.executors.toy_arm import TOY, name_arm
 from tests.bench.workspace.planar import manifest
 
@@ -44,6 +45,16 @@ def test_takes_by_the_clock_end_in_the_workspace(run, folder):
         plans = workspace.demonstrations.plans
     # Each take has the whole throw: 0.8 rad first, 0.1 rad farther every time.
     assert np.ptp(plans[:, :, 0], axis=1) == pytest.approx([0.8, 0.9, 1.0, 1.1], abs=2e-3)
+
+
+def test_the_import_that_is_to_be_typed_next_names_the_recordings(run, folder, monkeypatch):
+    def propose(command, workspace, source):
+        print(command._command("--smooth 5"))
+
+    monkeypatch.setattr(Import, "read_into", propose)
+    _, said, _ = run("record", folder, *BY_CLOCK, "--append")
+    command = f"import {folder} {folder}/recordings/1 --format npz --units rad rad --append"
+    assert f"prior-reinforce {command} --smooth 5\n" in said
 
 
 def test_what_a_leader_told_the_arm_is_learned_and_the_lag_is_said(run, folder, tmp_path):

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import sys
+
+from prior_reinforce.wording import RED, YELLOW, coloured, plain
+
 _HERE = "prior_reinforce.commands"
 GROUPS: dict[str, dict[str, tuple[str, str]]] = {
     "your arm": {
@@ -44,3 +48,18 @@ GROUPS: dict[str, dict[str, tuple[str, str]]] = {
 COMMANDS = {
     name: f"{_HERE}.{target}" for group in GROUPS.values() for name, (target, _) in group.items()
 }
+_LONGEST = 1000
+"""Characters of a message; ours: twelve lines of a terminal."""
+
+
+def complain(message: str, colour: str = RED) -> None:
+    """One line on standard error that can be read, whatever names and reasons hold."""
+    line = plain(message)
+    if len(line) > _LONGEST:  # what is wrong stands at the beginning, the remedy at the end
+        line = f"{line[: _LONGEST // 2]} ... {line[-_LONGEST // 3 :]}"
+    print(f"{coloured('prior-reinforce:', colour, sys.stderr)} {line}", file=sys.stderr)
+
+
+def warn(message: Warning | str, *_: object, **__: object) -> None:
+    """A warning in such a line; arguments as `warnings.showwarning` is given them."""
+    complain(f"warning: {message}", YELLOW)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -45,8 +44,7 @@ class Advise(OnWorkspace):
     """Picture, a .png; advice.png in the workspace if not given."""
     json: Json = False
 
-    def run_on(self, workspace: Workspace, words: Sequence[str]) -> None:
-        """Look over the region, print, and draw."""
+    def _run_on(self, workspace: Workspace, words: tuple[str, ...]) -> None:
         out = self.out or workspace.folder / "advice.png"
         if out.suffix != ".png":
             raise ConfigurationError(f"--out must name a .png file, got {out}")
@@ -65,14 +63,13 @@ class Advise(OnWorkspace):
         throws = gain(conditions, conditions)
         tried = np.arange(0, len(goals), _DEMONSTRATED_EVERY)
         shown = gain(goals[tried], conditions, demonstrations=True)
-        names, units = workspace.manifest.outcome_names, workspace.manifest.outcome_units
+        about = workspace.manifest.outcome_names, workspace.manifest.outcome_units
         best, worst, throw = np.argmax(p), np.argmin(p), np.argmax(throws)
         demonstration = goals[tried[np.argmax(shown)]] if shown.max() > 0 else None
         picture = None
         if goals.shape[1] == 2:
             from prior_reinforce.report.advice import draw_advice
 
-            about = names, units
             picture = draw_advice(out, goals, p, outcomes, goals[throw], demonstration, about)
         if self.json:
             record = AdviceRecord(
@@ -91,19 +88,17 @@ class Advise(OnWorkspace):
             return
         print(
             f"first throws hit with probability {p.mean():.2f} on average over the "
-            f"demonstrated region: {p[best]:.2f} at {say_place(goals[best], names, units)}, "
-            f"{p[worst]:.2f} at {say_place(goals[worst], names, units)}\n"
-            f"the throw that teaches most: {say_place(goals[throw], names, units)} "
+            f"demonstrated region: {p[best]:.2f} at {say_place(goals[best], *about)}, "
+            f"{p[worst]:.2f} at {say_place(goals[worst], *about)}\n"
+            f"the throw that teaches most: {say_place(goals[throw], *about)} "
             f"({throws[throw]:.0%} of what is unknown; half of all places teach less than "
             f"{np.median(throws):.0%})"
         )
-        if demonstration is not None:
-            print(
-                "the demonstration that teaches most: one that ends at "
-                f"{say_place(demonstration, names, units)} ({shown.max():.0%} of what is unknown)"
-            )
-        else:
+        if demonstration is None:
             print("one more demonstration here would teach nothing that trials do not")
+        else:
+            place = f"{say_place(demonstration, *about)} ({shown.max():.0%} of what is unknown)"
+            print(f"the demonstration that teaches most: one that ends at {place}")
         if picture is not None:
             print(f"picture: {picture}")
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import io
 import re
+import shlex
 import sys
-from collections.abc import Sequence
-from contextlib import AbstractContextManager, nullcontext, redirect_stdout
-from dataclasses import dataclass
+from collections.abc import Collection
+from contextlib import redirect_stdout, suppress
+from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Annotated, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import msgspec
 import tyro
@@ -45,14 +45,14 @@ class OnWorkspace:
                 f"{words[0]!r} is no workspace, and this command takes nothing else; drop it"
             )
         with Workspace(folder) as workspace:
-            return self.run_on(workspace, words)
+            return self._run_on(workspace, words)
 
-    def run_on(self, workspace: Workspace, words: Sequence[str]) -> int | None:
+    def _run_on(self, workspace: Workspace, words: tuple[str, ...]) -> int | None:
         """What the command does, with the words beside the workspace."""
         raise NotImplementedError
 
 
-def find_workspace(words: Sequence[str]) -> tuple[Path, tuple[str, ...]]:
+def find_workspace(words: tuple[str, ...]) -> tuple[Path, tuple[str, ...]]:
     """Return a workspace's folder and the words that are not its name.
 
     Within a workspace the words are about it, unless the first one names another; a number never
@@ -63,13 +63,13 @@ def find_workspace(words: Sequence[str]) -> tuple[Path, tuple[str, ...]]:
     """
     here = workspace_around(Path())
     if words and (here is None or _names_workspace(words[0])):
-        return check_path(Path(words[0])), tuple(words[1:])
+        return check_path(Path(words[0])), words[1:]
     if here is None:
         raise ConfigurationError(
             "name the workspace, or change into its folder; make one with: prior-reinforce new "
             "WORKSPACE"
         )
-    return here, tuple(words)
+    return here, words
 
 
 def _names_workspace(word: str) -> bool:
@@ -80,23 +80,30 @@ def _names_workspace(word: str) -> bool:
     return False
 
 
-def trial_and_rest(workspace: Workspace, words: Sequence[str]) -> tuple[int, tuple[str, ...]]:
+def trial_and_rest(workspace: Workspace, words: tuple[str, ...]) -> tuple[int, tuple[str, ...]]:
     """Return the trial that the first word numbers, else the one that waits, and the other words.
 
     Raises:
         ConfigurationError: None is numbered, and none waits.
     """
     if words and re.fullmatch(r"-?\d{1,9}", words[0], re.ASCII):
-        return int(words[0]), tuple(words[1:])
+        return int(words[0]), words[1:]
     waiting = workspace.state.open_trial
     if waiting is None:
         raise ConfigurationError("no trial waits; say which one: its number comes first")
-    return waiting.number, tuple(words)
+    return waiting.number, words
 
 
-def silent(really: bool) -> AbstractContextManager[object]:
-    """Print nothing, where JSON or nothing is wanted."""
-    return redirect_stdout(io.StringIO()) if really else nullcontext()
+def options_of(given: Any, prefix: str = "--", without: Collection[str] = ()) -> list[str]:
+    """The options of a command as they are typed, each with its values; defaults are left out."""
+    said = []
+    for each in fields(given):
+        value = getattr(given, each.name)
+        if each.name not in without and value != each.default:
+            name = f"{prefix}{'no-' if value is False else ''}{each.name.replace('_', '-')}"
+            values = value if isinstance(value, tuple) else (value,)
+            said.append(shlex.join([name, *(str(v) for v in values if not isinstance(v, bool))]))
+    return said
 
 
 def print_next(workspace: Workspace) -> None:
@@ -122,10 +129,17 @@ def print_checked(text: str) -> None:
 
 
 def answer_to(question: str) -> str:
-    """Ask the person at the terminal; on standard error, since output may go elsewhere.
+    """Ask the person at the terminal, on standard error.
 
     Raises:
         EOFError: No answer came.
     """
     with redirect_stdout(sys.stderr):
         return input(question)
+
+
+def says_yes(question: str, *yes: str) -> bool:
+    """Whether the person at the terminal answers `yes`, or one of `yes`."""
+    with suppress(EOFError):
+        return answer_to(f"{question} (yes/no) ").strip().lower() in ("yes", *yes)
+    return False

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ipaddress
 import socket
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from ssl import PROTOCOL_TLS_SERVER, SSLContext
@@ -53,8 +52,7 @@ class Console(OnWorkspace):
     vlm: VisionLanguageModelConfig = field(default_factory=VisionLanguageModelConfig)
     """Endpoint and model that find objects in pictures (docs/perception.md)."""
 
-    def run_on(self, workspace: Workspace, words: Sequence[str]) -> None:
-        """Serve until interrupted."""
+    def _run_on(self, workspace: Workspace, words: tuple[str, ...]) -> None:
         check_installed("uvicorn")
         from prior_reinforce.bench.console.guard import report_path, token_of
         from prior_reinforce.bench.console.server import Events, application, server_of
@@ -107,9 +105,7 @@ class Console(OnWorkspace):
 
     def _say(self, folder: Path, token: str) -> None:
         """Show the link, and as a QR code where another device is to open it."""
-        host = self.host
-        if host in ("0.0.0.0", "::"):
-            host = _own_address()
+        host = _own_address() if self.host in ("0.0.0.0", "::") else self.host
         secure = self.certificate is not None
         link = f"http{'s' * secure}://{host}:{self.port}/#{token}"
         print(f"console of {folder}: {link}", flush=True)
@@ -117,14 +113,8 @@ class Console(OnWorkspace):
             import segno
 
             segno.make(link).terminal(compact=True)
-            camera = (
-                ""
-                if secure
-                else (
-                    "; a browser gives its camera to this address only over https (docs: console)"
-                )
-            )
-            print(f"whoever has this link can move the arm{camera}", flush=True)
+            camera = "; a browser gives its camera to this address only over https (docs: console)"
+            print(f"whoever has this link can move the arm{camera * (not secure)}", flush=True)
 
 
 def _own_address() -> str:

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import shlex
 import sys
-from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import tyro
 
 from prior_reinforce.bench.importing import (
+    Inspection,
     Preprocessing,
     ReadOptions,
     Recordings,
@@ -33,14 +33,16 @@ from prior_reinforce.bench.importing.units import Ambiguity, raise_if_ambiguous
 from prior_reinforce.bench.workspace.manifest import UNKNOWN, Manifest
 from prior_reinforce.bench.workspace.records import InspectRecord
 from prior_reinforce.bench.workspace.workspace import Workspace
+from prior_reinforce.commands import warn
 from prior_reinforce.commands.base import (
     Json,
     OnWorkspace,
     Words,
-    answer_to,
+    options_of,
     print_checked,
     print_json,
     print_next,
+    says_yes,
 )
 from prior_reinforce.commands.outcome_questions import ask_for_outcomes
 from prior_reinforce.errors import (
@@ -53,6 +55,8 @@ from prior_reinforce.files import check_path, named_disk_errors
 from prior_reinforce.wording import plain
 
 _PICTURE = "demonstrations.png"
+Unclear = tuple[Ambiguity, ...]
+"""What is only guessed of units, times and names."""
 
 
 @dataclass(frozen=True)
@@ -91,15 +95,18 @@ class Import(OnWorkspace):
 
     takes_words = True
 
-    def run_on(self, workspace: Workspace, words: Sequence[str]) -> None:
-        """Read, show, take in."""
+    def _run_on(self, workspace: Workspace, words: tuple[str, ...]) -> None:
         if len(words) != 1:
             raise ConfigurationError("say which recordings to import: one file or folder")
         if self.json and not self.inspect:
             raise ConfigurationError("--json is of --inspect; add it, or drop --json")
         if not self.inspect:
             workspace.state.refuse_open_trial("importing demonstrations")
-        form, source = workspace.manifest.format, check_path(Path(words[0]))
+        self.read_into(workspace, check_path(Path(words[0])))
+
+    def read_into(self, workspace: Workspace, source: Path) -> None:
+        """Read recordings, and take them in or say what would be."""
+        form = workspace.manifest.format
         is_known = form.names != UNKNOWN
         joints = self.options.joints or (form.names if is_known else None)
         try:
@@ -116,11 +123,7 @@ class Import(OnWorkspace):
             raise ConfigurationError(f"{also}{error.what}; if so: {command}") from error
 
     def _import(
-        self,
-        workspace: Workspace,
-        recordings: Recordings,
-        selection: Selection,
-        unclear: tuple[Ambiguity, ...],
+        self, workspace: Workspace, recordings: Recordings, selection: Selection, unclear: Unclear
     ) -> None:
         manifest, at_terminal = workspace.manifest, sys.stdin.isatty()
         known, more = self._known(manifest, recordings, unclear, may_lack=at_terminal)
@@ -139,9 +142,7 @@ class Import(OnWorkspace):
                     raise InvalidDemonstrationsError("no episode is left; import again")
         names, units = manifest.outcome_names, manifest.outcome_units
         outcomes_of(selection.episodes, known, partial=partial)  # before the work of the next line
-        inspection = inspect(
-            selection, self._preprocessing(manifest), manifest.robot, manifest.gate
-        )
+        inspection = self._inspected(manifest, selection)
         result = recordings.demonstrations(inspection, known, names, units, partial=partial)
         print_checked(result.preview.text)
         n_before = workspace.take_in(result, str(recordings.source), append=self.append)
@@ -156,22 +157,17 @@ class Import(OnWorkspace):
         except WorkspaceError as error:  # the demonstrations are taken in without it
             with suppress(OSError):
                 picture.unlink()
-            print(f"prior-reinforce: warning: no picture: {error}", file=sys.stderr)
+            warn(f"no picture: {error}")
         if inspection.remedy:
             print(f"next: {self._command(inspection.remedy)}")
         else:
             print_next(workspace)
 
     def _inspect(
-        self,
-        workspace: Workspace,
-        recordings: Recordings,
-        selection: Selection,
-        unclear: tuple[Ambiguity, ...],
+        self, workspace: Workspace, recordings: Recordings, selection: Selection, unclear: Unclear
     ) -> None:
         manifest = workspace.manifest
-        found = inspect(selection, self._preprocessing(manifest), manifest.robot, manifest.gate)
-        found = replace(found, ambiguities=unclear)
+        found = replace(self._inspected(manifest, selection), ambiguities=unclear)
         places, episodes = recordings.outcome_places, selection.episodes
         table = self.outcomes or table_beside(places)
         known, more = self._known(manifest, recordings, unclear, may_lack=True)
@@ -211,32 +207,20 @@ class Import(OnWorkspace):
     def _command(self, *options: str) -> str:
         """The whole command as given, with further options that replace or join those given."""
         more = " ".join(filter(None, options))
-        said = ["prior-reinforce import", *map(shlex.quote, self.words)]
-        own: dict[str, Any] = {
-            f.name: getattr(self, f.name)
-            for f in fields(self)
-            if f.name not in _NOT_REPEATED and getattr(self, f.name) != f.default
-        }
-        for name, value in (self.options.given | own).items():
-            option = f"--{name.replace('_', '-')}"
-            if isinstance(value, bool):
-                said.append(option if value else option.replace("--", "--no-"))
-            elif option not in more.split():
-                values = value if isinstance(value, tuple) else (value,)
-                said.append(" ".join([option, *(shlex.quote(str(v)) for v in values)]))
-        return " ".join([*said, more]).rstrip()
+        own = options_of(self, without=("words", "inspect", "json", "options"))
+        given = [*options_of(self.options), *own]
+        kept = [option for option in given if option.split()[0] not in more.split()]
+        said = ["prior-reinforce import", shlex.join(self.words), *kept, more]
+        return " ".join(filter(None, said))
 
-    def _preprocessing(self, manifest: Manifest) -> Preprocessing:
-        return Preprocessing(manifest.format.dt, self.horizon, self.trim, self.smooth)
+    def _inspected(self, manifest: Manifest, selection: Selection) -> Inspection:
+        """What becomes of recordings, as they are trimmed and resampled here."""
+        how = Preprocessing(manifest.format.dt, self.horizon, self.trim, self.smooth)
+        return inspect(selection, how, manifest.robot, manifest.gate)
 
     def _known(
-        self,
-        manifest: Manifest,
-        recordings: Recordings,
-        unclear: Sequence[Ambiguity],
-        *,
-        may_lack: bool,
-    ) -> tuple[Outcomes, tuple[Ambiguity, ...]]:
+        self, manifest: Manifest, recordings: Recordings, unclear: Unclear, *, may_lack: bool
+    ) -> tuple[Outcomes, Unclear]:
         """The outcomes of a table or the recordings, in the manifest's units."""
         names = manifest.outcome_names
         try:
@@ -249,11 +233,7 @@ class Import(OnWorkspace):
         return in_units(found, manifest.outcome_units, self.outcome_unit)
 
 
-_NOT_REPEATED = ("words", "inspect", "json", "options")
-"""Fields of `Import` that are not options of the command to repeat."""
-
-
-def _settle(ambiguities: Sequence[Ambiguity], *, at_terminal: bool) -> None:
+def _settle(ambiguities: Unclear, *, at_terminal: bool) -> None:
     """Let a person at the terminal confirm the guesses.
 
     Raises:
@@ -264,7 +244,6 @@ def _settle(ambiguities: Sequence[Ambiguity], *, at_terminal: bool) -> None:
     except UnclearUnitsError as unclear:
         if at_terminal:
             print(plain(unclear.what))
-            with suppress(EOFError):
-                if answer_to("is it so? (yes/no) ").strip().lower() in {"y", "yes"}:
-                    return
+            if says_yes("is it so?", "y"):
+                return
         raise

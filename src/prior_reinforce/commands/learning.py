@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -48,8 +47,7 @@ class Learn(Fitting, OnWorkspace):
         prior-reinforce learn hoop --generator diffusion --seed 1
     """
 
-    def run_on(self, workspace: Workspace, words: Sequence[str]) -> None:
-        """Fit, and put in use."""
+    def _run_on(self, workspace: Workspace, words: tuple[str, ...]) -> None:
         make_generator(self.choice, device=self.device)  # a wrong setting is reported first
         with fit_progress(Console()) as progress:
             learned = workspace.learn(

@@ -6,7 +6,9 @@ again.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from functools import partial
 from itertools import count
 from pathlib import Path
 
@@ -57,28 +59,32 @@ def ask_for_outcomes(
     """
     outcomes: dict[str, Place] = {}
     for episode in selection.episodes:
-        try:
+        with suppress(InvalidDemonstrationsError):
             place, sd = outcomes_of([episode], known, partial=True)
-        except InvalidDemonstrationsError:
-            continue
-        outcomes[episode] = (*place[0].tolist(), float(sd[0, 0]))
+            outcomes[episode] = (*place[0].tolist(), float(sd[0, 0]))
     missing = [episode for episode in selection.episodes if episode not in outcomes]
     if not missing:
         return None
     table, before = _typed_before(folder, source, manifest)
-    again = [episode for episode in missing if episode in before]
-    outcomes |= {episode: before[episode] for episode in again}
+    again = {episode: before[episode] for episode in missing if episode in before}
+    outcomes |= again
     if again:
         print(plain(f"typed before, in {table}: {', '.join(again)}"))
-    missing = [episode for episode in missing if episode not in before]
+    missing = [episode for episode in missing if episode not in again]
     if missing:
         print(_explanation(manifest, missing))
     number = 0
     while number < len(missing):
         episode = missing[number]
         question = plain(f"{episode} ({number + 1} of {len(missing)}): ")
-        answer = _ask(question, episode, table, manifest)
-        if answer == _BACK[0]:
+        try:
+            answer = ask_place(partial(answer_to, question), manifest, *_SKIP, *_BACK)
+        except EOFError as error:
+            raise InvalidDemonstrationsError(
+                f"no outcome for episode {episode}; import again to go on (what was typed is kept "
+                f"in {table}), or leave it out with --leave-out"
+            ) from error
+        if answer in _BACK:
             number = max(0, number - 1)
             continue
         if isinstance(answer, str):
@@ -86,13 +92,41 @@ def ask_for_outcomes(
         else:
             outcomes[episode] = answer
             names, units, spread = manifest.outcome_names, manifest.outcome_units, answer[-1]
-            said = say_place(answer[:-1], names, units)
             give = f", give or take {say_length(spread, units)}" if spread else ""
-            print(f"  {said}{give}")
-        _keep(table, source, outcomes, manifest)
+            print(f"  {say_place(answer[:-1], names, units)}{give}")
+        keep_places(table, outcomes, manifest, source)
         number += 1
-    _keep(table, source, outcomes, manifest)
+    keep_places(table, outcomes, manifest, source)
     return _read(table, manifest)
+
+
+def ask_place(ask: Callable[[], str], manifest: Manifest, *words: str) -> Place | str:
+    """Ask until the answer is a place with its standard deviation (0 if none), or one of `words`.
+
+    Raises:
+        EOFError: `ask` gets no answer.
+    """
+    while True:
+        text = ask().strip()
+        if text.lower() in words:
+            return text.lower()
+        try:
+            place, sd = read_uncertain_place(text, manifest.outcome_names, manifest.outcome_units)
+        except InvalidFeedbackError as error:
+            print(error, flush=True)
+        else:
+            return (*place.tolist(), sd)
+
+
+def keep_places(
+    table: Path, places: Mapping[str, Place], manifest: Manifest, source: Path | None = None
+) -> None:
+    """Write a table of places by episode, as `import` reads it, and the source of the episodes."""
+    units, beside = manifest.outcome_units, () if source is None else (source.resolve(),)
+    rows = {episode: (*map(repr, place), *beside) for episode, place in places.items()}
+    heads = (*manifest.outcome_names, SD), (*units, units[0])
+    with named_disk_errors(table.parent):
+        write_outcome_table(table, rows, *heads, beside=_SOURCE if beside else "note")
 
 
 def _typed_before(folder: Path, source: Path, manifest: Manifest) -> tuple[Path, dict[str, Place]]:
@@ -119,15 +153,6 @@ def _read(table: Path, manifest: Manifest) -> Outcomes:
     return in_units(found, manifest.outcome_units, None)[0]
 
 
-def _keep(table: Path, source: Path, outcomes: Mapping[str, Place], manifest: Manifest) -> None:
-    """Write all answers for a source to its table in the workspace."""
-    units = manifest.outcome_units
-    rows = {episode: (*map(repr, v), source.resolve()) for episode, v in outcomes.items()}
-    with named_disk_errors(table.parent):
-        heads = (*manifest.outcome_names, SD), (*units, units[0])
-        write_outcome_table(table, rows, *heads, beside=_SOURCE)
-
-
 def _explanation(manifest: Manifest, missing: Sequence[str]) -> str:
     names, k = " ".join(manifest.outcome_names), len(manifest.outcome_names)
     units = ", ".join(dict.fromkeys(manifest.outcome_units))
@@ -141,23 +166,3 @@ def _explanation(manifest: Manifest, missing: Sequence[str]) -> str:
         f"type {names} [{units}]{words}; +- 2{unit} behind it says how "
         "uncertain it is; skip leaves an episode out, back goes back one"
     )
-
-
-def _ask(question: str, episode: str, table: Path, manifest: Manifest) -> tuple[float, ...] | str:
-    """A place and its standard deviation, `skip` or `back`."""
-    while True:
-        try:
-            text = answer_to(question).strip()
-        except EOFError as error:
-            raise InvalidDemonstrationsError(
-                f"no outcome for episode {episode}; import again to go on (what was typed is kept "
-                f"in {table}), or leave it out with --leave-out"
-            ) from error
-        for words in (_SKIP, _BACK):
-            if text.lower() in words:
-                return words[0]
-        try:
-            place, sd = read_uncertain_place(text, manifest.outcome_names, manifest.outcome_units)
-            return (*place.tolist(), sd)
-        except InvalidFeedbackError as error:
-            print(error)

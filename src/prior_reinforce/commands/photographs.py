@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import shlex
-import sys
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
@@ -14,6 +13,7 @@ import tyro
 from jaxtyping import Float, UInt8
 
 from prior_reinforce.arrays import FARTHEST, Point
+from prior_reinforce.commands import warn
 from prior_reinforce.environment import SeenObject, TableScene
 from prior_reinforce.errors import (
     ConfigurationError,
@@ -149,10 +149,9 @@ class Look:
             error = reading.reached.place - goal
             moved = float(np.linalg.norm(error - reading.error_seen))
             if moved > _SAME_GOAL:
-                print(
-                    f"prior-reinforce: warning: {self.goal} is seen {100 * moved:.1f} cm from the "
-                    "goal that is set; check the calibration, or move it there",
-                    file=sys.stderr,
+                warn(
+                    f"{self.goal} is seen {100 * moved:.1f} cm from the goal that is set; "
+                    "check the calibration, or move it there"
                 )
         print(f"seen: {to_words(error)}   boxes: {drawn}")
         numbers = " ".join(f"{component:.4f}+-{CAMERA_SD:g}" for component in error)

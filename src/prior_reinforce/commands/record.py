@@ -7,9 +7,8 @@ import select
 import sys
 import termios
 import tty
-from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
@@ -17,27 +16,25 @@ import numpy as np
 from typing_extensions import Self
 
 from prior_reinforce.bench.importing.options import ReadOptions
-from prior_reinforce.bench.importing.outcomes import OUTCOMES_FILE, SD, write_outcome_table
+from prior_reinforce.bench.importing.outcomes import OUTCOMES_FILE
 from prior_reinforce.bench.robots.executors.base import Guiding
 from prior_reinforce.bench.robots.executors.drive import arms_columns, guiding_of
 from prior_reinforce.bench.robots.executors.lock import executing_lock
 from prior_reinforce.bench.robots.executors.watch import State, Take, Watch
 from prior_reinforce.bench.workspace.manifest import Manifest
 from prior_reinforce.bench.workspace.workspace import Workspace
-from prior_reinforce.commands.base import OnWorkspace
+from prior_reinforce.commands.base import OnWorkspace, says_yes
 from prior_reinforce.commands.importing import Import
+from prior_reinforce.commands.outcome_questions import Place, ask_place, keep_places
 from prior_reinforce.commands.trials import arm_of
-from prior_reinforce.errors import (
-    ConfigurationError,
-    InvalidDemonstrationsError,
-    InvalidFeedbackError,
-)
+from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
 from prior_reinforce.files import named_disk_errors
 from prior_reinforce.plans.motions import PlanFormat
-from prior_reinforce.wording import plain, read_uncertain_place
+from prior_reinforce.wording import plain
 
 RECORDINGS = "recordings"
-_MOTIONS: tuple[Literal["measured", "commanded"], ...] = ("measured", "commanded")
+Which = Literal["measured", "commanded"]
+_MOTIONS: tuple[Which, ...] = ("measured", "commanded")
 _SUFFIXES = (".npz", ".png")
 _FEWEST = 10
 """States of a take; ours: a tenth of a second, which nobody means."""
@@ -61,7 +58,7 @@ class Record(OnWorkspace):
         prior-reinforce record hoop --takes 6 --seconds 3
     """
 
-    motion: Literal["measured", "commanded"] | None = None
+    motion: Which | None = None
     """What is learned: where the arm was measured, or what its leader told it. If not given: what
     it was told, if it is led: an arm that lags will lag as much again when it executes that."""
     takes: int | None = None
@@ -77,8 +74,7 @@ class Record(OnWorkspace):
     yes: bool = False
     """The arm's torque goes off, or a leader moves it at once: do not ask whether it may."""
 
-    def run_on(self, workspace: Workspace, words: Sequence[str]) -> None:
-        """Record, ask where each landed, import."""
+    def _run_on(self, workspace: Workspace, words: tuple[str, ...]) -> None:
         if self.takes is None and not sys.stdin.isatty():
             raise ConfigurationError("without a terminal there are no keys; say how many --takes")
         if not (self.seconds > 0 and self.pause >= 0 and (self.takes is None or self.takes > 0)):
@@ -93,7 +89,8 @@ class Record(OnWorkspace):
                 f"{workspace.folder} names no arm; add [arm] with its executor to the manifest"
             )
         question = _QUESTIONS[guiding_of(arm)]
-        if question and not (self.yes or _says_yes(question)):
+        asked = sys.stdin.isatty()
+        if question and not (self.yes or (asked and says_yes(question, "y"))):
             raise ConfigurationError(
                 f"nobody said yes to {question!r}; nothing was done: say --yes"
             )
@@ -105,17 +102,19 @@ class Record(OnWorkspace):
             channels = arms_columns(manifest.format, watch.arm)
             folder = _new_folder(workspace.folder / RECORDINGS)
             asks = self.takes is None
-            session = _Session(manifest, folder, channels, self.motion, terminal, asks=asks)
+            session = _Session(manifest, folder, channels, self.motion, terminal, asks)
             print(f"{watch.arm.model} is read", flush=True)
-            if self.takes is None:
-                _by_keys(watch, session, terminal)
+            if asks:
+                _by_keys(watch, session)
             else:
                 self._by_the_clock(watch, session)
-            taken = session.finished()
-        if not taken:
+            if session.open is not None:
+                session.discard()
+        if not session.taken:
             raise InvalidDemonstrationsError("nothing was recorded; record again")
         options = ReadOptions(format="npz", units=manifest.format.units)
-        Import(options=options, append=self.append).run_on(workspace, [str(folder)])
+        words = (str(workspace.folder), str(folder))
+        Import(words=words, options=options, append=self.append).read_into(workspace, folder)
 
     def _by_the_clock(self, watch: Watch, session: _Session) -> None:
         """Wait, take, end, by the arm's own time."""
@@ -131,13 +130,13 @@ class Record(OnWorkspace):
             session.toggle()
 
 
-def _by_keys(watch: Watch, session: _Session, terminal: _Terminal) -> None:
+def _by_keys(watch: Watch, session: _Session) -> None:
     """Takes from key to key."""
     print(_KEYS, flush=True)
     while True:
         if (state := watch.next(0.02)) is not None:
             session.add(state)
-        pressed = terminal.key()
+        pressed = session.terminal.key()
         if pressed in (" ", "\r", "\n"):
             session.toggle()
         elif pressed == "d":
@@ -146,7 +145,7 @@ def _by_keys(watch: Watch, session: _Session, terminal: _Terminal) -> None:
             session.name_last()
         elif pressed in ("q", "\x04"):
             return
-        if pressed and not session.taking:
+        if pressed and session.open is None:
             watch.forget()
 
 
@@ -162,128 +161,101 @@ def _state(watch: Watch) -> State:
     return state
 
 
+@dataclass(eq=False)
 class _Session:
     """The takes of one recording."""
 
-    def __init__(
-        self,
-        manifest: Manifest,
-        folder: Path,
-        channels: list[int],
-        motion: Literal["measured", "commanded"] | None,
-        terminal: _Terminal,
-        *,
-        asks: bool,
-    ) -> None:
-        self._asks = asks  # by the clock, the next take comes at once, and `import` asks
-        self._manifest, self._folder, self._channels = manifest, folder, channels
-        self._motion, self._terminal = motion, terminal
-        self._open: Take | None = None
-        self._places: dict[str, tuple[float, ...]] = {}
-        self._taken: list[str] = []
-        self._number = 0
-
-    @property
-    def taking(self) -> bool:
-        """Whether a take is being recorded."""
-        return self._open is not None
+    manifest: Manifest
+    folder: Path
+    channels: list[int]
+    """The arm's, of each column of a plan."""
+    motion: Which | None
+    terminal: _Terminal
+    asks: bool
+    """Whether to ask where each landed: by the clock, the next take comes at once."""
+    open: Take | None = None
+    """The take that is being recorded."""
+    taken: dict[str, Place | None] = field(default_factory=dict)
+    """Where the object of each take landed, if that was said."""
+    number: int = 0
 
     @property
     def next_name(self) -> str:
         """Of the next take."""
-        return f"take-{self._number + 1}"
+        return f"take-{self.number + 1}"
 
     def add(self, state: State) -> None:
         """One more state, of a take if there is one."""
-        if self._open is not None:
-            self._open.states.append(state)
+        if self.open is not None:
+            self.open.states.append(state)
 
     def toggle(self) -> None:
         """Begin a take, or end it: it is written, drawn, and asked about."""
-        take, self._open = self._open, None
+        take, self.open = self.open, None
         if take is None:
-            self._open = Take(self.next_name)
-            print(f"{self._open.name} ...", flush=True)
+            self.open = Take(self.next_name)
+            print(f"{self.open.name} ...", flush=True)
             return
         if len(take.states) < _FEWEST:
             print(f"{take.name} was too short, and is not kept", flush=True)
             return
-        self._number += 1
-        measured, commanded = (take.motion(k, self._channels) for k in _MOTIONS)
+        self.number += 1
+        measured, commanded = (take.motion(k, self.channels) for k in _MOTIONS)
         led = not np.array_equal(measured, commanded)
-        kind = self._motion or ("commanded" if led else "measured")
-        form = self._manifest.format
-        with named_disk_errors(self._folder):
-            take.save(self._folder, form, self._channels, kind)
-            picture = self._folder / f"{take.name}.png"
-            _draw(take, form, self._channels, kind, picture)
-        self._taken.append(take.name)
+        kind = self.motion or ("commanded" if led else "measured")
+        form = self.manifest.format
+        with named_disk_errors(self.folder):
+            take.save(self.folder, form, self.channels, kind)
+            picture = self.folder / f"{take.name}.png"
+            _draw(take, form, self.channels, kind, picture)
+        self.taken[take.name] = None
         print(f"{take.name}: {take.t[-1]:.2f} s, its {kind} motion; picture: {picture}", flush=True)
         if led:
-            lag = take.lag(self._channels)
+            lag = take.lag(self.channels)
             print(f"the arm was {1e3 * lag:.0f} ms behind what it was told: lag = {lag:.3f}")
-        if self._asks:
+        if self.asks:
             self._ask_place(take.name)
 
     def discard(self) -> None:
         """Drop the take that is being recorded, or else the last."""
-        if self._open is not None:
-            print(f"{self._open.name} is dropped", flush=True)
-            self._open = None
-        elif self._taken:
-            name = self._taken.pop()
-            self._places.pop(name, None)
+        if self.open is not None:
+            print(f"{self.open.name} is dropped", flush=True)
+            self.open = None
+        elif self.taken:
+            name, _ = self.taken.popitem()
             for suffix in _SUFFIXES:
-                (self._folder / f"{name}{suffix}").unlink(missing_ok=True)
+                (self.folder / f"{name}{suffix}").unlink(missing_ok=True)
             self._keep()
             print(f"{name} is dropped", flush=True)
 
     def name_last(self) -> None:
         """Give the last take another name."""
-        if not self._taken or self._open is not None:
+        if not self.taken or self.open is not None:
             return
-        old = self._taken[-1]
-        new = plain(self._terminal.line(f"another name for {old}: ")).strip()
-        if not new or "/" in new or new.startswith(".") or (self._folder / f"{new}.npz").exists():
+        old = [*self.taken][-1]
+        new = plain(self.terminal.line(f"another name for {old}: ")).strip()
+        if not new or "/" in new or new.startswith(".") or (self.folder / f"{new}.npz").exists():
             print(f"it stays {old}", flush=True)
             return
         for suffix in _SUFFIXES:
-            (self._folder / f"{old}{suffix}").rename(self._folder / f"{new}{suffix}")
-        self._taken[-1] = new
-        if old in self._places:
-            self._places[new] = self._places.pop(old)
+            (self.folder / f"{old}{suffix}").rename(self.folder / f"{new}{suffix}")
+        self.taken[new] = self.taken.pop(old)
+        if self.taken[new] is not None:
             self._keep()
-
-    def finished(self) -> list[str]:
-        """The names of all takes; one that is being recorded is not kept."""
-        if self._open is not None:
-            self.discard()
-        return self._taken
 
     def _ask_place(self, name: str) -> None:
         """Ask where the object of a take landed; what is skipped, `import` asks for."""
-        names, units = self._manifest.outcome_names, self._manifest.outcome_units
+        names, units = self.manifest.outcome_names, self.manifest.outcome_units
         question = f"where did it land, {' '.join(names)} [{', '.join(dict.fromkeys(units))}]? "
-        while True:
-            text = self._terminal.line(question).strip()
-            if text.lower() in ("", "s", "skip"):
-                return
-            try:
-                place, sd = read_uncertain_place(text, names, units)
-            except InvalidFeedbackError as error:
-                print(error, flush=True)
-                continue
-            self._places[name] = (*place.tolist(), sd)
+        place = ask_place(lambda: self.terminal.line(question), self.manifest, "", "s", "skip")
+        if not isinstance(place, str):
+            self.taken[name] = place
             self._keep()
-            return
 
     def _keep(self) -> None:
-        """Write the table of outcomes beside the recordings, as `import` reads it."""
-        names, units = self._manifest.outcome_names, self._manifest.outcome_units
-        rows = {name: tuple(map(repr, place)) for name, place in self._places.items()}
-        heads = (*names, SD), (*units, units[0])
-        with named_disk_errors(self._folder):
-            write_outcome_table(self._folder / OUTCOMES_FILE, rows, *heads)
+        """Write the table of outcomes beside the recordings."""
+        places = {name: place for name, place in self.taken.items() if place is not None}
+        keep_places(self.folder / OUTCOMES_FILE, places, self.manifest)
 
 
 class _Terminal:
@@ -329,31 +301,21 @@ def _new_folder(recordings: Path) -> Path:
     return folder
 
 
-def _says_yes(question: str) -> bool:
-    """Whether a person at a terminal says yes."""
-    if not sys.stdin.isatty():
-        return False
-    with suppress(EOFError):
-        return input(f"{question} (yes/no) ").strip().lower() in ("y", "yes")
-    return False
-
-
-def _draw(take: Take, form: PlanFormat, channels: list[int], kind: str, path: Path) -> None:
+def _draw(take: Take, form: PlanFormat, channels: list[int], kind: Which, path: Path) -> None:
     """A take over time: what will be learned, and in grey the other motion."""
     from prior_reinforce.report.style import INK_SOFT, calm_axes, drawing, new_figure, save_figure
 
+    other = next(motion for motion in _MOTIONS if motion != kind)
     with drawing():
         columns = min(form.action_dim, 3)
         rows = -(-form.action_dim // columns)
         figure = new_figure(3.0 * columns, 1.9 * rows)
         panels = figure.subplots(rows, columns, squeeze=False, sharex=True).ravel()
-        for other in sorted(_MOTIONS, key=lambda name: name == kind):
-            style: Any = {"linewidth": 1.5} if other == kind else {"color": INK_SOFT, "alpha": 0.5}
-            for axes, values in zip(panels, take.motion(other, channels).T, strict=False):
-                axes.plot(take.t, values, **style)
-        for axes, name, unit in zip(panels, form.names, form.units, strict=False):
-            calm_axes(axes)
-            axes.set_title(f"{name} [{unit}]", fontsize=9)
+        for j, (name, unit) in enumerate(zip(form.names, form.units, strict=True)):
+            calm_axes(panels[j])
+            panels[j].plot(take.t, take.motion(other, channels)[:, j], color=INK_SOFT, alpha=0.5)
+            panels[j].plot(take.t, take.motion(kind, channels)[:, j], linewidth=1.5)
+            panels[j].set_title(f"{name} [{unit}]", fontsize=9)
         for spare in panels[form.action_dim :]:
             spare.set_axis_off()
         save_figure(figure, path)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -17,6 +17,7 @@ from rich.table import Column
 from rich.table import Table as TerminalTable
 from rich.text import Text
 
+from prior_reinforce.commands.base import options_of
 from prior_reinforce.commands.live import say
 from prior_reinforce.errors import ConfigurationError, UnitFailedError
 from prior_reinforce.extras import check_installed
@@ -27,12 +28,7 @@ from prior_reinforce.lab.experiments.evidence import fill_tables, write_evidence
 from prior_reinforce.lab.experiments.recipes import QUICK, RECIPES, Recipe, Run, Scale, Table
 from prior_reinforce.lab.experiments.recipes.base import Planned
 from prior_reinforce.lab.experiments.recipes.base import Progress as OnProgress
-from prior_reinforce.lab.experiments.results import (
-    INCOMPLETE,
-    raw_path,
-    read_results,
-    write_rows,
-)
+from prior_reinforce.lab.experiments.results import INCOMPLETE, raw_path, read_results, write_rows
 from prior_reinforce.lab.experiments.units import Workers
 from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
 
@@ -189,16 +185,10 @@ class Reproduce:
             words += ["--sets", *self.sets] if self.sets != Scale().sets else []
         for own in include:
             words += ["--include", own]
+        said = [shlex.join(words)]
         if self._scale.model is not None and recipe.name == "trials":
-            words += ["--reader", "vlm"]
-            for setting in fields(self.vlm):
-                value = getattr(self.vlm, setting.name)
-                flag = setting.name.replace("_", "-")
-                if isinstance(value, bool):
-                    words += [f"--vlm.{flag}"] if value else []
-                elif value != setting.default:
-                    words += [f"--vlm.{flag}", str(value)]
-        return shlex.join(words)
+            said += ["--reader vlm", *options_of(self.vlm, "--vlm.")]
+        return " ".join(said)
 
     def _recipes(self) -> Sequence[Recipe]:
         if self.recipe in ("all", "more"):
@@ -252,19 +242,16 @@ def _terminal(table: Table, title: str, width: int) -> Iterator[TerminalTable]:
     names = 1  # leading columns that make a row one of its own
     while names < len(columns) and len({row[:names] for row in table.rows}) < len(table.rows):
         names += 1
-    end = names
-    while end < len(columns) or end == names == len(columns):
-        begin, end = end, end + 1
-        while end < len(columns) and sum(sizes[:names] + sizes[begin : end + 1]) < width:
-            end += 1
-        heads = (*table.header[:names], *table.header[begin:end])
+    parts = [list(range(names))]
+    for column in range(names, len(columns)):
+        if len(parts[-1]) > names and sum(sizes[i] for i in (*parts[-1], column)) >= width:
+            parts.append(list(range(names)))
+        parts[-1].append(column)
+    for part in parts:
         # As Text: rich would take [cm] for a style.
-        name = Text(title) if begin == names else None
-        shown = TerminalTable(*map(_column, heads), title=name, box=box.SIMPLE)
+        heads = [Column(Text(table.header[i]), overflow="fold") for i in part]
+        name = Text(title) if part is parts[0] else None
+        shown = TerminalTable(*heads, title=name, box=box.SIMPLE)
         for row in table.rows:
-            shown.add_row(*map(Text, (*row[:names], *row[begin:end])))
+            shown.add_row(*(Text(row[i]) for i in part))
         yield shown
-
-
-def _column(header: str) -> Column:
-    return Column(Text(header), overflow="fold")

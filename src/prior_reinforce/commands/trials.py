@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import io
 import sys
-from collections.abc import Sequence
+from contextlib import nullcontext, redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 from msgspec import to_builtins
@@ -25,6 +26,7 @@ from prior_reinforce.bench.workspace.status import (
     say_trial,
 )
 from prior_reinforce.bench.workspace.workspace import Workspace
+from prior_reinforce.commands import complain, warn
 from prior_reinforce.commands.base import (
     Json,
     OnWorkspace,
@@ -33,10 +35,10 @@ from prior_reinforce.commands.base import (
     print_checked,
     print_json,
     print_next,
-    silent,
+    says_yes,
     trial_and_rest,
 )
-from prior_reinforce.commands.reading import Seen
+from prior_reinforce.commands.reading import Seen, rows_to_tell
 from prior_reinforce.commands.workspace import print_goal, read_goal
 from prior_reinforce.errors import ConfigurationError, FileFormatError
 from prior_reinforce.files import check_path
@@ -44,6 +46,9 @@ from prior_reinforce.plans.motions import Plan
 from prior_reinforce.registry import own_class
 from prior_reinforce.session.trials import Stage, State, Trial
 from prior_reinforce.wording import bare_units, say_place
+
+if TYPE_CHECKING:
+    from prior_reinforce.bench.robots.executors.drive import Look
 
 
 @dataclass(frozen=True)
@@ -96,10 +101,9 @@ class Ask(OnWorkspace):
         self._check_flags()
         return super().run()
 
-    def run_on(self, workspace: Workspace, words: Sequence[str]) -> int:
-        """Show the plan, write it, execute it."""
+    def _run_on(self, workspace: Workspace, words: tuple[str, ...]) -> int:
         stop_seen = last_stop(workspace.folder)
-        with silent(self.json):
+        with redirect_stdout(io.StringIO()) if self.json else nullcontext():
             status = self._ask(workspace, stop_seen)
         if self.json:
             print_json(self._record(workspace))
@@ -122,20 +126,19 @@ class Ask(OnWorkspace):
         )
 
     def _ask(self, workspace: Workspace, stop_seen: int) -> int:
-        session = workspace.session(self.generator, self.adapter)
         self._check_out(workspace.state)
         if self.goal is not None:
             place, goals = read_goal(workspace, self.goal), workspace.state.goals
             if not goals or goals[-1].goal.tolist() != [*place]:
                 workspace.set_goal(place)
-                session = workspace.session(self.generator, self.adapter)
             print_goal(workspace)
+        session = workspace.session(self.generator, self.adapter)
         recovered = workspace.recover()
         if recovered is not None:
             print(f"trial {recovered.number}: {say_trial(workspace, recovered)}")
         did_not_move = self.arm_did_not_move
-        if not did_not_move and sys.stdin.isatty() and (trial := _cut_off(workspace)) is not None:
-            print(f"trial {trial.number}: {say_trial(workspace, trial)}")
+        if not did_not_move and sys.stdin.isatty() and (cut := _cut_off(workspace)) is not None:
+            print(f"trial {cut.number}: {say_trial(workspace, cut)}")
             if _ask_whether_it_moved():
                 print_next(workspace)
                 return 1
@@ -143,29 +146,23 @@ class Ask(OnWorkspace):
         reached_before = session.solved
         trial = session.ask(arm_did_not_move=did_not_move)
         self._show(workspace, trial, reached_before)
-        if trial.stage is Stage.EXECUTED and not (self.run_command or self.execute):
+        if trial.stage is Stage.EXECUTED:
+            if self.run_command or self.execute:
+                workspace.to_execute(trial.number)  # which refuses
             print("it was executed already")
-        elif self.execute and trial.stage is not Stage.EXECUTED:
+        elif self.execute:
             return self._on_arm(workspace, trial, stop_seen)
-        elif trial.stage is not Stage.EXECUTED:
+        else:
             command = None if self.check else self.run_command
-            where = self.where is not None
-            asks = command is not None and not self.yes
-            if asks and not _says_yes(ask_to_move(workspace, trial, where=where)):
-                print("nothing moved; ask again when it may")
+            if command is not None and not self._may_move(workspace, trial):
                 return 1
             # Last: the arm may be moved by hand while a person is asked.
-            if self.where is not None and not self._is_there(workspace, trial):
+            if self.where is not None and not _is_there(workspace, trial, self.where):
                 return 1
             if command is not None:
                 return self._execute(workspace, trial.number, command, stop_seen)
-            print(
-                "checked; nothing moved"
-                if self.check
-                else "execute it, then say where the object went:"
-            )
-        else:
-            workspace.to_execute(trial.number)  # which refuses
+            wait = "execute it, then say where the object went:"
+            print("checked; nothing moved" if self.check else wait)
         print_next(workspace)
         return 0
 
@@ -180,13 +177,12 @@ class Ask(OnWorkspace):
         speed = 1.0 if self.rehearse is None else self.rehearse
         look = workspace.look_at_arm(trial.number, arm, speed=speed)
         print(say_look(look))
-        approaches = self.approach and not look.there
-        if refused := look.refused or (look.approach_refused if approaches else ""):
-            print(f"prior-reinforce: {refused}; nothing moved", file=sys.stderr)
-            return 1
-        if not look.there and not self.approach:
-            why = "move it there, or ask again with --approach"
-            print(f"prior-reinforce: {look.said}; {why}; nothing moved", file=sys.stderr)
+        refused = look.refused
+        if not look.there and not refused:
+            elsewhere = f"{look.said}; move it there, or ask again with --approach"
+            refused = look.approach_refused if self.approach else elsewhere
+        if refused:
+            complain(f"{refused}; nothing moved")
             return 1
         if self.check:
             print("checked; nothing moved")
@@ -195,14 +191,27 @@ class Ask(OnWorkspace):
         motions.append("trial" if self.rehearse is None else "rehearsal")
         for motion in motions:
             share = speed if motion == "rehearsal" else 1.0
-            question = ask_to_move(workspace, trial, look, motion, share)
-            if not self.yes and not _says_yes(question):
-                print("nothing moved; ask again when it may")
+            if not self._may_move(workspace, trial, look, motion, share):
                 return 1
             status = self._execute(workspace, trial.number, arm, stop_seen, motion, share)
             if status != 0:
                 break
         return status
+
+    def _may_move(
+        self,
+        workspace: Workspace,
+        trial: Trial,
+        look: Look | None = None,
+        motion: Motion = "trial",
+        speed: float = 1.0,
+    ) -> bool:
+        """Whether a person says that the arm may move now."""
+        where = self.where is not None
+        if self.yes or says_yes(ask_to_move(workspace, trial, look, motion, speed, where=where)):
+            return True
+        print("nothing moved; ask again when it may")
+        return False
 
     def _check_flags(self) -> None:
         """Say what cannot be before anything is changed."""
@@ -228,25 +237,6 @@ class Ask(OnWorkspace):
                 "--rate is of the file that --out writes; --run is given the plan's own frames"
             )
 
-    def _is_there(self, workspace: Workspace, trial: Trial) -> bool:
-        """Whether the arm stands where the plan begins, as far as it says."""
-        from prior_reinforce.bench.robots.executors.pose import compare_pose, read_pose
-
-        assert trial.plan is not None
-        assert self.where is not None
-        form, gate = workspace.manifest.format, workspace.manifest.gate
-        try:
-            pose = read_pose(self.where, form)
-        except ConfigurationError as error:
-            print(f"prior-reinforce: {error}; nothing moved", file=sys.stderr)
-            return False
-        said, there = compare_pose(pose, trial.plan[0], form, gate)
-        if there:
-            print(said)
-        else:
-            print(f"prior-reinforce: {said}; move it there, then ask again", file=sys.stderr)
-        return there
-
     def _show(self, workspace: Workspace, trial: Trial, reached_before: bool) -> None:
         """Print where the trial aims and what the gate says, and write --out."""
         manifest = workspace.manifest
@@ -258,11 +248,8 @@ class Ask(OnWorkspace):
         if reached_before:
             print("the goal is reached already: this trial repeats it")
         assert trial.plan is not None
-        verdict = trial.verdict
-        if verdict is None:
-            print("no robot in the manifest, no limits checked")
-        else:
-            print_checked(verdict.text())
+        unchecked = "no robot in the manifest, no limits checked"
+        print_checked(unchecked if trial.verdict is None else trial.verdict.text())
         print(f"plan: {workspace.plan_path(trial)}")
         form = manifest.format
         first = zip(form.names, trial.plan[0].round(4) + 0.0, form.units, strict=True)
@@ -335,17 +322,14 @@ class Ask(OnWorkspace):
             elif not execution_warning(workspace, trial):
                 print_next(workspace)
                 return 0
-        print(f"prior-reinforce: {said}", file=sys.stderr)
-        if result.outcome == "aborted" and motion == "trial" and self._voids(number):
+        complain(said)
+        aborted = result.outcome == "aborted" and motion == "trial"
+        if aborted and sys.stdin.isatty() and says_yes(f"void trial {number}?"):
             workspace.session().void(number, result.reason)
             print(f"trial {number} is void; nothing is learned from it")
         if result.outcome != "unknown":
             print_next(workspace)
         return 0 if result.succeeded else 1
-
-    def _voids(self, number: int) -> bool:
-        """Whether a person says that an aborted trial is no data."""
-        return sys.stdin.isatty() and _says_yes(f"void trial {number}?")
 
 
 @dataclass(frozen=True)
@@ -362,27 +346,23 @@ class Tell(Seen):
     """Or a table with a row a trial, such as a tracker writes: trial, x, y (where the object ended,
     units as in x_cm) or said (words), and hit. Rows that were told already are passed over."""
 
-    def run_on(self, workspace: Workspace, words: Sequence[str]) -> None:
-        """Write it down."""
+    def _run_on(self, workspace: Workspace, words: tuple[str, ...]) -> None:
         if self.table is not None:
             self._tell_table(workspace, self.table, words)
         else:
-            number, said = trial_and_rest(workspace, words)
-            seen, hit = self.read(workspace, number, said)
+            number, (seen, hit) = self.read(workspace, words)
             _warn_of_its_execution(workspace, number)
             trial = workspace.session().tell(number, seen, hit=hit)
             print(f"trial {trial.number}: {_say_told(workspace, trial)}")
         print_next(workspace)
 
-    def _tell_table(self, workspace: Workspace, path: Path, words: Sequence[str]) -> None:
+    def _tell_table(self, workspace: Workspace, path: Path, words: tuple[str, ...]) -> None:
         if words or (self.error, self.outcome, self.hit, self.miss) != (None, None, False, False):
             raise ConfigurationError("--from tells what its table says; drop what else was given")
-        from prior_reinforce.commands.tracked import rows_to_tell
-
         rows, session = rows_to_tell(path, workspace), workspace.session()
-        for row in rows:
-            _warn_of_its_execution(workspace, row.number)
-            trial = session.tell(row.number, row.seen, hit=row.hit)
+        for number, (seen, hit) in rows:
+            _warn_of_its_execution(workspace, number)
+            trial = session.tell(number, seen, hit=hit)
             print(f"trial {trial.number}: {say_trial(workspace, trial)}")
         if not rows:
             print(f"{path} says nothing that was not told already")
@@ -396,10 +376,8 @@ class Amend(Seen):
         prior-reinforce amend hoop 3 "5cm short"
     """
 
-    def run_on(self, workspace: Workspace, words: Sequence[str]) -> None:
-        """Write it down."""
-        number, said = trial_and_rest(workspace, words)
-        seen, hit = self.read(workspace, number, said)
+    def _run_on(self, workspace: Workspace, words: tuple[str, ...]) -> None:
+        number, (seen, hit) = self.read(workspace, words)
         trial = workspace.session().amend(number, seen, hit=hit)
         print(f"trial {trial.number}, corrected: {_say_told(workspace, trial)}")
         _print_outdated(workspace)
@@ -422,8 +400,7 @@ class Void(OnWorkspace):
 
     takes_words = True
 
-    def run_on(self, workspace: Workspace, words: Sequence[str]) -> None:
-        """Write it down."""
+    def _run_on(self, workspace: Workspace, words: tuple[str, ...]) -> None:
         number, rest = trial_and_rest(workspace, words)
         if rest:
             raise ConfigurationError(f"unexpected {rest[0]!r}; say why with --reason")
@@ -450,8 +427,7 @@ class Export(OnWorkspace):
 
     takes_words = True
 
-    def run_on(self, workspace: Workspace, words: Sequence[str]) -> None:
-        """Write it, if it may still be executed."""
+    def _run_on(self, workspace: Workspace, words: tuple[str, ...]) -> None:
         number, rest = trial_and_rest(workspace, words)
         if len(rest) != 1:
             raise ConfigurationError("say the file to write after the trial: .npz, .csv or .json")
@@ -465,6 +441,26 @@ def _cut_off(workspace: Workspace) -> Trial | None:
     if trial is None or trial.stage is not Stage.EXECUTING or workspace.log.is_executing():
         return None
     return trial
+
+
+def _is_there(workspace: Workspace, trial: Trial, where: str) -> bool:
+    """Whether the arm stands where the plan begins, as far as a command says."""
+    from prior_reinforce.bench.robots.executors.pose import compare_pose, read_pose
+
+    assert trial.plan is not None
+    form = workspace.manifest.format
+    try:
+        said, there = compare_pose(
+            read_pose(where, form), trial.plan[0], form, workspace.manifest.gate
+        )
+    except ConfigurationError as error:
+        complain(f"{error}; nothing moved")
+        return False
+    if there:
+        print(said)
+    else:
+        complain(f"{said}; move it there, then ask again")
+    return there
 
 
 def _say_told(workspace: Workspace, trial: Trial) -> str:
@@ -481,10 +477,9 @@ def _warn_of_its_execution(workspace: Workspace, number: int) -> None:
     trial = workspace.state.trial(number)
     warning = execution_warning(workspace, trial) if trial.open else ""
     if warning:
-        print(
-            f"prior-reinforce: warning: trial {number} was executed, {warning}; if that spoiled "
-            "it, void it: a told trial can be voided too",
-            file=sys.stderr,
+        warn(
+            f"trial {number} was executed, {warning}; if that spoiled it, void it: a told "
+            "trial can be voided too"
         )
 
 
@@ -514,13 +509,6 @@ def arm_of(workspace: Workspace, own: str | None) -> ArmSettings | None:
             f"{'drop --executor' if own else f'add --executor {executor}'}"
         )
     return arm
-
-
-def _says_yes(question: str) -> bool:
-    try:
-        return answer_to(f"{question} (yes/no) ").strip().lower() == "yes"
-    except EOFError:
-        return False
 
 
 def _ask_whether_it_moved() -> bool:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
@@ -20,13 +19,13 @@ from prior_reinforce.bench.workspace.records import status_record, trial_records
 from prior_reinforce.bench.workspace.status import describe, say_trial
 from prior_reinforce.bench.workspace.workspace import Workspace
 from prior_reinforce.commands.base import Json, OnWorkspace, Words, print_json, print_next
-from prior_reinforce.errors import (
-    ConfigurationError,
-    InvalidFeedbackError,
-    InvalidGoalError,
-)
+from prior_reinforce.errors import ConfigurationError, InvalidFeedbackError, InvalidGoalError
 from prior_reinforce.files import check_path
 from prior_reinforce.wording import read_place, say_place, say_tolerance
+
+AdapterChoice = Annotated[
+    str, tyro.conf.arg(help=f"How the condition is corrected: {ADAPTERS.help}.")
+]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,7 +69,7 @@ def _say_robot(robot: RobotLimits) -> str:
     )
 
 
-def read_goal(workspace: Workspace, words: Sequence[str]) -> Point:
+def read_goal(workspace: Workspace, words: tuple[str, ...]) -> Point:
     """Read a goal as a person says it, in the outcome's units.
 
     Raises:
@@ -105,17 +104,14 @@ class Goal(OnWorkspace):
     memory: Literal["goal", "workspace"] | None = None
     """Which trials the adapter learns from: this goal's, or earlier goals' as well; by default
     earlier ones too where they serve the adapter, as they do bayes."""
-    adapter: Annotated[
-        str, tyro.conf.arg(help=f"How the condition is corrected: {ADAPTERS.help}.")
-    ] = DEFAULT_ADAPTER
+    adapter: AdapterChoice = DEFAULT_ADAPTER
     new_hardware: str | None = None
     """What was changed on the hardware since the last trial, a note: another ball, a new gripper.
     What was known is then believed less, and the next reading more."""
 
     takes_words = True
 
-    def run_on(self, workspace: Workspace, words: Sequence[str]) -> None:
-        """Set it."""
+    def _run_on(self, workspace: Workspace, words: tuple[str, ...]) -> None:
         workspace.set_goal(
             read_goal(workspace, words),
             carry_over=None if self.memory is None else self.memory == "workspace",
@@ -137,8 +133,7 @@ class Status(OnWorkspace):
 
     json: Json = False
 
-    def run_on(self, workspace: Workspace, words: Sequence[str]) -> None:
-        """Print ten lines, and one for each earlier goal."""
+    def _run_on(self, workspace: Workspace, words: tuple[str, ...]) -> None:
         if self.json:
             print_json(status_record(workspace))
         else:
@@ -158,8 +153,7 @@ class Trials(OnWorkspace):
     """As a table with a column for each number."""
     json: Json = False
 
-    def run_on(self, workspace: Workspace, words: Sequence[str]) -> None:
-        """Print them."""
+    def _run_on(self, workspace: Workspace, words: tuple[str, ...]) -> None:
         if self.csv and self.json:
             raise ConfigurationError("--csv or --json: drop one of the two")
         if self.json:
@@ -182,8 +176,7 @@ class Log(OnWorkspace):
         prior-reinforce log hoop | grep told
     """
 
-    def run_on(self, workspace: Workspace, words: Sequence[str]) -> None:
-        """Print it."""
+    def _run_on(self, workspace: Workspace, words: tuple[str, ...]) -> None:
         for entry in workspace.events:
             event = msgspec.to_builtins(entry.event)
             print(json.dumps({"id": entry.id, "time": entry.time, **event}))
@@ -200,8 +193,7 @@ class Report(OnWorkspace):
     out: Path | None = None
     """Folder for the page and its pictures; `report` in the workspace if not given."""
 
-    def run_on(self, workspace: Workspace, words: Sequence[str]) -> None:
-        """Write it."""
+    def _run_on(self, workspace: Workspace, words: tuple[str, ...]) -> None:
         from rich.console import Console
 
         from prior_reinforce.commands.live import drawing_progress
@@ -224,8 +216,7 @@ class Pack(OnWorkspace):
 
     takes_words = True
 
-    def run_on(self, workspace: Workspace, words: Sequence[str]) -> None:
-        """Write it."""
+    def _run_on(self, workspace: Workspace, words: tuple[str, ...]) -> None:
         if len(words) != 1:
             raise ConfigurationError("say which file to write: one name, such as hoop.zip")
         file = check_path(Path(words[0]))
