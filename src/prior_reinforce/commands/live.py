@@ -87,6 +87,14 @@ def trials_by_goal(results: Sequence[GoalTrials]) -> str:
     return ", ".join(str(r.solved_at or f"{len(r.trials)}+") for r in results)
 
 
+def say_outcome(
+    outcome: Point, names: Sequence[str], units: Sequence[str], *, digits: int = 3
+) -> str:
+    """Say where an object ended, in numbers: `x 0.920 m, y 0.100 m`."""
+    components = zip(names, outcome, units, strict=True)
+    return ", ".join(f"{name} {value:.{digits}f} {unit}" for name, value, unit in components)
+
+
 def asking(
     console: Console, demonstrations: Demonstrations, perception: Perception
 ) -> FailedReading:

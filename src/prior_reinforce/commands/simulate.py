@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import numpy as np
 import tyro
 
+from prior_reinforce.commands.live import say_outcome
 from prior_reinforce.commands.simulated import TaskChoice
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.files import claim_folder, named_disk_errors
@@ -122,8 +123,7 @@ class Simulate:
         if not rollout.valid:
             print("the object went where no outcome is", flush=True)
             return
-        places = zip(names, rollout.outcome, units, strict=True)
-        said = ", ".join(f"{name} {place:.4f} {unit}" for name, place, unit in places)
+        said = say_outcome(rollout.outcome, names, units, digits=4)
         if self.goal:
             eye, rng = make_perception("eye"), np.random.default_rng(0)
             error = rollout.outcome - np.array(self.goal)

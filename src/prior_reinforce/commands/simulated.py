@@ -2,41 +2,55 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
+from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import numpy as np
 import tyro
 from rich.console import Console
 
-from prior_reinforce.adapters import ADAPTERS, DEFAULT_ADAPTER, make_adapter
+from prior_reinforce.adapters import DEFAULT_ADAPTER, make_adapter
 from prior_reinforce.arrays import Frames, Point, Points
 from prior_reinforce.commands.learning import Fitting, GeneratorChoice
-from prior_reinforce.commands.live import LiveView, asking, fit_progress, say, trials_by_goal
+from prior_reinforce.commands.live import (
+    LiveView,
+    asking,
+    fit_progress,
+    say,
+    say_outcome,
+    trials_by_goal,
+)
+from prior_reinforce.commands.workspace import AdapterChoice
+from prior_reinforce.environment import Task
 from prior_reinforce.errors import ConfigurationError, FileFormatError, InvalidGoalError
 from prior_reinforce.files import claim_folder
 from prior_reinforce.generators import make_generator
+from prior_reinforce.generators.base import Generator
+from prior_reinforce.lab.experiments.adaptation import goal_record, recording
+from prior_reinforce.lab.experiments.learned import load_learned, save_learned
+from prior_reinforce.lab.experiments.protocol import (
+    GoalTrials,
+    is_hit,
+    perceive_demonstrations,
+    reach_goals,
+    unseen_goals,
+)
 from prior_reinforce.lab.tasks import TASKS, make_task
 from prior_reinforce.perception import PERCEPTIONS, make_perception
+from prior_reinforce.perception.base import Perception
 from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig, without_secrets
 from prior_reinforce.plans.motions import Demonstrations
-
-if TYPE_CHECKING:
-    from prior_reinforce.environment import Task
-    from prior_reinforce.generators.base import Generator
-    from prior_reinforce.lab.experiments.adaptation import FilmOrWhyNot
-    from prior_reinforce.lab.experiments.protocol import GoalTrials
-    from prior_reinforce.perception.base import Perception
-    from prior_reinforce.session.session import Session
+from prior_reinforce.readings import as_tolerance
+from prior_reinforce.report import AdaptationRecord, record_film, write_report
+from prior_reinforce.session.session import Session
+from prior_reinforce.wording import say_tolerance
 
 SEEN = "seen"
 """Folder beside the report for what a camera or a model saw and said."""
 
 TaskChoice = Annotated[str, tyro.conf.arg(help=f"Task to simulate: {TASKS.help}.")]
-AdapterChoice = Annotated[
-    str, tyro.conf.arg(help=f"How the condition is corrected: {ADAPTERS.help}.")
-]
 PerceptionChoice = Annotated[
     str, tyro.conf.arg(help=f"How a trial's error is seen: {PERCEPTIONS.help}.")
 ]
@@ -71,16 +85,9 @@ class OnTask:
 
 
 def learn(
-    demonstrations: Demonstrations,
-    folder: Path,
-    generator: Generator,
-    *,
-    seed: int,
-    console: Console,
+    demonstrations: Demonstrations, folder: Path, generator: Generator, seed: int, console: Console
 ) -> Generator:
     """Fit a generator under a progress line, say what it could not learn, and save it."""
-    from prior_reinforce.lab.experiments.learned import save_learned
-
     with fit_progress(console) as progress:
         generator = generator.fit(demonstrations, seed=seed, progress=progress)
     say(console, f"learned: {'; '.join(generator.remarks) or 'in closed form'}")
@@ -106,12 +113,26 @@ class Train(Fitting, OnTask):
         generator = make_generator(self.choice, device=self.device)
         _, demonstrations = self.open()
         claim_folder(self.out)
-        learn(demonstrations, self.out, generator, seed=self.seed, console=console)
+        learn(demonstrations, self.out, generator, self.seed, console)
         say(console, f"model of {demonstrations.n} demonstrations saved in {self.out}")
 
 
 @dataclass(frozen=True)
-class Adapt(OnTask):
+class _Reaching:
+    """How goals are reached."""
+
+    generator: GeneratorChoice = "diffusion"
+    perception: PerceptionChoice = "eye"
+    vlm: VisionLanguageModelConfig = field(default_factory=VisionLanguageModelConfig)
+    """Endpoint and model for --perception vlm (docs/perception.md)."""
+    film: bool = True
+    """Draw the last trial of each goal as a film."""
+    seed: int = 0
+    """Seed of training, goals, disturbances and perception."""
+
+
+@dataclass(frozen=True)
+class Adapt(_Reaching, OnTask):
     """Reach new goals on a simulated task, trial by trial (Stage 2), and write the report.
 
     For example:
@@ -121,22 +142,14 @@ class Adapt(OnTask):
     goal: tuple[str, ...] = ("random",)
     """The goal in metres, for instance `0.92 0.10` (forward, left), or `random`. Several are worked
     through one after another, as in one afternoon: `0.92 0.10 1.05 -0.10`, `random random`."""
-    generator: GeneratorChoice = "diffusion"
     model: Path | None = None
     """Folder of a model learned before; None learns one now. It knows its generator itself, unless
     that is a class of your own."""
-    perception: PerceptionChoice = "eye"
-    vlm: VisionLanguageModelConfig = field(default_factory=VisionLanguageModelConfig)
-    """Endpoint and model for --perception vlm (docs/perception.md)."""
     adapter: AdapterChoice = DEFAULT_ADAPTER
     rounds: int = 10
     """Largest number of trials per goal."""
     out: Path = Path("runs/adapt")
-    """Folder for the report."""
-    film: bool = True
-    """Draw the last trial as a film."""
-    seed: int = 0
-    """Seed of training, goals, disturbances and perception."""
+    """Folder for the model and the report."""
 
     def run(self) -> int:
         """Adapt; exit status 1 if the goal was not reached."""
@@ -148,7 +161,7 @@ class Adapt(OnTask):
     def reach(
         self, task: Task, demonstrations: Demonstrations, goals: Points, *, perceive: bool = False
     ) -> int:
-        """Learn, and work through goals.
+        """Learn, work through goals in one session, and write the report.
 
         Args:
             task: Where they are tried.
@@ -159,9 +172,6 @@ class Adapt(OnTask):
         Returns:
             Exit status: 1 if a goal was not reached.
         """
-        from prior_reinforce.lab.experiments.learned import load_learned
-        from prior_reinforce.session.session import Session
-
         console = Console()
         # Made first, so that a wrong setting is reported before anything is learned.
         adapter, unfitted = make_adapter(self.adapter), make_generator(self.generator)
@@ -173,97 +183,78 @@ class Adapt(OnTask):
                 demonstrations = self._perceive(task, demonstrations, perception, console)
             if self.model is None:
                 folder = self.out / "model"
-                generator = learn(demonstrations, folder, unfitted, seed=self.seed, console=console)
+                generator = learn(demonstrations, folder, unfitted, self.seed, console)
             else:
                 generator = load_learned(self.model, demonstrations, generator=self.generator)
-            outcomes = f"seen by {self.perception}" if perceive else "exact"
-            facts = {
-                "Demonstrations": f"{demonstrations.n}, {self.demonstrations}, outcomes {outcomes}",
-                "Generator": self.generator if self.model is None else f"the model in {self.model}",
-                "Adapter": self.adapter,
-                "Perception": self._seen_by(),
-                "Seed": str(self.seed),
-            }
             session = Session(generator, adapter, demonstrations)
-            return self._adapt(task, session, perception, goals, facts, console)
+            results, records = self._adapt(task, session, perception, goals, console)
+        seen_by = self.perception
+        if seen_by.split(",")[0] == "vlm":
+            seen_by += f", {self.vlm.model} at {without_secrets(self.vlm.base_url)}"
+        outcomes = f"seen by {self.perception}" if perceive else "exact"
+        names, units = demonstrations.outcome_names, demonstrations.outcome_units
+        tolerance = say_tolerance(as_tolerance(task.tolerance, names, units), names, units)
+        facts = {
+            "Task": f"{task.name}, tolerance {tolerance}",
+            "Demonstrations": f"{demonstrations.n}, {self.demonstrations}, outcomes {outcomes}",
+            "Generator": self.generator if self.model is None else f"the model in {self.model}",
+            "Adapter": self.adapter,
+            "Perception": seen_by,
+            "Seed": str(self.seed),
+            "Trials by goal": trials_by_goal(results),
+            "Earlier goals' trials used": "yes" if session.goals[-1].carry_over else "no",
+            "Version": version("prior-reinforce"),
+        }
+        title = f"{task.name}: {len(goals)} new goal" + "s" * (len(goals) > 1)
+        page = write_report(self.out, records, title=title, facts=facts, region=task.region)
+        say(console, f"report: {page}")
+        if hasattr(perception, "last_reading") and (self.out / SEEN).is_dir():
+            say(console, f"what was seen, with boxes and all answers: {self.out / SEEN}")
+        return 0 if all(result.solved_at for result in results) else 1
 
     def _perceive(
         self, task: Task, recorded: Demonstrations, perception: Perception, console: Console
     ) -> Demonstrations:
         """Execute the demonstrations once, see where they go, and keep that for `adapt`."""
-        from prior_reinforce.lab.experiments.adaptation import recording
-        from prior_reinforce.lab.experiments.protocol import perceive_demonstrations
-
         say(console, f"executing {recorded.n} demonstrations once, seen by {self.perception}")
         eyes = recording(perception, self.out / SEEN, "demonstration")
         ask = asking(console, recorded, eyes)
-        demonstrations = perceive_demonstrations(
-            task, recorded, eyes, seed=self.seed, on_failed_reading=ask
-        )
+        seen = perceive_demonstrations(task, recorded, eyes, seed=self.seed, on_failed_reading=ask)
         path = self.out / "demonstrations.npz"
-        path.parent.mkdir(parents=True, exist_ok=True)
-        demonstrations.save(path)
+        seen.save(path)
         say(console, f"their outcomes, as seen: {path}")
-        return demonstrations
+        return seen
 
     def _adapt(
-        self,
-        task: Task,
-        session: Session,
-        perception: Perception,
-        goals: Points,
-        facts: dict[str, str],
-        console: Console,
-    ) -> int:
-        """Work through goals in one session, with a live view, and write the report."""
-        from prior_reinforce.lab.experiments.adaptation import (
-            film_last_trial,
-            recording,
-            report_adaptation,
-        )
-        from prior_reinforce.lab.experiments.protocol import reach_goals
-
+        self, task: Task, session: Session, perception: Perception, goals: Points, console: Console
+    ) -> tuple[list[GoalTrials], list[AdaptationRecord]]:
+        """Work through goals in one session, with a live view."""
         view = LiveView(console, session.demonstrations)
         results: list[GoalTrials] = []
-        films: list[FilmOrWhyNot] = []
+        records: list[AdaptationRecord] = []
         for i, goal in enumerate(goals, start=1):
             view.goal(i, len(goals), goal)
             seed = self.seed + i - 1
-            recorded = recording(perception, self.out / SEEN, f"goal{i}-trial")
+            eyes = recording(perception, self.out / SEEN, f"goal{i}-trial")
             session.set_goal(goal, task.tolerance)
             (result,) = reach_goals(
                 task,
                 [session],
-                recorded,
+                eyes,
                 rounds=self.rounds,
                 seed=seed,
                 on_round=lambda _, so_far: view.trial(so_far[0]),
-                on_failed_reading=asking(console, session.demonstrations, recorded),
+                on_failed_reading=asking(console, session.demonstrations, eyes),
             )
             view.end(result)
             results.append(result)
-            film: FilmOrWhyNot = (None, "no film was asked for")
-            if self.film:
-                film = film_last_trial(task, result, seed, self.out, f"goal{i}")
-                if film[0] is None:
-                    say(console, film[1])
-            films.append(film)
+            film_in, demonstrations = self.out if self.film else None, session.demonstrations
+            record = goal_record(task, demonstrations, result, i, film_in=film_in, seed=seed)
+            if self.film and record.film is None:
+                say(console, record.film_caption)
+            records.append(record)
         view.summary(results)
-        facts = {
-            **facts,
-            "Trials by goal": trials_by_goal(results),
-            "Earlier goals' trials used": "yes" if session.goals[-1].carry_over else "no",
-        }
-        page = report_adaptation(self.out, task, session.demonstrations, results, films, facts)
-        say(console, f"report: {page}")
-        if (self.out / SEEN).is_dir() and recorded is not perception:
-            say(console, f"what was seen, with boxes and all answers: {self.out / SEEN}")
-        return 0 if all(result.solved_at for result in results) else 1
-
-    def _seen_by(self) -> str:
-        if self.perception.split(",")[0] == "vlm":
-            return f"{self.perception}, {self.vlm.model} at {without_secrets(self.vlm.base_url)}"
-        return self.perception
+        return results, records
 
     def _goals(self, task: Task, demonstrations: Demonstrations) -> Points:
         if set(self.goal) == {"random"}:
@@ -279,7 +270,7 @@ class Adapt(OnTask):
 
 
 @dataclass(frozen=True)
-class Demo:
+class Demo(_Reaching):
     """The main job: six demonstrations seen by eye and learned from, then five unseen goals.
 
     For example:
@@ -288,26 +279,14 @@ class Demo:
 
     out: Path = Path("runs/demo")
     """Folder for the model and the report."""
-    seed: int = 0
-    """Seed of training, goals, disturbances and perception."""
     goals: int = 5
     """Number of unseen goals."""
-    generator: GeneratorChoice = "diffusion"
-    perception: PerceptionChoice = "eye"
-    vlm: VisionLanguageModelConfig = field(default_factory=VisionLanguageModelConfig)
-    """Endpoint and model for --perception vlm (docs/perception.md)."""
-    film: bool = True
-    """Draw the hits as films."""
 
     def run(self) -> int:
         """See the demonstrations, learn, adapt, report."""
-        from prior_reinforce.lab.experiments.protocol import unseen_goals
-
         if self.goals < 1:
             raise ConfigurationError(f"--goals must be at least 1, got {self.goals}")
-        settings = {each.name: getattr(self, each.name) for each in fields(self)}
-        del settings["goals"]
-        adapt = Adapt(**settings)
+        adapt = Adapt(**{name: value for name, value in vars(self).items() if name != "goals"})
         task, recorded = adapt.open()
         goals = unseen_goals(task, recorded, self.goals, np.random.default_rng([self.seed, 3]))
         return adapt.reach(task, recorded, goals, perceive=True)
@@ -336,8 +315,6 @@ class Rollout(OnTask):
 
     def run(self) -> None:
         """Execute and print where it went."""
-        from prior_reinforce.lab.experiments.protocol import is_hit
-
         console = Console()
         task, demonstrations = self.open()
         plan, aim = self._plan(demonstrations)
@@ -349,12 +326,11 @@ class Rollout(OnTask):
             raise FileFormatError(f"{self.film} is there already; choose another name")
         plans = np.repeat(plan[None], self.repeats, axis=0)
         rollouts = task.rollout(plans, np.random.default_rng(self.seed))
-        units = task.outcome_units or ("m",) * len(task.outcome_names)
+        units = demonstrations.outcome_units
         for number, rollout in enumerate(rollouts, start=1):
-            components = zip(task.outcome_names, rollout.outcome, units, strict=True)
-            place = ", ".join(f"{name} {value:.3f} {unit}" for name, value, unit in components)
             hit = "  within the tolerance" if is_hit(rollout, aim, task.tolerance) else ""
             lost = "" if rollout.valid else "  (lost: it has no place on the table)"
+            place = say_outcome(rollout.outcome, task.outcome_names, units)
             say(console, f"rollout {number}: {place}{lost}{hit}")
         if self.repeats > 1:
             outcomes = np.array([rollout.outcome for rollout in rollouts])
@@ -364,16 +340,12 @@ class Rollout(OnTask):
             ]
             say(console, "spread (sd): " + ", ".join(spread))
         if self.film is not None:
-            from prior_reinforce.report import record_film
-
             frames = task.film(plan, aim, np.random.default_rng(self.seed))
             film = record_film(frames, self.film.parent, self.film.stem)
             say(console, f"film: {film.video}, its key moments: {film.strip}")
 
     def _plan(self, demonstrations: Demonstrations) -> tuple[Frames, Point]:
         """The plan to execute, and the outcome that it is for."""
-        from prior_reinforce.lab.experiments.learned import load_learned
-
         if (self.demonstration is None) == (self.condition is None):
             raise ConfigurationError("give either --demonstration or --condition")
         if self.demonstration is not None:

@@ -1,4 +1,4 @@
-"""Readings that are kept, films that are drawn or not, and the report of goals."""
+"""Readings that are kept, and films that are drawn or not."""
 
 import numpy as np
 import pytest
@@ -7,11 +7,7 @@ from prior_reinforce.adapters import make_adapter
 from prior_reinforce.environment import Rollout
 from prior_reinforce.errors import PerceptionFailedError, RenderingUnavailableError
 from prior_reinforce.generators import make_generator
-from prior_reinforce.lab.experiments.adaptation import (
-    film_last_trial,
-    recording,
-    report_adaptation,
-)
+from prior_reinforce.lab.experiments.adaptation import goal_record, recording
 from prior_reinforce.lab.experiments.protocol import GoalTrials, run_goals
 from prior_reinforce.lab.tasks import make_task
 from prior_reinforce.perception.exact import Exact
@@ -63,7 +59,7 @@ def test_a_perception_without_pictures_stays_as_it_is(tmp_path):
     assert recording(exact, tmp_path, "trial") is exact
 
 
-def test_the_report_says_why_there_is_no_film(tmp_path, monkeypatch):
+def test_what_a_report_tells_says_why_there_is_no_film(tmp_path, monkeypatch):
     task = make_task("basketball-v1")
     demonstrations = task.demonstrations("A")
     generator = make_generator("nearest").fit(demonstrations, seed=0)
@@ -82,13 +78,11 @@ def test_the_report_says_why_there_is_no_film(tmp_path, monkeypatch):
         raise RenderingUnavailableError("no OpenGL here")
 
     monkeypatch.setattr(task, "film", film)
-    none = film_last_trial(task, result, 0, tmp_path, "goal1")
-    assert none == (None, "no film: no OpenGL here")
-    page = report_adaptation(
-        tmp_path, task, demonstrations, [result], [none], {"Adapter": "frozen as ice"}
-    ).read_text()
-    for told in ("no film: no OpenGL here", "frozen as ice", "basketball-v1, tolerance 1.5 cm"):
-        assert told in page
+    record = goal_record(task, demonstrations, result, 1, film_in=tmp_path, seed=0)
+    assert (record.film, record.film_caption) == (None, "no film: no OpenGL here")
+    none = goal_record(task, demonstrations, result, 1, film_in=None, seed=0)
+    assert (none.film, none.film_caption) == (None, "no film was asked for")
+    assert np.array_equal(none.outcomes, [rollout.outcome for rollout in result.rollouts])
 
 
 def test_the_number_of_trials_a_goal_took_does_not_depend_on_their_numbers():

@@ -1,9 +1,7 @@
-"""Goals of a simulated task, worked through one after another and told in a report."""
+"""What a report of a simulated task shows: what was seen, and each goal's trials and film."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,15 +13,11 @@ from prior_reinforce.errors import RenderingUnavailableError
 from prior_reinforce.lab.experiments.protocol import GoalTrials
 from prior_reinforce.perception.base import Perception
 from prior_reinforce.plans.motions import Demonstrations
-from prior_reinforce.readings import Reading, as_tolerance
-from prior_reinforce.report import AdaptationRecord, Film, record_film, write_report
-from prior_reinforce.wording import say_tolerance
+from prior_reinforce.readings import Reading
+from prior_reinforce.report import AdaptationRecord, record_film
 
 if TYPE_CHECKING:
     from prior_reinforce.perception.vlm import VisionLanguageModel
-
-FilmOrWhyNot = tuple[Film | None, str]
-"""A film with its caption, or the line that says why there is none."""
 
 
 class RecordingPerception(Perception):
@@ -69,61 +63,42 @@ def recording(perception: Perception, folder: Path, stem: str) -> Perception:
     return RecordingPerception(perception, folder, stem)  # type: ignore[arg-type]
 
 
-def film_last_trial(
-    task: Task, result: GoalTrials, seed: int, folder: Path, name: str
-) -> FilmOrWhyNot:
-    """Film the last trial of a goal as `run_goals` executed it with this seed."""
-    last = result.trials[-1]
-    assert last.plan is not None
-    try:
-        frames = task.film(
-            last.plan, result.goal, np.random.default_rng([seed, 0, len(result.trials)])
-        )
-        film = record_film(frames, folder, name)
-    except RenderingUnavailableError as error:
-        return None, f"no film: {error}"
-    return film, f"trial {last.number}, " + ("which reached the goal" if last.hit else "a miss")
-
-
-def report_adaptation(
-    folder: Path,
+def goal_record(
     task: Task,
     demonstrations: Demonstrations,
-    results: Sequence[GoalTrials],
-    films: Sequence[FilmOrWhyNot],
-    facts: Mapping[str, str],
-) -> Path:
-    """Write the report of goals that were worked through on a task, with a film each.
+    result: GoalTrials,
+    number: int,
+    *,
+    film_in: Path | None,
+    seed: int,
+) -> AdaptationRecord:
+    """Return what the report tells of a goal, with a film of its last trial.
 
-    `facts` says what else is known of the run, by its heading.
-
-    Returns:
-        Path of the page.
+    Args:
+        task: Where it was tried.
+        demonstrations: D_prior.
+        result: What came of it.
+        number: Of the goal, from 1.
+        film_in: Folder for the film; None draws none.
+        seed: What `reach_goals` executed the trials with.
     """
-    units = demonstrations.outcome_units
-    names = demonstrations.outcome_names
-    tolerance = say_tolerance(as_tolerance(task.tolerance, names, units), names, units)
-    records = [
-        AdaptationRecord(
-            number=i,
-            demonstrations=demonstrations,
-            goal=result.goal,
-            tolerance=task.tolerance,
-            trials=result.trials,
-            outcomes=tuple(rollout.outcome for rollout in result.rollouts),
-            film=film,
-            film_caption=caption,
-        )
-        for i, (result, (film, caption)) in enumerate(zip(results, films, strict=True), start=1)
-    ]
-    return write_report(
-        folder,
-        records,
-        title=f"{task.name}: {len(results)} new goal" + ("s" if len(results) > 1 else ""),
-        facts={
-            "Task": f"{task.name}, tolerance {tolerance}",
-            **facts,
-            "Version": version("prior-reinforce"),
-        },
-        region=task.region,
+    last, film, caption = result.trials[-1], None, "no film was asked for"
+    if film_in is not None:
+        assert last.plan is not None
+        disturbances = np.random.default_rng([seed, 0, len(result.trials)])
+        try:
+            frames = task.film(last.plan, result.goal, disturbances)
+            film = record_film(frames, film_in, f"goal{number}")
+            caption = f"trial {last.number}, {'which reached the goal' if last.hit else 'a miss'}"
+        except RenderingUnavailableError as error:
+            caption = f"no film: {error}"
+    return AdaptationRecord(
+        number=number,
+        demonstrations=demonstrations,
+        goal=result.goal,
+        tolerance=task.tolerance,
+        trials=result.trials,
+        outcomes=tuple(rollout.outcome for rollout in result.rollouts),
+        film=film,
+        film_caption=caption,
     )
