@@ -103,27 +103,26 @@ class Recording:
             )
         # A frame that repeats the one before, time and all; another at the same time is an error.
         same = (np.diff(times) == 0) & np.all(np.diff(positions, axis=0) == 0, axis=1)
-        again = np.concatenate([[False], same])
-        if np.any(again) and not np.all(again[1:]):
-            times, positions = times[~again], positions[~again]
-            remark = f"{again.sum()} frames were recorded twice; once is kept"
-            object.__setattr__(self, "remarks", (*self.remarks, remark))
+        remarks = self.remarks
+        if np.any(same) and not np.all(same):
+            kept = np.concatenate([[True], ~same])
+            times, positions = times[kept], positions[kept]
+            remarks += (f"{same.sum()} frames were recorded twice; once is kept",)
         if np.any(np.diff(times) <= 0):
             frame = int(np.argmax(np.diff(times) <= 0)) + 1
             raise InvalidDemonstrationsError(
                 f"{episode}: time does not increase at frame {frame} ({times[frame - 1]:g} s, then "
                 f"{times[frame]:g} s); sort or drop those frames"
             )
-        outcome = self.outcome
-        if outcome is not None:
-            outcome = np.atleast_1d(np.array(outcome, dtype=np.float64))
         times -= times[0]
         times.setflags(write=False)
         positions.setflags(write=False)
         checked = {
-            "times": times, "positions": positions, "outcome": outcome, "named": bool(self.names),
-            "names": names, "units": units, "columns": tuple(self.columns) or names,
+            "times": times, "positions": positions, "named": bool(self.names), "names": names,
+            "units": units, "columns": tuple(self.columns) or names, "remarks": remarks,
         }  # fmt: skip
+        if self.outcome is not None:
+            checked["outcome"] = np.atleast_1d(np.array(self.outcome, dtype=np.float64))
         for name, value in checked.items():
             object.__setattr__(self, name, value)
 
