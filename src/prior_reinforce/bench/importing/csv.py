@@ -24,11 +24,11 @@ from prior_reinforce.bench.importing.recording import (
     natural_order,
     recorded,
     unread,
+    without_units,
 )
 from prior_reinforce.bench.importing.rtde import mixed_rows
 from prior_reinforce.bench.importing.tables import WORKBOOKS, Table, counts, read_tables
 from prior_reinforce.bench.importing.units import (
-    CHANNEL_UNITS,
     SECONDS,
     Ambiguity,
     say_names,
@@ -145,7 +145,7 @@ def _episode(
             table = table.rows(np.flatnonzero(~mixed).tolist())
             why = "rows left out whose positions are of another cycle than their time"
             remarks.append(f"{why}: {mixed.sum()}")
-    clock = _clock(table, episode, time, options, None if log is None else log.time_unit)
+    clock = _clock(table, episode, time, options, log and log.time_unit)
     if index is not None and channels == others and not options.joints:
         remarks.append(f"column {index + 1} left out, an index without a name")
     texts = [i for i in channels if table.is_text(i)] if channels == others else []
@@ -153,17 +153,14 @@ def _episode(
         channels = [i for i in channels if i not in texts]
         left_out = say_names([table.names[i] for i in texts])
         remarks.append(f"{left_out} left out, which holds no number")
-    split = [split_unit(table.names[i], CHANNEL_UNITS) for i in channels]
-    names = tuple(name or f"column {i + 1}" for (name, _), i in zip(split, channels, strict=True))
-    if len(set(names)) < len(names):
-        names = tuple(table.names[i] for i in channels)
+    names, units = without_units([table.names[i] or f"column {i + 1}" for i in channels])
     return recorded(
         episode,
         clock,
         table.columns(channels),
         names if named else (),
         remarks=tuple(remarks),
-        units=tuple(table.units[i] or u for (_, u), i in zip(split, channels, strict=True)),
+        units=tuple(table.units[i] or u for i, u in zip(channels, units, strict=True)),
         ambiguities=(*guessed, *clock.ambiguities),
         columns=names if table.named else (),
         left_out=_unread_motion(table, others, channels),

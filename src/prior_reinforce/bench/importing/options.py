@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any, Literal
 
 from prior_reinforce.bench.importing.clock import TIME_UNITS, Clock, clock_of
@@ -74,8 +74,7 @@ class ReadOptions:
     @property
     def given(self) -> dict[str, object]:
         """The options that were given, by field."""
-        values = {field.name: getattr(self, field.name) for field in fields(self)}
-        return {name: value for name, value in values.items() if value is not None}
+        return {name: value for name, value in vars(self).items() if value is not None}
 
     def leaves_out(self, episode: str) -> bool:
         """Whether an episode was not asked for."""

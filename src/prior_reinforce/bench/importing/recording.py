@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -82,7 +82,7 @@ class Recording:
             ) from error
         width = positions.shape[1] if positions.ndim == 2 else 0
         names = tuple(map(str, self.names)) or tuple(f"joint{i + 1}" for i in range(width))
-        names, units = _without_units(names) if not self.units else (names, tuple(self.units))
+        names, units = without_units(names) if not self.units else (names, tuple(self.units))
         fits = positions.shape == (times.size, len(names)) and len(names) > 0
         if times.ndim != 1 or not fits or times.size < 2:
             raise InvalidDemonstrationsError(
@@ -150,12 +150,12 @@ def unread() -> Recording:
     raise AssertionError("left-out episodes are never read")
 
 
-def _without_units(names: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[str | None, ...]]:
-    """Names without units, and the units; if two names would coincide, all stay as they are."""
+def without_units(names: Sequence[str]) -> tuple[tuple[str, ...], tuple[str | None, ...]]:
+    """Return names without units, and the units; names that would then coincide all stay."""
     split = [split_unit(name, CHANNEL_UNITS) for name in names]
-    stripped = tuple(name for name, _ in split)
+    bare = tuple(name for name, _ in split)
     units = tuple(unit for _, unit in split)
-    return (stripped if len(set(stripped)) == len(set(names)) else names), units
+    return (bare if len(set(bare)) == len(set(names)) else tuple(names)), units
 
 
 @contextmanager

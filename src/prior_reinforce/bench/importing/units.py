@@ -59,11 +59,7 @@ class Ambiguity:
 
 
 def raise_if_ambiguous(ambiguities: Iterable[Ambiguity], also: str = "") -> None:
-    """Raise if anything is ambiguous.
-
-    Args:
-        ambiguities: What is ambiguous.
-        also: Other problems, so that all are reported at once.
+    """Raise if anything is ambiguous; `also` are other problems, so that all are reported at once.
 
     Raises:
         UnclearUnitsError: Names all of them, and the options that settle them.
