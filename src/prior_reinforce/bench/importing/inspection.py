@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -241,13 +242,12 @@ class Inspection:
     @cached_property
     def _smoothing_helps(self) -> bool:
         """Whether any demonstration passes once smoothed; tried, as motion breaks limits too."""
+        settings = replace(self.settings, smooth=_SMOOTH_HZ)
         try:
-            smooth = replace(self.settings, smooth=_SMOOTH_HZ)
-            processed = preprocess(self.recordings, self.selection.units, smooth)
+            smooth = inspect(self.selection, settings, self.limits, self.gate)
         except ConfigurationError:  # recordings too short to be smoothed
             return False
-        reports = _check(self.selection, processed, self.limits, self.gate)
-        return not all(report.refused for report in reports)
+        return not all(report.refused for report in smooth.reports)
 
 
 def inspect(
@@ -261,7 +261,8 @@ def inspect(
     Args:
         selection: Recordings with the plan's channels.
         preprocessing: Time step, horizon and trimming; None takes the defaults.
-        robot: Limits that every demonstration is checked against; None checks none.
+        robot: Limits that every demonstration is checked against; None checks none. In units that
+            the gate cannot judge, none is checked either.
         gate: The gate's settings for that check.
 
     Raises:
@@ -270,24 +271,12 @@ def inspect(
     """
     settings = preprocessing or Preprocessing()
     processed = preprocess(selection.recordings, selection.units, settings)
-    reports = _check(selection, processed, robot, gate)
+    reports: tuple[LimitReport, ...] = ()
+    if robot is not None:
+        with suppress(InvalidPlanError):
+            form = PlanFormat(selection.names, selection.units, processed.dt)
+            reports = tuple(check_plan(Plan(p, form), robot, None, gate) for p in processed.plans)
     return Inspection(selection, processed, settings, robot, gate, reports)
-
-
-def _check(
-    selection: Selection,
-    processed: Preprocessed,
-    robot: RobotLimits | None,
-    gate: GateSettings | None,
-) -> tuple[LimitReport, ...]:
-    """The gate's verdict on every plan; none without a robot, or for units it cannot judge."""
-    if robot is None:
-        return ()
-    try:
-        form = PlanFormat(selection.names, selection.units, processed.dt)
-        return tuple(check_plan(Plan(p, form), robot, None, gate) for p in processed.plans)
-    except InvalidPlanError:
-        return ()
 
 
 def acceleration_of(noise: Channels, dt: float) -> Channels:
