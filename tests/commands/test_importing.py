@@ -205,13 +205,13 @@ def work(monkeypatch):
 
     count(npz, "_arrays")
     count(importer, "select")
-    count(importer, "find_outcomes")
+    count(importer.Recordings, "outcomes")
     count(inspection, "preprocess")
     count(inspection, "check_plan")
     return counted
 
 
-ONCE = {"_arrays": 4, "select": 1, "find_outcomes": 1, "preprocess": 1, "check_plan": 4}
+ONCE = {"_arrays": 4, "select": 1, "outcomes": 1, "preprocess": 1, "check_plan": 4}
 
 
 def on_a_panda(run, folder, scale, outcomes):

@@ -32,11 +32,6 @@ def test_values_are_checked(said, message):
         ReadOptions(**said)
 
 
-def test_a_delimiter_by_name_or_by_itself():
-    assert ReadOptions(delimiter="semicolon").dialect.delimiter == ";"
-    assert ReadOptions(delimiter="|", decimal=",").dialect.decimal == ","
-
-
 def test_what_was_not_asked_for_is_left_out():
     options = ReadOptions(episodes=("a", "b"), leave_out=("b",))
     assert [options.leaves_out(name) for name in "abc"] == [False, True, True]

@@ -7,7 +7,7 @@ import openpyxl
 import pandas as pd
 import pytest
 
-from prior_reinforce.bench.importing.tables import Dialect, read_tables
+from prior_reinforce.bench.importing.tables import read_tables
 from prior_reinforce.errors import FileFormatError
 
 FRAME = pd.DataFrame({"t": [0.0, 0.25, 0.5], "q 1": [0.5, -1.25, 3e-5], "q 2": [1.0, 2.0, 3.0]})
@@ -18,7 +18,7 @@ def numbers(table):
 
 
 def one(path, **said):
-    (table,) = read_tables(path, Dialect(**said))
+    (table,) = read_tables(path, **said)
     return table
 
 
@@ -87,9 +87,10 @@ def test_excels_own_first_line_and_code_page(tmp_path):
 
 def test_a_dialect_may_be_said(tmp_path):
     path = tmp_path / "a.csv"
-    path.write_text("a|b\n1,5|2\n3|4\n")
-    table = one(path, delimiter="|", decimal=",")
-    np.testing.assert_array_equal(numbers(table), [[1.5, 2], [3, 4]])
+    for delimiter, said in (("|", "|"), (";", "semicolon")):
+        path.write_text("a|b\n1,5|2\n3|4\n".replace("|", delimiter))
+        table = one(path, delimiter=said, decimal=",")
+        np.testing.assert_array_equal(numbers(table), [[1.5, 2], [3, 4]])
 
 
 def test_points_between_thousands_are_no_numbers(tmp_path):

@@ -78,35 +78,6 @@ def clock_of(
                 "drop it, or name the column"
             )
         return _even(episode, count, name, own_rate, rate)
-    numbers = _numbers(episode, count, stamps, name)
-    known = unit or split_unit(name, SECONDS)[1]
-    if known is not None and time_unit not in (None, known):
-        raise ConfigurationError(f"{name} is in {known}, but --time-unit says {time_unit}; drop it")
-    chosen = time_unit or known
-    if chosen == FRAME:
-        if rate is None:
-            raise ConfigurationError(f"{name} counts frames, so the rate is wanted: add --rate")
-        return Clock(numbers / rate, f"{name}, frames at {rate:g} Hz")
-    if not np.all(np.isfinite(numbers)):
-        return Clock(numbers, name)  # the recording names the frame
-    period = float(np.median(np.diff(numbers))) if count > 1 else 0.0
-    length = float(numbers[-1] - numbers[0]) if count else 0.0
-    ambiguities: tuple[Ambiguity, ...] = ()
-    if chosen is None or time_unit is not None:
-        chosen, ambiguities = _judge(name, period, length, chosen)
-    if rate is not None and not (period > 0 and _same(rate, 1 / (period * SECONDS[chosen]))):
-        found = f"{1 / (period * SECONDS[chosen]):.4g} Hz" if period > 0 else "no rate"
-        raise ConfigurationError(
-            f"--rate {rate:g}, but {name} in {chosen} says {found}; drop --rate, say the unit with "
-            "--time-unit, or leave the times unread with --time-column none"
-        )
-    # From the first on, since nanoseconds since 1970 are 0.2 us coarse as floats.
-    first = numbers[0] if count else 0.0
-    return Clock((numbers - first) * SECONDS[chosen], f"{name} in {chosen}", ambiguities)
-
-
-def _numbers(episode: str, count: int, stamps: Stamps, name: str) -> Times:
-    """The stamps as T numbers."""
     try:
         numbers = np.asarray(stamps, dtype=np.float64)
     except (TypeError, ValueError) as error:
@@ -118,7 +89,29 @@ def _numbers(episode: str, count: int, stamps: Stamps, name: str) -> Times:
             f"episode {episode} has {count} frames, but {name} of shape {numbers.shape}; expected "
             "one time a frame"
         )
-    return numbers
+    known = unit or split_unit(name, SECONDS)[1]
+    if known is not None and time_unit not in (None, known):
+        raise ConfigurationError(f"{name} is in {known}, but --time-unit says {time_unit}; drop it")
+    chosen, ambiguities = time_unit or known, tuple[Ambiguity, ...]()
+    if chosen == FRAME:
+        if rate is None:
+            raise ConfigurationError(f"{name} counts frames, so the rate is wanted: add --rate")
+        return Clock(numbers / rate, f"{name}, frames at {rate:g} Hz")
+    if not np.all(np.isfinite(numbers)):
+        return Clock(numbers, name)  # the recording names the frame
+    # From the first on, since nanoseconds since 1970 are 0.2 us coarse as floats.
+    elapsed = numbers - (numbers[0] if count else 0.0)
+    period = float(np.median(np.diff(numbers))) if count > 1 else 0.0
+    if chosen is None or time_unit is not None:
+        chosen, ambiguities = _judge(name, period, float(elapsed[-1]) if count else 0.0, chosen)
+    seconds = period * SECONDS[chosen]
+    if rate is not None and not (period > 0 and _same(rate, 1 / seconds)):
+        found = f"{1 / seconds:.4g} Hz" if period > 0 else "no rate"
+        raise ConfigurationError(
+            f"--rate {rate:g}, but {name} in {chosen} says {found}; drop --rate, say the unit with "
+            "--time-unit, or leave the times unread with --time-column none"
+        )
+    return Clock(elapsed * SECONDS[chosen], f"{name} in {chosen}", ambiguities)
 
 
 def _even(episode: str, count: int, name: str, own_rate: float | None, rate: float | None) -> Clock:
@@ -127,18 +120,17 @@ def _even(episode: str, count: int, name: str, own_rate: float | None, rate: flo
         raise FileFormatError(
             f"episode {episode}: {name} says {own_rate:g} frames a second; mend it, or leave it out"
         )
-    if rate is None and own_rate is None:
+    chosen, source = rate or own_rate, "the given rate"
+    if chosen is None:
         raise FileFormatError(
             f"episode {episode} holds neither times nor a rate; give the rate in frames a second: "
             "--rate"
         )
-    source = "the given rate"
     if rate is None:
-        rate, source = own_rate, f"{name} in the file"
+        source = f"{name} in the file"
     elif own_rate is not None and not _same(rate, own_rate):
         source = f"the given rate ({name} in the file says {own_rate:g} Hz)"
-    assert rate is not None
-    return Clock(np.arange(count) / rate, source)
+    return Clock(np.arange(count) / chosen, source)
 
 
 def _judge(
@@ -152,28 +144,26 @@ def _judge(
         length: Time of the recording, in that unit.
         said: The unit that the user gave, if any.
     """
-    judged = judge_unit(said or "s", period, period=True)
-    looks = judged.looks or "s"
-    if judged.plausible or period <= 0:
-        return judged.unit, ()
-    if said is not None:
-        # Believed, unless another unit makes it the length of a throw.
-        if judged.looks is None or not _SHORTEST <= length * SECONDS[looks] <= LONGEST:
-            return said, ()
-        what = f"{name} in {said}, as --time-unit says, would be {_rate(period, length, said)}, "
-    else:
-        what = f"{name} in s would be {_rate(period, length, 's')}, "
-    if judged.looks is None:
+
+    def rate_in(unit: str) -> str:
+        scale = SECONDS[unit]
+        return f"{1 / (period * scale):.4g} Hz and {length * scale:.3g} s long"
+
+    unit = said or "s"
+    looks = judge_unit(unit, period, period=True)
+    if looks == unit or period <= 0:
+        return unit, ()
+    is_throw = looks is not None and _SHORTEST <= length * SECONDS[looks] <= LONGEST
+    if said is not None and not is_throw:
+        return said, ()  # believed, unless another unit makes it the length of a throw
+    by = ", as --time-unit says," if said is not None else ""
+    what = f"{name} in {unit}{by} would be {rate_in(unit)}, "
+    if looks is None:
         return "s", (Ambiguity(f"{what}and no other unit fits better", "--time-unit s"),)
-    what += f"in {looks} {_rate(period, length, looks)}: it looks like {looks}"
+    what += f"in {looks} {rate_in(looks)}: it looks like {looks}"
     if said is None and period == 1:
         what += " (or it counts frames: --time-unit frame --rate HZ)"
     return looks, (Ambiguity(what, f"--time-unit {looks}"),)
-
-
-def _rate(period: float, length: float, unit: str) -> str:
-    scale = SECONDS[unit]
-    return f"{1 / (period * scale):.4g} Hz and {length * scale:.3g} s long"
 
 
 def _same(one: float, two: float) -> bool:

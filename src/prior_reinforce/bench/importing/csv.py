@@ -7,9 +7,9 @@ hold the time; all others are channels. Logs of libfranka and of RTDE are known 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,11 +24,11 @@ from prior_reinforce.bench.importing.recording import (
     natural_order,
     recorded,
     unread,
+    without_units,
 )
 from prior_reinforce.bench.importing.rtde import mixed_rows
 from prior_reinforce.bench.importing.tables import WORKBOOKS, Table, counts, read_tables
 from prior_reinforce.bench.importing.units import (
-    CHANNEL_UNITS,
     SECONDS,
     Ambiguity,
     say_names,
@@ -51,8 +51,7 @@ EPISODE_COLUMNS = tuple(
 """Names of a column that says of which episode a row is."""
 
 
-@dataclass(frozen=True)
-class LogFormat:
+class LogFormat(NamedTuple):
     """A log whose columns are documented."""
 
     name: str
@@ -89,7 +88,7 @@ def _of_files(paths: Sequence[Path], options: ReadOptions) -> Episodes:
         if len(paths) > 1 and path.stem in (options.leave_out or ()):
             yield path.stem, unread
             continue
-        tables = read_tables(path, options.dialect)
+        tables = read_tables(path, options.delimiter, options.decimal)
         for table in tables:
             if not table.names or len(table) < 2:
                 raise FileFormatError(
@@ -141,13 +140,12 @@ def _episode(
     if log is not None:
         remarks.append(f"{log.name}: time in {log.time_unit}, motion is {log.key} (measured)")
     if log is not None and log.mixed and time is not None:
-        positions = np.column_stack([table.numbers(i) for i in channels])
-        mixed = mixed_rows(table.numbers(time), positions)
+        mixed = mixed_rows(table.numbers(time), table.columns(channels))
         if np.any(mixed):
             table = table.rows(np.flatnonzero(~mixed).tolist())
             why = "rows left out whose positions are of another cycle than their time"
             remarks.append(f"{why}: {mixed.sum()}")
-    clock = _clock(table, episode, time, options, None if log is None else log.time_unit)
+    clock = _clock(table, episode, time, options, log and log.time_unit)
     if index is not None and channels == others and not options.joints:
         remarks.append(f"column {index + 1} left out, an index without a name")
     texts = [i for i in channels if table.is_text(i)] if channels == others else []
@@ -155,17 +153,14 @@ def _episode(
         channels = [i for i in channels if i not in texts]
         left_out = say_names([table.names[i] for i in texts])
         remarks.append(f"{left_out} left out, which holds no number")
-    split = [split_unit(table.names[i], CHANNEL_UNITS) for i in channels]
-    names = tuple(name or f"column {i + 1}" for (name, _), i in zip(split, channels, strict=True))
-    if len(set(names)) < len(names):
-        names = tuple(table.names[i] for i in channels)
+    names, units = without_units([table.names[i] or f"column {i + 1}" for i in channels])
     return recorded(
         episode,
         clock,
-        np.column_stack([table.numbers(i) for i in channels] or [np.zeros((0, 0))]),
+        table.columns(channels),
         names if named else (),
         remarks=tuple(remarks),
-        units=tuple(table.units[i] or u for (_, u), i in zip(split, channels, strict=True)),
+        units=tuple(table.units[i] or u for i, u in zip(channels, units, strict=True)),
         ambiguities=(*guessed, *clock.ambiguities),
         columns=names if table.named else (),
         left_out=_unread_motion(table, others, channels),
@@ -176,15 +171,14 @@ def _unread_motion(
     table: Table, others: Sequence[int], channels: Sequence[int]
 ) -> dict[str, tuple[float, float]]:
     """Range of each column of numbers that moves and is not read, such as a gripper's."""
-    columns = [i for i in others if i not in channels]
-    there, taken = ([table.names[i] for i in of] for of in (columns, channels))
-    numbers = {i: table.numbers(i) for i in columns if table.is_number(i)}
-    moving = could_be_forgotten(there, taken)
-    return {
-        table.names[i]: (float(values.min()), float(values.max()))
-        for i, values in numbers.items()
-        if table.names[i] in moving and not counts(values) and np.ptp(values) > 0
-    }
+    rest = [i for i in others if i not in channels]
+    moving = could_be_forgotten([table.names[i] for i in rest], [table.names[i] for i in channels])
+    ranges = {}
+    for i in rest:
+        name, values = table.names[i], table.values[:, i]
+        if name in moving and table.is_number(i) and not counts(values) and np.ptp(values) > 0:
+            ranges[name] = float(values.min()), float(values.max())
+    return ranges
 
 
 def _time_column(table: Table, options: ReadOptions) -> tuple[int | None, tuple[Ambiguity, ...]]:
@@ -240,14 +234,14 @@ def _channels(
 
     Only these need to be numbers in every row; a log may carry others beside them.
     """
-    names = [table.names[i] for i in others]
+    names, joints = [table.names[i] for i in others], options.joints or ()
     if not table.named:
         return list(others), False
-    if options.key is None and options.joints:
-        found = find_channels(options.joints, names)
+    if options.key is None and joints:
+        found = find_channels(joints, names)
         if found is not None:
             return [others[i] for i in found], True
-    key, groups = options.key or (None if log is None else log.key), vectors(names)
+    key, groups = options.key or (log and log.key), vectors(names)
     if key is None:
         return list(others), True
     if key not in groups:
@@ -256,12 +250,8 @@ def _channels(
             f"{', '.join(groups) or 'none'}: say which with the key"
         )
     columns = [others[i] for i in groups[key]]
-    by_name = {name: others[i] for name in options.joints or () for i in _called(name, names)}
-    if len(columns) + len(by_name) == len(options.joints or ()):  # a gripper beside a log's joints
+    by_name = {j: others[i] for j in joints for i in find_channels((j,), names) or ()}
+    if len(columns) + len(by_name) == len(joints):  # a gripper beside a log's joints
         rest = iter(columns)
-        columns = [by_name[j] if j in by_name else next(rest) for j in options.joints or ()]
+        columns = [by_name[j] if j in by_name else next(rest) for j in joints]
     return columns, False
-
-
-def _called(name: str, there: Sequence[str]) -> list[int]:
-    return find_channels((name,), there) or []

@@ -19,13 +19,20 @@ from prior_reinforce.bench.importing import csv, hdf5, lerobot, npz, ros, zarr
 from prior_reinforce.bench.importing.bounds import check_numbers
 from prior_reinforce.bench.importing.inspection import Inspection, inspect
 from prior_reinforce.bench.importing.options import ReadOptions
-from prior_reinforce.bench.importing.outcomes import Outcomes, find_outcomes, in_units, outcomes_of
+from prior_reinforce.bench.importing.outcomes import (
+    OUTCOMES_FILE,
+    Outcomes,
+    in_units,
+    outcomes_of,
+    read_outcomes,
+    table_beside,
+)
 from prior_reinforce.bench.importing.preprocessing import Preprocessing, copies
 from prior_reinforce.bench.importing.preview import Preview
 from prior_reinforce.bench.importing.recording import Episodes, Recording, has_files
 from prior_reinforce.bench.importing.selection import Selection, select
 from prior_reinforce.bench.importing.tables import WORKBOOKS
-from prior_reinforce.bench.importing.units import Ambiguity, raise_if_ambiguous
+from prior_reinforce.bench.importing.units import Ambiguity, listed, raise_if_ambiguous
 from prior_reinforce.bench.robots import GateSettings, RobotLimits
 from prior_reinforce.errors import (
     ConfigurationError,
@@ -241,8 +248,41 @@ class Recordings:
         given: str | os.PathLike[str] | Mapping[str, Sequence[float]] | None = None,
         names: Sequence[str] | None = None,
     ) -> Outcomes:
-        """Return the outcomes that are known, as in `find_outcomes`."""
-        return find_outcomes(self.outcome_places, self.episodes, given, names)
+        """Find outcomes: those given, a table beside the recordings, or the recordings' own.
+
+        Args:
+            given: A table, or numbers by episode.
+            names: Components wanted, in order; None takes them as they stand.
+
+        Raises:
+            ConfigurationError: The given outcomes are not numbers.
+            InvalidDemonstrationsError: There are no outcomes, or a component is missing.
+            FileFormatError: The table is missing or damaged.
+        """
+        if isinstance(given, Mapping):
+            try:
+                numbers = {str(name): tuple(map(float, value)) for name, value in given.items()}
+            except (TypeError, ValueError) as error:
+                raise ConfigurationError(
+                    f"outcomes must be numbers by episode, such as {{'0': (0.9, 0.1)}}: {error}"
+                ) from error
+            return Outcomes.of_numbers("the given outcomes", numbers)
+        places = self.outcome_places
+        path = Path(given) if given is not None else table_beside(places)
+        if path is not None:
+            found = read_outcomes(path, names)
+            return found if names is None else found.only(names)
+        own = {r.episode: r.outcome.tolist() for r in self.episodes if r.outcome is not None}
+        if own:
+            return Outcomes.of_numbers("the recording itself", own)
+        above = table_beside([place.parent for place in places])
+        hint = f" ({above} is not beside them: name it with --outcomes if it is theirs)"
+        raise InvalidDemonstrationsError(
+            f"no outcomes for episodes {listed([r.episode for r in self.episodes])}, and no "
+            "recording format says where the object landed; write "
+            f"{places[0] / OUTCOMES_FILE} with the columns episode,x,y (import --inspect writes "
+            f"one to fill in), or name a table with --outcomes{hint if above else ''}"
+        )
 
     def demonstrations(
         self,

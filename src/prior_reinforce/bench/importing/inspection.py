@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -102,24 +103,26 @@ class Inspection:
         clocks = " and ".join(dict.fromkeys(r.clock for r in self.recordings if r.clock))
         recorded = _span((1 / recording.period for recording in self.recordings), ".4g")
         before, after = done.starts, self._cut_after
-        cut = f"dropped {_span(before, '.2f')} s before and {_span(after, '.2f')} s after the"
+        cut = (
+            f"dropped {_span(before, '.2f')} s before and {_span(after, '.2f')} s after the motion"
+        )
         horizon = done.plans.shape[1]
         lengths = [end - start for start, end in zip(done.starts, done.ends, strict=True)]
         groups: dict[str, list[str]] = {}
         for i, name in enumerate(selection.names):
             groups.setdefault(self._unit(i, "recorded in"), []).append(name)
-        rows = {
+        return {
             "rate": f"recorded at {recorded} Hz{f' ({clocks})' if clocks else ''}, plans at "
             f"{1 / done.dt:.4g} Hz (dt {done.dt:.4g} s)",
             "channels": "; ".join(f"{say_names(n)} [{unit}]" for unit, n in groups.items()),
-            "still ends": f"{cut} motion" if max(*before, *after) > 0 else "nothing dropped",
+            "still ends": cut if max(*before, *after) > 0 else "nothing dropped",
             "length": f"motions of {_span(lengths, '.2f')} s, plans of {horizon} frames "
             f"({(horizon - 1) * done.dt:.2f} s)"
             + (f"; {done.held} hold their last pose" if done.held else ""),
             "noise": self._noise(),
             "motion": self._motion(),
+            **({"limits": self._limits()} if self.robot is not None else {}),
         }
-        return rows | ({"limits": self._limits()} if self.robot is not None else {})
 
     @property
     def text(self) -> str:
@@ -144,20 +147,20 @@ class Inspection:
         rows = [["episode", "frames", "Hz", "length s", "cut before s", "cut after s"]]
         spans = zip(self.recordings, self.processed.starts, self._cut_after, strict=True)
         for recording, start, after in spans:
-            numbers = [f"{n:.2f}" for n in (recording.duration, start, after)]
-            rate = f"{1 / recording.period:.4g}"
-            rows.append([recording.episode, str(len(recording.times)), rate, *numbers])
+            seconds = [f"{n:.2f}" for n in (recording.duration, start, after)]
+            counts = [str(len(recording.times)), f"{1 / recording.period:.4g}"]
+            rows.append([recording.episode, *counts, *seconds])
         return _columns(rows)
 
     def _channels(self) -> list[str]:
         rows = [["channel", "recorded as", "unit", "least", "most", "noise", ""]]
-        every = np.concatenate([r.positions for r in self.recordings])
-        for i, name in enumerate(self.selection.names):
+        every = np.concatenate([recording.positions for recording in self.recordings])
+        recorded = zip(self.selection.names, self.recordings[0].columns, strict=True)
+        for i, names in enumerate(recorded):
             ranges = (f"{every[:, i].min():.4g}", f"{every[:, i].max():.4g}")
-            noise = say_small(float(self.processed.noise[i]), self.selection.units[i])
+            noise = say_small(self.processed.noise[i], self.selection.units[i])
             held = "held" if i in self.processed.held_channels else ""
-            recorded = self.recordings[0].columns[i]
-            rows.append([name, recorded, self._unit(i, "from"), *ranges, noise, held])
+            rows.append([*names, self._unit(i, "from"), *ranges, noise, held])
         return _columns(rows)
 
     def _limits(self) -> str:
@@ -185,12 +188,10 @@ class Inspection:
     def _noise(self) -> str:
         names, units, done = self.selection.names, self.selection.units, self.processed
         noisiest = int(np.argmax(done.noise))
-        held = say_names([names[i] for i in done.held_channels]) or "no channel"
-        most = say_small(done.noise[noisiest], units[noisiest])
-        seen = (
-            f"up to {most} at rest ({names[noisiest]})" if done.noise[noisiest] > 1e-9 else "none"
-        )
-        said = f"{seen}; {held} held"
+        most, seen = done.noise[noisiest], "none"
+        if most > 1e-9:
+            seen = f"up to {say_small(most, units[noisiest])} at rest ({names[noisiest]})"
+        said = f"{seen}; {say_names([names[i] for i in done.held_channels]) or 'no channel'} held"
         if done.smoothed is None:
             return said
         rms, largest = done.smoothed[:, 0], done.smoothed[:, 1]
@@ -241,13 +242,12 @@ class Inspection:
     @cached_property
     def _smoothing_helps(self) -> bool:
         """Whether any demonstration passes once smoothed; tried, as motion breaks limits too."""
+        settings = replace(self.settings, smooth=_SMOOTH_HZ)
         try:
-            smooth = replace(self.settings, smooth=_SMOOTH_HZ)
-            processed = preprocess(self.recordings, self.selection.units, smooth)
+            smooth = inspect(self.selection, settings, self.limits, self.gate)
         except ConfigurationError:  # recordings too short to be smoothed
             return False
-        reports = _check(self.selection, processed, self.limits, self.gate)
-        return not all(report.refused for report in reports)
+        return not all(report.refused for report in smooth.reports)
 
 
 def inspect(
@@ -261,7 +261,8 @@ def inspect(
     Args:
         selection: Recordings with the plan's channels.
         preprocessing: Time step, horizon and trimming; None takes the defaults.
-        robot: Limits that every demonstration is checked against; None checks none.
+        robot: Limits that every demonstration is checked against; None checks none. In units that
+            the gate cannot judge, none is checked either.
         gate: The gate's settings for that check.
 
     Raises:
@@ -270,24 +271,12 @@ def inspect(
     """
     settings = preprocessing or Preprocessing()
     processed = preprocess(selection.recordings, selection.units, settings)
-    reports = _check(selection, processed, robot, gate)
+    reports: tuple[LimitReport, ...] = ()
+    if robot is not None:
+        with suppress(InvalidPlanError):
+            form = PlanFormat(selection.names, selection.units, processed.dt)
+            reports = tuple(check_plan(Plan(p, form), robot, None, gate) for p in processed.plans)
     return Inspection(selection, processed, settings, robot, gate, reports)
-
-
-def _check(
-    selection: Selection,
-    processed: Preprocessed,
-    robot: RobotLimits | None,
-    gate: GateSettings | None,
-) -> tuple[LimitReport, ...]:
-    """The gate's verdict on every plan; none without a robot, or for units it cannot judge."""
-    if robot is None:
-        return ()
-    try:
-        form = PlanFormat(selection.names, selection.units, processed.dt)
-        return tuple(check_plan(Plan(p, form), robot, None, gate) for p in processed.plans)
-    except InvalidPlanError:
-        return ()
 
 
 def acceleration_of(noise: Channels, dt: float) -> Channels:
@@ -311,14 +300,9 @@ def in_rows(rows: Mapping[str, str], remarks: Sequence[str]) -> str:
 
 def _columns(rows: Sequence[Sequence[str]]) -> list[str]:
     """Cells under each other; the first column to the left, numbers to the right."""
-    widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
-    return [
-        "  ".join(
-            cell.ljust(w) if i == 0 else cell.rjust(w)
-            for i, (cell, w) in enumerate(zip(row, widths, strict=True))
-        ).rstrip()
-        for row in rows
-    ]
+    first, *others = (max(map(len, column)) for column in zip(*rows, strict=True))
+    form = "  ".join([f"{{:<{first}}}", *(f"{{:>{width}}}" for width in others)])
+    return [form.format(*row).rstrip() for row in rows]
 
 
 def say_small(value: float, unit: str) -> str:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +20,6 @@ from prior_reinforce.bench.importing.options import ReadOptions
 from prior_reinforce.bench.importing.recording import (
     NO_COLUMN,
     Episodes,
-    Positions,
     Recording,
     files_at,
     named_damage,
@@ -62,9 +62,11 @@ def _episodes(path: Path, options: ReadOptions) -> Episodes:
             "of shape (T, D) or (N, T, D)"
         )
     outcomes = next((arrays[name] for name in _OUTCOME_KEYS if name in arrays), None)
-    single = motions.ndim == 2
-    if single:
+    episodes = [path.stem]
+    if motions.ndim == 2:
         motions, outcomes = motions[None], None if outcomes is None else outcomes.reshape(1, -1)
+    else:
+        episodes = [str(index) for index in range(len(motions))]
     if outcomes is not None and (
         outcomes.ndim != 2 or len(outcomes) != len(motions) or outcomes.dtype.kind not in "fiu"
     ):
@@ -73,20 +75,14 @@ def _episodes(path: Path, options: ReadOptions) -> Episodes:
             f"({len(motions)}, k)"
         )
     names = tuple(map(str, np.ravel(arrays.get("joint_names", arrays.get("names", ())))))
-    for index, motion in enumerate(motions):
-        episode = path.stem if single else str(index)
+
+    def episode_of(index: int) -> Recording:
+        clock = _clock(path, arrays, motions.shape[1], index, episodes[index], options)
         outcome = None if outcomes is None else outcomes[index]
+        return recorded(episodes[index], clock, motions[index], names, outcome=outcome)
 
-        def one(
-            index: int = index,
-            motion: Positions = motion,
-            episode: str = episode,
-            outcome: np.ndarray | None = outcome,
-        ) -> Recording:
-            clock = _clock(path, arrays, len(motion), index, episode, options)
-            return recorded(episode, clock, motion, names, outcome=outcome)
-
-        yield episode, one
+    for index, episode in enumerate(episodes):
+        yield episode, partial(episode_of, index)
 
 
 def _arrays(path: Path) -> Arrays:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any, Literal
 
 from prior_reinforce.bench.importing.clock import TIME_UNITS, Clock, clock_of
-from prior_reinforce.bench.importing.tables import DELIMITERS, Dialect
+from prior_reinforce.bench.importing.tables import DELIMITERS
 from prior_reinforce.errors import ConfigurationError
 
 
@@ -74,14 +74,7 @@ class ReadOptions:
     @property
     def given(self) -> dict[str, object]:
         """The options that were given, by field."""
-        values = {field.name: getattr(self, field.name) for field in fields(self)}
-        return {name: value for name, value in values.items() if value is not None}
-
-    @property
-    def dialect(self) -> Dialect:
-        """Dialect of a CSV, as far as it was given."""
-        said = self.delimiter
-        return Dialect(said if said is None else DELIMITERS.get(said, said), self.decimal)
+        return {name: value for name, value in vars(self).items() if value is not None}
 
     def leaves_out(self, episode: str) -> bool:
         """Whether an episode was not asked for."""

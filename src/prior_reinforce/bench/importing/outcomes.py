@@ -11,7 +11,6 @@ from __future__ import annotations
 import csv
 import io
 import math
-import os
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -22,17 +21,17 @@ import numpy as np
 
 from prior_reinforce.arrays import Points
 from prior_reinforce.bench.importing.csv import EPISODE_COLUMNS
-from prior_reinforce.bench.importing.recording import Recording
 from prior_reinforce.bench.importing.tables import Table, read_tables
 from prior_reinforce.bench.importing.units import (
     CHANNEL_UNITS,
     Ambiguity,
     base_of,
     conversion,
+    is_possible,
     judge_unit,
     known_unit,
     listed,
-    split_any_unit,
+    split_unit,
 )
 from prior_reinforce.errors import (
     ConfigurationError,
@@ -116,66 +115,14 @@ class Outcomes:
             )
         names = tuple(map(str, range(1, lengths.pop() + 1)))
         frame = pd.DataFrame.from_dict(dict(numbers), orient="index", columns=list(names))
-        return cls(
-            where, frame.astype(float).assign(**{SD: 0.0}), names, (None,) * len(names), named=False
-        )
-
-
-def find_outcomes(
-    places: Sequence[Path],
-    recordings: Sequence[Recording],
-    given: str | os.PathLike[str] | Mapping[str, Sequence[float]] | None = None,
-    names: Sequence[str] | None = None,
-) -> Outcomes:
-    """Find outcomes: those given, a table beside the recordings, or the recordings' own.
-
-    Args:
-        places: Folders beside the recordings.
-        recordings: Their episodes, some of which may hold outcomes.
-        given: A table, or numbers by episode.
-        names: Components wanted, in order; None takes them as they stand.
-
-    Raises:
-        ConfigurationError: The given outcomes are not numbers.
-        InvalidDemonstrationsError: There are no outcomes, or a component is missing.
-        FileFormatError: The table is missing or damaged.
-    """
-    if isinstance(given, Mapping):
-        try:
-            numbers = {str(name): tuple(map(float, value)) for name, value in given.items()}
-        except (TypeError, ValueError) as error:
-            raise ConfigurationError(
-                f"outcomes must be numbers by episode, such as {{'0': (0.9, 0.1)}}: {error}"
-            ) from error
-        return Outcomes.of_numbers("the given outcomes", numbers)
-    path = Path(given) if given is not None else table_beside(places)
-    if path is not None:
-        found = read_outcomes(path, names)
-        return found if names is None else found.only(names)
-    own = {r.episode: tuple(r.outcome.tolist()) for r in recordings if r.outcome is not None}
-    if own:
-        return Outcomes.of_numbers("the recording itself", own)
-    above = table_beside([place.parent for place in places])
-    hint = (
-        f" ({above} is not beside them: name it with --outcomes if it is theirs)" if above else ""
-    )
-    raise InvalidDemonstrationsError(
-        f"no outcomes for episodes {listed([r.episode for r in recordings])}, and no recording "
-        f"format says where the object landed; write {places[0] / OUTCOMES_FILE} with the columns "
-        "episode,x,y (import --inspect writes one to fill in), or name a table with "
-        f"--outcomes{hint}"
-    )
+        frame = frame.astype(float).assign(**{SD: 0.0})
+        return cls(where, frame, names, (None,) * len(names), named=False)
 
 
 def table_beside(places: Sequence[Path]) -> Path | None:
     """Return the table of outcomes in one of the folders; None if there is none."""
     names = (OUTCOMES_FILE, "outcomes.xlsx")
     return next((f / n for f in places for n in names if (f / n).is_file()), None)
-
-
-def headed(names: Sequence[str], units: Sequence[str]) -> list[str]:
-    """Return a table's column names of components, with their units if those are known here."""
-    return [f"{n} [{u}]" if u in CHANNEL_UNITS else n for n, u in zip(names, units, strict=True)]
 
 
 def write_outcome_table(
@@ -191,12 +138,14 @@ def write_outcome_table(
         path: The CSV.
         rows: Cells by episode: components, then the last column; missing ones stay empty.
         names: Names of the components.
-        units: Units of the components.
+        units: Units of the components; those known here stand in the head.
         beside: Name of the last column.
     """
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(map(as_cell, ["episode", *headed(names, units), beside]))
+    known = zip(names, units, strict=True)
+    heads = [f"{name} [{unit}]" if unit in CHANNEL_UNITS else name for name, unit in known]
+    writer.writerow(map(as_cell, ["episode", *heads, beside]))
     for episode, cells in rows.items():
         filled = [*cells, *[""] * (len(names) + 1 - len(cells))]
         writer.writerow([as_cell(episode), *filled])
@@ -227,7 +176,7 @@ def read_outcomes(
     if not path.is_file():
         raise FileFormatError(f"no table at {path}; give the path of a table {example}")
     table = read_tables(path, head=index)[0]
-    split = [split_any_unit(name) for name in table.names]
+    split = [split_unit(name) for name in table.names]
     # `distance_in` is in inches where there is a `distance`; elsewhere `plug_in` is no length.
     wanted = {f"{name}_in": (name, "in") for name in names or ()}
     split = [wanted.get(name, (name, unit)) for name, unit in split]
@@ -286,7 +235,7 @@ def _doubt_thousands(path: Path, table: Table, columns: Sequence[int]) -> None:
 
 
 def _finite(path: Path, table: Table, row: int, column: int) -> float:
-    value = table.number(row, column)
+    value = float(table.values[row, column])
     if not math.isfinite(value):
         raise FileFormatError(
             f"{path}, line {table.lines[row]}: {table.names[column]} is "
@@ -312,7 +261,7 @@ def in_units(
             components of several units.
         InvalidDemonstrationsError: A stated unit is impossible.
     """
-    said, where, chosen = outcomes.units, outcomes.where, wanted is not None
+    said, where, given = outcomes.units, outcomes.where, given and (known_unit(given) or given)
     if wanted is None:
         wanted = [base_of(unit or given or "m")[0] for unit in said]
     if len(wanted) != len(said):
@@ -330,26 +279,25 @@ def in_units(
     scale, unclear = [], dict[str, list[str]]()
     for name, own, spelt, largest in zip(outcomes.names, said, wanted, reach, strict=True):
         unit = known_unit(spelt) or spelt
-        looks = judge_unit(unit, largest).looks
-        recorded = own or given or looks or unit
-        if chosen and base_of(recorded)[0] != base_of(unit)[0]:
+        recorded = own or given or judge_unit(unit, largest) or unit
+        if base_of(recorded)[0] != base_of(unit)[0]:
             raise ConfigurationError(
                 f"{name} in {where} is in {recorded}, but its unit is to be {spelt}; correct "
                 "either (a workspace has it in workspace.toml, [outcome])"
             )
         scale.append(conversion(recorded, unit, f"{name} in {where}"))
-        judged = judge_unit(unit, largest * scale[-1])
-        rename = f"if that is in {judged.looks}, call its column {name} [{judged.looks}]"
-        if not judged.possible:
+        most = largest * scale[-1]
+        looks = judge_unit(unit, most)
+        rename = f"if that is in {looks}, call its column {name} [{looks}]"
+        if not is_possible(unit, most):
             raise InvalidDemonstrationsError(
-                f"in {where}, {name} is said to be in {recorded} and would reach "
-                f"{largest * scale[-1]:.4g} {unit}, too far for an arm; {rename}"
+                f"in {where}, {name} is said to be in {recorded} and would reach {most:.4g} "
+                f"{unit}, too far for an arm; {rename}"
             )
         if own is None and given is None and recorded != unit:
             unclear.setdefault(recorded, []).append(f"{name} reaches {largest:.4g}")
-        elif own is not None and given != unit and not judged.plausible:
-            what = f"{name} reaches {largest * scale[-1]:.4g} {unit} ({rename})"
-            unclear.setdefault(unit, []).append(what)
+        elif own is not None and given != unit and looks != unit:
+            unclear.setdefault(unit, []).append(f"{name} reaches {most:.4g} {unit} ({rename})")
     inches = " (or inches: --outcome-unit in)"
     ambiguities = tuple(
         Ambiguity(
@@ -389,8 +337,7 @@ def outcomes_of(
             each is named.
     """
     there = list(outcomes.frame.index)
-    picked = _matched(episodes, there)
-    missing = [episode for episode in episodes if episode not in picked]
+    picked, missing = _matched(episodes, there), missing_outcomes(episodes, outcomes)
     if missing:
         raise InvalidDemonstrationsError(
             f"no outcome for episodes {listed(missing)} in {outcomes.where} (it has "
@@ -428,5 +375,5 @@ def _matched(episodes: Sequence[str], names: Sequence[str]) -> dict[str, str]:
 
 def _digits_at_end(name: str) -> str:
     """The number at the end of a name, without leading zeros; empty if there is none."""
-    match = re.search(r"([0-9]+)$", name)
-    return (match[1].lstrip("0") or "0") if match else ""
+    match = re.search(r"0*([0-9]+)$", name)
+    return match[1] if match else ""

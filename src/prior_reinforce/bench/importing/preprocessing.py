@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from enum import IntEnum, auto
+from enum import IntEnum
 from typing import Annotated
 
 import numpy as np
@@ -101,14 +101,10 @@ def preprocess(
     dt = settings.dt or _common_dt(recordings)
     every, units = [r.positions for r in recordings], tuple(units)
     signals = analyse(every, units, float(np.median([r.period for r in recordings])))
-    spans = [
-        _moving_span(r, signals.trim_band, settings.margin) if settings.trim else (0.0, r.duration)
-        for r in recordings
-    ]
-    sampled = [
-        _resample(recording, *span, dt, signals)
-        for recording, span in zip(recordings, spans, strict=True)
-    ]
+    spans = [(0.0, r.duration) for r in recordings]
+    if settings.trim:
+        spans = [_moving_span(r, signals.trim_band, settings.margin) for r in recordings]
+    sampled = [_resample(r, *s, dt, signals) for r, s in zip(recordings, spans, strict=True)]
     pieces, changes = [piece for piece, _ in sampled], None
     if settings.smooth is not None:
         of_plans = analyse(pieces, units, dt)
@@ -128,8 +124,8 @@ def preprocess(
                 f"episode {recording.episode} has {len(piece)} frames, more than the horizon "
                 f"{horizon}; give a horizon of {longest}, or a larger dt (motions are never cut)"
             )
-        own = _remarks(recording, span, units, signals, jumping, held=len(piece) < horizon)
-        for remark in own:
+        held = len(piece) < horizon
+        for remark in _remarks(recording, span, units, signals, jumping, held=held):
             remarks.setdefault(remark, []).append(recording.episode)
     longest_motion = max(end - start for start, end in spans)
     if longest_motion > LONGEST:
@@ -175,15 +171,8 @@ def copies(plans: Plans, names: Sequence[str]) -> str:
     return ""
 
 
-class _Kind(IntEnum):
-    """What a remark is about, the most important first."""
-
-    SLOW = auto()
-    ENDS = auto()
-    GAP = auto()
-    READING = auto()
-    STEP = auto()
-    LONG = auto()
+_Kind = IntEnum("_Kind", ["SLOW", "ENDS", "GAP", "READING", "STEP", "LONG"])
+"""What a remark is about, the most important first."""
 
 
 def _remarks(

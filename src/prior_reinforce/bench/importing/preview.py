@@ -139,7 +139,7 @@ class Preview:
         if demos.outcome_dim == 1:
             return nearest
         corners = hull_corners(points[:, :2])
-        x, y = points[corners, 0], points[corners, 1]
+        x, y = points[corners, :2].T
         area = 0.5 * abs(np.dot(x, np.roll(y, -1)) - np.dot(y, np.roll(x, -1)))
         unit = demos.outcome_units[0]
         square = f" {unit}^2" if demos.outcome_units[1] == unit else ""

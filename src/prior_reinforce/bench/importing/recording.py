@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -82,7 +82,7 @@ class Recording:
             ) from error
         width = positions.shape[1] if positions.ndim == 2 else 0
         names = tuple(map(str, self.names)) or tuple(f"joint{i + 1}" for i in range(width))
-        names, units = _without_units(names) if not self.units else (names, tuple(self.units))
+        names, units = without_units(names) if not self.units else (names, tuple(self.units))
         fits = positions.shape == (times.size, len(names)) and len(names) > 0
         if times.ndim != 1 or not fits or times.size < 2:
             raise InvalidDemonstrationsError(
@@ -103,27 +103,26 @@ class Recording:
             )
         # A frame that repeats the one before, time and all; another at the same time is an error.
         same = (np.diff(times) == 0) & np.all(np.diff(positions, axis=0) == 0, axis=1)
-        again = np.concatenate([[False], same])
-        if np.any(again) and not np.all(again[1:]):
-            times, positions = times[~again], positions[~again]
-            remark = f"{again.sum()} frames were recorded twice; once is kept"
-            object.__setattr__(self, "remarks", (*self.remarks, remark))
+        remarks = self.remarks
+        if np.any(same) and not np.all(same):
+            kept = np.concatenate([[True], ~same])
+            times, positions = times[kept], positions[kept]
+            remarks += (f"{same.sum()} frames were recorded twice; once is kept",)
         if np.any(np.diff(times) <= 0):
             frame = int(np.argmax(np.diff(times) <= 0)) + 1
             raise InvalidDemonstrationsError(
                 f"{episode}: time does not increase at frame {frame} ({times[frame - 1]:g} s, then "
                 f"{times[frame]:g} s); sort or drop those frames"
             )
-        outcome = self.outcome
-        if outcome is not None:
-            outcome = np.atleast_1d(np.array(outcome, dtype=np.float64))
         times -= times[0]
         times.setflags(write=False)
         positions.setflags(write=False)
         checked = {
-            "times": times, "positions": positions, "outcome": outcome, "named": bool(self.names),
-            "names": names, "units": units, "columns": tuple(self.columns) or names,
+            "times": times, "positions": positions, "named": bool(self.names), "names": names,
+            "units": units, "columns": tuple(self.columns) or names, "remarks": remarks,
         }  # fmt: skip
+        if self.outcome is not None:
+            checked["outcome"] = np.atleast_1d(np.array(self.outcome, dtype=np.float64))
         for name, value in checked.items():
             object.__setattr__(self, name, value)
 
@@ -151,12 +150,12 @@ def unread() -> Recording:
     raise AssertionError("left-out episodes are never read")
 
 
-def _without_units(names: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[str | None, ...]]:
-    """Names without units, and the units; if two names would coincide, all stay as they are."""
+def without_units(names: Sequence[str]) -> tuple[tuple[str, ...], tuple[str | None, ...]]:
+    """Return names without units, and the units; names that would then coincide all stay."""
     split = [split_unit(name, CHANNEL_UNITS) for name in names]
-    stripped = tuple(name for name, _ in split)
+    bare = tuple(name for name, _ in split)
     units = tuple(unit for _, unit in split)
-    return (stripped if len(set(stripped)) == len(set(names)) else names), units
+    return (bare if len(set(bare)) == len(set(names)) else tuple(names)), units
 
 
 @contextmanager

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,9 +19,9 @@ from prior_reinforce.bench.importing.recording import Recording
 from prior_reinforce.bench.importing.tables import counts
 from prior_reinforce.bench.importing.units import (
     Ambiguity,
-    UnitGuess,
     base_of,
     conversion,
+    is_possible,
     judge_unit,
     known_unit,
     listed,
@@ -117,13 +117,11 @@ def select(
         plan_units[i] if plan_units is not None else base_of(unit or "rad")[0]
         for i, unit in enumerate(said)
     ]
-    picked = tuple(
-        _without_lost_frames(_only(r, c, joints)) for r, c in zip(recordings, columns, strict=True)
-    )
+    picked = [_picked(*each, joints) for each in zip(recordings, columns, strict=True)]
     # No option may contradict a unit that the file states.
     open_ = all(r.units[i] is None for r, c in zip(recordings, columns, strict=True) for i in c)
     recorded, unclear, remarks, other = _judge_units(
-        picked, names, said, wanted, units is not None, open_
+        picked, names, said, wanted, given=units is not None, open_=open_
     )
     scale = [conversion(*one) for one in zip(recorded, wanted, names, strict=True)]
     return Selection(
@@ -180,36 +178,30 @@ def _columns(recording: Recording, joints: tuple[str, ...]) -> list[int]:
     return list(range(len(joints)))
 
 
-def _only(recording: Recording, columns: list[int], joints: tuple[str, ...]) -> Recording:
-    """Return the recording with some of its channels."""
-    return replace(
-        recording,
-        positions=recording.positions[:, columns],
-        names=joints,
-        units=tuple(recording.units[i] for i in columns),
-        columns=tuple(recording.columns[i] for i in columns),
-    )
-
-
-def _without_lost_frames(recording: Recording) -> Recording:
-    """Drop the few frames in which a channel is not finite."""
-    bad = ~np.isfinite(recording.positions)
+def _picked(recording: Recording, columns: list[int], joints: tuple[str, ...]) -> Recording:
+    """Some channels, without the few frames in which one of them is not finite."""
+    positions, remarks = recording.positions[:, columns], recording.remarks
+    called = tuple(recording.columns[i] for i in columns)
+    bad = ~np.isfinite(positions)
     lost = np.any(bad, axis=1)
-    if not np.any(lost):
-        return recording
-    frame, channel = np.argwhere(bad)[0].tolist()
-    what = f"{recording.columns[channel]} is {recording.positions[frame, channel]} at frame {frame}"
-    if np.mean(lost) > _MOST_LOST:
-        raise InvalidDemonstrationsError(
-            f"episode {recording.episode}: {what}, expected a finite number, and {lost.sum()} of "
-            f"{len(lost)} frames are lost so; mend or drop that episode (--leave-out)"
-        )
-    count = "frame is" if lost.sum() == 1 else "frames are"
+    if np.any(lost):
+        frame, channel = np.argwhere(bad)[0].tolist()
+        what = f"{called[channel]} is {positions[frame, channel]} at frame {frame}"
+        if np.mean(lost) > _MOST_LOST:
+            raise InvalidDemonstrationsError(
+                f"episode {recording.episode}: {what}, expected a finite number, and {lost.sum()} "
+                f"of {len(lost)} frames are lost so; mend or drop that episode (--leave-out)"
+            )
+        count = "frame is" if lost.sum() == 1 else "frames are"
+        remarks += (f"{what}; {lost.sum()} {count} left out, as lost packets are",)
     return replace(
         recording,
         times=recording.times[~lost],
-        positions=recording.positions[~lost],
-        remarks=(*recording.remarks, f"{what}; {lost.sum()} {count} left out, as lost packets are"),
+        positions=positions[~lost],
+        names=joints,
+        units=tuple(recording.units[i] for i in columns),
+        columns=called,
+        remarks=remarks,
     )
 
 
@@ -258,6 +250,7 @@ def _judge_units(
     names: Sequence[str],
     said: Sequence[str | None],
     wanted: Sequence[str],
+    *,
     given: bool,
     open_: bool,
 ) -> tuple[list[str], list[Ambiguity], list[str], str]:
@@ -268,57 +261,48 @@ def _judge_units(
         names: Of the channels in the plan.
         said: Their units, given or from the file; None where neither states one.
         wanted: Units of the plan.
-        given: Whether units were given.
+        given: Whether units were given, then of all channels.
         open_: Whether the files state none of them.
 
     Returns:
-        Units, what is ambiguous of them, remarks, and the option that gives the unit they look
-        like, as in `Selection`.
+        Units, what is ambiguous of them, remarks, and `Selection.other_unit`.
     """
     reach = np.array([np.abs(r.positions).max(axis=0) for r in recordings])
     recorded = [unit or w for unit, w in zip(said, wanted, strict=True)]
-    every, unsaid = range(len(names)), [i for i, unit in enumerate(said) if unit is None]
 
-    def judge(among: Sequence[int]) -> tuple[float, str, UnitGuess]:
-        """The largest number of channels of one unit, where it stands, and what it suggests."""
-        episode, channel = divmod(int(np.argmax(reach[:, among])), len(among))
-        most, index = float(reach[episode, among[channel]]), among[channel]
-        where = f"{names[index]} of {recordings[episode].episode}"
-        return most, where, judge_unit(recorded[index], most)
-
-    def by_unit(channels: Sequence[int]) -> list[list[int]]:
-        units = dict.fromkeys(recorded[i] for i in channels)
-        return [[i for i in channels if recorded[i] == unit] for unit in units]
+    def by_unit(channels: Iterable[int]) -> Iterator[tuple[list[int], float, str, str, str | None]]:
+        """Channels of one unit, the largest number, where it stands, the unit, and its looks."""
+        groups: dict[str, list[int]] = {}
+        for i in channels:
+            groups.setdefault(recorded[i], []).append(i)
+        for unit, among in groups.items():
+            episode, channel = divmod(int(np.argmax(reach[:, among])), len(among))
+            most, where = reach[episode, among[channel]], names[among[channel]]
+            where = f"{where} of {recordings[episode].episode}"
+            yield among, most, where, unit, judge_unit(unit, most)
 
     unclear, remarks, other = [], [], ""
-    for among in by_unit(unsaid):
-        most, where, judged = judge(among)
-        if not judged.plausible:
-            seen = f"it looks like {judged.looks}" if judged.looks else "check that recording"
-            unclear.append(
-                f"{say_names([names[i] for i in among])} in {judged.unit} would reach {most:.4g} "
-                f"({where}), which no arm does: {seen}"
-            )
-            for i in among:
-                recorded[i] = judged.looks or judged.unit
+    may_doubt_given = open_ and len(set(recorded)) == 1
+    unsure = [i for i, unit in enumerate(said) if given or unit is None]
+    for among, most, where, unit, looks in by_unit(unsure):
+        is_sure = is_possible(unit, most) or looks is None or not may_doubt_given
+        if looks == unit or (given and is_sure):
+            continue
+        seen = f"it looks like {looks}" if looks else "check that recording"
+        by = ", as --units says," if given else ""
+        unclear.append(
+            f"{say_names([names[i] for i in among])} in {unit}{by} would reach {most:.4g} "
+            f"({where}), which no arm does: {seen}"
+        )
+        for i in among:
+            recorded[i] = looks or unit
     single = len(set(recorded)) == 1
     option = f"--units {recorded[0] if single else ' '.join(recorded)}"
-    ambiguities = [Ambiguity(what, option) for what in unclear]
-    if single and open_ and given:
-        most, where, judged = judge(every)
-        if not judged.possible and judged.looks is not None:
-            what = (
-                f"{say_names(names)} in {judged.unit}, as --units says, would reach {most:.4g} "
-                f"({where}), which no arm does: it looks like {judged.looks}"
-            )
-            ambiguities.append(Ambiguity(what, f"--units {judged.looks}"))
-            recorded = [judged.looks] * len(names)
-    for among in by_unit(every):
-        most, where, judged = judge(among)
-        if not judged.plausible and judged.looks is not None:
+    for _, most, where, unit, looks in by_unit(range(len(names))):
+        if looks not in (unit, None):
             advice = "check its unit"
             if open_ and single:
-                other = f"--units {judged.looks}"
-                advice = f"if it was recorded in {judged.looks}, say {other}"
-            remarks.append(f"{where} reaches {most:.4g} {judged.unit}, and arms do not: {advice}")
-    return recorded, ambiguities, remarks, other
+                other = f"--units {looks}"
+                advice = f"if it was recorded in {looks}, say {other}"
+            remarks.append(f"{where} reaches {most:.4g} {unit}, and arms do not: {advice}")
+    return recorded, [Ambiguity(what, option) for what in unclear], remarks, other

@@ -14,6 +14,8 @@ import re
 from collections import Counter
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -21,9 +23,10 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from prior_reinforce.bench.importing.bounds import check_bytes, check_names, check_table
+from prior_reinforce.bench.importing.recording import named_damage
 from prior_reinforce.bench.importing.units import known_unit
 from prior_reinforce.bench.importing.workbooks import check_workbook
-from prior_reinforce.errors import FileFormatError, PriorReinforceError
+from prior_reinforce.errors import FileFormatError
 
 Column = Float[np.ndarray, " T"]
 """Numbers of T rows."""
@@ -37,16 +40,6 @@ _WESTERN = set("°µ²³äöüÄÖÜßàâçéèêëîïôùûñÀÉÈáíóúã
 _COMMA = re.compile(r"[+-]?(0,\d{3}|\d+,(\d{1,2}|\d{4,}))")
 _DATE = re.compile(r"\d{4}-\d\d-\d\d|\d{1,2}:\d\d")
 _SECOND_ROW_OF_UNITS = re.compile(r"[\[(]?[A-Za-zµμ°/^*·0-9.%-]{0,12}[\])]?")
-
-
-@dataclass(frozen=True)
-class Dialect:
-    """How a CSV is written; None is inferred."""
-
-    delimiter: str | None = None
-    """`,`, `;`, a tab, or `\\s+` for any white space."""
-    decimal: str | None = None
-    """`.` or `,`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,37 +69,38 @@ class Table:
         cells = tuple([column[i] for i in kept] for column in self.cells)
         return replace(self, cells=cells, lines=tuple(self.lines[i] for i in kept))
 
+    @cached_property
+    def values(self) -> Float[np.ndarray, "T C"]:
+        """The cells as numbers; nan where one is none."""
+        columns = [[_number(cell, self.decimal) for cell in column] for column in self.cells]
+        return np.array(columns, dtype=float).reshape(len(self.names), len(self)).T
+
     def numbers(self, column: int) -> Column:
         """Return a column as numbers.
 
         Raises:
             FileFormatError: A cell that is none, with its line.
         """
-        values = self._parsed(column)
-        for i in np.flatnonzero(np.isnan(values)).tolist():
+        for i in np.flatnonzero(np.isnan(self.values[:, column])).tolist():
             text = self.cells[column][i]
             if text.lower() not in ("nan", "+nan", "-nan"):
                 raise FileFormatError(
                     f"{self.where}, line {self.lines[i]}: {self.names[column]} is {text[:40]!r}, "
                     "expected a number; mend that cell, or keep other columns"
                 )
-        return values
+        return self.values[:, column]
 
-    def number(self, row: int, column: int) -> float:
-        """Return a cell as a number; nan if it is none."""
-        return _number(self.cells[column][row], self.decimal)
+    def columns(self, chosen: Sequence[int]) -> Float[np.ndarray, "T D"]:
+        """Return some columns as numbers, as `numbers` does."""
+        return np.column_stack([self.numbers(i) for i in chosen] or [np.zeros((0, 0))])
 
     def is_number(self, column: int) -> bool:
         """Whether every cell of a column is a number."""
-        return not np.any(np.isnan(self._parsed(column)))
+        return not np.any(np.isnan(self.values[:, column]))
 
     def is_text(self, column: int) -> bool:
         """Whether no cell of a column is a number."""
-        return bool(np.all(np.isnan(self._parsed(column))))
-
-    def _parsed(self, column: int) -> Column:
-        """Numbers; nan where a cell is none."""
-        return np.array([_number(cell, self.decimal) for cell in self.cells[column]], dtype=float)
+        return bool(np.all(np.isnan(self.values[:, column])))
 
     def nanoseconds(self, column: int) -> Int[np.ndarray, " T"] | None:
         """Return dates or times of day from the first on, in [ns]; None where it holds others."""
@@ -126,30 +120,26 @@ class Table:
 
 
 def read_tables(
-    path: Path, dialect: Dialect | None = None, head: Collection[str] = ()
+    path: Path,
+    delimiter: str | None = None,
+    decimal: str | None = None,
+    head: Collection[str] = (),
 ) -> list[Table]:
     """Read a CSV, or every sheet of a workbook that holds something.
 
     Args:
         path: Of the file.
-        dialect: What is said of a CSV.
+        delimiter: Of a CSV, by its name in `DELIMITERS` or itself; None infers it.
+        decimal: Decimal sign of a CSV; None infers it.
         head: Names of which the line of names has one; rows above it are titles.
 
     Raises:
         FileFormatError: It is no such file.
     """
-    try:
+    with named_damage(path, "a table"):
         if path.suffix.lower() in WORKBOOKS:
             return _read_workbook(path, head)
-        return [_read_csv(path, dialect or Dialect(), head)]
-    except PriorReinforceError:
-        raise
-    except Exception as error:  # pandas and calamine raise a dozen kinds on damaged bytes
-        words = str(error).split("\n")[0][:200] or "no reason given"
-        raise FileFormatError(
-            f"cannot read {path} as a table ({type(error).__name__}: {words}); it is damaged or "
-            "something else: export it again, or say its format"
-        ) from error
+        return [_read_csv(path, DELIMITERS.get(delimiter or "", delimiter), decimal, head)]
 
 
 WORKBOOKS = (".xlsx", ".xlsm", ".xls", ".ods")
@@ -166,7 +156,7 @@ def _read_workbook(path: Path, head: Collection[str]) -> list[Table]:
         numbered = [(i, row) for i, row in enumerate(rows, 1) if any(row)]
         if numbered:
             where = f"{path}" if len(sheets) == 1 else f"{path} [{name}]"
-            tables.append(_table(where, _below_titles(numbered, head), ".", None))
+            tables.append(_table(where, numbered, head))
     if not tables:
         raise FileFormatError(f"{path} has no row; expected a line of column names and frames")
     return tables
@@ -183,17 +173,9 @@ def _as_text(cell: Any) -> str:
     return "" if pd.isna(cell) else str(cell)
 
 
-def _below_titles(
-    rows: list[tuple[int, list[str]]], head: Collection[str]
-) -> list[tuple[int, list[str]]]:
-    """The rows from the line of names on, where one of the first has one of its names."""
-    for i, (_, row) in enumerate(rows[:_SAMPLE]):
-        if any(cell.lower() in head for cell in row):
-            return rows[i:]
-    return rows
-
-
-def _read_csv(path: Path, dialect: Dialect, head: Collection[str]) -> Table:
+def _read_csv(
+    path: Path, delimiter: str | None, decimal: str | None, head: Collection[str]
+) -> Table:
     check_bytes(path, path.stat().st_size)
     kept = [(i, line) for i, line in enumerate(_decoded(path).splitlines(), 1) if line.strip()]
     data = [(i, line) for i, line in kept if not line.lstrip().startswith(_COMMENTS)]
@@ -202,10 +184,10 @@ def _read_csv(path: Path, dialect: Dialect, head: Collection[str]) -> Table:
     # A first line `sep=;` is Excel's own.
     said = re.fullmatch(r"sep=(.)", data[0][1].strip())
     if said and len(data) > 1:
-        dialect, data = Dialect(dialect.delimiter or said[1], dialect.decimal), data[1:]
+        delimiter, data = delimiter or said[1], data[1:]
     sample = [line for _, line in data[:_SAMPLE]]
     check_table(path, 1, 1 + max(line.count(mark) for line in sample for mark in ",;\t"))
-    delimiter, decimal = _dialect(sample, dialect)
+    delimiter, decimal = _dialect(sample, delimiter, decimal)
     check_table(path, len(data), max(len(_split(line, delimiter)) for _, line in data))
     mark, lines = delimiter, [line for _, line in data]
     if delimiter == DELIMITERS["space"]:
@@ -217,8 +199,8 @@ def _read_csv(path: Path, dialect: Dialect, head: Collection[str]) -> Table:
     width = max(len(row) for _, row in rows)
     rows = [(i, row + [""] * (width - len(row))) for i, row in rows]
     above = [line for i, line in kept if i == data[0][0] - 1 and (i, line) not in data]
-    title = [c.strip() for c in _split(above[0].lstrip(" #%/"), delimiter)] if above else None
-    return _table(str(path), _below_titles(rows, head), decimal, title)
+    title = [c.strip() for c in _split(above[0].lstrip(" #%/"), delimiter)] if above else []
+    return _table(str(path), rows, head, decimal, title)
 
 
 def _decoded(path: Path) -> str:
@@ -242,22 +224,20 @@ def _split(line: str, delimiter: str) -> list[str]:
     return line.split() if delimiter == r"\s+" else line.split(delimiter)
 
 
-def _dialect(lines: Sequence[str], given: Dialect) -> tuple[str, str]:
+def _dialect(lines: Sequence[str], delimiter: str | None, decimal: str | None) -> tuple[str, str]:
     """Delimiter and decimal sign under which the lines are rows of one width and mostly numbers."""
-    best, chosen = (-1.0, -1.0), (",", ".")
     body = lines[min(1, len(lines) - 1) :]
-    for delimiter in [given.delimiter] if given.delimiter else [",", ";", "\t", r"\s+"]:
-        for decimal in [given.decimal] if given.decimal else [".", ","]:
-            if delimiter == decimal:
-                continue
-            rows = [_split(line.rstrip(";,"), delimiter) for line in body]
-            cells = [cell for row in rows for cell in row if cell.strip()]
-            numeric = sum(_is_number(cell, decimal) for cell in cells) / max(len(cells), 1)
-            width, often = Counter(map(len, rows)).most_common(1)[0]
-            score = (round(numeric * often / len(rows), 2), float(width))
-            if score > best:
-                best, chosen = score, (delimiter, decimal)
-    return chosen
+
+    def score(dialect: tuple[str, str]) -> tuple[float, int]:
+        rows = [_split(line.rstrip(";,"), dialect[0]) for line in body]
+        cells = [cell for row in rows for cell in row if cell.strip()]
+        numeric = sum(_is_number(cell, dialect[1]) for cell in cells) / max(len(cells), 1)
+        width, often = Counter(map(len, rows)).most_common(1)[0]
+        return round(numeric * often / len(rows), 2), width
+
+    delimiters = [delimiter] if delimiter else [",", ";", "\t", r"\s+"]
+    pairs = product(delimiters, [decimal] if decimal else [".", ","])
+    return max((pair for pair in pairs if pair[0] != pair[1]), key=score, default=(",", "."))
 
 
 def _number(text: str, decimal: str = ".") -> float:
@@ -279,17 +259,32 @@ def _is_number(text: str, decimal: str) -> bool:
 
 
 def _table(
-    where: str, rows: list[tuple[int, list[str]]], decimal: str, title: list[str] | None
+    where: str,
+    rows: list[tuple[int, list[str]]],
+    head: Collection[str],
+    decimal: str = ".",
+    title: Sequence[str] = (),
 ) -> Table:
-    """Names, units and cells of rows with the numbers of their lines."""
+    """Names, units and cells of rows with the numbers of their lines.
+
+    Args:
+        where: File and sheet.
+        rows: All of one width.
+        head: As in `read_tables`.
+        decimal: Decimal sign.
+        title: Cells of a comment right above; names, if there are as many as columns.
+    """
+    above = [any(cell.lower() in head for cell in row) for _, row in rows[:_SAMPLE]]
+    rows = rows[above.index(True) if any(above) else 0 :]
     first = rows[0][1]
     units: list[str | None] = [None] * len(first)
+    names, named = [f"column {i}" for i in range(1, len(first) + 1)], True
     if not any(_is_number(c, decimal) or _DATE.match(c) for c in first):
-        names, named, rows = first, True, rows[1:]
-    elif title is not None and len(title) == len(first):
-        names, named = title, True
+        names, rows = first, rows[1:]
+    elif len(title) == len(first):
+        names = list(title)
     else:
-        names, named = [f"column {i}" for i in range(1, len(first) + 1)], False
+        named = False
     if named and len(rows) > 1 and _are_units(rows[0][1], decimal):
         units, rows = [known_unit(c) for c in rows[0][1]], rows[1:]
     check_names(where, names)

@@ -27,16 +27,12 @@ _SPELLINGS = {
     "ns": ("ns", "nsec", "nanosecond", "nanoseconds"),
 }
 _UNITS = {spelling: unit for unit, spellings in _SPELLINGS.items() for spelling in spellings}
-_BASE: Mapping[str, tuple[str, float]] = {
-    "rad": ("rad", 1.0),
-    "deg": ("rad", math.pi / 180),
-    "m": ("m", 1.0),
-    "cm": ("m", 0.01),
-    "mm": ("m", 0.001),
-    "in": ("m", 0.0254),
-}
+_ANGLES = {"rad": 1.0, "deg": math.pi / 180}
+_LENGTHS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 SECONDS: Mapping[str, float] = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 """Units of time, in [s]."""
+CHANNEL_UNITS = (*_ANGLES, *_LENGTHS)
+"""Units that a channel's name may carry: angles and lengths."""
 _SLOWEST, _FASTEST = 5.0, 5000.0
 """Frames a second at which arms are recorded. Ours: teleoperation at 10 Hz is the slowest in use,
 libfranka's and RTDE's logs have 1000 and 500."""
@@ -63,11 +59,7 @@ class Ambiguity:
 
 
 def raise_if_ambiguous(ambiguities: Iterable[Ambiguity], also: str = "") -> None:
-    """Raise if anything is ambiguous.
-
-    Args:
-        ambiguities: What is ambiguous.
-        also: Other problems, so that all are reported at once.
+    """Raise if anything is ambiguous; `also` are other problems, so that all are reported at once.
 
     Raises:
         UnclearUnitsError: Names all of them, and the options that settle them.
@@ -84,47 +76,35 @@ def known_unit(text: str) -> str | None:
     return _UNITS.get(text.strip().strip("[]()").strip().lower())
 
 
-def split_unit(column: str, among: Collection[str]) -> tuple[str, str | None]:
+def split_unit(column: str, among: Collection[str] | None = None) -> tuple[str, str | None]:
     """Split a column's name into the name and the unit in it.
 
     Args:
         column: For instance `x_cm`, `q0 [deg]` or `time (ms)`.
-        among: Units that may stand there.
+        among: Units that may stand there; None takes all, and in square brackets any word at all:
+            `volume [ml]`.
 
     Returns:
         For instance `("x", "cm")`; the whole name and None if there is no such unit.
     """
     for pattern in (_BRACKETS, _ENDING):
         match = pattern.fullmatch(column.strip())
-        if match is not None and known_unit(match["unit"]) in among:
-            if pattern is _ENDING and match["unit"] == "in":
-                continue  # `plug_in` is no length
-            return match["name"].strip(), known_unit(match["unit"])
+        unit = match and known_unit(match["unit"])
+        if match is None or (pattern is _ENDING and match["unit"] == "in"):
+            continue  # `plug_in` is no length
+        if unit in (among or _SPELLINGS):
+            return match["name"].strip(), unit
+        if among is None and column.strip().endswith("]"):
+            return match["name"].strip(), match["unit"]
     return column, None
-
-
-def split_any_unit(column: str) -> tuple[str, str | None]:
-    """Split a column's name as `split_unit` does, with any unit at all in square brackets.
-
-    Args:
-        column: For instance `x_cm`, `arrival_ms` or `volume [ml]`.
-    """
-    name, unit = split_unit(column, (*CHANNEL_UNITS, *SECONDS))
-    match = _BRACKETS.fullmatch(column.strip())
-    if unit is not None or match is None or not column.strip().endswith("]"):
-        return name, unit
-    return match["name"].strip(), known_unit(match["unit"]) or match["unit"]
-
-
-CHANNEL_UNITS = tuple(_BASE)
-"""Units that a channel's name may carry: angles and lengths."""
 
 
 def base_of(unit: str) -> tuple[str, float]:
     """Return the base unit and the factor to it, rad and pi/180 for deg; other units stay."""
-    if unit in SECONDS:
-        return "s", SECONDS[unit]
-    return _BASE.get(unit, (unit, 1.0))
+    for units in (_ANGLES, _LENGTHS, SECONDS):
+        if unit in units:
+            return next(iter(units)), units[unit]
+    return unit, 1.0
 
 
 def conversion(recorded: str, wanted: str, name: str) -> float:
@@ -142,25 +122,8 @@ def conversion(recorded: str, wanted: str, name: str) -> float:
     return factor / divisor
 
 
-@dataclass(frozen=True)
-class UnitGuess:
-    """Whether a number can be in a unit."""
-
-    unit: str
-    """That unit."""
-    looks: str | None
-    """The unit it looks like: the same if that is plausible, None if no unit fits."""
-    possible: bool
-    """Whether it can be in that unit if that is stated explicitly."""
-
-    @property
-    def plausible(self) -> bool:
-        """Whether it is plausible in that unit."""
-        return self.looks == self.unit
-
-
-def judge_unit(unit: str, number: float, *, period: bool = False) -> UnitGuess:
-    """Judge whether a number can be in a unit.
+def judge_unit(unit: str, number: float, *, period: bool = False) -> str | None:
+    """Return the unit that a number looks like: the same if that is plausible, None if none fits.
 
     Args:
         unit: `rad` or `m`, or for a period a unit of time; any other unit is plausible.
@@ -169,10 +132,12 @@ def judge_unit(unit: str, number: float, *, period: bool = False) -> UnitGuess:
     """
     ranges = _PLAUSIBLE.get("period" if period else unit, {unit: (0.0, math.inf)})
     fitting = [u for u, (low, high) in ranges.items() if low <= number <= high]
-    if unit in fitting:
-        return UnitGuess(unit, unit, possible=True)
-    possible = not period and number <= BEYOND_DOUBT * ranges[unit][1]
-    return UnitGuess(unit, fitting[0] if fitting else None, possible)
+    return unit if unit in fitting else next(iter(fitting), None)
+
+
+def is_possible(unit: str, number: float) -> bool:
+    """Return whether an angle or a length can be in a unit if that is stated explicitly."""
+    return unit not in _PLAUSIBLE or number <= BEYOND_DOUBT * _PLAUSIBLE[unit][unit][1]
 
 
 def say_names(names: Sequence[str]) -> str:
