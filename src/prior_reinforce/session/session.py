@@ -33,7 +33,6 @@ from prior_reinforce.errors import (
     TrialStateError,
     WorkspaceError,
 )
-from prior_reinforce.plans.motions import Plan
 from prior_reinforce.readings import Reading, as_tolerance
 from prior_reinforce.session.events import Amended, Asked, GoalSet, Told, Voided
 from prior_reinforce.session.trials import AskedTrial, Goal, Log, Stage, State, Trial, Verdict
@@ -421,7 +420,7 @@ class Session:
             expected_trials=None if expected is None else expected.trials,
             expected_error=None if expected is None else _as_list(expected.error),
             expected_sd=None if expected is None else _as_list(expected.sd),
-            plan=self.log.keep_plan(number, Plan(plan, self.demonstrations.format)),
+            plan=self.log.keep_plan(number, plan, self.demonstrations.format),
         )
         self.log.append(event)
         return verdict

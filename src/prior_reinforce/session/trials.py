@@ -23,7 +23,7 @@ from prior_reinforce.errors import (
     TrialStateError,
     WorkspaceError,
 )
-from prior_reinforce.plans.motions import Plan
+from prior_reinforce.plans.motions import PlanFormat
 from prior_reinforce.readings import Reading, in_tolerances
 from prior_reinforce.session.events import (
     Amended,
@@ -377,9 +377,9 @@ class Log:
         self._entries.append(entry)
         self._n_added += 1
 
-    def keep_plan(self, number: int, plan: Plan) -> KeptPlan | None:
+    def keep_plan(self, number: int, plan: Frames, form: PlanFormat) -> KeptPlan | None:
         """Keep a trial's plan, and return its file if it has one."""
-        self._state.plans[number] = plan.actions
+        self._state.plans[number] = _read_only(plan)
         return None
 
     def plan(self, trial: Trial) -> Frames:

@@ -29,7 +29,7 @@ from prior_reinforce.bench.workspace.log import (
 )
 from prior_reinforce.bench.workspace.store import Store
 from prior_reinforce.errors import TrialStateError, WorkspaceError
-from prior_reinforce.plans.motions import Plan
+from prior_reinforce.plans.motions import Plan, PlanFormat
 from prior_reinforce.session.events import Entry, Event, KeptPlan
 from prior_reinforce.session.trials import Log, Trial
 
@@ -239,10 +239,10 @@ class Journal(Log):
             )
             self._connection.execute("COMMIT")
 
-    def keep_plan(self, number: int, plan: Plan) -> KeptPlan:
+    def keep_plan(self, number: int, plan: Frames, form: PlanFormat) -> KeptPlan:
         """Write the plan's file, before the event that names it."""
         named = {trial.kept.file for trial in self._state.trials if trial.kept is not None}
-        file = self._store.save_plan(plan, number, named)
+        file = self._store.save_plan(Plan(plan, form), number, named)
         return KeptPlan(file.path.name, file.sha256)
 
     def plan(self, trial: Trial) -> Frames:
