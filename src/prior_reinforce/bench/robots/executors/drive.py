@@ -15,7 +15,7 @@ import shlex
 import signal
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -192,9 +192,15 @@ def approach(
 class _Prepared:
     """A plan in an arm's columns, and how the arm stands to it."""
 
+    request: Request
+    form: PlanFormat
+    """Of the plan as it came."""
     arm: ArmDescription
     channels: list[int]
+    """The arm's, of the plan's columns."""
     pose: Float[np.ndarray, " d"]
+    here: dict[str, float]
+    """The pose by the plan's columns."""
     plan: Plan
     """Channels that the plan leaves out are held where they stand."""
     said: str
@@ -204,23 +210,33 @@ class _Prepared:
     def to_start(self) -> Plan:
         return approach(self.pose, self.plan.actions[0], self.arm)
 
-    def check_way(self, names: tuple[str, ...], request: Request) -> None:
+    def check_way(self) -> None:
         """Hold the way to the start against the gate, box and all; in the plan's own columns.
 
         Raises:
             RobotLimitError: It is refused.
         """
-        if request.limits is None:
+        if self.request.limits is None:
             return
-        way, units = self.to_start, tuple(self.arm.units[channel] for channel in self.channels)
-        form = PlanFormat(names, units, way.format.dt)
+        way = self.to_start
+        form = replace(self.form, dt=way.format.dt)
         own = Plan(way.actions[:, self.channels], form)
-        refused = check_plan(own, request.limits, settings=request.gate).refusals
+        refused = check_plan(own, self.request.limits, settings=self.request.gate).refusals
         if refused:
             raise RobotLimitError(
                 f"the way from where the arm stands to the plan's first frame: {refused}; move it "
                 "nearer by hand or with its own program, then ask again"
             )
+
+    def motions(self) -> Sequence[Plan]:
+        """What is to be executed, one after the other; the arm's limits hold for all of it."""
+        if self.request.motion == "approach":
+            return [self.to_start]
+        if not self.there:
+            raise ConfigurationError(f"{self.said}; move it there, or ask again with --approach")
+        far = np.abs(self.plan.actions[0] - self.pose)
+        tolerance = [_START_TOLERANCE.get(unit, 0.0) for unit in self.arm.units]
+        return [self.plan] if np.all(far <= tolerance) else [self.to_start, self.plan]
 
 
 def _prepare(executor: Executor, plan: Plan, request: Request) -> _Prepared:
@@ -233,34 +249,28 @@ def _prepare(executor: Executor, plan: Plan, request: Request) -> _Prepared:
     own = Plan(frames, PlanFormat(arm.columns, arm.units, plan.format.dt / request.speed))
     here = dict(zip(plan.format.names, pose[channels].tolist(), strict=True))
     said, there = compare_pose(here, plan.actions[0].tolist(), plan.format, request.gate)
-    return _Prepared(arm, channels, pose, own, said, there)
+    return _Prepared(request, plan.format, arm, channels, pose, here, own, said, there)
 
 
-def look(executor: Executor, plan: Plan, request: Request) -> Look:
+def _look(executor: Executor, prepared: _Prepared) -> Look:
     """How the arm stands to a plan; nothing moves."""
-    prepared = _prepare(executor, plan, request)
-    refused = [
-        _refusal(lambda: executor.check(prepared.plan)),
-        _refusal(lambda: prepared.check_way(plan.format.names, request)),
-    ]
-    pose = prepared.pose[prepared.channels].tolist()
+
+    def refusal(check: Callable[[], None]) -> str:
+        try:
+            check()
+        except PriorReinforceError as error:
+            return str(error)
+        return ""
+
     return Look(
         arm=prepared.arm,
-        pose=dict(zip(plan.format.names, pose, strict=True)),
+        pose=prepared.here,
         there=prepared.there,
         said=prepared.said,
         approach=float(prepared.to_start.times[-1]),
-        refused=refused[0],
-        approach_refused=refused[1],
+        refused=refusal(lambda: executor.check(prepared.plan)),
+        approach_refused=refusal(prepared.check_way),
     )
-
-
-def _refusal(check: Callable[[], None]) -> str:
-    try:
-        check()
-    except PriorReinforceError as error:
-        return str(error)
-    return ""
 
 
 class _Stop:
@@ -288,13 +298,14 @@ def drive(request: Request, plan: Plan, folder: Path) -> DriverResult:
     try:
         stop.executor = executor = make_executor(request.arm)
         try:
-            if request.motion == "look":
-                _write(folder / LOOK_FILE, look(executor, plan, request))
-                return DriverResult("done")
             prepared = _prepare(executor, plan, request)
-            motions = _motions(prepared, request)
+            if request.motion == "look":
+                said = msgspec.json.encode(_look(executor, prepared))
+                (folder / LOOK_FILE).write_bytes(said)
+                return DriverResult("done")
+            motions = prepared.motions()
             if prepared.plan is not motions[0]:
-                prepared.check_way(plan.format.names, request)
+                prepared.check_way()
             for motion in motions:
                 executor.check(motion)
             for motion in motions:
@@ -310,31 +321,13 @@ def drive(request: Request, plan: Plan, folder: Path) -> DriverResult:
         finally:
             executor.close()
     except Exception as error:
-        said = str(error) if isinstance(error, PriorReinforceError) else repr(error)
-        result = DriverResult("aborted" if moved else "not_moved", said)
+        why = str(error) if isinstance(error, PriorReinforceError) else repr(error)
+        result = DriverResult("aborted" if moved else "not_moved", why)
     else:
         outcome: Any = "done" if not path.fault else "aborted" if moved else "not_moved"
         result = DriverResult(outcome, path.fault)
-    _write(folder / RESULT_FILE, result)
+    (folder / RESULT_FILE).write_bytes(msgspec.json.encode(result))
     return result
-
-
-def _motions(prepared: _Prepared, request: Request) -> Sequence[Plan]:
-    """What is to be executed, one after the other; the arm's limits hold for all of it."""
-    to_start = prepared.to_start
-    if request.motion == "approach":
-        return [to_start]
-    if not prepared.there:
-        raise ConfigurationError(f"{prepared.said}; move it there, or ask again with --approach")
-    far = np.abs(prepared.plan.actions[0] - prepared.pose)
-    near = all(
-        d <= _START_TOLERANCE.get(u, 0.0) for d, u in zip(far, prepared.arm.units, strict=True)
-    )
-    return [prepared.plan] if near else [to_start, prepared.plan]
-
-
-def _write(path: Path, content: Any) -> None:
-    path.write_bytes(msgspec.json.encode(content))
 
 
 def main() -> None:
