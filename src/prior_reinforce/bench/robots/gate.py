@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import msgspec
 import numpy as np
@@ -25,7 +25,6 @@ from prior_reinforce.bench.robots.report import (
     LimitLine,
     LimitReport,
     Samples,
-    Status,
     Times,
     worst_place,
 )
@@ -136,7 +135,7 @@ class GateSettings(Checked):
                 f"{self.beyond_refuse}"
             )
         for unit, *both in self.errors:
-            if not max(both) < math.inf:
+            if not all(map(math.isfinite, both)):
                 raise ConfigurationError(f"errors must be finite, got {both} for {unit}")
         for name, low, high in self.ranges:
             if not -math.inf < low < high < math.inf:
@@ -217,7 +216,6 @@ def _joints(
 ) -> LimitLine:
     """Whether the plan has a column for every joint, but for those left out on purpose."""
     missing, d = missing_joints(columns, limits, absent), len(limits.joint_names)
-    status: Status = "warn" if missing else "pass"
     text = f"all {d} are in the plan"
     if absent:
         text = f"{len(columns)} of {d}, without {', '.join(absent)} on purpose"
@@ -226,9 +224,16 @@ def _joints(
     others = [n for i, n in enumerate(plan.format.names) if i not in columns.values()]
     if others and columns:
         text += f"; {', '.join(others)}: by range and speed"
-    n, joint = float(len(missing)), missing[0] if missing else None
-    numbers: dict[str, Any] = {"value": n, "limit": 0.0, "margin": 0.0 - n, "unit": "1"}
-    return LimitLine(check="joints", status=status, text=text, joint=joint, **numbers)
+    return LimitLine(
+        check="joints",
+        status="warn" if missing else "pass",
+        value=float(len(missing)),
+        limit=0.0,
+        margin=0.0 - len(missing),
+        unit="1",
+        joint=missing[0] if missing else None,
+        text=text,
+    )
 
 
 def _motion(

@@ -182,19 +182,17 @@ def _encode(plan: Plan, format: PlanFileFormat, rate: float | None) -> bytes:
         # Each number is the shortest text that reads back as the same one.
         writer.writerows(np.column_stack([t, q, dq, ddq]).tolist())
         return text.getvalue().encode()
-    points = []
-    for k, seconds in enumerate(t.tolist()):
-        sec, nanosec = divmod(round(seconds * 1e9), 10**9)
-        point = {
-            "positions": q[k],
-            "velocities": dq[k],
-            "accelerations": ddq[k],
-            "effort": q[k, :0],
+    times = [divmod(round(seconds * 1e9), 10**9) for seconds in t.tolist()]
+    points = [
+        {
+            "positions": q[k].tolist(),
+            "velocities": dq[k].tolist(),
+            "accelerations": ddq[k].tolist(),
+            "effort": [],
+            "time_from_start": {"sec": sec, "nanosec": nanosec},
         }
-        points.append(
-            {key: values.tolist() for key, values in point.items()}
-            | {"time_from_start": {"sec": sec, "nanosec": nanosec}}
-        )
+        for k, (sec, nanosec) in enumerate(times)
+    ]
     header = {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""}
     message = {"header": header, "joint_names": names, "points": points}
     return (json.dumps(message, indent=1) + "\n").encode()
