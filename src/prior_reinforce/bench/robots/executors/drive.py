@@ -15,7 +15,7 @@ import shlex
 import signal
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -188,27 +188,28 @@ def approach(
     return Plan(frames, PlanFormat(arm.columns, arm.units, _APPROACH_DT))
 
 
-@dataclass(frozen=True, eq=False)
 class _Prepared:
-    """A plan in an arm's columns, and how the arm stands to it."""
+    """A plan in an arm's columns, and how the arm stands to it; nothing moves here."""
 
-    request: Request
-    form: PlanFormat
-    """Of the plan as it came."""
-    arm: ArmDescription
-    channels: list[int]
-    """The arm's, of the plan's columns."""
-    pose: Float[np.ndarray, " d"]
-    here: dict[str, float]
-    """The pose by the plan's columns."""
-    plan: Plan
-    """Channels that the plan leaves out are held where they stand."""
-    said: str
-    there: bool
+    def __init__(self, executor: Executor, plan: Plan, request: Request) -> None:
+        self._executor, self._request, self._form = executor, request, plan.format
+        arm, pose = executor.describe(), executor.where()
+        if missing := [n for n, q in zip(arm.columns, pose, strict=True) if not math.isfinite(q)]:
+            raise ConfigurationError(f"{arm.model} does not say where {', '.join(missing)} stands")
+        self.arm, self._pose, self.channels = arm, pose, arms_columns(plan.format, arm)
+        """The arm, where it stands, and its channel of each of the plan's columns."""
+        frames = np.tile(pose, (plan.horizon, 1))
+        frames[:, self.channels] = plan.actions
+        own = PlanFormat(arm.columns, arm.units, plan.format.dt / request.speed)
+        self.plan = Plan(frames, own)
+        """Channels that the plan leaves out are held where they stand."""
+        self._here = dict(zip(plan.format.names, pose[self.channels].tolist(), strict=True))
+        first = plan.actions[0].tolist()
+        self._said, self._there = compare_pose(self._here, first, plan.format, request.gate)
 
     @property
     def to_start(self) -> Plan:
-        return approach(self.pose, self.plan.actions[0], self.arm)
+        return approach(self._pose, self.plan.actions[0], self.arm)
 
     def check_way(self) -> None:
         """Hold the way to the start against the gate, box and all; in the plan's own columns.
@@ -216,12 +217,11 @@ class _Prepared:
         Raises:
             RobotLimitError: It is refused.
         """
-        if self.request.limits is None:
+        if self._request.limits is None:
             return
         way = self.to_start
-        form = replace(self.form, dt=way.format.dt)
-        own = Plan(way.actions[:, self.channels], form)
-        refused = check_plan(own, self.request.limits, settings=self.request.gate).refusals
+        own = Plan(way.actions[:, self.channels], replace(self._form, dt=way.format.dt))
+        refused = check_plan(own, self._request.limits, settings=self._request.gate).refusals
         if refused:
             raise RobotLimitError(
                 f"the way from where the arm stands to the plan's first frame: {refused}; move it "
@@ -230,78 +230,53 @@ class _Prepared:
 
     def motions(self) -> Sequence[Plan]:
         """What is to be executed, one after the other; the arm's limits hold for all of it."""
-        if self.request.motion == "approach":
+        if self._request.motion == "approach":
             return [self.to_start]
-        if not self.there:
-            raise ConfigurationError(f"{self.said}; move it there, or ask again with --approach")
-        far = np.abs(self.plan.actions[0] - self.pose)
+        if not self._there:
+            raise ConfigurationError(f"{self._said}; move it there, or ask again with --approach")
+        far = np.abs(self.plan.actions[0] - self._pose)
         tolerance = [_START_TOLERANCE.get(unit, 0.0) for unit in self.arm.units]
         return [self.plan] if np.all(far <= tolerance) else [self.to_start, self.plan]
 
+    def look(self) -> Look:
+        """How the arm stands to the plan."""
 
-def _prepare(executor: Executor, plan: Plan, request: Request) -> _Prepared:
-    arm, pose = executor.describe(), executor.where()
-    if missing := [n for n, q in zip(arm.columns, pose, strict=True) if not math.isfinite(q)]:
-        raise ConfigurationError(f"{arm.model} does not say where {', '.join(missing)} stands")
-    channels = arms_columns(plan.format, arm)
-    frames = np.tile(pose, (plan.horizon, 1))
-    frames[:, channels] = plan.actions
-    own = Plan(frames, PlanFormat(arm.columns, arm.units, plan.format.dt / request.speed))
-    here = dict(zip(plan.format.names, pose[channels].tolist(), strict=True))
-    said, there = compare_pose(here, plan.actions[0].tolist(), plan.format, request.gate)
-    return _Prepared(request, plan.format, arm, channels, pose, here, own, said, there)
+        def refusal(check: Callable[[], None]) -> str:
+            try:
+                check()
+            except PriorReinforceError as error:
+                return str(error)
+            return ""
 
-
-def _look(executor: Executor, prepared: _Prepared) -> Look:
-    """How the arm stands to a plan; nothing moves."""
-
-    def refusal(check: Callable[[], None]) -> str:
-        try:
-            check()
-        except PriorReinforceError as error:
-            return str(error)
-        return ""
-
-    return Look(
-        arm=prepared.arm,
-        pose=prepared.here,
-        there=prepared.there,
-        said=prepared.said,
-        approach=float(prepared.to_start.times[-1]),
-        refused=refusal(lambda: executor.check(prepared.plan)),
-        approach_refused=refusal(prepared.check_way),
-    )
-
-
-class _Stop:
-    """The wish to stop, whenever it comes."""
-
-    def __init__(self) -> None:
-        self.asked = False
-        self.executor: Executor | None = None
-        signal.signal(signal.SIGTERM, self._note)
-
-    def _note(self, *_: object) -> None:
-        self.asked = True
-        if self.executor is not None:
-            self.executor.stop()
-
-    def raise_if_asked(self) -> None:
-        if self.asked:
-            raise ConfigurationError("it was asked to stop before it moved; ask again")
+        return Look(
+            arm=self.arm,
+            pose=self._here,
+            there=self._there,
+            said=self._said,
+            approach=float(self.to_start.times[-1]),
+            refused=refusal(lambda: self._executor.check(self.plan)),
+            approach_refused=refusal(self.check_way),
+        )
 
 
 def drive(request: Request, plan: Plan, folder: Path) -> DriverResult:
     """Make one motion, or look; write what came of it."""
-    stop = _Stop()
-    moved = False
+    executor: Executor | None = None
+    asked_to_stop = moved = False
+
+    def stop(*_: object) -> None:
+        nonlocal asked_to_stop
+        asked_to_stop = True
+        if executor is not None:
+            executor.stop()
+
+    signal.signal(signal.SIGTERM, stop)  # whenever it comes
     try:
-        stop.executor = executor = make_executor(request.arm)
+        executor = make_executor(request.arm)
         try:
-            prepared = _prepare(executor, plan, request)
+            prepared = _Prepared(executor, plan, request)
             if request.motion == "look":
-                said = msgspec.json.encode(_look(executor, prepared))
-                (folder / LOOK_FILE).write_bytes(said)
+                (folder / LOOK_FILE).write_bytes(msgspec.json.encode(prepared.look()))
                 return DriverResult("done")
             motions = prepared.motions()
             if prepared.plan is not motions[0]:
@@ -309,7 +284,8 @@ def drive(request: Request, plan: Plan, folder: Path) -> DriverResult:
             for motion in motions:
                 executor.check(motion)
             for motion in motions:
-                stop.raise_if_asked()
+                if asked_to_stop:
+                    raise ConfigurationError("it was asked to stop before it moved; ask again")
                 print(f"{prepared.arm.model} moves for {motion.times[-1]:.2f} s", flush=True)
                 moved_before, moved = moved, True  # whatever happens now, it may have
                 path = executor.run(motion)
