@@ -310,6 +310,7 @@ def test_degrees_are_refused():
         {"ranges": (("gripper", 0.0, np.nan),)},
         {"errors": (("percent", 0.0, 5.0),)},
         {"errors": (("percent", 5.0, np.nan),)},
+        {"errors": (("percent", np.inf, 5.0),)},
     ],
 )
 def test_settings_are_checked(values):

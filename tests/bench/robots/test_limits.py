@@ -43,6 +43,7 @@ def test_velocity_of_an_fr3_is_zero_at_and_beyond_its_stop():
         {"upper": np.full(7, -9.0)},
         {"joint_names": ("a",) * 7},
         {"acceleration": "fast"},
+        {"chain": robot_limits("ur5e").chain},
     ],
 )
 def test_given_limits_are_checked(change):

@@ -67,6 +67,13 @@ def test_a_rate_that_makes_another_motion_is_refused(plan, tmp_path, rate):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize("rate", [0.0, -80.0, 2e5, float("nan")])
+def test_a_rate_that_no_arm_has_is_refused(plan, tmp_path, rate):
+    with pytest.raises(InvalidPlanError, match="samples a second up to 100000, got"):
+        write_plan(plan, tmp_path / "odd.npz", rate=rate)
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.mark.parametrize("rate", [33.0, 80.0, 101.0, 1000.0])
 def test_a_motion_at_another_rate_is_the_same_motion(plan, tmp_path, rate):
     back = read_plan(write_plan(plan, tmp_path / "other.npz", rate=rate).path)
@@ -152,6 +159,15 @@ def test_unknown_suffix(plan, tmp_path):
     with pytest.raises(ConfigurationError, match=r"\.npz, \.csv or \.json"):
         write_plan(plan, tmp_path / "plan.xlsx")
     assert write_plan(plan, tmp_path / "plan", format="csv").path.name == "plan"
+
+
+def test_a_file_of_another_version_is_no_plan(plan, tmp_path):
+    with np.load(write_plan(plan, tmp_path / "plan.npz").path) as archive:
+        parts = {**archive}
+    metadata = json.loads(str(parts["metadata"])) | {"version": 2}
+    np.savez(tmp_path / "later.npz", **parts | {"metadata": json.dumps(metadata)})
+    with pytest.raises(FileFormatError, match="written as prior-reinforce plan 2"):
+        read_plan(tmp_path / "later.npz")
 
 
 def test_missing_plan(tmp_path):

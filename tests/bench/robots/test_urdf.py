@@ -78,6 +78,8 @@ def test_the_flange_may_be_named_and_else_is_behind_the_last_turning_joint(tmp_p
     np.testing.assert_allclose(tool_tip(read_urdf(path, "link3").chain, np.zeros(2)), [0, 0, 3])
     with pytest.raises(FileFormatError, match="finger is prismatic"):
         read_urdf(path, "tip")
+    with pytest.raises(FileFormatError, match="no joint turns between the base and link0"):
+        read_urdf(path, "link0")
     with pytest.raises(ConfigurationError, match="no link 'hand'; it has link0, link1"):
         read_urdf(path, "hand")
 
@@ -209,6 +211,7 @@ def test_a_urdf_that_lacks_a_character_is_refused_or_is_the_same_arm(tmp_path):
         ('name="b" type', 'name="a" type', "two joints are called a"),
         ('type="continuous"', 'type="continous"', "joint b has no type, or none of"),
         ("</joint></robot>", '<mimic joint="a"/></joint></robot>', "joint b follows another"),
+        ("</joint></robot>", '<axis xyz="0 0 1"/></joint></robot>', "joint b has two <axis>"),
         ("<robot", "<!DOCTYPE robot><robot", "it has a DOCTYPE"),
     ],
 )

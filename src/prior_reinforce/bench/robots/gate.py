@@ -13,19 +13,26 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
+import msgspec
 import numpy as np
 from jaxtyping import Float
 
 from prior_reinforce.bench.robots.kinematics import tool_tip
 from prior_reinforce.bench.robots.limits import RobotLimits, match_joints, missing_joints
-from prior_reinforce.bench.robots.report import Check, LimitLine, LimitReport, Samples, Times
+from prior_reinforce.bench.robots.report import (
+    LimitLine,
+    LimitReport,
+    Samples,
+    Times,
+    worst_place,
+)
 from prior_reinforce.errors import ConfigurationError, InvalidPlanError
 from prior_reinforce.plans.interpolation import RATE, join_frames
 from prior_reinforce.plans.motions import Demonstrations, Plan
 from prior_reinforce.plans.signals import REST_SPEED
-from prior_reinforce.settings import Checked
+from prior_reinforce.settings import Checked, NonNegative, Positive
 
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
@@ -57,6 +64,7 @@ _NO_BOX = (
     "no box given, so the tool tip is not checked: set tool_tip, workspace_low and workspace_high "
     "in [gate]"
 )
+_NONE_SHOWN = "no demonstrations given"
 _RATE = "{joint} at {value:.4g} {unit}, {percent:.0f} % of {limit:.4g}"
 _AT = ", at {time:.3f} s"
 _RESTS = ("rest at start", "rest at end")
@@ -71,17 +79,17 @@ Ends = Float[np.ndarray, " d"]
 class GateSettings(Checked):
     """Where the gate draws the lines that no maker publishes, and the box for the tool tip."""
 
-    warn_above: float = 0.95
+    warn_above: Annotated[float, msgspec.Meta(gt=0, le=1)] = 0.95
     """Share of a velocity, acceleration or jerk limit from which on the gate warns. Ours: a
     delayed cycle makes the robot extrapolate, which costs a few per cent of acceleration."""
-    position_margin: float = 0.02
+    position_margin: NonNegative = 0.02
     """Distance from a joint's end that warns, in [rad]. Ours: about one degree."""
-    rest_speed: float = REST_SPEED["rad"]
+    rest_speed: NonNegative = REST_SPEED["rad"]
     """Speed over the first and the last frame's interval that is no rest any more, in [rad/s].
     Ours: the makers ask for exactly 0; a smooth start recorded at 30 frames/s shows 0.02. The jerk
     of the step into the hold is stricter where frames are close: at 80 frames/s, 0.05 rad/s asks
     for 14 000 rad/s^3."""
-    beyond_warn: float = 0.1
+    beyond_warn: NonNegative = 0.1
     """How far beyond the demonstrations' band warns, as a share of the joint's demonstrated
     range. Ours."""
     beyond_refuse: float = 0.5
@@ -97,13 +105,13 @@ class GateSettings(Checked):
     """Lowest corner that the tool tip may reach, [m], base frame; None leaves the box unchecked."""
     box_high: tuple[float, float, float] | None = None
     """Highest corner that the tool tip may reach, [m], base frame."""
-    start_error: float = 0.02
+    start_error: Positive = 0.02
     """How far a joint may stand from a plan's first frame when it is to begin, [rad]. Ours: about
     one degree, and what the FR3's interface refuses by itself is less."""
-    tracking_error: float = 0.01
+    tracking_error: Positive = 0.01
     """Distance of the executed from the planned motion, root mean square, [rad], from which on a
     reading is warned of. Ours: good servos stay below 4 mrad, one that lags 100 ms is at 90."""
-    errors: tuple[tuple[str, float, float], ...] = ()
+    errors: tuple[tuple[str, Positive, Positive], ...] = ()
     """The same two for columns in other units: unit, at the start, on the way; see `errors_of`."""
     tool_tip: tuple[float, float, float] | None = None
     """Tool tip in the flange's frame of the maker's kinematics, [m]; the Franka hand's frame is
@@ -121,40 +129,26 @@ class GateSettings(Checked):
             ConfigurationError: A value of another type or outside its range, or half a box.
         """
         super().__post_init__()
-        if not (0 < self.warn_above <= 1 and 0 <= self.beyond_warn <= self.beyond_refuse):
+        if self.beyond_warn > self.beyond_refuse:
             raise ConfigurationError(
-                "warn_above must be within (0, 1] and beyond_warn at most beyond_refuse, got "
-                f"{self.warn_above}, {self.beyond_warn} and {self.beyond_refuse}"
-            )
-        if not (self.start_error > 0 and self.tracking_error > 0):
-            raise ConfigurationError(
-                "start_error and tracking_error must be more than 0, got "
-                f"{self.start_error} and {self.tracking_error}"
+                f"beyond_warn must be at most beyond_refuse, got {self.beyond_warn} and "
+                f"{self.beyond_refuse}"
             )
         for unit, *both in self.errors:
-            if not all(0 < error < math.inf for error in both):
-                raise ConfigurationError(f"errors must be more than 0, got {both} for {unit}")
-        if not (self.position_margin >= 0 and self.rest_speed >= 0):
-            raise ConfigurationError(
-                "position_margin and rest_speed must be 0 or more, got "
-                f"{self.position_margin} and {self.rest_speed}"
-            )
+            if not all(map(math.isfinite, both)):
+                raise ConfigurationError(f"errors must be finite, got {both} for {unit}")
         for name, low, high in self.ranges:
-            if not (math.isfinite(low) and math.isfinite(high) and low < high):
+            if not -math.inf < low < high < math.inf:
                 raise ConfigurationError(
                     f"ranges must be [name, low, high] with low < high, got {name}, {low}, {high}"
                 )
-        tip = (0.0, 0.0, 0.0) if self.tool_tip is None else self.tool_tip
-        if len(tip) != 3 or not np.all(np.isfinite(tip)):
+        if not np.all(np.isfinite(self.tool_tip or 0.0)):
             raise ConfigurationError(f"tool_tip must be three numbers in [m], got {self.tool_tip}")
-        if self.box_low is None and self.box_high is None:
-            return
-        if self.box_low is None or self.box_high is None:
+        if (self.box_low is None) != (self.box_high is None):
             raise ConfigurationError("a box for the tool tip needs both corners: give low and high")
-        box = np.array([self.box_low, self.box_high], dtype=float)
-        if box.shape != (2, 3) or not np.all(box[0] < box[1]):
+        if self.box_low and self.box_high and not np.all(np.less(self.box_low, self.box_high)):
             raise ConfigurationError(
-                f"the box must have low < high in x, y and z, got {box.tolist()}"
+                f"the box must have low < high in x, y and z, got {self.box_low}, {self.box_high}"
             )
 
 
@@ -203,17 +197,16 @@ def check_plan(
     lines = [_joints(plan, limits, columns, settings.absent_joints)]
     with np.errstate(all="ignore"):  # what is no number refuses
         if columns:
-            checks = _motion(plan, limits, columns, demonstrations, settings)
-            lines += [check.line() for check in checks]
+            lines += _motion(plan, limits, columns, demonstrations, settings)
         else:
             why = f"the plan has no column named like {limits.joint_names[0]}"
             names = ("position", "velocity", "acceleration", "jerk", *_RESTS)
             lines += [_unchecked(name, why) for name in names]
         lines += _channels(plan, columns, demonstrations, settings)
         if demonstrations is None:
-            lines.append(_unchecked("demonstrations", "no demonstrations given"))
+            lines.append(_unchecked("demonstrations", _NONE_SHOWN))
         else:
-            lines.append(_distance(plan, demonstrations, settings).line())
+            lines.append(_distance(plan, demonstrations, settings))
         lines.append(_box(plan, limits, columns, settings))
     return LimitReport(limits.robot, limits.firmware, limits.source, tuple(lines))
 
@@ -249,7 +242,7 @@ def _motion(
     columns: dict[int, int],
     shown: Demonstrations | None,
     settings: GateSettings,
-) -> list[Check]:
+) -> list[LimitLine]:
     """Position, velocity, acceleration, jerk, and rest at either end."""
     rows, picked = list(columns), list(columns.values())
     joints = [limits.joint_names[row] for row in rows]
@@ -265,37 +258,35 @@ def _motion(
     speed = np.where(np.abs(dq) < 1e-6, 0.0, np.abs(dq))
     here = " at that position" if limits.envelopes else ""
     near = 1 - settings.position_margin
-    checks = [
+    lines = [
         _range("position", "rad", joints, t, q, limits.lower[rows], limits.upper[rows], near),
-        Check("velocity", "rad/s", _RATE + here + _AT, joints, t, speed, bound, warn),
+        worst_place("velocity", "rad/s", _RATE + here + _AT, joints, t, speed, bound, warn),
     ]
     largest = limits.velocity / _FULL_SPEED_WITHIN
     for name, unit, rates in (
         ("acceleration", "rad/s^2", _accelerations),
         ("jerk", "rad/s^3", _jerks),
     ):
-        published = getattr(limits, name)
-        if published is not None:
-            limit, warns, says = published[rows], np.full(len(rows), warn), _RATE + _AT
-        elif shown is None:
-            limit, warns = largest[rows], np.full(len(rows), warn)
+        published, warns, says = getattr(limits, name), warn, _RATE + _AT
+        largest = largest if published is None else published
+        limit = largest[rows]
+        if published is None and shown is None:
             says = f"no limit is known; {_RATE}, allowed without demonstrations{_AT}"
-        else:
+        elif published is None and shown is not None:
             splines = [join_frames(p[:, picked], shown.format.dt) for p in shown.plans]
             most = np.max([rates(each)[1].max(axis=0) for each in splines], axis=0)
-            most = np.clip(most, _FLOOR * largest[rows], largest[rows])
-            limit = np.minimum(_REFUSED_BEYOND_SHOWN * most, largest[rows])
+            most = np.clip(most, _FLOOR * limit, limit)
+            limit = np.minimum(_REFUSED_BEYOND_SHOWN * most, limit)
             warns = np.minimum(_WARNED_BEYOND_SHOWN * most / limit, warn)
             says = f"no limit is known; {_RATE}, allowed after the demonstrations{_AT}"
-        checks.append(Check(name, unit, says, joints, *rates(spline), limit, warns))
-        largest = (largest if published is None else published) / _FULL_ACCELERATION_WITHIN
+        lines.append(worst_place(name, unit, says, joints, *rates(spline), limit, warns))
+        largest = largest / _FULL_ACCELERATION_WITHIN
     # The spline brings the arm to rest at either end in any case; what this measures is whether the
     # plan itself does, or leaves the braking to the step where the pose is held.
     steps = np.abs(np.diff(spline(spline.x[[0, 1, -2, -1]]), axis=0))[[0, 2]] / dt
-    rest, says = np.full(len(rows), settings.rest_speed), "{joint} moves at {value:.3g} {unit}, "
-    says += "less than {limit:g} counts as rest"
-    return checks + [
-        Check(name, "rad/s", says, joints, np.array([time]), step[None], rest)
+    says = "{joint} moves at {value:.3g} {unit}, less than {limit:g} counts as rest"
+    return lines + [
+        worst_place(name, "rad/s", says, joints, np.array([time]), step[None], settings.rest_speed)
         for name, time, step in zip(_RESTS, (0.0, end), steps, strict=True)
     ]
 
@@ -308,48 +299,44 @@ def _channels(
     Ranges are those of the settings, else the demonstrations' with a margin; speeds are held
     against the demonstrations' largest as unpublished accelerations are.
     """
-    form = plan.format
+    form, names = plan.format, np.array(plan.format.names)
     given = {name: (low, high) for name, low, high in settings.ranges}
     if unknown := given.keys() - {*form.names}:
         raise ConfigurationError(
             f"ranges names {', '.join(sorted(unknown))}, and columns are {', '.join(form.names)}"
         )
-    others = [i for i in range(len(form.names)) if i not in columns.values()]
-    ranged = [
-        i
-        for i, name in enumerate(form.names)
-        if name in given or (shown is not None and i in others)
-    ]
+    others = ~np.isin(np.arange(len(names)), list(columns.values()))
+    ranged = np.isin(names, list(given)) | (others & (shown is not None))
     spline = join_frames(plan.actions, form.dt)
     t, lines = _instants(spline), list[LimitLine]()
-    low, high = np.zeros((2, len(form.names)))
+    low, high = np.zeros((2, len(names)))
     if shown is not None:
         low, high = shown.plans.min(axis=(0, 1)), shown.plans.max(axis=(0, 1))
         margin = _RANGE_MARGIN * _span(low, high)
         low, high = low - margin, high + margin
     for name, ends in given.items():
-        low[form.names.index(name)], high[form.names.index(name)] = ends
-    if ranged:
+        low[names == name], high[names == name] = ends
+    if ranged.any():
         says = "{joint} at {value:.4g} {unit}, {margin:.3g} {within} its end {limit:.4g} ("
         says += f"of [gate] ranges, or as demonstrated and {_RANGE_MARGIN:.0%} more)"
-        names, units = ([of[i] for i in ranged] for of in (form.names, form.units))
+        units, own = (np.array(of)[ranged].tolist() for of in (form.units, form.names))
         slack = 1e-9 * (high - low)  # a gripper that is closed stands at its end
         low, high, q = (low - slack)[ranged], (high + slack)[ranged], spline(t)[:, ranged]
-        lines.append(_range("range", units, names, t, q, low, high, says=says).line())
-    elif others:
-        lines.append(_unchecked("range", "no demonstrations given"))
-    if shown is not None and others:
+        lines.append(_range("range", units, own, t, q, low, high, says=says))
+    elif others.any():
+        lines.append(_unchecked("range", _NONE_SHOWN))
+    if shown is not None and others.any():
         splines = [join_frames(each, shown.format.dt) for each in shown.plans]
         most = np.max([np.abs(each(_instants(each), 1)).max(axis=0) for each in splines], axis=0)
         limit = np.maximum(_REFUSED_BEYOND_SHOWN * most, margin / form.dt)[others]  # or noise
         says = f"{_RATE}, {_REFUSED_BEYOND_SHOWN:g} times what was demonstrated{_AT}"
-        names = [form.names[i] for i in others]
-        units = [f"{form.units[i]}/s" for i in others]
+        units, own = (np.array(of)[others].tolist() for of in (form.units, form.names))
+        units = [f"{unit}/s" for unit in units]
         warn = _WARNED_BEYOND_SHOWN / _REFUSED_BEYOND_SHOWN
         speed = np.abs(spline(t, 1))[:, others]
-        lines.append(Check("speed", units, says, names, t, speed, limit, warn).line())
-    elif others:
-        lines.append(_unchecked("speed", "no demonstrations given"))
+        lines.append(worst_place("speed", units, says, own, t, speed, limit, warn))
+    elif others.any():
+        lines.append(_unchecked("speed", _NONE_SHOWN))
     return lines
 
 
@@ -368,11 +355,11 @@ def _range(
     high: Ends,
     warn: float = 1.0,
     says: str = "{joint} at {value:.3f} {unit}, {margin:.3f} {within} its end {limit:.3f}",
-) -> Check:
+) -> LimitLine:
     """Values between two ends; a range is used up by how near an end is, in its unit."""
     limit = np.where(values - low < high - values, low, high)
     used = 1 - np.minimum(values - low, high - values)
-    return Check(name, unit, says + _AT, joints, t, values, limit, warn, used)
+    return worst_place(name, unit, says + _AT, joints, t, values, limit, warn, used)
 
 
 def _instants(spline: CubicSpline) -> Times:
@@ -419,7 +406,7 @@ def _jerks(spline: CubicSpline) -> tuple[Times, Samples]:
     return np.clip(late, 0, end), np.abs(jerk)
 
 
-def _distance(plan: Plan, demonstrations: Demonstrations, settings: GateSettings) -> Check:
+def _distance(plan: Plan, demonstrations: Demonstrations, settings: GateSettings) -> LimitLine:
     """Distance from the demonstrations' envelope, as a share of each column's demonstrated range.
 
     The envelope is the band between the lowest and the highest demonstration at each frame; for a
@@ -435,16 +422,8 @@ def _distance(plan: Plan, demonstrations: Demonstrations, settings: GateSettings
     if not beyond.any():
         says = "within the band of the demonstrations at every frame"
     limit = max(settings.beyond_refuse, 1e-12)
-    return Check(
-        "demonstrations",
-        "1",
-        says,
-        form.names,
-        plan.times,
-        beyond,
-        np.full(len(form.names), limit),
-        settings.beyond_warn / limit,
-    )
+    warn = settings.beyond_warn / limit
+    return worst_place("demonstrations", "1", says, form.names, plan.times, beyond, limit, warn)
 
 
 def _box(
@@ -465,7 +444,7 @@ def _box(
     what = "flange" if settings.tool_tip is None else "tool tip"
     says = f"{what} at {{joint}} = {{value:.3f}} {{unit}}, {{margin:.3f}} {{within}} the box's "
     low, high = np.array(settings.box_low, float), np.array(settings.box_high, float)
-    line = _range("box", "m", "xyz", t, tip, low, high, says=says + "{limit:.3f}").line()
+    line = _range("box", "m", "xyz", t, tip, low, high, says=says + "{limit:.3f}")
     if settings.tool_tip is not None or line.status == "refuse":
         return line
     return replace(line, status="warn", text=f"{line.text}; the tool is not checked: set tool_tip")

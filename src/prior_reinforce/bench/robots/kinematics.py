@@ -17,10 +17,9 @@ JointPositions = Float[np.ndarray, "*n D"]
 """Positions of an arm's D joints, [rad]."""
 Places = Float[np.ndarray, "*n 3"]
 """As many points in the base frame, [m]."""
-
-
 Pose = tuple[float, float, float, float, float, float]
 """x, y, z in [m] and roll, pitch, yaw in [rad], as in URDF: R = Rz(yaw) Ry(pitch) Rx(roll)."""
+_Z = (0.0, 0.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -49,7 +48,7 @@ class Chain:
         origins = tuple(
             (a, -math.sin(alpha) * d, math.cos(alpha) * d, alpha, 0.0, 0.0) for a, d, alpha in rows
         )
-        return cls(origins, (_Z,) * len(rows), (0.0, 0.0, flange, 0.0, 0.0, 0.0))
+        return cls(origins, (_Z,) * len(rows), flange=(0.0, 0.0, flange, 0.0, 0.0, 0.0))
 
     @classmethod
     def standard(cls, rows: Sequence[tuple[float, float, float]], yaw: float = 0.0) -> Chain:
@@ -64,54 +63,33 @@ class Chain:
         return cls((base, *poses[:-1]), (_Z,) * len(rows), poses[-1])
 
 
-_Z = (0.0, 0.0, 1.0)
-
-
-def tool_tip(
-    chain: Chain, joints: JointPositions, tip: Sequence[float] = (0.0, 0.0, 0.0)
-) -> Places:
-    """Return where a point that is fixed to the flange is, in the base frame.
-
-    `tip` is the point in the flange's frame, in [m].
-    """
+def tool_tip(chain: Chain, joints: JointPositions, tip: Sequence[float] = (0.0,) * 3) -> Places:
+    """Return where a point of the flange's frame, `tip` in [m], is in the base frame."""
     place = _moved(chain.flange, np.broadcast_to(tip, (*joints.shape[:-1], 3)))
     # From the flange back to the base, each joint turns the point and its origin moves it.
     for index in reversed(range(len(chain.origins))):
         axis = np.array(chain.axes[index])
         cos, sin = np.cos(joints[..., index, None]), np.sin(joints[..., index, None])
         along = (place @ axis)[..., None] * axis
-        place = _moved(
-            chain.origins[index], along + cos * (place - along) + sin * np.cross(axis, place)
-        )
+        turned = along + cos * (place - along) + sin * np.cross(axis, place)
+        place = _moved(chain.origins[index], turned)
     return place
 
 
 def link_places(chain: Chain, joints: JointPositions) -> Float[np.ndarray, "*n links 3"]:
-    """Return where the base, every joint's frame and the flange are, in the base frame: the arm.
-
-    Args:
-        chain: The arm.
-        joints: Joint positions.
-    """
-    at, turn = np.zeros((*joints.shape[:-1], 3)), np.eye(3)
-    places = [at]
-    for index, (origin, axis) in enumerate(zip(chain.origins, chain.axes, strict=True)):
-        at = at + turn @ np.array(origin[:3])
-        places.append(at)
-        # Rodrigues' formula: R = I + sin K + (1 - cos) K^2, with K the axis as a cross product.
-        cross = np.cross(np.eye(3), np.array(axis))
-        angle = joints[..., index, None, None]
-        turning = np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * (cross @ cross)
-        turn = turn @ rotation(*origin[3:]) @ turning
-    places.append(at + turn @ np.array(chain.flange[:3]))
-    return np.stack(places, axis=-2)
+    """Return where the base, every joint's frame and the flange are, in the base frame: the arm."""
+    # A joint's frame stands behind those before it as the flange behind all.
+    ends = (*chain.origins, chain.flange)
+    before = [Chain(ends[:n], chain.axes[:n], flange=end) for n, end in enumerate(ends)]
+    base = np.zeros((*joints.shape[:-1], 3))
+    return np.stack([base, *(tool_tip(each, joints) for each in before)], axis=-2)
 
 
 def rotation(roll: float, pitch: float, yaw: float) -> Float[np.ndarray, "3 3"]:
     """Return Rz(yaw) Ry(pitch) Rx(roll), angles in [rad]."""
-    cr, sr, cp, sp, cy, sy = (
-        f(angle) for angle in (roll, pitch, yaw) for f in (math.cos, math.sin)
-    )
+    cr, sr = math.cos(roll), math.sin(roll)
+    cp, sp = math.cos(pitch), math.sin(pitch)
+    cy, sy = math.cos(yaw), math.sin(yaw)
     return np.array(
         [
             [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],

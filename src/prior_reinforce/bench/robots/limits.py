@@ -75,9 +75,8 @@ class RobotLimits:
             raise ConfigurationError(
                 f"limits of {self.robot} need joint names that differ, got {self.joint_names}"
             )
-        for name in ("lower", "upper", "velocity", "acceleration", "jerk"):
-            if getattr(self, name) is None and name in ("acceleration", "jerk"):
-                continue
+        published = [n for n in ("acceleration", "jerk") if getattr(self, n) is not None]
+        for name in ("lower", "upper", "velocity", *published):
             values = _per_joint(self.robot, name, getattr(self, name), d)
             object.__setattr__(self, name, values)
             if name not in ("lower", "upper") and np.any(values <= 0):
@@ -124,11 +123,7 @@ def is_joint(column: str, joint: str) -> bool:
 
 
 def match_joints(format: PlanFormat, limits: RobotLimits) -> dict[int, int]:
-    """Match a plan's columns to a robot's joints: by name, never guessed.
-
-    Args:
-        format: Of the plan; its columns are held against `is_joint`.
-        limits: Of the robot.
+    """Match a plan's columns to a robot's joints: by name (`is_joint`), never guessed.
 
     Returns:
         Column of the plan by index of the robot's joint, for the joints that have one.

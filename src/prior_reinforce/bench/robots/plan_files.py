@@ -11,11 +11,10 @@ from __future__ import annotations
 import csv
 import io
 import json
-import math
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, cast, get_args
+from typing import Literal, cast, get_args
 
 import numpy as np
 
@@ -26,10 +25,8 @@ from prior_reinforce.errors import (
     WorkspaceError,
 )
 from prior_reinforce.files import as_cell, open_npz, sha256, write_once
+from prior_reinforce.plans.interpolation import interpolate
 from prior_reinforce.plans.motions import Plan, PlanFormat
-
-if TYPE_CHECKING:
-    from prior_reinforce.plans.interpolation import FineMotion
 
 PlanFileFormat = Literal["npz", "csv", "json"]
 _FILE_FORMAT = "prior-reinforce plan"
@@ -79,9 +76,8 @@ def write_plan(
 ) -> PlanFile:
     """Write a plan, durable and read-only; the suffix gives the format unless `format` does.
 
-    Nothing is held against a robot's limits: call `check_plan(plan, ...).require()` before.
-
-    The same plan always gives the same bytes, and so the same hash.
+    Nothing is held against a robot's limits: call `check_plan(plan, ...).require()` before. The
+    same plan always gives the same bytes, and so the same hash.
 
     Args:
         plan: The plan.
@@ -99,9 +95,8 @@ def write_plan(
     kind = check_plan_path(path, format=format, rate=rate)
     if rate is not None:
         _check_rate(plan, rate)
-    content = _encode(plan, kind, rate=rate)
-    write_once(path, content)
-    return PlanFile(path, sha256(content))
+    content = _encode(plan, kind, rate)
+    return PlanFile(write_once(path, content), sha256(content))
 
 
 def check_plan_path(
@@ -141,10 +136,8 @@ def read_plan(path: str | os.PathLike[str], *, sha256: str | None = None) -> Pla
         raise FileFormatError(f"no plan at {path}; give the path of an .npz plan file")
     if sha256 is not None:
         PlanFile(path, sha256).verify()
-    remedy = "it must be a plan file; write one with write_plan or `export`"
-    with open_npz(path, remedy) as archive:
-        q = np.array(archive["q"])
-        metadata = json.loads(str(archive["metadata"]))
+    with open_npz(path, "it must be a plan file; write one with write_plan or `export`") as archive:
+        q, metadata = np.array(archive["q"]), json.loads(str(archive["metadata"]))
         if metadata["file_format"] != _FILE_FORMAT or metadata["version"] != _FILE_VERSION:
             raise ValueError(f"written as {metadata['file_format']} {metadata['version']}")
         names, units = tuple(metadata["joint_names"]), tuple(metadata["units"])
@@ -153,8 +146,6 @@ def read_plan(path: str | os.PathLike[str], *, sha256: str | None = None) -> Pla
 
 def _check_rate(plan: Plan, rate: float) -> None:
     """Refuse a rate whose samples, joined as frames are, give another motion than was checked."""
-    from prior_reinforce.plans.interpolation import interpolate
-
     same = interpolate(plan.actions, plan.format.dt)
     samples = interpolate(plan.actions, plan.format.dt, rate=rate).q
     again = interpolate(samples, 1 / rate)
@@ -167,73 +158,41 @@ def _check_rate(plan: Plan, rate: float) -> None:
         )
 
 
-def _encode(plan: Plan, format: PlanFileFormat, *, rate: float | None = None) -> bytes:
+def _encode(plan: Plan, format: PlanFileFormat, rate: float | None) -> bytes:
     """The bytes of a plan's file, the same for the same plan."""
-    from prior_reinforce.plans.interpolation import FineMotion, interpolate
-
+    dt = 1 / rate if rate else plan.format.dt
     fine = interpolate(plan.actions, plan.format.dt, rate=rate or 1 / plan.format.dt)
+    t, q, dq, ddq = fine.t, fine.q, fine.dq, fine.ddq
     if rate is None:
         # On the frames themselves the spline is exact to rounding; write them as they are.
-        fine = FineMotion(plan.times, np.array(plan.actions), fine.dq, fine.ddq, fine.dddq)
+        t, q = plan.times, plan.actions
+    names = plan.format.names
     if format == "npz":
-        return _as_npz(plan, fine, 1 / rate if rate else plan.format.dt)
-    return _as_csv(plan.format, fine) if format == "csv" else _as_json(plan.format, fine)
-
-
-def _as_npz(plan: Plan, fine: FineMotion, dt: float) -> bytes:
-    metadata = {
-        "file_format": _FILE_FORMAT,
-        "version": _FILE_VERSION,
-        "joint_names": plan.format.names,
-        "units": plan.format.units,
-        "dt": dt,
-    }
-    buffer = io.BytesIO()
-    # numpy stamps every member with the same date, so the bytes depend on the plan alone.
-    np.savez(
-        buffer,
-        t=fine.t,
-        q=fine.q,
-        dq=fine.dq,
-        ddq=fine.ddq,
-        metadata=np.array(json.dumps(metadata)),
-    )
-    return buffer.getvalue()
-
-
-def _as_csv(format: PlanFormat, fine: FineMotion) -> bytes:
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    prefixes = ("", "d_", "dd_")
-    names = (prefix + name for prefix in prefixes for name in format.names)
-    writer.writerow(["t", *map(as_cell, names)])
-    # repr of a float is the shortest text that reads back as the same number.
-    writer.writerows(
-        [repr(float(value)) for value in row]
-        for row in np.column_stack([fine.t, fine.q, fine.dq, fine.ddq])
-    )
-    return text.getvalue().encode()
-
-
-def _as_json(format: PlanFormat, fine: FineMotion) -> bytes:
-    message: dict[str, Any] = {
-        "header": {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""},
-        "joint_names": list(format.names),
-        "points": [
-            {
-                "positions": q.tolist(),
-                "velocities": dq.tolist(),
-                "accelerations": ddq.tolist(),
-                "effort": [],
-                "time_from_start": _duration(float(t)),
-            }
-            for t, q, dq, ddq in zip(fine.t, fine.q, fine.dq, fine.ddq, strict=True)
-        ],
-    }
+        metadata = {"file_format": _FILE_FORMAT, "version": _FILE_VERSION, "joint_names": names}
+        metadata |= {"units": plan.format.units, "dt": dt}
+        npz = io.BytesIO()
+        # numpy stamps every member with the same date, so the bytes depend on the plan alone.
+        np.savez(npz, t=t, q=q, dq=dq, ddq=ddq, metadata=np.array(json.dumps(metadata)))
+        return npz.getvalue()
+    if format == "csv":
+        text = io.StringIO()
+        writer = csv.writer(text, lineterminator="\n")
+        heads = (prefix + name for prefix in ("", "d_", "dd_") for name in names)
+        writer.writerow(["t", *map(as_cell, heads)])
+        # Each number is the shortest text that reads back as the same one.
+        writer.writerows(np.column_stack([t, q, dq, ddq]).tolist())
+        return text.getvalue().encode()
+    times = [divmod(round(seconds * 1e9), 10**9) for seconds in t.tolist()]
+    points = [
+        {
+            "positions": q[k].tolist(),
+            "velocities": dq[k].tolist(),
+            "accelerations": ddq[k].tolist(),
+            "effort": [],
+            "time_from_start": {"sec": sec, "nanosec": nanosec},
+        }
+        for k, (sec, nanosec) in enumerate(times)
+    ]
+    header = {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""}
+    message = {"header": header, "joint_names": names, "points": points}
     return (json.dumps(message, indent=1) + "\n").encode()
-
-
-def _duration(seconds: float) -> dict[str, int]:
-    nanoseconds = round(seconds * 1e9)
-    whole = math.floor(nanoseconds / 1_000_000_000)
-    return {"sec": whole, "nanosec": nanoseconds - whole * 1_000_000_000}

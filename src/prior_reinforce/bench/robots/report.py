@@ -50,61 +50,53 @@ class LimitLine:
     """The same for a person, without the check's name."""
 
 
-@dataclass(frozen=True, eq=False)
-class Check:
-    """A quantity of a plan at T times for d joints, and what is allowed there."""
+def worst_place(
+    check: str,
+    unit: str | Sequence[str],
+    says: str,
+    joints: Sequence[str],
+    t: Times,
+    value: Samples,
+    limit: float | Float[np.ndarray, "*T d"],
+    warn: float | Float[np.ndarray, " d"] = 1.0,
+    used: Samples | None = None,
+) -> LimitLine:
+    """The worst place: of what refuses where anything does, else of what is nearest to warning.
 
-    name: str
-    """As in `LimitLine.check`."""
-    unit: str | Sequence[str]
-    """Unit of `value` and `limit`: one for all joints, or one each."""
-    says: str
-    """The line's text; `{joint}`, `{value}`, `{unit}`, `{limit}`, `{margin}`, `{percent}`, `{time}`
-    and `{within}` stand for those of the worst place."""
-    joints: Sequence[str]
-    """Names of the d joints or axes."""
-    t: Times
-    """From the plan's first frame."""
-    value: Samples
-    limit: Float[np.ndarray, "*T d"]
-    """Limit of `value` at each time, or of each joint."""
-    warn: float | Float[np.ndarray, " d"] = 1.0
-    """Share of a limit from which on it warns."""
-    used: Samples | None = None
-    """Share of the limit that is used, 1 and more being refused; None is value / limit."""
+    What is no number refuses.
 
-    def line(self) -> LimitLine:
-        """The worst place: of what refuses where anything does, else of what is nearest to warning.
-
-        What is no number refuses.
-        """
-        limits = np.broadcast_to(self.limit, self.value.shape)
-        used = self.used
-        if used is None:
-            used = np.where(self.value == 0, 0.0, self.value / np.maximum(limits, 1e-12))
-        refuses, warns = ~(used < 1), used > self.warn
-        status: Status = "refuse" if refuses.any() else "warn" if warns.any() else "pass"
-        worst = int(np.argmax(used if status == "refuse" else used - self.warn))
-        sample, joint = divmod(worst, len(self.joints))
-        value, limit = float(self.value[sample, joint]), float(limits[sample, joint])
-        beyond = bool(refuses[sample, joint])
-        margin = abs(limit - value) * (-1 if beyond else 1)
-        unit = self.unit if isinstance(self.unit, str) else self.unit[joint]
-        place = {"joint": self.joints[joint], "time": float(self.t[sample]), "unit": unit}
-        said = {"within": "beyond" if beyond else "within", "margin": abs(margin)}
-        percent = 100 * (value if unit == "1" else float(used[sample, joint]))
-        text = self.says.format(value=value, limit=limit, percent=percent, **said, **place)
-        return LimitLine(
-            check=self.name,
-            status=status,
-            value=value,
-            limit=limit,
-            margin=margin,
-            unit=unit,
-            joint=self.joints[joint],
-            time=float(self.t[sample]),
-            text=text,
-        )
+    Args:
+        check: As in `LimitLine`.
+        unit: Of `value` and `limit`: one for all joints, or one each.
+        says: The line's text; `{joint}`, `{value}`, `{unit}`, `{limit}`, `{margin}`, `{percent}`,
+            `{time}` and `{within}` stand for those of the worst place.
+        joints: Names of the d joints or axes.
+        t: From the plan's first frame.
+        value: Of each joint at each time.
+        limit: Of `value` at each time, of each joint, or of all.
+        warn: Share of a limit from which on it warns.
+        used: Share of the limit that is used, 1 and more being refused; None is value / limit.
+    """
+    limits = np.broadcast_to(limit, value.shape)
+    if used is None:
+        used = np.where(value == 0, 0.0, value / np.maximum(limits, 1e-12))
+    refuses, warns = ~(used < 1), used > warn
+    status: Status = "refuse" if refuses.any() else "warn" if warns.any() else "pass"
+    worst = used if status == "refuse" else used - warn
+    at, joint = divmod(int(np.argmax(worst)), len(joints))
+    distance, beyond = abs(float(limits[at, joint] - value[at, joint])), bool(refuses[at, joint])
+    place: dict[str, Any] = {
+        "value": float(value[at, joint]),
+        "limit": float(limits[at, joint]),
+        "unit": unit if isinstance(unit, str) else unit[joint],
+        "joint": joints[joint],
+        "time": float(t[at]),
+    }
+    percent = 100 * (place["value"] if unit == "1" else float(used[at, joint]))
+    within = "beyond" if beyond else "within"
+    text = says.format(**place, margin=distance, percent=percent, within=within)
+    margin = -distance if beyond else distance
+    return LimitLine(check=check, status=status, margin=margin, text=text, **place)
 
 
 @dataclass(frozen=True)
@@ -162,9 +154,7 @@ class LimitReport:
     def as_json(self) -> dict[str, Any]:
         """Return the same as plain data, ready for `json.dumps`."""
         verdicts = {"refused": self.refused, "warned": self.warned, "unchecked": [*self.unchecked]}
-        lines = [asdict(line) for line in self.lines]
-        about = {"robot": self.robot, "firmware": self.firmware, "source": self.source}
-        return about | verdicts | {"lines": lines}
+        return asdict(self) | verdicts
 
     def require(self) -> None:
         """Do nothing if the plan may leave.

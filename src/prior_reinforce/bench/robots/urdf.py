@@ -37,7 +37,7 @@ _ELSEWHERE = ("dynamics", "calibration")
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?", re.ASCII)
 _LENGTH_OF_AXIS = 0.01
 """By how much an axis may differ from length 1: two written digits."""
-_LONGEST_NAME = 200
+_LONGEST_NAME, _LONGEST_PROBLEM = 200, 400
 _ENDLESS = 4 * math.pi
 """What any joint may turn either way, in [rad]. Ours: two turns, since a throw that needs more is a
 wrong unit, and a range beyond it a lost decimal point."""
@@ -65,47 +65,36 @@ def read_urdf(path: Path, tip: str | None = None) -> RobotLimits:
         FileFormatError: No URDF, a damaged one, or one without such a chain.
         ConfigurationError: No such link, or a joint without limits.
     """
-    robot = _parsed(path)
-    joints = _joints(path, robot)
-    links, parent = _links(path, robot, joints), {joint.child: joint for joint in joints}
-    if tip is None:
-        tip = next((name for name in _TIPS if name in links), None) or _longest(path, links, parent)
-    elif tip not in links:
-        raise ConfigurationError(f"{path} has no link {tip!r}; it has {', '.join([*links][:40])}")
-    chain, link = list[_Joint](), tip
-    while link in parent:
-        chain.insert(0, parent[link])
-        link = chain[0].parent
-    turning = [joint for joint in chain if joint.type in _TURNING]
-    if not turning:
-        raise FileFormatError(f"{path}: no joint turns between the base and {tip}; say --tip")
-    for joint in chain:
-        if joint.type not in (*_TURNING, "fixed"):
-            raise FileFormatError(
-                f"{path}: {joint.name} is {joint.type}, and arms of turning joints are known only; "
-                "say --tip for a link before it"
-            )
-    lower, upper, velocity = (
-        np.array(values) for values in zip(*(joint.limits() for joint in turning), strict=True)
-    )
-    soft = any("safety_controller" in joint.parts for joint in turning)
-    return RobotLimits(
-        robot=robot.get("name") or path.stem,
-        firmware="any",
-        source=f"{path.name}, from {chain[0].parent} to {tip}" + ", soft limits too" * soft,
-        joint_names=tuple(joint.name for joint in turning),
-        lower=lower,
-        upper=upper,
-        velocity=velocity,
-        chain=_chain(chain),
-    )
+    if not path.is_file():
+        raise FileFormatError(f"no URDF at {path}; give the path of a .urdf file")
+    if path.name.endswith(".xacro"):
+        raise FileFormatError(f"{path} is a xacro; make a URDF of it: xacro {path} > arm.urdf")
+    try:
+        robot = ElementTree.parse(path, ElementTree.XMLParser(target=_Builder())).getroot()
+        joints = _joints(robot)
+        links = _links(robot, joints)
+    except (ElementTree.ParseError, OSError, ValueError, LookupError) as error:
+        problem = str(error)[:_LONGEST_PROBLEM]
+        raise FileFormatError(f"cannot read {path} as URDF: {problem}; export it again") from error
+    try:
+        chain = _joints_before(tip, joints, links)
+        turning = [joint for joint in chain if joint.type in _TURNING]
+        limits = np.array([joint.limits() for joint in turning])
+        kinematics = _chain(chain)
+    except (ConfigurationError, FileFormatError) as error:
+        raise type(error)(f"{path}: {error}") from error
+    source = f"{path.name}, from {chain[0].parent} to {chain[-1].child}"
+    source += ", soft limits too" * any("safety_controller" in joint.parts for joint in turning)
+    names = tuple(joint.name for joint in turning)
+    lower, upper, velocity = limits.T
+    name = robot.get("name") or path.stem
+    return RobotLimits(name, "any", source, names, lower, upper, velocity, chain=kinematics)
 
 
 @dataclass(frozen=True)
 class _Joint:
     """A joint of which every element and attribute is known."""
 
-    path: Path
     name: str
     type: str
     parts: dict[str, dict[str, str]]
@@ -119,12 +108,17 @@ class _Joint:
     def child(self) -> str:
         return self.parts["child"]["link"]
 
+    @property
+    def free(self) -> bool:
+        """Whether it turns by itself."""
+        return self.type in _TURNING and "mimic" not in self.parts
+
     def error(self, problem: str) -> ConfigurationError:
-        return ConfigurationError(f"{self.path}: joint {self.name} {problem}")
+        return ConfigurationError(f"joint {self.name} {problem}")
 
     def number(self, part: str, key: str) -> float | None:
         """One number; None where it is not said."""
-        return None if key not in self.parts.get(part, {}) else self.vector(part, key, 1)[0]
+        return self.vector(part, key, 1)[0] if key in self.parts.get(part, {}) else None
 
     def vector(self, part: str, key: str, n: int = 3) -> list[float]:
         """So many numbers; zeros where they are not said."""
@@ -183,107 +177,102 @@ class _Builder(ElementTree.TreeBuilder):
         raise ValueError("it has a DOCTYPE, which no URDF has")
 
 
-def _parsed(path: Path) -> ElementTree.Element:
-    """The file's XML, well formed."""
-    if not path.is_file():
-        raise FileFormatError(f"no URDF at {path}; give the path of a .urdf file")
-    if path.name.endswith(".xacro"):
-        raise FileFormatError(f"{path} is a xacro; make a URDF of it: xacro {path} > arm.urdf")
-    try:
-        robot = ElementTree.parse(path, ElementTree.XMLParser(target=_Builder())).getroot()
-    except (ElementTree.ParseError, OSError, ValueError, LookupError) as error:
-        raise _damaged(path, f"{error}"[:200]) from error
-    if robot.tag != "robot":
-        raise _damaged(path, f"it begins with <{robot.tag[:80]}>, not <robot>")
-    _refuse_text(path, robot, "robot")
-    return robot
-
-
-def _damaged(path: Path, problem: str) -> FileFormatError:
-    return FileFormatError(f"cannot read {path} as URDF: {problem}; export it again")
-
-
-def _refuse_text(path: Path, element: ElementTree.Element, where: str) -> None:
+def _refuse_text(element: ElementTree.Element, where: str) -> None:
     """Refuse text, which is an element that lacks its bracket."""
     for text in (element.text, *(part.tail for part in element)):
         if text and text.strip():
-            raise _damaged(path, f"text in {where}: {text.strip()[:80]!r}")
+            raise ValueError(f"text in {where}: {text.strip()[:80]!r}")
 
 
-def _name(path: Path, element: ElementTree.Element) -> str:
+def _name(element: ElementTree.Element) -> str:
     name = element.get("name", "")
     if not (name and name.isprintable() and len(name) <= _LONGEST_NAME):
-        raise _damaged(path, f"a <{element.tag}> has no name, or one that is none: {name[:80]!r}")
+        raise ValueError(f"a <{element.tag}> has no name, or one that is none: {name[:80]!r}")
     return name
 
 
-def _joints(path: Path, robot: ElementTree.Element) -> list[_Joint]:
+def _joints(robot: ElementTree.Element) -> list[_Joint]:
     """Every joint, with nothing in it that is unknown or said twice."""
+    if robot.tag != "robot":
+        raise ValueError(f"it begins with <{robot.tag[:80]}>, not <robot>")
+    _refuse_text(robot, "robot")
     found: dict[str, _Joint] = {}
     for element in robot.findall("joint"):
-        name, kind = _name(path, element), element.get("type", "")
-        _refuse_text(path, element, f"joint {name}")
+        name, kind = _name(element), element.get("type", "")
+        _refuse_text(element, f"joint {name}")
         if kind not in _TYPES or set(element.attrib) != {"name", "type"}:
-            raise _damaged(path, f"joint {name} has no type, or none of {', '.join(_TYPES)}")
+            raise ValueError(f"joint {name} has no type, or none of {', '.join(_TYPES)}")
         parts: dict[str, dict[str, str]] = {}
         for part in element:
             unknown = set(part.attrib) - _ATTRIBUTES.get(part.tag, set(part.attrib))
             if part.tag not in (*_ATTRIBUTES, *_ELSEWHERE) or unknown:
                 what = f"{min(unknown)[:80]} in <{part.tag}>" if unknown else f"<{part.tag[:80]}>"
-                raise _damaged(path, f"joint {name} has an unknown {what}")
+                raise ValueError(f"joint {name} has an unknown {what}")
             if part.tag in parts:
-                raise _damaged(path, f"joint {name} has two <{part.tag}>")
+                raise ValueError(f"joint {name} has two <{part.tag}>")
             parts[part.tag] = dict(part.attrib)
         if not all(parts.get(end, {}).get("link") for end in ("parent", "child")):
-            raise _damaged(path, f"joint {name} has no <parent link> or <child link>")
+            raise ValueError(f"joint {name} has no <parent link> or <child link>")
         if name in found:
-            raise _damaged(path, f"two joints are called {name}")
-        found[name] = _Joint(path, name, kind, parts)
+            raise ValueError(f"two joints are called {name}")
+        found[name] = _Joint(name, kind, parts)
     if not found:
-        raise FileFormatError(f"{path} is no URDF of an arm: it has no joint; export it again")
+        raise ValueError("it has no joint, and so is no arm")
     return list(found.values())
 
 
-def _links(path: Path, robot: ElementTree.Element, joints: list[_Joint]) -> dict[str, int]:
+def _links(robot: ElementTree.Element, joints: list[_Joint]) -> dict[str, int]:
     """How many joints turn between the root and each link; all links hang from one root."""
-    names = {_name(path, element) for element in robot.findall("link")}
+    names = {_name(element) for element in robot.findall("link")}
     moved = [joint.child for joint in joints]
     if len(names) < len(robot.findall("link")) or len(set(moved)) < len(moved):
-        raise _damaged(path, "two links have one name, or two joints move one link")
+        raise ValueError("two links have one name, or two joints move one link")
     behind: dict[str, list[_Joint]] = {name: [] for name in names}
     for joint in joints:
         for end in (joint.parent, joint.child):
             if end not in names:
-                raise _damaged(path, f"joint {joint.name} names {end[:80]!r}, which is no link")
+                raise ValueError(f"joint {joint.name} names {end[:80]!r}, which is no link")
         behind[joint.parent].append(joint)
     turning = dict.fromkeys(names.difference(moved), 0)
     if len(turning) != 1:
-        raise _damaged(path, f"{len(turning)} links hang from no joint instead of one")
+        raise ValueError(f"{len(turning)} links hang from no joint instead of one")
     reached = [*turning]
     for link in reached:
-        for joint in behind[link]:
-            free = joint.type in _TURNING and "mimic" not in joint.parts
-            turning[joint.child] = turning[link] + free
-            reached.append(joint.child)
+        turning |= {joint.child: turning[link] + joint.free for joint in behind[link]}
+        reached += [joint.child for joint in behind[link]]
     if len(turning) < len(names):
-        raise _damaged(path, "its joints form a loop")
+        raise ValueError("its joints form a loop")
     return turning
 
 
-def _longest(path: Path, turning: dict[str, int], parent: dict[str, _Joint]) -> str:
-    """The link behind the last turning joint of the chain that has most of them."""
-    most = max(turning.values())
-    moved = [
-        link
-        for link, n in turning.items()
-        if n == most > 0 and parent[link].type in _TURNING and "mimic" not in parent[link].parts
-    ]
-    if len(moved) != 1:
-        raise ConfigurationError(
-            f"{path} ends in {', '.join(moved[:40]) or 'no turning joint'}; say which link is the "
-            "flange with --tip"
-        )
-    return moved[0]
+def _joints_before(tip: str | None, joints: list[_Joint], links: dict[str, int]) -> list[_Joint]:
+    """The chain from the root to the flange: `tip`, or the link that `read_urdf` takes for it."""
+    moving = {joint.child: joint for joint in joints}
+    tip = next((name for name in _TIPS if name in links), None) if tip is None else tip
+    if tip is None:  # the link behind the last turning joint of the chain that has most of them
+        most = max(links.values())
+        last = [link for link, n in links.items() if n == most > 0 and moving[link].free]
+        if len(last) != 1:
+            raise ConfigurationError(
+                f"it ends in {', '.join(last[:40]) or 'no turning joint'}; say which link is the "
+                "flange with --tip"
+            )
+        tip = last[0]
+    if tip not in links:
+        raise ConfigurationError(f"it has no link {tip!r}; it has {', '.join([*links][:40])}")
+    chain, link = list[_Joint](), tip
+    while link in moving:
+        chain.insert(0, moving[link])
+        link = chain[0].parent
+    if not any(joint.type in _TURNING for joint in chain):
+        raise FileFormatError(f"no joint turns between the base and {tip}; say --tip")
+    for joint in chain:
+        if joint.type not in (*_TURNING, "fixed"):
+            raise FileFormatError(
+                f"{joint.name} is {joint.type}, and arms of turning joints are known only; "
+                "say --tip for a link before it"
+            )
+    return chain
 
 
 def _chain(joints: list[_Joint]) -> Chain:

@@ -26,6 +26,8 @@ from prior_reinforce.environment import Rollout
 from prior_reinforce.lab.arms.feetech import (
     GOAL_POSITION,
     HOMING_OFFSET,
+    MAX_LIMIT,
+    MIN_LIMIT,
     P_COEFFICIENT,
     PRESENT_POSITION,
     TORQUE_ENABLE,
@@ -76,10 +78,10 @@ class SimulatedSO101:
         model = self.task.model
         self._data = mujoco.MjData(model)
         mujoco.mj_forward(model, self._data)
-        ranges = [tuple(np.round(model.jnt_range[i] * _STEPS).astype(int)) for i in range(4)]
-        limits = [(2047 + int(low), 2047 + int(high)) for low, high in ranges]
-        self.servos = {i + 1: Servo(*ends) for i, ends in enumerate([*limits, (0, 4095), _GRIPPER])}
-        self._middle = np.array([sum(ends) / 2 for ends in [*limits, (0, 4095)]])
+        limits = (2047 + np.round(model.jnt_range[:4] * _STEPS)).astype(int).tolist()
+        ends = [*limits, (0, 4095), _GRIPPER]
+        self.servos = {i: Servo(low, high) for i, (low, high) in enumerate(ends, start=1)}
+        self._middle = np.array(ends[:5]).mean(axis=1)
         self._position = np.zeros(6)
         """Of each servo, in [rad] from the middle; of the gripper, from its closed end."""
         self._hand = np.empty((0, 5)) if demonstrations is None else _guided(demonstrations)
@@ -150,17 +152,16 @@ class SimulatedSO101:
 
     def calibration(self) -> dict[str, dict[str, int]]:
         """What LeRobot's calibration wrote down of these servos: the content of its file."""
+        names, servos = [*MOTORS, "gripper"], self.servos.values()
         return {
             motor: {
                 "id": identity,
                 "drive_mode": 0,
                 "homing_offset": servo.word(HOMING_OFFSET),
-                "range_min": servo.word(9),
-                "range_max": servo.word(11),
+                "range_min": servo.word(MIN_LIMIT),
+                "range_max": servo.word(MAX_LIMIT),
             }
-            for motor, (identity, servo) in zip(
-                [*MOTORS, "gripper"], self.servos.items(), strict=True
-            )
+            for motor, identity, servo in zip(names, self.servos, servos, strict=True)
         }
 
 

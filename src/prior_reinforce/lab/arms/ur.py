@@ -15,14 +15,13 @@ busy computer changes no path; otherwise cycles follow the clock.
 
 from __future__ import annotations
 
-import selectors
-import socket
+import asyncio
 import struct
 import sys
 import time
-from collections.abc import Callable
-from contextlib import suppress
-from dataclasses import dataclass, field
+from asyncio import StreamReader, StreamWriter
+from collections.abc import Awaitable, Callable
+from contextlib import ExitStack, suppress
 
 import numpy as np
 
@@ -48,7 +47,7 @@ _ANSWER_WITHIN = 1.0
 _NORMAL, _PROTECTIVE_STOP = (1, 1 << 0), (3, 1 << 2)
 """Safety mode and safety status bits."""
 _FORMATS = {"DOUBLE": ">d", "VECTOR6D": ">6d", "INT32": ">i", "UINT32": ">I"}
-_OUTPUTS = {
+_FIELDS = {
     "timestamp": "DOUBLE",
     "actual_q": "VECTOR6D",
     "robot_mode": "INT32",
@@ -56,31 +55,18 @@ _OUTPUTS = {
     "runtime_state": "UINT32",
     "robot_status_bits": "UINT32",
     "safety_status_bits": "UINT32",
-    **{f"output_int_register_{i}": "INT32" for i in range(24)},
-    **{f"output_double_register_{i}": "DOUBLE" for i in range(24)},
-}
-_INPUTS = {
     "external_force_torque": "VECTOR6D",
-    **{f"input_int_register_{i}": "INT32" for i in range(24)},
-    **{f"input_double_register_{i}": "DOUBLE" for i in range(24)},
+    **{f"{way}_int_register_{i}": "INT32" for way in ("input", "output") for i in range(24)},
+    **{f"{way}_double_register_{i}": "DOUBLE" for way in ("input", "output") for i in range(24)},
 }
+"""What a client may ask for, or write."""
 _SAYS = {
     b"PolyscopeVersion": b"URSoftware 5.12.2.1101534 (Jul 06 2022)",
     b"get serial number": b"20225500001",
     b"is in remote control": b"true",
 }
-
-
-@dataclass(eq=False)
-class _Client:
-    """One connection."""
-
-    connection: socket.socket
-    answer: Callable[[_Client], None]
-    received: bytes = b""
-    outputs: list[str] = field(default_factory=list)
-    recipes: list[list[str]] = field(default_factory=list)
-    started: bool = False
+_Talk = Callable[[StreamReader, StreamWriter], Awaitable[None]]
+"""With one client, until it leaves."""
 
 
 class SimulatedUR:
@@ -97,13 +83,14 @@ class SimulatedUR:
         self.running = True
         self.q, self._velocity, self.time = np.array(HOME), np.zeros(6), 0.0
         """Joint positions, in [rad]; time since power-on, in [s]."""
-        self._registers: dict[str, float] = dict.fromkeys([*_INPUTS, *_OUTPUTS], 0)
+        self._registers: dict[str, float] = dict.fromkeys(_FIELDS, 0)
         self._safety = _NORMAL
         self._program, self._servoing, self._executing = False, False, False
         self._watchdog, self._silent = 0.0, 0.0
-        self._in_step, self._answered = False, False
-        self._clients: list[_Client] = []
-        self._selector = selectors.DefaultSelector()
+        self._in_step, self._told = False, asyncio.Event()
+        """Whether a client gives a set point every cycle; that it did, or that one left."""
+        self._outputs: dict[StreamWriter, list[str]] = {}
+        """What each client hears of at every cycle."""
 
     def serve(self, ready: Callable[[], None] = lambda: None) -> None:
         """Serve until `running` is made false; `ready` is called when clients may connect.
@@ -111,117 +98,104 @@ class SimulatedUR:
         Raises:
             ConfigurationError: Somebody else serves there, or the address is not this computer's.
         """
-        answers = {DASHBOARD: self._dashboard, SCRIPT: self._script, RTDE: self._rtde}
-        listening = []
-        try:
-            for port, answer in answers.items():
-                listening.append(listener := socket.socket())
-                listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        asyncio.run(self._serve(ready))
+
+    async def _serve(self, ready: Callable[[], None]) -> None:
+        talks = {DASHBOARD: self._dashboard, SCRIPT: self._script, RTDE: self._rtde}
+        with ExitStack() as listening:
+            for port, talk in talks.items():
                 try:
-                    listener.bind((self.host, port))
+                    server = await asyncio.start_server(self._and_close(talk), self.host, port)
                 except OSError as error:
                     raise ConfigurationError(
                         f"cannot serve on {self.host} ({error.strerror}); stop what serves there, "
                         "or give another --host, such as 127.0.77.2"
                     ) from error
-                listener.listen()
-                self._selector.register(listener, selectors.EVENT_READ, answer)
+                listening.callback(server.close)
             ready()
-            self._go_on()
-        finally:
-            for end in [*listening, *(client.connection for client in self._clients)]:
-                end.close()
-            self._selector.close()
+            await self._go_on()
 
-    def _go_on(self) -> None:
+    async def _go_on(self) -> None:
         last = time.monotonic()
         while self.running:
-            in_step = self._servoing and self._in_step
-            period = CYCLE if not in_step else 0.0 if self._answered else _ANSWER_WITHIN
-            due = last + period
-            for key, _ in self._selector.select(max(0.0, due - time.monotonic())):
-                if isinstance(key.data, _Client):
-                    self._read(key.data)
-                else:
-                    connection, _ = key.fileobj.accept()  # type: ignore[union-attr]
-                    connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-                    client = _Client(connection, key.data)
-                    self._clients.append(client)
-                    self._selector.register(connection, selectors.EVENT_READ, client)
-                    if key.data == self._dashboard:
-                        connection.sendall(b"Connected: Universal Robots Dashboard Server\n")
-            answered = in_step and self._answered
-            if answered or time.monotonic() >= due:
-                if in_step and not answered:  # cycles go on without it
+            if self._servoing and self._in_step:
+                try:
+                    await asyncio.wait_for(self._told.wait(), _ANSWER_WITHIN)
+                except asyncio.TimeoutError:  # cycles go on without it
                     self._in_step = False
-                last, self._answered = time.monotonic(), False
-                self._cycle()
+            else:
+                await asyncio.sleep(max(0.0, last + CYCLE - time.monotonic()))
+            last = time.monotonic()
+            self._told.clear()
+            self._cycle()
 
-    def _read(self, client: _Client) -> None:
-        content = b""
-        with suppress(OSError):
-            content = client.connection.recv(1 << 16)
-        client.received += content
-        if content:
-            with suppress(OSError):  # it left before it was answered
-                client.answer(client)
-            return
-        self._selector.unregister(client.connection)
-        self._clients.remove(client)
-        client.connection.close()
-        self._in_step = False
+    def _and_close(self, talk: _Talk) -> _Talk:
+        async def talk_and_close(reader: StreamReader, writer: StreamWriter) -> None:
+            try:
+                with suppress(OSError, EOFError):
+                    await talk(reader, writer)
+            finally:
+                self._outputs.pop(writer, None)
+                self._in_step = False
+                self._told.set()
+                writer.close()
 
-    def _dashboard(self, client: _Client) -> None:
-        while b"\n" in client.received:
-            line, _, client.received = client.received.partition(b"\n")
-            answer = _SAYS.get(line.strip(), b"could not understand: '%s'" % line.strip())
-            client.connection.sendall(answer + b"\n")
+        return talk_and_close
 
-    def _script(self, client: _Client) -> None:
+    async def _dashboard(self, reader: StreamReader, writer: StreamWriter) -> None:
+        writer.write(b"Connected: Universal Robots Dashboard Server\n")
+        while line := await reader.readline():
+            word = line.strip()
+            writer.write(_SAYS.get(word, b"could not understand: '%s'" % word) + b"\n")
+
+    async def _script(self, reader: StreamReader, writer: StreamWriter) -> None:
         """Start the program once it is there as a whole."""
-        if not client.received.rstrip().endswith(b"\nend"):
-            return
-        if _PROGRAM in client.received:
-            self._program, self._executing, self._watchdog = True, False, 0.0
-            self._registers["input_int_register_0"] = 0
-            self._registers["output_int_register_0"] = _READY
-        else:
-            print("a program that is not ur_rtde 1.6's was not run", file=sys.stderr)
-        client.received = b""
+        received = b""
+        while more := await reader.read(1 << 16):
+            received += more
+            if not received.rstrip().endswith(b"\nend"):
+                continue
+            if _PROGRAM in received:
+                self._program, self._executing, self._watchdog = True, False, 0.0
+                self._registers["input_int_register_0"] = 0
+                self._registers["output_int_register_0"] = _READY
+            else:
+                print("a program that is not ur_rtde 1.6's was not run", file=sys.stderr)
+            received = b""
 
-    def _rtde(self, client: _Client) -> None:
-        while len(client.received) >= 3:
-            size = int.from_bytes(client.received[:2], "big")
-            if len(client.received) < size:
-                return
-            kind, payload = chr(client.received[2]), client.received[3:size]
-            client.received = client.received[size:]
-            if kind == "U":
-                self._take(client, payload)
+    async def _rtde(self, reader: StreamReader, writer: StreamWriter) -> None:
+        outputs, recipes = list[str](), list[list[str]]()
+        while True:
+            size, kind = struct.unpack(">Hc", await reader.readexactly(3))
+            payload = await reader.readexactly(size - 3)
+            if kind == b"U":
+                self._take(recipes[payload[0] - 1], payload)
                 continue
             answer = b"\1"  # accepted
-            if kind == "v":
+            if kind == b"v":
                 answer = struct.pack(">4I", 5, 12, 2, 1101534)
-            elif kind == "O":
-                client.outputs = _names(payload[8:])
-                answer += _types(client.outputs, _OUTPUTS)
-            elif kind == "I":
-                client.recipes.append(_names(payload))
-                answer = bytes([len(client.recipes)]) + _types(client.recipes[-1], _INPUTS)
-            elif kind in "SP":
-                client.started = kind == "S"
-            client.connection.sendall(_packet(kind, answer))
+            elif kind == b"O":
+                outputs = _names(payload[8:])
+                answer += _types(outputs)
+            elif kind == b"I":
+                recipes.append(_names(payload))
+                answer = bytes([len(recipes)]) + _types(recipes[-1])
+            elif kind == b"S":
+                self._outputs[writer] = outputs
+            elif kind == b"P":
+                self._outputs.pop(writer, None)
+            writer.write(_packet(kind, answer))
 
-    def _take(self, client: _Client, payload: bytes) -> None:
+    def _take(self, names: list[str], payload: bytes) -> None:
         """Write a client's inputs to the registers."""
         at = 1
-        for name in client.recipes[payload[0] - 1]:
-            form = _FORMATS[_INPUTS[name]]
-            values = struct.unpack_from(form, payload, at)
+        for name in names:
+            form = _FORMATS[_FIELDS[name]]
+            self._registers[name] = struct.unpack_from(form, payload, at)[0]
             at += struct.calcsize(form)
-            self._registers[name] = values[0]
             if name == "input_int_register_0":
-                self._silent, self._answered, self._in_step = 0.0, True, True
+                self._silent, self._in_step = 0.0, True
+                self._told.set()
 
     def _cycle(self) -> None:
         """2 ms: the program's loop goes round, the arm moves, clients hear of it."""
@@ -249,11 +223,9 @@ class SimulatedUR:
             "runtime_state": 2 if self._program else 1,  # playing, stopped
             "robot_status_bits": 1 | 2 * self._program,  # power is on, the program runs
         }
-        for client in self._clients:
-            if client.started:
-                state = b"\1" + b"".join(_packed(values[n], _OUTPUTS[n]) for n in client.outputs)
-                with suppress(OSError):  # it left; its end is read next
-                    client.connection.sendall(_packet("U", state))
+        for client, names in self._outputs.items():
+            state = b"\1" + b"".join(_packed(values[n], _FIELDS[n]) for n in names)
+            client.write(_packet(b"U", state))
 
     def _run_program(self) -> None:
         """Once round the loop of ur_rtde's control script."""
@@ -298,13 +270,13 @@ def _names(text: bytes) -> list[str]:
     return [name for name in text.decode().split(",") if name]
 
 
-def _types(names: list[str], known: dict[str, str]) -> bytes:
-    return ",".join(known.get(name, "NOT_FOUND") for name in names).encode()
+def _types(names: list[str]) -> bytes:
+    return ",".join(_FIELDS.get(name, "NOT_FOUND") for name in names).encode()
 
 
 def _packed(value: float | list[float], kind: str) -> bytes:
     return struct.pack(_FORMATS[kind], *(value if isinstance(value, list) else [value]))
 
 
-def _packet(kind: str, payload: bytes) -> bytes:
-    return struct.pack(">HB", 3 + len(payload), ord(kind)) + payload
+def _packet(kind: bytes, payload: bytes) -> bytes:
+    return struct.pack(">Hc", 3 + len(payload), kind) + payload

@@ -4,7 +4,12 @@ from pathlib import Path
 
 import pytest
 
-from prior_reinforce.bench.robots.executors.arguments import split_command, without_arguments
+from prior_reinforce.bench.robots.executors.arguments import (
+    check_program,
+    split_command,
+    without_arguments,
+)
+from prior_reinforce.errors import ConfigurationError
 
 
 def test_the_path_stays_one_argument_whatever_is_in_it():
@@ -31,3 +36,9 @@ def test_no_argument_of_a_persons_own_goes_to_the_journal(secret):
     assert "hunter" not in kept
     assert kept.startswith("arm ...")
     assert kept.endswith("{plan} {result}")
+
+
+def test_where_what_is_started_cannot_be_found_again_nothing_is(monkeypatch):
+    monkeypatch.setattr("sys.platform", "darwin")
+    with pytest.raises(ConfigurationError, match=r"on Linux only, .*write the plan with --out"):
+        check_program("true")

@@ -9,8 +9,9 @@ import time
 import numpy as np
 import pytest
 
-from prior_reinforce.bench.robots.executors.command import run_command
+from prior_reinforce.bench.robots.executors.command import execute_command, run_command
 from prior_reinforce.bench.robots.executors.lock import executing_lock
+from prior_reinforce.bench.robots.executors.supervision import Interruptions
 from prior_reinforce.bench.robots.plan_files import write_plan
 from prior_reinforce.errors import ConfigurationError, FileFormatError, TrialStateError
 from prior_reinforce.plans.motions import Plan, PlanFormat
@@ -123,6 +124,38 @@ def test_a_changed_plan_does_not_run(plan_file, tmp_path):
 def test_commands_that_cannot_run(plan_file, command, says):
     with pytest.raises(ConfigurationError, match=says):
         run_command(command, plan_file, time_limit=1)
+
+
+def test_a_program_that_the_system_cannot_start_is_named(plan_file, tmp_path):
+    program = tmp_path / "driver"
+    program.write_text("#!/no/such/interpreter")
+    program.chmod(0o755)
+    with pytest.raises(ConfigurationError, match=r"cannot start .*No such file .*that can run"):
+        run_command(f"{program} {{plan}}", plan_file, time_limit=30)
+
+
+def test_who_is_interrupted_before_it_runs_runs_nothing(plan_file, tmp_path):
+    result, ran = tmp_path / "result", tmp_path / "ran"
+    result.mkdir()
+    with executing_lock() as lock, Interruptions() as interruptions:
+        interruptions.came = True
+        with pytest.raises(KeyboardInterrupt):
+            execute_command(
+                f"touch {ran} {{plan}}",
+                plan_file,
+                result,
+                time_limit=30,
+                lock=lock,
+                interruptions=interruptions,
+            )
+    assert not ran.exists()
+
+
+def test_who_is_interrupted_while_it_runs_hears_of_it_once_all_has_ended(plan_file, tmp_path):
+    command = f"sh -c 'kill -INT {os.getpid()}; sleep 60; touch {tmp_path}/ran' sh {{plan}}"
+    with pytest.raises(KeyboardInterrupt):
+        run_command(command, plan_file, time_limit=120)
+    assert not (tmp_path / "ran").exists()
 
 
 @pytest.mark.parametrize("limit", [0.0, -1.0, float("nan"), float("inf")])

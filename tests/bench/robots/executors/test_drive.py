@@ -214,6 +214,14 @@ def test_asked_to_stop_it_stops_in_mid_swing_and_says_so(arm, tmp_path):
     assert 0 < sum(arm.pose()) < 1.4
 
 
+def test_asked_to_stop_before_it_moves_it_does_not(arm, monkeypatch):
+    monkeypatch.setattr(toy_arm.ToyArm, "check", lambda *_: signal.raise_signal(signal.SIGTERM))
+    result = arm.drive()
+    assert result.outcome == "not_moved"
+    assert result.reason == "it was asked to stop before it moved; ask again"
+    assert arm.motions() == 0
+
+
 def test_the_program_says_how_it_ended_by_its_status(arm, tmp_path):
     file = write_plan(PLAN, tmp_path / "plan.npz")
     for kind, status, outcome in (("works", 0, "done"), ("dead", 75, "not_moved")):

@@ -4,6 +4,7 @@ import contextlib
 import itertools
 import re
 import signal
+from types import SimpleNamespace
 
 import numpy as np
 import pylibfranka
@@ -203,3 +204,23 @@ def test_while_it_is_guided_it_says_what_it_measures_by_its_own_clock(arm):
     assert np.diff(t).min() > 0.0044
     assert np.round(t / 0.001) * 0.001 == pytest.approx(t, abs=1e-6)
     assert states[-1].measured == pytest.approx(arm.where(), abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("mode", "says"),
+    [("UserStopped", "its stop button is pressed"), ("Guiding", "it is in mode Guiding")],
+)
+def test_a_robot_that_is_in_no_state_to_move_says_which(arm, monkeypatch, mode, says):
+    state = SimpleNamespace(robot_mode=getattr(pylibfranka.RobotMode, mode))
+    monkeypatch.setattr(arm, "_robot", SimpleNamespace(read_once=lambda: state))
+    with pytest.raises(ConfigurationError, match=f"cannot move, {says}; see to it, then ask again"):
+        arm.where()
+
+
+def test_a_robot_that_is_gone_while_it_is_guided_says_so(arm, monkeypatch):
+    def lost():
+        raise pylibfranka.FrankaException("libfranka: UDP receive: Timeout")
+
+    monkeypatch.setattr(arm, "_robot", SimpleNamespace(read_once=lost))
+    with pytest.raises(ConfigurationError, match="does not answer: UDP receive: Timeout"):
+        next(arm.guide())

@@ -21,6 +21,50 @@ def test_servos_are_told_to_stay_before_lerobot_gives_them_torque():
     assert done == [("Goal_Position", {"pan": 7}), "configured, with torque"]
 
 
+def device(**values):
+    """One end of LeRobot's: where it stands, or goes."""
+    return SimpleNamespace(
+        is_connected=False,
+        is_calibrated=True,
+        connect=lambda calibrate: None,
+        action_features=dict.fromkeys(values, float),
+        get_action=lambda: values,
+        get_observation=lambda: values,
+    )
+
+
+def test_an_arm_does_not_jump_to_a_leader_that_is_elsewhere():
+    bridge, sent = object.__new__(Bridge), []
+    bridge.robot, bridge.leader = device(pan=0.0, lift=5.0), device(pan=3.0, lift=26.0)
+    bridge.robot.send_action = sent.append
+    with pytest.raises(ValueError, match=r"lift of the leader is 21 from .* would jump there"):
+        bridge.guide()
+    assert not sent
+
+
+def test_a_leader_that_is_not_calibrated_leads_nothing():
+    bridge = object.__new__(Bridge)
+    bridge.robot, bridge.leader = device(pan=0.0), device(pan=0.0)
+    bridge.leader.is_calibrated = False
+    with pytest.raises(ValueError, match=r"not calibrated, .*run lerobot-calibrate"):
+        bridge.guide()
+
+
+def test_positions_that_are_lost_again_and_again_are_an_error():
+    tries = []
+
+    def lost():
+        tries.append(1)
+        raise ConnectionError("no status packet")
+
+    bridge = object.__new__(Bridge)
+    bridge.robot, bridge.bus = device(pan=0.0), None
+    bridge.robot.get_observation = lost
+    with pytest.raises(ConnectionError, match="no status packet"):
+        bridge.observe()
+    assert len(tries) == 3
+
+
 @pytest.mark.slow
 def test_a_port_that_is_not_there_is_named(tmp_path):
     with pytest.raises(ConfigurationError, match="Could not connect on port"):

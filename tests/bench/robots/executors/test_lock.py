@@ -1,7 +1,9 @@
 """The lock of an execution: one at a time, on a workspace and on an arm."""
 
+import errno
 import os
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -16,7 +18,7 @@ from prior_reinforce.bench.robots.executors.lock import (
     stop_executing,
     stop_marked,
 )
-from prior_reinforce.errors import TrialStateError, WorkspaceError
+from prior_reinforce.errors import ConfigurationError, TrialStateError, WorkspaceError
 
 on_linux = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="sockets and /proc")
 
@@ -129,5 +131,39 @@ def test_a_folder_that_is_not_there_is_named(tmp_path):
     with (
         pytest.raises(WorkspaceError, match="make it a readable folder"),
         executing_lock(tmp_path / "none"),
+    ):
+        pass
+
+
+@on_linux
+def test_a_stop_that_cannot_be_noted_says_so(tmp_path):
+    (tmp_path / ".stopped").symlink_to("elsewhere")
+    with pytest.raises(WorkspaceError, match=r"the stop cannot be noted .*waiting commands too"):
+        stop_executing(tmp_path)
+    assert not (tmp_path / "elsewhere").exists()
+
+
+@on_linux
+def test_a_file_system_without_locks_is_named(tmp_path, monkeypatch):
+    def refuse(*_):
+        raise OSError(errno.ENOLCK, "No locks available")
+
+    monkeypatch.setattr("fcntl.flock", refuse)
+    with pytest.raises(WorkspaceError, match=r"No locks available.*to a local disk"):
+        is_executing(tmp_path)
+
+
+@on_linux
+def test_a_system_that_forbids_sockets_locks_no_arm(monkeypatch):
+    class Forbidden(socket.socket):
+        def bind(self, address):
+            raise OSError(errno.EPERM, "Operation not permitted")
+
+    monkeypatch.setattr("socket.socket", Forbidden)
+    with (
+        pytest.raises(
+            ConfigurationError, match=r"not permitted.*let this program use Unix sockets"
+        ),
+        executing_lock(),
     ):
         pass

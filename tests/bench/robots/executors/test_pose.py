@@ -33,6 +33,14 @@ def test_a_joint_that_is_left_out_is_refused(pose):
         read_pose(says(pose), FORM)
 
 
+@pytest.mark.parametrize(
+    "line", ["", "ready", "[1, 2]", '{"joint1": "far"}', '{"joint1": NaN, "joint2": 0}']
+)
+def test_a_line_that_is_no_pose_is_refused(line):
+    with pytest.raises(ConfigurationError, match="must end with a line of JSON such as"):
+        read_pose(says(line), FORM)
+
+
 @pytest.mark.parametrize("command", ["false", "sh -c 'echo [1,2,3]; exit 1'", "sleep 60"])
 def test_a_command_that_fails_says_nothing(command):
     with pytest.raises(ConfigurationError, match="did not say where the arm stands"):

@@ -1,5 +1,6 @@
 """What happens here while a command runs: nothing that is raised leaves the arm moving."""
 
+import errno
 import signal
 import sys
 from pathlib import Path
@@ -9,6 +10,7 @@ import pytest
 
 from prior_reinforce.bench.robots.executors.command import run_command
 from prior_reinforce.bench.robots.plan_files import write_plan
+from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.plans.motions import Plan, PlanFormat
 
 pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="prctl and /proc")
@@ -69,3 +71,15 @@ def test_a_reader_that_left_ends_no_motion(moves, tmp_path):
 
     command = "sh -c 'echo moves; sleep 0.2; exit 3' {plan}"
     assert run_command(command, moves[1], time_limit=60, show=show).exit_status == 3
+
+
+def test_where_the_system_starts_nothing_nothing_has_run(moves, tmp_path, monkeypatch):
+    def refuse(*_, **__):
+        raise OSError(errno.EAGAIN, "Resource temporarily unavailable")
+
+    monkeypatch.setattr("subprocess.Popen", refuse)
+    with pytest.raises(
+        ConfigurationError, match=r"nothing can be started .*unavailable.*make room"
+    ):
+        run_command(*moves, time_limit=30)
+    assert not (tmp_path / "pid").exists()

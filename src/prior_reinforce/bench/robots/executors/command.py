@@ -126,17 +126,12 @@ def execute_command(
         ConfigurationError, FileFormatError, KeyboardInterrupt: Nothing has run.
     """
     check_command(command, time_limit=time_limit)
-    copy = write_once(_copy_in(folder, plan.path.suffix), plan.verify())
+    copy = write_once(_copy_in(folder, plan), plan.verify())
     arguments = split_command(command, copy, folder)
     if interruptions.came:
         raise KeyboardInterrupt
     ended, raised = supervise(
-        arguments,
-        folder,
-        time_limit=time_limit,
-        interruptions=interruptions,
-        lock=lock,
-        show=show,
+        arguments, folder, time_limit=time_limit, interruptions=interruptions, lock=lock, show=show
     )
     with suppress(OSError):  # a driver may delete its files; that it ran must stay to be found
         folder.mkdir(exist_ok=True)
@@ -152,12 +147,10 @@ def execute_command(
 
 def read_ended(folder: Path, command: str, plan: PlanFile) -> CommandResult | None:
     """How the command of a folder ended, where its supervisor wrote it down; None if it did not."""
-    try:
+    with suppress(OSError, ValueError, KeyError, TypeError):  # a person has to say what moved
         ended = json.loads((folder / ENDED_FILE).read_bytes())
         if ended["started"]:
             return _result(tuple(split(command)), ended, folder, plan)
-    except (OSError, ValueError, KeyError, TypeError):
-        pass  # a person has to say what moved
     return None
 
 
@@ -170,9 +163,9 @@ def was_executed(folder: Path) -> bool:
         return begun
 
 
-def _copy_in(folder: Path, suffix: str) -> Path:
+def _copy_in(folder: Path, plan: PlanFile) -> Path:
     """The plan that the command reads, which nothing but the command knows of."""
-    return folder / f"plan{suffix}"
+    return folder / f"plan{plan.path.suffix}"
 
 
 def _result(
@@ -195,7 +188,7 @@ def _result(
         outcome, reason = said.outcome, said.reason
     elif said is not None and said.outcome != "done":
         outcome, reason = "aborted", said.reason or reason
-    copy = _copy_in(folder, plan.path.suffix)
+    copy = _copy_in(folder, plan)
     if outcome == "done" and copy.exists():  # a driver may delete its folder
         try:
             replace(plan, path=copy).verify()

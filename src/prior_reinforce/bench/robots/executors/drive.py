@@ -15,7 +15,7 @@ import shlex
 import signal
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -188,117 +188,104 @@ def approach(
     return Plan(frames, PlanFormat(arm.columns, arm.units, _APPROACH_DT))
 
 
-@dataclass(frozen=True, eq=False)
 class _Prepared:
-    """A plan in an arm's columns, and how the arm stands to it."""
+    """A plan in an arm's columns, and how the arm stands to it; nothing moves here."""
 
-    arm: ArmDescription
-    channels: list[int]
-    pose: Float[np.ndarray, " d"]
-    plan: Plan
-    """Channels that the plan leaves out are held where they stand."""
-    said: str
-    there: bool
+    def __init__(self, executor: Executor, plan: Plan, request: Request) -> None:
+        self._executor, self._request, self._form = executor, request, plan.format
+        arm, pose = executor.describe(), executor.where()
+        if missing := [n for n, q in zip(arm.columns, pose, strict=True) if not math.isfinite(q)]:
+            raise ConfigurationError(f"{arm.model} does not say where {', '.join(missing)} stands")
+        self.arm, self._pose, self.channels = arm, pose, arms_columns(plan.format, arm)
+        """The arm, where it stands, and its channel of each of the plan's columns."""
+        frames = np.tile(pose, (plan.horizon, 1))
+        frames[:, self.channels] = plan.actions
+        own = PlanFormat(arm.columns, arm.units, plan.format.dt / request.speed)
+        self.plan = Plan(frames, own)
+        """Channels that the plan leaves out are held where they stand."""
+        self._here = dict(zip(plan.format.names, pose[self.channels].tolist(), strict=True))
+        first = plan.actions[0].tolist()
+        self._said, self._there = compare_pose(self._here, first, plan.format, request.gate)
 
     @property
     def to_start(self) -> Plan:
-        return approach(self.pose, self.plan.actions[0], self.arm)
+        return approach(self._pose, self.plan.actions[0], self.arm)
 
-    def check_way(self, names: tuple[str, ...], request: Request) -> None:
+    def check_way(self) -> None:
         """Hold the way to the start against the gate, box and all; in the plan's own columns.
 
         Raises:
             RobotLimitError: It is refused.
         """
-        if request.limits is None:
+        if self._request.limits is None:
             return
-        way, units = self.to_start, tuple(self.arm.units[channel] for channel in self.channels)
-        form = PlanFormat(names, units, way.format.dt)
-        own = Plan(way.actions[:, self.channels], form)
-        refused = check_plan(own, request.limits, settings=request.gate).refusals
+        way = self.to_start
+        own = Plan(way.actions[:, self.channels], replace(self._form, dt=way.format.dt))
+        refused = check_plan(own, self._request.limits, settings=self._request.gate).refusals
         if refused:
             raise RobotLimitError(
                 f"the way from where the arm stands to the plan's first frame: {refused}; move it "
                 "nearer by hand or with its own program, then ask again"
             )
 
+    def motions(self) -> Sequence[Plan]:
+        """What is to be executed, one after the other; the arm's limits hold for all of it."""
+        if self._request.motion == "approach":
+            return [self.to_start]
+        if not self._there:
+            raise ConfigurationError(f"{self._said}; move it there, or ask again with --approach")
+        far = np.abs(self.plan.actions[0] - self._pose)
+        tolerance = [_START_TOLERANCE.get(unit, 0.0) for unit in self.arm.units]
+        return [self.plan] if np.all(far <= tolerance) else [self.to_start, self.plan]
 
-def _prepare(executor: Executor, plan: Plan, request: Request) -> _Prepared:
-    arm, pose = executor.describe(), executor.where()
-    if missing := [n for n, q in zip(arm.columns, pose, strict=True) if not math.isfinite(q)]:
-        raise ConfigurationError(f"{arm.model} does not say where {', '.join(missing)} stands")
-    channels = arms_columns(plan.format, arm)
-    frames = np.tile(pose, (plan.horizon, 1))
-    frames[:, channels] = plan.actions
-    own = Plan(frames, PlanFormat(arm.columns, arm.units, plan.format.dt / request.speed))
-    here = dict(zip(plan.format.names, pose[channels].tolist(), strict=True))
-    said, there = compare_pose(here, plan.actions[0].tolist(), plan.format, request.gate)
-    return _Prepared(arm, channels, pose, own, said, there)
+    def look(self) -> Look:
+        """How the arm stands to the plan."""
 
+        def refusal(check: Callable[[], None]) -> str:
+            try:
+                check()
+            except PriorReinforceError as error:
+                return str(error)
+            return ""
 
-def look(executor: Executor, plan: Plan, request: Request) -> Look:
-    """How the arm stands to a plan; nothing moves."""
-    prepared = _prepare(executor, plan, request)
-    refused = [
-        _refusal(lambda: executor.check(prepared.plan)),
-        _refusal(lambda: prepared.check_way(plan.format.names, request)),
-    ]
-    pose = prepared.pose[prepared.channels].tolist()
-    return Look(
-        arm=prepared.arm,
-        pose=dict(zip(plan.format.names, pose, strict=True)),
-        there=prepared.there,
-        said=prepared.said,
-        approach=float(prepared.to_start.times[-1]),
-        refused=refused[0],
-        approach_refused=refused[1],
-    )
-
-
-def _refusal(check: Callable[[], None]) -> str:
-    try:
-        check()
-    except PriorReinforceError as error:
-        return str(error)
-    return ""
-
-
-class _Stop:
-    """The wish to stop, whenever it comes."""
-
-    def __init__(self) -> None:
-        self.asked = False
-        self.executor: Executor | None = None
-        signal.signal(signal.SIGTERM, self._note)
-
-    def _note(self, *_: object) -> None:
-        self.asked = True
-        if self.executor is not None:
-            self.executor.stop()
-
-    def raise_if_asked(self) -> None:
-        if self.asked:
-            raise ConfigurationError("it was asked to stop before it moved; ask again")
+        return Look(
+            arm=self.arm,
+            pose=self._here,
+            there=self._there,
+            said=self._said,
+            approach=float(self.to_start.times[-1]),
+            refused=refusal(lambda: self._executor.check(self.plan)),
+            approach_refused=refusal(self.check_way),
+        )
 
 
 def drive(request: Request, plan: Plan, folder: Path) -> DriverResult:
     """Make one motion, or look; write what came of it."""
-    stop = _Stop()
-    moved = False
+    executor: Executor | None = None
+    asked_to_stop = moved = False
+
+    def stop(*_: object) -> None:
+        nonlocal asked_to_stop
+        asked_to_stop = True
+        if executor is not None:
+            executor.stop()
+
+    signal.signal(signal.SIGTERM, stop)  # whenever it comes
     try:
-        stop.executor = executor = make_executor(request.arm)
+        executor = make_executor(request.arm)
         try:
+            prepared = _Prepared(executor, plan, request)
             if request.motion == "look":
-                _write(folder / LOOK_FILE, look(executor, plan, request))
+                (folder / LOOK_FILE).write_bytes(msgspec.json.encode(prepared.look()))
                 return DriverResult("done")
-            prepared = _prepare(executor, plan, request)
-            motions = _motions(prepared, request)
+            motions = prepared.motions()
             if prepared.plan is not motions[0]:
-                prepared.check_way(plan.format.names, request)
+                prepared.check_way()
             for motion in motions:
                 executor.check(motion)
             for motion in motions:
-                stop.raise_if_asked()
+                if asked_to_stop:
+                    raise ConfigurationError("it was asked to stop before it moved; ask again")
                 print(f"{prepared.arm.model} moves for {motion.times[-1]:.2f} s", flush=True)
                 moved_before, moved = moved, True  # whatever happens now, it may have
                 path = executor.run(motion)
@@ -310,31 +297,13 @@ def drive(request: Request, plan: Plan, folder: Path) -> DriverResult:
         finally:
             executor.close()
     except Exception as error:
-        said = str(error) if isinstance(error, PriorReinforceError) else repr(error)
-        result = DriverResult("aborted" if moved else "not_moved", said)
+        why = str(error) if isinstance(error, PriorReinforceError) else repr(error)
+        result = DriverResult("aborted" if moved else "not_moved", why)
     else:
         outcome: Any = "done" if not path.fault else "aborted" if moved else "not_moved"
         result = DriverResult(outcome, path.fault)
-    _write(folder / RESULT_FILE, result)
+    (folder / RESULT_FILE).write_bytes(msgspec.json.encode(result))
     return result
-
-
-def _motions(prepared: _Prepared, request: Request) -> Sequence[Plan]:
-    """What is to be executed, one after the other; the arm's limits hold for all of it."""
-    to_start = prepared.to_start
-    if request.motion == "approach":
-        return [to_start]
-    if not prepared.there:
-        raise ConfigurationError(f"{prepared.said}; move it there, or ask again with --approach")
-    far = np.abs(prepared.plan.actions[0] - prepared.pose)
-    near = all(
-        d <= _START_TOLERANCE.get(u, 0.0) for d, u in zip(far, prepared.arm.units, strict=True)
-    )
-    return [prepared.plan] if near else [to_start, prepared.plan]
-
-
-def _write(path: Path, content: Any) -> None:
-    path.write_bytes(msgspec.json.encode(content))
 
 
 def main() -> None:

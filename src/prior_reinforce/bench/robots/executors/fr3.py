@@ -85,11 +85,10 @@ class FR3(Executor):
         self._errors = pylibfranka.FrankaException, RuntimeError  # which its others derive from
         self._limits = robot_limits("fr3", config.firmware)
         self._enforced = _REALTIME.exists() and _REALTIME.read_text().strip() == "1"
-        kind = pylibfranka.RealtimeConfig
+        kinds = pylibfranka.RealtimeConfig
         try:
-            self._robot = pylibfranka.Robot(
-                config.host, kind.kEnforce if self._enforced else kind.kIgnore
-            )
+            kind = kinds.kEnforce if self._enforced else kinds.kIgnore
+            self._robot = pylibfranka.Robot(config.host, kind)
         except self._errors as error:
             raise ConfigurationError(
                 f"cannot reach the robot at {config.host} ({_line(error)}); unlock its joints, "
@@ -202,11 +201,9 @@ class FR3(Executor):
         except self._errors as error:
             raise ConfigurationError(f"the robot does not answer: {_line(error)}") from error
         if state.robot_mode != modes.Idle:
-            why = (
-                "its stop button is pressed"
-                if state.robot_mode == modes.UserStopped
-                else (f"it is in mode {state.robot_mode.name}")
-            )
+            why = f"it is in mode {state.robot_mode.name}"
+            if state.robot_mode == modes.UserStopped:
+                why = "its stop button is pressed"
             raise ConfigurationError(f"the robot cannot move, {why}; see to it, then ask again")
         return state
 

@@ -18,8 +18,9 @@ from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
+import msgspec
 import numpy as np
 from jaxtyping import Float
 
@@ -34,6 +35,7 @@ from prior_reinforce.bench.robots.executors.result import lag_behind
 from prior_reinforce.errors import ConfigurationError, RobotLimitError
 from prior_reinforce.plans.interpolation import interpolate
 from prior_reinforce.plans.motions import Plan
+from prior_reinforce.settings import Checked
 
 _LARGEST_GAP = 0.1
 """What a goal that comes late may leave out of a joint's way, in [rad]; more ends the motion. Ours:
@@ -54,7 +56,7 @@ _UNITS = {"degrees": ("rad", math.pi / 180), "range_0_100": ("percent", 1.0)}
 
 
 @dataclass(frozen=True)
-class LeRobotConfig:
+class LeRobotConfig(Checked):
     """Settings of an arm that LeRobot drives."""
 
     robot: Mapping[str, Any]
@@ -63,9 +65,9 @@ class LeRobotConfig:
     """Its teleoperator, to record with: `type`, `port`, `id`; none for an arm guided by hand."""
     python: str = sys.executable
     """A Python that has LeRobot."""
-    rate: float = 100.0
+    rate: Annotated[float, msgspec.Meta(ge=1, le=1000)] = 100.0
     """Goals and measurements a second."""
-    lag: float = 0.0
+    lag: Annotated[float, msgspec.Meta(ge=0, le=1)] = 0.0
     """How far behind its goals the arm is at constant speed, in [s]."""
     goals: Literal["ahead", "as planned"] = "ahead"
     """Ahead of the plan by the lag, so that the measured motion is the plan; or the plan itself,
@@ -76,18 +78,10 @@ class LeRobotConfig:
     """`cycles` is for a simulated arm whose time passes with every goal."""
 
     def __post_init__(self) -> None:
-        """Check the values.
-
-        Raises:
-            ConfigurationError: One is missing or out of range.
-        """
-        if not {"type"} <= {*self.robot}:
+        """Check the settings."""
+        super().__post_init__()
+        if "type" not in self.robot:
             raise ConfigurationError('robot needs LeRobot\'s type, as {type = "so101_follower"}')
-        if not (1 <= self.rate <= 1000 and 0 <= self.lag <= 1):
-            raise ConfigurationError(
-                f"rate must be within 1 and 1000 a second and lag within 0 and 1 s, got "
-                f"{self.rate:g} and {self.lag:g}"
-            )
 
 
 class LeRobotArm(Executor):
@@ -96,11 +90,7 @@ class LeRobotArm(Executor):
     config_type = LeRobotConfig
 
     def __init__(self, config: LeRobotConfig) -> None:
-        """Start LeRobot and connect; nothing moves.
-
-        Raises:
-            ConfigurationError: It cannot be started, or says why it cannot connect.
-        """
+        """Start LeRobot and connect; nothing moves."""
         self._config, self._stop = config, False
         bridge = Path(__file__).with_name("lerobot_bridge.py")
         settings = {"robot": dict(config.robot), "leader": dict(config.leader)}
@@ -116,6 +106,9 @@ class LeRobotArm(Executor):
                 f"cannot start {config.python!r} ({error.strerror}); give the path of the Python "
                 "in which LeRobot is installed as python in [arm]"
             ) from error
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self._requests, self._answers = self._process.stdin, self._process.stdout
         try:
             said = self._answer()
             self._columns = tuple(said["columns"])
@@ -188,9 +181,8 @@ class LeRobotArm(Executor):
     ) -> tuple[Float[np.ndarray, "T d"], Float[np.ndarray, "T d"]]:
         """Where the arm is expected, and what it is sent, at every cycle."""
         config = self._config
-        fine = interpolate(
-            plan.actions, plan.format.dt, rate=config.rate, hold_after=_SETTLE + 5 * config.lag
-        )
+        settle = _SETTLE + 5 * config.lag
+        fine = interpolate(plan.actions, plan.format.dt, rate=config.rate, hold_after=settle)
         if config.goals == "ahead":
             return fine.q, fine.q + config.lag * fine.dq
         later = np.array([np.interp(fine.t - config.lag, fine.t, column) for column in fine.q.T]).T
@@ -206,9 +198,8 @@ class LeRobotArm(Executor):
         times: list[float] = []
         path: list[Float[np.ndarray, " d"]] = []
         sent: list[Float[np.ndarray, " d"]] = []
-        fault, moved, start = "", False, time.monotonic()
+        fault, moved, cycle, start = "", False, 0, time.monotonic()
         try:
-            cycle = 0
             while cycle < len(goals):
                 due = cycle * period
                 if wall:
@@ -216,8 +207,7 @@ class LeRobotArm(Executor):
                     late = time.monotonic() - start - due
                     # What is overdue is left out: sent in a burst, the arm would jerk after it.
                     now = min(cycle + int(late / period), len(goals) - 1)
-                    left_out = np.abs(goals[now] - goals[cycle])[joints].max(initial=0.0)
-                    if left_out > _LARGEST_GAP:
+                    if np.any(np.abs(goals[now] - goals[cycle])[joints] > _LARGEST_GAP):
                         fault = f"a goal was {late * 1e3:.0f} ms late; the computer is too busy"
                     cycle = now
                 goal, there = goals[cycle], expected[cycle]
@@ -227,7 +217,7 @@ class LeRobotArm(Executor):
                 if fault:
                     break
                 moved = True
-                asked = dict(zip(self._columns, (goal / self._sizes).tolist(), strict=True))
+                asked = self._named(goal)
                 said = self._ask("move", goal=asked)
                 here = self._vector(said["measured"])
                 if not np.isfinite(here).all():  # nor is it known where to hold the arm then
@@ -247,9 +237,8 @@ class LeRobotArm(Executor):
                 if deviation.max() > _PATH_TOLERANCE:
                     name = self._columns[int(deviation.argmax())]
                     fault = f"{name} is {deviation.max():.2f} rad from where it should be"
-            if fault and path:  # held where it was seen last
-                held = dict(zip(self._columns, (path[-1] / self._sizes).tolist(), strict=True))
-                self._ask("move", goal=held)
+            if fault and path:
+                self._ask("move", goal=self._named(path[-1]))  # held where it was seen last
         except ConfigurationError as error:
             fault = str(error) if not fault else f"{fault}; {error}"
         q = np.array(path) if path else np.empty((0, len(self._columns)))
@@ -264,34 +253,30 @@ class LeRobotArm(Executor):
 
     def close(self) -> None:
         """See `Executor`: the end of its input lets LeRobot let go."""
-        if self._process.stdin is not None:
-            self._process.stdin.close()
+        self._requests.close()
         try:
             self._process.wait(10.0)
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
-        if self._process.stdout is not None:
-            self._process.stdout.close()
+        self._answers.close()
 
     def _vector(self, values: Mapping[str, float]) -> Float[np.ndarray, " d"]:
         """LeRobot's values as ours; one that is missing is no number."""
         return np.array([values.get(n, math.nan) for n in self._columns]) * self._sizes
 
+    def _named(self, values: Float[np.ndarray, " d"]) -> dict[str, float]:
+        """Ours as LeRobot's."""
+        return dict(zip(self._columns, (values / self._sizes).tolist(), strict=True))
+
     def _ask(self, do: str, **given: Any) -> dict[str, Any]:
-        assert self._process.stdin is not None
         with suppress(OSError):  # it has ended; its last answer says why
-            print(json.dumps({"do": do, **given}), file=self._process.stdin, flush=True)
+            print(json.dumps({"do": do, **given}), file=self._requests, flush=True)
         return self._answer()
 
     def _answer(self) -> dict[str, Any]:
-        """The next answer of LeRobot's process.
-
-        Raises:
-            ConfigurationError: What went wrong there.
-        """
-        assert self._process.stdout is not None
-        line = self._process.stdout.readline()
+        """The next answer of LeRobot's process; ConfigurationError says what went wrong there."""
+        line = self._answers.readline()
         if not line:
             raise ConfigurationError(
                 f"LeRobot's process ended without a word; try {self._config.python} -c 'import "

@@ -27,18 +27,18 @@ _JUMP = 20.0
 per cent). Ours: it goes there as fast as it can."""
 
 
-def make_device(family: str, base: str, make: str, settings: dict[str, Any]) -> Any:
-    """Make a robot or a teleoperator of LeRobot from its `type` and other settings."""
+def make_device(family: str, settings: dict[str, Any]) -> Any:
+    """Make a `robot` or a `teleoperator` of LeRobot from its `type` and other settings."""
     import draccus
 
-    package = importlib.import_module(f"lerobot.{family}")
-    registry = getattr(package, base)
+    package = importlib.import_module(f"lerobot.{family}s")
+    registry = getattr(package, f"{family.capitalize()}Config")
     name = settings["type"]
     for module in pkgutil.iter_modules(package.__path__):
         if name in registry.get_known_choices():
             break
         with suppress(ImportError):  # what another robot needs is not installed
-            importlib.import_module(f"lerobot.{family}.{module.name}")
+            importlib.import_module(f"lerobot.{family}s.{module.name}")
     if name not in registry.get_known_choices():
         plugins = importlib.import_module("lerobot.utils.import_utils")
         plugins.register_third_party_plugins()
@@ -47,7 +47,7 @@ def make_device(family: str, base: str, make: str, settings: dict[str, Any]) -> 
     if "disable_torque_on_disconnect" in kind.__dataclass_fields__:
         # An arm that was brought to a plan's first frame must not fall before the plan begins.
         given.setdefault("disable_torque_on_disconnect", False)
-    return getattr(package, make)(draccus.decode(kind, given))
+    return getattr(package, f"make_{family}_from_config")(draccus.decode(kind, given))
 
 
 def _check_calibrated(device: Any) -> None:
@@ -62,17 +62,8 @@ class Bridge:
 
     def __init__(self, settings: dict[str, Any]) -> None:
         """Connect; nothing moves."""
-        self.robot = make_device(
-            "robots", "RobotConfig", "make_robot_from_config", settings["robot"]
-        )
-        self.leader = None
-        if settings["leader"]:
-            self.leader = make_device(
-                "teleoperators",
-                "TeleoperatorConfig",
-                "make_teleoperator_from_config",
-                settings["leader"],
-            )
+        self.robot, leader = make_device("robot", settings["robot"]), settings["leader"]
+        self.leader = make_device("teleoperator", leader) if leader else None
         self.bus: Any = getattr(self.robot, "bus", None)
         self._configure, self.robot.configure = self.robot.configure, self._configure_once
         self.robot.connect(calibrate=False)

@@ -129,11 +129,8 @@ def last_stop(folder: Path | None) -> int:
 def _note_stop(folder: Path) -> None:
     flags = os.O_WRONLY | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK
     try:
-        descriptor = os.open(folder / STOP_FILE, flags, 0o644)
-        try:
-            os.utime(descriptor, ns=(time.time_ns(),) * 2)
-        finally:
-            os.close(descriptor)
+        with os.fdopen(os.open(folder / STOP_FILE, flags, 0o644), "wb") as file:
+            os.utime(file.fileno(), ns=(time.time_ns(),) * 2)
     except OSError as error:
         raise WorkspaceError(
             f"{folder}: the stop cannot be noted ({error.strerror}); stop waiting commands too"

@@ -74,10 +74,11 @@ def ask_arm(command: str, arguments: tuple[str, ...], folder: Path, *, time_limi
         raise raised
     if noted.came:
         raise KeyboardInterrupt
-    if ended is None or not ended["started"] or ended["timed_out"] or ended["exit_status"]:
-        said = "" if ended is None else ended.get("error") or ended["output_tail"].strip()
+    ended = ended or {"started": False}
+    if not ended["started"] or ended["timed_out"] or ended["exit_status"]:
+        said = ended.get("error") or ended.get("output_tail", "").strip()
         why = said.splitlines()[-1] if said else "no output"
-        if ended is not None and ended.get("timed_out"):
+        if ended.get("timed_out"):
             why = f"no answer within {time_limit:g} s"
         raise ConfigurationError(
             f"{command!r} did not say where the arm stands: {why}; mend that, then ask again"

@@ -26,8 +26,6 @@ NOT_MOVED_STATUS = 75
 """Exit status for `not_moved`: EX_TEMPFAIL of sysexits.h, "the user is invited to retry"."""
 _LARGEST_RESULT = 100_000
 """Of `result.json`, in bytes; ours: a reason is a sentence."""
-
-
 _Distance = Annotated[float, msgspec.Meta(ge=0)]
 
 
@@ -116,17 +114,13 @@ def measure_tracking(folder: Path, plan: Plan) -> dict[str, dict[str, float]]:
     t, q = path
     off = np.abs(q - join_frames(plan.actions, plan.format.dt)(np.clip(t, 0.0, plan.times[-1])))
     start, end = np.abs(q[0] - plan.actions[0]), np.abs(q[-1] - plan.actions[-1])
-    found: dict[str, dict[str, float]] = {}
-    for unit in dict.fromkeys(plan.format.units):
-        own = np.array(plan.format.units) == unit
-        for name, distance in (
-            ("start_error", start[own].max()),
-            ("tracking_rms", np.sqrt(np.mean(off[:, own] ** 2))),
-            ("tracking_max", off[:, own].max()),
-            ("end_error", end[own].max()),
-        ):
-            found.setdefault(name, {})[unit] = float(distance)
-    return found
+    own = {unit: np.array(plan.format.units) == unit for unit in plan.format.units}
+    return {
+        "start_error": {unit: float(start[of].max()) for unit, of in own.items()},
+        "tracking_rms": {u: float(np.sqrt(np.mean(off[:, of] ** 2))) for u, of in own.items()},
+        "tracking_max": {unit: float(off[:, of].max()) for unit, of in own.items()},
+        "end_error": {unit: float(end[of].max()) for unit, of in own.items()},
+    }
 
 
 def read_path(
@@ -145,12 +139,8 @@ def read_path(
         return None
     with open_npz(path, "write t (T,) and q (T, D) with numpy.savez") as archive:
         t, q = np.asarray(archive["t"], float), np.asarray(archive["q"], float)
-        if not (
-            len(t) > 0
-            and q.shape == (len(t), form.action_dim)
-            and np.all(np.isfinite(t))
-            and np.all(np.isfinite(q))
-        ):
+        is_path = len(t) > 0 and q.shape == (len(t), form.action_dim)
+        if not (is_path and np.isfinite(t).all() and np.isfinite(q).all()):
             raise ValueError(f"t {t.shape} and q {q.shape} are not one finite row a sample")
     return t, q
 

@@ -80,8 +80,9 @@ def supervise(
         _named_refusal(lambda: supervisor is None),
         (folder / OUTPUT_FILE).open("wb+", buffering=0) as output,
         (folder / ENDED_FILE).open("wb+", buffering=0) as ended,
+        (folder / OUTPUT_FILE).open("rb") as to_show,
     ):
-        shown = _Shown(os.open(folder / OUTPUT_FILE, os.O_RDONLY), show)
+        shown = _Shown(to_show, show)
         request = {
             "arguments": arguments,
             "time_limit": time_limit,
@@ -90,34 +91,33 @@ def supervise(
             "output": output.fileno(),
             "ended": ended.fileno(),
         }
-        with shown:
-            while True:
-                try:
-                    if supervisor is None:
-                        with _blocked_signals():
-                            supervisor = subprocess.Popen(
-                                [sys.executable, "-I", "-S", str(_SUPERVISOR), json.dumps(request)],
-                                pass_fds=(*descriptors, output.fileno(), ended.fileno()),
-                                env=os.environ | {MARK: " ".join((*names, run))},
-                            )
-                    while supervisor.poll() is None:
-                        # Who stops a workspace finds nothing to stop if this begins just then.
-                        revoked = lock is not None and lock.revoked()
-                        if (interruptions.came or revoked or raised is not None) and not asked:
-                            supervisor.send_signal(signal.SIGTERM)
-                            asked = True
-                        time.sleep(_LOOK)
-                        shown.go_on()
-                    # Nobody is left who would stop them, unless the supervisor ended as it should.
-                    stop_marked(run, 2 * GRACE)
+        while True:
+            try:
+                if supervisor is None:
+                    with _blocked_signals():
+                        supervisor = subprocess.Popen(
+                            [sys.executable, "-I", "-S", str(_SUPERVISOR), json.dumps(request)],
+                            pass_fds=(*descriptors, output.fileno(), ended.fileno()),
+                            env=os.environ | {MARK: " ".join((*names, run))},
+                        )
+                while supervisor.poll() is None:
+                    # Who stops a workspace finds nothing to stop if this begins just then.
+                    revoked = lock is not None and lock.revoked()
+                    if (interruptions.came or revoked or raised is not None) and not asked:
+                        supervisor.send_signal(signal.SIGTERM)
+                        asked = True
+                    time.sleep(_LOOK)
                     shown.go_on()
-                    break
-                except BaseException as error:
-                    if supervisor is None:
-                        raise
-                    # Whatever it is, the arm moves: it stops before anybody hears of it.
-                    raised = raised or error
-                    shown.show = None
+                # Nobody is left who would stop them, unless the supervisor ended as it should.
+                stop_marked(run, 2 * GRACE)
+                shown.go_on()
+                break
+            except BaseException as error:
+                if supervisor is None:
+                    raise
+                # Whatever it is, the arm moves: it stops before anybody hears of it.
+                raised = raised or error
+                shown.show = None
         ended.seek(0)
         written = ended.read()
     return (json.loads(written) if written.endswith(b"}") else None), raised
@@ -149,16 +149,9 @@ def _blocked_signals() -> Iterator[None]:
 class _Shown:
     """A file's text, shown as the file grows."""
 
-    def __init__(self, file: int, show: Callable[[str], None] | None) -> None:
-        self.show = show
-        self._file: IO[bytes] = os.fdopen(file, "rb")
+    def __init__(self, file: IO[bytes], show: Callable[[str], None] | None) -> None:
+        self.show, self._file = show, file
         self._decoder = codecs.getincrementaldecoder("utf-8")("replace")
-
-    def __enter__(self) -> _Shown:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._file.close()
 
     def go_on(self) -> None:
         """Show what came; a reader that left, or a full disk, ends no motion."""

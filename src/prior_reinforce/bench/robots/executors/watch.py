@@ -44,12 +44,6 @@ class State(msgspec.Struct, array_like=True, frozen=True):
     measured: list[float]
 
 
-class _Fault(msgspec.Struct, frozen=True):
-    """The last line, where something went wrong."""
-
-    error: str
-
-
 @dataclass(eq=False)
 class Take:
     """One demonstration."""
@@ -60,8 +54,7 @@ class Take:
     @property
     def t(self) -> Float[np.ndarray, " T"]:
         """Times from its beginning, in [s]."""
-        times = np.array([state.t for state in self.states])
-        return times - times[0]
+        return np.array([state.t - self.states[0].t for state in self.states])
 
     def motion(
         self, kind: Literal["measured", "commanded"], channels: list[int]
@@ -103,6 +96,9 @@ class Watch:
             pass_fds=lock.descriptors,
             env=os.environ | {MARK: " ".join(lock.names)},
         )
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self._input, self._output = self._process.stdin, self._process.stdout
         self._listener = threading.Thread(target=self._listen, daemon=True)
         try:
             self.arm = msgspec.json.decode(self._line(), type=ArmDescription)
@@ -113,12 +109,11 @@ class Watch:
         self._listener.start()
 
     def _line(self) -> bytes:
-        assert self._process.stdout is not None
-        line = self._process.stdout.readline()
+        line = self._output.readline()
         if not line:
             raise ConfigurationError("the program that reads the arm ended without a word")
         if line.startswith(b'{"error"'):
-            raise ConfigurationError(msgspec.json.decode(line, type=_Fault).error)
+            raise ConfigurationError(msgspec.json.decode(line)["error"])
         return line
 
     def _listen(self) -> None:
@@ -153,9 +148,7 @@ class Watch:
 
     def __exit__(self, *_: object) -> None:
         """End the program, which lets go of the arm."""
-        assert self._process.stdin is not None
-        assert self._process.stdout is not None
-        self._process.stdin.close()
+        self._input.close()
         try:
             self._process.wait(15.0)
         except subprocess.TimeoutExpired:
@@ -163,16 +156,15 @@ class Watch:
             self._process.wait()
         if self._listener.ident is not None:
             self._listener.join()
-        self._process.stdout.close()
+        self._output.close()
 
 
 def main() -> None:
     """Read an arm until the input ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the end of the input tells
-    encode = msgspec.json.encode
 
     def say(content: object) -> None:
-        sys.stdout.buffer.write(encode(content) + b"\n")
+        sys.stdout.buffer.write(msgspec.json.encode(content) + b"\n")
         sys.stdout.buffer.flush()
 
     with suppress(BrokenPipeError):
@@ -187,4 +179,4 @@ def main() -> None:
             finally:
                 executor.close()
         except PriorReinforceError as error:
-            say(_Fault(str(error)))
+            say({"error": str(error)})
