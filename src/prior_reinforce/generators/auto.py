@@ -11,20 +11,17 @@ them. Ours; on which evidence, docs/decisions-generator.md tells.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, ClassVar
 
 from prior_reinforce.arrays import Plans, Points
 from prior_reinforce.errors import InvalidDemonstrationsError
-from prior_reinforce.generators.base import Generator, OnProgress
+from prior_reinforce.generators.base import Generator, OnProgress, Wrapper
 from prior_reinforce.generators.config import WAYS, DiffusionConfig
 from prior_reinforce.generators.diffusion import DiffusionGenerator
 from prior_reinforce.generators.interpolation import SmoothInterpolation, SmoothInterpolationConfig
 from prior_reinforce.generators.patterns import patterns
-from prior_reinforce.generators.saving import Tensors
 from prior_reinforce.generators.timed import Timed
-from prior_reinforce.generators.wrapping import Wrapper
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.registry import build
 
@@ -109,13 +106,6 @@ class Auto(Wrapper):
 
     def check_savable(self) -> None:
         """Do nothing: whatever is chosen can be saved; see `Generator.check_savable`."""
-
-    def state(self) -> tuple[dict[str, Any], Tensors]:
-        """Nothing of its own; see `Generator.state`."""
-        return {}, {}
-
-    def restore(self, settings: Mapping[str, Any], tensors: Tensors) -> None:
-        """Nothing to take up; see `Wrapper.restore`."""
 
 
 def _listed(indices: tuple[int, ...]) -> str:

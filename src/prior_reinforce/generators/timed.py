@@ -26,10 +26,9 @@ import numpy as np
 
 from prior_reinforce.arrays import Plans, Points
 from prior_reinforce.errors import ConfigurationError
-from prior_reinforce.generators.base import Generator, OnProgress
+from prior_reinforce.generators.base import Generator, OnProgress, Wrapper
 from prior_reinforce.generators.saving import Tensors
 from prior_reinforce.generators.timing_evidence import TOO_FEW_FRAMES, choose_timing
-from prior_reinforce.generators.wrapping import Wrapper
 from prior_reinforce.plans.alignment import align
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.plans.timeline import Decomposition, Timeline, decompose
