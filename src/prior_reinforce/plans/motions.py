@@ -51,6 +51,8 @@ if TYPE_CHECKING:
 
 _FILE_FORMAT = "prior-reinforce demonstrations"
 _FILE_VERSION = 1
+_ARRAYS = ("plans", "outcomes_seen", "outcome_noise", "outcome_correction")
+"""Of demonstrations, N rows each."""
 
 
 @dataclass(frozen=True)
@@ -216,10 +218,9 @@ class Demonstrations:
             raise InvalidDemonstrationsError(
                 f"outcomes have {k} components; got names {names} and units {units}"
             )
-        for name in ("outcome_noise", "outcome_correction"):
+        for name, signed in (("outcome_noise", False), ("outcome_correction", True)):
             values = np.array(getattr(self, name), dtype=np.float64)
             values = values if values.any() else np.zeros_like(outcomes)
-            signed = name == "outcome_correction"
             far = np.argwhere(np.isposinf(values))
             if far.size and not signed:
                 raise InvalidDemonstrationsError(
@@ -286,15 +287,9 @@ class Demonstrations:
 
     def only(self, chosen: Sequence[int]) -> Self:
         """Return some of the demonstrations, by their numbers from 0."""
-        members = list(chosen)
+        arrays: dict[str, Any] = {name: getattr(self, name)[list(chosen)] for name in _ARRAYS}
         with _warned_before():
-            return replace(
-                self,
-                plans=self.plans[members],
-                outcomes_seen=self.outcomes_seen[members],
-                outcome_noise=self.outcome_noise[members],
-                outcome_correction=self.outcome_correction[members],
-            )
+            return replace(self, **arrays)
 
     def repeated_outcomes(self) -> list[tuple[int, int]]:
         """Return pairs whose outcomes were measured and are the same; by eye they often look it."""
@@ -350,15 +345,9 @@ class Demonstrations:
             "outcome_names": self.outcome_names,
             "outcome_units": self.outcome_units,
         }
-        arrays: dict[str, Any] = {
-            "plans": self.plans,
-            "outcomes_seen": self.outcomes_seen,
-            "outcome_noise": self.outcome_noise,
-            "outcome_correction": self.outcome_correction,
-            "metadata": np.array(json.dumps(metadata)),
-        }
+        arrays: dict[str, Any] = {name: getattr(self, name) for name in _ARRAYS}
         with open(path, "wb") as file:
-            np.savez_compressed(file, **arrays)
+            np.savez_compressed(file, **arrays, metadata=np.array(json.dumps(metadata)))
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Self:
@@ -372,18 +361,16 @@ class Demonstrations:
         if not path.is_file():
             raise FileFormatError(f"no demonstrations at {path}; give the path of an .npz file")
         remedy = "it must be a demonstrations file; write one with Demonstrations.save"
-        with open_npz(path, remedy) as archive:
-            plans, outcomes = archive["plans"], archive["outcomes_seen"]
-            of_outcomes = ("outcome_noise", "outcome_correction")
-            off = [archive[of] if of in archive else np.empty((0, 0)) for of in of_outcomes]
+        with open_npz(path, remedy) as archive, _warned_before():
             metadata = json.loads(str(archive["metadata"]))
             if metadata["file_format"] != _FILE_FORMAT or metadata["version"] != _FILE_VERSION:
                 raise ValueError(f"written as {metadata['file_format']} {metadata['version']}")
-            format_ = PlanFormat(**metadata["format"])
-            names = tuple(metadata["outcome_names"])
-            units = tuple(metadata["outcome_units"])
-        with _warned_before():
-            return cls(plans, outcomes, format_, names, units, *off)
+            return cls(
+                **{name: archive[name] for name in _ARRAYS if name in archive},
+                format=PlanFormat(**metadata["format"]),
+                outcome_names=tuple(metadata["outcome_names"]),
+                outcome_units=tuple(metadata["outcome_units"]),
+            )
 
     def _warn_about_repeated_outcomes(self) -> None:
         pairs = self.repeated_outcomes()
