@@ -19,13 +19,7 @@ from prior_reinforce.adapters.change_points import Change, History, split
 from prior_reinforce.adapters.displacement import BayesianConfig, DisplacementPrior
 from prior_reinforce.adapters.expectation_propagation import Readings, infer
 from prior_reinforce.adapters.memory import LATEST, Memory, Places
-from prior_reinforce.adapters.p_hit import (
-    Belief,
-    Targets,
-    evenly_spread,
-    p_hit_after,
-    share_within,
-)
+from prior_reinforce.adapters.p_hit import Belief, Targets, evenly_spread, p_hit_after, share_within
 from prior_reinforce.arrays import Point, Points
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.readings import Reading
@@ -143,7 +137,7 @@ class BayesianAdapter(Adapter):
         changed = [
             replace(
                 h,
-                changes=(*h.changes, Change(self._now, shift_sd, announced=True)),
+                changes=(*h.changes, Change(self._now, shift_sd)),
                 log_prior=h.log_prior + math.log(0.5 * (1.0 - _NOTHING)),
             )
             for h in self._histories
