@@ -36,7 +36,7 @@ class SavedLayer(msgspec.Struct, omit_defaults=True):
     """`Generator.remarks`."""
     settings: dict[str, Any]
     """JSON types."""
-    tensors: dict[str, Any] = {}
+    tensors: dict[str, np.ndarray] = {}
     """`Tensors`; they stand in the other file."""
 
 
@@ -112,6 +112,12 @@ def _read_config(path: Path) -> _Config:
             "again, or learn the model again"
         )
     return config
+
+
+def without_prefix(prefix: str, tensors: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the tensors of which the name begins so, by the rest of it."""
+    named = (name for name in tensors if name.startswith(prefix))
+    return {name.removeprefix(prefix): tensors[name] for name in named}
 
 
 def _digest(content: Mapping[str, Any]) -> str:

@@ -239,8 +239,8 @@ class Demonstrations:
         object.__setattr__(self, "outcomes_seen", outcomes)
         object.__setattr__(self, "outcome_names", names)
         object.__setattr__(self, "outcome_units", units)
-        self._warn_about_units(stated=stated)
-        self._warn_about_repeated_outcomes()
+        for oddity in self._oddities(unit_stated=stated):
+            warnings.warn(oddity, stacklevel=3)
 
     @property
     def n(self) -> int:
@@ -372,33 +372,27 @@ class Demonstrations:
                 outcome_units=tuple(metadata["outcome_units"]),
             )
 
-    def _warn_about_repeated_outcomes(self) -> None:
-        pairs = self.repeated_outcomes()
-        if pairs:
-            i, j = pairs[0]
-            warnings.warn(
-                f"demonstrations {i} and {j} have the same outcome "
-                f"{self.outcomes_seen[i].tolist()}: the mean of both motions is learned; if "
-                "that is a mistake, correct it, or drop one",
-                stacklevel=4,
-            )
-
-    def _warn_about_units(self, *, stated: bool) -> None:
+    def _oddities(self, *, unit_stated: bool) -> Iterator[str]:
+        """What looks like a slip: other units, and an outcome that comes twice."""
         metres = np.array([unit == "m" for unit in self.outcome_units])
         farthest = np.abs(self.outcomes_seen[:, metres]).max(initial=0.0)
-        if farthest > FARTHEST * (BEYOND_DOUBT if stated else 1.0):
-            warnings.warn(
+        if farthest > FARTHEST * (BEYOND_DOUBT if unit_stated else 1.0):
+            yield (
                 f"an outcome of {farthest:g} m looks like centimetres; outcomes are in metres: "
-                "divide by 100",
-                stacklevel=4,
+                "divide by 100"
             )
         radians = np.array([unit == "rad" for unit in self.format.units])
         largest = np.abs(self.plans[:, :, radians]).max(initial=0.0)
         if largest > LARGEST_TURN:
-            warnings.warn(
-                f"an angle of {largest:g} rad looks like degrees; plans are in radians: "
-                "convert with numpy.deg2rad",
-                stacklevel=4,
+            yield (
+                f"an angle of {largest:g} rad looks like degrees; plans are in radians: convert "
+                "with numpy.deg2rad"
+            )
+        for i, j in self.repeated_outcomes()[:1]:
+            yield (
+                f"demonstrations {i} and {j} have the same outcome "
+                f"{self.outcomes_seen[i].tolist()}: the mean of both motions is learned; if that "
+                "is a mistake, correct it, or drop one"
             )
 
 
