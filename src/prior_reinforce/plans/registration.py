@@ -193,12 +193,9 @@ def correlation_lags(profiles: Profiles) -> Float[np.ndarray, " N"]:
     Returns:
         How many frames later each demonstration is to be moved, mean zero; all count alike.
     """
-    profiles = _unit_energy(profiles)
     n, horizon, _ = profiles.shape
-    spectra = np.fft.rfft(profiles, n=2 * horizon, axis=1)  # padded: a lag never wraps around
     frequencies = 2 * np.pi * np.fft.rfftfreq(2 * horizon)  # [rad/frame]
-    # Correlation of i, moved later by s frames, with j: the real part of sum(cross[i, j] e^{jws}).
-    cross = np.einsum("ifd,jfd->ijf", spectra.conj(), spectra)
+    cross = _cross_spectra(profiles)
     # Start from the demonstration that resembles all others most.
     resembles = [
         float(np.maximum(_correlations(cross[:, j]).max(axis=1), 0).sum()) for j in range(n)
@@ -208,15 +205,29 @@ def correlation_lags(profiles: Profiles) -> Float[np.ndarray, " N"]:
     lags -= lags.mean()
     for _ in range(_MAX_ROUNDS):
         previous = lags.copy()
+        delays = np.exp(-1j * np.outer(lags, frequencies))  # e^{-jws}: moved later by s
         for i in range(n):
-            delays = np.exp(-1j * np.outer(lags, frequencies))  # e^{-jws}: moved later by s
             delays[i] = 0.0
             template = np.einsum("jf,jf->f", delays, cross[i])
             lags[i] = _best_lag(template, frequencies)
+            delays[i] = np.exp(-1j * (lags[i] * frequencies))
         lags -= lags.mean()
         if np.max(np.abs(lags - previous)) < CONVERGED:
             break
     return lags
+
+
+def best_correlations(profiles: Profiles) -> Float[np.ndarray, "N N"]:
+    """Correlation of each two motions at the lag at which they agree best, at most 1."""
+    return _correlations(_cross_spectra(profiles)).max(axis=-1)
+
+
+def _cross_spectra(profiles: Profiles) -> Complex[np.ndarray, "N N F"]:
+    """Correlation of i, moved later by s frames, with j: the real part of sum([i, j] e^{jws})."""
+    profiles = _unit_energy(profiles)
+    # Padded, so that a lag never wraps around.
+    spectra = np.fft.rfft(profiles, n=2 * profiles.shape[1], axis=1)
+    return np.asarray(np.einsum("ifd,jfd->ijf", spectra.conj(), spectra))
 
 
 def _correlations(cross_spectra: Complex[np.ndarray, "*n F"]) -> Float[np.ndarray, "*n lags"]:
@@ -239,14 +250,18 @@ def _best_lag(
     lag -= length if lag > length / 2 else 0
     # The real signal's spectrum has two sides, but for its ends.
     sided = np.where((frequencies == 0) | (frequencies == np.pi), 1.0, 2.0) * cross_spectrum
+    turns = 1j * frequencies
     for _ in range(_NEWTON_STEPS):
-        terms = sided * np.exp(1j * frequencies * lag)
+        terms = sided * np.exp(turns * lag)
         slope = -np.sum(frequencies * terms.imag)
         curvature = -np.sum(frequencies**2 * terms.real)
         if curvature >= 0:  # a plateau: the scan's answer stands
             break
         step = -slope / curvature
+        before = lag
         lag += float(np.clip(step, -1 / _LAGS_PER_FRAME, 1 / _LAGS_PER_FRAME))
+        if lag == before:  # and stays there
+            break
     return lag
 
 
