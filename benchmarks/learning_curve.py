@@ -44,7 +44,7 @@ from scipy.signal import lfilter
 from prior_reinforce.adapters import make_adapter
 from prior_reinforce.bench.robots import check_plan, robot_limits
 from prior_reinforce.generators import DiffusionConfig, DiffusionGenerator, Generator, UNetSize
-from prior_reinforce.generators.wrapping import Wrapper
+from prior_reinforce.generators.base import Wrapper
 from prior_reinforce.lab.experiments.protocol import run_goals
 from prior_reinforce.lab.experiments.recipes.generators import FreshNoise
 from prior_reinforce.lab.tasks.basketball import BasketballShot

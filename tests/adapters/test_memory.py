@@ -9,7 +9,8 @@ from tests.adapters.test_bayesian import CORNERS, started
 def remembering(conditions) -> Memory:
     known = Memory.empty(2)
     for number, condition in enumerate(conditions):
-        known = known.with_one(condition, number, condition, *np.zeros((4, 2)))
+        at = condition[None]
+        known = known.followed_by(Memory(at, np.array([number]), at, *np.zeros((4, 1, 2))))
     return known
 
 

@@ -1,10 +1,14 @@
-"""What the base class does for every generator."""
+"""What the base classes do for every generator, and for those that wrap another."""
 
 import numpy as np
 import pytest
 
 from prior_reinforce.errors import ConfigurationError, FileFormatError, NotFittedError
-from prior_reinforce.generators.base import ConditionScale, Generator
+from prior_reinforce.generators import GENERATORS, load_generator, make_generator
+from prior_reinforce.generators.base import ConditionScale, Generator, Wrapper
+from prior_reinforce.generators.corrected import Corrected
+from prior_reinforce.generators.interpolation import NearestNeighbours
+from prior_reinforce.generators.timed import Timed
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 
 
@@ -88,7 +92,7 @@ def test_scaled_conditions_span_minus_one_to_one_in_every_unit():
     np.testing.assert_allclose(scaled, [[-1, 0], [1, 1], [0, -1]], atol=1e-12)
 
 
-class Remarking(Generator):
+class OneRemark(Generator):
     name = "remarking"
 
     def _fit(self, demonstrations, seed, progress):
@@ -99,9 +103,77 @@ class Remarking(Generator):
 
 def test_what_a_fit_remarks_is_logged(caplog):
     demos = Demonstrations(np.eye(2)[:, :, None], [[0.1], [0.2]], PlanFormat(["a"], ["rad"], 0.1))
-    generator = Remarking()
-    assert repr(generator) == "Remarking(not fitted)"
+    generator = OneRemark()
+    assert repr(generator) == "OneRemark(not fitted)"
     with caplog.at_level("INFO", logger="prior_reinforce"):
         generator.fit(demos, seed=0)
     assert caplog.messages == ["remarking: joint3 is held"]
-    assert repr(generator) == "Remarking(fitted)"
+    assert repr(generator) == "OneRemark(fitted)"
+
+
+def demonstrations() -> Demonstrations:
+    s = np.clip((np.arange(60) - np.array([5, 9, 15, 12])[:, None]) / 30, 0, 1)
+    plans = (10 * s**3 - 15 * s**4 + 6 * s**5)[:, :, None] * np.array([1.0, -0.4])
+    outcomes = np.array([[0.8, -0.2], [0.8, 0.2], [1.0, -0.1], [1.0, 0.2]])
+    return Demonstrations(plans, outcomes, PlanFormat(("a", "b"), ("rad",) * 2, 0.02))
+
+
+def test_two_wraps_are_rebuilt_in_order(tmp_path):
+    demos = demonstrations()
+    made = Timed(Corrected(NearestNeighbours()), "start").fit(demos, seed=0)
+    made.save(tmp_path)
+    loaded = load_generator(tmp_path)
+    assert isinstance(loaded, Timed)
+    assert isinstance(loaded.generator, Corrected)
+    assert isinstance(loaded.generator.generator, NearestNeighbours)
+    conditions = np.array([[0.9, 0.1]])
+    np.testing.assert_array_equal(loaded.generate(conditions), made.generate(conditions))
+
+
+def test_a_wrapped_generator_keeps_its_name():
+    assert GENERATORS.name_of(make_generator("regression")) == "regression"
+    assert GENERATORS.name_of(make_generator("auto")) == "auto"
+
+
+def test_a_generator_is_wrapped_once_in_each_way():
+    with pytest.raises(ConfigurationError, match="corrected already"):
+        Corrected(Timed(Corrected(NearestNeighbours())))
+
+
+def test_a_wrapper_without_a_generator_is_refused():
+    layer, _ = Timed(NearestNeighbours(), "start").fit(demonstrations(), seed=0).pack()
+    with pytest.raises(FileFormatError, match="around another"):
+        Timed.unpack_layer(layer)
+
+
+class Remarking(NearestNeighbours):
+    """Has something to say of every fit."""
+
+    name = "remarking"
+
+    def _fit(self, demonstrations, seed, progress):
+        super()._fit(demonstrations, seed, progress)
+        self.remarks = (f"{demonstrations.n} demonstrations",)
+
+
+class Plain(Wrapper):
+    """A wrapper that says nothing of remarks."""
+
+    name = "plain"
+
+    def _fit(self, demonstrations, seed, progress):
+        self.generator.fit(demonstrations, seed=seed, progress=progress)
+
+    def _generate(self, conditions):
+        return self.generator.generate(conditions)
+
+
+def test_remarks_of_what_is_wrapped_are_never_lost():
+    wrapped = Plain(Corrected(Remarking()))
+    for _ in range(2):
+        correction, inner = wrapped.fit(demonstrations(), seed=0).remarks
+        assert correction.startswith("correction")
+        assert inner == "4 demonstrations"
+    timed = Timed(wrapped, "auto").fit(demonstrations(), seed=0)
+    assert timed.remarks[0].startswith("timing")
+    assert timed.remarks[1:] == (correction, inner)

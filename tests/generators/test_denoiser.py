@@ -9,10 +9,10 @@ import torch
 
 from prior_reinforce.generators import DiffusionConfig
 from prior_reinforce.generators.config import UNetSize
-from prior_reinforce.generators.denoiser import draw_batch, mixed, sample, train
+from prior_reinforce.generators.denoiser import draw_batch, loss, mixed, sample
 from prior_reinforce.generators.noise_schedule import NoiseSchedule, mean_shift_levels
 from prior_reinforce.generators.threads import torch_threads
-from prior_reinforce.generators.training import build
+from prior_reinforce.generators.training import build, optimise
 from prior_reinforce.generators.unet import ConditionalUNet
 
 CONFIG = DiffusionConfig(prediction="sample", margin=1.0, sampling_steps=6)
@@ -157,8 +157,10 @@ def test_the_network_itself_learns_codes_and_what_lies_between_them(prediction):
             learning_rate=3e-3, warmup_steps=20, ema_limit=0.98,
         )  # fmt: skip
         network = build(lambda: ConditionalUNet(2, 2, TINY), seed=0)
+        of_step = loss(network, ramps(SHOWN), SHOWN, config, torch.Generator().manual_seed(0))
+        how = {"betas": (0.95, 0.999), "decay": config.decay}
         with torch_threads(1):
-            network = train(network, ramps(SHOWN), SHOWN, config, 0, lambda progress: None)
+            network = optimise(network, of_step, config, lambda progress: None, **how)
         errors[steps] = [
             (sample(network, c, (2, 8), config, seed=0) - ramps(c)).square().mean().sqrt().item()
             for c in (SHOWN, BETWEEN)

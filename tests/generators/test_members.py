@@ -9,12 +9,12 @@ import pytest
 from prior_reinforce.errors import ConfigurationError, FileFormatError
 from prior_reinforce.generators import GENERATORS, load_generator, make_generator
 from prior_reinforce.generators.auto import Auto
+from prior_reinforce.generators.base import Wrapper
 from prior_reinforce.generators.config import DiffusionConfig
 from prior_reinforce.generators.corrected import Corrected
 from prior_reinforce.generators.diffusion import DiffusionGenerator
 from prior_reinforce.generators.interpolation import NearestNeighbours
 from prior_reinforce.generators.timed import Timed
-from prior_reinforce.generators.wrapping import Wrapper
 
 
 class Own(NearestNeighbours):

@@ -1,8 +1,8 @@
 """What diffusion and regression share: threads, devices, and weights that have to fit."""
 
 import copy
-from dataclasses import replace
 
+import msgspec
 import numpy as np
 import pytest
 import torch
@@ -81,10 +81,10 @@ def test_weights_of_another_network_are_a_damaged_model(make, throws):
     if "perceptron" in settings["config"]:
         settings["config"]["perceptron"]["width"] = 32
     with pytest.raises(FileFormatError, match="learn it again"):
-        make().unpack_layer(replace(layer, settings=settings))
+        make().unpack_layer(msgspec.structs.replace(layer, settings=settings))
     fewer = {k: v for k, v in layer.tensors.items() if not k.endswith(("head.1.bias", "last.bias"))}
     with pytest.raises(FileFormatError, match="learn it again"):
-        make().unpack_layer(replace(layer, tensors=fewer))
+        make().unpack_layer(msgspec.structs.replace(layer, tensors=fewer))
 
 
 @each

@@ -80,7 +80,7 @@ def test_mixed_dimensions_are_each_coded_as_they_need():
     codec = codec_of(plans)
     assert codec.kinds == ("spline", "frames", "number", "spline", "spline", "frames")
     assert codec.levels == ((), (0.0, 1.0), (), (), (), ())
-    assert codec.channels == 4 + 2 * 4
+    assert codec.shape[0] == 4 + 2 * 4
     back = round_trip(codec, plans)
     np.testing.assert_array_equal(back[:, :, 1:3], plans[:, :, 1:3])
     np.testing.assert_allclose(back[:, :, 5], plans[:, :, 5], atol=1e-12)
@@ -101,7 +101,7 @@ def test_any_code_decodes_into_range_and_to_rest_at_both_ends():
     codec = codec_of(plans)
     assert all(codec.rest_start)
     assert all(codec.rest_end)
-    codes = np.random.default_rng(0).normal(scale=3, size=(50, codec.channels, codec.length))
+    codes = np.random.default_rng(0).normal(scale=3, size=(50, *codec.shape))
     decoded = codec.decode(codes)
     low, high = plans.min(axis=(0, 1)), plans.max(axis=(0, 1))
     assert np.all(decoded >= low - 0.05 * (high - low) - 1e-12)
@@ -129,7 +129,7 @@ def test_settings_and_arrays_are_all_there_is():
     plans = throws(3)
     codec = codec_of(plans)
     again = PlanCodec.restore(codec.settings(), codec.plan_range, codec.code_range)
-    codes = np.random.default_rng(0).normal(size=(5, codec.channels, codec.length))
+    codes = np.random.default_rng(0).normal(size=(5, *codec.shape))
     np.testing.assert_array_equal(again.decode(codes), codec.decode(codes))
 
 

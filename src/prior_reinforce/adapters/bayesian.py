@@ -19,13 +19,7 @@ from prior_reinforce.adapters.change_points import Change, History, split
 from prior_reinforce.adapters.displacement import BayesianConfig, DisplacementPrior
 from prior_reinforce.adapters.expectation_propagation import Readings, infer
 from prior_reinforce.adapters.memory import LATEST, Memory, Places
-from prior_reinforce.adapters.p_hit import (
-    Belief,
-    Targets,
-    evenly_spread,
-    p_hit_after,
-    share_within,
-)
+from prior_reinforce.adapters.p_hit import Belief, Targets, evenly_spread, p_hit_after, share_within
 from prior_reinforce.arrays import Point, Points
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.readings import Reading
@@ -117,7 +111,6 @@ class BayesianAdapter(Adapter):
 
     config_type: ClassVar[type[BayesianConfig]] = BayesianConfig
     carries_over: ClassVar[bool] = True
-    _missed: Memory | None
 
     def __init__(self, config: BayesianConfig | None = None) -> None:
         """Take the settings, or the defaults."""
@@ -128,7 +121,6 @@ class BayesianAdapter(Adapter):
         self._normalisation = self._prior.normalisation
         self._memory, self._now = Memory.empty(demonstrations.outcome_dim), 0
         self._histories = [self._from_the_beginning()]
-        self._missed = None
 
     def _from_the_beginning(self) -> History:
         """What follows from demonstrations alone, where nothing happened."""
@@ -145,35 +137,34 @@ class BayesianAdapter(Adapter):
         changed = [
             replace(
                 h,
-                changes=(*h.changes, Change(self._now, shift_sd, announced=True)),
+                changes=(*h.changes, Change(self._now, shift_sd)),
                 log_prior=h.log_prior + math.log(0.5 * (1.0 - _NOTHING)),
             )
             for h in self._histories
             for shift_sd in (0.0, self.config.shift_sd)
         ]
         self._histories = sorted(unchanged + changed, key=lambda h: -h.log_weight)
-        self._missed = None
 
     def _observe_reading(self, condition: Point, goal: Point, reading: Reading) -> None:
         scale, moved = self._normalisation.scale, goal - condition
         radius = reading.missed_by_at_least
-        memory = self._memory.with_one(
-            self._normalisation.apply(condition),
-            self._now,
-            self._normalisation.apply(goal),
-            (reading.low + moved) / scale,
-            (reading.high + moved) / scale,
-            (reading.sd / scale) ** 2 + _SHARPEST**2,
-            np.zeros(len(scale)) if radius is None else radius / scale,
+        new = Memory(
+            self._normalisation.apply(condition[None]),
+            np.array([self._now]),
+            self._normalisation.apply(goal[None]),
+            low=((reading.low + moved) / scale)[None],
+            high=((reading.high + moved) / scale)[None],
+            variance=((reading.sd / scale) ** 2 + _SHARPEST**2)[None],
+            missed_by=(np.zeros(len(scale)) if radius is None else radius / scale)[None],
         )
-        new = memory.only(slice(-1, None))
         may_be = split(self._histories, self._prior, self._memory, new)
+        memory = self._memory.followed_by(new)
         keep = memory.worth_keeping()
         memory = memory.only(keep)
         base = self._prior.covariance(memory.conditions, memory.conditions)
         told = [history.told(self._prior, memory, base, keep[:-1]) for history in may_be]
         self._histories = sorted(told, key=lambda history: -history.log_weight)
-        self._memory, self._now, self._missed = memory, self._now + 1, None
+        self._memory, self._now = memory, self._now + 1
 
     def _propose(self, goal_seen: Point) -> Point:
         goal = self._normalisation.apply(goal_seen)
@@ -297,15 +288,12 @@ class BayesianAdapter(Adapter):
 
     def _misses(self) -> Memory:
         """The latest trials that missed and of which their readings do not say so."""
-        if self._missed is None:
-            missed = self._memory.only(slice(-LATEST, None))
-            missed = missed.only(np.any(missed.missed_by > 0.0, axis=1))
-            blur = _BLUR * np.sqrt(missed.variance)
-            beyond = np.maximum(missed.low - missed.aims, missed.aims - missed.high) - blur
-            least = np.linalg.norm(np.maximum(beyond, 0.0) / missed.missed_by, axis=1)
-            missed = missed.only(least < 1.0)
-            self._missed = missed
-        return self._missed
+        missed = self._memory.only(slice(-LATEST, None))
+        missed = missed.only(np.any(missed.missed_by > 0.0, axis=1))
+        blur = _BLUR * np.sqrt(missed.variance)
+        beyond = np.maximum(missed.low - missed.aims, missed.aims - missed.high) - blur
+        least = np.linalg.norm(np.maximum(beyond, 0.0) / missed.missed_by, axis=1)
+        return missed.only(least < 1.0)
 
     def _expected(self, at: Places) -> tuple[Points, Points]:
         """Mean and variance of displacements over all that may be."""
@@ -411,7 +399,6 @@ class BayesianAdapter(Adapter):
         at = self._memory.conditions
         base, known = other._prior.covariance(at, at), np.ones(len(at), dtype=bool)
         other._histories = [self._histories[0].told(other._prior, self._memory, base, known)]
-        other._missed = None
         return other
 
 

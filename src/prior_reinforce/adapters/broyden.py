@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from jaxtyping import Float
 
-from prior_reinforce.adapters.base import Adapter
+from prior_reinforce.adapters.proportional import ProportionalAdapter
 from prior_reinforce.arrays import Point
-from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.plans.normalisation import Normalisation
 
@@ -20,28 +17,18 @@ _LEAST_STEP = 1e-6
 """Steps below it, in spreads, say nothing of a slope."""
 
 
-class BroydenAdapter(Adapter):
+class BroydenAdapter(ProportionalAdapter):
     """c' = c - gain J^-1 (r - g), J the slope of outcomes, learned from one trial to the next.
 
     J begins as the identity; every step c' - c with its r' - r corrects J along that step alone
     (Broyden 1965, A class of methods for solving nonlinear simultaneous equations, the good
-    method), its singular values kept within a factor of two of 1.
+    method), its singular values kept within a factor of two of 1. Until then it is proportional.
     """
 
-    def __init__(self, gain: float = 0.8) -> None:
-        """Choose the share of each step to make.
-
-        Raises:
-            ConfigurationError: The gain is not a positive number.
-        """
-        if not (math.isfinite(gain) and gain > 0):
-            raise ConfigurationError(f"gain must be a positive number, got {gain}; try 0.8")
-        self.gain = gain
-
     def _start(self, demonstrations: Demonstrations) -> None:
+        super()._start(demonstrations)
         self._normalisation = Normalisation.of(demonstrations)
         self._slope = np.eye(demonstrations.outcome_dim)
-        self._last: tuple[Point, Point] | None = None
 
     def _propose(self, goal_seen: Point) -> Point:
         if self._last is None:

@@ -44,8 +44,6 @@ class Change:
     shift all by the same."""
     goal: Point | None = None
     """The only goal that it concerns, which was moved; None where it concerns all."""
-    announced: bool = False
-    """Whether somebody said so."""
 
     def concerns(self, places: Places) -> Bool[np.ndarray, " p"]:
         """Which of them it concerns."""
@@ -165,9 +163,7 @@ def split(
             scored.append((history.log_weight + np.log(p) + told, after))
         wrong = float(np.log(config.p_mistaken) + flat)
         after = replace(
-            history,
-            mistaken=history.mistaken | {number},
-            log_prior=history.log_prior + wrong,
+            history, mistaken=history.mistaken | {number}, log_prior=history.log_prior + wrong
         )
         scored.append((history.log_weight + wrong, after))
     scored.sort(key=lambda pair: -pair[0])

@@ -22,18 +22,22 @@ from __future__ import annotations
 
 import copy
 import itertools
-import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
+import msgspec
 import numpy as np
 from jaxtyping import Float
 
-from prior_reinforce.arrays import Points
-from prior_reinforce.errors import ConfigurationError
+from prior_reinforce.arrays import LARGEST, Points
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.plans.normalisation import Normalisation
 from prior_reinforce.plans.outcome_weights import smooth_weights
+from prior_reinforce.settings import Checked
+
+Size = Annotated[float, msgspec.Meta(gt=0, lt=LARGEST)]
+Sizes = Annotated[tuple[Size, ...], msgspec.Meta(min_length=1)]
+Probability = Annotated[float, msgspec.Meta(gt=0, lt=1)]
 
 _LESS = 2 / 3
 """How probable a size is beforehand, relative to the next smaller one (ours): equal odds say too
@@ -45,62 +49,47 @@ that is left then. Inside a hull it is about 1."""
 _REMEMBERED = 8
 """Sets of places whose weights are remembered (ours): trials in memory are asked about again and
 again."""
+_AtPlaces = tuple[
+    Float[np.ndarray, "p N"],
+    Float[np.ndarray, "p N"],
+    Float[np.ndarray, " p"],
+    Float[np.ndarray, "k p"],
+]
 
 
 @dataclass(frozen=True)
-class BayesianConfig:
+class BayesianConfig(Checked):
     """Settings of `BayesianAdapter`, in units of S, the demonstrations' spread (`Normalisation`).
 
     Where there are several values, all combinations are models, and their evidence weighs them; of
     sizes each is beforehand two thirds as probable as the one before.
     """
 
-    generator_sd: tuple[float, ...] = (0.05, 0.2, 0.8)
+    generator_sd: Sizes = (0.05, 0.2, 0.8)
     """a, by how much landing bends between demonstrations."""
-    generator_reach: float = 1.4
+    generator_reach: Size = 1.4
     """How far that reaches."""
-    hardware_sd: tuple[float, float] = (0.01, 0.3)
+    hardware_sd: tuple[Size, Size] = (0.01, 0.3)
     """What is different from the demonstrations' day: where nothing was changed, and where
     something was."""
-    hardware_reach: float = 2.5
+    hardware_reach: Size = 2.5
     """How far that reaches: shift and stretch."""
-    p_changed: float = 0.2
+    p_changed: Probability = 0.2
     """Beforehand, the probability that something was changed."""
-    shift_sd: float = 0.8
+    shift_sd: Size = 0.8
     """By how much everything may be shifted when table, object or camera move."""
-    p_change: float = 0.02
+    p_change: Probability = 0.02
     """Probability that something changes between two trials, unsaid: a shift of everything, or as
     `hardware_sd` says, with equal odds."""
-    p_misplaced: float = 0.002
+    p_misplaced: Probability = 0.002
     """Probability that one goal's place changes between two trials, unsaid."""
-    p_mistaken: float = 0.01
+    p_mistaken: Probability = 0.01
     """Probability that a trial is told wrongly: a mistyped number, a lost ball."""
-    execution_sd: tuple[float, ...] = (0.005, 0.02, 0.05)
+    execution_sd: Sizes = (0.005, 0.02, 0.05)
     """How far apart outcomes of one plan, or of plans next to each other, lie: 3 to 4 mm where the
     spread is 12 to 18 cm, on our tasks."""
-    outlier: float = 0.002
+    outlier: Probability = 0.002
     """Probability that one component of a reading says nothing."""
-
-    def __post_init__(self) -> None:
-        """Check the settings.
-
-        Raises:
-            ConfigurationError: A setting is not positive, a probability is 1 or more, or
-                `hardware_sd` has not two values.
-        """
-        for name in ("generator_sd", "execution_sd", "hardware_sd"):
-            if not isinstance(getattr(self, name), tuple):
-                raise ConfigurationError(f"{name} must be a tuple, got {getattr(self, name)}")
-        for name, value in vars(self).items():
-            values = value if isinstance(value, tuple) else (value,)
-            if not (values and all(math.isfinite(v) and v > 0 for v in values)):
-                raise ConfigurationError(f"{name} must be positive, got {value}")
-            if (name.startswith("p_") and value >= 1.0) or (name == "outlier" and value >= 1.0):
-                raise ConfigurationError(f"{name} must be below 1, got {value}")
-        if len(self.hardware_sd) != 2:
-            raise ConfigurationError(
-                f"hardware_sd must have two values, unchanged and changed, got {self.hardware_sd}"
-            )
 
 
 class DisplacementPrior:
@@ -179,14 +168,7 @@ class DisplacementPrior:
         square = np.square(a[:, None] - b[None]).sum(axis=-1)
         return np.asarray(np.exp(-0.5 * square / self.config.hardware_reach**2))
 
-    def _at(
-        self, at: Float[np.ndarray, "p k"]
-    ) -> tuple[
-        Float[np.ndarray, "p N"],
-        Float[np.ndarray, "p N"],
-        Float[np.ndarray, " p"],
-        Float[np.ndarray, "k p"],
-    ]:
+    def _at(self, at: Float[np.ndarray, "p k"]) -> _AtPlaces:
         """S w, how much each demonstration counts, s (K(at, r) - w K(r, r) / 2), s, and the mean.
 
         s is 1 but where weights are steep: all that is unknown there is scaled down by it.

@@ -43,7 +43,9 @@ _FARTHEST = 37.0
 """Standard deviations beyond which the normal distribution is 0 in floating point."""
 _TINY = 1e-290
 
-
+Each = Float[np.ndarray, "m k n"]
+"""A number for each latent, under m models and for k outputs."""
+Matrices = Float[np.ndarray, "m k n n"]
 Sites = tuple[Float[np.ndarray, "m k s"], Float[np.ndarray, "m k s"]]
 """Precision, and precision times mean."""
 
@@ -68,13 +70,13 @@ class Readings:
 class Posterior:
     """The latent after its readings, for m models and k outputs."""
 
-    tau: Float[np.ndarray, "m k n"]
+    tau: Each
     """Precision of each site."""
-    nu: Float[np.ndarray, "m k n"]
+    nu: Each
     """Precision times mean of each site."""
-    weights: Float[np.ndarray, "m k n"]
+    weights: Each
     """What multiplies prior covariances to give a mean: E d(x) = k(x)' weights."""
-    precision: Float[np.ndarray, "m k n n"]
+    precision: Matrices
     """(K + diag(1 / tau))^-1: Var d(x) = k(x, x) - k(x)' precision k(x)."""
     log_evidence: Float[np.ndarray, "m k"]
     """log p(readings, model), for each output."""
@@ -161,7 +163,7 @@ def _greatest_evidence(readings: Readings) -> Float[np.ndarray, " k"]:
 
 def _filtered(
     prior: Float[np.ndarray, "m 1 n n"], readings: Readings
-) -> tuple[Float[np.ndarray, "m k n"], Float[np.ndarray, "m k n"], Float[np.ndarray, "m k"]]:
+) -> tuple[Each, Each, Float[np.ndarray, "m k"]]:
     """Sites and log evidence where each reading is taken in once, in order."""
     m, (k, n) = len(prior), readings.low.shape
     covariance = np.broadcast_to(prior, (m, k, n, n)).copy()
@@ -187,12 +189,7 @@ def _filtered(
     return tau, nu, evidence
 
 
-def _rest(
-    mean: Float[np.ndarray, "m k n"],
-    variance: Float[np.ndarray, "m k n"],
-    tau: Float[np.ndarray, "m k n"],
-    nu: Float[np.ndarray, "m k n"],
-) -> tuple[Float[np.ndarray, "m k n"], Float[np.ndarray, "m k n"]]:
+def _rest(mean: Each, variance: Each, tau: Each, nu: Each) -> tuple[Each, Each]:
     """Precision and mean of each latent without its own site.
 
     Where updates swing, nothing may be left of the precision; the mean then stays where it is.
@@ -203,9 +200,7 @@ def _rest(
     return rest, np.where(sound, (mean / variance - nu) / rest, mean)
 
 
-def _whitened(
-    prior: Float[np.ndarray, "m 1 n n"], tau: Float[np.ndarray, "m k n"]
-) -> Float[np.ndarray, "m k n n"]:
+def _whitened(prior: Float[np.ndarray, "m 1 n n"], tau: Each) -> Matrices:
     """I + tau^1/2 K tau^1/2, which is never ill-conditioned."""
     root = np.sqrt(tau)
     b = root[..., :, None] * prior * root[..., None, :]
@@ -215,10 +210,8 @@ def _whitened(
 
 
 def _latent(
-    prior: Float[np.ndarray, "m 1 n n"],
-    tau: Float[np.ndarray, "m k n"],
-    nu: Float[np.ndarray, "m k n"],
-) -> tuple[Float[np.ndarray, "m k n"], Float[np.ndarray, "m k n"], Float[np.ndarray, "m k n n"]]:
+    prior: Float[np.ndarray, "m 1 n n"], tau: Each, nu: Each
+) -> tuple[Each, Each, Matrices]:
     """Mean and variance of every latent, and (K + diag(1 / tau))^-1."""
     root = np.sqrt(tau)
     precision = root[..., :, None] * np.linalg.inv(_whitened(prior, tau)) * root[..., None, :]
@@ -229,9 +222,7 @@ def _latent(
     return mean, np.maximum(variance, 1e-12), precision
 
 
-def tilted(
-    mean: Float[np.ndarray, "m k n"], variance: Float[np.ndarray, "m k n"], readings: Readings
-) -> tuple[Float[np.ndarray, "m k n"], Float[np.ndarray, "m k n"], Float[np.ndarray, "m k n"]]:
+def tilted(mean: Each, variance: Each, readings: Readings) -> tuple[Each, Each, Each]:
     """Return log normaliser, mean and variance of N(mean, variance) times each likelihood."""
     from scipy.special import ndtr  # a third of the start of a command that infers nothing
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
+import msgspec
 import numpy as np
 from jaxtyping import Float
 
@@ -15,10 +16,11 @@ from prior_reinforce.arrays import Point, Points
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.plans.normalisation import Normalisation
+from prior_reinforce.settings import Checked, Positive
 
-# Below this, the rounding of a kernel matrix of amplitude 1e5 comes near the diagonal term, and
-# the likelihood loses its fifth decimal.
-_LEAST_JITTER = 1e-6
+Jitter = Annotated[float, msgspec.Meta(ge=1e-6)]
+"""alpha. Below 1e-6, the rounding of a kernel matrix of amplitude 1e5 comes near the diagonal term,
+and the likelihood loses its fifth decimal."""
 _CONVENTION_DISTANCE = 2.0
 """How far from the demonstrations' mean c = r is added where they are too few, in their spreads
 (ours): of 1, 1.5 and 2 the one that took fewest trials (docs/decisions-adapter.md)."""
@@ -28,7 +30,7 @@ their spreads (ours): 3 mm where 0.25 m x 0.5 m can be reached."""
 
 
 @dataclass(frozen=True)
-class GaussianProcessConfig:
+class GaussianProcessConfig(Checked):
     """Settings of `GaussianProcessAdapter`; lengths in normalised units (see `Normalisation`).
 
     The paper asks for "a small diagonal regularization term" without a size. Ours has two sizes,
@@ -41,16 +43,16 @@ class GaussianProcessConfig:
 
     memory_size: int | None = 2
     """m, the number of latest trials kept beside all demonstrations; None keeps every trial."""
-    trial_jitter: float = 1e-3
+    trial_jitter: Jitter = 1e-3
     """alpha of the trials, added to the kernel's diagonal: 3 % of the demonstrations' spread,
     squared, which is 5 mm where 0.25 m x 0.5 m can be reached."""
-    demonstration_jitter_bounds: tuple[float, float] = (1e-3, 0.3)
+    demonstration_jitter_bounds: tuple[Jitter, Jitter] = (1e-3, 0.3)
     """Least and greatest alpha of the demonstrations. The least is used before any trial, and makes
     the first condition the goal to 0.2 mm inside their hull; the greatest (half of their spread,
     squared) keeps one lost object from making the demonstrations worthless."""
-    amplitude_bounds: tuple[float, float] = (1e-5, 1e5)
+    amplitude_bounds: tuple[Positive, Positive] = (1e-5, 1e5)
     """Least and greatest kernel constant; scikit-learn's defaults."""
-    length_scale_bounds: tuple[float, float] = (1e-5, 1e5)
+    length_scale_bounds: tuple[Positive, Positive] = (1e-5, 1e5)
     """Least and greatest length scale; scikit-learn's defaults."""
 
     def __post_init__(self) -> None:
@@ -59,26 +61,17 @@ class GaussianProcessConfig:
         Raises:
             ConfigurationError: A setting is outside its range.
         """
+        super().__post_init__()
         if self.memory_size is not None and self.memory_size < 1:
             raise ConfigurationError(
                 f"memory_size must be at least 1 trial, got {self.memory_size}; "
                 "None keeps all trials, and FrozenAdapter learns from none"
             )
-        if not _LEAST_JITTER <= self.trial_jitter < np.inf:
-            raise ConfigurationError(
-                f"trial_jitter must be at least {_LEAST_JITTER:g}, so that rounding errors stay "
-                f"below it, got {self.trial_jitter}"
-            )
-        for name, least in (
-            ("demonstration_jitter_bounds", _LEAST_JITTER),
-            ("amplitude_bounds", np.finfo(float).tiny),
-            ("length_scale_bounds", np.finfo(float).tiny),
-        ):
+        for name in ("demonstration_jitter_bounds", "amplitude_bounds", "length_scale_bounds"):
             low, high = getattr(self, name)
-            if not least <= low <= high < np.inf:
+            if not low <= high < np.inf:
                 raise ConfigurationError(
-                    f"{name} must be two numbers of at least {least:g}, the smaller first, "
-                    f"got {(low, high)}"
+                    f"{name} must be two finite numbers, the smaller first, got {(low, high)}"
                 )
 
 

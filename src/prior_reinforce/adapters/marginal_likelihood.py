@@ -42,6 +42,12 @@ _ZOOM_ROUNDS = 4
 """Each round divides the bracket by (points - 1) / 2 = 8: 4 rounds end at 1e-4 of a scan step."""
 
 
+Targets = Float[np.ndarray, "n outputs"]
+"""Y, of zero prior mean."""
+Jitter = Float[np.ndarray, " n"]
+"""alpha of each point, positive."""
+
+
 @dataclass(frozen=True)
 class Kernel:
     """a exp(-d^2 / (2 l^2)); a Gaussian process with it and prior mean 0."""
@@ -58,35 +64,18 @@ class Kernel:
         """
         return self.amplitude * _correlation(cdist(a, b, "sqeuclidean"), self.length_scale)
 
-    def weights(
-        self,
-        inputs: Points,
-        targets: Float[np.ndarray, "n outputs"],
-        jitter: Float[np.ndarray, " n"],
-    ) -> Float[np.ndarray, "n outputs"]:
+    def weights(self, inputs: Points, targets: Targets, jitter: Jitter) -> Targets:
         """Return (K + diag(alpha))^-1 Y; `kernel(x, inputs) @ weights` is the posterior mean."""
         covariance = self(inputs, inputs)
         covariance[np.diag_indices_from(covariance)] += jitter
         return np.asarray(cho_solve(cho_factor(covariance, lower=True), targets))
 
 
-def log_marginal_likelihood(
-    kernel: Kernel,
-    inputs: Points,
-    targets: Float[np.ndarray, "n outputs"],
-    jitter: Float[np.ndarray, " n"],
-) -> float:
-    """Return log p(Y | X) under one kernel, summed over outputs; arguments as in `maximise`."""
-    squared = cdist(inputs, inputs, "sqeuclidean")
-    spectra = _Spectra(squared, targets, jitter, np.array([kernel.length_scale]))
-    return float(spectra.log_likelihood(np.log([[kernel.amplitude]]))[0, 0])
-
-
 def maximise(
     inputs: Points,
-    targets: Float[np.ndarray, "n outputs"],
+    targets: Targets,
     *,
-    jitter: Float[np.ndarray, " n"],
+    jitter: Jitter,
     amplitude_bounds: tuple[float, float],
     length_scale_bounds: tuple[float, float],
 ) -> tuple[Kernel, float]:
@@ -96,8 +85,8 @@ def maximise(
 
     Args:
         inputs: X.
-        targets: Y, of zero prior mean; its columns share the kernel.
-        jitter: alpha, added to the diagonal, positive.
+        targets: Y; its columns share the kernel.
+        jitter: Added to the diagonal.
         amplitude_bounds: Least and greatest a.
         length_scale_bounds: Least and greatest l, in the inputs' unit.
     """
@@ -140,8 +129,8 @@ class _Spectra:
     def __init__(
         self,
         squared_distances: Float[np.ndarray, "n n"],
-        targets: Float[np.ndarray, "n outputs"],
-        jitter: Float[np.ndarray, " n"],
+        targets: Targets,
+        jitter: Jitter,
         length_scales: Float[np.ndarray, " m"],
     ) -> None:
         whitening = 1.0 / np.sqrt(jitter)

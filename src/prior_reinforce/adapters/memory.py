@@ -6,12 +6,11 @@ Source: ours, so that a proposal stays below tens of milliseconds (docs/decision
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Int
 
-from prior_reinforce.arrays import Point, Points
+from prior_reinforce.arrays import Points
 
 LATEST = 8
 """The latest trials, which are never forgotten, and whose misses count for themselves (ours)."""
@@ -51,20 +50,9 @@ class Memory(Places):
         """Displacements that would have hit: goal minus condition."""
         return self.goals - self.conditions
 
-    def with_one(
-        self,
-        condition: Point,
-        number: int,
-        goal: Point,
-        low: Point,
-        high: Point,
-        variance: Point,
-        missed_by: Point,
-    ) -> Memory:
-        """The same and one more."""
-        new: tuple[Any, ...] = (condition[None], [number], goal[None])
-        new += (low[None], high[None], variance[None], missed_by[None])
-        pairs = zip(vars(self).values(), new, strict=True)
+    def followed_by(self, others: Memory) -> Memory:
+        """The same and others after them."""
+        pairs = zip(vars(self).values(), vars(others).values(), strict=True)
         return Memory(*(np.concatenate(pair) for pair in pairs))
 
     def only(self, which: Bool[np.ndarray, " n"] | Int[np.ndarray, " m"] | slice) -> Memory:

@@ -19,10 +19,7 @@ class ProportionalAdapter(Adapter):
     """
 
     def __init__(self, gain: float = 0.8) -> None:
-        """Choose the share of the error to correct.
-
-        Args:
-            gain: Dimensionless; the paper's is 0.8.
+        """Choose the share of the error to correct; the paper's is 0.8.
 
         Raises:
             ConfigurationError: The gain is not a positive number.

@@ -11,22 +11,17 @@ them. Ours; on which evidence, docs/decisions-generator.md tells.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, ClassVar
 
 from prior_reinforce.arrays import Plans, Points
 from prior_reinforce.errors import InvalidDemonstrationsError
-from prior_reinforce.generators.base import Generator, OnProgress
-from prior_reinforce.generators.config import WAYS, DiffusionConfig
-from prior_reinforce.generators.diffusion import DiffusionGenerator
+from prior_reinforce.generators.base import Generator, OnProgress, Wrapper
 from prior_reinforce.generators.interpolation import SmoothInterpolation, SmoothInterpolationConfig
+from prior_reinforce.generators.members import GENERATORS
 from prior_reinforce.generators.patterns import patterns
-from prior_reinforce.generators.saving import Tensors
 from prior_reinforce.generators.timed import Timed
-from prior_reinforce.generators.wrapping import Wrapper
 from prior_reinforce.plans.motions import Demonstrations
-from prior_reinforce.registry import build
 
 _MORE_THAN_AFFINE = 1
 """A pattern is learned alone if it has k + 1 demonstrations and this many more. Ours: an affine
@@ -47,13 +42,9 @@ class Auto(Wrapper):
         threads: int = 1,
         states: Path | None = None,
     ) -> None:
-        """Choose where a network would be trained, if one is needed.
+        """Choose where a network would be trained, if one is needed (see `NetworkGenerator`).
 
-        Args:
-            generator: What was chosen, of a saved model; `fit` chooses anew.
-            device: See `NetworkGenerator`.
-            threads: See `NetworkGenerator`.
-            states: See `NetworkGenerator`.
+        `generator` is what was chosen, of a saved model; `fit` chooses anew.
         """
         if generator is not None:
             super().__init__(generator)
@@ -68,8 +59,7 @@ class Auto(Wrapper):
             self.generator = Timed(SmoothInterpolation())
             remark = "generator: closed form, since the demonstrations show one pattern"
         elif not ways:
-            config: DiffusionConfig = build(DiffusionConfig, WAYS)
-            self.generator = Timed(DiffusionGenerator(config, **self._network))
+            self.generator = GENERATORS.make("diffusion-ways", **self._network)
             remark = (
                 f"generator: diffusion, since the demonstrations show {len(groups)} patterns that "
                 f"do not mix: {'; '.join(map(_listed, groups))}"
@@ -109,13 +99,6 @@ class Auto(Wrapper):
 
     def check_savable(self) -> None:
         """Do nothing: whatever is chosen can be saved; see `Generator.check_savable`."""
-
-    def state(self) -> tuple[dict[str, Any], Tensors]:
-        """Nothing of its own; see `Generator.state`."""
-        return {}, {}
-
-    def restore(self, settings: Mapping[str, Any], tensors: Tensors) -> None:
-        """Nothing to take up; see `Wrapper.restore`."""
 
 
 def _listed(indices: tuple[int, ...]) -> str:

@@ -1,7 +1,8 @@
 """The interface of pi: conditions in, whole action plans out (paper, Stage 1).
 
 A member says how it learns (`_fit`), how it generates (`_generate`), and what it keeps on disk
-(`state`, `from_state`). What all have in common is here: checked conditions, saving and loading.
+(`state`, `from_state`). What all have in common is here: checked conditions, saving and loading. So
+is what those around another one have in common (`Wrapper`).
 """
 
 from __future__ import annotations
@@ -72,7 +73,7 @@ class Generator(ABC):
             This generator, fitted; `remarks` says what could not be done.
         """
         self.remarks = ()
-        self._fit(demonstrations, seed, progress or _silent)
+        self._fit(demonstrations, seed, progress or (lambda _: None))
         self._outcome_dim = demonstrations.outcome_dim
         remarks: tuple[str, ...] = self.remarks
         for remark in remarks:
@@ -156,8 +157,8 @@ class Generator(ABC):
         Raises:
             NotFittedError: Before `fit`.
         """
-        outcome_dim = self._fitted_to()
-        return [SavedLayer(self.name, outcome_dim, self.remarks, *self.state())]
+        outcome_dim, (settings, tensors) = self._fitted_to(), self.state()
+        return [SavedLayer(self.name, outcome_dim, self.remarks, settings, dict(tensors))]
 
     @classmethod
     def unpack_layer(cls, layer: SavedLayer, inner: Generator | None = None) -> Self:
@@ -213,12 +214,72 @@ class Generator(ABC):
         return self._outcome_dim
 
 
+class Wrapper(Generator):
+    """A generator around another one, which is fitted, saved and moved with it."""
+
+    generator: Generator
+    """The one that is wrapped."""
+
+    def __init__(self, generator: Generator) -> None:
+        """Wrap a generator.
+
+        Raises:
+            ConfigurationError: It is wrapped in the same way already.
+        """
+        inner: Generator | None = generator
+        while isinstance(inner, Wrapper):
+            if isinstance(inner, type(self)):
+                raise ConfigurationError(f"this generator is {self.name} already; wrap it once")
+            inner = inner.generator
+        self.generator = generator
+
+    def fit(
+        self, demonstrations: Demonstrations, *, seed: int, progress: OnProgress | None = None
+    ) -> Self:
+        """Learn with the wrapped generator, whose remarks follow one's own; see `Generator.fit`."""
+        super().fit(demonstrations, seed=seed, progress=progress)
+        self.remarks += self.generator.remarks
+        return self
+
+    def check_savable(self) -> None:
+        """Do nothing if the wrapped generator can be saved; see `Generator.check_savable`."""
+        self.generator.check_savable()
+
+    def to(self, device: str) -> Self:
+        """Compute on another device from now on; see `Generator.to`."""
+        self.generator.to(device)
+        return self
+
+    def pack(self) -> list[SavedLayer]:
+        """Return what both learned; see `Generator.pack`."""
+        return super().pack() + self.generator.pack()
+
+    def state(self) -> tuple[dict[str, Any], Tensors]:
+        """Nothing of its own, unless a member says otherwise; see `Generator.state`."""
+        return {}, {}
+
+    @classmethod
+    def from_state(
+        cls, settings: Mapping[str, Any], tensors: Tensors, generator: Generator | None = None
+    ) -> Self:
+        """Rebuild it around a generator that was rebuilt already; see `Generator.from_state`."""
+        if generator is None:
+            raise ValueError(f"a {cls.name} generator is rebuilt around another")
+        wrapper = cls(generator)
+        wrapper.restore(settings, tensors)
+        return wrapper
+
+    def restore(self, settings: Mapping[str, Any], tensors: Tensors) -> None:
+        """Take up what `state` gave, if it is more than nothing.
+
+        Raises:
+            KeyError, TypeError, ValueError: Something is missing, or does not fit.
+        """
+
+
 def at_once(progress: OnProgress, loss: float) -> None:
     """Report a fit that is a single step."""
     progress(FitProgress(step=1, n_steps=1, loss=loss, seconds_left=0.0))
-
-
-def _silent(progress: FitProgress) -> None: ...
 
 
 @dataclass(frozen=True, eq=False)

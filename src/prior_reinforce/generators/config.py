@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
 import msgspec
@@ -71,8 +71,7 @@ class PerceptronSize(Checked):
     """Size of the embedding of the noise level; even, at least 4."""
 
 
-def _laptop() -> UNetSize:
-    return UNetSize(widths=(64, 128, 128), step_width=64, condition_width=64, activation="silu")
+_LAPTOP = UNetSize(widths=(64, 128, 128), step_width=64, condition_width=64, activation="silu")
 
 
 @dataclass(frozen=True)
@@ -85,7 +84,7 @@ class UNetConfig(Checked):
     """Frames for each spline control point."""
     margin: NonNegative = 0.05
     """How far plans may leave the demonstrated range of a dimension, as a fraction of it."""
-    network: UNetSize = field(default_factory=_laptop)
+    network: UNetSize = _LAPTOP
     """Size of the U-Net, where it is one."""
     training_steps: Annotated[int, msgspec.Meta(ge=0)] = 500
     """Optimiser steps. 0 is the control: a network that has learned nothing."""
@@ -143,7 +142,7 @@ class DiffusionConfig(UNetConfig):
     coordinates: Literal["span", "time"] = "span"
     """What is denoised: coordinates of plans in the space that the demonstrations span (`span`), by
     a perceptron; or their codes over time, by the U-Net, as in the paper."""
-    perceptron: PerceptronSize = field(default_factory=PerceptronSize)
+    perceptron: PerceptronSize = PerceptronSize()
     """Size of the perceptron."""
     training_steps: Annotated[int, msgspec.Meta(ge=0)] = 1500
     """Optimiser steps. 0 is the control: a network that has learned nothing."""
@@ -188,6 +187,10 @@ class DiffusionConfig(UNetConfig):
                 f"sampling_steps must be at most noise_levels ({self.noise_levels}), "
                 f"got {self.sampling_steps}"
             )
+
+    def decay(self, n: int) -> float:
+        """How much of their average the averaged weights keep after n steps."""
+        return min(1.0 - (1.0 + n) ** -self.ema_power, self.ema_limit)
 
     @classmethod
     def paper(cls) -> Self:

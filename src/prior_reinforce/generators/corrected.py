@@ -23,10 +23,9 @@ from dataclasses import replace
 from typing import Any, ClassVar
 
 from prior_reinforce.arrays import Plans, Points
-from prior_reinforce.generators.base import Generator, OnProgress
+from prior_reinforce.generators.base import Generator, OnProgress, Wrapper
 from prior_reinforce.generators.interpolation import SmoothInterpolation
 from prior_reinforce.generators.saving import Tensors
-from prior_reinforce.generators.wrapping import Wrapper
 from prior_reinforce.plans.motions import Demonstrations
 
 

@@ -15,24 +15,17 @@ import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 from jaxtyping import Float, Int
 
-from prior_reinforce.generators.base import OnProgress
 from prior_reinforce.generators.config import DiffusionConfig
 from prior_reinforce.generators.noise_schedule import NoiseSchedule, mean_shift_levels
 from prior_reinforce.generators.threads import torch
-from prior_reinforce.generators.training import Network, optimise
-
-# Diffusion Policy's optimiser (real-stanford/diffusion_policy, commit 5ba07ac).
-_BETAS = (0.95, 0.999)
 
 _SLACK = 0.5
 """How far coordinates in the demonstrations' span may leave their range, as a fraction of half of
 it; plans keep to the margin besides. Ours: at the ends of the region a straight line leaves it by a
 third."""
-
 _BEYOND = 0.5
 """How far weights of a mixture go beyond a convex one, so that ends of the region are learned, too.
 Ours: 0.3 hits fewer first throws."""
@@ -43,34 +36,25 @@ _PURE = 0.1
 """Share of samples that are demonstrations as they are. Ours."""
 
 Denoise = Callable[[torch.Tensor, torch.Tensor, torch.Tensor], torch.Tensor]
-"""A trained network: noisy codes (B, C, T), levels (B,) and conditions (B, k) to a prediction."""
+"""A network: noisy codes (B, C, T), levels (B,) and conditions (B, k) to a prediction."""
 
 
-def train(
-    network: Network,
+def loss(
+    network: Denoise,
     codes: Float[torch.Tensor, "N C T"],
     conditions: Float[torch.Tensor, "N k"],
     config: DiffusionConfig,
-    seed: int,
-    progress: OnProgress,
-    *,
-    state: Path | None = None,
-) -> Network:
-    """Fit a network to all codes.
+    rng: torch.Generator,
+) -> Callable[[], torch.Tensor]:
+    """Return what draws a batch and tells how far the network is off, mean square.
 
     Args:
-        network: As initialised, on the device to train on.
-        codes: x_0 of the demonstrations, on the same device.
+        network: Of one member, or of several, each with a prediction of its own.
+        codes: x_0 of the demonstrations, on the network's device.
         conditions: Scaled outcomes, on the same device.
-        config: Optimiser and so on.
-        seed: Of noise and noise levels.
-        progress: Called some 200 times.
-        state: See `optimise`.
-
-    Returns:
-        The network with exponentially averaged weights, in evaluation mode.
+        config: Batch, noise levels and what is predicted.
+        rng: Source of noise and noise levels.
     """
-    rng = torch.Generator().manual_seed(seed)
     schedule = NoiseSchedule.squared_cosine(config.noise_levels)
     alike = None
     if config.mixtures:
@@ -88,16 +72,7 @@ def train(
         errors = network(noisy, levels, given) - target  # of each member, if several
         return errors.square().mean()
 
-    return optimise(
-        network,
-        loss_of_step,
-        config,
-        progress,
-        betas=_BETAS,
-        decay=lambda n: min(1 - (1 + n) ** -config.ema_power, config.ema_limit),
-        rng=rng,
-        state=state,
-    )
+    return loss_of_step
 
 
 def draw_batch(
@@ -159,7 +134,7 @@ def sample(
     """Return one code for each condition.
 
     Args:
-        network: Trained by `train` with the same config.
+        network: Trained with the same config.
         conditions: Scaled conditions, on the network's device.
         shape: (C, T) of a code.
         config: Sampler and its settings.
@@ -194,10 +169,6 @@ class _Denoiser:
     sources: Sequence[torch.Generator]
     """Of noise: one for all conditions, or one each."""
 
-    def mean(self) -> Float[torch.Tensor, "n C T"]:
-        """The mean of all latents, which is zero, for each condition."""
-        return torch.zeros((len(self.conditions), *self.shape), device=self.conditions.device)
-
     def noise(self, count: int) -> Float[torch.Tensor, "n {count} C T"]:
         """Draw so much for each condition."""
         shape = count, *self.shape
@@ -231,9 +202,10 @@ def _mean_shift(denoiser: _Denoiser) -> torch.Tensor:
     inputs with less noise than it was trained on, and has two to three times the error
     (docs/decisions-generator.md).
     """
-    config = denoiser.config
+    config, conditions = denoiser.config, denoiser.conditions
     levels = mean_shift_levels(config.noise_levels, config.sampling_steps)
-    return _climbed(denoiser, denoiser.mean(), levels)
+    mean = torch.zeros((len(conditions), *denoiser.shape), device=conditions.device)
+    return _climbed(denoiser, mean, levels)
 
 
 def _climbed(denoiser: _Denoiser, x: torch.Tensor, at: Sequence[int]) -> torch.Tensor:

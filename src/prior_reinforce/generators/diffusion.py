@@ -15,16 +15,19 @@ between demonstrations, and an untrained network hits about as much as a trained
 from __future__ import annotations
 
 import copy
+from collections.abc import Callable, Mapping
 from dataclasses import replace
-from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
-from prior_reinforce.generators.base import OnProgress
 from prior_reinforce.generators.config import DiffusionConfig, Sampler
 from prior_reinforce.generators.network import Learned, NetworkGenerator
 
 if TYPE_CHECKING:
+    import torch
     from torch import Tensor, nn
+
+_BETAS = (0.95, 0.999)
+"""Diffusion Policy's optimiser (real-stanford/diffusion_policy, commit 5ba07ac)."""
 
 
 class DiffusionGenerator(NetworkGenerator):
@@ -77,23 +80,18 @@ class DiffusionGenerator(NetworkGenerator):
             return ConditionalPerceptron(channels, outcome_dim, self.config.perceptron)
         return ConditionalUNet(channels, outcome_dim, self.config.network)
 
-    def _train(
-        self,
-        network: nn.Module,
-        codes: Tensor,
-        conditions: Tensor,
-        seed: int,
-        progress: OnProgress,
-        state: Path | None,
-    ) -> nn.Module:
-        from prior_reinforce.generators.denoiser import train
+    def _loss(
+        self, network: nn.Module, codes: Tensor, conditions: Tensor, rng: torch.Generator
+    ) -> Callable[[], Tensor]:
+        from prior_reinforce.generators.denoiser import loss
 
-        return train(network, codes, conditions, self.config, seed, progress, state=state)
+        return loss(network, codes, conditions, self.config, rng)
+
+    def _optimiser(self) -> Mapping[str, Any]:
+        return {"betas": _BETAS, "decay": self.config.decay}
 
     def _codes(self, learned: Learned, conditions: Tensor) -> Tensor:
         from prior_reinforce.generators.denoiser import sample
 
-        shape = learned.codec.channels, learned.codec.length
-        if learned.span is not None:
-            shape = len(learned.span.directions), 1
+        shape = (learned.span or learned.codec).shape
         return sample(learned.network, conditions, shape, self.config, seed=learned.seed)

@@ -32,11 +32,7 @@ from prior_reinforce.arrays import Plans, Points
 from prior_reinforce.generators.base import Generator, OnProgress, at_once
 from prior_reinforce.generators.saving import Tensors
 from prior_reinforce.plans.motions import Demonstrations
-from prior_reinforce.plans.outcome_weights import (
-    Kernel,
-    inverse_distance_weights,
-    smooth_weights,
-)
+from prior_reinforce.plans.outcome_weights import Kernel, inverse_distance_weights, smooth_weights
 from prior_reinforce.registry import build
 from prior_reinforce.settings import Checked, Count, Positive
 
@@ -126,10 +122,7 @@ class NearestNeighbours(_Mixture):
     def _weights(self, conditions: Points) -> Float[np.ndarray, "n N"]:
         """Weigh the nearest plans; at a demonstration's outcome, its own alone."""
         return inverse_distance_weights(
-            conditions,
-            self._outcomes,
-            neighbours=self.config.neighbours,
-            power=self.config.power,
+            conditions, self._outcomes, neighbours=self.config.neighbours, power=self.config.power
         )
 
 

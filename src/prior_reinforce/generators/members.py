@@ -19,6 +19,7 @@ from prior_reinforce.registry import Member, Registry, parse_choice
 
 if TYPE_CHECKING:
     from prior_reinforce.generators.base import Generator
+    from prior_reinforce.generators.timed import Timing
 
 _HERE = "prior_reinforce.generators"
 _BASE = f"{_HERE}.base:Generator"
@@ -50,6 +51,9 @@ class GeneratorRegistry(Registry["Generator"]):
             ConfigurationError: Also where there is no such `correction`, or another device is asked
                 for than the generator computes on.
         """
+        from prior_reinforce.generators.corrected import Corrected
+        from prior_reinforce.generators.timed import Timed
+
         name, settings = parse_choice(choice)
         device = context.get("device", "cpu")
         if device != "cpu" and "device" not in inspect.signature(self.resolve(name)).parameters:
@@ -66,22 +70,14 @@ class GeneratorRegistry(Registry["Generator"]):
         plain = ",".join([name, *(f"{key}={value}" for key, value in settings.items())])
         generator = super().make(plain, **context)
         if correction == "spline":
-            generator = WRAPPERS.wrap("corrected", generator)
-        return generator if timing == "none" else WRAPPERS.wrap("timed", generator, timing)
+            generator = Corrected(generator)
+        return generator if timing == "none" else Timed(generator, cast("Timing", timing))
 
     def name_of(self, made: Generator) -> str:
         """Return the name of a generator's class, wrapped or not; `module:Class` for one's own."""
         while getattr(made, "name", None) in WRAPPERS.members:
             made = cast(Any, made).generator
         return super().name_of(made)
-
-
-class _Wrappers(Registry["Generator"]):
-    """Generators around another one, by the names that saved models know them by."""
-
-    def wrap(self, name: str, generator: Generator, *settings: Any) -> Generator:
-        wrapper: Any = self.resolve(name)
-        return cast("Generator", wrapper(generator, *settings))
 
 
 GENERATORS = GeneratorRegistry(
@@ -117,7 +113,7 @@ GENERATORS = GeneratorRegistry(
         ),
     },
 )
-WRAPPERS = _Wrappers(
+WRAPPERS: Registry[Generator] = Registry(
     "wrapper",
     _BASE,
     {
@@ -125,6 +121,7 @@ WRAPPERS = _Wrappers(
         "corrected": Member(f"{_HERE}.corrected:Corrected", "a spline corrects it"),
     },
 )
+"""Generators around another one, by the names that saved models know them by."""
 make_generator = GENERATORS.make
 
 

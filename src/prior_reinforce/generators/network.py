@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import json
 from abc import abstractmethod
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -23,13 +23,14 @@ from prior_reinforce.extras import check_installed
 from prior_reinforce.files import sha256
 from prior_reinforce.generators.base import ConditionScale, Generator, OnProgress
 from prior_reinforce.generators.config import UNetConfig
-from prior_reinforce.generators.saving import Tensors
+from prior_reinforce.generators.saving import Tensors, without_prefix
 from prior_reinforce.generators.span import Span
 from prior_reinforce.plans.codec import PlanCodec
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.registry import build
 
 if TYPE_CHECKING:
+    import torch
     from torch import Tensor, nn
 
 _CHUNK = 128
@@ -98,24 +99,22 @@ class NetworkGenerator(Generator):
         """Make the network, of any weights, for codes (C, T) of conditions (k,)."""
 
     @abstractmethod
-    def _train(
-        self,
-        network: nn.Module,
-        codes: Tensor,
-        conditions: Tensor,
-        seed: int,
-        progress: OnProgress,
-        state: Path | None,
-    ) -> nn.Module:
-        """Fit the network to codes (N, C, T) and conditions (N, k)."""
+    def _loss(
+        self, network: nn.Module, codes: Tensor, conditions: Tensor, rng: torch.Generator
+    ) -> Callable[[], Tensor]:
+        """Return what runs the network on a batch of codes (N, C, T) and conditions (N, k)."""
+
+    def _optimiser(self) -> Mapping[str, Any]:
+        """What is not the usual of `training.optimise`."""
+        return {}
 
     @abstractmethod
     def _codes(self, learned: Learned, conditions: Tensor) -> Tensor:
         """Make codes (n, C, T) for scaled conditions (n, k)."""
 
     def _fit(self, demonstrations: Demonstrations, seed: int, progress: OnProgress) -> None:
-        from prior_reinforce.generators.threads import torch_threads
-        from prior_reinforce.generators.training import build
+        from prior_reinforce.generators.threads import torch, torch_threads
+        from prior_reinforce.generators.training import build, optimise
 
         outcomes = demonstrations.outcomes_seen
         codec = PlanCodec.fit(
@@ -127,11 +126,10 @@ class NetworkGenerator(Generator):
         )
         scale = ConditionScale.fit(outcomes)
         scaled, codes = scale.scale(outcomes), codec.encode(demonstrations.plans)
-        shape = codec.channels, codec.length, outcomes.shape[1]
         span = Span.fit(codes) if self._in_span else None
         if span is not None:
             codes = span.encode(codes)
-            shape = codes.shape[1], 1, shape[2]
+        shape = *codes.shape[1:], outcomes.shape[1]
         state = None
         if self._states is not None:
             told = json.dumps([self.name, asdict(self.config), seed]).encode()
@@ -143,8 +141,10 @@ class NetworkGenerator(Generator):
             clean, known = self._tensor(codes), self._tensor(scaled)
             untrained = Learned(codec, scale, span, network.eval(), seed)
             before = self._missed(untrained, clean, known)
-            network = self._train(network.train(), clean, known, seed, progress, state)
-            self._learned = Learned(codec, scale, span, network, seed)
+            rng = torch.Generator().manual_seed(seed)
+            loss, how = self._loss(network.train(), clean, known, rng), self._optimiser()
+            network = optimise(network, loss, self.config, progress, rng=rng, state=state, **how)
+            self._learned = replace(untrained, network=network)
             after = self._missed(self._learned, clean, known)
         if state is not None:
             state.unlink(missing_ok=True)
@@ -208,16 +208,12 @@ class NetworkGenerator(Generator):
         generator = cls(build(cls.config_type, settings["config"]))
         codec = PlanCodec.restore(settings["codec"], tensors["plan_range"], tensors["code_range"])
         scale = ConditionScale(tensors["condition_range"])
-        shape = codec.channels, codec.length, scale.range.shape[1]
-        span = None
-        if generator._in_span:
-            span = Span(tensors["origin"], tensors["directions"])
-            shape = len(span.directions), 1, shape[2]
+        span = Span(tensors["origin"], tensors["directions"]) if generator._in_span else None
+        shape = *(span or codec).shape, scale.range.shape[1]
         network = build_network(lambda: generator._build(*shape), seed=0)
         weights = {
-            name.removeprefix(_PREFIX): torch.from_numpy(value)
-            for name, value in tensors.items()
-            if name.startswith(_PREFIX)
+            name: torch.from_numpy(value)
+            for name, value in without_prefix(_PREFIX, tensors).items()
         }
         network.load_state_dict(weights)  # refuses missing, unknown and misshapen tensors
         network.eval().requires_grad_(False)
@@ -246,9 +242,9 @@ def _available(device: str) -> str:
 
     try:
         parsed = torch.device(device)
-    except RuntimeError as error:
-        raise ConfigurationError(f"no device {device!r}; use 'cpu' or 'cuda'") from error
-    if parsed.type not in ("cpu", "cuda"):
+    except RuntimeError:
+        parsed = None
+    if parsed is None or parsed.type not in ("cpu", "cuda"):
         raise ConfigurationError(f"no device {device!r}; use 'cpu' or 'cuda'")
     if parsed.type == "cuda" and (parsed.index or 0) >= torch.cuda.device_count():
         raise ConfigurationError(f"device {device!r} is not available here; use 'cpu'")

@@ -61,8 +61,7 @@ def patterns(demonstrations: Demonstrations) -> tuple[tuple[int, ...], ...]:
         decomposition = decompose(demonstrations, "start")
     except InvalidDemonstrationsError:
         return (everything,)
-    shapes = decomposition.shapes
-    units = decomposition.timeline.names(demonstrations.format)[1][: shapes.shape[2]]
+    shapes, units = decomposition.shapes, decomposition.units
     velocities = np.gradient(shapes, axis=1)
     flat = _pooled(velocities, units)
     outcomes = demonstrations.outcomes_seen
@@ -91,8 +90,7 @@ def motion_vectors(demonstrations: Demonstrations) -> _Motions:
     """
     decomposition = decompose(demonstrations, "start")
     shapes = decomposition.shapes
-    units = decomposition.timeline.names(demonstrations.format)[1][: shapes.shape[2]]
-    return _pooled(shapes, units, shapes.mean(axis=0))
+    return _pooled(shapes, decomposition.units, shapes.mean(axis=0))
 
 
 def _pooled(

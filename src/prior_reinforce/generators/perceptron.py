@@ -24,13 +24,7 @@ class ConditionalPerceptron(nn.Module):
     """Predicts from noisy coordinates, their noise level and a condition."""
 
     def __init__(self, coordinates: int, condition_dim: int, size: PerceptronSize) -> None:
-        """Build the network.
-
-        Args:
-            coordinates: L; as many come out.
-            condition_dim: k.
-            size: Width and so on.
-        """
+        """Build it for L coordinates, and conditions of k components."""
         super().__init__()
         width, members = size.width, size.members
         self.members = members

@@ -14,14 +14,14 @@ Notation:
 
 from __future__ import annotations
 
-from pathlib import Path
+from collections.abc import Callable
 from typing import TYPE_CHECKING, ClassVar
 
-from prior_reinforce.generators.base import OnProgress
 from prior_reinforce.generators.config import UNetRegressionConfig
 from prior_reinforce.generators.network import Learned, NetworkGenerator
 
 if TYPE_CHECKING:
+    import torch
     from torch import Tensor, nn
 
     from prior_reinforce.generators.unet import RegressionNetwork
@@ -39,27 +39,13 @@ class UNetRegression(NetworkGenerator):
 
         return RegressionNetwork(channels, length, outcome_dim, self.config.network)
 
-    def _train(
-        self,
-        network: nn.Module,
-        codes: Tensor,
-        conditions: Tensor,
-        seed: int,
-        progress: OnProgress,
-        state: Path | None,
-    ) -> nn.Module:
-        """Fit to all demonstrations at every step; the seed has drawn the initial weights."""
+    def _loss(
+        self, network: nn.Module, codes: Tensor, conditions: Tensor, rng: torch.Generator
+    ) -> Callable[[], Tensor]:
+        """Of all demonstrations at every step: nothing is drawn but the initial weights."""
         from torch.nn.functional import mse_loss
 
-        from prior_reinforce.generators.training import optimise
-
-        return optimise(
-            network,
-            lambda: mse_loss(network(conditions), codes),
-            self.config,
-            progress,
-            state=state,
-        )
+        return lambda: mse_loss(network(conditions), codes)
 
     def _codes(self, learned: Learned, conditions: Tensor) -> Tensor:
         codes: Tensor = learned.network(conditions)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -26,35 +25,28 @@ TENSOR_FILE = "model.safetensors"
 Tensors = Mapping[str, Shaped[np.ndarray, "..."]]
 
 
-class _LayerConfig(msgspec.Struct):
+class SavedLayer(msgspec.Struct, omit_defaults=True):
+    """One generator of a stack, without what it wraps."""
+
     name: str
+    """`Generator.name`."""
     outcome_dim: Annotated[int, msgspec.Meta(ge=1)]
+    """k."""
     remarks: tuple[str, ...]
+    """`Generator.remarks`."""
     settings: dict[str, Any]
+    """JSON types."""
+    tensors: dict[str, np.ndarray] = {}
+    """`Tensors`; they stand in the other file."""
 
 
 class _Config(msgspec.Struct):
     """What `config.json` holds, beside its own checksum."""
 
-    layers: Annotated[list[_LayerConfig], msgspec.Meta(min_length=1)]
+    layers: Annotated[list[SavedLayer], msgspec.Meta(min_length=1)]
     tensors_sha256: str
     file_format: Literal["prior-reinforce generator"] = "prior-reinforce generator"
     version: Literal[6] = 6
-
-
-@dataclass(frozen=True)
-class SavedLayer:
-    """One generator of a stack, without what it wraps."""
-
-    name: str
-    """`Generator.name`."""
-    outcome_dim: int
-    """k."""
-    remarks: tuple[str, ...]
-    """`Generator.remarks`."""
-    settings: Mapping[str, Any]
-    """JSON types."""
-    tensors: Tensors = field(default_factory=dict)
 
 
 def write_model(folder: Path, layers: Sequence[SavedLayer]) -> None:
@@ -68,17 +60,14 @@ def write_model(folder: Path, layers: Sequence[SavedLayer]) -> None:
             for name, array in layer.tensors.items()
         }
     )
-    described = [
-        _LayerConfig(layer.name, layer.outcome_dim, layer.remarks, dict(layer.settings))
-        for layer in layers
-    ]
+    described = [msgspec.structs.replace(layer, tensors={}) for layer in layers]
     content = msgspec.to_builtins(_Config(described, sha256(packed)))
     write(folder / TENSOR_FILE, packed)
     content["config_sha256"] = _digest(content)
     write(folder / CONFIG_FILE, json.dumps(content, indent=2) + "\n")
 
 
-def read_model(folder: Path) -> tuple[SavedLayer, ...]:
+def read_model(folder: Path) -> list[SavedLayer]:
     """Read what `write_model` wrote.
 
     Returns:
@@ -97,19 +86,15 @@ def read_model(folder: Path) -> tuple[SavedLayer, ...]:
             f"{folder / TENSOR_FILE} is damaged or belongs to another model: its checksum is not "
             f"the one in {CONFIG_FILE}; copy the folder again, or learn the model again"
         )
-    tensors: list[dict[str, np.ndarray]] = [{} for _ in config.layers]
     try:
         for key, array in load(packed).items():
             depth, _, name = key.partition(".")
-            tensors[int(depth)][name] = array
+            config.layers[int(depth)].tensors[name] = array
     except (SafetensorError, ValueError, IndexError) as error:
         raise FileFormatError(
             f"{folder / TENSOR_FILE} does not hold the tensors of this model: {error}"
         ) from error
-    return tuple(
-        SavedLayer(layer.name, layer.outcome_dim, layer.remarks, layer.settings, own)
-        for layer, own in zip(config.layers, tensors, strict=True)
-    )
+    return config.layers
 
 
 def _read_config(path: Path) -> _Config:
@@ -127,6 +112,12 @@ def _read_config(path: Path) -> _Config:
             "again, or learn the model again"
         )
     return config
+
+
+def without_prefix(prefix: str, tensors: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the tensors of which the name begins so, by the rest of it."""
+    named = (name for name in tensors if name.startswith(prefix))
+    return {name.removeprefix(prefix): tensors[name] for name in named}
 
 
 def _digest(content: Mapping[str, Any]) -> str:

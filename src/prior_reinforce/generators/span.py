@@ -46,6 +46,11 @@ class Span:
         largest = np.abs(left * size).max(axis=0)[kept]
         return cls(origin, (largest[:, None] * directions[kept]).reshape(-1, *origin.shape))
 
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(L, 1), of coordinates."""
+        return len(self.directions), 1
+
     def encode(self, codes: Codes) -> Coordinates:
         """Return the coordinates of codes, of what lies in the space."""
         flat = self.directions.reshape(len(self.directions), -1)

@@ -26,10 +26,9 @@ import numpy as np
 
 from prior_reinforce.arrays import Plans, Points
 from prior_reinforce.errors import ConfigurationError
-from prior_reinforce.generators.base import Generator, OnProgress
+from prior_reinforce.generators.base import Generator, OnProgress, Wrapper
 from prior_reinforce.generators.saving import Tensors
 from prior_reinforce.generators.timing_evidence import TOO_FEW_FRAMES, choose_timing
-from prior_reinforce.generators.wrapping import Wrapper
 from prior_reinforce.plans.alignment import align
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.plans.timeline import Decomposition, Timeline, decompose
@@ -41,13 +40,11 @@ class Timed(Wrapper):
     """A generator that learns timing and motions separately, or learns aligned ones."""
 
     name: ClassVar[str] = "timed"
+    timeline: Timeline | None = None
+    """The common phase that was learned on; None before `fit`, and where plans are aligned."""
 
     def __init__(self, generator: Generator, timing: Timing = "auto") -> None:
-        """Wrap a generator.
-
-        Args:
-            generator: Learns the motions; it is fitted with this one.
-            timing: See the module.
+        """Wrap a generator; the module tells what each timing is.
 
         Raises:
             ConfigurationError: There is no such timing, or the generator is timed already.
@@ -56,40 +53,34 @@ class Timed(Wrapper):
             raise ConfigurationError(f"timing must be one of {get_args(Timing)}, got {timing!r}")
         super().__init__(generator)
         self.timing = timing
-        self._timeline: Timeline | None = None
-
-    @property
-    def timeline(self) -> Timeline | None:
-        """The common phase that was learned on; None before `fit`, and where plans are aligned."""
-        return self._timeline
 
     def _fit(self, demonstrations: Demonstrations, seed: int, progress: OnProgress) -> None:
-        self._timeline = None
+        self.timeline = None
         if self.timing == "align":
             learned = align(demonstrations).demonstrations
         else:
             decomposition = self._decomposed(demonstrations)
-            self._timeline = decomposition.timeline
+            self.timeline = decomposition.timeline
             learned = _as_plans(decomposition, demonstrations)
         self.generator.fit(learned, seed=seed, progress=progress)
 
     def _generate(self, conditions: Points) -> Plans:
         plans = self.generator.generate(conditions)
-        if self._timeline is None:
+        if self.timeline is None:
             return plans
-        n_channels = plans.shape[2] - self._timeline.n_numbers
-        return self._timeline.reconstruct(plans[:, :, :n_channels], plans[:, 0, n_channels:])
+        n_channels = plans.shape[2] - self.timeline.n_numbers
+        return self.timeline.reconstruct(plans[:, :, :n_channels], plans[:, 0, n_channels:])
 
     def state(self) -> tuple[dict[str, Any], Tensors]:
         """The common phase; see `Generator.state`."""
-        timeline = None if self._timeline is None else self._timeline.settings()
+        timeline = None if self.timeline is None else self.timeline.settings()
         return {"timing": self.timing, "timeline": timeline}, {}
 
     def restore(self, settings: Mapping[str, Any], tensors: Tensors) -> None:
         """Take up the common phase; see `Wrapper.restore`."""
         self.timing = settings["timing"]
         if settings["timeline"] is not None:
-            self._timeline = Timeline.restore(settings["timeline"])
+            self.timeline = Timeline.restore(settings["timeline"])
 
     def _decomposed(self, demonstrations: Demonstrations) -> Decomposition:
         if self.timing == "auto":

@@ -81,8 +81,7 @@ class TimingChoice:
 def choose_timing(demonstrations: Demonstrations) -> TimingChoice:
     """Take the timing in which the motion best predicts left-out outcomes.
 
-    Args:
-        demonstrations: N of them; with few, starts are learned separately, as a rule.
+    With few demonstrations, starts are learned separately, as a rule.
     """
     n = demonstrations.n
     try:
@@ -154,7 +153,7 @@ def _states(
 
     plan_format = demonstrations.format
     shapes = decomposition.shapes[:, :: decomposition.timeline.per_frame]
-    units = np.array(decomposition.timeline.names(plan_format)[1][: shapes.shape[2]])
+    units = np.array(decomposition.units)
     variances = shapes.var(axis=1).mean(axis=0)
     for unit in set(units.tolist()):
         pooled = float(np.sqrt(variances[units == unit].sum()))

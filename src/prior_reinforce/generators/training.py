@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -19,6 +19,7 @@ from prior_reinforce.errors import FileFormatError
 from prior_reinforce.files import write
 from prior_reinforce.generators.base import FitProgress, OnProgress
 from prior_reinforce.generators.config import UNetConfig
+from prior_reinforce.generators.saving import without_prefix
 from prior_reinforce.generators.threads import torch
 
 _REPORTS = 200
@@ -154,14 +155,14 @@ class _Run:
             done, mean_loss = tensors["progress"].tolist()
             if not 0 < done < n_steps:
                 raise ValueError(f"{done:g} of {n_steps} steps are done")
-            self.network.load_state_dict(_of("network.", tensors))
+            self.network.load_state_dict(without_prefix("network.", tensors))
             moments: dict[int, dict[str, torch.Tensor]] = {}
-            for name, value in _of("moment.", tensors).items():
+            for name, value in without_prefix("moment.", tensors).items():
                 number, key = name.split(".")
                 moments.setdefault(int(number), {})[key] = value
             self.optimiser.load_state_dict({**self.optimiser.state_dict(), "state": moments})
             if self.average is not None:
-                self.average.load_state_dict(_of("average.", tensors))
+                self.average.load_state_dict(without_prefix("average.", tensors))
             if self.rng is not None:
                 self.rng.set_state(tensors["rng"])
         except (SafetensorError, KeyError, ValueError, RuntimeError) as error:
@@ -169,14 +170,6 @@ class _Run:
                 f"{path} is not the state of this training: {error}; remove it to begin anew"
             ) from error
         return int(done), float(mean_loss)
-
-
-def _of(prefix: str, tensors: Mapping[str, torch.Tensor]) -> dict[str, torch.Tensor]:
-    return {
-        name.removeprefix(prefix): value
-        for name, value in tensors.items()
-        if name.startswith(prefix)
-    }
 
 
 def _averaging(decay: Callable[[int], float]) -> Callable[..., None]:

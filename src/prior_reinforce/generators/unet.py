@@ -20,13 +20,7 @@ class ConditionalUNet(nn.Module):
     """Predicts from a noisy code, its noise level and a condition; any length, see `UNetSize`."""
 
     def __init__(self, channels: int, condition_dim: int, size: UNetSize) -> None:
-        """Build the network.
-
-        Args:
-            channels: C, of the code; the same come out.
-            condition_dim: k.
-            size: Widths and so on.
-        """
+        """Build it for codes of C channels, and conditions of k components."""
         super().__init__()
         self.step_embedding = StepEmbedding(size.step_width, type(_activation(size)))
         self.condition_embedding = nn.Sequential(
@@ -61,13 +55,7 @@ class ConditionalUNet(nn.Module):
         steps: Shaped[torch.Tensor, " B"],
         conditions: Float[torch.Tensor, "B k"],
     ) -> Float[torch.Tensor, "B C T"]:
-        """Predict for each sample of a batch.
-
-        Args:
-            noisy: x_t; T a multiple of `UNetSize.length_multiple`.
-            steps: t.
-            conditions: Normalised conditions.
-        """
+        """Predict for each x_t of a batch, its t and its scaled condition."""
         context = torch.cat(
             [self.step_embedding(steps), self.condition_embedding(conditions)], dim=-1
         )

@@ -92,13 +92,9 @@ class PlanCodec:
     ) -> Self:
         """Choose a code for plans like the demonstrated ones.
 
-        Args:
-            demonstrations: Their plans, and what these are made of.
-            representation: `splines` where they fit, or `frames` for every dimension.
-            frames_per_point: Frames for each control point.
-            length_multiple: T will be a multiple of this.
-            margin: How far generated plans may leave the demonstrated range of a dimension, as a
-                fraction of that range.
+        `representation` is `splines` where they fit, or `frames` for every dimension. T will be a
+        multiple of `length_multiple`; `margin` is how far generated plans may leave the
+        demonstrated range of a dimension, as a fraction of that range.
         """
         plans, signals = demonstrations.plans, demonstrations.signals
         horizon, action_dim = demonstrations.horizon, demonstrations.action_dim
@@ -131,9 +127,9 @@ class PlanCodec:
         return replace(raw, code_range=np.concatenate(ranges, axis=1))
 
     @property
-    def channels(self) -> int:
-        """C, the numbers of a code at one position."""
-        return self.code_range.shape[1]
+    def shape(self) -> tuple[int, int]:
+        """(C, T), of codes."""
+        return self.code_range.shape[1], self.length
 
     def encode(self, plans: Plans) -> Codes:
         """Code plans; demonstrations land in [-1, 1]."""

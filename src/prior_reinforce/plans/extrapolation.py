@@ -26,13 +26,7 @@ class ExtrapolatedPlans:
     def __init__(
         self, plans: Plans, jumps: Bool[np.ndarray, " D"], speeds: Float[np.ndarray, "n H"]
     ) -> None:
-        """Find where each plan rests.
-
-        Args:
-            plans: A.
-            jumps: Which channels are steps or switches (`signals`).
-            speeds: How fast each plan moves at each frame.
-        """
+        """Find where each plan rests, of which `speeds` tell; `jumps` are steps and switches."""
         from scipy.interpolate import make_interp_spline
 
         horizon = plans.shape[1]

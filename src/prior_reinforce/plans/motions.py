@@ -51,6 +51,8 @@ if TYPE_CHECKING:
 
 _FILE_FORMAT = "prior-reinforce demonstrations"
 _FILE_VERSION = 1
+_ARRAYS = ("plans", "outcomes_seen", "outcome_noise", "outcome_correction")
+"""Of demonstrations, N rows each."""
 
 
 @dataclass(frozen=True)
@@ -216,10 +218,9 @@ class Demonstrations:
             raise InvalidDemonstrationsError(
                 f"outcomes have {k} components; got names {names} and units {units}"
             )
-        for name in ("outcome_noise", "outcome_correction"):
+        for name, signed in (("outcome_noise", False), ("outcome_correction", True)):
             values = np.array(getattr(self, name), dtype=np.float64)
             values = values if values.any() else np.zeros_like(outcomes)
-            signed = name == "outcome_correction"
             far = np.argwhere(np.isposinf(values))
             if far.size and not signed:
                 raise InvalidDemonstrationsError(
@@ -238,8 +239,8 @@ class Demonstrations:
         object.__setattr__(self, "outcomes_seen", outcomes)
         object.__setattr__(self, "outcome_names", names)
         object.__setattr__(self, "outcome_units", units)
-        self._warn_about_units(stated=stated)
-        self._warn_about_repeated_outcomes()
+        for oddity in self._oddities(unit_stated=stated):
+            warnings.warn(oddity, stacklevel=3)
 
     @property
     def n(self) -> int:
@@ -286,15 +287,9 @@ class Demonstrations:
 
     def only(self, chosen: Sequence[int]) -> Self:
         """Return some of the demonstrations, by their numbers from 0."""
-        members = list(chosen)
+        arrays: dict[str, Any] = {name: getattr(self, name)[list(chosen)] for name in _ARRAYS}
         with _warned_before():
-            return replace(
-                self,
-                plans=self.plans[members],
-                outcomes_seen=self.outcomes_seen[members],
-                outcome_noise=self.outcome_noise[members],
-                outcome_correction=self.outcome_correction[members],
-            )
+            return replace(self, **arrays)
 
     def repeated_outcomes(self) -> list[tuple[int, int]]:
         """Return pairs whose outcomes were measured and are the same; by eye they often look it."""
@@ -350,15 +345,9 @@ class Demonstrations:
             "outcome_names": self.outcome_names,
             "outcome_units": self.outcome_units,
         }
-        arrays: dict[str, Any] = {
-            "plans": self.plans,
-            "outcomes_seen": self.outcomes_seen,
-            "outcome_noise": self.outcome_noise,
-            "outcome_correction": self.outcome_correction,
-            "metadata": np.array(json.dumps(metadata)),
-        }
+        arrays: dict[str, Any] = {name: getattr(self, name) for name in _ARRAYS}
         with open(path, "wb") as file:
-            np.savez_compressed(file, **arrays)
+            np.savez_compressed(file, **arrays, metadata=np.array(json.dumps(metadata)))
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Self:
@@ -372,46 +361,38 @@ class Demonstrations:
         if not path.is_file():
             raise FileFormatError(f"no demonstrations at {path}; give the path of an .npz file")
         remedy = "it must be a demonstrations file; write one with Demonstrations.save"
-        with open_npz(path, remedy) as archive:
-            plans, outcomes = archive["plans"], archive["outcomes_seen"]
-            of_outcomes = ("outcome_noise", "outcome_correction")
-            off = [archive[of] if of in archive else np.empty((0, 0)) for of in of_outcomes]
+        with open_npz(path, remedy) as archive, _warned_before():
             metadata = json.loads(str(archive["metadata"]))
             if metadata["file_format"] != _FILE_FORMAT or metadata["version"] != _FILE_VERSION:
                 raise ValueError(f"written as {metadata['file_format']} {metadata['version']}")
-            format_ = PlanFormat(**metadata["format"])
-            names = tuple(metadata["outcome_names"])
-            units = tuple(metadata["outcome_units"])
-        with _warned_before():
-            return cls(plans, outcomes, format_, names, units, *off)
-
-    def _warn_about_repeated_outcomes(self) -> None:
-        pairs = self.repeated_outcomes()
-        if pairs:
-            i, j = pairs[0]
-            warnings.warn(
-                f"demonstrations {i} and {j} have the same outcome "
-                f"{self.outcomes_seen[i].tolist()}: the mean of both motions is learned; if "
-                "that is a mistake, correct it, or drop one",
-                stacklevel=4,
+            return cls(
+                **{name: archive[name] for name in _ARRAYS if name in archive},
+                format=PlanFormat(**metadata["format"]),
+                outcome_names=tuple(metadata["outcome_names"]),
+                outcome_units=tuple(metadata["outcome_units"]),
             )
 
-    def _warn_about_units(self, *, stated: bool) -> None:
+    def _oddities(self, *, unit_stated: bool) -> Iterator[str]:
+        """What looks like a slip: other units, and an outcome that comes twice."""
         metres = np.array([unit == "m" for unit in self.outcome_units])
         farthest = np.abs(self.outcomes_seen[:, metres]).max(initial=0.0)
-        if farthest > FARTHEST * (BEYOND_DOUBT if stated else 1.0):
-            warnings.warn(
+        if farthest > FARTHEST * (BEYOND_DOUBT if unit_stated else 1.0):
+            yield (
                 f"an outcome of {farthest:g} m looks like centimetres; outcomes are in metres: "
-                "divide by 100",
-                stacklevel=4,
+                "divide by 100"
             )
         radians = np.array([unit == "rad" for unit in self.format.units])
         largest = np.abs(self.plans[:, :, radians]).max(initial=0.0)
         if largest > LARGEST_TURN:
-            warnings.warn(
-                f"an angle of {largest:g} rad looks like degrees; plans are in radians: "
-                "convert with numpy.deg2rad",
-                stacklevel=4,
+            yield (
+                f"an angle of {largest:g} rad looks like degrees; plans are in radians: convert "
+                "with numpy.deg2rad"
+            )
+        for i, j in self.repeated_outcomes()[:1]:
+            yield (
+                f"demonstrations {i} and {j} have the same outcome "
+                f"{self.outcomes_seen[i].tolist()}: the mean of both motions is learned; if that "
+                "is a mistake, correct it, or drop one"
             )
 
 

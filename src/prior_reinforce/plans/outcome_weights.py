@@ -12,7 +12,6 @@ Notation (docs/notation.md):
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Literal
 
 import numpy as np
@@ -82,10 +81,6 @@ def inverse_distance_weights(
     return weights
 
 
-Weights = Callable[[Float[np.ndarray, "n k"]], Float[np.ndarray, "n N"]]
-"""Conditions c to weights w, a row a condition, a column a demonstration."""
-
-
 def smooth_weights(
     outcomes: Float[np.ndarray, "N k"],
     *,
@@ -153,7 +148,7 @@ class SmoothWeights:
         return np.asarray(weights).reshape(len(conditions), self._n)
 
 
-def amplification(weights: Weights, outcomes: Float[np.ndarray, "N k"]) -> float:
+def amplification(weights: SmoothWeights, outcomes: Float[np.ndarray, "N k"]) -> float:
     r"""Return the mean of :math:`\sum_i w_i(c)^2` half-way between any two outcomes.
 
     It is the variance of what differs between demonstrations by chance (posture, tempo) in what is

@@ -190,11 +190,8 @@ def _start_and_pace(warps: Warps) -> tuple[Float[np.ndarray, "N 1"], Float[np.nd
 def correlation_lags(profiles: Profiles) -> Float[np.ndarray, " N"]:
     """Find the lags that maximise the sum of all pairwise correlations.
 
-    Args:
-        profiles: Smoothed velocities; each demonstration's count alike.
-
     Returns:
-        How many frames later each is to be moved, mean zero.
+        How many frames later each demonstration is to be moved, mean zero; all count alike.
     """
     n, horizon, _ = profiles.shape
     frequencies = 2 * np.pi * np.fft.rfftfreq(2 * horizon)  # [rad/frame]
@@ -280,19 +277,13 @@ def _agree_when_fastest(
     """
     horizon = profiles.shape[1]
     tau = np.arange(-horizon * _FINE, horizon * _FINE + 1) / _FINE
-    clock = np.arange(horizon, dtype=float)
     unit = _unit_energy(profiles)
     reach = int(_SEARCHED * length * _FINE)
     steps = np.arange(-reach, reach + 1)
     size = 2 * len(tau)  # padded: what is moved never wraps around
     moved = starts
     for _ in range(_ROUNDS):
-        moved_to = np.stack(
-            [
-                np.stack([np.interp(tau + s, clock, p, left=0.0, right=0.0) for p in each.T])
-                for s, each in zip(moved, unit, strict=True)
-            ]
-        )
+        moved_to = np.stack([_at(tau + s, each) for s, each in zip(moved, unit, strict=True)])
         mean = moved_to.mean(axis=0)
         fastest = tau[np.argmax(np.linalg.norm(mean, axis=0))]
         window = np.exp(-0.5 * ((tau - fastest) / (_AROUND * length)) ** 2)
@@ -321,13 +312,11 @@ def _tempos(profiles: Profiles, starts: Float[np.ndarray, " N"], length: float) 
 
     n, horizon, _ = profiles.shape
     tau = np.arange(-horizon / 2, horizon / 2 + 1, max(1.0, length / _COMPARED))
-    clock = np.arange(horizon, dtype=float)
     unit = _unit_energy(profiles)
 
     def root_velocity(i: int, theta: Float[np.ndarray, " 2"]) -> Float[np.ndarray, "L D"]:
-        t = times_at(theta[None], tau)[0]
-        warped = np.stack([np.interp(t, clock, v, left=0.0, right=0.0) for v in unit[i].T], axis=1)
-        return np.asarray(warped * np.sqrt(np.exp(theta[1])))
+        warped = _at(times_at(theta[None], tau)[0], unit[i])
+        return np.asarray(warped.T * np.sqrt(np.exp(theta[1])))
 
     def misfit(theta: np.ndarray, i: int, mean: Float[np.ndarray, "L D"]) -> np.ndarray:
         return (root_velocity(i, theta) - mean).ravel()
@@ -347,6 +336,14 @@ def _tempos(profiles: Profiles, starts: Float[np.ndarray, " N"], length: float) 
         warps[:, 1] -= warps[:, 1].mean()
         warps = np.clip(warps, -bound, bound)
     return warps
+
+
+def _at(
+    times: Float[np.ndarray, " L"], profile: Float[np.ndarray, "H D"]
+) -> Float[np.ndarray, "D L"]:
+    """Velocities at parts of frames."""
+    clock = np.arange(len(profile), dtype=float)
+    return np.stack([np.interp(times, clock, v, left=0.0, right=0.0) for v in profile.T])
 
 
 def _unit_energy(profiles: Profiles) -> Profiles:

@@ -124,12 +124,9 @@ class Signals:
 
 
 def analyse(motions: Sequence[Motion] | np.ndarray, units: Sequence[str], dt: float) -> Signals:
-    """Analyse motions of the same channels, all together.
+    """Analyse motions of the same channels, all together: plans, or recordings of any length.
 
-    Args:
-        motions: A: plans of one shape, or recordings of any length.
-        units: Of the D channels.
-        dt: Time between two frames, in [s]; of recordings, their median period.
+    `dt` is the time between two frames, in [s]; of recordings, their median period.
     """
     sigma = noise(motions)
     ranges = np.ptp(np.concatenate(list(motions)), axis=0)
@@ -177,9 +174,7 @@ def active_runs(
 ) -> list[list[tuple[int, int]]]:
     """Return the stretches in which one channel changes, of each motion: first frame, and end.
 
-    Args:
-        steps: Its absolute changes from frame to frame, in each motion.
-        sigma: Its noise.
+    `steps` are its absolute changes from frame to frame, in each motion.
     """
     peak = max(step.max() for step in steps)
     noisy = _NOISE_PEAK * sigma
@@ -253,11 +248,7 @@ def moving_rows(motion: Motion, band: Channels) -> tuple[int, int] | None:
     """Return the first row away from the first pose, and the last one away from the last pose.
 
     A motion that returns to where it began has rows of both kinds all the same. None if nothing
-    moves.
-
-    Args:
-        motion: One of A.
-        band: How far each channel may stray from a pose: `trim_band` or `pose_band`.
+    moves. `band` is how far each channel may stray from a pose: `trim_band` or `pose_band`.
     """
     left = np.flatnonzero(np.any(np.abs(motion - motion[0]) > band, axis=1))
     ahead = np.flatnonzero(np.any(np.abs(motion - motion[-1]) > band, axis=1))

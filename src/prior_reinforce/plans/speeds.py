@@ -53,13 +53,9 @@ def velocity_profiles(
     Channels of one unit share one scale, their pooled root mean square over all motions: a joint
     that only jitters stays small beside one that throws. A unit in which nothing moves gives zeros.
 
-    Args:
-        motions: A.
-        units: Of the D channels.
-        smoothing: Standard deviation of the Gaussian they are smoothed with, in frames.
-
     Returns:
-        Of each motion, central differences, smoothed and scaled: pure numbers.
+        Of each motion, central differences, smoothed by a Gaussian of standard deviation
+        `smoothing`, in frames, and scaled: pure numbers.
     """
     from scipy.ndimage import gaussian_filter1d
 

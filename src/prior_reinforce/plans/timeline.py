@@ -148,17 +148,15 @@ class Timeline:
         units = [plan_format.units[d] for d in self.shared]
         events = []
         for step in self.steps:
-            changes = [
-                f"{plan_format.names[step.channel]}, change {m + 1}"
-                for m in range(len(step.phases))
-            ]
+            name = plan_format.names[step.channel]
+            changes = [f"{name}, change {m + 1}" for m in range(len(step.phases))]
             names += changes
             units += [plan_format.units[step.channel]] * len(changes)
             events += [f"time of {change}" for change in changes]
-        warp = {"start": "frame", "tempo": "log"}
-        warp = dict(list(warp.items())[: self.n_numbers - len(events)])
+        warp = ("start", "tempo")[: self.n_numbers - len(events)]
         numbers = _unused([*warp, *events], names)
-        return (*names, *numbers), (*units, *warp.values(), *["frame"] * len(events))
+        of_numbers = *("frame", "log")[: len(warp)], *["frame"] * len(events)
+        return (*names, *numbers), (*units, *of_numbers)
 
     def settings(self) -> dict[str, Any]:
         """Everything as JSON types."""
@@ -186,6 +184,8 @@ class Decomposition:
 
     timeline: Timeline
     shapes: Float[np.ndarray, "N L C"]
+    units: tuple[str, ...]
+    """Of the C channels of a shape."""
     numbers: Numbers
     """theta of each demonstration."""
     by_step: bool
@@ -197,10 +197,6 @@ class Decomposition:
 @lru_cache(maxsize=8)  # patterns, the choice of timing and the generator ask for the same one
 def decompose(demonstrations: Demonstrations, kind: WarpKind) -> Decomposition:
     """Find the warp of each demonstration, and its shape on the common phase.
-
-    Args:
-        demonstrations: N of them, of any kind of channel.
-        kind: What the warps may do.
 
     Returns:
         The decomposition; of kind `none` where what was asked for would lose part of the motion.
@@ -276,7 +272,8 @@ def decompose(demonstrations: Demonstrations, kind: WarpKind) -> Decomposition:
             break
     if kind != "none" and np.any(off > _LOSSY * size):
         return decompose(demonstrations, "none")
-    return Decomposition(timeline, shapes, numbers, by_step, exact)
+    of_channels = timeline.names(demonstrations.format)[1][: shapes.shape[2]]
+    return Decomposition(timeline, shapes, of_channels, numbers, by_step, exact)
 
 
 def _sample(values: Float[np.ndarray, "L C"], at: Float[np.ndarray, " H"]) -> np.ndarray:

@@ -12,7 +12,6 @@ import pytest
 from prior_reinforce.adapters.base import Adapter
 from prior_reinforce.arrays import Point
 from prior_reinforce.errors import InvalidFeedbackError, InvalidGoalError, NotFittedError
-from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.readings import Reading
 from prior_reinforce.testing.synthetic import synthetic_demonstrations
 
@@ -66,7 +65,7 @@ class AdapterContract:
         used.start(synthetic_demonstrations(8, k=k))
         for trial in _trials(k):
             used.observe(*trial)
-        used.start(_demonstrations(k))
+        used.start(synthetic_demonstrations(k=k))
         np.testing.assert_array_equal(used.propose(_goal(k)), fresh.propose(_goal(k)))
 
     @each_k
@@ -125,7 +124,7 @@ class AdapterContract:
     @each_k
     def test_intervals_open_ends_and_mere_hits_are_no_trouble(self, k: int) -> None:
         adapter = self._started(k)
-        goal, spread = _goal(k), np.ptp(_demonstrations(k).outcomes_seen, axis=0)
+        goal, spread = _goal(k), np.ptp(synthetic_demonstrations(k=k).outcomes_seen, axis=0)
         error, everywhere = 0.1 * spread, np.full(k, np.inf)
         for reading in (
             Reading(error, 0.5 * error, 2 * error, np.zeros(k)),
@@ -146,24 +145,20 @@ class AdapterContract:
 
     def _started(self, k: int) -> Adapter:
         adapter = self.make()
-        adapter.start(_demonstrations(k))
+        adapter.start(synthetic_demonstrations(k=k))
         return adapter
-
-
-def _demonstrations(k: int) -> Demonstrations:
-    return synthetic_demonstrations(k=k)
 
 
 def _goal(k: int) -> Point:
     """Four tenths of the way through the demonstrated outcomes."""
-    outcomes = _demonstrations(k).outcomes_seen
+    outcomes = synthetic_demonstrations(k=k).outcomes_seen
     return np.asarray(outcomes.min(axis=0) + 0.4 * np.ptp(outcomes, axis=0))
 
 
 def _trials(k: int, n: int = 4) -> list[tuple[Point, Point, Point]]:
     """Conditions, the goal, and numbers that say they missed by a twentieth of the region."""
     rng = np.random.default_rng(50 + k)
-    outcomes = _demonstrations(k).outcomes_seen
+    outcomes = synthetic_demonstrations(k=k).outcomes_seen
     low, high = outcomes.min(axis=0), outcomes.max(axis=0)
     conditions = rng.uniform(low, high, size=(n, k))
     missed = conditions + rng.normal(scale=0.05, size=(n, k)) * (high - low) - _goal(k)

@@ -20,9 +20,8 @@ from typing import Any, ClassVar, Literal
 import pandas as pd
 
 from prior_reinforce.arrays import Plans, Points
-from prior_reinforce.generators.base import Generator, OnProgress
+from prior_reinforce.generators.base import Generator, OnProgress, Wrapper
 from prior_reinforce.generators.diffusion import DiffusionGenerator
-from prior_reinforce.generators.wrapping import Wrapper
 from prior_reinforce.lab.experiments.evaluation import (
     LearnedGenerator,
     Trials,
