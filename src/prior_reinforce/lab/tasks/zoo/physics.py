@@ -71,6 +71,11 @@ def moving(path: Float[np.ndarray, "t ..."], dt: float) -> CubicSpline:
     return CubicSpline(np.arange(len(path)) * dt, path)
 
 
+def finely(path: CubicSpline) -> Float[np.ndarray, " t"]:
+    """Times of a path, eight a frame, among which a release is looked for."""
+    return np.linspace(path.x[0], path.x[-1], _PER_FRAME * (len(path.x) - 1) + 1)
+
+
 def first_passage(values: Float[np.ndarray, " t"], level: float, dt: float) -> float | None:
     """When values first pass a level upwards, by linear interpolation; None if they never do."""
     up = np.flatnonzero((values[:-1] < level) & (values[1:] >= level))
@@ -92,7 +97,7 @@ def lift_off(hand: CubicSpline, normals: Places) -> float | None:
     Returns:
         The time; None if it stays, or did not lie in the hand at first.
     """
-    fine = np.linspace(hand.x[0], hand.x[-1], _PER_FRAME * (len(hand.x) - 1) + 1)
+    fine = finely(hand)
     pressed = hand(fine, 2) + np.array([0.0, 0.0, GRAVITY])
     force = np.sum(pressed * CubicSpline(hand.x, normals)(fine), axis=1)
     if force[0] <= 0.0:
