@@ -20,7 +20,7 @@ from jaxtyping import Float
 from prior_reinforce.environment import Rollout, SeenObject, TableScene
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.lab.tasks.panda import JOINT_NAMES, N_JOINTS
-from prior_reinforce.lab.tasks.panda_task import Draws, PandaTask, first_descent
+from prior_reinforce.lab.tasks.panda_task import Disturbances, PandaTask, first_descent
 from prior_reinforce.plans.motions import PlanFormat
 
 RIM_HEIGHT = 0.10
@@ -60,46 +60,25 @@ HARDWARE = {
 }
 
 
-@dataclass(frozen=True)
-class ShotDisturbances:
-    """What differs between two executions of one plan; standard deviations, ours.
-
-    Together these of Basketball Shot spread the landing point of a repeated plan by about half a
-    centimetre along each axis (docs/tasks/basketball.md), which is what a good throwing arm does.
-    """
-
-    pose: float = 0.003
-    """Offset of every joint, kept through the execution (its zero, its friction), in [rad]."""
-    servo: float = 0.06
-    """Relative error of every joint's servo stiffness and damping."""
-    ball: float = 0.001
-    """Where the ball is put in the bowl, along each of the bowl's two axes, in [m]."""
-    friction: float = 0.10
-    """Relative error of the friction between ball and bowl."""
-
-
 class Shot(PandaTask):
     """A ball that lies in a bowl on the arm is thrown through the plane of a rim on the table."""
 
     scene: TableScene
+    # Of the friction between ball and bowl; of the ball in the bowl, along the bowl's axes, in [m].
+    # Together these spread the landing point of a repeated plan by about half a centimetre along
+    # each axis (docs/tasks/basketball.md), which is what a good throwing arm does.
+    disturbances = Disturbances(pose=0.003, servo=0.06, scene=0.10, start=0.001)
+    drawn = ("pose", "start", "servo", "scene")
     lead_in = 0.2  # the ball settles in the bowl
     lead_out = 0.9  # the longest fall takes 0.5 s
     batch = 64  # 40 MB of recorded states
 
-    def __init__(self, disturbances: ShotDisturbances) -> None:
-        """Compile the scene."""
-        self.disturbances = disturbances
-        super().__init__()
+    def __init__(self, disturbances: Disturbances | None = None) -> None:
+        """Compile the scene; argument as in `PandaTask`."""
+        super().__init__(disturbances)
         self._bowl = np.flatnonzero(self.model.geom_bodyid == self.model.body("tool/bowl").id)
         self.ball = int(self.model.jnt_qposadr[self.model.joint("ball").id])
         """Where the ball's position begins in the state `qpos`."""
-
-    def _draw(self, n: int, rng: np.random.Generator) -> Draws:
-        size = self.disturbances
-        pose = rng.normal(0.0, size.pose, (n, self.format.action_dim))
-        ball = rng.normal(0.0, size.ball, (n, 2))
-        servo = 1.0 + rng.normal(0.0, size.servo, (n, self.format.action_dim))
-        return Draws(pose, servo, 1.0 + rng.normal(0.0, size.friction, (n, 1)), ball)
 
     def _disturb(self, model: mujoco.MjModel, scene: Float[np.ndarray, "1"]) -> None:
         model.geom_friction[self._bowl, 0] *= scene[0]
@@ -129,7 +108,7 @@ class BasketballShot(Shot):
     region = np.array([[0.92, -0.26], [1.18, 0.26]])
     recordings = "basketball"
 
-    def __init__(self, hardware: str = "v1", disturbances: ShotDisturbances | None = None) -> None:
+    def __init__(self, hardware: str = "v1", disturbances: Disturbances | None = None) -> None:
         """Compile the scene.
 
         Args:
@@ -146,4 +125,4 @@ class BasketballShot(Shot):
         self.name = f"basketball-{hardware}"
         self.xml, self.tolerance = HARDWARE[hardware].xml, HARDWARE[hardware].tolerance
         self.scene = HARDWARE[hardware].scene
-        super().__init__(disturbances or ShotDisturbances())
+        super().__init__(disturbances)

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from prior_reinforce.lab.tasks.basketball import BasketballShot, ShotDisturbances
+from prior_reinforce.lab.tasks.basketball import BasketballShot
+from prior_reinforce.lab.tasks.panda_task import Disturbances
 
 _STIFFNESS = np.array([4500.0, 4500.0, 3500.0, 3500.0, 2000.0, 2000.0, 2000.0])
 """Of each joint's servo, in [Nm/rad]: the position actuators of MuJoCo Menagerie's FR3 (fr3v2), as
@@ -23,7 +24,7 @@ class BasketballFR3(BasketballShot):
 
     recordings = "basketball_fr3"
 
-    def __init__(self, disturbances: ShotDisturbances | None = None) -> None:
+    def __init__(self, disturbances: Disturbances | None = None) -> None:
         """Compile the scene; argument as in `BasketballShot`."""
         super().__init__("v1", disturbances)
         self.name = "basketball-fr3"

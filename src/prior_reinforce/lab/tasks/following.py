@@ -33,14 +33,5 @@ def follow(path: Float[np.ndarray, "H D"], dt: float, bandwidth: float) -> Float
     w = 2 * np.pi * bandwidth
     numerator, denominator, _ = cont2discrete(([w * w], [1.0, 2 * w, w * w]), dt, method="bilinear")
     numerator = numerator.ravel()
-    return np.column_stack(
-        [
-            lfilter(
-                numerator,
-                denominator,
-                axis,
-                zi=lfiltic(numerator, denominator, [axis[0]] * 2, [axis[0]] * 2),
-            )[0]
-            for axis in path.T
-        ]
-    )
+    rest = [lfiltic(numerator, denominator, [x] * 2, [x] * 2) for x in path[0]]
+    return lfilter(numerator, denominator, path, axis=0, zi=np.column_stack(rest))[0]
