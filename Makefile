@@ -39,7 +39,8 @@ reproduce: $(VENV)/.all
 evidence: $(VENV)/.core
 	$(BIN)/prior-reinforce reproduce all --from results --fill README.md docs/evidence.md $(ARGS)
 
-# The prior sets of our own tasks, made again, bit for bit, where they are shipped.
+# The prior sets of our own tasks, made again where they are shipped: bit for bit on one kind of
+# processor, to rounding on another.
 demonstrations: $(VENV)/.core
 	for name in basketball so101 curling curling_round fishing; do $(BIN)/python -m demonstrations.$$name $(ARGS) || exit; done
 

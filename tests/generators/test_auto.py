@@ -42,8 +42,10 @@ def test_patterns_too_small_to_stand_alone_go_to_diffusion(monkeypatch):
     monkeypatch.setattr(DiffusionGenerator, "_fit", lambda self, *a: started.append(self))
     made = Auto().fit(throws((1, -1, -1, 1, 1, -1)), seed=0)
     assert len(started) == 1
-    assert made.remarks[0].startswith("generator: diffusion, since the demonstrations show ")
-    assert made.remarks[0].endswith("; 1")
+    assert made.remarks[0] == (
+        "generator: diffusion, since the demonstrations show 2 patterns that do not mix: "
+        "1, 4, 5; 2, 3, 6"
+    )
 
 
 def test_it_is_loaded_as_it_was_learned(tmp_path):

@@ -28,6 +28,11 @@ def test_a_throw_from_below_does_not_mix_with_one_from_above():
     assert patterns(throws((1, -1, 1, 1, -1, 1))) == ((0, 2, 3, 5), (1, 4))
 
 
+def test_a_throw_that_mirrored_ones_drive_away_from_its_like_is_still_of_its_pattern():
+    """Aligned with all of them, the first agrees with none."""
+    assert patterns(throws((1, -1, -1, 1, 1, -1))) == ((0, 3, 4), (1, 2, 5))
+
+
 def test_pushes_to_either_side_are_one_pattern():
     """Opposite motions that an affine function of the outcome tells."""
     s = np.clip(np.arange(60) / 40, 0, 1)

@@ -196,12 +196,9 @@ def correlation_lags(profiles: Profiles) -> Float[np.ndarray, " N"]:
     Returns:
         How many frames later each is to be moved, mean zero.
     """
-    profiles = _unit_energy(profiles)
     n, horizon, _ = profiles.shape
-    spectra = np.fft.rfft(profiles, n=2 * horizon, axis=1)  # padded: a lag never wraps around
     frequencies = 2 * np.pi * np.fft.rfftfreq(2 * horizon)  # [rad/frame]
-    # Correlation of i, moved later by s frames, with j: the real part of sum(cross[i, j] e^{jws}).
-    cross = np.einsum("ifd,jfd->ijf", spectra.conj(), spectra)
+    cross = _cross_spectra(profiles)
     # Start from the demonstration that resembles all others most.
     resembles = [
         float(np.maximum(_correlations(cross[:, j]).max(axis=1), 0).sum()) for j in range(n)
@@ -220,6 +217,19 @@ def correlation_lags(profiles: Profiles) -> Float[np.ndarray, " N"]:
         if np.max(np.abs(lags - previous)) < CONVERGED:
             break
     return lags
+
+
+def best_correlations(profiles: Profiles) -> Float[np.ndarray, "N N"]:
+    """Correlation of each two motions at the lag at which they agree best, at most 1."""
+    return _correlations(_cross_spectra(profiles)).max(axis=-1)
+
+
+def _cross_spectra(profiles: Profiles) -> Complex[np.ndarray, "N N F"]:
+    """Correlation of i, moved later by s frames, with j: the real part of sum([i, j] e^{jws})."""
+    profiles = _unit_energy(profiles)
+    # Padded, so that a lag never wraps around.
+    spectra = np.fft.rfft(profiles, n=2 * profiles.shape[1], axis=1)
+    return np.asarray(np.einsum("ifd,jfd->ijf", spectra.conj(), spectra))
 
 
 def _correlations(cross_spectra: Complex[np.ndarray, "*n F"]) -> Float[np.ndarray, "*n lags"]:
