@@ -83,10 +83,10 @@ class Shot(PandaTask):
     def _disturb(self, model: mujoco.MjModel, scene: Float[np.ndarray, "1"]) -> None:
         model.geom_friction[self._bowl, 0] *= scene[0]
 
-    def _place(self, data: mujoco.MjData, start: Float[np.ndarray, "2"] | None) -> None:
+    def _place(self, data: mujoco.MjData, start: Float[np.ndarray, "2"]) -> None:
         """The ball lies in the bowl."""
         seat = data.site("tool/seat")
-        offset = 0.0 if start is None else seat.xmat.reshape(3, 3)[:, :2] @ start
+        offset = seat.xmat.reshape(3, 3)[:, :2] @ start
         data.qpos[self.ball : self.ball + 3] = seat.xpos + offset
 
     def _result(
@@ -123,6 +123,6 @@ class BasketballShot(Shot):
                 f"no hardware {hardware!r} of Basketball Shot; use one of {', '.join(HARDWARE)}"
             )
         self.name = f"basketball-{hardware}"
-        self.xml, self.tolerance = HARDWARE[hardware].xml, HARDWARE[hardware].tolerance
-        self.scene = HARDWARE[hardware].scene
+        used = HARDWARE[hardware]
+        self.xml, self.tolerance, self.scene = used.xml, used.tolerance, used.scene
         super().__init__(disturbances)

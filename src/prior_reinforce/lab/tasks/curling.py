@@ -66,10 +66,9 @@ class Curling(PandaTask):
     def _disturb(self, model: mujoco.MjModel, scene: Float[np.ndarray, "1"]) -> None:
         model.geom_friction[self._feet, 0] *= scene[0]
 
-    def _place(self, data: mujoco.MjData, start: Float[np.ndarray, "2"] | None) -> None:
+    def _place(self, data: mujoco.MjData, start: Float[np.ndarray, "2"]) -> None:
         """The stone starts at `STONE_START`, where the scene has it."""
-        if start is not None:
-            data.qpos[self._stone : self._stone + 2] += start
+        data.qpos[self._stone : self._stone + 2] += start
 
     def _result(
         self, states: Float[np.ndarray, "steps s"], sensors: Float[np.ndarray, "steps m"]

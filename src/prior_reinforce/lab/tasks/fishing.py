@@ -70,19 +70,16 @@ class Fishing(PandaTask):
         dofs = (model.jnt_dofadr[self._bends][:, None] + np.arange(3)).ravel()
         model.dof_damping[dofs] *= damping
 
-    def _place(self, data: mujoco.MjData, start: Float[np.ndarray, "2"] | None) -> None:
+    def _place(self, data: mujoco.MjData, start: Float[np.ndarray, "2"]) -> None:
         """Let the rope hang: the swivel undoes the rod's attitude, every segment is straight.
 
         This is the settled state itself, because the swivel has no spring and the others are
         relaxed, so nothing has to be simulated to reach it.
         """
-        sway = np.zeros(3)
-        if start is not None:
-            sway[:2] = start
         upright, rod, hanging = np.empty((3, 4))
         mujoco.mju_mat2Quat(rod, data.site("tool/tip").xmat)
         mujoco.mju_negQuat(upright, rod)
-        mujoco.mju_quatIntegrate(quat := np.array([1.0, 0.0, 0.0, 0.0]), sway, 1.0)
+        mujoco.mju_quatIntegrate(quat := np.array([1.0, 0.0, 0.0, 0.0]), np.append(start, 0.0), 1.0)
         mujoco.mju_mulQuat(hanging, upright, quat)
         data.qpos[self._swivel : self._swivel + 4] = hanging
 

@@ -23,12 +23,9 @@ def warped(part: Float[np.ndarray, " t"], warp: Float[np.ndarray, " w"]) -> Floa
 
 
 def follow(path: Float[np.ndarray, "H D"], dt: float, bandwidth: float) -> Float[np.ndarray, "H D"]:
-    """Low-pass a path with a critically damped second-order filter, from rest.
+    """Low-pass a path, a row each dt [s], with a critically damped second-order filter, from rest.
 
-    Args:
-        path: What is to be followed, a row a frame.
-        dt: Time between frames, in [s].
-        bandwidth: Of the filter, in [Hz].
+    The filter's bandwidth is in [Hz].
     """
     w = 2 * np.pi * bandwidth
     numerator, denominator, _ = cont2discrete(([w * w], [1.0, 2 * w, w * w]), dt, method="bilinear")

@@ -29,6 +29,7 @@ from prior_reinforce.lab.tasks.panda import STEP, build_scene, servo_controls
 from prior_reinforce.plans.motions import Demonstrations
 
 _FOLDER = Path(__file__).parent
+_UNDISTURBED = np.zeros(2)
 _DRAWN = re.compile(r"v\d\d")
 FULL = mujoco.mjtState.mjSTATE_FULLPHYSICS
 _Batch = tuple[list[mujoco.MjModel], Float[np.ndarray, "n s"], Float[np.ndarray, "n steps d"]]
@@ -95,12 +96,12 @@ class PandaTask(Task):
         """Multiply the task's own constants in a copy of the model by an execution's factors."""
 
     @abstractmethod
-    def _place(self, data: mujoco.MjData, start: Float[np.ndarray, " q"] | None) -> None:
+    def _place(self, data: mujoco.MjData, start: Float[np.ndarray, "2"]) -> None:
         """Put the task's objects where they start; the arm already stands in its first frame.
 
         Args:
             data: The state to be changed.
-            start: What the execution drew; None where nothing is disturbed.
+            start: What the execution drew; zero where nothing is disturbed.
         """
 
     @abstractmethod
@@ -199,7 +200,7 @@ class PandaTask(Task):
         joints = self.joint_plans(plans)
         controls = self._controls(joints, n_steps)
         if rng is None:
-            states = np.stack([self._start(frame, None) for frame in joints[:, 0]])
+            states = np.stack([self._start(frame) for frame in joints[:, 0]])
             return [self.model], states, controls
         d = joints.shape[2]
         width = {"pose": d, "servo": d, "scene": self.n_constants, "start": 2}
@@ -224,7 +225,7 @@ class PandaTask(Task):
         return model
 
     def _start(
-        self, joints: Float[np.ndarray, " d"], start: Float[np.ndarray, " q"] | None
+        self, joints: Float[np.ndarray, " d"], start: Float[np.ndarray, "2"] = _UNDISTURBED
     ) -> Float[np.ndarray, " s"]:
         """Full physics state with the arm at `joints` and the objects in place."""
         data = self._scratch

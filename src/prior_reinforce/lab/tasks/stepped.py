@@ -41,7 +41,7 @@ class SteppedTask:
 
     def load(self, joints: Float[np.ndarray, "7"]) -> None:
         """Put the objects back, as a person does between trials, the arm at rest at `joints`."""
-        mujoco.mj_setState(self.model, self.data, self.task._start(joints, None), FULL)
+        mujoco.mj_setState(self.model, self.data, self.task._start(joints), FULL)
         self.hold(joints)
         for _ in range(round(self.task.lead_in / STEP)):
             self.step(joints)

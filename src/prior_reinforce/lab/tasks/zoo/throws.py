@@ -12,20 +12,10 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 
 from prior_reinforce.arrays import Frames, Point
+from prior_reinforce.lab.tasks.zoo import physics
 from prior_reinforce.lab.tasks.zoo.base import ZooTask, joints
 from prior_reinforce.lab.tasks.zoo.human import Strategy, Submovement, reach_and_strike
-from prior_reinforce.lab.tasks.zoo.physics import (
-    GRAVITY,
-    Arm,
-    Place,
-    first_passage,
-    flight,
-    flight_in_air,
-    landing,
-    lift_off,
-    moving,
-    on_parabola,
-)
+from prior_reinforce.lab.tasks.zoo.physics import GRAVITY, Arm, Place, first_passage, moving
 from prior_reinforce.plans.motions import PlanFormat
 
 _OPENING = 0.12
@@ -43,7 +33,7 @@ class Throw(ZooTask):
 
     def _flies(self, time: float, start: Place, velocity: Place) -> ArrayLike | None:
         """Outcome of a ball that leaves then, there and so fast: here, where it comes down."""
-        return landing(start, velocity)
+        return physics.landing(start, velocity)
 
     def _execute(self, plan: Frames, disturbed: Float[np.ndarray, " m"]) -> ArrayLike | None:
         hand = moving(self.arm.hand(plan), self.format.dt)
@@ -109,7 +99,7 @@ class Scoop(Throw):
         return reach_and_strike(home, wound, struck, reach=0.45, strike=0.55)
 
     def _leaves(self, plan: Frames, hand: CubicSpline) -> float | None:
-        return lift_off(hand, self.arm.direction(plan, (1.0, 0.0, 0.0)))
+        return physics.lift_off(hand, self.arm.direction(plan, (1.0, 0.0, 0.0)))
 
 
 class GripperThrow(Throw):
@@ -140,7 +130,7 @@ class GripperThrow(Throw):
         return first_passage(plan[:, 3], 0.5, self.format.dt)
 
     def _flies(self, time: float, start: Place, velocity: Place) -> Point | None:
-        landed = flight(start, velocity)
+        landed = physics.flight(start, velocity)
         if landed is None:
             return None
         apex = start[2] + max(velocity[2], 0.0) ** 2 / (2.0 * GRAVITY)
@@ -183,12 +173,12 @@ class Bounce(Latched):
         return reach_and_strike((0.0, -0.3, -0.2, -0.1), wound, struck, 0.4, 0.5)
 
     def _flies(self, time: float, start: Place, velocity: Place) -> Point | None:
-        first = flight(start, velocity)
+        first = physics.flight(start, velocity)
         if first is None:
             return None
         after = velocity * self.slip
         after[2] = -self.restitution * (velocity[2] - GRAVITY * first[1])
-        return landing(np.array([*first[0][:2], 0.0]), after)
+        return physics.landing(np.array([*first[0][:2], 0.0]), after)
 
 
 class Drag(Latched):
@@ -216,7 +206,7 @@ class Drag(Latched):
         return reach_and_strike((-0.4, -0.4), wound, struck, 0.3, 0.45, 0.05)
 
     def _flies(self, time: float, start: Place, velocity: Place) -> Point | None:
-        landed = flight_in_air(start, velocity, self.drag)
+        landed = physics.flight_in_air(start, velocity, self.drag)
         return None if landed is None else landed[:1]
 
 
@@ -247,7 +237,7 @@ class Arrival(Latched):
         return replace(swung, settle=float(early))
 
     def _flies(self, time: float, start: Place, velocity: Place) -> Point | None:
-        landed = flight(start, velocity)
+        landed = physics.flight(start, velocity)
         return None if landed is None else np.array([landed[0][0], time + landed[1]])
 
     def _execute(self, plan: Frames, disturbed: Float[np.ndarray, "2"]) -> ArrayLike | None:
@@ -299,7 +289,7 @@ class Hoop(Throw):
         if velocity[0] <= 0.1 or start[0] >= self.window:
             return None
         flies = float((self.window - start[0]) / velocity[0])
-        place = on_parabola(start, velocity, flies)
+        place = physics.on_parabola(start, velocity, flies)
         return None if place[2] < 0.0 else np.array([place[1], place[2], flies])
 
 
@@ -345,5 +335,5 @@ class Catapult(ZooTask):
         draw, elevation = (float(np.interp(time, frames, plan[:, i])) for i in (0, 1))
         speed = self.stiffness * draw * (1.0 + disturbed[0])
         velocity = speed * np.array([np.cos(elevation), 0.0, np.sin(elevation)])
-        landed = landing(np.array([0.0, 0.0, self.height]), velocity)
+        landed = physics.landing(np.array([0.0, 0.0, self.height]), velocity)
         return None if landed is None else landed[:1]

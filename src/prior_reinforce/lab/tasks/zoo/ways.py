@@ -21,11 +21,9 @@ from prior_reinforce.plans.motions import PlanFormat
 
 
 def fastest(path: CubicSpline, least: float) -> float | None:
-    """When a path is fastest, by a parabola through three samples; None if slower than `least`.
+    """When a path [m] is fastest, by a parabola through three samples.
 
-    Args:
-        path: Places, in [m].
-        least: In [m/s]: who swings less has not thrown.
+    None if it is slower than `least` [m/s]: who swings less has not thrown.
     """
     fine = finely(path)
     speed = np.linalg.norm(np.atleast_2d(path(fine, 1).T), axis=0)
