@@ -10,7 +10,7 @@ import pytest
 
 from demonstrations import basketball as making
 from prior_reinforce.errors import ConfigurationError, InvalidGoalError
-from prior_reinforce.lab.tasks import panda
+from prior_reinforce.lab.tasks import make_task, panda
 from prior_reinforce.lab.tasks.basketball import HARDWARE, RIM_HEIGHT, BasketballShot
 from prior_reinforce.lab.tasks.panda_task import Disturbances
 
@@ -19,7 +19,7 @@ GRAVITY = 9.81
 
 @pytest.fixture(scope="module")
 def tasks() -> dict[str, BasketballShot]:
-    return {hardware: BasketballShot(hardware) for hardware in HARDWARE}
+    return {kind.name[-2:]: kind() for kind in HARDWARE}
 
 
 @pytest.fixture(scope="module")
@@ -301,5 +301,5 @@ def test_a_ball_that_lands_at_the_goal_stays_in_the_cup(tasks):
 
 
 def test_an_unknown_hardware_is_named():
-    with pytest.raises(ConfigurationError, match="'v9' of Basketball Shot; use one of v1, v2, v3"):
-        BasketballShot("v9")
+    with pytest.raises(ConfigurationError, match=r"'basketball-v9'; known are .*v1, .*v2, .*v3"):
+        make_task("basketball-v9")

@@ -11,14 +11,11 @@ The scenes are in `basketball.xml`, `basketball_v2.xml` and `basketball_v3.xml`,
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import mujoco
 import numpy as np
 from jaxtyping import Float
 
 from prior_reinforce.environment import Rollout, SeenObject, TableScene
-from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.lab.tasks.panda import JOINT_NAMES, N_JOINTS
 from prior_reinforce.lab.tasks.panda_task import Disturbances, PandaTask, first_descent
 from prior_reinforce.plans.motions import PlanFormat
@@ -26,38 +23,6 @@ from prior_reinforce.plans.motions import PlanFormat
 RIM_HEIGHT = 0.10
 """Height of the rim's plane (V3: the cup's) above the table, in [m]; ours, the paper does not
 give it."""
-
-
-@dataclass(frozen=True)
-class Hardware:
-    """Spoon, ball and goal."""
-
-    xml: str
-    """File name of the scene."""
-    tolerance: float
-    """For a clean pass, in [m]: (9 - 6) cm / 2 of free diameter and ball; V3: (7.5 - 5) cm / 2."""
-    scene: TableScene
-    """What a camera sees of them."""
-
-
-_BALL_AND_HOOP = TableScene(
-    SeenObject("the orange ball", 0.06), SeenObject("the red hoop", 0.10), plane_height=RIM_HEIGHT
-)
-HARDWARE = {
-    "v1": Hardware("basketball.xml", 0.015, _BALL_AND_HOOP),
-    # V1 with a shorter spoon.
-    "v2": Hardware("basketball_v2.xml", 0.015, _BALL_AND_HOOP),
-    # V2 with a smaller, lighter ball and a smaller white cup, its rim 8.3 cm wide outside.
-    "v3": Hardware(
-        "basketball_v3.xml",
-        0.0125,
-        TableScene(
-            SeenObject("the orange ball", 0.05),
-            SeenObject("the red rim of the cup", 0.083),
-            plane_height=RIM_HEIGHT,
-        ),
-    ),
-}
 
 
 class Shot(PandaTask):
@@ -102,27 +67,40 @@ class Shot(PandaTask):
 
 
 class BasketballShot(Shot):
-    """Basketball Shot (paper, Section III and Figure 3), in MuJoCo."""
+    """Basketball Shot (paper, Section III and Figure 3), in MuJoCo, with the hardware V1."""
 
+    name = "basketball-v1"
     format = PlanFormat(JOINT_NAMES, ("rad",) * N_JOINTS, 0.0125)
+    tolerance: float = 0.015  # for a clean pass: (9 - 6) cm / 2 of free diameter and ball
     region = np.array([[0.92, -0.26], [1.18, 0.26]])
+    scene = TableScene(
+        SeenObject("the orange ball", 0.06),
+        SeenObject("the red hoop", 0.10),
+        plane_height=RIM_HEIGHT,
+    )
+    xml = "basketball.xml"
     recordings = "basketball"
 
-    def __init__(self, hardware: str = "v1", disturbances: Disturbances | None = None) -> None:
-        """Compile the scene.
 
-        Args:
-            hardware: One of `HARDWARE`.
-            disturbances: How repeated executions differ; the documented ones when not given.
+class BasketballV2(BasketballShot):
+    """V1 with a shorter spoon."""
 
-        Raises:
-            ConfigurationError: There is no such hardware.
-        """
-        if hardware not in HARDWARE:
-            raise ConfigurationError(
-                f"no hardware {hardware!r} of Basketball Shot; use one of {', '.join(HARDWARE)}"
-            )
-        self.name = f"basketball-{hardware}"
-        used = HARDWARE[hardware]
-        self.xml, self.tolerance, self.scene = used.xml, used.tolerance, used.scene
-        super().__init__(disturbances)
+    name = "basketball-v2"
+    xml = "basketball_v2.xml"
+
+
+class BasketballV3(BasketballShot):
+    """V2 with a smaller, lighter ball and a smaller white cup, its rim 8.3 cm wide outside."""
+
+    name = "basketball-v3"
+    tolerance = 0.0125  # (7.5 - 5) cm / 2
+    scene = TableScene(
+        SeenObject("the orange ball", 0.05),
+        SeenObject("the red rim of the cup", 0.083),
+        plane_height=RIM_HEIGHT,
+    )
+    xml = "basketball_v3.xml"
+
+
+HARDWARE = (BasketballShot, BasketballV2, BasketballV3)
+"""The task with each of the paper's three sets of hardware."""

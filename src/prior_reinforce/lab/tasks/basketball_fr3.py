@@ -22,12 +22,12 @@ _DAMPING = _STIFFNESS / 10
 class BasketballFR3(BasketballShot):
     """Basketball Shot V1 on an FR3."""
 
+    name = "basketball-fr3"
     recordings = "basketball_fr3"
 
     def __init__(self, disturbances: Disturbances | None = None) -> None:
-        """Compile the scene; argument as in `BasketballShot`."""
-        super().__init__("v1", disturbances)
-        self.name = "basketball-fr3"
+        """Compile the scene; argument as in `PandaTask`."""
+        super().__init__(disturbances)
         self.model.actuator_gainprm[:, 0] = _STIFFNESS
         self.model.actuator_biasprm[:, 1] = -_STIFFNESS
         self.model.actuator_biasprm[:, 2] = -_DAMPING
