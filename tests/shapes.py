@@ -31,21 +31,40 @@ def _wrapped_where_needed(*, typechecker: Callable[..., Any]) -> Callable[..., A
     def wrapped(made: Any) -> Any:
         if not inspect.isfunction(made):
             return jaxtyped(made, typechecker=typechecker)
-        if not _takes_or_gives_arrays(made):
+        # A function within another is made at each call of that one, and is the same.
+        place = (made.__module__, made.__qualname__, made.__code__.co_firstlineno)
+        if place not in _CALLS:
+            _CALLS[place] = itertools.count() if _takes_or_gives_arrays(made) else None
+        calls = _CALLS[place]
+        if calls is None:
             return made
-        return _often(made, jaxtyped(made, typechecker=typechecker))
+        return _often(made, calls, functools.partial(jaxtyped, made, typechecker=typechecker))
 
     return wrapped
 
 
-def _often(made: Callable[..., Any], checked: Callable[..., Any]) -> Callable[..., Any]:
-    """Check a function's first calls and some of those that follow."""
-    calls = itertools.count()
+_CALLS: dict[tuple[str, str, int], itertools.count[int] | None] = {}
+"""Of each function in a process, counted; None where no array goes in or out."""
+
+
+def _often(
+    made: Callable[..., Any], calls: itertools.count[int], check: Callable[[], Callable[..., Any]]
+) -> Callable[..., Any]:
+    """Check a function's first calls and some of those that follow.
+
+    What checks is made at the first call that is checked: it takes 10 ms, and most are not called.
+    """
+    checked: Callable[..., Any] | None = None
 
     @functools.wraps(made)
     def call(*args: Any, **kwargs: Any) -> Any:
+        nonlocal checked
         n = next(calls)
-        return (checked if n < ALWAYS or n % SELDOM == 0 else made)(*args, **kwargs)
+        if n >= ALWAYS and n % SELDOM:
+            return made(*args, **kwargs)
+        if checked is None:
+            checked = check()
+        return checked(*args, **kwargs)
 
     return call
 

@@ -118,9 +118,10 @@ def test_the_loop_of_the_readme_has_types(tmp_path):
     """A reader's own checker at its strictest accepts the first thing that is copied."""
     loop = next(code for name, code in CODE.items() if name.startswith("README"))
     (tmp_path / "loop.py").write_text(loop)
-    program = [sys.executable, "-m", "mypy", "--strict", str(tmp_path / "loop.py")]
-    done = subprocess.run(program, capture_output=True, text=True, cwd=REPOSITORY)
-    assert done.returncode == 0, done.stdout
-    (tmp_path / "loop.py").write_text(loop + "\nsession.ask().plan + ''\nsession.asks()\n")
-    done = subprocess.run(program, capture_output=True, text=True, cwd=REPOSITORY)
+    (tmp_path / "wrong.py").write_text(loop + "\nsession.ask().plan + ''\nsession.asks()\n")
+    program = [sys.executable, "-m", "mypy", "--strict", "loop.py", "wrong.py"]
+    settings = f"--config-file={REPOSITORY / 'pyproject.toml'}"
+    kept = f"--cache-dir={REPOSITORY / '.mypy_cache'}"
+    done = subprocess.run([*program, settings, kept], capture_output=True, text=True, cwd=tmp_path)
     assert '"Session" has no attribute "asks"' in done.stdout
+    assert "loop.py" not in done.stdout, done.stdout

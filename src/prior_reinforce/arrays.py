@@ -158,14 +158,8 @@ def as_goal(values: ArrayLike, outcome_names: Sequence[str]) -> Point:
         InvalidGoalError: Wrong shape, or not finite.
     """
     k = len(outcome_names)
-    return as_vector(
-        values,
-        k,
-        InvalidGoalError,
-        name="goal",
-        size=f"the demonstrations' outcomes have {k} components {tuple(outcome_names)}",
-        remedy="give numbers",
-    )
+    size = f"the demonstrations' outcomes have {k} components {tuple(outcome_names)}"
+    return as_vector(values, k, InvalidGoalError, "goal", size, "give numbers")
 
 
 def as_error(values: ArrayLike, outcome_dim: int) -> Point:
@@ -174,21 +168,15 @@ def as_error(values: ArrayLike, outcome_dim: int) -> Point:
     Raises:
         InvalidFeedbackError: Wrong shape, or not finite.
     """
-    return as_vector(
-        values,
-        outcome_dim,
-        InvalidFeedbackError,
-        name="error",
-        size=f"an error is {outcome_dim} numbers, outcome minus goal",
-        remedy="void the trial if nothing was seen",
-    )
+    size = f"an error is {outcome_dim} numbers, outcome minus goal"
+    remedy = "void the trial if nothing was seen"
+    return as_vector(values, outcome_dim, InvalidFeedbackError, "error", size, remedy)
 
 
 def as_vector(
     values: ArrayLike,
     length: int,
     problem: type[InvalidGoalError] | type[InvalidFeedbackError],
-    *,
     name: str,
     size: str,
     remedy: str,

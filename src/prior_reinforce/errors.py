@@ -40,7 +40,6 @@ class UnclearUnitsError(ConfigurationError):
     """
 
     def __init__(self, what: str, options: str, also: str = "") -> None:
-        """Keep the parts beside the message."""
         self.what, self.options, self.also = what, options, also
         more = f"; and {also}" if also else ""
         super().__init__(f"{what}; if so, add: {options}{more}")

@@ -38,7 +38,7 @@ _LARGEST_NPZ = 4_000_000_000
 """Bytes of all arrays in a file; ours: an hour of an arm at 1 kHz is a tenth of it. A small file
 that unpacks to more is a trap."""
 
-_FORMULAS = "=+-@\t\r"
+_FORMULAS = ("=", "+", "-", "@", "\t", "\r")
 """What a spreadsheet takes for the start of a formula, which may run a program (OWASP, CSV
 injection)."""
 
@@ -98,12 +98,12 @@ def open_npz(path: Path, remedy: str, largest: int | None = None) -> Iterator[np
 
 def as_cell(text: str) -> str:
     """Return a text for a cell of a table, of which no spreadsheet makes a formula."""
-    return f"'{text}" if text[:1] in _FORMULAS and text[:1] else text
+    return f"'{text}" if text.startswith(_FORMULAS) else text
 
 
 def from_cell(text: str) -> str:
     """Return what `as_cell` was given."""
-    return text[1:] if text[:1] == "'" and text[1:2] in _FORMULAS and text[1:2] else text
+    return text[1:] if text[:1] == "'" and text[1:].startswith(_FORMULAS) else text
 
 
 def without_advice(error: BaseException) -> str:
@@ -159,8 +159,6 @@ def write_once(path: Path, content: bytes) -> Path:
         FileFormatError: Another file is there already.
         WorkspaceError: The disk is full or the folder read-only; nothing is left behind.
     """
-    if not path.parent.is_dir():
-        raise WorkspaceError(f"cannot write {path}, there is no such folder; make the folder first")
     with named_disk_errors(path.parent), _unfinished(path) as unfinished:
         unfinished.write_bytes(content)
         unfinished.chmod(unfinished.stat().st_mode & 0o444)
@@ -295,8 +293,6 @@ def _link(finished: Path, path: Path) -> None:
     """
     try:
         os.link(finished, path)
-    except FileExistsError:
-        raise
     except OSError as error:
         # Memory sticks (FAT) have no links.
         if error.errno not in (errno.EPERM, errno.EOPNOTSUPP, errno.ENOSYS):
@@ -324,8 +320,6 @@ def _sync(path: Path) -> None:
 def _lives(pid: int) -> bool:
     try:
         os.kill(pid, 0)
-    except ProcessLookupError:
-        return False
-    except PermissionError:
-        pass
+    except OSError as error:
+        return not isinstance(error, ProcessLookupError)
     return True

@@ -142,7 +142,6 @@ class Reading:
         return np.asarray(0.5 * (low + high))
 
     def __post_init__(self) -> None:
-        """Check, copy, and make read-only."""
         k = np.size(self.error_seen)
         object.__setattr__(self, "error_seen", as_error(self.error_seen, k))
         for name in ("low", "high", "sd"):

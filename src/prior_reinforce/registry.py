@@ -72,14 +72,15 @@ class Registry(Generic[T]):
                 that the setting cannot have.
         """
         name, given = parse_choice(choice)
-        kind, settings = self.resolve(name), {**self._preset(name), **given}
+        kind, member = self.resolve(name), self.members.get(name)
+        settings = {**(member.settings if member is not None else {}), **given}
         takes = inspect.signature(kind).parameters
         context = {key: value for key, value in context.items() if key in takes}
         config = getattr(kind, "config_type", None)
         given_config = context.pop("config", None)
         try:
             if config is None:
-                return kind(**context, **_checked_names(kind, settings, takes, choice))
+                return kind(**context, **_arguments(kind, settings, choice))
             if isinstance(given_config, config):  # settings in the choice come on top
                 settings = {**asdict(given_config), **settings}
             if settings:  # else the class's own defaults, which may differ from its config's
@@ -124,9 +125,6 @@ class Registry(Generic[T]):
         target = f"{type(made).__module__}:{type(made).__qualname__}"
         return next((n for n, m in self.members.items() if m.target == target), target)
 
-    def _preset(self, name: str) -> Mapping[str, Any]:
-        return self.members[name].settings if name in self.members else {}
-
 
 def parse_choice(choice: str) -> tuple[str, dict[str, str]]:
     """Split `name,setting=value,...` into the name and its settings.
@@ -168,11 +166,22 @@ def build(config: type[Any], settings: Mapping[str, Any], choice: str = "") -> A
     """
     import msgspec
 
+    choice = choice or config.__name__
     try:
-        plain = _plain(config, settings, choice or config.__name__)
-        return msgspec.convert(plain, config, strict=False)
+        return msgspec.convert(_plain(config, settings, choice), config, strict=False)
     except msgspec.ValidationError as error:
-        raise ConfigurationError(f"{choice or config.__name__}: {error}") from error
+        raise ConfigurationError(f"{choice}: {error}") from error
+
+
+def _arguments(kind: type[Any], settings: Mapping[str, Any], choice: str) -> dict[str, Any]:
+    """Plain arguments of a constructor, read by its annotations as a dataclass of settings is."""
+    import msgspec
+
+    hints = typing.get_type_hints(kind.__init__)
+    hints.pop("return", None)
+    fields = [(name, hints[name] if name in settings else Any, None) for name in hints]
+    made = build(msgspec.defstruct(kind.__name__, fields), settings, choice)
+    return {name: getattr(made, name) for name in settings}
 
 
 def _plain(config: type[Any], settings: Mapping[str, Any], choice: str) -> dict[str, Any]:
@@ -181,9 +190,9 @@ def _plain(config: type[Any], settings: Mapping[str, Any], choice: str) -> dict[
     plain: dict[str, Any] = {}
     for key, value in settings.items():
         outer, _, inner = key.partition(".")
-        fields = config.__dataclass_fields__
-        if outer not in fields:
-            raise ConfigurationError(f"{choice} has no setting {key!r}; it has {', '.join(fields)}")
+        if outer not in hints:
+            known = ", ".join(hints) or "none"
+            raise ConfigurationError(f"{choice} has no setting {key!r}; it has {known}")
         hint = hints[outer]
         kinds: list[Any] = [typing.get_origin(each) for each in (hint, *typing.get_args(hint))]
         if inner and is_dataclass(hint):
@@ -234,23 +243,3 @@ def _resolve(target: str) -> Any:
         raise ConfigurationError(
             f"cannot import {target}: {error}; it must be importable from here (PYTHONPATH)"
         ) from error
-
-
-def _checked_names(
-    kind: type[Any], settings: Mapping[str, Any], takes: Mapping[str, Any], choice: str
-) -> dict[str, Any]:
-    """Plain arguments of a constructor, read from text by their annotations."""
-    import msgspec
-
-    hints = typing.get_type_hints(kind.__init__)
-    arguments: dict[str, Any] = {}
-    for name, value in settings.items():
-        if name not in takes or hints.get(name) is None:
-            known = ", ".join(each for each in takes if each in hints) or "none"
-            raise ConfigurationError(f"{choice} has no setting {name!r}; it has {known}")
-        plain = None if value in ("none", "None") else value
-        try:
-            arguments[name] = msgspec.convert(plain, hints[name], strict=False)
-        except (TypeError, msgspec.ValidationError) as error:
-            raise ConfigurationError(f"{choice}: {name}: {error}") from error
-    return arguments

@@ -8,8 +8,10 @@ An operator stands behind the robot and looks along x, from the robot's base ove
     z                 high or low                     up or down
     a time            late or early
 
-A component is x, y or z by its name, else by its position. An error is outcome minus goal. Lengths
-are said in centimetres, errors of other tasks by their names and units.
+`names` and `units` are those of the k components of an outcome. A component is x, y or z by its
+name, else by its position. An error is outcome minus goal. Lengths are said in centimetres, errors
+of other tasks by their names and units.
+
 Source: paper, Section IV, "Perception Process" (coarse human feedback); the words are ours.
 """
 
@@ -151,9 +153,15 @@ def say_place(place: ArrayLike, names: Sequence[str], units: Sequence[str]) -> s
     return _components(place, names, units)
 
 
-def error_words(names: Sequence[str], units: Sequence[str]) -> list[tuple[str, str] | None]:
-    """For each component of an error the words where it is positive and negative; None: none."""
-    return _pairs(WORDS, names, units)
+def error_words(
+    names: Sequence[str], units: Sequence[str], words: Sequence[tuple[str, str]] = WORDS
+) -> list[tuple[str, str] | None]:
+    """For each component the words where it is positive and negative; None where it has none."""
+    pairs = [
+        _TIMES if unit in ("s", "ms") else words[axis] if axis < len(words) else None
+        for axis, unit in zip(axes_of(names, units), units, strict=True)
+    ]
+    return [pair if pairs.count(pair) == 1 else None for pair in pairs]
 
 
 def error_example(names: Sequence[str], units: Sequence[str]) -> str:
@@ -202,17 +210,18 @@ def say_tolerance(
 def from_words(
     text: str, names: Sequence[str], units: Sequence[str], least_sd: ArrayLike = 0.0
 ) -> Reading:
-    """Read an error from words.
+    """Read an error from words, for instance `5cm long, 2 cm left`, `20ms late`, `5-7 in short`.
+
+    A length without a unit is in centimetres, or in the outcome's inches; a component that is not
+    named is zero. 0, 2, 5 cm and tens are an observer's words (`Reading.by_eye`), other numbers
+    estimates (`Reading.estimated`), `5 +- 0.5 cm long` is a measurement. `long` means by 1 cm or
+    more, and leaves components that are not named unknown; so does `5 cm long, somewhere`. `hit`
+    and `miss` stand alone or beside terms.
 
     Args:
-        text: For instance `5cm long, 2 cm left`, `20ms late`, `5-7 in short`, `5 deg high`. A
-            length without a unit is in centimetres, or in the outcome's inches; a component that
-            is not named is zero. 0, 2, 5 cm and tens are an observer's words (`Reading.by_eye`),
-            other numbers estimates (`Reading.estimated`), `5 +- 0.5 cm long` is a measurement.
-            `long` means by 1 cm or more, and leaves components that are not named unknown; so does
-            `5 cm long, somewhere`. `hit` and `miss` stand alone or beside terms.
-        names: Names of the k components.
-        units: Units of the k components.
+        text: The words.
+        names: Of the k components.
+        units: Of the k components.
         least_sd: Least standard deviation of what is no length and was not measured, in `units`.
 
     Returns:
@@ -222,22 +231,16 @@ def from_words(
         InvalidFeedbackError: Unknown words, or one direction named twice.
     """
     k, sds = len(units), np.broadcast_to(np.asarray(least_sd, dtype=np.float64), len(units))
-    hits, terms, rest_unknown = set(), [], False
-    for part in _parts(text):
-        if part in _HITS:
-            hits.add(_HITS[part])
-        elif part == _SOMEWHERE:
-            rest_unknown = True
-        elif part not in _ON_THE_GOAL:
-            terms.append(part)
+    parts = _parts(text)
+    hits = {_HITS[part] for part in parts if part in _HITS}
+    terms = [part for part in parts if part not in (*_HITS, _SOMEWHERE, *_ON_THE_GOAL)]
     if len(hits) > 1:
         raise InvalidFeedbackError(f"{text!r} says hit and miss; say one of them")
     hit = hits.pop() if hits else None
     if hit is not None and not terms:
         return replace(Reading.only(hit, k), said=text)
-    example = f'for instance "{error_example(names, units)}", or "hit"'
-    said = _read(terms, text, WORDS, names, units, example, sizes=False)
-    rest_unknown |= any(term.size is None for term in said.values())
+    said = _read(terms, text, names, units)
+    rest_unknown = _SOMEWHERE in parts or any(term.size is None for term in said.values())
     metres = np.array([_METRES.get(unit, 0.0) for unit in units])
     is_length = metres > 0.0
     number = np.zeros(k)
@@ -251,25 +254,23 @@ def from_words(
                 f"{'cm' if is_length[j] else 'deg'}, or void the trial if that is true"
             )
     seen = Reading.estimated(number, sds)
-    low, high, sd = seen.low.copy(), seen.high.copy(), seen.sd.copy()
+    bounds = np.array([seen.low, seen.high, seen.sd])  # of each component
     if np.any(is_length):
         eye = Reading.by_eye((number * metres)[is_length])
-        for ends, of in ((low, eye.low), (high, eye.high), (sd, eye.sd)):
-            ends[is_length] = of / metres[is_length]
+        bounds[:, is_length] = np.array([eye.low, eye.high, eye.sd]) / metres[is_length]
     if rest_unknown:
         unsaid = [j for j in range(k) if j not in said]
-        low[unsaid], high[unsaid], sd[unsaid] = -math.inf, math.inf, 0.0
+        bounds[:, unsaid] = [[-math.inf], [math.inf], [0.0]]
     for j, term in said.items():
         if term.size is None:
             nearest = EYE_BETWEEN[0] / metres[j] if is_length[j] else 0.0
-            low[j], high[j] = sorted((term.sign * nearest, term.sign * math.inf))
-            sd[j] = 0.0
+            bounds[:, j] = *sorted((term.sign * nearest, term.sign * math.inf)), 0.0
         elif term.least is not None:
-            low[j], high[j] = sorted((term.sign * term.least, number[j]))
-            number[j], sd[j] = 0.5 * (low[j] + high[j]), 0.0
+            low, high = sorted((term.sign * term.least, number[j]))
+            number[j], bounds[:, j] = 0.5 * (low + high), (low, high, 0.0)
         elif term.sd is not None:
-            low[j], high[j], sd[j] = number[j], number[j], term.sd
-    return Reading(number, low, high, sd, hit, text)
+            bounds[:, j] = number[j], number[j], term.sd
+    return Reading(number, bounds[0], bounds[1], bounds[2], hit, text)
 
 
 def as_reading(
@@ -279,18 +280,9 @@ def as_reading(
     units: Sequence[str],
     least_sd: _Point,
 ) -> Reading:
-    """Return what was seen of a trial as a reading.
+    """Return what was seen of a trial as a reading; `seen`, `hit` and errors as in `Session.tell`.
 
-    Args:
-        seen: A reading, words, or outcome minus goal as numbers of unknown origin, shape (k,); None
-            if only `hit` is known.
-        hit: Whether the goal was reached, if that was seen directly.
-        names: Names of the k components.
-        units: Units of the k components.
-        least_sd: Least standard deviation of numbers of unknown origin, shape (k,), in `units`.
-
-    Raises:
-        InvalidFeedbackError: Wrong shape, not finite, or words that cannot be read.
+    `least_sd`, shape (k,), in `units`, is the least sd of numbers of unknown origin.
     """
     if not (hit is None or isinstance(hit, (bool, np.bool_))):
         raise InvalidFeedbackError(f"hit must be True, False or None, got {hit!r}")
@@ -309,11 +301,7 @@ def as_reading(
 
 
 def read_numbers(text: str) -> list[tuple[float, float | None]] | None:
-    """Read numbers, each with the number after its `+-`; None if the text is anything else.
-
-    Args:
-        text: For instance `0.05+-0.003, -0.02 ± 0.001`.
-    """
+    """Read numbers, each with that after its `+-` (`0.05+-0.003, -0.02 ± 0.001`); None if none."""
     parts = re.sub(rf"\s*{_PLUS_MINUS}\s*", "±", text).replace(",", " ").split()
     try:
         split = [part.split("±") for part in parts]
@@ -325,12 +313,7 @@ def read_numbers(text: str) -> list[tuple[float, float | None]] | None:
 def read_uncertain_place(
     text: str, names: Sequence[str], units: Sequence[str]
 ) -> tuple[_Point, float]:
-    """Read a place as `read_place` does, and the standard deviation that may follow it.
-
-    Args:
-        text: For instance `92cm 10cm +- 2cm`.
-        names: Names of the components.
-        units: Units of the components.
+    """Read a place, and the standard deviation that may follow it: `92cm 10cm +- 2cm`.
 
     Raises:
         InvalidFeedbackError: As `read_place` does, or a `+-` for components of several units.
@@ -346,11 +329,8 @@ def read_uncertain_place(
 def read_place(text: str, names: Sequence[str], units: Sequence[str]) -> _Point:
     """Read a place from numbers in the outcome's units, numbers with a unit, or words.
 
-    Args:
-        text: For instance `0.92 0.10`, `92cm 10cm`, `92 10 cm`, or `92cm ahead, 10cm left`; beside
-            words, a length without one is the component in that position: `92cm, 10cm left`.
-        names: Names of the components.
-        units: Units of the components.
+    For instance `0.92 0.10`, `92cm 10cm`, `92 10 cm`, or `92cm ahead, 10cm left`; beside words, a
+    length without one is the component in that position: `92cm, 10cm left`.
 
     Raises:
         InvalidFeedbackError: It is none of these, has a `+-`, or is farther than any arm throws.
@@ -361,10 +341,8 @@ def read_place(text: str, names: Sequence[str], units: Sequence[str]) -> _Point:
     numbers = _numbers_with_units(text, units)
     if numbers is None:
         if k <= len(WORDS) and set(units) <= set(_METRES):
-            example = 'for instance "92cm ahead, 10cm left"'
-            read = _read(_parts(text), text, PLACE_WORDS, names, units, example, sizes=True)
             place = np.zeros(k)
-            for j, term in read.items():
+            for j, term in _read(_parts(text), text, names, units, place=True).items():
                 place[j] = term.sign * (term.size or 0.0)
             return place
         raise InvalidFeedbackError(f"cannot read {text!r}; give {expected}")
@@ -427,32 +405,20 @@ def _parts(text: str) -> list[str]:
     return [part.rstrip(".! ") for part in parts]
 
 
-def _pairs(
-    words: Sequence[tuple[str, str]], names: Sequence[str], units: Sequence[str]
-) -> list[tuple[str, str] | None]:
-    """The words of each component; None where it has none."""
-    pairs = [
-        _TIMES if unit in ("s", "ms") else words[axis] if axis < len(words) else None
-        for axis, unit in zip(axes_of(names, units), units, strict=True)
-    ]
-    return [pair if pairs.count(pair) == 1 else None for pair in pairs]
-
-
 def _with_units(text: str, names: Sequence[str], units: Sequence[str]) -> str:
     """Words with the unit that was understood where none was said: `5 cm long` for `5 long`."""
+    pairs = zip(error_words(names, units), units, strict=True)
+    unit_of = {word: unit for pair, unit in pairs for word in pair or ()}
     said = []
     for part in _parts(text):
         term = _TERM.fullmatch(part)
         if term is None or not term["value"] or term["unit"] or term["sd_unit"]:
             said.append(part)
             continue
-        unit = next(
-            (u for pair, u in zip(error_words(names, units), units, strict=True)
-             if pair and term["word"] in pair), units[0]
-        )  # fmt: skip
+        unit = _bare(unit_of.get(term["word"], units[0]))
         least = f"{term['least']}-" if term["least"] else ""
         spread = f" +- {term['sd']}" if term["sd"] else ""
-        said.append(f"{least}{term['value']}{spread} {_bare(unit)} {term['word']}")
+        said.append(f"{least}{term['value']}{spread} {unit} {term['word']}")
     return text if said == _parts(text) else ", ".join(said)
 
 
@@ -462,17 +428,11 @@ def _bare(unit: str) -> str:
 
 
 def _read(
-    parts: Sequence[str],
-    text: str,
-    words: Sequence[tuple[str, str]],
-    names: Sequence[str],
-    units: Sequence[str],
-    example: str,
-    *,
-    sizes: bool,
+    parts: Sequence[str], text: str, names: Sequence[str], units: Sequence[str], place: bool = False
 ) -> dict[int, _Term]:
-    """Read the terms of a text by component; `sizes` wants a number for each, and no `+-`."""
-    pairs, k = _pairs(words, names, units), len(units)
+    """Read the terms of a text by component; a place has a number for each, and no `+-`."""
+    words, k = PLACE_WORDS if place else WORDS, len(units)
+    pairs = error_words(names, units, words)
     known = {word: (j, pair) for j, pair in enumerate(pairs) if pair for word in pair}
     if k == 1 and units[0] not in _METRES:  # whatever is more of it
         known |= {word: (0, pair) for pair in (*words, _TIMES) for word in pair}
@@ -480,12 +440,12 @@ def _read(
     for turn, part in enumerate(parts):
         match, bare = _TERM.fullmatch(part), _BARE_TERM.fullmatch(part)
         told = {} if match is None else match.groupdict()
-        if bare is not None and sizes and len(parts) > 1 and turn < k:
+        if bare is not None and place and len(parts) > 1 and turn < k:
             told, j, pair, sign = bare.groupdict(), turn, pairs[turn], 1.0
         elif told.get("word") not in known or (
-            sizes and (not told["value"] or told["sd"] or told["least"])
+            place and (not told["value"] or told["sd"] or told["least"])
         ):
-            raise InvalidFeedbackError(_unread(part, text, [*known], example, sizes=sizes))
+            raise InvalidFeedbackError(_unread(part, text, [*known], names, units, place))
         else:
             j, pair = known[told["word"]]
             sign = -1.0 if told["word"] == pair[1] else 1.0
@@ -493,7 +453,6 @@ def _read(
             raise InvalidFeedbackError(
                 f"{text!r} names {' and '.join(pair or names[j])} twice; give each direction once"
             )
-
         numbers: list[float | None] = []
         for which in ("value", "least", "sd"):
             unit = told.get(f"{which}_unit") or told.get("unit") or told.get("sd_unit") or ""
@@ -503,15 +462,23 @@ def _read(
     return read
 
 
-def _unread(part: str, text: str, known: Sequence[str], example: str, *, sizes: bool) -> str:
-    from_base = _FROM_BASE.fullmatch(part) if sizes else None
-    if from_base is not None:
+def _unread(
+    part: str,
+    text: str,
+    known: Sequence[str],
+    names: Sequence[str],
+    units: Sequence[str],
+    place: bool,
+) -> str:
+    if place and (from_base := _FROM_BASE.fullmatch(part)):
         return (
             f"{part!r} may be straight to the place or along x only; measure along x and say "
             f"{from_base['length']} {known[0]}"
         )
+    example = '"92cm ahead, 10cm left"' if place else f'"{error_example(names, units)}", or "hit"'
     where = "" if part == text.strip().lower() else f" in {text!r}"
-    return f"cannot read {part!r}{where}; write a length and one of {', '.join(known)}, {example}"
+    said = f"cannot read {part!r}{where}; write a length and one of {', '.join(known)}"
+    return f"{said}, for instance {example}"
 
 
 def _in_unit(number: str, said: str, unit: str, k: int, part: str) -> float:

@@ -53,7 +53,17 @@ def wait_for_a_write(folder: Path, pid: int) -> None:
 
 
 def main(folder: Path, seed: int) -> None:
+    # Loaded once: runs that load torch and MuJoCo themselves are mostly killed while they do.
+    import joblib  # noqa: F401
+    import torch._dynamo  # noqa: F401  # an optimizer does
     from quick_units import results
+
+    import prior_reinforce.adapters.gaussian_process
+    import prior_reinforce.adapters.proportional
+    import prior_reinforce.generators.denoiser
+    import prior_reinforce.generators.training
+    import prior_reinforce.lab.tasks.basketball
+    import prior_reinforce.perception.amplified  # noqa: F401
 
     reference = folder / "reference"
     started = time.monotonic()

@@ -101,7 +101,9 @@ def said(folder):
 def main(folder, seed):
     # Loaded once: children that load torch themselves are mostly killed while they do.
     import prior_reinforce.adapters.bayesian
-    import prior_reinforce.generators.diffusion  # noqa: F401
+    import prior_reinforce.generators.denoiser
+    import prior_reinforce.generators.diffusion
+    import prior_reinforce.generators.training  # noqa: F401
 
     learned, reference, killed = folder / "learned", folder / "reference", folder / "killed"
     learn_in_child(learned)

@@ -82,7 +82,9 @@ def test_an_so101_goes_from_six_recorded_throws_to_a_hit(run, tmp_path, monkeypa
         assert run("new", "hoop", "--robot", "so101", "--dt", "0.02", "--tolerance", "0.02")[0] == 0
         with Path("hoop/workspace.toml").open("a") as manifest:
             manifest.write("".join(["\n", *section, f'python = "{LEROBOT}"\n']))
-        run("record", "hoop", "--takes", "6", "--seconds", "1.7", "--pause", "3.8", "--yes")
+        record = ("record", "hoop", "--takes", "6", "--seconds", "1.7", "--pause", "3.8", "--yes")
+        _, _, err = run(*record)
+        assert "no outcomes for episodes take-1, take-2, take-3, take-4, take-5, take-6," in err
         rows = ["episode,x,y"]
         for i in range(1, 7):
             place = re.findall(r"[xy] (-?[\d.]+) m", lines_of(served, "came down")[-1])

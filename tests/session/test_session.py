@@ -24,7 +24,7 @@ from prior_reinforce.generators.interpolation import SmoothInterpolation
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
 from prior_reinforce.readings import Reading
 from prior_reinforce.session.session import Session, ask_all
-from prior_reinforce.session.trials import MemoryLog, Stage, State
+from prior_reinforce.session.trials import Log, Stage, State
 
 DEMOS = Demonstrations(
     plans=np.arange(2 * 3 * 2, dtype=float).reshape(2, 3, 2),
@@ -518,7 +518,7 @@ def test_a_goal_of_the_wrong_dimension_is_named():
 
 def test_a_log_that_does_not_fit_together_is_refused(session):
     session.tell(session.ask().number, [0.05, 0.0])
-    log = MemoryLog()
+    log = Log()
     with pytest.raises(WorkspaceError, match="does not fit the ones before"):
         log.append(session.log.entries()[-1].event)
 

@@ -7,7 +7,7 @@ from msgspec.structs import replace
 from prior_reinforce.errors import WorkspaceError
 from prior_reinforce.readings import Reading
 from prior_reinforce.session.events import Amended, Asked, GoalSet, Told, Voided
-from prior_reinforce.session.trials import MemoryLog, Stage
+from prior_reinforce.session.trials import Log, Stage
 
 
 def reading(*error_seen):
@@ -27,7 +27,7 @@ def amended(trial=1, error_seen=(0.02, 0.0), hit=False):
 
 
 def state(*events):
-    log = MemoryLog()
+    log = Log()
     for event in events:
         log.append(event)
     return log.state()

@@ -208,11 +208,12 @@ def correlation_lags(profiles: Profiles) -> Float[np.ndarray, " N"]:
     lags -= lags.mean()
     for _ in range(_MAX_ROUNDS):
         previous = lags.copy()
+        delays = np.exp(-1j * np.outer(lags, frequencies))  # e^{-jws}: moved later by s
         for i in range(n):
-            delays = np.exp(-1j * np.outer(lags, frequencies))  # e^{-jws}: moved later by s
             delays[i] = 0.0
             template = np.einsum("jf,jf->f", delays, cross[i])
             lags[i] = _best_lag(template, frequencies)
+            delays[i] = np.exp(-1j * (lags[i] * frequencies))
         lags -= lags.mean()
         if np.max(np.abs(lags - previous)) < CONVERGED:
             break
@@ -252,14 +253,18 @@ def _best_lag(
     lag -= length if lag > length / 2 else 0
     # The real signal's spectrum has two sides, but for its ends.
     sided = np.where((frequencies == 0) | (frequencies == np.pi), 1.0, 2.0) * cross_spectrum
+    turns = 1j * frequencies
     for _ in range(_NEWTON_STEPS):
-        terms = sided * np.exp(1j * frequencies * lag)
+        terms = sided * np.exp(turns * lag)
         slope = -np.sum(frequencies * terms.imag)
         curvature = -np.sum(frequencies**2 * terms.real)
         if curvature >= 0:  # a plateau: the scan's answer stands
             break
         step = -slope / curvature
+        before = lag
         lag += float(np.clip(step, -1 / _LAGS_PER_FRAME, 1 / _LAGS_PER_FRAME))
+        if lag == before:  # and stays there
+            break
     return lag
 
 

@@ -36,22 +36,15 @@ class Event(
 
 
 class GoalSet(Event, frozen=True):
-    """A goal was set."""
+    """A goal was set; its fields are those of `trials.Goal`."""
 
     goal: list[float]
-    """g, shape (k,), in the outcomes' units."""
     tolerance: list[float]
-    """epsilon of each component, in its unit."""
     names: list[str]
-    """Names of the outcomes' components."""
     units: list[str]
-    """Their units."""
     carry_over: bool
-    """Whether the adapter also learns from the trials of earlier goals."""
     adapter: str = ""
-    """Choice of the adapter; empty where the session was given an object."""
     new_hardware: str | None = None
-    """What was changed on the hardware before; None where nothing was."""
 
 
 class KeptPlan(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -14,9 +14,8 @@ Notation (docs/notation.md):
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from contextlib import ExitStack
-from dataclasses import fields
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from functools import cached_property
 from threading import RLock
 from types import FunctionType, MethodType
@@ -34,18 +33,10 @@ from prior_reinforce.errors import (
     TrialStateError,
     WorkspaceError,
 )
+from prior_reinforce.plans.motions import Plan
 from prior_reinforce.readings import Reading, as_tolerance
 from prior_reinforce.session.events import Amended, Asked, GoalSet, Told, Voided
-from prior_reinforce.session.trials import (
-    AskedTrial,
-    Goal,
-    Log,
-    MemoryLog,
-    Stage,
-    State,
-    Trial,
-    Verdict,
-)
+from prior_reinforce.session.trials import AskedTrial, Goal, Log, Stage, State, Trial, Verdict
 from prior_reinforce.wording import as_reading
 
 if TYPE_CHECKING:
@@ -104,9 +95,7 @@ class Session:
                 raise ConfigurationError(
                     f"{given.__name__} is a class; give an object, for instance {given.__name__}()"
                 )
-        self.log: Log = MemoryLog() if log is None else log
-        self.state: State = self.log.state()
-        """What happened so far, as this session last read it from its log."""
+        self.log = Log() if log is None else log
         self._given: Any = (generator, adapter, demonstrations)
         self._gate = gate
         self._loaded_for: tuple[str, ...] = ()
@@ -118,7 +107,7 @@ class Session:
         self._start = 0
         self._on_hardware_of = 0
         """The latest goal whose change of hardware the adapter knows of."""
-        self._refresh()
+        self.state  # noqa: B018  (whether the log can be read)
         if goal is not None:
             self.set_goal(goal)
 
@@ -138,34 +127,46 @@ class Session:
         return _loaded(self._given[2])
 
     @property
+    def state(self) -> State:
+        """What happened so far, whoever wrote it down."""
+        with self._lock:
+            state = self.log.state()
+            now = (*state.in_use, "" if state.goal is None else state.goal.adapter)
+            if now != self._loaded_for:  # forget what was loaded: other things are in use
+                self._loaded_for, self._observed = now, None
+                for name in ("generator", "adapter", "demonstrations"):
+                    self.__dict__.pop(name, None)
+            return state
+
+    @property
     def goals(self) -> tuple[Goal, ...]:
         """All goals so far, in order."""
-        return tuple(self._known().goals)
+        return tuple(self.state.goals)
 
     @property
     def goal(self) -> Point:
         """The goal g tilde that is worked on: the latest."""
-        return self._current_goal(self._known()).goal
+        return self._latest_goal().goal
 
     @property
     def tolerance(self) -> Point:
         """The tolerance epsilon of each component, of the goal that is worked on."""
-        return self._current_goal(self._known()).tolerance
+        return self._latest_goal().tolerance
 
     @property
     def trials(self) -> tuple[Trial, ...]:
         """All trials for the goal that is worked on, in order; `state.trials` has all."""
-        return self._known().current
+        return self.state.current
 
     @property
     def open_trial(self) -> Trial | None:
         """The trial that waits to be told, if any."""
-        return self._known().open_trial
+        return self.state.open_trial
 
     @property
     def solved(self) -> bool:
         """Whether a told trial reached the goal that is worked on."""
-        return self._known().solved
+        return self.state.solved
 
     @property
     def n_trials(self) -> int:
@@ -178,7 +179,7 @@ class Session:
         Raises:
             TrialStateError: There is no such trial.
         """
-        return self._known().trial(number)
+        return self.state.trial(number)
 
     def set_goal(
         self,
@@ -205,7 +206,6 @@ class Session:
             ConfigurationError: As in the constructor.
             TrialStateError: A trial for the goal before waits to be told.
         """
-        self._refresh()
         self.state.refuse_open_trial("setting a goal")  # before anything is said of the goal
         checked = self.demonstrations.check_goal(goal)
         names, units = self.demonstrations.outcome_names, self.demonstrations.outcome_units
@@ -215,19 +215,18 @@ class Session:
         if carried is None:
             kind = ADAPTERS.resolve(adapter) if adapter else type(self.adapter)
             carried = kind.carries_over
-        with self._exclusive():
-            self.state.refuse_open_trial("setting a goal")
-            event = GoalSet(
-                goal=checked.tolist(),
-                tolerance=tolerances.tolist(),
-                names=list(names),
-                units=list(units),
-                carry_over=carried,
-                adapter=adapter,
-                new_hardware=new_hardware,
-            )
+        event = GoalSet(
+            goal=checked.tolist(),
+            tolerance=tolerances.tolist(),
+            names=list(names),
+            units=list(units),
+            carry_over=carried,
+            adapter=adapter,
+            new_hardware=new_hardware,
+        )
+        with self._exclusive() as state:
+            state.refuse_open_trial("setting a goal")
             self.log.append(event)
-        self._refresh()
         return self.state.goals[-1]
 
     def ask(self, *, arm_did_not_move: bool = False) -> AskedTrial:
@@ -274,15 +273,15 @@ class Session:
             TrialStateError: There is no such trial, or it is not open.
             InvalidFeedbackError: Wrong shape, or not finite.
         """
-        with self._exclusive():
-            trial = self.trial(number)
+        with self._exclusive() as state:
+            trial = state.trial(number)
             if not trial.open:
                 raise TrialStateError(
                     f"trial {number} is already {trial.stage.value}; "
                     + ("amend it to correct it" if trial.stage is Stage.TOLD else "ask for another")
                 )
             self._append_reading(Told, trial, seen, hit)
-        return self._now(number)
+        return self.trial(number)
 
     def amend(
         self, number: int, seen: Reading | ArrayLike | None = None, *, hit: bool | None = None
@@ -297,15 +296,15 @@ class Session:
             TrialStateError: There is no such trial, or it has not been told.
             InvalidFeedbackError: Wrong shape, or not finite.
         """
-        with self._exclusive():
-            trial = self.trial(number)
+        with self._exclusive() as state:
+            trial = state.trial(number)
             if trial.stage is not Stage.TOLD:
                 raise TrialStateError(
                     f"trial {number} is {trial.stage.value}, only a told trial can be amended; "
                     + ("tell it" if trial.open else "ask for another")
                 )
             self._append_reading(Amended, trial, seen, hit)
-        return self._now(number)
+        return self.trial(number)
 
     def void(self, number: int, reason: str = "") -> Trial:
         """Declare that a trial, open or told, is not data; the adapter forgets it.
@@ -317,31 +316,17 @@ class Session:
         Raises:
             TrialStateError: There is no such trial, or it is voided already.
         """
-        with self._exclusive():
-            trial = self.trial(number)
+        with self._exclusive() as state:
+            trial = state.trial(number)
             if trial.stage is Stage.VOIDED:
                 raise TrialStateError(f"trial {number} is already voided; ask for another")
             # What a terminal could not decode cannot be printed again.
             text = str(reason).encode(errors="replace").decode()
             self.log.append(Voided(trial=trial.number, reason=text))
-        return self._now(number)
-
-    def _current_goal(self, state: State | None = None) -> Goal:
-        goal = (state or self.state).goal
-        if goal is None:
-            raise WorkspaceError(
-                "no goal is set; set one (Session.set_goal, or: prior-reinforce goal)"
-            )
-        return goal
-
-    def _known(self) -> State:
-        """All that the log says by now, whoever wrote it."""
-        self._refresh()
-        return self.state
+        return self.trial(number)
 
     def __repr__(self) -> str:
-        """The goal, and how far it is."""
-        state = self._known()
+        state = self.state
         if state.goal is None:
             return "Session(no goal)"
         said = "reached" if state.solved else "not reached"
@@ -358,28 +343,19 @@ class Session:
         """As it was, with a lock of its own."""
         self.__dict__.update(state, _lock=RLock())
 
-    def _refresh(self) -> None:
-        """Know all that the log says, and forget what was loaded if other things are in use."""
-        with self._lock:
-            self.state = self.log.state()
-            goal = self.state.goal
-            now = (*self.state.in_use, "" if goal is None else goal.adapter)
-            if now != self._loaded_for:
-                self._loaded_for, self._observed = now, None
-                for name in ("generator", "adapter", "demonstrations"):
-                    self.__dict__.pop(name, None)
+    def _latest_goal(self) -> Goal:
+        goal = self.state.goal
+        if goal is None:
+            raise WorkspaceError(
+                "no goal is set; set one (Session.set_goal, or: prior-reinforce goal)"
+            )
+        return goal
 
-    def _now(self, number: int) -> Trial:
-        self._refresh()
-        return self.state.trials[number - 1]
-
-    def _exclusive(self) -> ExitStack:
+    @contextmanager
+    def _exclusive(self) -> Iterator[State]:
         """Hold the log, and know all that it says."""
-        with ExitStack() as stack:
-            stack.enter_context(self._lock)
-            stack.enter_context(self.log.exclusive())
-            self._refresh()
-            return stack.pop_all()
+        with self._lock, self.log.exclusive():
+            yield self.state
 
     def _append_reading(
         self,
@@ -390,9 +366,7 @@ class Session:
     ) -> None:
         goal = self.state.goal_of(trial)
         reading = as_reading(seen, hit, goal.names, goal.units, goal.least_sd)
-        reached = reading.hit
-        if reached is None:
-            reached = goal.is_hit(reading.error_seen)
+        reached = goal.is_hit(reading.error_seen) if reading.hit is None else reading.hit
         self.log.append(event(trial=trial.number, reading=reading.record(), hit=bool(reached)))
 
     def informed_adapter(self) -> Adapter:
@@ -404,31 +378,25 @@ class Session:
             WorkspaceError: No goal is set.
         """
         with self._exclusive():
-            self._inform()
-        return self.adapter
+            return self._informed()
 
-    def _propose(self) -> Point:
-        """M(g), after the adapter has seen every reading that counts."""
-        self._inform()
-        return self.adapter.propose(self._current_goal().goal)
-
-    def _inform(self) -> None:
-        """Let the adapter see every reading that counts."""
-        readings = self.state.readings_for(self._current_goal(), self._loaded_for[0])
+    def _informed(self) -> Adapter:
+        goal, adapter = self._latest_goal(), self.adapter
+        readings = self.state.readings_for(goal, self._loaded_for[0])
         seen, self._observed = self._observed, None  # until it has seen them all
         # Start again if one was voided or amended, or if another session has used the adapter.
-        again = self.adapter.n_starts != self._start
+        again = adapter.n_starts != self._start
         if again or seen is None or seen != readings[: len(seen)]:
-            self.adapter.start(self.demonstrations)
-            seen, self._start, self._on_hardware_of = [], self.adapter.n_starts, 0
+            adapter.start(self.demonstrations)
+            seen, self._start, self._on_hardware_of = [], adapter.n_starts, 0
         for trial in readings[len(seen) :]:
-            goal = self.state.goal_of(trial)
+            about = self.state.goal_of(trial)
             assert trial.reading is not None
-            self._change_hardware_until(goal.number)
-            reading = trial.reading.within(goal.tolerance)
-            self.adapter.observe(trial.condition, goal.goal, reading)
+            self._change_hardware_until(about.number)
+            adapter.observe(trial.condition, about.goal, trial.reading.within(about.tolerance))
         self._observed = readings
-        self._change_hardware_until(self._current_goal().number)
+        self._change_hardware_until(goal.number)
+        return adapter
 
     def _change_hardware_until(self, goal_number: int) -> None:
         """Tell the adapter of every change of hardware up to a goal, once."""
@@ -439,7 +407,7 @@ class Session:
 
     def _open(self, condition: Point, plan: Frames) -> Verdict | None:
         """Write a new trial down, if its plan may be executed."""
-        goal = self._current_goal()
+        goal = self._latest_goal()
         verdict = self._check(plan, self._say_no_plan(goal.goal, condition))
         number = len(self.state.trials) + 1
         expected = self.adapter.expect(condition, goal.goal, goal.tolerance)
@@ -451,9 +419,9 @@ class Session:
             gate=None if verdict is None else verdict.as_json(),
             p_hit=None if expected is None else expected.p_hit,
             expected_trials=None if expected is None else expected.trials,
-            expected_error=_plain(None if expected is None else expected.error),
-            expected_sd=_plain(None if expected is None else expected.sd),
-            plan=self.log.keep_plan(number, plan),
+            expected_error=None if expected is None else _as_list(expected.error),
+            expected_sd=None if expected is None else _as_list(expected.sd),
+            plan=self.log.keep_plan(number, Plan(plan, self.demonstrations.format)),
         )
         self.log.append(event)
         return verdict
@@ -468,21 +436,20 @@ class Session:
             said += ", which lies far outside the demonstrations (choose one nearer to them)"
         return said
 
-    def _with_plan(self, number: int, opened: Sequence[Verdict | None]) -> AskedTrial:
+    def _with_plan(self, number: int, verdict: Verdict | None) -> AskedTrial:
         """A trial with its plan and the gate's verdict, unless the gate refuses it now.
 
-        `opened` holds the verdict on a trial that was opened just now.
+        `verdict` is that on a trial that was opened just now.
         """
-        trial = self._now(number)
+        trial = self.trial(number)
         if not trial.open:
             raise TrialStateError(f"trial {number} was {trial.stage.value} meanwhile; ask again")
-        plan = self.log.plan(trial) if trial.plan is None else trial.plan
+        plan = self.log.plan(trial)
         refusal = f"trial {number} may not be executed now, void it and ask again"
-        verdict = opened[0] if opened else self._check(plan, refusal)
-        if isinstance(trial, AskedTrial) and trial.plan is plan and verdict is None:
+        verdict = verdict or self._check(plan, refusal)
+        if isinstance(trial, AskedTrial) and verdict is None:
             return trial
-        known = {each.name: getattr(trial, each.name) for each in fields(trial)}
-        return AskedTrial(**{**known, "plan": plan, "verdict": verdict})
+        return AskedTrial(**{**vars(trial), "plan": plan, "verdict": verdict})
 
     def _check(self, plan: Frames, refusal: str) -> Verdict | None:
         """What the gate says of a plan; an error that begins with `refusal` if it refuses."""
@@ -511,27 +478,26 @@ def ask_all(sessions: Sequence[Session], *, arm_did_not_move: bool = False) -> l
     if len({id(session) for session in sessions}) < len(sessions):
         raise ConfigurationError("sessions asked together must be different ones")
     for session in sessions:
-        session._refresh()
         if session.open_trial is None:  # load before the log is held: others need not wait for it
             session.generator, session.goal, session.adapter  # noqa: B018
     with ExitStack() as logs:
-        numbers = []
+        numbers, new = [], []
         for session in sessions:
-            logs.enter_context(session._exclusive())
-            trial = session.open_trial
-            stage = None if trial is None else trial.stage
-            if trial is not None and (
-                stage is Stage.EXECUTING or (stage is Stage.EXECUTED and arm_did_not_move)
+            state = logs.enter_context(session._exclusive())
+            trial = state.open_trial
+            if trial is None:
+                new.append(session)
+            elif trial.stage is Stage.EXECUTING or (
+                trial.stage is Stage.EXECUTED and arm_did_not_move
             ):
                 session.log.settle(trial, arm_did_not_move=arm_did_not_move)
-            numbers.append(len(session.state.trials) + 1 if trial is None else trial.number)
-        new = [session for session in sessions if session.open_trial is None]
+            numbers.append(len(state.trials) + 1 if trial is None else trial.number)
         verdicts: dict[Session, Verdict | None] = {}
         if new:
             generator = new[0].generator
             if any(session.generator is not generator for session in new):
                 raise ConfigurationError("sessions asked together must share one generator object")
-            conditions = np.stack([session._propose() for session in new])
+            conditions = np.stack([each._informed().propose(each.goal) for each in new])
             plans = generator.generate(conditions)
             if not np.all(np.isfinite(plans)):
                 raise InvalidPlanError(
@@ -540,12 +506,12 @@ def ask_all(sessions: Sequence[Session], *, arm_did_not_move: bool = False) -> l
             for session, condition, plan in zip(new, conditions, plans, strict=True):
                 verdicts[session] = session._open(condition, plan)
     return [
-        session._with_plan(number, [verdicts[session]] if session in verdicts else [])
+        session._with_plan(number, verdicts.get(session))
         for session, number in zip(sessions, numbers, strict=True)
     ]
 
 
-def _plain(numbers: Point | None) -> list[float] | None:
+def _as_list(numbers: Point | None) -> list[float] | None:
     return None if numbers is None else numbers.tolist()
 
 

@@ -1,7 +1,7 @@
 """What a session knows: its goals and trials, as the fold of a log of events.
 
-What stands is `State`, so a session can be brought back from its log alone. `MemoryLog` keeps the
-events in a list; a workspace keeps a journal on disk.
+What stands is `State`, so a session can be brought back from its log alone. `Log` keeps the events
+in a list; a workspace's keeps a journal on disk.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from numbers import Integral
 from typing import Any, Protocol
 
 import numpy as np
+from msgspec import structs
 
 from prior_reinforce.arrays import Frames, Point
 from prior_reinforce.errors import (
@@ -22,6 +23,7 @@ from prior_reinforce.errors import (
     TrialStateError,
     WorkspaceError,
 )
+from prior_reinforce.plans.motions import Plan
 from prior_reinforce.readings import Reading, in_tolerances
 from prior_reinforce.session.events import (
     Amended,
@@ -144,7 +146,6 @@ class Trial:
     """The gate's verdict of now, on a trial that `Session.ask` returned; None without a gate."""
 
     def __repr__(self) -> str:
-        """Number, what was asked for, and what was seen."""
         said = [f"{self.number} for goal {self.goal_number}", self.stage.value]
         said.append(f"condition {np.round(self.condition, 4).tolist()}")
         if self.error_seen is not None:
@@ -187,38 +188,10 @@ class AskedTrial(Trial):
     """A = pi(c); read-only."""
 
 
-class Log(Protocol):
-    """Where the events of a session are kept."""
-
-    def state(self) -> State:
-        """What happened so far, whoever wrote it."""
-
-    def exclusive(self) -> AbstractContextManager[object]:
-        """Hold the log for reading and then appending; what is appended is kept when it ends."""
-
-    def append(self, event: Event) -> None:
-        """Add an event; called within `exclusive`."""
-
-    def keep_plan(self, number: int, plan: Frames) -> KeptPlan | None:
-        """Keep a trial's plan, and return its file if it has one."""
-
-    def plan(self, trial: Trial) -> Frames:
-        """Return a plan that was kept."""
-
-    def settle(self, trial: Trial, *, arm_did_not_move: bool) -> None:
-        """Note that a trial may be executed after all; called within `exclusive`.
-
-        Raises:
-            TrialStateError: It is executing now, was executed to its end, or nobody has said
-                whether the arm moved.
-        """
-
-
 class State:
     """What the events of a log add up to."""
 
     def __init__(self) -> None:
-        """Nothing has happened."""
         self.goals: list[Goal] = []
         self.trials: list[Trial] = []
         self.plans: dict[int, Frames] = {}
@@ -325,8 +298,7 @@ class State:
                     raise ValueError("a tolerance is not positive")
                 rest = (event.carry_over, event.adapter, event.new_hardware)
                 outcome = (tuple(event.names), tuple(event.units))
-                number = len(self.goals) + 1
-                self.goals.append(Goal(number, place, tolerance, *rest, *outcome))
+                self.goals.append(Goal(len(self.goals) + 1, place, tolerance, *rest, *outcome))
             case Asked():
                 if event.trial != len(self.trials) + 1 or self.open_trial is not None:
                     raise ValueError(f"trial {event.trial} after {len(self.trials)}")
@@ -334,36 +306,20 @@ class State:
                     raise ValueError(f"there is no goal {event.goal}")
                 if len(event.condition) != self.goals[event.goal - 1].goal.size:
                     raise ValueError("the condition has another length than the goal")
-                plan = self.plans.get(event.trial)
+                known = structs.asdict(event)
+                for name in ("condition", "expected_error", "expected_sd"):
+                    known[name] = None if known[name] is None else _read_only(known[name])
+                number, goal, kept = (known.pop(name) for name in ("trial", "goal", "plan"))
+                plan = self.plans.get(number)
                 kind = Trial if plan is None else AskedTrial
-                self.trials.append(
-                    kind(
-                        event.trial,
-                        event.goal,
-                        _read_only(event.condition),
-                        plan,
-                        p_hit=event.p_hit,
-                        expected_trials=event.expected_trials,
-                        expected_error=_read_only_or_none(event.expected_error),
-                        expected_sd=_read_only_or_none(event.expected_sd),
-                        model=event.model,
-                        kept=event.plan,
-                        gate=event.gate,
-                    )
-                )
+                self.trials.append(kind(number, goal, plan=plan, kept=kept, **known))
             case Amended():
-                told = self._told(event)
-                self._outdate(told)
-                self.trials[event.trial - 1] = told
+                self._correct(self._told(event))
             case Told():
                 self.trials[event.trial - 1] = self._told(event)
             case Voided():
-                trial = self.trial(event.trial)
-                void = replace(
-                    trial, stage=Stage.VOIDED, reading=None, hit=False, note=event.reason
-                )
-                self._outdate(void)
-                self.trials[event.trial - 1] = void
+                void = replace(self.trial(event.trial), stage=Stage.VOIDED, note=event.reason)
+                self._correct(replace(void, reading=None, hit=False))
             case _:
                 raise ValueError("no event of a session")
 
@@ -374,52 +330,69 @@ class State:
             raise InvalidFeedbackError("the reading has another number of components than the goal")
         return replace(trial, stage=Stage.TOLD, reading=reading, hit=event.hit)
 
-    def _outdate(self, corrected: Trial) -> None:
-        """Mark the open trial if it was planned from a reading that is corrected now."""
+    def _correct(self, corrected: Trial) -> None:
+        """Replace a trial, and mark the open one if it was planned from what is corrected now."""
         before, waiting = self.trial(corrected.number), self.open_trial
-        if waiting is None or before.open or _meaning(before) == _meaning(corrected):
-            return
-        used = self.readings_for(self.goal_of(waiting), waiting.model)
-        if before.number in {reading.number for reading in used}:
+        if (
+            waiting is not None
+            and not before.open
+            and _meaning(before) != _meaning(corrected)
+            and before in self.readings_for(self.goal_of(waiting), waiting.model)
+        ):
             self.trials[waiting.number - 1] = replace(waiting, outdated=True)
+        self.trials[corrected.number - 1] = corrected
 
 
-class MemoryLog:
-    """A log that lasts as long as the program."""
+class Log:
+    """Events of a session, and what they add up to; here, as long as the program lasts."""
 
     def __init__(self) -> None:
-        """Start empty."""
         self._entries: list[Entry] = []
         self._state = State()
+        self._n_added = 0
 
     def entries(self) -> Sequence[Entry]:
-        """All events so far, in order."""
+        """All events so far, in order, whoever wrote them."""
         return self._entries
 
     def state(self) -> State:
-        """See `Log.state`."""
+        """What happened so far, whoever wrote it.
+
+        Raises:
+            WorkspaceError: The events do not fit together, or cannot be read.
+        """
+        for entry in self.entries()[self._n_added :]:
+            self._state.add(entry)
+            self._n_added += 1
         return self._state
 
     def exclusive(self) -> AbstractContextManager[object]:
-        """Nobody else can append."""
-        return nullcontext()
+        """Hold the log for reading and then appending; what is appended is kept when it ends."""
+        return nullcontext()  # nobody else can append
 
     def append(self, event: Event) -> None:
-        """See `Log.append`."""
+        """Add an event; called within `exclusive`."""
         entry = Entry(len(self._entries) + 1, event)
-        self._state.add(entry)
+        self._state.add(entry)  # which refuses what does not fit
         self._entries.append(entry)
+        self._n_added += 1
 
-    def keep_plan(self, number: int, plan: Frames) -> None:
-        """See `Log.keep_plan`."""
-        self._state.plans[number] = _read_only(plan)
+    def keep_plan(self, number: int, plan: Plan) -> KeptPlan | None:
+        """Keep a trial's plan, and return its file if it has one."""
+        self._state.plans[number] = plan.actions
+        return None
 
     def plan(self, trial: Trial) -> Frames:
-        """See `Log.plan`."""
+        """Return a plan that was kept."""
         return self._state.plans[trial.number]
 
     def settle(self, trial: Trial, *, arm_did_not_move: bool) -> None:
-        """See `Log.settle`; nothing is executed from here."""
+        """Note that a trial may be executed after all; called within `exclusive`.
+
+        Raises:
+            TrialStateError: It is executing now, was executed to its end, or nobody has said
+                whether the arm moved.
+        """
         raise NotImplementedError("only a workspace executes trials")
 
 
@@ -427,10 +400,6 @@ def _meaning(trial: Trial) -> object:
     """What was seen of a trial, in whatever words; None unless told."""
     reading = trial.reading
     return None if reading is None else (replace(reading, said="").record(), trial.hit)
-
-
-def _read_only_or_none(values: Any) -> np.ndarray | None:
-    return None if values is None else _read_only(values)
 
 
 def _read_only(values: Any) -> np.ndarray:

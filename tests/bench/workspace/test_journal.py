@@ -6,9 +6,10 @@ import threading
 import pytest
 
 from prior_reinforce.bench.workspace.journal import JOURNAL_VERSION, Journal
+from prior_reinforce.bench.workspace.store import Store
 from prior_reinforce.bench.workspace.workspace import Workspace
 from prior_reinforce.errors import TrialStateError, WorkspaceError
-from prior_reinforce.session.events import Told, Voided
+from prior_reinforce.session.events import Voided
 from prior_reinforce.session.trials import Stage
 from tests.bench.workspace.planar import ask, tell, trials, void
 
@@ -127,4 +128,4 @@ def test_a_journal_whose_events_are_a_view_is_refused(tmp_path):
     journal.execute(f"PRAGMA user_version = {JOURNAL_VERSION}")
     journal.commit()
     with pytest.raises(WorkspaceError, match="no table of events"):
-        Journal(tmp_path / "journal.sqlite", Told)
+        Journal(tmp_path, Store(tmp_path))

@@ -83,11 +83,11 @@ def test_importing_again_mends_damaged_demonstrations(workspace):
 def test_what_a_crash_left_blocks_nothing(workspace):
     """A plan's file that no event names, with the same motion at another tempo, or half of it."""
     number = ask(workspace).number
-    kept = workspace.state.trial(1).kept
+    first = workspace.state.trial(1)
     void(workspace, number, "")
-    frames = workspace.store.plan(kept).actions
-    left = kept.file.replace("trial-001", "trial-002")
-    write_plan(Plan(frames, replace(FORMAT, dt=0.04)), workspace.store.plan_path(left))
+    frames = workspace.plan(first).actions
+    left = first.kept.file.replace("trial-001", "trial-002")
+    write_plan(Plan(frames, replace(FORMAT, dt=0.04)), workspace.folder / "plans" / left)
     trial = ask(workspace)
     assert trial.kept.file == left
     assert workspace.plan(trial).format.dt == 0.02

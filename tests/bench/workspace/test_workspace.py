@@ -17,8 +17,9 @@ import pytest
 
 from prior_reinforce.adapters.bayesian import BayesianAdapter
 from prior_reinforce.adapters.proportional import ProportionalAdapter
-from prior_reinforce.bench.robots.executors import command, supervision
+from prior_reinforce.bench.robots.executors import supervision
 from prior_reinforce.bench.robots.executors.lock import executing_lock, stop_executing
+from prior_reinforce.bench.workspace import workspace as workspace_module
 from prior_reinforce.bench.workspace.log import Executing
 from prior_reinforce.bench.workspace.status import describe
 from prior_reinforce.bench.workspace.workspace import Workspace
@@ -503,7 +504,7 @@ def test_the_time_limit_of_an_arm_is_beyond_the_plans_own_duration(arm, monkeypa
         limits.append(time_limit)
         raise ConfigurationError("nothing is started here")
 
-    monkeypatch.setattr(command, "execute_command", executed)
+    monkeypatch.setattr(workspace_module, "execute_command", executed)
     settings, seconds = workspace.manifest.driven_by, workspace.plan(trials(workspace)[0]).times[-1]
     for motion, speed in (("trial", 1.0), ("rehearsal", 0.05)):
         with pytest.raises(ConfigurationError, match="nothing is started"):

@@ -1,7 +1,7 @@
 """The trial journal: append-only events in SQLite, each durable before a command returns.
 
 Nothing is ever changed or deleted; what happened is the list of events, and everything else is a
-fold over it (`log.WorkspaceState`). One program at a time may read-then-append
+fold over it (`WorkspaceState`). One program at a time may read-then-append
 (`Journal.exclusive`). Every event carries a digest of itself and of all before it, so that a
 damaged copy is an error rather than a reading that is slightly another one.
 """
@@ -15,12 +15,23 @@ from contextlib import contextmanager, suppress
 from datetime import datetime, timezone
 from pathlib import Path
 from threading import RLock
-from typing import Any, NoReturn
+from typing import NoReturn
 
 import msgspec
 
-from prior_reinforce.errors import WorkspaceError
-from prior_reinforce.session.events import Entry, Event
+from prior_reinforce.arrays import Frames
+from prior_reinforce.bench.robots.executors.lock import is_executing
+from prior_reinforce.bench.workspace.log import (
+    Executed,
+    NotExecuted,
+    WorkspaceEvent,
+    WorkspaceState,
+)
+from prior_reinforce.bench.workspace.store import Store
+from prior_reinforce.errors import TrialStateError, WorkspaceError
+from prior_reinforce.plans.motions import Plan
+from prior_reinforce.session.events import Entry, Event, KeptPlan
+from prior_reinforce.session.trials import Log, Trial
 
 JOURNAL_FILE = "journal.sqlite"
 JOURNAL_VERSION = 3
@@ -39,6 +50,7 @@ BEGIN SELECT RAISE(ABORT, 'the journal is append-only'); END;
 CREATE TRIGGER IF NOT EXISTS events_are_never_deleted BEFORE DELETE ON events
 BEGIN SELECT RAISE(ABORT, 'the journal is append-only'); END;
 """
+_INSERT = "INSERT INTO events (time, event, digest) VALUES (?, ?, ?)"
 _HEADER_BYTES = 100
 """Of any SQLite file that has something in it (sqlite.org/fileformat.html, section 1.3)."""
 
@@ -53,30 +65,33 @@ class Row(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """JSON, to the byte."""
 
 
-class Journal:
-    """Events of one workspace."""
+class Journal(Log):
+    """The log of a workspace's session: events in its journal, plans in its store."""
 
-    def __init__(self, path: Path, events: Any) -> None:
-        """Open a journal; made if there is none.
+    _state: WorkspaceState
 
-        Args:
-            path: Its file.
-            events: Union of the events that it may hold.
+    def __init__(self, folder: Path, store: Store) -> None:
+        """Open the journal in a folder; made if there is none.
 
         Raises:
-            WorkspaceError: It cannot be opened, is damaged, or was written by a newer version.
+            WorkspaceError: It cannot be opened, is damaged, was written by another version, or is
+                missing beside files that it named.
         """
-        self._path = path
-        self._entries: list[Entry] = []
+        super().__init__()
+        self._state = WorkspaceState()
+        self._folder, self._store = folder, store
+        self._path = path = folder / JOURNAL_FILE
         self._last_digest = ""
         self._data_version: int | None = None
-        self._decoder = msgspec.json.Decoder(events)
+        self._decoder = msgspec.json.Decoder(WorkspaceEvent)
         self._lock = RLock()
         self.appended = False
         """Whether anything became durable since it was opened here."""
-        self._pending: list[tuple[Entry, str]] = []
+        size = path.stat().st_size if path.exists() else 0
+        if size == 0:  # a new workspace's has no event until the first import has ended
+            self._refuse_files("demonstrations", "models", "plans")
         # SQLite takes a file of a few bytes for an empty one, and would write over it.
-        if path.exists() and 0 < path.stat().st_size < _HEADER_BYTES:
+        elif size < _HEADER_BYTES:
             raise WorkspaceError(
                 f"the journal {path} is damaged (shorter than its header); restore it from a copy"
             )
@@ -103,15 +118,27 @@ class Journal:
                     f"the journal {path} is damaged (it has no table of events); restore it from a "
                     "copy"
                 )
+        try:
+            if not self.entries():
+                self._refuse_files("models", "plans")
+        except WorkspaceError:
+            self.close()
+            raise
+
+    def _refuse_files(self, *parts: str) -> None:
+        """Refuse to begin anew beside what an earlier journal named."""
+        for folder in (self._folder / part for part in parts):
+            if folder.is_dir() and any(path.name[0] != "." for path in folder.iterdir()):
+                raise WorkspaceError(
+                    f"{self._path} is missing or empty, but {folder} holds files that it named; "
+                    "restore the journal from a copy, or make another workspace"
+                )
 
     def __reduce__(self) -> NoReturn:
-        """Refuse to be copied, with whatever holds it: what happened is in the folder.
-
-        Raises:
-            WorkspaceError: Always.
-        """
-        folder = str(self._path.parent)
-        raise WorkspaceError(f"a workspace is not copied; open it again: Workspace({folder!r})")
+        """Refuse to be copied, with whatever holds it: what happened is in the folder."""
+        raise WorkspaceError(
+            f"a workspace is not copied; open it again: Workspace({str(self._folder)!r})"
+        )
 
     def close(self) -> None:
         """Close the file."""
@@ -130,6 +157,11 @@ class Journal:
                 self._data_version = version
         return self._entries
 
+    def state(self) -> WorkspaceState:
+        """See `Log.state`."""
+        super().state()
+        return self._state
+
     def rows(self) -> list[Row]:
         """All events as they are written, after they were checked."""
         self.entries()
@@ -143,8 +175,7 @@ class Journal:
         )
         for id_, time, text, written in rows:
             texts = isinstance(time, str) and isinstance(text, str)  # damaged, they may be none
-            digest = _digest(self._last_digest, time, text) if texts else None
-            if digest is None or digest != written:
+            if not texts or _digest(self._last_digest, time, text) != written:
                 raise WorkspaceError(
                     f"{self._path}: event {id_} is not what was written; restore the journal "
                     "from a copy"
@@ -157,7 +188,7 @@ class Journal:
                     "wrote it, or restore the journal from a copy"
                 ) from error
             self._entries.append(Entry(id_, event, time))
-            self._last_digest = digest
+            self._last_digest = written
 
     @contextmanager
     def exclusive(self) -> Iterator[None]:
@@ -172,22 +203,18 @@ class Journal:
         with self._lock:
             with self._named_errors():
                 self._connection.execute("BEGIN IMMEDIATE")
-            self._pending = []
             try:
                 self.entries()
                 yield
                 with self._named_errors():
                     self._connection.execute("COMMIT")
-                self._keep_pending()
-            except BaseException:
-                self._pending = []
+            finally:
                 if self._connection.in_transaction:
                     self._connection.execute("ROLLBACK")
-                else:  # committed and then interrupted, or rolled back already for a full disk
+                else:  # committed, maybe interrupted since; or rolled back for a full disk
                     n, self._data_version = len(self._entries), None
                     with suppress(WorkspaceError):
                         self.appended |= len(self.entries()) > n
-                raise
 
     def append(self, event: Event) -> None:
         """Add an event; call it inside `exclusive`.
@@ -196,23 +223,53 @@ class Journal:
             WorkspaceError: The disk is full, or the folder is read-only.
         """
         assert self._connection.in_transaction, "append inside Journal.exclusive"
-        before = self._pending[-1][1] if self._pending else self._last_digest
         now = datetime.now(timezone.utc).isoformat(timespec="milliseconds")
         text = msgspec.json.encode(event).decode()
-        digest = _digest(before, now, text)
         with self._named_errors():
-            added = self._connection.execute(
-                "INSERT INTO events (time, event, digest) VALUES (?, ?, ?)", (now, text, digest)
-            )
-        assert added.lastrowid is not None
-        self._pending.append((Entry(added.lastrowid, event, now), digest))
+            last = self._connection.execute("SELECT digest FROM events ORDER BY id DESC").fetchone()
+            digest = _digest(last[0] if last else "", now, text)
+            self._connection.execute(_INSERT, (now, text, digest))
 
-    def _keep_pending(self) -> None:
-        """What was appended is durable now."""
-        for entry, digest in self._pending:
-            self._entries.append(entry)
-            self._last_digest, self.appended = digest, True
-        self._pending = []
+    def restore(self, rows: Sequence[Row]) -> None:
+        """Take rows into a journal that has none; opened again, it checks them."""
+        with self._named_errors():
+            self._connection.execute("BEGIN IMMEDIATE")
+            self._connection.executemany(
+                _INSERT, ((row.time, bytes(row.event).decode(), row.digest) for row in rows)
+            )
+            self._connection.execute("COMMIT")
+
+    def keep_plan(self, number: int, plan: Plan) -> KeptPlan:
+        """Write the plan's file, before the event that names it."""
+        named = {trial.kept.file for trial in self._state.trials if trial.kept is not None}
+        file = self._store.save_plan(plan, number, named)
+        return KeptPlan(file.path.name, file.sha256)
+
+    def plan(self, trial: Trial) -> Frames:
+        """Read a trial's plan, checked against its hash."""
+        return self._store.plan(trial).actions
+
+    def is_executing(self) -> bool:
+        """Whether a trial is being executed right now, by any program."""
+        return is_executing(self._folder)
+
+    def settle(self, trial: Trial, *, arm_did_not_move: bool) -> None:
+        """See `Log.settle`."""
+        if self.is_executing():
+            raise TrialStateError(f"trial {trial.number} is executing now; wait for it")
+        began = self._state.executions[trial.number]
+        if isinstance(began, Executed) and began.outcome != "aborted":
+            raise TrialStateError(
+                f"trial {trial.number} was executed to its end, as its command says: tell or void "
+                "it"
+            )
+        if not arm_did_not_move:
+            raise TrialStateError(
+                f"trial {trial.number} was executing when the program stopped; did the arm move? "
+                f"If it did, tell or void trial {trial.number}; if it did not, ask again with "
+                "--arm-did-not-move"
+            )
+        self.append(NotExecuted(trial=trial.number))
 
     @contextmanager
     def _named_errors(self) -> Iterator[None]:
@@ -222,7 +279,7 @@ class Journal:
         except (sqlite3.Error, UnicodeDecodeError, msgspec.DecodeError, RecursionError) as error:
             text = str(error)
             if "closed database" in text:
-                raise WorkspaceError(f"{self._path.parent} is closed; open it again") from error
+                raise WorkspaceError(f"{self._folder} is closed; open it again") from error
             remedy = "restore it from a copy"
             if "locked" in text or "busy" in text:
                 remedy = "another command works on this workspace; wait for it, then try again"
@@ -231,23 +288,6 @@ class Journal:
             elif "full" in text or "disk I/O" in text:
                 remedy = "free some disk space; what was told before is safe"
             raise WorkspaceError(f"{self._path}: {text}; {remedy}") from error
-
-
-def restore(path: Path, rows: Sequence[Row]) -> None:
-    """Make a journal again from its rows; opened as any journal, it checks them.
-
-    Raises:
-        WorkspaceError: The disk refuses.
-    """
-    journal = Journal(path, object)
-    with journal._named_errors():
-        journal._connection.execute("BEGIN IMMEDIATE")
-        journal._connection.executemany(
-            "INSERT INTO events (time, event, digest) VALUES (?, ?, ?)",
-            ((row.time, bytes(row.event).decode(), row.digest) for row in rows),
-        )
-        journal._connection.execute("COMMIT")
-    journal.close()
 
 
 def _digest(before: str, time: str, event: str) -> str:

@@ -1,21 +1,14 @@
-"""The journal and the store as one log: events of trials, of learning and of executing."""
+"""What can happen in a workspace: trials, learning and executing; and what it adds up to."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 
-from prior_reinforce.arrays import Frames
 from prior_reinforce.bench.robots.executors.base import Motion
 from prior_reinforce.bench.robots.executors.result import MotionResult, Outcome
-from prior_reinforce.bench.workspace.journal import JOURNAL_FILE, Journal
-from prior_reinforce.bench.workspace.store import Store
-from prior_reinforce.errors import TrialStateError, WorkspaceError
-from prior_reinforce.plans.motions import Plan, PlanFormat
 from prior_reinforce.registry import own_class
-from prior_reinforce.session.events import Event, KeptPlan, SessionEvent
-from prior_reinforce.session.trials import Stage, State, Trial
+from prior_reinforce.session.events import Event, SessionEvent
+from prior_reinforce.session.trials import Stage, State
 
 
 class DemonstrationsImported(Event, frozen=True):
@@ -102,7 +95,6 @@ class WorkspaceState(State):
     """What the events of a workspace add up to."""
 
     def __init__(self) -> None:
-        """Nothing has happened."""
         super().__init__()
         self.demonstrations: str | None = None
         """SHA-256 of the demonstrations in use; None before the first import."""
@@ -153,84 +145,3 @@ class WorkspaceState(State):
         trial = self.trial(event.trial)
         self.trials[event.trial - 1] = replace(trial, stage=stage)
         self.executions[event.trial] = event
-
-
-class WorkspaceLog(Journal):
-    """The `Log` of a workspace's session (see `session.trials.Log`)."""
-
-    def __init__(self, folder: Path, store: Store, format: PlanFormat) -> None:
-        """Open the journal in a folder; plans are kept in the store, in that format.
-
-        Raises:
-            WorkspaceError: The journal cannot be used.
-        """
-        self._folder, self._store, self._format = folder, store, format
-        self._state = WorkspaceState()
-        self._n_added = 0
-        path = folder / JOURNAL_FILE
-        # A new workspace's journal is empty until the first import has ended.
-        if not path.exists() or path.stat().st_size == 0:
-            self._refuse_files(("demonstrations", "models", "plans"))
-        super().__init__(path, WorkspaceEvent)
-        try:
-            if not self.entries():
-                self._refuse_files(("models", "plans"))
-        except WorkspaceError:
-            self.close()
-            raise
-
-    def _refuse_files(self, parts: Sequence[str]) -> None:
-        """Refuse to begin anew beside what an earlier journal named."""
-        for part in parts:
-            folder = self._folder / part
-            if folder.is_dir() and any(path.name[0] != "." for path in folder.iterdir()):
-                raise WorkspaceError(
-                    f"{self._folder / JOURNAL_FILE} is missing or empty, but {folder} holds files "
-                    "that it named; restore the journal from a copy, or make another workspace"
-                )
-
-    def state(self) -> WorkspaceState:
-        """What happened so far, in any program.
-
-        Raises:
-            WorkspaceError: The journal is damaged, or another version wrote it.
-        """
-        for entry in self.entries()[self._n_added :]:
-            self._state.add(entry)
-            self._n_added += 1
-        return self._state
-
-    def keep_plan(self, number: int, plan: Frames) -> KeptPlan:
-        """Write the plan's file, before the event that names it."""
-        named = {trial.kept.file for trial in self._state.trials if trial.kept is not None}
-        file = self._store.save_plan(Plan(plan, self._format), number, named)
-        return KeptPlan(file.path.name, file.sha256)
-
-    def plan(self, trial: Trial) -> Frames:
-        """Read a trial's plan, checked against the hash in the journal."""
-        assert trial.kept is not None
-        return self._store.plan(trial.kept).actions
-
-    def is_executing(self) -> bool:
-        """Whether a trial is being executed right now, by any program."""
-        from prior_reinforce.bench.robots.executors.lock import is_executing
-
-        return is_executing(self._folder)
-
-    def settle(self, trial: Trial, *, arm_did_not_move: bool) -> None:
-        """See `Log.settle`."""
-        if self.is_executing():
-            raise TrialStateError(f"trial {trial.number} is executing now; wait for it")
-        began = self._state.executions[trial.number]
-        if isinstance(began, Executed) and began.outcome != "aborted":
-            raise TrialStateError(
-                f"trial {trial.number} was executed to its end, as its command says: tell or void "
-                "it"
-            )
-        if not arm_did_not_move:
-            raise TrialStateError(
-                f"trial {trial.number} was executing when the program stopped; did the arm move? "
-                f"If it did, tell or void trial {trial.number}; if it did not, ask again with "
-                "--arm-did-not-move"
-            )
-        self.append(NotExecuted(trial=trial.number))

@@ -9,11 +9,10 @@ import json
 import math
 import re
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Annotated, Any, get_type_hints
+from typing import Annotated, Any, TypeVar, get_type_hints
 
 import msgspec
 import numpy as np
@@ -28,7 +27,7 @@ from prior_reinforce.bench.robots import (
 )
 from prior_reinforce.bench.robots.executors import EXECUTORS
 from prior_reinforce.bench.robots.executors.base import ArmSettings
-from prior_reinforce.bench.robots.kinematics import Chain
+from prior_reinforce.bench.robots.kinematics import Chain, Pose
 from prior_reinforce.bench.robots.presets import GRIPPERS, PRESETS
 from prior_reinforce.bench.robots.urdf import read_urdf
 from prior_reinforce.errors import ConfigurationError, FileFormatError, PriorReinforceError
@@ -43,6 +42,7 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
+T = TypeVar("T")
 MANIFEST_FILE = "workspace.toml"
 TEMPLATE = Path(__file__).with_name("template.toml").read_text(encoding="utf-8")
 """The manifest that `new` writes, for `format` to fill in."""
@@ -80,7 +80,6 @@ class Manifest:
 _Texts = Annotated[tuple[str, ...], Meta(min_length=1)]
 _Numbers = Annotated[tuple[float, ...], Meta(min_length=1)]
 _Positive = Annotated[tuple[Annotated[float, Meta(gt=0)], ...], Meta(min_length=1)]
-_Six = tuple[float, float, float, float, float, float]
 _Nine = tuple[float, float, float, float, float, float, float, float, float]
 
 
@@ -114,7 +113,7 @@ class _Robot(_Section, frozen=True):
     acceleration: _Numbers | None = None
     jerk: _Numbers | None = None
     kinematics: Annotated[tuple[_Nine, ...], Meta(min_length=1)] | None = None
-    flange: _Six | None = None
+    flange: Pose | None = None
     source: str = ""
     arm: str = ""
 
@@ -206,12 +205,12 @@ class NewWorkspace:
         given = robot if isinstance(robot, RobotLimits) and robot.robot not in PRESETS else None
         numbers = np.atleast_1d(self.tolerance).tolist()
         text = TEMPLATE.format(
-            name=_quoted(self.name or folder)[1:-1],
-            names=_list(names),
-            units=_list(units),
+            name=_toml(self.name or folder)[1:-1],
+            names=_toml(names),
+            units=_toml(units),
             dt=self.dt,
-            outcome_names=_list(self.outcome_names),
-            outcome_units=_list(_spread(self.outcome_units, len(self.outcome_names))),
+            outcome_names=_toml(self.outcome_names),
+            outcome_units=_toml(_spread(self.outcome_units, len(self.outcome_names))),
             tolerance=numbers[0] if len(numbers) == 1 else numbers,
             robot="given" if given is not None else known,
         )
@@ -226,7 +225,7 @@ def with_columns(text: str, names: Sequence[str], units: Sequence[str]) -> str:
     start = text.index("[plan]")
     head, plan = text[:start], text[start:]
     for key, values in (("names", names), ("units", units)):
-        said = f"{key} = {_list(values)}".replace("\\", r"\\")
+        said = f"{key} = {_toml(values)}".replace("\\", r"\\")
         plan = re.sub(rf"^[ \t]*{key}[ \t]*=[^\[]*\[[^\]]*\]", said, plan, count=1, flags=re.M)
     return head + plan
 
@@ -249,7 +248,7 @@ def _spread(values: Sequence[str], n: int) -> tuple[str, ...]:
 
 def _written_out(robot: RobotLimits) -> str:
     """An arm's numbers as lines of the manifest."""
-    lines = [f"source = {_quoted(robot.source)}", f"joint_names = {_list(robot.joint_names)}"]
+    lines = [f"source = {_toml(robot.source)}", f"joint_names = {_toml(robot.joint_names)}"]
     for key in _LISTS:
         values = getattr(robot, key)
         if values is None:
@@ -257,25 +256,24 @@ def _written_out(robot: RobotLimits) -> str:
                 f"# {key} = []  # not published; the gate compares with the demonstrations"
             )
         else:
-            lines.append(f"{key} = {[float(f'{v:.9g}') for v in values]}")
+            lines.append(f"{key} = {_rounded(values, 9)}")
     if robot.chain is not None:
         lines.append(
             "# Of each joint: x, y, z [m], roll, pitch, yaw [rad] in the frame before, axis."
         )
         pairs = zip(robot.chain.origins, robot.chain.axes, strict=True)
-        rows = [[float(f"{v:.12g}") for v in (*o, *a)] for o, a in pairs]
-        lines += ["kinematics = [", *(f"  {row}," for row in rows), "]"]
-        lines.append(f"flange = {[float(f'{v:.12g}') for v in robot.chain.flange]}")
+        rows = [f"  {_rounded((*origin, *axis), 12)}," for origin, axis in pairs]
+        lines += ["kinematics = [", *rows, "]", f"flange = {_rounded(robot.chain.flange, 12)}"]
     return "".join(f"{line}\n" for line in lines)
 
 
-def _quoted(text: str) -> str:
-    """A text in quotes, as TOML wants it: JSON's, but for one control character."""
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+def _rounded(values: Iterable[float], digits: int) -> list[float]:
+    return [float(f"{value:.{digits}g}") for value in values]
 
 
-def _list(values: Sequence[str]) -> str:
-    return "[" + ", ".join(_quoted(value) for value in values) + "]"
+def _toml(value: str | Sequence[str]) -> str:
+    """A text, or a list of them, as TOML wants it: JSON's, but for one control character."""
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def read_manifest(path: Path) -> str:
@@ -305,7 +303,7 @@ def parse_manifest(text: str, path: Path) -> Manifest:
         data = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
         raise FileFormatError(f"{path} is not a TOML file: {error}; mend that line") from error
-    return _Reader(path, text.splitlines(), data).manifest()
+    return _Reader(path, text, data).manifest()
 
 
 @dataclass(frozen=True)
@@ -313,7 +311,7 @@ class _Reader:
     """Checks what sections say together, and says where a wrong value stands."""
 
     path: Path
-    lines: list[str]
+    text: str
     data: dict[str, Any]
 
     def manifest(self) -> Manifest:
@@ -327,38 +325,32 @@ class _Reader:
         if plan.dt > _IMPLAUSIBLE_SECONDS:
             raise self.error("plan", "dt", "looks like milliseconds or a rate; give seconds")
         if robot.model != "none" and plan.dt < (1 - 1e-9) / RATE:
-            cycle = (
-                f"is less than an arm's cycle of {1 / RATE:g} s, within which nothing is checked"
-            )
-            raise self.error("plan", "dt", f"{cycle}; give more")
+            cycle = f"an arm's cycle of {1 / RATE:g} s, within which nothing is checked"
+            raise self.error("plan", "dt", f"is less than {cycle}; give more")
         names, units = outcome.names, outcome.units
         if len(names) != len(units):
             raise self.error("outcome", "units", f"must name one unit for each of {list(names)}")
         if len(set(names)) < len(names):
             raise self.error("outcome", "names", "must differ from each other")
-        with self.named("outcome"):
-            tolerance = as_tolerance(outcome.tolerance, names, units)
+        tolerance = self.made("outcome", as_tolerance, outcome.tolerance, names, units)
         if np.any(tolerance[np.array(units) == "m"] >= _IMPLAUSIBLE_METRES):
             raise self.error("outcome", "tolerance", "looks like centimetres; give metres")
-        with self.named("plan"):
-            form = PlanFormat(plan.names, plan.units, plan.dt)
-        with self.named("robot"):
-            limits = self.limits(robot, task)
-        with self.named("gate"):
-            gate = GateSettings(**structs.asdict(file.gate))
+        form = self.made("plan", PlanFormat, plan.names, plan.units, plan.dt)
+        limits = self.made("robot", self.limits, robot, task)
+        gate = self.made("gate", GateSettings, **structs.asdict(file.gate))
         if unknown := {name for name, *_ in gate.ranges} - {*form.names}:
             named = f"names {', '.join(sorted(unknown))}, and plans have {', '.join(form.names)}"
             raise self.error("gate", "ranges", f"{named}; correct it")
         if limits is not None:
             self.check_joints(form, limits, gate)
-        elif gate.box_low is not None:
+        if gate.box_low is not None and (limits is None or limits.chain is None):
             why = "with no robot there is no tool tip to check; take it out, or name the robot"
-            raise self.error("gate", _BOX["box_low"], why)
-        if limits is not None and limits.chain is None and gate.box_low is not None:
-            why = (
-                f"cannot be checked, since the kinematics of {limits.robot} are not known; take it "
-                "out, or make the workspace with: prior-reinforce new --robot path/to/arm.urdf"
-            )
+            if limits is not None:
+                why = (
+                    f"cannot be checked, since the kinematics of {limits.robot} are not known; "
+                    "take it out, or make the workspace with: prior-reinforce new --robot "
+                    "path/to/arm.urdf"
+                )
             raise self.error("gate", _BOX["box_low"], why)
         numbers, arm = tuple(tolerance.tolist()), self.driven_by(file.arm)
         return Manifest(task, form, names, units, numbers, limits, gate, robot.arm, arm)
@@ -371,9 +363,9 @@ class _Reader:
         name = options.pop("executor", None)
         if not isinstance(name, str):
             raise self.error("arm", "executor", f"must be one of {', '.join(EXECUTORS.members)}")
-        with self.named("arm"):
-            if own_class(name) is None:
-                build(EXECUTORS.resolve(name).config_type, options, name)
+        if not self.made("arm", own_class, name):
+            kind = self.made("arm", EXECUTORS.resolve, name)
+            self.made("arm", build, kind.config_type, options, name)
         return ArmSettings(name, options)
 
     def check_values(self) -> None:
@@ -399,9 +391,9 @@ class _Reader:
             problem = f"unknown; {'keys' if place else 'sections'} are {known}"
             place += [unknown[1]]
         else:
-            problem = f"{problem}; mend it, `prior-reinforce new` shows how"
+            problem = f"{problem[0].lower()}{problem[1:]}; mend it, `prior-reinforce new` shows how"
         section, key, *_ = (*place, None)
-        return self.error(str(section), key, problem[0].lower() + problem[1:])
+        return self.error(str(section), key, problem)
 
     def limits(self, robot: _Robot, task: str) -> RobotLimits | None:
         """Limits of the robot's model; None where there is none."""
@@ -419,16 +411,9 @@ class _Reader:
         for key, largest in _LARGEST_PLAUSIBLE.items():
             if np.abs(getattr(robot, key)).max() > largest:
                 raise self.error("robot", key, "looks like degrees; give radians")
-        given = {key: getattr(robot, key) for key in _LISTS}
-        numbers: dict[str, Any] = {k: np.array(v) for k, v in given.items() if v is not None}
-        return RobotLimits(
-            robot=task,
-            firmware="as given",
-            source=robot.source or str(self.path),
-            joint_names=robot.joint_names or (),
-            chain=self.chain(robot),
-            **numbers,
-        )
+        given = {key: getattr(robot, key) for key in ("joint_names", *_LISTS)}
+        source, chain = robot.source or str(self.path), self.chain(robot)
+        return RobotLimits(task, firmware="as given", source=source, chain=chain, **given)
 
     def chain(self, robot: _Robot) -> Chain | None:
         """Kinematics that are given."""
@@ -448,10 +433,8 @@ class _Reader:
 
     def check_joints(self, form: PlanFormat, robot: RobotLimits, gate: GateSettings) -> None:
         """Refuse a plan format that lacks joints of the robot: nothing of them would be checked."""
-        with self.named("plan"):
-            columns = match_joints(form, robot)
-        with self.named("gate"):
-            missing = missing_joints(columns, robot, gate.absent_joints)
+        columns = self.made("plan", match_joints, form, robot)
+        missing = self.made("gate", missing_joints, columns, robot, gate.absent_joints)
         if missing:
             raise self.error(
                 "plan",
@@ -462,11 +445,10 @@ class _Reader:
                 '[robot] model = "none"',
             )
 
-    @contextmanager
-    def named(self, section: str) -> Iterator[None]:
-        """Say where a section stands that an object cannot be made of."""
+    def made(self, section: str, make: Callable[..., T], *args: Any, **settings: Any) -> T:
+        """What is made of a section; where it stands, if it cannot be."""
         try:
-            yield
+            return make(*args, **settings)
         except PriorReinforceError as error:
             if str(self.path) in str(error):
                 raise
@@ -486,11 +468,9 @@ class _Reader:
         """Line of a key, of its section's head where the key is not there, from 1."""
         name = re.escape(section if key is None else key)
         wanted = re.compile(rf"\s*\"?{name}\"?\s*=")
-        inside = False
-        found = None
-        for number, line in enumerate(self.lines, start=1):
-            header = re.match(r"\s*\[\s*([\w-]+)\s*\]", line)
-            if header:
+        inside, found = False, None
+        for number, line in enumerate(self.text.splitlines(), start=1):
+            if header := re.match(r"\s*\[\s*([\w-]+)\s*\]", line):
                 inside = header[1] == section
                 found = number if inside else found
             elif (inside or key is None) and wanted.match(line):

@@ -13,20 +13,21 @@ opened, and all is checked before a folder of the wanted name is there.
 
 from __future__ import annotations
 
-import hashlib
 import re
 import struct
 import zipfile
 from collections.abc import Iterable
+from contextlib import closing
 from datetime import datetime, timezone
 from pathlib import Path
 
 import msgspec
 
 import prior_reinforce
-from prior_reinforce.bench.workspace.journal import JOURNAL_FILE, JOURNAL_VERSION, Row, restore
+from prior_reinforce.bench.workspace.journal import JOURNAL_VERSION, Journal, Row
 from prior_reinforce.bench.workspace.log import DemonstrationsImported, ModelTrained
 from prior_reinforce.bench.workspace.manifest import MANIFEST_FILE, read_manifest, without_arm
+from prior_reinforce.bench.workspace.store import Store
 from prior_reinforce.bench.workspace.workspace import Workspace
 from prior_reinforce.errors import FileFormatError, PriorReinforceError, WorkspaceError
 from prior_reinforce.files import in_place, named_disk_errors, sha256
@@ -69,7 +70,10 @@ def pack(workspace: Workspace, path: Path) -> str:
         rows = workspace.log.rows()
         named = _named(entry.event for entry in workspace.events)
     manifest = without_arm(read_manifest(workspace.folder / MANIFEST_FILE))
-    contents = {MANIFEST_FILE: manifest.encode(), _EVENTS: b"\n".join([*map(_line, rows), b""])}
+    contents = {
+        MANIFEST_FILE: manifest.encode(),
+        _EVENTS: b"\n".join([*map(msgspec.json.encode, rows), b""]),
+    }
     for folder in (workspace.folder / name for name in named):
         for file in sorted(folder.iterdir()) if folder.is_dir() else [folder]:
             if not file.name.startswith("."):
@@ -87,7 +91,7 @@ def pack(workspace: Workspace, path: Path) -> str:
         with zipfile.ZipFile(unfinished, "w", zipfile.ZIP_STORED) as archive:
             for name, content in {_CONTENTS: described, **contents}.items():
                 archive.writestr(zipfile.ZipInfo(name), content)
-        return _sha256_of(unfinished)
+        return sha256(unfinished.read_bytes())
 
 
 def unpack(path: Path, folder: Path) -> str:
@@ -106,7 +110,7 @@ def unpack(path: Path, folder: Path) -> str:
                 with Workspace(unfinished) as workspace:
                     if workspace.state.demonstrations is not None:
                         workspace.demonstrations  # noqa: B018  (whether they are whole)
-        return _sha256_of(path)
+        return sha256(path.read_bytes())
     except FileNotFoundError:
         raise
     except (PriorReinforceError, *_DAMAGED) as error:
@@ -126,10 +130,6 @@ def _named(events: Iterable[object]) -> list[str]:
             case Asked(plan=kept) if kept is not None:
                 names.append(f"plans/{kept.file}")
     return list(dict.fromkeys(names))
-
-
-def _line(row: Row) -> bytes:
-    return msgspec.json.encode(row)
 
 
 def _checked(archive: zipfile.ZipFile, size: int) -> Pack:
@@ -164,24 +164,16 @@ def _checked(archive: zipfile.ZipFile, size: int) -> Pack:
 def _write(archive: zipfile.ZipFile, about: Pack, folder: Path) -> None:
     """Write every file of an archive whose hash is right, and the journal that its events make."""
     folder.mkdir()
-    rows: list[Row] = []
-    for name, digest in about.files.items():
-        content = archive.read(name)
-        if sha256(content) != digest:
-            raise FileFormatError(f"{name} is not what was packed; get it again")
-        if name == _EVENTS:
-            rows = [msgspec.json.decode(line, type=Row) for line in content.splitlines()]
-            continue
-        if name == MANIFEST_FILE and without_arm(content.decode()) != content.decode():
-            raise FileFormatError("its manifest names an [arm]; it was not packed by pack")
-        (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        (folder / name).write_bytes(content)
-    restore(folder / JOURNAL_FILE, rows)
-
-
-def _sha256_of(path: Path) -> str:
-    digest = hashlib.sha256()
-    with path.open("rb") as file:
-        while block := file.read(1 << 20):
-            digest.update(block)
-    return digest.hexdigest()
+    with closing(Journal(folder, Store(folder))) as journal:  # while there are no files yet
+        for name, digest in about.files.items():
+            content = archive.read(name)
+            if sha256(content) != digest:
+                raise FileFormatError(f"{name} is not what was packed; get it again")
+            if name == _EVENTS:
+                rows = [msgspec.json.decode(line, type=Row) for line in content.splitlines()]
+                journal.restore(rows)
+                continue
+            if name == MANIFEST_FILE and without_arm(content.decode()) != content.decode():
+                raise FileFormatError("its manifest names an [arm]; it was not packed by pack")
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            (folder / name).write_bytes(content)

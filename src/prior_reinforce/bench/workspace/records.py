@@ -113,7 +113,6 @@ class StatusRecord(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     """The same for a person, as `status` prints it."""
 
     def __repr__(self) -> str:
-        """As `status` prints it."""
         return self.text
 
     def _repr_html_(self) -> str:
@@ -191,13 +190,11 @@ def goal_record(workspace: Workspace, goal: Goal) -> GoalRecord:
 
 def trial_records(workspace: Workspace) -> list[TrialRecord]:
     """Return all trials as records, in order."""
-    times: dict[tuple[str, int], str] = {}
-    for entry in workspace.events:
-        match entry.event:
-            case Asked(trial=number):
-                times["asked", number] = entry.time
-            case Told(trial=number):
-                times["told", number] = entry.time
+    times = {
+        ("asked" if isinstance(entry.event, Asked) else "told", entry.event.trial): entry.time
+        for entry in workspace.events
+        if isinstance(entry.event, Asked | Told)
+    }
     return [_trial_record(workspace, trial, times) for trial in workspace.state.trials]
 
 
@@ -256,22 +253,19 @@ def status_record(workspace: Workspace) -> StatusRecord:
 
 def trials_table(workspace: Workspace) -> str:
     """Return all trials as CSV: a row each, vectors a column a component with its unit."""
-    names, units = workspace.manifest.outcome_names, workspace.manifest.outcome_units
-    goals = {goal.number: goal.goal.tolist() for goal in workspace.state.goals}
-    vectors = ("goal", "condition", "error")
-    plainly = ("stage", "hit", "said", "reason", "p_hit", "expected_trials", "model")
-    components = [(v, f"{v} {n} [{u}]") for v in vectors for n, u in zip(names, units, strict=True)]
+    names = workspace.manifest.outcome_names
+    components = [
+        f"{n} [{u}]" for n, u in zip(names, workspace.manifest.outcome_units, strict=True)
+    ]
+    vectors = [f"{v} {each}" for v in ("goal", "condition", "error") for each in components]
+    plainly = ("stage", "hit", "said", "reason", "p_hit", "expected_trials", "model", *_TIMES)
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
-    table.writerow(
-        as_cell(head)
-        for head in ("trial", "number of goal", *(h for _, h in components), *plainly, *_TIMES)
-    )
+    table.writerow(map(as_cell, ("trial", "number of goal", *vectors, *plainly)))
     for record in trial_records(workspace):
-        row: list[Any] = [record.number, record.goal]
-        for vector in vectors:
-            values = goals[record.goal] if vector == "goal" else getattr(record, vector)
-            row += values if values is not None else [None] * len(names)
-        row += [getattr(record, name) for name in (*plainly, *_TIMES)]
+        goal = workspace.state.goals[record.goal - 1].goal.tolist()
+        error = [None] * len(names) if record.error is None else record.error
+        row = [record.number, record.goal, *goal, *record.condition, *error]
+        row += [getattr(record, name) for name in plainly]
         table.writerow(as_cell(cell) if isinstance(cell, str) else cell for cell in row)
     return text.getvalue()

@@ -29,23 +29,13 @@ from prior_reinforce.wording import say_reading
 def report_workspace(
     workspace: Workspace, folder: Path, progress: Callable[[int, int], None] | None = None
 ) -> Path:
-    """Write the page and its pictures.
+    """Write the page and its pictures; see `Workspace.report`.
 
-    Args:
-        workspace: With a goal that a trial was asked for.
-        folder: Where to write; made if need be.
-        progress: See `write_report`.
-
-    Returns:
-        Path of the page.
-
-    Raises:
-        WorkspaceError: There is nothing to report yet, or the folder cannot be written.
-        FileFormatError: The demonstrations are damaged. A plan that is lost or damaged stops
-            nothing: it is not drawn, and named.
+    A plan that is lost or damaged stops nothing: it is not drawn, and named.
     """
     state = workspace.state
     goals = [goal for goal in state.goals if state.trials_of(goal.number)]
+    without = [goal.number for goal in state.goals if goal not in goals]
     if not goals:
         raise WorkspaceError(
             f"there is no trial to report yet; run: prior-reinforce ask {workspace.folder}"
@@ -69,22 +59,14 @@ def report_workspace(
         facts["Remarks"] = "; ".join(training.remarks)
     claim_folder(folder)
     title = f"{workspace.manifest.name}: {len(goals)} goal" + "s" * (len(goals) > 1)
+    note = f"No plan was given for {_name_goals(without)}." if without else ""
     with named_disk_errors(folder):
-        return write_report(
-            folder, records, title=title, facts=facts, note=_say_without_plan(state),
-            progress=progress,
-        )  # fmt: skip
+        return write_report(folder, records, title=title, facts=facts, note=note, progress=progress)
 
 
 def _say_model(state: WorkspaceState, model: str) -> str:
     training = state.trainings.get(model)
     return model if training is None else f"{model} ({training.generator}, seed {training.seed})"
-
-
-def _say_without_plan(state: WorkspaceState) -> str:
-    """Name the goals that were set and that no plan was given for."""
-    without = [goal.number for goal in state.goals if not state.trials_of(goal.number)]
-    return f"No plan was given for {_name_goals(without)}." if without else ""
 
 
 def _name_goals(numbers: Iterable[int]) -> str:
@@ -142,8 +124,6 @@ def _notes(workspace: Workspace, goal: Goal, trials: Sequence[Trial]) -> Iterato
                     first = say_reading(told[number], goal.names, goal.units)
                     yield f"Trial {number} was corrected on {entry.time[:10]}; before: {first}."
                 told[number] = Reading.from_record(record)
-            case _:
-                pass
     for trial in trials:
         if trial.surprise:
             yield f"Trial {trial.number} was {trial.surprise}."
@@ -159,15 +139,14 @@ def _measured(
     """Paths that drivers measured, by trial; what cannot be read is said in `remarks`."""
     numbers, found = {trial.number for trial in trials}, dict[int, tuple[Any, Any]]()
     for entry in workspace.events:
-        if isinstance(entry.event, Executing) and entry.event.trial in numbers:
-            number, folder = entry.event.trial, entry.event.folder
-            try:
-                kept = workspace.store.execution_folder(folder) if folder else None
-                path = None if kept is None else read_path(kept, workspace.manifest.format)
-            except FileFormatError as error:
-                remarks.append(f"the path of trial {number} is not drawn: {error}")
-            else:
-                found |= {} if path is None else {number: path}
+        match entry.event:
+            case Executing(trial=number, folder=folder) if number in numbers and folder:
+                try:
+                    kept = workspace.store.execution_folder(folder)
+                    if path := read_path(kept, workspace.manifest.format):
+                        found[number] = path
+                except FileFormatError as error:
+                    remarks.append(f"the path of trial {number} is not drawn: {error}")
     return found
 
 

@@ -203,9 +203,10 @@ def next_step(workspace: Workspace) -> str:
         return f"{tell} (or --hit)"
     if state.solved:
         return f"{new_goal}, or {call(workspace, 'report')}"
-    training = state.training
-    own = {"generator": training.own if training is not None else None}
-    own["adapter"] = own_class(state.goals[-1].adapter)
+    own = {
+        "generator": state.training and state.training.own,
+        "adapter": own_class(state.goals[-1].adapter),
+    }
     flags = (f"--{family} {shlex.quote(name)}" for family, name in own.items() if name)
     return call(workspace, "ask", *flags)
 

@@ -28,7 +28,7 @@ from prior_reinforce.files import (
     sweep,
 )
 from prior_reinforce.plans.motions import Demonstrations, Plan
-from prior_reinforce.session.events import KeptPlan
+from prior_reinforce.session.trials import Trial
 
 if TYPE_CHECKING:
     from prior_reinforce.generators.base import Generator
@@ -38,34 +38,30 @@ _DIGITS = 16
 
 
 class Store:
-    """Where the files lie."""
+    """Where the files lie.
+
+    Raises:
+        WorkspaceError: The disk is full, or the folder read-only.
+        FileFormatError: A file is missing, damaged, another one, or led to by a link out of the
+            workspace.
+    """
 
     def __init__(self, folder: Path) -> None:
-        """Remember the workspace's folder."""
         self._folder = folder
 
-    @property
-    def training(self) -> Path:
-        """Folder of what a training goes on from."""
-        return require_inside(self._folder / ".training", self._folder)
+    def path(self, *parts: str) -> Path:
+        """A place in the workspace."""
+        return require_inside(self._folder.joinpath(*parts), self._folder)
 
     def save_demonstrations(self, demonstrations: Demonstrations) -> None:
-        """Keep demonstrations under their hash.
-
-        Raises:
-            WorkspaceError: The disk is full, or the folder read-only.
-        """
-        path = self._demonstrations_path(demonstrations.sha256)
+        """Keep demonstrations under their hash."""
+        path = self.path("demonstrations", f"{demonstrations.sha256[:_DIGITS]}.npz")
         with named_disk_errors(self._folder), in_place(path) as unfinished:
             demonstrations.save(unfinished)
 
     def demonstrations(self, sha256: str) -> Demonstrations:
-        """Read what was kept.
-
-        Raises:
-            FileFormatError: The file is missing, damaged, or another one.
-        """
-        path = self._demonstrations_path(sha256)
+        """Read what was kept."""
+        path = self.path("demonstrations", f"{sha256[:_DIGITS]}.npz")
         found = Demonstrations.load(path)
         if sha256 != found.sha256:
             raise FileFormatError(
@@ -74,11 +70,7 @@ class Store:
         return found
 
     def save_model(self, generator: Generator) -> str:
-        """Keep a fitted generator; its hash is the name of its folder.
-
-        Raises:
-            WorkspaceError: The disk is full, or the folder read-only.
-        """
+        """Keep a fitted generator; its hash is the name of its folder."""
         models = self._folder / "models"
         with named_disk_errors(self._folder):
             models.mkdir(exist_ok=True)
@@ -87,7 +79,7 @@ class Store:
                 saved = Path(scratch) / "model"
                 generator.save(saved)
                 model = sha256_of_folder(saved)[:_DIGITS]
-                kept = require_inside(models / model, self._folder)
+                kept = self.path("models", model)
                 if not _is_model(kept, model):  # nothing can read it, and this mends it
                     if kept.is_dir():
                         shutil.rmtree(kept)
@@ -104,13 +96,10 @@ class Store:
             model: Its hash.
             own: `module:Class` of a generator of one's own. It is never taken from the folder: a
                 model is data, and names no code to run.
-
-        Raises:
-            FileFormatError: Its files are missing, damaged, or others.
         """
         from prior_reinforce.generators import load_generator
 
-        folder = require_inside(self._folder / "models" / model, self._folder)
+        folder = self.path("models", model)
         if not _is_model(folder, model):
             raise FileFormatError(
                 f"the model in {folder} is not the one that was learned; restore it from a copy, "
@@ -126,36 +115,27 @@ class Store:
             number: The trial's.
             named: Names of the plans that events name. Any other file is what a crash left before
                 its event, and is replaced.
-
-        Raises:
-            WorkspaceError: The disk is full, or the folder read-only.
         """
-        path = self.plan_path(f"trial-{number:03d}-{sha256(plan.actions.tobytes())[:8]}.npz")
+        path = self.path("plans", f"trial-{number:03d}-{sha256(plan.actions.tobytes())[:8]}.npz")
         with named_disk_errors(self._folder):
             path.parent.mkdir(exist_ok=True)
             if path.name not in named:
                 path.unlink(missing_ok=True)
         return write_plan(plan, path)
 
-    def plan_path(self, name: str) -> Path:
-        """Where a plan lies."""
-        return require_inside(self._folder / "plans" / name, self._folder)
+    def plan_file(self, trial: Trial) -> PlanFile:
+        """A trial's plan, as the journal knows it."""
+        assert trial.kept is not None  # every trial of a workspace has one
+        return PlanFile(self.path("plans", trial.kept.file), trial.kept.sha256)
 
-    def plan(self, kept: KeptPlan) -> Plan:
-        """Read a trial's plan.
-
-        Raises:
-            FileFormatError: The file is missing, or not what was written.
-        """
-        return read_plan(self.plan_path(kept.file), sha256=kept.sha256)
+    def plan(self, trial: Trial) -> Plan:
+        """Read a trial's plan."""
+        file = self.plan_file(trial)
+        return read_plan(file.path, sha256=file.sha256)
 
     def read(self, name: str) -> bytes:
-        """Read one of the files, by its path in the workspace.
-
-        Raises:
-            FileFormatError: It is missing.
-        """
-        path = require_inside(self._folder / name, self._folder)
+        """Read one of the files, by its path in the workspace."""
+        path = self.path(name)
         try:
             return path.read_bytes()
         except OSError as error:
@@ -164,11 +144,7 @@ class Store:
             ) from error
 
     def make_execution_folder(self, plan: str) -> Path:
-        """Make an empty folder for what a command writes while it executes the plan of a file.
-
-        Raises:
-            WorkspaceError: The disk is full, or the folder read-only.
-        """
+        """Make an empty folder for what a command writes while it executes the plan of a file."""
         with named_disk_errors(self._folder):
             attempt = 1
             while True:
@@ -186,12 +162,7 @@ class Store:
 
     def execution_folder(self, name: str) -> Path:
         """Where such a folder lies."""
-        return require_inside(self._folder / "executions" / Path(name).name, self._folder)
-
-    def _demonstrations_path(self, sha256: str) -> Path:
-        return require_inside(
-            self._folder / "demonstrations" / f"{sha256[:_DIGITS]}.npz", self._folder
-        )
+        return self.path("executions", Path(name).name)
 
 
 def _is_model(folder: Path, model: str) -> bool:

@@ -26,11 +26,28 @@ from msgspec.structs import replace
 from numpy.typing import ArrayLike
 from typing_extensions import Self
 
-from prior_reinforce.adapters import ADAPTERS, DEFAULT_ADAPTER
+from prior_reinforce.adapters import ADAPTERS, DEFAULT_ADAPTER, make_adapter
 from prior_reinforce.arrays import Frames
+from prior_reinforce.bench.robots.executors.arguments import (
+    check_command,
+    split_command,
+    without_arguments,
+)
 from prior_reinforce.bench.robots.executors.base import ArmSettings, Motion
+from prior_reinforce.bench.robots.executors.command import (
+    CommandResult,
+    execute_command,
+    read_ended,
+    was_executed,
+)
+from prior_reinforce.bench.robots.executors.drive import Look, Request, drive_command, read_look
+from prior_reinforce.bench.robots.executors.lock import executing_lock
+from prior_reinforce.bench.robots.executors.pose import ask_arm
+from prior_reinforce.bench.robots.executors.result import measure_tracking
+from prior_reinforce.bench.robots.executors.supervision import Interruptions
+from prior_reinforce.bench.robots.gate import check_plan
 from prior_reinforce.bench.robots.plan_files import PlanFile, write_plan
-from prior_reinforce.bench.workspace.journal import JOURNAL_FILE
+from prior_reinforce.bench.workspace.journal import JOURNAL_FILE, Journal
 from prior_reinforce.bench.workspace.log import (
     DemonstrationsImported,
     Executed,
@@ -39,7 +56,6 @@ from prior_reinforce.bench.workspace.log import (
     Moved,
     Moving,
     NotExecuted,
-    WorkspaceLog,
     WorkspaceState,
 )
 from prior_reinforce.bench.workspace.manifest import (
@@ -63,7 +79,7 @@ from prior_reinforce.errors import (
 from prior_reinforce.files import named_disk_errors, require_inside, sweep, write, write_once
 from prior_reinforce.plans.motions import Demonstrations, Plan, PlanFormat
 from prior_reinforce.registry import own_class
-from prior_reinforce.session.events import Entry, KeptPlan
+from prior_reinforce.session.events import Entry
 from prior_reinforce.session.session import Session
 from prior_reinforce.session.trials import Goal, Stage, Trial
 from prior_reinforce.wording import as_html
@@ -71,8 +87,6 @@ from prior_reinforce.wording import as_html
 if TYPE_CHECKING:
     from prior_reinforce.adapters.base import Adapter
     from prior_reinforce.bench.importing import ImportResult, Preprocessing
-    from prior_reinforce.bench.robots.executors.command import CommandResult
-    from prior_reinforce.bench.robots.executors.drive import Look
     from prior_reinforce.bench.robots.report import LimitReport
     from prior_reinforce.bench.workspace.records import StatusRecord
     from prior_reinforce.generators.base import FitProgress, Generator
@@ -107,16 +121,22 @@ def workspace_around(folder: Path, *, above: bool = True) -> Path | None:
 
 
 class Workspace:
-    """Trials of one task, on disk."""
+    """Trials of one task, on disk.
+
+    Opening one raises these, and so may every method, beside those that it names.
+
+    Raises:
+        WorkspaceError: There is no workspace; its journal is damaged, held by another program, or
+            of another version; or the disk refuses.
+        FileFormatError: A file that the journal names is missing, or not what was written; the
+            manifest is no TOML; or a part of the workspace is a link out of it.
+        ConfigurationError: The manifest holds a wrong value, or has another number of outcomes than
+            the goals so far.
+        InvalidDemonstrationsError: The manifest says otherwise since they were imported.
+    """
 
     def __init__(self, folder: str | os.PathLike[str]) -> None:
-        """Open a workspace that `create` made.
-
-        Raises:
-            WorkspaceError: There is none, or its journal cannot be used.
-            FileFormatError: Its manifest is no TOML, or a part of it is a link out of it.
-            ConfigurationError: Its manifest holds a wrong value.
-        """
+        """Open a workspace that `create` made."""
         self.folder = folder = Path(folder)
         for name in _OWN:
             require_inside(folder / name, folder)
@@ -125,10 +145,9 @@ class Workspace:
                 f"{folder} is not a workspace (it has no {MANIFEST_FILE}); make one with: "
                 f"prior-reinforce new {folder}"
             )
-        self._manifest_text: str | None = None
         self._read_manifest()
         self.store = Store(folder)
-        self.log = WorkspaceLog(folder, self.store, self.manifest.format)
+        self.log = Journal(folder, self.store)
         self._read: dict[str, Demonstrations] = {}
 
     @classmethod
@@ -161,13 +180,9 @@ class Workspace:
     def _read_manifest(self) -> None:
         """Know what the manifest says now."""
         path = self.folder / MANIFEST_FILE
-        text = read_manifest(path)
-        if text != self._manifest_text:
-            self.manifest: Manifest = parse_manifest(text, path)
-            self._manifest_text = text
+        self.manifest: Manifest = parse_manifest(read_manifest(path), path)
 
     def __repr__(self) -> str:
-        """The folder, and what it holds."""
         try:
             state = self.state
         except PriorReinforceError as error:
@@ -179,7 +194,6 @@ class Workspace:
         return as_html(self.status().text)
 
     def __reduce__(self) -> NoReturn:
-        """As its log."""
         self.log.__reduce__()
 
     def close(self) -> None:
@@ -187,7 +201,6 @@ class Workspace:
         self.log.close()
 
     def __enter__(self) -> Self:
-        """Use it for the length of a block."""
         return self
 
     def __exit__(self, _: object, error: BaseException | None, __: object) -> None:
@@ -200,17 +213,12 @@ class Workspace:
 
     @property
     def events(self) -> Sequence[Entry]:
-        """The journal; errors as `state`."""
+        """The journal."""
         return self.log.entries()
 
     @property
     def state(self) -> WorkspaceState:
-        """What the journal adds up to.
-
-        Raises:
-            WorkspaceError: The journal is damaged, or another version wrote it.
-            ConfigurationError: The manifest has another number of outcomes than the goals so far.
-        """
+        """What the journal adds up to."""
         state, k = self.log.state(), len(self.manifest.outcome_names)
         if any(goal.goal.size != k for goal in state.goals):
             raise ConfigurationError(
@@ -221,13 +229,7 @@ class Workspace:
 
     @property
     def demonstrations(self) -> Demonstrations:
-        """The demonstrations in use.
-
-        Raises:
-            WorkspaceError: None were imported yet.
-            FileFormatError: The file is damaged.
-            InvalidDemonstrationsError: The manifest says otherwise since they were imported.
-        """
+        """The demonstrations in use; a WorkspaceError if none were imported yet."""
         sha256 = self.state.demonstrations
         if sha256 is None:
             raise WorkspaceError(
@@ -237,11 +239,7 @@ class Workspace:
         return self._demonstrations(sha256)
 
     def demonstrations_of(self, model: str) -> Demonstrations:
-        """The demonstrations that a model was fitted to.
-
-        Raises:
-            FileFormatError: The file is missing or damaged.
-        """
+        """The demonstrations that a model was fitted to."""
         return self._demonstrations(self.state.trainings[model].demonstrations_sha256)
 
     def session(self, own: str | None = None, own_adapter: str | None = None) -> Session:
@@ -251,9 +249,6 @@ class Workspace:
             own: `module:Class` that the model was learned by, where it is one's own: nothing in the
                 folder may start code.
             own_adapter: `module:Class` that the goal was set with, likewise.
-
-        Raises:
-            WorkspaceError, ConfigurationError: See `state`.
         """
         goals = self.state.goals
         return Session(
@@ -273,20 +268,10 @@ class Workspace:
         adapter: str = DEFAULT_ADAPTER,
         new_hardware: str | None = None,
     ) -> Goal:
-        """Set the goal that the next trials are for.
+        """Set the goal that the next trials are for; arguments and errors as `Session.set_goal`.
 
-        Args:
-            goal: g, shape (k,), in the outcome's units.
-            carry_over: Let earlier goals' trials serve this one; by default where they serve the
-                adapter.
-            adapter: Choice of the adapter, for instance `gp` or `proportional,gain=0.6`.
-            new_hardware: What was changed on the hardware since the last trial; see
-                `Session.set_goal`.
-
-        Raises:
-            InvalidGoalError: Wrong shape, or not finite.
-            ConfigurationError: There is no such adapter.
-            TrialStateError: A trial for the goal before waits to be told.
+        `adapter` is any choice, for instance `gp` or `proportional,gain=0.6`; a ConfigurationError
+        if there is none.
         """
         ADAPTERS.check(adapter)
         return self.session().set_goal(
@@ -297,17 +282,10 @@ class Workspace:
         """Hold a plan against the robot's limits of now; None where the manifest names no robot.
 
         The manifest is read again: a person may have narrowed the limits while this program waits.
-
-        Raises:
-            InvalidDemonstrationsError: The manifest says otherwise since they were imported.
-            ConfigurationError: The manifest holds a wrong value by now.
-            FileFormatError: The manifest is gone, or no TOML any more.
         """
         self._read_manifest()
         if self.manifest.robot is None:
             return None
-        from prior_reinforce.bench.robots import check_plan
-
         training = self.state.training
         shown = self.demonstrations if training is None else self.demonstrations_of(training.model)
         plan = Plan(frames, shown.format)
@@ -315,15 +293,11 @@ class Workspace:
 
     def plan_path(self, trial: Trial) -> Path:
         """Where a trial's plan file is."""
-        return self.store.plan_path(_kept(trial).file)
+        return self.store.plan_file(trial).path
 
     def plan(self, trial: Trial) -> Plan:
-        """A trial's plan, checked against the hash in the journal.
-
-        Raises:
-            FileFormatError: The file is missing, or not what was written.
-        """
-        return self.store.plan(_kept(trial))
+        """A trial's plan, checked against the hash in the journal."""
+        return self.store.plan(trial)
 
     def export(
         self, number: int, path: str | os.PathLike[str], *, rate: float | None = None
@@ -338,7 +312,7 @@ class Workspace:
         Raises:
             RobotLimitError: The plan breaks a limit of now.
             TrialStateError: There is no such trial.
-            FileFormatError: The file is there already, or the plan is not what was written.
+            FileFormatError: The file is there already.
             ConfigurationError: Another kind of file, or an impossible rate.
         """
         plan = self.plan(self.state.trial(number))
@@ -357,8 +331,8 @@ class Workspace:
             Its SHA-256, for whoever gets it to compare.
 
         Raises:
-            FileFormatError: The file is there already, or a file of the workspace is missing.
-            WorkspaceError: A trial is executing, or the disk refuses.
+            FileFormatError: The file is there already.
+            WorkspaceError: A trial is executing.
         """
         from prior_reinforce.bench.workspace.packing import pack
 
@@ -370,7 +344,7 @@ class Workspace:
 
         Raises:
             FileFormatError: It is damaged, was changed, or holds what `pack` does not write.
-            WorkspaceError: The folder exists, or the disk refuses.
+            WorkspaceError: The folder exists.
         """
         from prior_reinforce.bench.workspace.packing import unpack
 
@@ -396,8 +370,7 @@ class Workspace:
             progress: Called with the number of goals drawn and of all goals.
 
         Raises:
-            WorkspaceError: There is nothing to report yet, or the folder cannot be written.
-            FileFormatError: The demonstrations are damaged.
+            WorkspaceError: There is nothing to report yet.
         """
         from prior_reinforce.bench.workspace.report import report_workspace
 
@@ -438,17 +411,15 @@ class Workspace:
 
         self.state.refuse_open_trial("importing demonstrations")
         manifest, form = self.manifest, self.manifest.format
-        is_known = form.names != UNKNOWN
-        if is_known:
-            options = {"joints": form.names, **options}
+        if form.names != UNKNOWN:
+            meant = {"names": form.names, "plan_units": form.units}
+            options = {"joints": form.names, **options, **meant}
         result = import_demonstrations(
             source,
             outcomes=outcomes,
             outcome_names=manifest.outcome_names,
             outcome_units=manifest.outcome_units,
             outcome_unit=outcome_unit,
-            names=form.names if is_known else None,
-            plan_units=form.units if is_known else None,
             preprocessing=dataclasses.replace(preprocessing or Preprocessing(), dt=form.dt),
             robot=manifest.robot,
             gate=manifest.gate,
@@ -510,8 +481,6 @@ class Workspace:
         with named_disk_errors(self.folder):
             write(path, with_columns(read_manifest(path), form.names, form.units))
         self._read_manifest()
-        self.log.close()
-        self.log = WorkspaceLog(self.folder, self.store, self.manifest.format)
 
     def learn(
         self,
@@ -541,7 +510,7 @@ class Workspace:
         self.state.refuse_open_trial("learning")
         demonstrations, known_as = self.demonstrations, self.state.demonstrations
         assert known_as is not None
-        made = make_generator(generator, device=device, states=self.store.training)
+        made = make_generator(generator, device=device, states=self.store.path(".training"))
         made.check_savable()
         fitted = made.fit(demonstrations, seed=seed, progress=progress)
         trained = ModelTrained(
@@ -591,17 +560,8 @@ class Workspace:
             RobotLimitError: The plan breaks a limit of now; nothing moved.
             ConfigurationError: The command could not be started; nothing moved, and the journal
                 says so.
-            FileFormatError: The plan's file is not what was written; nothing moved.
             KeyboardInterrupt: Interrupted; the command was stopped, and the journal says so.
         """
-        from prior_reinforce.bench.robots.executors.arguments import (
-            check_command,
-            without_arguments,
-        )
-        from prior_reinforce.bench.robots.executors.command import execute_command
-        from prior_reinforce.bench.robots.executors.lock import executing_lock
-        from prior_reinforce.bench.robots.executors.supervision import Interruptions
-
         if (speed != 1.0) != (motion == "rehearsal") or not 0 < speed <= 1:
             raise ConfigurationError(
                 f"a rehearsal has a share of the plan's speed above 0 and below 1, and nothing "
@@ -617,7 +577,7 @@ class Workspace:
         ):
             self._note_unknown_execution(self.state.trial(number))
             trial = self.to_execute(number)
-            plan = self.plan(trial)
+            plan, file = self.plan(trial), self.store.plan_file(trial)
             verdict = self.gate(plan.actions)
             if verdict is not None:
                 verdict.require()
@@ -632,9 +592,8 @@ class Workspace:
                 raise TrialStateError(
                     f"somebody pressed Stop since this was asked for: no {motion} began; ask again"
                 )
-            name = _kept(trial).file
             folder = self.store.make_execution_folder(
-                name if motion == "trial" else f"{motion}-{name}"
+                file.path.name if motion == "trial" else f"{motion}-{file.path.name}"
             )
             who = command.executor if isinstance(command, ArmSettings) else without_arguments(text)
             self._begin(
@@ -645,7 +604,7 @@ class Workspace:
             try:
                 result, raised = execute_command(
                     text,
-                    self._plan_file(trial),
+                    file,
                     folder,
                     time_limit=time_limit,
                     lock=lock,
@@ -687,15 +646,9 @@ class Workspace:
         Raises:
             TrialStateError: It is moved or recorded right now: two programs on one bus clash.
             ConfigurationError: The arm does not answer, or is another one since.
-            FileFormatError: The plan's file is not what was written.
         """
-        from prior_reinforce.bench.robots.executors.arguments import split_command
-        from prior_reinforce.bench.robots.executors.drive import read_look
-        from prior_reinforce.bench.robots.executors.lock import executing_lock
-        from prior_reinforce.bench.robots.executors.pose import ask_arm
-
         text = self._command(arm, "look", speed)
-        plan = self._plan_file(self.state.trial(number))
+        plan = self.store.plan_file(self.state.trial(number))
         with executing_lock(arm=self.manifest.arm), tempfile.TemporaryDirectory() as place:
             folder = Path(place)
             copy = write_once(folder / plan.path.name, plan.verify())
@@ -711,14 +664,13 @@ class Workspace:
             if motion != "trial":
                 raise ConfigurationError(f"a command makes no {motion}; name the arm in [arm]")
             return command
-        from prior_reinforce.bench.robots.executors.drive import Request, drive_command
-
         if self.manifest.driven_by != command:
             raise ConfigurationError(
                 f"{self.folder / MANIFEST_FILE} names another arm since; ask again"
             )
-        known = self.manifest
-        return drive_command(Request(command, known.gate, motion, speed, known.robot))
+        return drive_command(
+            Request(command, self.manifest.gate, motion, speed, self.manifest.robot)
+        )
 
     def recover(self) -> Trial | None:
         """Note how an execution ended whose program was killed, where its supervisor wrote it down.
@@ -726,8 +678,6 @@ class Workspace:
         Returns:
             The trial as it stands now; None where there is nothing to recover.
         """
-        from prior_reinforce.bench.robots.executors.command import read_ended
-
         trial = self.state.open_trial
         if trial is None or self.log.is_executing():
             return None
@@ -736,7 +686,7 @@ class Workspace:
         if not isinstance(began, Executing) or not began.command or not began.folder:
             return None  # a person has to say
         folder = self.store.execution_folder(began.folder)
-        result = read_ended(folder, began.command, self._plan_file(trial))
+        result = read_ended(folder, began.command, self.store.plan_file(trial))
         if result is None:
             return None
         self._record(result, trial, folder)
@@ -759,18 +709,12 @@ class Workspace:
 
         Such a journal was restored from a copy; a person has to say whether that was this trial.
         """
-        from prior_reinforce.bench.robots.executors.command import was_executed
-
         if trial.stage is Stage.ASKED:
-            folders = self.store.execution_folders(_kept(trial).file)
-            known = {e.event.folder for e in self.log.entries() if isinstance(e.event, Executing)}
-            for folder in folders:
+            known = {e.event.folder for e in self.events if isinstance(e.event, Executing)}
+            for folder in self.store.execution_folders(self.plan_path(trial).name):
                 if folder.name not in known and was_executed(folder):
                     self._begin(Executing(trial=trial.number, command="", folder=folder.name))
                     return
-
-    def _plan_file(self, trial: Trial) -> PlanFile:
-        return PlanFile(self.plan_path(trial), _kept(trial).sha256)
 
     def _record(
         self,
@@ -785,14 +729,11 @@ class Workspace:
         Returns:
             The result with that error.
         """
-        from prior_reinforce.bench.robots.executors.result import measure_tracking
-
         try:
             plan = self.plan(trial)
             slow = dataclasses.replace(plan.format, dt=plan.format.dt / speed)
             if motion != "approach":
-                measured = measure_tracking(folder, Plan(plan.actions, slow))
-                result = replace(result, **measured)
+                result = replace(result, **measure_tracking(folder, Plan(plan.actions, slow)))
         except FileFormatError as error:
             reasons = filter(None, [result.reason, str(error)])
             result = replace(result, reason="; ".join(reasons))
@@ -811,23 +752,16 @@ class Workspace:
         """The model in use."""
         self.demonstrations  # noqa: B018  (whether there are any that fit the manifest)
         training = self.state.training
-        if training is None:
-            raise WorkspaceError(
-                f"nothing is learned yet; run: prior-reinforce learn {self.folder}"
-            )
-        if self.state.stale:
-            raise WorkspaceError(
-                "other demonstrations were imported since the model was learned; run: "
-                f"prior-reinforce learn {self.folder}"
-            )
+        if training is None or self.state.stale:
+            why = "other demonstrations were imported since the model was learned"
+            why = why if training is not None else "nothing is learned yet"
+            raise WorkspaceError(f"{why}; run: prior-reinforce learn {self.folder}")
         said = "the model was learned by"
         _require_own(own, training.generator, "generator", said, "learn again")
         return self.store.model(training.model, own)
 
     def _adapter(self, choice: str, own: str | None) -> Adapter:
         """The adapter that a goal was set with."""
-        from prior_reinforce.adapters import make_adapter
-
         choice = choice or DEFAULT_ADAPTER
         _require_own(own, choice, "adapter", "the goal was set with", "set the goal again")
         return make_adapter(choice)
@@ -864,9 +798,3 @@ def _require_own(given: str | None, choice: str, family: str, said: str, again: 
         if own is not None:
             remedy = f"name it, for the journal starts no code: --{family} {own}"
         raise ConfigurationError(f"{said} {choice}; {remedy}")
-
-
-def _kept(trial: Trial) -> KeptPlan:
-    """A trial's plan, which every trial of a workspace has."""
-    assert trial.kept is not None
-    return trial.kept
