@@ -60,7 +60,7 @@ def draw(path: Path) -> None:
     promised = BasketballShot().rollout(plan[None], None)[0].outcome
     columns = []
     for hardware in HARDWARE:
-        task = BasketballShot(hardware)
+        task = hardware()
         (rollout,) = task.rollout(plan[None], None)
         ready, frame = task._start(plan[0], np.zeros(2)), rollout.key_frame
         assert frame is not None
@@ -117,7 +117,7 @@ def main() -> None:
     )
     print("|---|---|---|---|---|---|---|")
     for hardware in HARDWARE:
-        task = BasketballShot(hardware)
+        task = hardware()
         landed, _ = read(task.rollout(plans, None))
         shift = 100 * (landed - on_v1)
         distance = np.linalg.norm(shift, axis=1)

@@ -126,7 +126,7 @@ def test_what_the_scene_lacks_is_named(camera, table_model, frame_with_ball_at):
         camera.picture(KeyFrame(bare, np.zeros(0), 0.0), np.zeros(2))
     with pytest.raises(ConfigurationError, match=r"\[5.0, 0.0, 0.1\] m is not wholly in the pic"):
         camera.find_marks(table_model, np.array([[5.0, 0.0, 0.1]]))
-    with pytest.raises(ConfigurationError, match="0 x 336 pixels"):
+    with pytest.raises(ConfigurationError, match="width: Expected `int` >= 1, got 0"):
         Camera(CameraConfig(width=0, height=336))
 
 

@@ -47,7 +47,7 @@ def test_your_own_gets_what_it_takes_and_is_closed():
         ("eyes", "no perception 'eyes'; known are exact, eye, amplified, camera, vlm"),
         ("camera", "give the task a `scene`"),
         ("vlm", "give the task a `scene`"),
-        ("camera,votes=0", "0 votes"),
+        ("camera,votes=0", "Expected `int` >= 1"),
         ("amplified,loudness=3", "no setting 'loudness'"),
     ],
 )

@@ -92,12 +92,12 @@ def test_a_server_on_this_machine_is_asked_without_the_proxy_for_others(
     ("settings", "message"),
     [
         ({"family": "gpt"}, "family 'gpt' is unknown; use one of glm"),
-        ({"votes": 0}, "0 votes"),
+        ({"votes": 0}, "votes: Expected `int` >= 1, got 0"),
         ({"votes": 5, "most_requests": 4}, "5 votes in at most 4"),
-        ({"spread_gate": 0.0}, "spread_gate = 0.0"),
-        ({"timeout": -1.0}, "timeout = -1.0"),
-        ({"max_retries": -1}, "max_retries = -1"),
-        ({"temperature": float("nan")}, "temperature = nan"),
+        ({"spread_gate": 0.0}, "spread_gate: Expected `float` > 0.0, got 0.0"),
+        ({"timeout": -1.0}, "timeout: Expected `float` > 0.0, got -1.0"),
+        ({"max_retries": -1}, "max_retries: Expected `int` >= 0, got -1"),
+        ({"temperature": float("nan")}, "temperature: Expected a finite number, got nan"),
     ],
 )
 def test_settings_out_of_range_are_refused(settings, message):

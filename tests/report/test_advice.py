@@ -21,7 +21,9 @@ def test_where_a_first_throw_hits_is_dark(tmp_path):
 
 def test_what_the_shades_and_the_axes_mean_is_said(tmp_path, monkeypatch):
     figures = []
-    monkeypatch.setattr(advice, "save_figure", lambda figure, path: figures.append(figure) or path)
+    monkeypatch.setattr(
+        advice.style, "save_figure", lambda figure, path: figures.append(figure) or path
+    )
     grid = np.stack(np.meshgrid([0.8, 0.9, 1.0], [-0.2, 0.2], indexing="ij"), -1).reshape(-1, 2)
     draw_advice(
         tmp_path / "a.png", grid, np.full(6, 0.5), grid[:2], grid[3], grid[3],

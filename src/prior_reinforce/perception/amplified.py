@@ -12,37 +12,31 @@ from prior_reinforce.environment import Rollout
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.perception.base import Perception
 from prior_reinforce.readings import Reading
+from prior_reinforce.settings import Checked, NonNegative
 
 _LEAST_SCALE = 0.1
 """Factors below it are taken for it when a reading is weighed (ours): 1/s has no variance at 0."""
 
 
 @dataclass(frozen=True)
-class Amplified(Perception):
+class Amplified(Checked, Perception):
     """The true error times one random factor, plus Gaussian noise on each component."""
 
-    scale_low: float = 0.7
+    scale_low: NonNegative = 0.7
     """Least factor, uniformly drawn once a vector (paper: 0.7)."""
-    scale_high: float = 1.4
+    scale_high: NonNegative = 1.4
     """Greatest factor (paper: 1.4)."""
-    noise_sd: float = 0.01
+    noise_sd: NonNegative = 0.01
     """Standard deviation of the noise of each component, in [m]. Ours, because the paper gives
     none: 1 cm is two thirds of the tolerance, and half of the finest step of an estimate by eye."""
 
     def __post_init__(self) -> None:
-        """Check the settings.
-
-        Raises:
-            ConfigurationError: The factors do not rise from 0, or the noise is negative.
-        """
-        if not 0 <= self.scale_low <= self.scale_high < math.inf:
+        """Check the settings."""
+        super().__post_init__()
+        if self.scale_low > self.scale_high:
             raise ConfigurationError(
-                "scale_low and scale_high must rise from 0 or more, got "
+                "scale_low and scale_high must rise, got "
                 f"{self.scale_low} and {self.scale_high}; the paper's are 0.7 and 1.4"
-            )
-        if not 0 <= self.noise_sd < math.inf:
-            raise ConfigurationError(
-                f"noise_sd must be 0 m or more, got {self.noise_sd}; 0.01 is the default"
             )
 
     def perceive(self, rollout: Rollout, goal: Point, rng: np.random.Generator) -> Reading:

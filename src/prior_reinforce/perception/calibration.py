@@ -10,6 +10,7 @@ down, and the first pixel's centre is (0.5, 0.5).
 from __future__ import annotations
 
 import json
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -81,7 +82,16 @@ class TableCalibration:
         Raises:
             ConfigurationError: Too few points, points on one line, or pixels in another order.
         """
-        points, seen = _checked_pairs(table_points, pixels)
+        points, seen = np.asarray(table_points, dtype=float), np.asarray(pixels, dtype=float)
+        if points.shape != seen.shape or points.shape[1:] != (2,) or len(points) < 4:
+            raise ConfigurationError(
+                f"calibration points of shape {points.shape} and pixels of shape {seen.shape}: "
+                "expected (n, 2) for both, with n >= 4; click at least four known points"
+            )
+        if not np.isfinite([points, seen]).all():
+            raise ConfigurationError(
+                "calibration points and pixels must be finite; click them again"
+            )
         homography = _direct_linear_transform(points, seen)
         fit_error = _rms(_map(np.linalg.inv(homography), seen) - points)
         return cls(homography, float(height), fit_error, _left_out_error(points, seen))
@@ -165,27 +175,14 @@ class TableCalibration:
         )
 
 
-def _checked_pairs(table_points: ArrayLike, pixels: ArrayLike) -> tuple[_Pairs, _Pairs]:
-    points, seen = np.asarray(table_points, dtype=float), np.asarray(pixels, dtype=float)
-    if points.ndim != 2 or points.shape[1] != 2 or points.shape != seen.shape or len(points) < 4:
-        raise ConfigurationError(
-            f"calibration points of shape {points.shape} and pixels of shape {seen.shape}: "
-            "expected (n, 2) for both, with n >= 4; click at least four known points"
-        )
-    if not (np.isfinite(points).all() and np.isfinite(seen).all()):
-        raise ConfigurationError("calibration points and pixels must be finite; click them again")
-    return points, seen
-
-
 def _direct_linear_transform(points: _Pairs, pixels: _Pairs) -> Float[np.ndarray, "3 3"]:
     """Least algebraic error H with unit norm."""
     to_unit_points, to_unit_pixels = _similarity_to_unit(points), _similarity_to_unit(pixels)
-    x, y = _map(to_unit_points, points).T
-    u, v = _map(to_unit_pixels, pixels).T
-    one, zero = np.ones_like(x), np.zeros_like(x)
-    rows_u = np.stack([x, y, one, zero, zero, zero, -u * x, -u * y, -u], axis=1)
-    rows_v = np.stack([zero, zero, zero, x, y, one, -v * x, -v * y, -v], axis=1)
-    _, singular_values, right = np.linalg.svd(np.concatenate([rows_u, rows_v]))
+    table = np.insert(_map(to_unit_points, points), 2, 1.0, axis=1)
+    u, v = _map(to_unit_pixels, pixels).T[:, :, None]
+    none = np.zeros_like(table)
+    design = np.block([[table, none, -u * table], [none, table, -v * table]])
+    _, singular_values, right = np.linalg.svd(design)
     if singular_values[7] < _RANK_FLOOR * singular_values[0]:
         raise ConfigurationError(
             f"{len(points)} calibration points (nearly) on one line do not fix a plane; spread "
@@ -193,7 +190,7 @@ def _direct_linear_transform(points: _Pairs, pixels: _Pairs) -> Float[np.ndarray
         )
     homography = np.linalg.inv(to_unit_pixels) @ right[-1].reshape(3, 3) @ to_unit_points
     homography /= np.linalg.norm(homography)
-    depths = homography[2] @ np.vstack([points.T, np.ones(len(points))])
+    depths = points @ homography[2, :2] + homography[2, 2]
     if depths.sum() < 0:
         homography, depths = -homography, -depths
     # A camera above the table sees all points before it, and turns x forward, y left (which are
@@ -211,14 +208,11 @@ def _left_out_error(points: _Pairs, pixels: _Pairs) -> float | None:
     if len(points) == 4:
         return None
     misses = []
-    for left_out in range(len(points)):
-        others = np.arange(len(points)) != left_out
-        try:
-            homography = _direct_linear_transform(points[others], pixels[others])
-        except ConfigurationError:
-            continue  # the others lie on one line: they cannot judge this point
-        seen = _map(np.linalg.inv(homography), pixels[left_out])
-        misses.append(seen - points[left_out])
+    for i in range(len(points)):
+        with suppress(ConfigurationError):  # the others lie on one line: they cannot judge this one
+            others = np.delete(points, i, axis=0), np.delete(pixels, i, axis=0)
+            homography = _direct_linear_transform(*others)
+            misses.append(_map(np.linalg.inv(homography), pixels[i]) - points[i])
     return _rms(np.array(misses)) if misses else None
 
 
@@ -230,9 +224,7 @@ def _similarity_to_unit(points: _Pairs) -> Float[np.ndarray, "3 3"]:
         raise ConfigurationError(
             f"all {len(points)} calibration points are the same; spread them over the table"
         )
-    return np.array(
-        [[1 / spread, 0, -centre[0] / spread], [0, 1 / spread, -centre[1] / spread], [0, 0, 1]]
-    )
+    return np.array([[1, 0, -centre[0]], [0, 1, -centre[1]], [0, 0, spread]]) / spread
 
 
 def _map(

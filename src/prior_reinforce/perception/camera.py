@@ -17,25 +17,25 @@ from prior_reinforce.arrays import Point
 from prior_reinforce.environment import KeyFrame, Picture, make_renderer
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.perception.calibration import TableCalibration
+from prior_reinforce.settings import Checked, Count
 
 GOAL_BODY = "goal"
 """Mocap body that is the goal's object in every scene (see `rollouts.KeyFrame`)."""
 
 # Calibration marks are bright discs of 1 cm radius (ours): large enough for a centroid finer than
 # a tenth of a pixel, small enough that perspective does not shift it (below 0.1 mm at 1 m).
-_MARK_RADIUS = 0.01
-_MARK_THICKNESS = 1e-4
+_MARK_SIZE = np.array([0.01, 0.01, 1e-4])  # a radius twice, and half its thickness, in [m]
 
 
 @dataclass(frozen=True)
-class CameraConfig:
+class CameraConfig(Checked):
     """Which camera of the scene, and how finely it sees."""
 
     name: str = "birdseye"
     """Camera of the scene."""
-    width: int = 896
+    width: Count = 896
     """Picture width, in [px]. Over the 1.3 m that our scenes show, a pixel is 1.4 mm (ours)."""
-    height: int = 896
+    height: Count = 896
     """Picture height, in [px]. Square, as the scale of 0-1000 in which most models answer is
     coarser along a longer side; 896 is a multiple of the 28 and 32 px of their image patches."""
 
@@ -45,11 +45,6 @@ class Camera:
 
     def __init__(self, config: CameraConfig | None = None) -> None:
         self.config = config or CameraConfig()
-        if self.config.width < 1 or self.config.height < 1:
-            raise ConfigurationError(
-                f"a picture of {self.config.width} x {self.config.height} pixels cannot be drawn; "
-                "give a positive width and height"
-            )
         self._source: mujoco.MjModel | None = None
         self._renderer: mujoco.Renderer | None = None
 
@@ -67,9 +62,16 @@ class Camera:
         """
         renderer = self._renderer_for(key_frame.model)
         model = renderer.model
+        body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, GOAL_BODY)
+        mocap = model.body_mocapid[body] if body >= 0 else -1
+        if mocap < 0:
+            raise ConfigurationError(
+                f"the scene has no mocap body '{GOAL_BODY}' to put at the goal; add "
+                f'<body name="{GOAL_BODY}" mocap="true"> with the goal\'s object'
+            )
         data = mujoco.MjData(model)
         data.qpos[:] = key_frame.state
-        data.mocap_pos[_goal_mocap_id(model)] = np.pad(goal, (0, 3 - len(goal)))
+        data.mocap_pos[mocap] = np.pad(goal, (0, 3 - len(goal)))
         mujoco.mj_forward(model, data)
         renderer.update_scene(data, camera=self.config.name)
         picture: Picture = renderer.render()
@@ -111,8 +113,8 @@ class Camera:
         centres = []
         for point, picture in zip(points, marked, strict=True):
             brightness = np.abs(picture - empty).sum(axis=2)
-            edge = (brightness[0], brightness[-1], brightness[:, 0], brightness[:, -1])
-            if not brightness.any() or any(line.any() for line in edge):
+            inside = brightness[1:-1, 1:-1].sum()
+            if not inside or inside < brightness.sum():
                 raise ConfigurationError(
                     f"the mark at {point.tolist()} m is not wholly in the picture of camera "
                     f"'{self.config.name}'; choose a point nearer to the table's middle"
@@ -127,10 +129,8 @@ class Camera:
     ) -> TableCalibration:
         """Calibrate the camera on marks laid at known points of a plane parallel to the table.
 
-        Args:
-            model: The scene; not changed.
-            table_points: Where the marks lie, table frame, shape (n, 2), n >= 4, in [m].
-            height: Height of the plane above the table, in [m].
+        The points, table frame, have shape (n, 2), n >= 4; they and the plane's height above the
+        table are in [m]. The scene is not changed.
         """
         points = np.asarray(table_points, dtype=float)
         heights = np.full((len(points), 1), height)
@@ -157,26 +157,9 @@ class Camera:
         return self._renderer
 
 
-def _goal_mocap_id(model: mujoco.MjModel) -> int:
-    body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, GOAL_BODY)
-    mocap = int(model.body_mocapid[body]) if body >= 0 else -1
-    if mocap < 0:
-        raise ConfigurationError(
-            f"the scene has no mocap body '{GOAL_BODY}' to put at the goal; add "
-            f'<body name="{GOAL_BODY}" mocap="true"> with the goal\'s object'
-        )
-    return mocap
-
-
 def _add_mark(scene: mujoco.MjvScene, point: Float[np.ndarray, "3"]) -> None:
-    mark = scene.geoms[scene.ngeom]
-    mujoco.mjv_initGeom(
-        mark,
-        mujoco.mjtGeom.mjGEOM_CYLINDER,
-        np.array([_MARK_RADIUS, _MARK_RADIUS, _MARK_THICKNESS]),
-        point,
-        np.eye(3).ravel(),
-        np.ones(4, dtype=np.float32),
-    )
+    mark, white = scene.geoms[scene.ngeom], np.ones(4, dtype=np.float32)
+    disc, upright = mujoco.mjtGeom.mjGEOM_CYLINDER, np.eye(3).ravel()
+    mujoco.mjv_initGeom(mark, disc, _MARK_SIZE, point, upright, white)
     mark.emission = 1.0
     scene.ngeom += 1

@@ -53,15 +53,10 @@ class ColourCamera(VisionLanguageModel):
         camera: Camera | None = None,
         calibration: TableCalibration | None = None,
     ) -> None:
-        """Make the camera; nothing is drawn yet.
+        """Make the camera, as `VisionLanguageModel` does; nothing is drawn yet.
 
-        Args:
-            scene: What to look for.
-            config: Model family whose format is used, and votes; the endpoint is ignored.
-            seed: Of the outliers.
-            outlier_rate: Share of answers whose box, of the right size, lies anywhere.
-            camera: As in `VisionLanguageModel`.
-            calibration: As in `VisionLanguageModel`.
+        Of `config`, family and votes are used, and no endpoint. A share `outlier_rate` of answers,
+        drawn from `seed`, has a box of the right size that lies anywhere.
 
         Raises:
             ConfigurationError: There is no scene, or the rate is no share.
@@ -94,8 +89,11 @@ class ColourClient:
         if self._found[0] is not picture or self._found[1] != words:  # it is asked several times
             self._found = (picture, words, find_by_colour(picture, words))
         box = self._found[2]
-        if box is not None and astray:
-            box = _elsewhere(box, size, self._rng)
+        if box is not None and astray:  # of the same size, anywhere in the picture
+            width, height = box[2] - box[0], box[3] - box[1]
+            left = self._rng.uniform(0, size[0] - width)
+            top = self._rng.uniform(0, size[1] - height)
+            box = left, top, left + width, top + height
         return Answer(say_box(box, size, words, self._family), None, "stop")
 
     def close(self) -> None:
@@ -105,11 +103,7 @@ class ColourClient:
 def say_box(box: Box | None, size: tuple[int, int], words: str, family: Family) -> str:
     """Return the answer of a model of some family: the box in its scale, an empty list for none.
 
-    Args:
-        box: In pixels of the picture that was sent.
-        size: Width and height of that picture, in [px].
-        words: What was asked for.
-        family: Of the model.
+    The box is in pixels of the picture that was sent, and `size` that picture's width and height.
     """
     if box is None:
         numbers = []
@@ -124,30 +118,22 @@ def say_box(box: Box | None, size: tuple[int, int], words: str, family: Family) 
     return f"```json\n{json.dumps(labelled)}\n```"
 
 
-def _elsewhere(box: Box, size: tuple[int, int], rng: np.random.Generator) -> Box:
-    """A box of the same size anywhere in the picture."""
-    width, height = box[2] - box[0], box[3] - box[1]
-    left, top = rng.uniform(0, size[0] - width), rng.uniform(0, size[1] - height)
-    return left, top, left + width, top + height
-
-
 def find_by_colour(picture: Picture, words: str) -> Box | None:
-    """Find the bounding box of what has the colour that the words name.
-
-    Args:
-        picture: RGB.
-        words: For instance `the orange ball`; they name exactly one of `COLOURS`.
-
-    Returns:
-        The box in pixels; None if nothing in the picture has that colour.
+    """Find the box, in pixels, around what has the colour that the words name; None if nothing has.
 
     Raises:
-        ConfigurationError: The words name no colour, or several.
+        ConfigurationError: The words name none of `COLOURS`, or several.
     """
     from PIL import Image
     from scipy import ndimage
 
-    low, high, least_saturation = COLOURS[_named_colour(words)]
+    named = [colour for colour in COLOURS if re.search(rf"\b{colour}\b", words)]
+    if len(named) != 1:
+        raise ConfigurationError(
+            f"{words!r} names {len(named)} colours; to be found by colour it must name one of "
+            f"{', '.join(COLOURS)}"
+        )
+    low, high, least_saturation = COLOURS[named[0]]
     hue, saturation, value = np.moveaxis(np.asarray(Image.fromarray(picture).convert("HSV")), 2, 0)
     degrees = (hue * (360 / 256) - low) % 360 + low
     of_colour = (degrees <= high) & (saturation > 255 * least_saturation) & (value > _DARKEST)
@@ -158,13 +144,3 @@ def find_by_colour(picture: Picture, words: str) -> Box | None:
         return None
     rows, columns = np.nonzero((areas > areas.max() * _PIECE)[pieces])
     return float(columns.min()), float(rows.min()), columns.max() + 1.0, rows.max() + 1.0
-
-
-def _named_colour(words: str) -> str:
-    named = [colour for colour in COLOURS if re.search(rf"\b{colour}\b", words)]
-    if len(named) != 1:
-        raise ConfigurationError(
-            f"{words!r} names {len(named)} colours; to be found by colour it must name one of "
-            f"{', '.join(COLOURS)}"
-        )
-    return named[0]

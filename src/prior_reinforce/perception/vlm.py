@@ -17,6 +17,7 @@ from jaxtyping import Float
 from prior_reinforce.arrays import Point
 from prior_reinforce.environment import KeyFrame, Picture, Rollout, SeenObject, TableScene
 from prior_reinforce.errors import ConfigurationError, EndpointError, PerceptionFailedError
+from prior_reinforce.perception import vlm_formats
 from prior_reinforce.perception.base import Perception
 from prior_reinforce.perception.calibration import TableCalibration
 from prior_reinforce.perception.vlm_client import (
@@ -24,15 +25,7 @@ from prior_reinforce.perception.vlm_client import (
     OpenAIClient,
     VisionLanguageModelConfig,
 )
-from prior_reinforce.perception.vlm_formats import (
-    FORMATS,
-    Box,
-    Family,
-    NotInPictureError,
-    UnreadableAnswerError,
-    read_box,
-    size_to_send,
-)
+from prior_reinforce.perception.vlm_formats import FORMATS, Box, Family, UnreadableAnswerError
 from prior_reinforce.perception.vlm_reading import Answer, PictureReading, Sighting
 from prior_reinforce.readings import Reading
 
@@ -161,11 +154,7 @@ class VisionLanguageModel(Perception):
         return camera
 
     def find(self, wanted: SeenObject, picture: Picture) -> Sighting:
-        """Ask for one object until enough answers agree, or none will.
-
-        Args:
-            wanted: What to look for.
-            picture: RGB, of the calibrated camera.
+        """Ask for one object, in an RGB picture of the calibrated camera, until enough agree.
 
         Raises:
             ConfigurationError: There is no calibration.
@@ -177,6 +166,7 @@ class VisionLanguageModel(Perception):
         calibration, sent = self._calibration, _shrunk(picture, self.config)
         words, votes = wanted.words, self.config.votes
         answers: list[Answer] = []
+        boxes: list[Box] = []
         for _ in range(self.config.most_requests):
             try:
                 answer = self._client.ask(words, sent)
@@ -194,7 +184,13 @@ class VisionLanguageModel(Perception):
             if len(boxes) >= votes and box is not None:
                 place = calibration.to_table(_centres(np.array([box])))[0]
                 return Sighting(words, tuple(answers), box, place)
-        return Sighting(words, tuple(answers), problem=_no_agreement(words, answers, self.config))
+        if len(boxes) >= votes:
+            gate_cm = 100 * self.config.spread_gate
+            why = f"{len(boxes)} answers do not agree on a place to {gate_cm:g} cm"
+        else:
+            last = [answer.problem for answer in answers if answer.problem is not None][-1]
+            why = f"only {len(boxes)} of {len(answers)} answers hold a box (last: {last})"
+        return Sighting(words, tuple(answers), problem=f"{words}: {why}")
 
 
 def _shrunk(picture: Picture, config: VisionLanguageModelConfig) -> Picture:
@@ -202,7 +198,7 @@ def _shrunk(picture: Picture, config: VisionLanguageModelConfig) -> Picture:
     from PIL import Image
 
     image = Image.fromarray(picture)
-    sent = size_to_send(*image.size, config.max_image_side, FORMATS[config.family])
+    sent = vlm_formats.size_to_send(*image.size, config.max_image_side, FORMATS[config.family])
     if sent == image.size:
         return picture
     return np.asarray(image.resize(sent, Image.Resampling.LANCZOS))
@@ -210,15 +206,16 @@ def _shrunk(picture: Picture, config: VisionLanguageModelConfig) -> Picture:
 
 def _with_box(answer: Answer, family: Family, picture: Picture, sent: Picture) -> Answer:
     """The answer with its box, in pixels of the picture as taken, or with why there is none."""
-    sent_size = (sent.shape[1], sent.shape[0])
+    height, width, _ = sent.shape
     try:
         if answer.finish_reason == "length":
             raise UnreadableAnswerError("cut off at max_tokens")
-        left, top, right, bottom = read_box(answer.text, FORMATS[family], sent_size)
+        box = vlm_formats.read_box(answer.text, FORMATS[family], (width, height))
     except UnreadableAnswerError as error:
-        absent = isinstance(error, NotInPictureError)
+        absent = isinstance(error, vlm_formats.NotInPictureError)
         return replace(answer, problem=str(error), absent=absent)
-    per_x, per_y = picture.shape[1] / sent_size[0], picture.shape[0] / sent_size[1]
+    left, top, right, bottom = box
+    per_x, per_y = picture.shape[1] / width, picture.shape[0] / height
     return replace(answer, box=(left * per_x, top * per_y, right * per_x, bottom * per_y))
 
 
@@ -250,12 +247,3 @@ def _agreed(boxes: list[Box], calibration: TableCalibration, gate: float) -> Box
         return None
     left, top, right, bottom = np.median(stacked[near], axis=0).tolist()
     return left, top, right, bottom
-
-
-def _no_agreement(words: str, answers: list[Answer], config: VisionLanguageModelConfig) -> str:
-    read = sum(answer.box is not None for answer in answers)
-    if read >= config.votes:
-        gate_cm = 100 * config.spread_gate
-        return f"{words}: {read} answers do not agree on a place to {gate_cm:g} cm"
-    problems = [answer.problem for answer in answers if answer.problem is not None]
-    return f"{words}: only {read} of {len(answers)} answers hold a box (last: {problems[-1]})"

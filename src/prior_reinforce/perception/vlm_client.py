@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import base64
 import io
-import math
 import os
 from dataclasses import dataclass
-from typing import Any, Literal, Protocol
+from typing import Annotated, Any, Literal, Protocol
 from urllib.parse import urlsplit
 
 import msgspec
@@ -17,16 +16,16 @@ from prior_reinforce.errors import ConfigurationError, EndpointError
 from prior_reinforce.extras import check_installed
 from prior_reinforce.perception.vlm_formats import FORMATS, Family
 from prior_reinforce.perception.vlm_reading import Answer
+from prior_reinforce.settings import Checked, Count, NonNegative, Positive
 
 _NO_KEY = "EMPTY"
-_MOST_RETRIES = 20
 _MOST_SHOWN = 160
 """Characters of a server's own words in a message."""
 _THIS_MACHINE = {"127.0.0.1", "localhost", "::1"}
 
 
 @dataclass(frozen=True)
-class VisionLanguageModelConfig:
+class VisionLanguageModelConfig(Checked):
     """Where the model is, its format, and when its answers are accepted."""
 
     base_url: str = "http://127.0.0.1:8000/v1"
@@ -42,22 +41,22 @@ class VisionLanguageModelConfig:
     """Environment variable that holds the key; None for a server that wants none."""
     enable_thinking: bool = False
     """Let the model think first: slower, and `max_tokens` must be enough to finish."""
-    votes: int = 3
+    votes: Count = 3
     """Readable answers wanted for each object; the median of three forgives one outlier."""
-    most_requests: int = 7
+    most_requests: Count = 7
     """Requests for each object before the operator is asked."""
-    spread_gate: float = 0.01
+    spread_gate: Positive = 0.01
     """More than half of the answers lie within this distance of their median, or they do not
     agree, in [m]. 1 cm (ours): the order of the tasks' tolerances."""
-    temperature: float = 0.7
+    temperature: NonNegative = 0.7
     """Sampling temperature (ours). At 0 all votes are one answer, and voting means nothing."""
-    max_tokens: int = 2048
+    max_tokens: Count = 2048
     """Longest answer, thinking included."""
-    timeout: float = 60.0
+    timeout: Positive = 60.0
     """For a connection, and from one part of an answer to the next, in [s]."""
-    max_retries: int = 2
+    max_retries: Annotated[int, msgspec.Meta(ge=0, le=20)] = 2
     """Repetitions of a request after a timeout, a lost connection, HTTP 429 or 5xx."""
-    max_image_side: int = 1000
+    max_image_side: Count = 1000
     """Larger pictures are shrunk before they are sent, in [px]: the scale is no finer."""
 
     def __post_init__(self) -> None:
@@ -66,21 +65,11 @@ class VisionLanguageModelConfig:
             raise ConfigurationError(
                 f"model family '{self.family}' is unknown; use one of {', '.join(FORMATS)}"
             )
-        if not 1 <= self.votes <= self.most_requests:
+        super().__post_init__()
+        if self.votes > self.most_requests:
             raise ConfigurationError(
                 f"{self.votes} votes in at most {self.most_requests} requests; expected "
-                "1 <= votes <= most_requests"
-            )
-        for name in ("spread_gate", "timeout", "max_tokens", "max_image_side"):
-            if not 0 < getattr(self, name) < math.inf:
-                raise ConfigurationError(
-                    f"{name} = {getattr(self, name)} must be greater than zero; leave it out for "
-                    "the default"
-                )
-        if not (0 <= self.max_retries <= _MOST_RETRIES and 0 <= self.temperature < math.inf):
-            raise ConfigurationError(
-                f"max_retries = {self.max_retries} must be 0 to {_MOST_RETRIES}, temperature = "
-                f"{self.temperature} finite and not negative; use 0 for none"
+                "votes <= most_requests"
             )
 
 
@@ -139,7 +128,14 @@ class OpenAIClient:
         import openai
 
         self.config, self.model = config, config.model
-        self._key = _key(config)
+        self._key = _NO_KEY  # the client insists on one; servers that want none take any
+        if config.api_key_variable is not None:
+            self._key = os.environ.get(config.api_key_variable, "")
+            if not self._key:
+                raise ConfigurationError(
+                    f"environment variable {config.api_key_variable} is not set; export the key of "
+                    f"{without_secrets(config.base_url)} in it"
+                )
         self._client = openai.OpenAI(
             base_url=config.base_url,
             api_key=self._key,
@@ -175,11 +171,11 @@ class OpenAIClient:
         # Whatever a server sends, the client's parsing included, is no reason to break off.
         except Exception as error:
             raise EndpointError(self._what_failed(error)) from None
-        thinking = choice.message.reasoning_content
+        thinking, reason = choice.message.reasoning_content, choice.finish_reason
         return Answer(
             self._hidden(choice.message.content or ""),
             None if thinking is None else self._hidden(thinking),
-            None if choice.finish_reason is None else self._hidden(choice.finish_reason),
+            None if reason is None else self._hidden(reason),
         )
 
     def close(self) -> None:
@@ -222,18 +218,6 @@ def _png_address(picture: Picture) -> str:
     data = io.BytesIO()
     Image.fromarray(picture).save(data, format="PNG")
     return f"data:image/png;base64,{base64.b64encode(data.getvalue()).decode()}"
-
-
-def _key(config: VisionLanguageModelConfig) -> str:
-    if config.api_key_variable is None:
-        return _NO_KEY  # the client insists on one; servers that want none take any
-    key = os.environ.get(config.api_key_variable, "")
-    if not key:
-        raise ConfigurationError(
-            f"environment variable {config.api_key_variable} is not set; export the key of "
-            f"{without_secrets(config.base_url)} in it"
-        )
-    return key
 
 
 def _extra_body(config: VisionLanguageModelConfig) -> dict[str, Any]:

@@ -71,14 +71,8 @@ FORMATS: dict[Family, BoxFormat] = {
 def size_to_send(width: int, height: int, most_side: int, box_format: BoxFormat) -> tuple[int, int]:
     """Return the largest size, at most a picture's own, that a server will leave as it is.
 
-    Args:
-        width: Picture width, in [px].
-        height: Picture height, in [px].
-        most_side: Longest side to send, in [px].
-        box_format: Of the model that will see it.
-
-    Returns:
-        Width and height to resize to, in [px]; the shape may change by less than a multiple.
+    All are in [px], `most_side` is the longest to send; the shape may change by less than a
+    multiple of the format's.
     """
     step = box_format.side_multiple
     shrink = min(1.0, most_side / max(width, height), math.sqrt(MOST_PIXELS / (width * height)))
@@ -94,16 +88,16 @@ def read_box(answer: str, box_format: BoxFormat, size: tuple[int, int]) -> Box:
     Args:
         answer: What the model said, drafts, markers and all.
         box_format: Of the model.
-        size: Width and height of the picture it was sent, in [px].
-
-    Returns:
-        The box in pixels of that picture.
+        size: Width and height of the picture it was sent, in [px]; the box is in its pixels.
 
     Raises:
         NotInPictureError: The answer is an empty list.
         UnreadableAnswerError: No box, several at once, or one that cannot be in the picture.
     """
-    said = " ".join(_without_thinking(answer).split())
+    _, thought_through, said = answer.rpartition("</think>")
+    if "<think>" in said and not thought_through:
+        raise UnreadableAnswerError("the answer ends while the model is still thinking")
+    said = " ".join(said.split())
     if len(said) > _LONGEST:
         raise UnreadableAnswerError(f"an answer of {len(said)} characters to a plain question")
     marked = _MARKED.findall(said)
@@ -111,7 +105,8 @@ def read_box(answer: str, box_format: BoxFormat, size: tuple[int, int]) -> Box:
     if boxes is None and marked:
         boxes = _last_boxes(said)
     if boxes is None:
-        raise UnreadableAnswerError(f"no box in the answer {_shown(said)}")
+        shown = said if len(said) <= 80 else said[:77] + "..."
+        raise UnreadableAnswerError(f"no box in the answer {shown!r}")
     if not boxes:
         raise NotInPictureError("the model says that it is not in the picture")
     if len(boxes) > 1:
@@ -128,16 +123,8 @@ _BOX_OR_EMPTY = re.compile(_BETWEEN.join([_NUMBER] * 4) + r"|\[[ \[\]]{0,40}\]")
 _MARKED = re.compile(
     r"<\|(?:begin_of_box|box_start)\|>(.*?)(?:<\|(?:end_of_box|box_end)\|>|\Z)", re.DOTALL
 )
+_SEPARATORS = re.compile(r"[\s,;\[\](){}<>]*")
 _MARKER = re.compile(r"<\|[a-z_]+\|>")
-
-
-def _without_thinking(answer: str) -> str:
-    before, closed, said = answer.rpartition("</think>")
-    if closed:
-        return said
-    if "<think>" in before or "<think>" in said:
-        raise UnreadableAnswerError("the answer ends while the model is still thinking")
-    return answer
 
 
 def _last_boxes(said: str) -> list[tuple[float, ...]] | None:
@@ -149,25 +136,16 @@ def _last_boxes(said: str) -> list[tuple[float, ...]] | None:
     text = " ".join(_MARKER.sub(" ", said).split())
     depths = list(accumulate((c in "[({") - (c in "])}") for c in text))
     last: list[tuple[float, ...]] | None = None
-    end = None
+    end = 0
     for found in _BOX_OR_EMPTY.finditer(text):
-        if found[1] is None:
-            last, end = [], None
-            continue
-        if last is None or end is None or not _same_list(text, depths, end, found.start()):
+        start, is_box = found.start(), found[1] is not None
+        follows = _SEPARATORS.fullmatch(text, end, start) or min(depths[end:start]) > 0
+        if last is None or not follows or not is_box:
             last = []
-        numbers = tuple(map(float, found.groups()))
-        if numbers not in last:
+        if is_box and (numbers := tuple(map(float, found.groups()))) not in last:
             last.append(numbers)
         end = found.end()
     return last
-
-
-def _same_list(text: str, depths: list[int], end: int, start: int) -> bool:
-    between = text[end:start]
-    if not re.search(r"[^\s,;\[\](){}<>]", between):
-        return True
-    return min(depths[end:start]) > 0
 
 
 def _in_pixels(numbers: tuple[float, ...], box_format: BoxFormat, size: tuple[int, int]) -> Box:
@@ -182,8 +160,3 @@ def _in_pixels(numbers: tuple[float, ...], box_format: BoxFormat, size: tuple[in
         raise UnreadableAnswerError(f"box {list(numbers)} has no area")
     per_x, per_y = size[0] / most_x, size[1] / most_y
     return left * per_x, top * per_y, right * per_x, bottom * per_y
-
-
-def _shown(text: str) -> str:
-    flat = " ".join(text.split())
-    return repr(flat if len(flat) <= 80 else flat[:77] + "...")

@@ -107,24 +107,22 @@ class PictureReading:
                 if answer.box is not None:
                     pen.rectangle(answer.box, outline=colour, width=1)
         if self.reached.box is not None and self.goal_pixel is not None:
-            pen.line([self.goal_pixel, _middle(self.reached.box)], fill="black", width=2)
+            left, top, right, bottom = self.reached.box
+            middle = ((left + right) / 2, (top + bottom) / 2)
+            pen.line([self.goal_pixel, middle], fill="black", width=2)
             pen.circle(self.goal_pixel, 4, outline="black", width=2)
-        agreed = [(sighting.words, sighting.box, colour) for sighting, colour in found]
-        boxes = np.array([box for _, box, _ in agreed if box is not None]).reshape(-1, 4)
+        agreed = [(s.words, s.box, colour) for s, colour in found if s.box is not None]
+        boxes = np.array([box for _, box, _ in agreed]).reshape(-1, 4)
         # The upper object's words go above it, the lower's below it; of two that are close
         # together, above and below both, so that words never cover a box.
-        close = len(boxes) == 2 and np.ptp(boxes[:, :2] + boxes[:, 2:], axis=0).max() < (
-            2 * image.width / 5
-        )
-        for words, box, colour in agreed:
-            if box is not None:
-                left, top, right, bottom = box
-                pen.rectangle((left - 3, top - 3, right + 3, bottom + 3), outline=colour, width=3)
-                above = top + bottom == (boxes[:, 1] + boxes[:, 3]).min()
-                if close:
-                    top, bottom = boxes[:, 1].min(), boxes[:, 3].max()
-                at = ((left + right) / 2, top - 8 if above else bottom + 8)
-                _write(pen, words, at, colour, image.size, above=above)
+        apart = np.ptp(boxes[:, :2] + boxes[:, 2:], axis=0).max() if len(boxes) == 2 else np.inf
+        for words, (left, top, right, bottom), colour in agreed:
+            pen.rectangle((left - 3, top - 3, right + 3, bottom + 3), outline=colour, width=3)
+            above = top + bottom == (boxes[:, 1] + boxes[:, 3]).min()
+            if apart < 2 * image.width / 5:
+                top, bottom = boxes[:, 1].min(), boxes[:, 3].max()
+            at = ((left + right) / 2, top - 8 if above else bottom + 8)
+            _write(pen, words, at, colour, image.size, above=above)
         return np.asarray(image)
 
     def save(self, folder: Path, stem: str) -> None:
@@ -138,23 +136,26 @@ class PictureReading:
         write(folder / f"{stem}.json", record + "\n")
 
     def _record(self) -> dict[str, Any]:
-        error = self.error_seen
         return {
             "model": self.model,
             "picture_size_px": [self.picture.shape[1], self.picture.shape[0]],
-            "error_seen_m": None if error is None else error.tolist(),
+            "error_seen_m": _listed(self.error_seen),
             "problem": self.problem,
             "reached": _sighting_record(self.reached),
             "goal": None if self.goal is None else _sighting_record(self.goal),
-            "goal_place_m": None if self.goal_place is None else self.goal_place.tolist(),
+            "goal_place_m": _listed(self.goal_place),
         }
+
+
+def _listed(place: Float[np.ndarray, "2"] | None) -> list[float] | None:
+    return None if place is None else place.tolist()
 
 
 def _sighting_record(sighting: Sighting) -> dict[str, Any]:
     return {
         "words": sighting.words,
         "box_px": sighting.box,
-        "place_m": None if sighting.place is None else sighting.place.tolist(),
+        "place_m": _listed(sighting.place),
         "problem": sighting.problem,
         "answers": [vars(answer) for answer in sighting.answers],
     }
@@ -174,16 +175,5 @@ def _write(
     half = pen.textlength(words, font_size=font_size) / 2 + 4
     x = min(max(at[0], half), size[0] - half)
     y = max(at[1], font_size + 4) if above else min(at[1], size[1] - font_size - 4)
-    pen.text(
-        (x, y),
-        words,
-        fill=colour,
-        anchor="mb" if above else "mt",
-        font_size=font_size,
-        stroke_width=3,
-        stroke_fill="white",
-    )
-
-
-def _middle(box: Box) -> tuple[float, float]:
-    return (box[0] + box[2]) / 2, (box[1] + box[3]) / 2
+    look: Any = {"font_size": font_size, "stroke_width": 3, "stroke_fill": "white"}
+    pen.text((x, y), words, fill=colour, anchor="mb" if above else "mt", **look)

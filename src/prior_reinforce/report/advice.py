@@ -10,22 +10,12 @@ from jaxtyping import Float
 from matplotlib.ticker import PercentFormatter
 
 from prior_reinforce.arrays import Point, Points
+from prior_reinforce.report import style
 from prior_reinforce.report.panels import axis_label
 from prior_reinforce.report.record import drawn_scale
-from prior_reinforce.report.style import (
-    DEMONSTRATION,
-    GOAL,
-    HIT,
-    INK,
-    INK_SOFT,
-    calm_axes,
-    drawing,
-    new_figure,
-    save_figure,
-)
 
 
-@drawing()
+@style.drawing()
 def draw_advice(
     path: Path,
     goals: Points,
@@ -55,28 +45,28 @@ def draw_advice(
     x, y = (np.unique(goals[:, j]) for j in range(2))
     # As high as the region at this width, and what stands below it.
     height = 4.8 * np.ptp(x) / np.ptp(y) if units[0] == units[1] else 3.0
-    figure = new_figure(6.4, 1.1 + float(np.clip(height, 1.5, 6.0)))
+    figure = style.new_figure(6.4, 1.1 + float(np.clip(height, 1.5, 6.0)))
     axes = figure.add_subplot()
-    calm_axes(axes, grid=False)
+    style.calm_axes(axes, grid=False)
     # As seen from the robot: ahead is up, left is left.
     shade = axes.pcolormesh(
         y, x, p_hit.reshape(len(x), len(y)), cmap="Greys", vmin=0.0, vmax=1.0, shading="gouraud"
     )
     bar = figure.colorbar(shade, cax=axes.inset_axes((1.04, 0, 0.035, 1)))  # as high as the panel
-    bar.set_label("probability that\na first throw hits", color=INK_SOFT)
+    bar.set_label("probability that\na first throw hits", color=style.INK_SOFT)
     bar.ax.yaxis.set_major_formatter(PercentFormatter(1.0))
-    bar.ax.tick_params(labelsize=9, colors=INK_SOFT)
+    bar.ax.tick_params(labelsize=9, colors=style.INK_SOFT)
     marks = [
-        (demonstrated, "o", 42, DEMONSTRATION, "demonstrated"),
-        (throw[None], "*", 260, GOAL, "throw that teaches most"),
+        (demonstrated, "o", 42, style.DEMONSTRATION, "demonstrated"),
+        (throw[None], "*", 260, style.GOAL, "throw that teaches most"),
     ]
     if demonstration is not None:  # the diamond fits into the star, for both are often at one place
         shown = scale * demonstration[None]
-        marks.append((shown, "D", 26, HIT, "demonstration that teaches most"))
+        marks.append((shown, "D", 26, style.HIT, "demonstration that teaches most"))
     for points, mark, size, colour, label in marks:
         axes.scatter(
             points[:, 1], points[:, 0], marker=mark, s=size, color=colour,
-            edgecolors=INK, linewidths=0.8, label=label, zorder=3, clip_on=False,
+            edgecolors=style.INK, linewidths=0.8, label=label, zorder=3, clip_on=False,
         )  # fmt: skip
     axes.invert_xaxis()
     axes.set_xlabel(axis_label(names, units, 1, mirrored=True))
@@ -84,4 +74,4 @@ def draw_advice(
     if units[0] == units[1]:
         axes.set_aspect("equal")
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=3, frameon=False, fontsize=8)
-    return save_figure(figure, path)
+    return style.save_figure(figure, path)

@@ -30,15 +30,15 @@ def draw_badges(
     away_from: _Place,
     avoid: Sequence[_Place] = (),
 ) -> None:
-    """Draw a label near each place.
+    """Draw a label near each place; all places are in data coordinates.
 
     Args:
         axes: Of a figure that is laid out; its limits must not change afterwards.
-        places: In data coordinates.
+        places: What is labelled.
         labels: One a place.
         colours: One a place.
-        away_from: Where badges should not point to (the goal), in data coordinates.
-        avoid: Other marks that badges should not cover, in data coordinates.
+        away_from: Where badges should not point to (the goal).
+        avoid: Other marks that badges should not cover.
     """
     longest = max(map(len, labels), default=1)
     size = np.array([_HEIGHT + _LETTER * (longest - 1), _HEIGHT])
@@ -51,7 +51,7 @@ def draw_badges(
 
     def cost(mark: _Place, offset: _Place, detour: float) -> float:
         place = mark + offset
-        outside = np.any(place < low + size / 2) or np.any(place > high - size / 2)
+        outside = np.any((place < low + size / 2) | (place > high - size / 2))
         covered = np.linalg.norm((marks - place) / size, axis=1) < 0.7
         clashes = [np.linalg.norm((place - other) / size) < 1.1 for other in taken]
         return detour + 100 * sum(clashes) + 50 * bool(outside) + 3 * float(covered.sum())

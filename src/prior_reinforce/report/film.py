@@ -62,10 +62,9 @@ def record_film(
 
 
 def key_moments(pictures: Sequence[_Picture], moments: int) -> list[int]:
-    """Choose pictures that are about equally far apart, counting motion more than time.
+    """Indices of pictures about equally far apart, the first and the last among them.
 
-    Returns:
-        Rising indices, the first and the last picture among them.
+    Motion counts more than time.
     """
     n = len(pictures)
     if n <= moments:
@@ -76,13 +75,10 @@ def key_moments(pictures: Sequence[_Picture], moments: int) -> list[int]:
     motion = motion / motion.sum() if motion.sum() > 0 else motion
     steps = (1 - _STILLNESS_SHARE) * motion + _STILLNESS_SHARE / (n - 1)
     way = np.concatenate([[0.0], np.cumsum(steps)])
-    wanted = np.linspace(0.0, way[-1], moments)
-    chosen = [int(np.abs(way - w).argmin()) for w in wanted]
-    for i in range(1, moments):  # One jump of the picture must not be chosen twice.
-        chosen[i] = max(chosen[i], chosen[i - 1] + 1)
-    for i in range(moments - 1, -1, -1):
-        chosen[i] = min(chosen[i], n - moments + i)
-    return chosen
+    nearest = np.abs(way[:, None] - np.linspace(0.0, way[-1], moments)).argmin(axis=0)
+    order = np.arange(moments)  # one jump of the picture must not be chosen twice
+    chosen = np.maximum.accumulate(nearest - order) + order
+    return np.minimum(chosen, n - moments + order).tolist()
 
 
 def _write_video(pictures: Iterator[_Picture], path: Path, fps: int) -> Path:

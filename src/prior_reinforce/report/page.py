@@ -14,19 +14,9 @@ from numpy.typing import ArrayLike
 
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.files import write
+from prior_reinforce.report import summary
 from prior_reinforce.report.html import data_uri, render
 from prior_reinforce.report.record import AdaptationRecord, Box
-from prior_reinforce.report.summary import (
-    CALLED,
-    explain_words,
-    headline,
-    numbers,
-    outcome_line,
-    say_goal,
-    say_tolerance,
-    titles,
-    trial_rows,
-)
 from prior_reinforce.wording import in_words
 
 if TYPE_CHECKING:
@@ -35,9 +25,8 @@ if TYPE_CHECKING:
 LARGEST_INLINE_FILE = 3_000_000
 """[bytes]; a larger film or photograph lies beside the page, so that the page opens fast."""
 
-_PICTURES = ("table", "landings", "aims", "errors", "plans")
-_OF_A_GOAL = re.compile(rf"goal-\d+-(?:{'|'.join(_PICTURES)})\.(?:png|svg)")
-"""Of a goal, `goal-3-table.svg`, PNG in earlier versions; those that show something are drawn."""
+_OF_A_GOAL = re.compile(r"goal-\d+-(?:table|landings|aims|errors|plans)\.(?:png|svg)")
+"""Pictures of a goal, `goal-3-table.svg`, PNG in earlier versions."""
 
 
 def write_report(
@@ -76,42 +65,41 @@ def write_report(
     if not adaptations:
         raise ConfigurationError("a report needs at least one adaptation, got none")
     box = None if region is None else np.array(region, dtype=float)
-    for record in adaptations:
-        if box is not None and box.shape != (2, record.goal.size):
+    for k in {record.goal.size for record in adaptations}:
+        if box is not None and box.shape != (2, k):
             raise ConfigurationError(
-                f"region must have shape (2, {record.goal.size}), lower and upper corner, got "
-                f"{box.shape}"
+                f"region must have shape (2, {k}), lower and upper corner, got {box.shape}"
             )
-    if len(set(numbers(adaptations))) < len(adaptations):
+    if len(set(summary.numbers(adaptations))) < len(adaptations):
         raise ConfigurationError(
-            f"two goals go by one number in {numbers(adaptations)}; number all or none"
+            f"two goals go by one number in {summary.numbers(adaptations)}; number all or none"
         )
-    folder = Path(folder)
+    folder, several = Path(folder), len(adaptations) > 1
     first = adaptations[0].demonstrations
-    one_table = len(adaptations) > 1 and all(r.demonstrations is first for r in adaptations)
+    overview = by_goal = None
     sections = []
     for number, called, record in zip(
-        numbers(adaptations), titles(adaptations), adaptations, strict=True
+        summary.numbers(adaptations), summary.titles(adaptations), adaptations, strict=True
     ):
         sections.append(_section(folder, record, f"goal-{number}", called, box))
         if progress is not None:
             progress(len(sections), len(adaptations))
+    if several:
+        by_goal = _picture(draw_trials_by_goal(adaptations), folder / "trials-by-goal.svg")
+    if several and all(record.demonstrations is first for record in adaptations):
+        overview = _picture(draw_table(adaptations, box), folder / "overview.svg")
     page = render(
         "page.html",
         title=title,
-        headline=headline(adaptations),
-        overview=_picture(draw_table(adaptations, box), folder / "overview.svg")
-        if one_table
-        else None,
-        by_goal=_picture(draw_trials_by_goal(adaptations), folder / "trials-by-goal.svg")
-        if len(adaptations) > 1
-        else None,
+        headline=summary.headline(adaptations),
+        overview=overview,
+        by_goal=by_goal,
         sections=sections,
         note=note,
         from_behind=first.outcome_dim > 1 and in_words(first.outcome_units),
         any_truth=any(_knows_truth(record) for record in adaptations),
-        words=explain_words(adaptations[0]),
-        any_called=any(row.off.startswith(CALLED) for s in sections for row in s["rows"]),
+        words=summary.explain_words(adaptations[0]),
+        any_called=any(row.off.startswith(summary.CALLED) for s in sections for row in s["rows"]),
         facts=dict(facts or {}),
     )
     drawn = {f"{s['anchor']}-{name}.svg" for s in sections for name in s["pictures"]}
@@ -137,24 +125,19 @@ def _section(
     if record.trials:
         figures |= {"aims": draw_close_up(record, aims=True), "plans": draw_plans(record)}
     return {
+        "record": record,
         "anchor": stem,
         "title": title,
-        "place": say_goal(record),
-        "tolerance": say_tolerance(record),
-        "outcome": outcome_line(record),
-        "reached": record.trials_to_hit is not None,
-        "rows": trial_rows(record),
+        "place": summary.say_goal(record),
+        "tolerance": summary.say_tolerance(record),
+        "outcome": summary.outcome_line(record),
+        "rows": summary.trial_rows(record),
         "colours": [trial_colour(i, n, hit=trial.hit) for i, trial in enumerate(record.trials)],
-        "joints": record.demonstrations.format.names,
         "knows_truth": _knows_truth(record),
         "expects": any(trial.p_hit is not None for trial in record.trials),
-        "notes": record.notes,
-        "measured": bool(record.measured),
         "photographs": [(said, _file(folder, picture)) for said, picture in record.photographs],
-        "checks": record.checks,
         "strip": record.film and data_uri(record.film.strip),
         "video": record.film and _file(folder, record.film.video),
-        "film_caption": record.film_caption,
         "pictures": {
             name: _picture(figure, folder / f"{stem}-{name}.svg")
             for name, figure in figures.items()

@@ -15,17 +15,9 @@ from matplotlib.patches import Ellipse, FancyArrowPatch, Rectangle
 from matplotlib.ticker import MaxNLocator
 
 from prior_reinforce.arrays import Point
+from prior_reinforce.report import style
 from prior_reinforce.report.badges import draw_badges
 from prior_reinforce.report.record import AdaptationRecord, Box, drawn_scale
-from prior_reinforce.report.style import (
-    DEMONSTRATION,
-    GOAL,
-    INK_SOFT,
-    LINE,
-    REGION,
-    calm_axes,
-    trial_colour,
-)
 from prior_reinforce.report.summary import titles
 from prior_reinforce.session.trials import Stage
 from prior_reinforce.wording import WORDS, in_words
@@ -72,18 +64,13 @@ class Panel:
     def __init__(
         self, axes: Axes, view: View, record: AdaptationRecord, extent: Box, n_rows: int
     ) -> None:
-        """Label axes, and limit them to what is to be seen.
+        """Label axes, and limit them to what is to be seen: an extent in the units drawn.
 
-        Args:
-            axes: To draw in.
-            view: What they show.
-            record: Names and units of the components, and the demonstrations.
-            extent: What is to be seen, in the units drawn.
-            n_rows: Rows that stand below each other on a line.
+        On a line, `n_rows` stand below each other.
         """
         self._axes, self._view, self._record = axes, view, record
-        calm_axes(axes, grid=view.up is not None)
-        axes.set_title(view.title, fontsize=10, loc="left", color=INK_SOFT)
+        style.calm_axes(axes, grid=view.up is not None)
+        axes.set_title(view.title, fontsize=10, loc="left", color=style.INK_SOFT)
         axes.set_xlim(*extent[:: -1 if view.mirrored else 1, view.across])
         axes.set_xlabel(self._axis_label(view.across))
         axes.xaxis.set_major_locator(MaxNLocator(9, steps=[1, 2, 5, 10]))
@@ -109,19 +96,11 @@ class Panel:
         across, up = (left + right) / 2, (low + high) / 2
         axes.set_xbound(across - half * box.width, across + half * box.width)
         axes.set_ybound(up - half * box.height, up + half * box.height)
-        self._drop_ticks_beyond_the_paper()
-
-    def _drop_ticks_beyond_the_paper(self) -> None:
-        """Leave out the ticks whose labels other limits put over the figure's edge."""
-        axes, (low, high) = self._axes, self._axes.get_xbound()
-        edge = axes.figure.bbox.x1
-        axes.set_xticks(
-            [
-                tick
-                for tick, label in zip(axes.get_xticks(), axes.get_xticklabels(), strict=True)
-                if low <= tick <= high and label.get_window_extent().x1 <= edge
-            ]
-        )
+        # Ticks are left out whose labels the new limits put over the figure's edge.
+        (low, high), edge = axes.get_xbound(), axes.figure.bbox.x1
+        ticks = zip(axes.get_xticks(), axes.get_xticklabels(), strict=True)
+        inside = [(tick, label) for tick, label in ticks if low <= tick <= high]
+        axes.set_xticks([tick for tick, label in inside if label.get_window_extent().x1 <= edge])
 
     def draw_region(self, region: Box) -> None:
         """Shade the region of goals."""
@@ -129,13 +108,15 @@ class Panel:
         if self._view.up is None:
             low[1], high[1] = self._axes.get_ylim()
         self._axes.add_patch(
-            Rectangle(tuple(low), *(high - low), facecolor=REGION, edgecolor=LINE, zorder=0)
+            Rectangle(
+                tuple(low), *(high - low), facecolor=style.REGION, edgecolor=style.LINE, zorder=0
+            )
         )
 
     def draw_demonstrations(self) -> None:
         """Draw where the demonstrations ended."""
         for outcome in self._record.demonstrations.outcomes_seen:
-            self._mark(self._place(outcome), "D", DEMONSTRATION, zorder=3)
+            self._mark(self._place(outcome), "D", style.DEMONSTRATION, zorder=3)
 
     def draw_goal(self, record: AdaptationRecord) -> None:
         """Draw a goal and all that counts as reached."""
@@ -143,14 +124,14 @@ class Panel:
         radius = record.half_axes * record.scale
         across = radius[self._view.across]
         if self._view.up is None:
-            self._axes.axvspan(x - across, x + across, color=GOAL, alpha=0.13, linewidth=0)
-            self._axes.axvline(x, color=GOAL, linewidth=1.6, zorder=2)
+            self._axes.axvspan(x - across, x + across, color=style.GOAL, alpha=0.13, linewidth=0)
+            self._axes.axvline(x, color=style.GOAL, linewidth=1.6, zorder=2)
             return
-        edge: Any = {"facecolor": "none", "edgecolor": GOAL, "linewidth": 1.6, "zorder": 4}
+        edge: Any = {"facecolor": "none", "edgecolor": style.GOAL, "linewidth": 1.6, "zorder": 4}
         size = 2 * across, 2 * radius[self._view.up]
-        self._axes.add_patch(Ellipse((x, y), *size, facecolor=GOAL, alpha=0.13, zorder=1))
+        self._axes.add_patch(Ellipse((x, y), *size, facecolor=style.GOAL, alpha=0.13, zorder=1))
         self._axes.add_patch(Ellipse((x, y), *size, **edge))
-        self._axes.plot(x, y, "+", color=GOAL, markersize=7, markeredgewidth=1.6, zorder=4)
+        self._axes.plot(x, y, "+", color=style.GOAL, markersize=7, markeredgewidth=1.6, zorder=4)
 
     def draw_trials(
         self,
@@ -179,7 +160,7 @@ class Panel:
                 continue
             row = 1 + i if numbered else 1
             place = self._place(point, row)
-            colour = trial_colour(i, len(record.trials), hit=trial.hit)
+            colour = style.trial_colour(i, len(record.trials), hit=trial.hit)
             start = self._place(record.goal, row)
             if aims:
                 start = places[-1] if places else place
@@ -193,8 +174,8 @@ class Panel:
             if with_truth and truth is not None:
                 true_places.append(self._place(truth, row))
                 dotted = np.stack([place, true_places[-1]]).T
-                self._axes.plot(*dotted, ":", color=INK_SOFT, linewidth=1, zorder=5)
-                self._mark(true_places[-1], "o", "white", edge=INK_SOFT, zorder=5)
+                self._axes.plot(*dotted, ":", color=style.INK_SOFT, linewidth=1, zorder=5)
+                self._mark(true_places[-1], "o", "white", edge=style.INK_SOFT, zorder=5)
             places.append(place)
             labels.append(str(trial.number))
             colours.append(colour)
@@ -206,17 +187,10 @@ class Panel:
         """Call the goals what the page calls them."""
         goals = [self._place(record.goal) for record in records]
         landings = [point for r in records for point in r.landings if point is not None]
-        draw_badges(
-            self._axes,
-            goals,
-            titles(records),
-            [GOAL] * len(records),
-            away_from=np.mean(goals, axis=0),
-            avoid=[
-                self._place(point)
-                for point in (*self._record.demonstrations.outcomes_seen, *landings)
-            ],
-        )
+        shown = (*self._record.demonstrations.outcomes_seen, *landings)
+        avoid = [self._place(point) for point in shown]
+        colours, middle = [style.GOAL] * len(records), np.mean(goals, axis=0)
+        draw_badges(self._axes, goals, titles(records), colours, away_from=middle, avoid=avoid)
 
     def _place(self, point: Point, row: int = 0) -> _Place:
         """Where an outcome stands on paper; on a line, in a row from the top."""
@@ -224,9 +198,8 @@ class Panel:
         return np.array([drawn[view.across], -row if view.up is None else drawn[view.up]])
 
     def _axis_label(self, component: int) -> str:
-        shown = self._record.demonstrations
         mirrored = self._view.mirrored and component == self._view.across
-        return axis_label(shown.outcome_names, shown.outcome_units, component, mirrored=mirrored)
+        return axis_label(*self._record.labels, component, mirrored=mirrored)
 
     def _mark(
         self, place: _Place, marker: str, colour: str, *, edge: str = "white", zorder: int
@@ -236,17 +209,7 @@ class Panel:
     def _draw_arrow(self, start: _Place, end: _Place, colour: str, *, dashed: bool) -> None:
         pixels = np.diff(self._axes.transData.transform([start, end]), axis=0)
         short = np.linalg.norm(pixels) * 72 / self._axes.figure.dpi < _SHORT_ARROW
-        self._axes.add_patch(
-            FancyArrowPatch(
-                tuple(start),
-                tuple(end),
-                arrowstyle="-" if short else "-|>",
-                mutation_scale=9,
-                shrinkA=0,
-                shrinkB=3.5,
-                color=colour,
-                linewidth=1.5,
-                linestyle=(0, (2, 1.5)) if dashed else "-",
-                zorder=5,
-            )
-        )
+        line = (0, (2, 1.5)) if dashed else "-"
+        look: Any = {"mutation_scale": 9, "shrinkA": 0, "shrinkB": 3.5, "linewidth": 1.5}
+        look |= {"arrowstyle": "-" if short else "-|>", "linestyle": line, "color": colour}
+        self._axes.add_patch(FancyArrowPatch(tuple(start), tuple(end), zorder=5, **look))

@@ -12,20 +12,9 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from prior_reinforce.arrays import Point, Points
+from prior_reinforce.report import style
 from prior_reinforce.report.panels import Panel, views_of
 from prior_reinforce.report.record import AdaptationRecord, Box
-from prior_reinforce.report.style import (
-    DEMONSTRATION,
-    GOAL,
-    HIT,
-    LINE,
-    REGION,
-    add_legend,
-    drawing,
-    lay_out,
-    new_figure,
-    trial_colour,
-)
 from prior_reinforce.report.summary import say_tolerance
 from prior_reinforce.session.trials import Stage
 
@@ -36,7 +25,7 @@ _LEAST_HEIGHT = 1.6  # [inch], of a panel inside its labels
 _ROW = 0.45  # [inch], of a trial where k = 1
 
 
-@drawing()
+@style.drawing()
 def draw_table(records: Sequence[AdaptationRecord], region: Box | None = None) -> Figure:
     """Draw the whole table: demonstrations, goals, and what was seen of every trial.
 
@@ -49,7 +38,7 @@ def draw_table(records: Sequence[AdaptationRecord], region: Box | None = None) -
     legend = _legend(first)
     seen = [*first.demonstrations.outcomes_seen]
     if region is not None:
-        legend["region of goals"] = Patch(facecolor=REGION, edgecolor=LINE)
+        legend["region of goals"] = Patch(facecolor=style.REGION, edgecolor=style.LINE)
         seen += [*region]
     for record in records:
         seen += [record.goal, *(point for point in record.landings if point is not None)]
@@ -69,7 +58,7 @@ def draw_table(records: Sequence[AdaptationRecord], region: Box | None = None) -
     return figure
 
 
-@drawing()
+@style.drawing()
 def draw_close_up(record: AdaptationRecord, *, aims: bool = False) -> Figure:
     """Draw where each trial was seen to land, or where it was aimed."""
     seen = [record.goal, *(trial.condition for trial in record.trials)]
@@ -77,7 +66,7 @@ def draw_close_up(record: AdaptationRecord, *, aims: bool = False) -> Figure:
         seen += [point for point in record.landings if point is not None]
         seen += _near(np.stack(seen), record.true_outcomes)
     n_rows = 1 + len(record.trials)
-    legend = _legend_of_aims(record) if aims else None
+    legend = _legend(record, aims=True) if aims else None
     figure, panels = _panels(record, seen, margin=0.14, least=3, n_rows=n_rows, legend=legend)
     for panel in panels:
         panel.draw_demonstrations()
@@ -125,15 +114,15 @@ def _panels(
     elif flat and record.unit():
         wanted = (_WIDTH - _LABELS[0]) * max(half[view.up] / half[view.across] for view in views)
     height = np.clip(wanted, _LEAST_HEIGHT, _HEIGHT - around) + around
-    figure = new_figure(_WIDTH * len(views), height)
+    figure = style.new_figure(_WIDTH * len(views), height)
     panels = [
         Panel(axes, view, record, np.stack([middle - half, middle + half]), n_rows)
         for axes, view in zip(figure.subplots(1, len(views), squeeze=False)[0], views, strict=True)
     ]
     if legend:
         side_by_side = {tuple: HandlerTuple(ndivide=None)}
-        add_legend(figure, legend, "center", handler_map=side_by_side)
-    lay_out(figure)  # so that data coordinates have their place on paper
+        style.add_legend(figure, legend, "center", handler_map=side_by_side)
+    style.lay_out(figure)  # so that data coordinates have their place on paper
     for panel in panels:
         panel.equalise()
     return figure, panels
@@ -143,30 +132,18 @@ def _mark(colour: str, marker: str = "o", **more: Any) -> Line2D:
     return Line2D([], [], linestyle="", marker=marker, markersize=5, color=colour, **more)
 
 
-def _legend_of_goal(record: AdaptationRecord) -> dict[str, Any]:
-    return {
-        f"goal ± {say_tolerance(record)}": _mark(GOAL, markerfacecolor="none"),
-        "demonstrations": _mark(DEMONSTRATION, "D"),
-    }
-
-
-def _legend(record: AdaptationRecord) -> dict[str, Any]:
+def _legend(record: AdaptationRecord, *, aims: bool = False) -> dict[str, Any]:
     """Marks by what they mean; a tuple of marks stands side by side."""
-    return {
-        **_legend_of_goal(record),
-        "misses, first to last": tuple(_mark(trial_colour(i, 3)) for i in range(3)),
-        "hits": _mark(HIT),
+    tried, marker = ("aims", "s") if aims else ("misses", "o")
+    legend: dict[str, Any] = {
+        f"goal ± {say_tolerance(record)}": _mark(style.GOAL, markerfacecolor="none"),
+        "demonstrations": _mark(style.DEMONSTRATION, "D"),
+        f"{tried}, first to last": tuple(_mark(style.trial_colour(i, 3), marker) for i in range(3)),
     }
-
-
-def _legend_of_aims(record: AdaptationRecord) -> dict[str, Any]:
-    """The same for aims, hits and voided ones where there are any."""
-    legend = {
-        **_legend_of_goal(record),
-        "aims, first to last": tuple(_mark(trial_colour(i, 3), "s") for i in range(3)),
-    }
-    if record.trials_to_hit is not None:
-        legend["aim that hit"] = _mark(HIT, "s")
-    if any(trial.stage is Stage.VOIDED for trial in record.trials):
-        legend["voided"] = _mark(trial_colour(2, 3), "s", markerfacecolor="white")
+    if not aims:
+        legend["hits"] = _mark(style.HIT)
+    elif record.trials_to_hit is not None:
+        legend["aim that hit"] = _mark(style.HIT, "s")
+    if aims and any(trial.stage is Stage.VOIDED for trial in record.trials):
+        legend["voided"] = _mark(style.trial_colour(2, 3), "s", markerfacecolor="white")
     return legend

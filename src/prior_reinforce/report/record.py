@@ -98,14 +98,18 @@ class AdaptationRecord:
             InvalidGoalError: The goal has a wrong shape, or is not finite.
             ConfigurationError: There are not as many outcomes as trials, or the tolerance is none.
         """
-        names, units = self.demonstrations.outcome_names, self.demonstrations.outcome_units
-        object.__setattr__(self, "goal", as_goal(self.goal, names))
-        as_tolerance(self.tolerance, names, units)
+        object.__setattr__(self, "goal", as_goal(self.goal, self.labels[0]))
+        as_tolerance(self.tolerance, *self.labels)
         if self.outcomes is not None and len(self.outcomes) != len(self.trials):
             raise ConfigurationError(
                 f"{len(self.trials)} trials need as many true outcomes, got {len(self.outcomes)}; "
                 "give None where one is not known"
             )
+
+    @property
+    def labels(self) -> tuple[Sequence[str], Sequence[str]]:
+        """Names of the outcomes' components, and their units."""
+        return self.demonstrations.outcome_names, self.demonstrations.outcome_units
 
     @property
     def told(self) -> tuple[Trial, ...]:
@@ -120,9 +124,7 @@ class AdaptationRecord:
     @property
     def half_axes(self) -> Point:
         """The tolerance of each component, in its unit."""
-        demonstrations = self.demonstrations
-        names, units = demonstrations.outcome_names, demonstrations.outcome_units
-        return as_tolerance(self.tolerance, names, units)
+        return as_tolerance(self.tolerance, *self.labels)
 
     @property
     def distance_unit(self) -> str:
@@ -160,12 +162,12 @@ class AdaptationRecord:
     @property
     def scale(self) -> float:
         """Number that turns the outcomes' unit into the one drawn: metres become centimetres."""
-        return drawn_scale(self.demonstrations.outcome_units)
+        return drawn_scale(self.labels[1])
 
     def unit(self, *components: int) -> str:
         """Unit drawn for some components, or for distances over all; empty where they differ."""
-        units = self.demonstrations.outcome_units
-        drawn = {units[i] for i in components or range(len(units))}
+        units = self.labels[1]
+        drawn = {units[i] for i in components} or set(units)
         return "cm" if self.scale == 100 else drawn.pop() if len(drawn) == 1 else ""
 
     def _landing(self, trial: Trial) -> Point | None:

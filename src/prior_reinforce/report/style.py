@@ -61,9 +61,8 @@ def trial_colour(position: int, n: int, *, hit: bool = False) -> str:
     if hit:
         return HIT
     share = position / (n - 1) if n > 1 else 1.0
-    first, last = to_rgb(_TRIAL_FIRST), to_rgb(_TRIAL_LAST)
-    red, green, blue = (a + share * (b - a) for a, b in zip(first, last, strict=True))
-    return to_hex((red, green, blue))
+    first, last = np.array(to_rgb(_TRIAL_FIRST)), np.array(to_rgb(_TRIAL_LAST))
+    return to_hex(tuple(first + share * (last - first)))
 
 
 def text_on(colour: str) -> str:
@@ -73,12 +72,9 @@ def text_on(colour: str) -> str:
 
 
 def new_figure(width: float, height: float, *, laid_out: bool = True) -> Figure:
-    """Make an empty figure outside matplotlib's list of figures.
+    """Make an empty figure, in [inch], outside matplotlib's list of figures.
 
-    Args:
-        width: In [inch].
-        height: In [inch].
-        laid_out: Let matplotlib arrange panels and labels; otherwise the caller does.
+    Matplotlib arranges panels and labels, unless `laid_out` is False: then the caller does.
     """
     layout: Any = "constrained" if laid_out else None
     figure = Figure(figsize=(width, height), dpi=PICTURE_DPI, layout=layout)
@@ -103,14 +99,9 @@ def calm_axes(axes: Axes, *, grid: bool = True) -> None:
 def add_legend(
     figure: Figure, marks: Mapping[str, Any], side: str = "left", ncols: int = 3, **more: Any
 ) -> None:
-    """Add a legend above all panels.
+    """Add a legend above all panels of a figure that is not laid out yet: marks by their meaning.
 
-    Args:
-        figure: Not laid out yet.
-        marks: By what they mean.
-        side: `left` or `center`.
-        ncols: Columns.
-        more: Further settings of `Figure.legend`.
+    It stands at a side, `left` or `center`; `more` are further settings of `Figure.legend`.
     """
     place: Any = f"outside upper {side}"
     grey: Any = {"frameon": False, "fontsize": 9, "labelcolor": INK_SOFT, "ncols": ncols}
@@ -133,11 +124,7 @@ def lay_out(figure: Figure) -> None:
 
 
 def save_figure(figure: Figure, path: Path) -> Path:
-    """Write a PNG or an SVG, as its name says, whole or not at all: one figure, the same bytes.
-
-    Returns:
-        The path.
-    """
+    """Write a PNG or an SVG, as its name says, whole or not at all: one figure, the same bytes."""
     with drawing(), in_place(path) as unfinished:
         lay_out(figure)
         kind = path.suffix.lower()[1:]

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from prior_reinforce import wording
-from prior_reinforce.readings import Reading
 from prior_reinforce.report.record import AdaptationRecord
 from prior_reinforce.session.trials import Stage, Trial
 from prior_reinforce.wording import error_words, in_words, say_place, say_reading, to_words
@@ -18,8 +17,6 @@ _OPEN = {
     Stage.EXECUTING: "executing",
     Stage.EXECUTED: "executed, not told yet",
 }
-
-
 CALLED = "called "
 """Before the distance of a hit that was told to lie farther off than the tolerance."""
 _MEANS = {
@@ -89,20 +86,21 @@ def headline(records: Sequence[AdaptationRecord]) -> Headline:
     if len(demonstrated) > 1:
         return Headline(text, "", within)
     n, mean = demonstrated.pop(), float(np.mean(counts))
-    count = f"N = {n} + {mean:.1f} trials" if several else f"N = {n} + {counts[0]} trials"
+    least, most = _count(min(counts), "trial"), max(counts)
     if not several:
-        spent = f"{_count(counts[0], 'trial')} on the arm to reach the goal"
+        spent = f"{least} on the arm to reach the goal"
     elif len(counts) == 1:
-        spent = f"{_count(counts[0], 'trial')} to reach one goal"
-    elif min(counts) == max(counts):
-        spent = f"{_count(counts[0], 'trial')} to reach each goal"
+        spent = f"{least} to reach one goal"
+    elif min(counts) == most:
+        spent = f"{least} to reach each goal"
     else:
-        spent = f"{mean:.1f} trials on average to reach a goal, from {min(counts)} to {max(counts)}"
+        spent = f"{mean:.1f} trials on average to reach a goal, from {min(counts)} to {most}"
     missing = len(tried) - len(counts)
     left_out = ""
     if missing:
         goals = "goal that was" if missing == 1 else "goals that were"
         left_out = f" This leaves out the {missing} {goals} not reached."
+    count = f"N = {n} + {mean:.1f} trials" if several else f"N = {n} + {most} trials"
     explanation = f"{n} demonstrations, then {spent}.{left_out} {within}"
     return Headline(text, count, explanation, complete=not missing)
 
@@ -139,16 +137,12 @@ def trial_rows(record: AdaptationRecord) -> list[TrialRow]:
 
 def say_goal(record: AdaptationRecord) -> str:
     """Say where the goal is."""
-    demonstrations = record.demonstrations
-    return say_place(record.goal, demonstrations.outcome_names, demonstrations.outcome_units)
+    return say_place(record.goal, *record.labels)
 
 
 def say_tolerance(record: AdaptationRecord) -> str:
     """Say how near counts as reached."""
-    demonstrations = record.demonstrations
-    return wording.say_tolerance(
-        record.half_axes, demonstrations.outcome_names, demonstrations.outcome_units
-    )
+    return wording.say_tolerance(record.half_axes, *record.labels)
 
 
 def say_distance(record: AdaptationRecord, distance: float) -> str:
@@ -158,54 +152,40 @@ def say_distance(record: AdaptationRecord, distance: float) -> str:
 
 
 def _row(record: AdaptationRecord, i: int, trial: Trial) -> TrialRow:
-    names, units = record.demonstrations.outcome_names, record.demonstrations.outcome_units
+    names, units = record.labels
     expected = ""
     if trial.p_hit is not None and trial.expected_trials is not None:
         expected = f"{trial.p_hit:.0%}, {trial.expected_trials:.1f}"
     aim = say_place(trial.condition, names, units)
     if in_words(units):
         aim = to_words(trial.condition - record.goal, names).replace("on the goal", "at the goal")
-    if trial.reading is None or trial.error_seen is None:
+    warning = record.warnings.get(trial.number)
+    reading = trial.reading
+    if reading is None:
         if trial.stage is Stage.VOIDED:
-            seen, state, result = "voided", "voided", "not counted"
-            seen += f": {trial.note}" if trial.note else ""
-        else:
-            seen, state, result = _OPEN[trial.stage], "open", "open"
-            if trial.number in record.warnings:
-                seen = f"{trial.stage.value}, {record.warnings[trial.number]}"
-        return TrialRow(trial.number, state, aim, seen, "–", expected, "", result)
+            seen = f"voided: {trial.note}" if trial.note else "voided"
+            return TrialRow(trial.number, "voided", aim, seen, "–", expected, "", "not counted")
+        seen = f"{trial.stage.value}, {warning}" if warning else _OPEN[trial.stage]
+        return TrialRow(trial.number, "open", aim, seen, "–", expected, "", "open")
+    seen, off, truly_off = say_reading(reading, names, units), "–", ""
+    if np.all(np.isfinite(reading.low) & np.isfinite(reading.high)):
+        distance = record.distance(reading.error_seen)
+        called = CALLED if trial.hit and distance > record.edge else ""
+        off = called + say_distance(record, distance)
+    state = result = "hit" if trial.hit else "miss"
     truth = record.true_outcomes[i]
-    truly_off = None if truth is None else record.distance(truth - record.goal)
-    result = "hit" if trial.hit else "miss"
-    # The truth, once known, is admitted where it disagrees.
-    disagrees = truly_off is not None and (truly_off <= record.edge) != trial.hit
-    seen = say_reading(trial.reading, names, units)
-    if trial.number in record.warnings:
-        seen += f"; {record.warnings[trial.number]}"
-    return TrialRow(
-        trial.number,
-        state=result,
-        aim=aim,
-        seen=seen,
-        off=_say_off(record, trial.reading, trial.hit),
-        expected=expected,
-        truly_off="" if truly_off is None else say_distance(record, truly_off),
-        result=f"taken for a {result}" if disagrees else result,
-    )
-
-
-def _say_off(record: AdaptationRecord, reading: Reading, hit: bool) -> str:
-    if not np.all(np.isfinite(reading.low) & np.isfinite(reading.high)):
-        return "–"
-    off = record.distance(reading.error_seen)
-    return f"{CALLED if hit and off > record.edge else ''}{say_distance(record, off)}"
+    if truth is not None:
+        distance = record.distance(truth - record.goal)
+        truly_off = say_distance(record, distance)
+        if (distance <= record.edge) != trial.hit:  # the truth, once known, is admitted
+            result = f"taken for a {result}"
+    seen += f"; {warning}" if warning else ""
+    return TrialRow(trial.number, state, aim, seen, off, expected, truly_off, result)
 
 
 def explain_words(record: AdaptationRecord) -> str:
     """Say what the words of an error mean, of those that these outcomes have."""
-    demonstrations = record.demonstrations
-    pairs = error_words(demonstrations.outcome_names, demonstrations.outcome_units)
-    return "; ".join(_MEANS[pair[0]] for pair in pairs if pair)
+    return "; ".join(_MEANS[pair[0]] for pair in error_words(*record.labels) if pair)
 
 
 def _count(n: int, what: str) -> str:

@@ -10,20 +10,16 @@ import pytest
 
 from demonstrations import basketball as making
 from prior_reinforce.errors import ConfigurationError, InvalidGoalError
-from prior_reinforce.lab.tasks import panda
-from prior_reinforce.lab.tasks.basketball import (
-    HARDWARE,
-    RIM_HEIGHT,
-    BasketballShot,
-    ShotDisturbances,
-)
+from prior_reinforce.lab.tasks import make_task, panda
+from prior_reinforce.lab.tasks.basketball import HARDWARE, RIM_HEIGHT, BasketballShot
+from prior_reinforce.lab.tasks.panda_task import Disturbances
 
 GRAVITY = 9.81
 
 
 @pytest.fixture(scope="module")
 def tasks() -> dict[str, BasketballShot]:
-    return {hardware: BasketballShot(hardware) for hardware in HARDWARE}
+    return {kind.name[-2:]: kind() for kind in HARDWARE}
 
 
 @pytest.fixture(scope="module")
@@ -107,7 +103,7 @@ def test_a_repeated_plan_lands_within_about_half_a_centimetre(task):
     plans = np.repeat(shot(0.0, 0.1)[None], 64, axis=0)
     landed = outcomes(task.rollout(plans, np.random.default_rng(0)))
     assert np.all((landed.std(axis=0) > 0.003) & (landed.std(axis=0) < 0.007))
-    still = ShotDisturbances(pose=0.0, servo=0.0, ball=0.0, friction=0.0)
+    still = Disturbances(pose=0.0, servo=0.0, scene=0.0, start=0.0)
     quiet = BasketballShot(disturbances=still)
     landed = outcomes(quiet.rollout(plans[:4], np.random.default_rng(0)))
     np.testing.assert_array_equal(landed, np.repeat(landed[:1], 4, axis=0))
@@ -305,5 +301,5 @@ def test_a_ball_that_lands_at_the_goal_stays_in_the_cup(tasks):
 
 
 def test_an_unknown_hardware_is_named():
-    with pytest.raises(ConfigurationError, match="'v9' of Basketball Shot; use one of v1, v2, v3"):
-        BasketballShot("v9")
+    with pytest.raises(ConfigurationError, match=r"'basketball-v9'; known are .*v1, .*v2, .*v3"):
+        make_task("basketball-v9")

@@ -22,7 +22,7 @@ def test_demonstrations_keep_half_of_the_accelerations_unused():
 
 
 def test_its_servo_is_stiffer_and_nothing_else_differs():
-    fr3, v1 = make_task("basketball-fr3"), BasketballShot("v1")
+    fr3, v1 = make_task("basketball-fr3"), BasketballShot()
     assert np.all(fr3.model.actuator_gainprm[:, 0] > 5 * v1.model.actuator_gainprm[:, 0])
     assert fr3.model.body_mass == pytest.approx(v1.model.body_mass)
     assert fr3.tolerance == v1.tolerance

@@ -12,10 +12,9 @@ from prior_reinforce.lab.tasks.curling import (
     STONE_START,
     TARGET_BEHIND,
     Curling,
-    CurlingDisturbances,
 )
 from prior_reinforce.lab.tasks.inverse_kinematics import joint_paths
-from prior_reinforce.lab.tasks.panda_task import ArmDisturbances
+from prior_reinforce.lab.tasks.panda_task import Disturbances
 
 GRAVITY = 9.81
 
@@ -121,7 +120,7 @@ def test_a_repeated_plan_stops_within_about_half_a_centimetre(task):
     plans = np.repeat(pushes([0.1]), 64, axis=0)
     spread = outcomes(task.rollout(plans, np.random.default_rng(0))).std(axis=0)
     assert np.all((spread > 0.0005) & (spread < 0.006))
-    quiet = Curling(CurlingDisturbances(ArmDisturbances(0.0, 0.0), stone=0.0, friction=0.0))
+    quiet = Curling(Disturbances(pose=0.0, servo=0.0, scene=0.0, start=0.0))
     stopped = outcomes(quiet.rollout(plans[:4], np.random.default_rng(0)))
     np.testing.assert_array_equal(stopped, np.repeat(stopped[:1], 4, axis=0))
 

@@ -6,8 +6,8 @@ import pytest
 
 from demonstrations import fishing as making
 from prior_reinforce.lab.tasks import panda
-from prior_reinforce.lab.tasks.fishing import HOOK_RADIUS, TABLE, Fishing, FishingDisturbances
-from prior_reinforce.lab.tasks.panda_task import ArmDisturbances
+from prior_reinforce.lab.tasks.fishing import HOOK_RADIUS, TABLE, Fishing
+from prior_reinforce.lab.tasks.panda_task import Disturbances
 
 GRAVITY = 9.81
 
@@ -132,7 +132,7 @@ def test_a_repeated_plan_lands_within_about_three_millimetres(task):
     plans = np.repeat(casts([0.1]), 16, axis=0)
     spread = outcomes(task.rollout(plans, np.random.default_rng(0))).std(axis=0)
     assert np.all((spread > 0.001) & (spread < 0.0045))
-    quiet = Fishing(FishingDisturbances(ArmDisturbances(0.0, 0.0), sway=0.0, rope=0.0))
+    quiet = Fishing(Disturbances(pose=0.0, servo=0.0, scene=0.0, start=0.0))
     landed = outcomes(quiet.rollout(plans[:2], np.random.default_rng(0)))
     np.testing.assert_array_equal(landed[0], landed[1])
 

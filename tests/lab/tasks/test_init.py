@@ -1,11 +1,14 @@
 import pytest
 
 from prior_reinforce.errors import ConfigurationError
-from prior_reinforce.lab.tasks import make_task
+from prior_reinforce.lab.tasks import TASKS, make_task
 
 
 def test_a_choice_sets_the_hardware():
-    assert make_task("basketball-v1,hardware=v3").name == "basketball-v3"
+    for name in ("basketball-v1", "basketball-v2", "basketball-v3"):
+        task = make_task(name)
+        assert task.name == name
+        assert TASKS.name_of(task) == name
 
 
 @pytest.mark.parametrize("name", ["darts", "basketball"])

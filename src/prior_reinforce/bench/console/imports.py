@@ -127,12 +127,9 @@ class Imports:
             except PriorReinforceError as error:
                 return Dropped(files, problem=str(error))
         places = {name: row[:-1] for name, row in found.rows.items()}
-        return Dropped(
-            files,
-            inspection.text,
-            questions=[one.what for one in found.unclear],
-            episodes={name: places.get(name) for name in found.selection.episodes},
-        )
+        episodes = {name: places.get(name) for name in found.selection.episodes}
+        questions = [one.what for one in found.unclear]
+        return Dropped(files, inspection.text, questions=questions, episodes=episodes)
 
     def place(self, body: Place) -> Dropped:
         """Write down where a recording's object landed."""

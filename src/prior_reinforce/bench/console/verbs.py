@@ -20,15 +20,8 @@ from typing import Any
 from msgspec import Struct, structs
 
 from prior_reinforce.adapters import DEFAULT_ADAPTER
-from prior_reinforce.bench.console.view import (
-    MotionView,
-    Mover,
-    State,
-    motion_of,
-    output_of,
-    state_of,
-    step_of,
-)
+from prior_reinforce.bench.console import view
+from prior_reinforce.bench.console.view import MotionView, Mover, State
 from prior_reinforce.bench.robots.executors.base import ArmSettings, Motion
 from prior_reinforce.bench.robots.executors.lock import is_executing, last_stop, stop_executing
 from prior_reinforce.bench.workspace.status import ask_to_move, say_look
@@ -177,7 +170,7 @@ class Verbs:
             return
         self._closed.set()
         self._watcher.join()
-        if self._execution is not None and not self._execution.done():
+        if self._is_running():
             self._halt()
         self._threads.shutdown()
         self.workspace.close()
@@ -185,10 +178,10 @@ class Verbs:
     def state(self) -> State:
         """What the page shows."""
         with self._lock:
-            entries, step = self.workspace.events, step_of(self.workspace)
+            entries, step = self.workspace.events, view.step_of(self.workspace)
             now = (len(entries), step, last_stop(self.folder))
             if now != self._shown_for or step == "executing" or not entries:
-                self._shown, self._shown_for = state_of(self.workspace), now
+                self._shown, self._shown_for = view.state_of(self.workspace), now
             return structs.replace(
                 self._shown,  # computed once for all tabs that ask after an event
                 moved_by=_KIND[type(self._moved_by)],
@@ -284,7 +277,7 @@ class Verbs:
     def motion(self, number: int) -> MotionView:
         """Return a trial's plan, to be played."""
         with self._lock:
-            return motion_of(self.workspace, number)
+            return view.motion_of(self.workspace, number)
 
     def plan_file(self, number: int) -> Path:
         """Return a trial's plan file, if its plan may still be executed."""
@@ -379,7 +372,7 @@ class Verbs:
                     now = {
                         "id": entries[-1].id if entries else 0,
                         "stopped": str(last_stop(self.folder)),
-                        "output": "" if trial is None else output_of(self.workspace, trial),
+                        "output": "" if trial is None else view.output_of(self.workspace, trial),
                     }
                     left = trial is not None and trial.stage is Stage.EXECUTING
                     left = left and not self._is_running()

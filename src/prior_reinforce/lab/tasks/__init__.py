@@ -11,15 +11,15 @@ if TYPE_CHECKING:
     from prior_reinforce.environment import Task
 
 _HERE = "prior_reinforce.lab.tasks"
-_SHOT = f"{_HERE}.basketball:BasketballShot"
+_BASKETBALL = f"{_HERE}.basketball"
 
 TASKS: Registry[Task] = Registry(
     "task",
     "prior_reinforce.environment:Task",
     {
-        "basketball-v1": Member(_SHOT, "throw a ball into a hoop"),
-        "basketball-v2": Member(_SHOT, "the same with a shorter spoon", {"hardware": "v2"}),
-        "basketball-v3": Member(_SHOT, "a smaller ball and a cup", {"hardware": "v3"}),
+        "basketball-v1": Member(f"{_BASKETBALL}:BasketballShot", "throw a ball into a hoop"),
+        "basketball-v2": Member(f"{_BASKETBALL}:BasketballV2", "the same with a shorter spoon"),
+        "basketball-v3": Member(f"{_BASKETBALL}:BasketballV3", "a smaller ball and a cup"),
         "basketball-fr3": Member(
             f"{_HERE}.basketball_fr3:BasketballFR3", "the first on a Franka Research 3"
         ),

@@ -11,16 +11,13 @@ The scenes are in `basketball.xml`, `basketball_v2.xml` and `basketball_v3.xml`,
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import mujoco
 import numpy as np
 from jaxtyping import Float
 
 from prior_reinforce.environment import Rollout, SeenObject, TableScene
-from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.lab.tasks.panda import JOINT_NAMES, N_JOINTS
-from prior_reinforce.lab.tasks.panda_task import Draws, PandaTask, first_descent
+from prior_reinforce.lab.tasks.panda_task import Disturbances, PandaTask, first_descent
 from prior_reinforce.plans.motions import PlanFormat
 
 RIM_HEIGHT = 0.10
@@ -28,86 +25,33 @@ RIM_HEIGHT = 0.10
 give it."""
 
 
-@dataclass(frozen=True)
-class Hardware:
-    """Spoon, ball and goal."""
-
-    xml: str
-    """File name of the scene."""
-    tolerance: float
-    """For a clean pass, in [m]: (9 - 6) cm / 2 of free diameter and ball; V3: (7.5 - 5) cm / 2."""
-    scene: TableScene
-    """What a camera sees of them."""
-
-
-_BALL_AND_HOOP = TableScene(
-    SeenObject("the orange ball", 0.06), SeenObject("the red hoop", 0.10), plane_height=RIM_HEIGHT
-)
-HARDWARE = {
-    "v1": Hardware("basketball.xml", 0.015, _BALL_AND_HOOP),
-    # V1 with a shorter spoon.
-    "v2": Hardware("basketball_v2.xml", 0.015, _BALL_AND_HOOP),
-    # V2 with a smaller, lighter ball and a smaller white cup, its rim 8.3 cm wide outside.
-    "v3": Hardware(
-        "basketball_v3.xml",
-        0.0125,
-        TableScene(
-            SeenObject("the orange ball", 0.05),
-            SeenObject("the red rim of the cup", 0.083),
-            plane_height=RIM_HEIGHT,
-        ),
-    ),
-}
-
-
-@dataclass(frozen=True)
-class ShotDisturbances:
-    """What differs between two executions of one plan; standard deviations, ours.
-
-    Together these of Basketball Shot spread the landing point of a repeated plan by about half a
-    centimetre along each axis (docs/tasks/basketball.md), which is what a good throwing arm does.
-    """
-
-    pose: float = 0.003
-    """Offset of every joint, kept through the execution (its zero, its friction), in [rad]."""
-    servo: float = 0.06
-    """Relative error of every joint's servo stiffness and damping."""
-    ball: float = 0.001
-    """Where the ball is put in the bowl, along each of the bowl's two axes, in [m]."""
-    friction: float = 0.10
-    """Relative error of the friction between ball and bowl."""
-
-
 class Shot(PandaTask):
     """A ball that lies in a bowl on the arm is thrown through the plane of a rim on the table."""
 
     scene: TableScene
+    # Of the friction between ball and bowl; of the ball in the bowl, along the bowl's axes, in [m].
+    # Together these spread the landing point of a repeated plan by about half a centimetre along
+    # each axis (docs/tasks/basketball.md), which is what a good throwing arm does.
+    disturbances = Disturbances(pose=0.003, servo=0.06, scene=0.10, start=0.001)
+    drawn = ("pose", "start", "servo", "scene")
     lead_in = 0.2  # the ball settles in the bowl
     lead_out = 0.9  # the longest fall takes 0.5 s
     batch = 64  # 40 MB of recorded states
 
-    def __init__(self, disturbances: ShotDisturbances) -> None:
-        """Compile the scene."""
-        self.disturbances = disturbances
-        super().__init__()
+    def __init__(self, disturbances: Disturbances | None = None) -> None:
+        """Compile the scene; argument as in `PandaTask`."""
+        super().__init__(disturbances)
         self._bowl = np.flatnonzero(self.model.geom_bodyid == self.model.body("tool/bowl").id)
         self.ball = int(self.model.jnt_qposadr[self.model.joint("ball").id])
         """Where the ball's position begins in the state `qpos`."""
 
-    def _draw(self, n: int, rng: np.random.Generator) -> Draws:
-        size = self.disturbances
-        pose = rng.normal(0.0, size.pose, (n, self.format.action_dim))
-        ball = rng.normal(0.0, size.ball, (n, 2))
-        servo = 1.0 + rng.normal(0.0, size.servo, (n, self.format.action_dim))
-        return Draws(pose, servo, 1.0 + rng.normal(0.0, size.friction, (n, 1)), ball)
-
     def _disturb(self, model: mujoco.MjModel, scene: Float[np.ndarray, "1"]) -> None:
         model.geom_friction[self._bowl, 0] *= scene[0]
 
-    def _place(self, data: mujoco.MjData, start: Float[np.ndarray, "2"] | None) -> None:
+    def _place(self, data: mujoco.MjData, start: Float[np.ndarray, "2"]) -> None:
         """The ball lies in the bowl."""
         seat = data.site("tool/seat")
-        offset = 0.0 if start is None else seat.xmat.reshape(3, 3)[:, :2] @ start
+        offset = seat.xmat.reshape(3, 3)[:, :2] @ start
         data.qpos[self.ball : self.ball + 3] = seat.xpos + offset
 
     def _result(
@@ -123,27 +67,40 @@ class Shot(PandaTask):
 
 
 class BasketballShot(Shot):
-    """Basketball Shot (paper, Section III and Figure 3), in MuJoCo."""
+    """Basketball Shot (paper, Section III and Figure 3), in MuJoCo, with the hardware V1."""
 
+    name = "basketball-v1"
     format = PlanFormat(JOINT_NAMES, ("rad",) * N_JOINTS, 0.0125)
+    tolerance: float = 0.015  # for a clean pass: (9 - 6) cm / 2 of free diameter and ball
     region = np.array([[0.92, -0.26], [1.18, 0.26]])
+    scene = TableScene(
+        SeenObject("the orange ball", 0.06),
+        SeenObject("the red hoop", 0.10),
+        plane_height=RIM_HEIGHT,
+    )
+    xml = "basketball.xml"
     recordings = "basketball"
 
-    def __init__(self, hardware: str = "v1", disturbances: ShotDisturbances | None = None) -> None:
-        """Compile the scene.
 
-        Args:
-            hardware: One of `HARDWARE`.
-            disturbances: How repeated executions differ; the documented ones when not given.
+class BasketballV2(BasketballShot):
+    """V1 with a shorter spoon."""
 
-        Raises:
-            ConfigurationError: There is no such hardware.
-        """
-        if hardware not in HARDWARE:
-            raise ConfigurationError(
-                f"no hardware {hardware!r} of Basketball Shot; use one of {', '.join(HARDWARE)}"
-            )
-        self.name = f"basketball-{hardware}"
-        self.xml, self.tolerance = HARDWARE[hardware].xml, HARDWARE[hardware].tolerance
-        self.scene = HARDWARE[hardware].scene
-        super().__init__(disturbances or ShotDisturbances())
+    name = "basketball-v2"
+    xml = "basketball_v2.xml"
+
+
+class BasketballV3(BasketballShot):
+    """V2 with a smaller, lighter ball and a smaller white cup, its rim 8.3 cm wide outside."""
+
+    name = "basketball-v3"
+    tolerance = 0.0125  # (7.5 - 5) cm / 2
+    scene = TableScene(
+        SeenObject("the orange ball", 0.05),
+        SeenObject("the red rim of the cup", 0.083),
+        plane_height=RIM_HEIGHT,
+    )
+    xml = "basketball_v3.xml"
+
+
+HARDWARE = (BasketballShot, BasketballV2, BasketballV3)
+"""The task with each of the paper's three sets of hardware."""

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from prior_reinforce.lab.tasks.basketball import BasketballShot, ShotDisturbances
+from prior_reinforce.lab.tasks.basketball import BasketballShot
+from prior_reinforce.lab.tasks.panda_task import Disturbances
 
 _STIFFNESS = np.array([4500.0, 4500.0, 3500.0, 3500.0, 2000.0, 2000.0, 2000.0])
 """Of each joint's servo, in [Nm/rad]: the position actuators of MuJoCo Menagerie's FR3 (fr3v2), as
@@ -21,12 +22,12 @@ _DAMPING = _STIFFNESS / 10
 class BasketballFR3(BasketballShot):
     """Basketball Shot V1 on an FR3."""
 
+    name = "basketball-fr3"
     recordings = "basketball_fr3"
 
-    def __init__(self, disturbances: ShotDisturbances | None = None) -> None:
-        """Compile the scene; argument as in `BasketballShot`."""
-        super().__init__("v1", disturbances)
-        self.name = "basketball-fr3"
+    def __init__(self, disturbances: Disturbances | None = None) -> None:
+        """Compile the scene; argument as in `PandaTask`."""
+        super().__init__(disturbances)
         self.model.actuator_gainprm[:, 0] = _STIFFNESS
         self.model.actuator_biasprm[:, 1] = -_STIFFNESS
         self.model.actuator_biasprm[:, 2] = -_DAMPING

@@ -9,15 +9,13 @@ lengths in [m], table frame.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-
 import mujoco
 import numpy as np
 from jaxtyping import Float
 
 from prior_reinforce.environment import Rollout, SeenObject, TableScene
 from prior_reinforce.lab.tasks.panda import JOINT_NAMES, N_JOINTS
-from prior_reinforce.lab.tasks.panda_task import ArmDisturbances, Draws, PandaTask
+from prior_reinforce.lab.tasks.panda_task import Disturbances, PandaTask
 from prior_reinforce.plans.motions import PlanFormat
 
 STONE_START = np.array([0.43, 0.0])
@@ -33,21 +31,6 @@ TARGET_BEHIND = 0.08
 Ours: a gap of 2 cm between two stones, so that a success never touches the target."""
 
 
-@dataclass(frozen=True)
-class CurlingDisturbances:
-    """What differs between two executions of one plan; standard deviations, ours.
-
-    Together they spread the resting place of a repeated plan by 0.34 cm along x and 0.12 cm along y
-    (docs/tasks/curling.md).
-    """
-
-    arm: ArmDisturbances = field(default_factory=ArmDisturbances)
-    stone: float = 0.0005
-    """Where the stone is put, along each axis, in [m]."""
-    friction: float = 0.005
-    """Relative error of the friction between stone and table."""
-
-
 class Curling(PandaTask):
     """Curling (paper, Section III and Figure 3), in MuJoCo."""
 
@@ -61,15 +44,18 @@ class Curling(PandaTask):
         plane_height=0.02,  # both stones lie on the table and are 3 cm high
         goal_offset=(-TARGET_BEHIND, 0.0),
     )
+    # Of the friction between stone and table; of where the stone is put, along each axis, in [m].
+    # Together these spread the resting place of a repeated plan by 0.34 cm along x and 0.12 cm
+    # along y (docs/tasks/curling.md).
+    disturbances = Disturbances(pose=0.001, servo=0.03, scene=0.005, start=0.0005)
     xml = "curling.xml"
     recordings = "curling"
     lead_in = 0.1
     lead_out = 1.5  # the fastest stone slides for 1 s
 
-    def __init__(self, disturbances: CurlingDisturbances | None = None) -> None:
-        """Compile the scene; repeated executions differ as documented unless told."""
-        self.disturbances = disturbances or CurlingDisturbances()
-        super().__init__()
+    def __init__(self, disturbances: Disturbances | None = None) -> None:
+        """Compile the scene; argument as in `PandaTask`."""
+        super().__init__(disturbances)
         stone = self.model.body("stone")
         self._stone = self.model.jnt_qposadr[stone.jntadr[0]]
         self._feet = np.flatnonzero(
@@ -77,18 +63,12 @@ class Curling(PandaTask):
             & (self.model.geom_type == mujoco.mjtGeom.mjGEOM_SPHERE)
         )
 
-    def _draw(self, n: int, rng: np.random.Generator) -> Draws:
-        pose, servo = self.disturbances.arm.draw(n, rng)
-        friction = 1.0 + rng.normal(0.0, self.disturbances.friction, (n, 1))
-        return Draws(pose, servo, friction, rng.normal(0.0, self.disturbances.stone, (n, 2)))
-
     def _disturb(self, model: mujoco.MjModel, scene: Float[np.ndarray, "1"]) -> None:
         model.geom_friction[self._feet, 0] *= scene[0]
 
-    def _place(self, data: mujoco.MjData, start: Float[np.ndarray, "2"] | None) -> None:
+    def _place(self, data: mujoco.MjData, start: Float[np.ndarray, "2"]) -> None:
         """The stone starts at `STONE_START`, where the scene has it."""
-        if start is not None:
-            data.qpos[self._stone : self._stone + 2] += start
+        data.qpos[self._stone : self._stone + 2] += start
 
     def _result(
         self, states: Float[np.ndarray, "steps s"], sensors: Float[np.ndarray, "steps m"]

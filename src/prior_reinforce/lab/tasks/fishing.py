@@ -10,8 +10,6 @@ The scene is in `fishing.xml`, the arm in `panda.xml`; lengths in [m], table fra
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-
 import mujoco
 import numpy as np
 from jaxtyping import Float
@@ -19,7 +17,7 @@ from jaxtyping import Float
 from prior_reinforce.arrays import Plans
 from prior_reinforce.environment import Rollout, SeenObject, TableScene
 from prior_reinforce.lab.tasks.inverse_kinematics import POSE_NAMES, POSE_UNITS, joint_paths
-from prior_reinforce.lab.tasks.panda_task import ArmDisturbances, Draws, PandaTask, first_descent
+from prior_reinforce.lab.tasks.panda_task import Disturbances, PandaTask, first_descent
 from prior_reinforce.plans.motions import PlanFormat
 
 HOOK_RADIUS = 0.006
@@ -29,21 +27,6 @@ TABLE = np.array([[0.35, -0.5], [1.35, 0.5]])
 _PULL, _GRIP = 200.0, 1.5
 """The magnet's force on a hook within its reach, in [N/m] and [N s/m]; for films only, and ours: it
 stops the hook within a centimetre and then holds against the rope."""
-
-
-@dataclass(frozen=True)
-class FishingDisturbances:
-    """What differs between two executions of one plan; standard deviations, ours.
-
-    Together they spread the hook's first touch by about 0.3 cm (docs/tasks/fishing.md).
-    """
-
-    arm: ArmDisturbances = field(default_factory=ArmDisturbances)
-    sway: float = 0.008
-    """Angle at which the rope still hangs off the vertical at the start, about x and y, in [rad]:
-    3 mm at the hook, what an operator calls still."""
-    rope: float = 0.1
-    """Relative error of the rope's bending stiffness and damping: cords stiffen and soften."""
 
 
 class Fishing(PandaTask):
@@ -59,15 +42,19 @@ class Fishing(PandaTask):
         SeenObject("the yellow disc", 0.02),
         plane_height=0.003,
     )
+    # Of the rope's bending stiffness and damping: cords stiffen and soften. Of the angle at which
+    # it hangs off the vertical, about x and y, in [rad]: 3 mm at the hook, what an operator calls
+    # still. Together these spread the hook's first touch by 0.3 cm (docs/tasks/fishing.md).
+    disturbances = Disturbances(pose=0.001, servo=0.03, scene=0.1, start=0.008)
+    n_constants = 2
     xml = "fishing.xml"
     recordings = "fishing"
     lead_in = 0.1
     lead_out = 0.4
 
-    def __init__(self, disturbances: FishingDisturbances | None = None) -> None:
-        """Compile the scene; repeated executions differ as documented unless told."""
-        self.disturbances = disturbances or FishingDisturbances()
-        super().__init__()
+    def __init__(self, disturbances: Disturbances | None = None) -> None:
+        """Compile the scene; argument as in `PandaTask`."""
+        super().__init__(disturbances)
         self._swivel = self.model.jnt_qposadr[self.model.joint("tool/swivel").id]
         self._hook = self.model.sensor("tool/hook").adr[0]
         balls = np.flatnonzero(self.model.jnt_type == mujoco.mjtJoint.mjJNT_BALL)
@@ -77,30 +64,22 @@ class Fishing(PandaTask):
         """Follow the poses with the arm, within its limits."""
         return joint_paths(plans, self.format.dt)
 
-    def _draw(self, n: int, rng: np.random.Generator) -> Draws:
-        pose, servo = self.disturbances.arm.draw(n, rng)
-        rope = 1.0 + rng.normal(0.0, self.disturbances.rope, (n, 2))
-        return Draws(pose, servo, rope, rng.normal(0.0, self.disturbances.sway, (n, 2)))
-
     def _disturb(self, model: mujoco.MjModel, scene: Float[np.ndarray, "2"]) -> None:
         stiffness, damping = scene
         model.jnt_stiffness[self._bends] *= stiffness
         dofs = (model.jnt_dofadr[self._bends][:, None] + np.arange(3)).ravel()
         model.dof_damping[dofs] *= damping
 
-    def _place(self, data: mujoco.MjData, start: Float[np.ndarray, "2"] | None) -> None:
+    def _place(self, data: mujoco.MjData, start: Float[np.ndarray, "2"]) -> None:
         """Let the rope hang: the swivel undoes the rod's attitude, every segment is straight.
 
         This is the settled state itself, because the swivel has no spring and the others are
         relaxed, so nothing has to be simulated to reach it.
         """
-        sway = np.zeros(3)
-        if start is not None:
-            sway[:2] = start
-        upright, rod, hanging = np.empty(4), np.empty(4), np.empty(4)
+        upright, rod, hanging = np.empty((3, 4))
         mujoco.mju_mat2Quat(rod, data.site("tool/tip").xmat)
         mujoco.mju_negQuat(upright, rod)
-        mujoco.mju_quatIntegrate(quat := np.array([1.0, 0.0, 0.0, 0.0]), sway, 1.0)
+        mujoco.mju_quatIntegrate(quat := np.array([1.0, 0.0, 0.0, 0.0]), np.append(start, 0.0), 1.0)
         mujoco.mju_mulQuat(hanging, upright, quat)
         data.qpos[self._swivel : self._swivel + 4] = hanging
 

@@ -23,24 +23,12 @@ def warped(part: Float[np.ndarray, " t"], warp: Float[np.ndarray, " w"]) -> Floa
 
 
 def follow(path: Float[np.ndarray, "H D"], dt: float, bandwidth: float) -> Float[np.ndarray, "H D"]:
-    """Low-pass a path with a critically damped second-order filter, from rest.
+    """Low-pass a path, a row each dt [s], with a critically damped second-order filter, from rest.
 
-    Args:
-        path: What is to be followed, a row a frame.
-        dt: Time between frames, in [s].
-        bandwidth: Of the filter, in [Hz].
+    The filter's bandwidth is in [Hz].
     """
     w = 2 * np.pi * bandwidth
     numerator, denominator, _ = cont2discrete(([w * w], [1.0, 2 * w, w * w]), dt, method="bilinear")
     numerator = numerator.ravel()
-    return np.column_stack(
-        [
-            lfilter(
-                numerator,
-                denominator,
-                axis,
-                zi=lfiltic(numerator, denominator, [axis[0]] * 2, [axis[0]] * 2),
-            )[0]
-            for axis in path.T
-        ]
-    )
+    rest = [lfiltic(numerator, denominator, [x] * 2, [x] * 2) for x in path[0]]
+    return lfilter(numerator, denominator, path, axis=0, zi=np.column_stack(rest))[0]

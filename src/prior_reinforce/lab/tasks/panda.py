@@ -58,17 +58,9 @@ def setpoints(
 ) -> tuple[Float[np.ndarray, "n steps d"], Float[np.ndarray, "n steps d"]]:
     """Joint positions and velocities asked for at every servo period.
 
-    Frames are joined by a cubic spline with continuous acceleration, at rest at both ends; the
-    first frame is held before it and the last one after it.
-
-    Args:
-        plans: Joint paths, in [rad].
-        dt: Time between frames, in [s].
-        n_steps: Servo periods, counted from the start of the lead-in.
-        lead_in: How long the first frame is held, in [s].
-
-    Returns:
-        Positions in [rad] and velocities in [rad/s].
+    Frames, dt [s] apart, are joined by a cubic spline with continuous acceleration, at rest at both
+    ends; the first one is held for `lead_in` [s] before it, the last one until `n_steps` periods
+    are over. Plans and positions are in [rad], velocities in [rad/s].
     """
     position, velocity = _interpolation(plans.shape[1], dt, lead_in, n_steps)
     return position @ plans, velocity @ plans

@@ -25,45 +25,29 @@ from numpy.typing import ArrayLike
 from prior_reinforce.arrays import Plans, as_goal, as_plans
 from prior_reinforce.environment import KeyFrame, Picture, Rollout, Task, make_renderer
 from prior_reinforce.errors import ConfigurationError
-from prior_reinforce.lab.tasks.panda import N_JOINTS, STEP, build_scene, servo_controls
+from prior_reinforce.lab.tasks.panda import STEP, build_scene, servo_controls
 from prior_reinforce.plans.motions import Demonstrations
 
 _FOLDER = Path(__file__).parent
+_UNDISTURBED = np.zeros(2)
 _DRAWN = re.compile(r"v\d\d")
-_FULL = mujoco.mjtState.mjSTATE_FULLPHYSICS
+FULL = mujoco.mjtState.mjSTATE_FULLPHYSICS
 _Batch = tuple[list[mujoco.MjModel], Float[np.ndarray, "n s"], Float[np.ndarray, "n steps d"]]
 """Models (one, or one an execution), initial full physics states, and controls in [rad]."""
 
 
 @dataclass(frozen=True)
-class ArmDisturbances:
-    """What differs in the arm between two executions of one plan; standard deviations, ours."""
+class Disturbances:
+    """What differs between two executions of one plan; standard deviations, ours."""
 
-    pose: float = 0.001
+    pose: float
     """Offset of every joint, kept through the execution (its zero, its friction), in [rad]."""
-    servo: float = 0.03
+    servo: float
     """Relative error of every joint's servo stiffness and damping."""
-
-    def draw(
-        self, n: int, rng: np.random.Generator
-    ) -> tuple[Float[np.ndarray, "n 7"], Float[np.ndarray, "n 7"]]:
-        """Pose offsets and servo factors of n executions."""
-        pose = rng.normal(0.0, self.pose, (n, N_JOINTS))
-        return pose, 1.0 + rng.normal(0.0, self.servo, (n, N_JOINTS))
-
-
-@dataclass(frozen=True, eq=False)
-class Draws:
-    """What differs between the executions of one batch; row i belongs to execution i."""
-
-    pose: Float[np.ndarray, "n d"]
-    """Offset of every joint, in [rad]."""
-    servo: Float[np.ndarray, "n d"]
-    """Factor on every joint's servo stiffness and damping."""
-    scene: Float[np.ndarray, "n p"]
-    """The task's own numbers for `_disturb`."""
-    start: Float[np.ndarray, "n q"]
-    """The task's own numbers for `_place`."""
+    scene: float
+    """Relative error of the task's own constants, see its `_disturb`."""
+    start: float
+    """Of the task's object at the start, about or along two axes, see its `_place`."""
 
 
 class PandaTask(Task):
@@ -79,12 +63,19 @@ class PandaTask(Task):
     """The arm stands in its first frame for so long before the plan begins, in [s]."""
     lead_out: float
     """Physics goes on for so long after the last frame, in [s]."""
+    disturbances: Disturbances
+    """How repeated executions differ."""
+    drawn: tuple[str, ...] = ("pose", "servo", "scene", "start")
+    """The order in which disturbances are drawn, which is part of what a seed means."""
+    n_constants: int = 1
+    """How many constants of its own `_disturb` changes."""
     batch: int = 32
     """Executions simulated at once: bounds memory at about 100 MB of recorded states. Draws are
     made batch by batch, so the number is part of what a seed means."""
 
-    def __init__(self) -> None:
-        """Compile the scene."""
+    def __init__(self, disturbances: Disturbances | None = None) -> None:
+        """Compile the scene; repeated executions differ as documented unless told."""
+        self.disturbances = disturbances or type(self).disturbances
         self.model = build_scene(_FOLDER / self.xml, self.flange)
         self.model.opt.timestep = STEP
         self._workers = [mujoco.MjData(self.model) for _ in range(joblib.cpu_count())]
@@ -101,20 +92,16 @@ class PandaTask(Task):
         return servo_controls(self.model, joints, self.format.dt, n_steps, lead_in=self.lead_in)
 
     @abstractmethod
-    def _draw(self, n: int, rng: np.random.Generator) -> Draws:
-        """Draw what differs between n executions; the order is part of what a seed means."""
-
-    @abstractmethod
     def _disturb(self, model: mujoco.MjModel, scene: Float[np.ndarray, " p"]) -> None:
-        """Change the task's own constants in a copy of the model by an execution's draws."""
+        """Multiply the task's own constants in a copy of the model by an execution's factors."""
 
     @abstractmethod
-    def _place(self, data: mujoco.MjData, start: Float[np.ndarray, " q"] | None) -> None:
+    def _place(self, data: mujoco.MjData, start: Float[np.ndarray, "2"]) -> None:
         """Put the task's objects where they start; the arm already stands in its first frame.
 
         Args:
             data: The state to be changed.
-            start: The execution's draws; None where nothing is disturbed.
+            start: What the execution drew; zero where nothing is disturbed.
         """
 
     @abstractmethod
@@ -164,7 +151,7 @@ class PandaTask(Task):
         goal = as_goal(goal, self.outcome_names)
         models, states, controls = self._prepare(plan[None], rng)
         model, data = models[0], mujoco.MjData(models[0])
-        mujoco.mj_setState(model, data, states[0], _FULL)
+        mujoco.mj_setState(model, data, states[0], FULL)
         data.mocap_pos[model.body("goal").mocapid[0]] = [*goal, 0.0]
         mujoco.mj_forward(model, data)
         with closing(make_renderer(model, width, height)) as renderer:
@@ -213,13 +200,19 @@ class PandaTask(Task):
         joints = self.joint_plans(plans)
         controls = self._controls(joints, n_steps)
         if rng is None:
-            states = np.stack([self._start(frame, None) for frame in joints[:, 0]])
+            states = np.stack([self._start(frame) for frame in joints[:, 0]])
             return [self.model], states, controls
-        draws = self._draw(n, rng)
-        models = [self._disturbed(*own) for own in zip(draws.servo, draws.scene, strict=True)]
-        controls += draws.pose[:, None, :]
-        frames = joints[:, 0] + draws.pose
-        states = np.stack([self._start(*own) for own in zip(frames, draws.start, strict=True)])
+        d = joints.shape[2]
+        width = {"pose": d, "servo": d, "scene": self.n_constants, "start": 2}
+        draws = {
+            what: rng.normal(0.0, getattr(self.disturbances, what), (n, width[what]))
+            for what in self.drawn
+        }
+        factors = zip(1.0 + draws["servo"], 1.0 + draws["scene"], strict=True)
+        models = [self._disturbed(*own) for own in factors]
+        controls += draws["pose"][:, None, :]
+        frames = joints[:, 0] + draws["pose"]
+        states = np.stack([self._start(*own) for own in zip(frames, draws["start"], strict=True)])
         return models, states, controls
 
     def _disturbed(
@@ -232,7 +225,7 @@ class PandaTask(Task):
         return model
 
     def _start(
-        self, joints: Float[np.ndarray, " d"], start: Float[np.ndarray, " q"] | None
+        self, joints: Float[np.ndarray, " d"], start: Float[np.ndarray, "2"] = _UNDISTURBED
     ) -> Float[np.ndarray, " s"]:
         """Full physics state with the arm at `joints` and the objects in place."""
         data = self._scratch
@@ -240,9 +233,14 @@ class PandaTask(Task):
         data.qpos[: len(joints)] = joints
         mujoco.mj_kinematics(self.model, data)
         self._place(data, start)
-        state = np.empty(mujoco.mj_stateSize(self.model, _FULL))
-        mujoco.mj_getState(self.model, data, state, _FULL)
-        return state
+        return full_state(self.model, data)
+
+
+def full_state(model: mujoco.MjModel, data: mujoco.MjData) -> Float[np.ndarray, " s"]:
+    """A copy of the full physics state."""
+    state = np.empty(mujoco.mj_stateSize(model, FULL))
+    mujoco.mj_getState(model, data, state, FULL)
+    return state
 
 
 def first_descent(

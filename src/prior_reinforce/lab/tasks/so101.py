@@ -12,8 +12,9 @@ import numpy as np
 from jaxtyping import Float
 
 from prior_reinforce.environment import SeenObject, TableScene
-from prior_reinforce.lab.tasks.basketball import Shot, ShotDisturbances
+from prior_reinforce.lab.tasks.basketball import Shot
 from prior_reinforce.lab.tasks.panda import STEP
+from prior_reinforce.lab.tasks.panda_task import Disturbances
 from prior_reinforce.plans.interpolation import join_frames
 from prior_reinforce.plans.motions import PlanFormat
 
@@ -49,10 +50,6 @@ def servo_speed(
     return np.clip((goal - position) / lag, -SPEED, SPEED)
 
 
-DISTURBANCES = ShotDisturbances(pose=0.003, servo=0.05, ball=0.0005, friction=0.10)
-"""Ours; of the pose, play of the gears: a step of the encoder is 1.5 mrad."""
-
-
 class SO101Shot(Shot):
     """SO-101 Shot (ours), in MuJoCo."""
 
@@ -66,12 +63,14 @@ class SO101Shot(Shot):
         plane_height=RIM_HEIGHT,
         marks=tuple((x, y) for x in (0.3, 0.45, 0.6) for y in (-0.2, 0.0, 0.2)),
     )
+    # Of the pose, play of the gears: a step of the encoder is 1.5 mrad.
+    disturbances = Disturbances(pose=0.003, servo=0.05, scene=0.10, start=0.0005)
     xml = "so101.xml"
     flange = "arm/gripper"
     recordings = "so101"
 
-    def __init__(self, disturbances: ShotDisturbances = DISTURBANCES) -> None:
-        """Compile the scene; repeated executions differ as documented unless told."""
+    def __init__(self, disturbances: Disturbances | None = None) -> None:
+        """Compile the scene; argument as in `PandaTask`."""
         super().__init__(disturbances)
         self.feed_forward = -self.model.actuator_biasprm[:, 2] / self.model.actuator_gainprm[:, 0]
         """What the model's own servos are told ahead by, in [s], so that they are where they should

@@ -8,9 +8,7 @@ from jaxtyping import Float
 
 from prior_reinforce.environment import Rollout
 from prior_reinforce.lab.tasks.panda import N_JOINTS, STEP
-from prior_reinforce.lab.tasks.panda_task import PandaTask
-
-_FULL = mujoco.mjtState.mjSTATE_FULLPHYSICS
+from prior_reinforce.lab.tasks.panda_task import FULL, PandaTask, full_state
 
 
 class SteppedTask:
@@ -43,7 +41,7 @@ class SteppedTask:
 
     def load(self, joints: Float[np.ndarray, "7"]) -> None:
         """Put the objects back, as a person does between trials, the arm at rest at `joints`."""
-        mujoco.mj_setState(self.model, self.data, self.task._start(joints, None), _FULL)
+        mujoco.mj_setState(self.model, self.data, self.task._start(joints), FULL)
         self.hold(joints)
         for _ in range(round(self.task.lead_in / STEP)):
             self.step(joints)
@@ -61,9 +59,7 @@ class SteppedTask:
         sensors = self.data.sensordata.copy()
         mujoco.mj_step(self.model, self.data)
         if self._recorded is not None:
-            state = np.empty(mujoco.mj_stateSize(self.model, _FULL))
-            mujoco.mj_getState(self.model, self.data, state, _FULL)
-            self._recorded.append((state, sensors))
+            self._recorded.append((full_state(self.model, self.data), sensors))
 
     def begin(self) -> None:
         """What happens from now on decides an outcome."""

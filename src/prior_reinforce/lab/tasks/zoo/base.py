@@ -6,7 +6,7 @@ from abc import abstractmethod
 from typing import ClassVar
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from numpy.typing import ArrayLike
 
 from prior_reinforce.arrays import Frames, Point, as_plans
@@ -18,6 +18,11 @@ from prior_reinforce.plans.motions import Demonstrations
 _GONE = 100.0
 """An outcome farther off than this, in its unit, is of an object that is lost. Ours: goals are
 within a few metres and seconds."""
+
+
+def joints(n: int) -> tuple[str, ...]:
+    """Names of an arm's joints, in a plan."""
+    return tuple(f"joint{i + 1}" for i in range(n))
 
 
 class ZooTask(Task):
@@ -64,6 +69,11 @@ class ZooTask(Task):
             disturbed: Draws with the standard deviations of `spread`.
         """
 
+    @property
+    def is_angle(self) -> Bool[np.ndarray, " D"]:
+        """Which channels are angles."""
+        return np.array([unit == "rad" for unit in self.format.units])
+
     def recorded(self, path: Frames) -> Frames:
         """The plan that a led path is recorded as; here the path itself."""
         return path
@@ -84,15 +94,15 @@ class ZooTask(Task):
             plan: Shape (H, D).
             draws: D + m draws of a standard normal distribution; None: no disturbances.
         """
+        d = self.format.action_dim
         if draws is None:
-            draws = np.zeros(self.format.action_dim + len(self.spread))
-        joints = np.array([unit == "rad" for unit in self.format.units])
-        plan = plan + self.pose * joints * draws[: len(joints)]
+            draws = np.zeros(d + len(self.spread))
+        plan = plan + self.pose * self.is_angle * draws[:d]
         if self.bandwidth is not None:
             still = np.tile(self.held(plan), (round(self.lead_out / self.format.dt), 1))
             plan = follow(np.vstack([plan, still]), self.format.dt, self.bandwidth)
         try:
-            outcome = self._execute(plan, draws[len(joints) :] * self.spread)
+            outcome = self._execute(plan, draws[d:] * self.spread)
         except OverflowError:  # a wild plan throws it out of all numbers
             return None
         if outcome is None or not np.all(np.abs(outcome) <= _GONE):
@@ -102,14 +112,11 @@ class ZooTask(Task):
     def rollout(self, plans: ArrayLike, rng: np.random.Generator | None) -> list[Rollout]:
         """See `Task.rollout`, and the task for its outcome."""
         plans = as_plans(plans, self.format.action_dim)
-        n, k = len(plans), len(self.outcome_names)
-        width = self.format.action_dim + len(self.spread)
-        draws = np.zeros((n, width)) if rng is None else rng.normal(size=(n, width))
+        size = (len(plans), self.format.action_dim + len(self.spread))
+        draws = [None] * len(plans) if rng is None else rng.normal(size=size)
         outcomes = [self.execute(*pair) for pair in zip(plans, draws, strict=True)]
-        return [
-            Rollout(np.zeros(k) if outcome is None else outcome, outcome is not None)
-            for outcome in outcomes
-        ]
+        k = len(self.outcome_names)
+        return [Rollout(np.zeros(k) if r is None else r, r is not None) for r in outcomes]
 
     def demonstrations(self, name: str) -> Demonstrations:
         """Make the set of a name, `KIND-COUNT-SEED`; see `human`.

@@ -14,20 +14,19 @@ from prior_reinforce.lab.tasks.zoo.human import Strategy, Submovement, reach_and
 from prior_reinforce.lab.tasks.zoo.physics import first_passage, hung, landing, moving
 from prior_reinforce.plans.motions import PlanFormat
 
-_POSE = ("x", "y", "z", "rx", "ry", "rz")
-_UNITS = ("m", "m", "m", "rad", "rad", "rad")
+_POSES = PlanFormat(("x", "y", "z", "rx", "ry", "rz"), ("m",) * 3 + ("rad",) * 3, 0.02)
 
 
-def _turned(plan: Frames, own: tuple[float, float, float]) -> Float[np.ndarray, "H 3"]:
-    """A vector of the tool's own frame at each pose."""
-    return np.asarray(Rotation.from_rotvec(plan[:, 3:]).apply(own))
+def _ahead(plan: Frames) -> Float[np.ndarray, "H 3"]:
+    """Where the tool's own x axis points at each pose."""
+    return np.asarray(Rotation.from_rotvec(plan[:, 3:]).apply((1.0, 0.0, 0.0)))
 
 
 class Pour(ZooTask):
     """A marble rolls off a ladle as it tips, with the ladle's velocity."""
 
     name = "zoo-pour"
-    format = PlanFormat(_POSE, _UNITS, 0.02)
+    format = _POSES
     horizon = 80
     release = "the ladle's tilt"
     tolerance = 0.004
@@ -55,7 +54,7 @@ class Pour(ZooTask):
         return Strategy((0.40, 0.0, 0.30, 0.0, -0.1, 0.0), moves, 0.4)
 
     def _execute(self, plan: Frames, disturbed: Float[np.ndarray, "1"]) -> Point | None:
-        ahead = _turned(plan, (1.0, 0.0, 0.0))
+        ahead = _ahead(plan)
         time = first_passage(-ahead[:, 2], math.sin(self.tilt), self.format.dt)
         if time is None:
             return None
@@ -68,7 +67,7 @@ class Swing(ZooTask):
     """A weight on a string from a rod's tip is let go at a fixed frame: poses, and a clock."""
 
     name = "zoo-swing"
-    format = PlanFormat(_POSE, _UNITS, 0.02)
+    format = _POSES
     horizon = 90
     release = "the clock"
     tolerance = 0.008
@@ -90,14 +89,12 @@ class Swing(ZooTask):
         back, raised = (0.15, 0.0) if style == 0 else (0.10, -0.4)
         home = (0.40, 0.0, 0.75, 0.0, 0.0, 0.0)
         wound = (0.40 - back * cos, -back * sin, 0.75, 0.0, raised, 0.0)
-        reached = length - back
-        struck = (0.40 + reached * cos, reached * sin, 0.80, 0.0, 0.0, 0.0)
+        struck = (0.40 + (length - back) * cos, (length - back) * sin, 0.80, 0.0, 0.0, 0.0)
         return reach_and_strike(home, wound, struck, 0.6, 0.6)
 
     def _execute(self, plan: Frames, disturbed: Float[np.ndarray, "1"]) -> Point | None:
         if len(plan) <= self.clock:
             return None
-        tip = moving(plan[:, :3] + self.rod * _turned(plan, (1.0, 0.0, 0.0)), self.format.dt)
-        until, step = self.clock * self.format.dt, self.format.dt / 2.0
-        place, velocity = hung(tip, self.string, until, step)
+        tip = moving(plan[:, :3] + self.rod * _ahead(plan), self.format.dt)
+        place, velocity = hung(tip, self.string, self.clock * self.format.dt, self.format.dt / 2.0)
         return landing(place, velocity * (1.0 + disturbed[0]))

@@ -19,6 +19,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from jaxtyping import Float
+from numpy.linalg import norm
+from numpy.typing import ArrayLike
 
 from prior_reinforce.arrays import Frames, Point, Points
 from prior_reinforce.errors import ConfigurationError
@@ -80,8 +82,8 @@ class Strategy:
 
 def reach_and_strike(
     home: tuple[float, ...],
-    wound: tuple[float, ...],
-    struck: tuple[float, ...],
+    wound: ArrayLike,
+    struck: ArrayLike,
     reach: float,
     strike: float,
     overlap: float = 0.0,
@@ -91,11 +93,10 @@ def reach_and_strike(
 
     They take `reach` and `strike` seconds; the strike begins `overlap` before the reach ends.
     """
-    there = tuple(b - a for a, b in zip(home, wound, strict=True))
-    onward = tuple(b - a for a, b in zip(wound, struck, strict=True))
-    first = Submovement(0.0, reach, there)
-    second = Submovement(reach - overlap, strike, onward)
-    return Strategy(home, (first, second, *more), reach - overlap)
+    there, onward = (tuple(np.subtract(*ends)) for ends in ((wound, home), (struck, wound)))
+    begins = reach - overlap
+    moves = (Submovement(0.0, reach, there), Submovement(begins, strike, onward), *more)
+    return Strategy(home, moves, begins)
 
 
 @dataclass(frozen=True)
@@ -207,33 +208,26 @@ def demonstrate(task: ZooTask, name: str) -> Demonstrations:
     Raises:
         ConfigurationError: The name is not `KIND-COUNT-SEED`, or the task cannot be done so.
     """
-    kind, count, seed = _parse(task.name, name)
-    variation = KINDS[kind]
+    kind, *numbers = name.rsplit("-", 2)
+    known = kind in KINDS and len(numbers) == 2 and all(n.isdecimal() for n in numbers)
+    if not known or not COUNTS[0] <= int(numbers[0]) <= COUNTS[1]:
+        raise ConfigurationError(
+            f"{task.name} has no demonstration set {name!r}; write KIND-COUNT-SEED, for instance "
+            f"clean-6-0, with {COUNTS[0]} to {COUNTS[1]} demonstrations of the kind "
+            f"{', '.join(KINDS)}"
+        )
+    variation, count, seed = KINDS[kind], *map(int, numbers)
     rng = np.random.default_rng([seed, zlib.crc32(f"{task.name} {kind} {count}".encode())])
     styles = np.zeros(count, dtype=int)
     odd = rng.permutation(count)
     styles[odd[: round(variation.second_style * count)]] = 1
     outliers = {int(i) for i in odd[: variation.outliers]}
-    plans, outcomes = [], []
-    for i, meant in enumerate(_meant(task, variation, count, rng)):
-        plan, outcome = _attempt(task, variation, meant, int(styles[i]), i in outliers, rng)
-        plans.append(plan)
-        outcomes.append(outcome)
-    return Demonstrations(
-        np.array(plans), np.array(outcomes), task.format, task.outcome_names, task.outcome_units
-    )
-
-
-def _parse(task: str, name: str) -> tuple[str, int, int]:
-    kind, *numbers = name.rsplit("-", 2)
-    known = kind in KINDS and len(numbers) == 2 and all(n.isdecimal() for n in numbers)
-    if not known or not COUNTS[0] <= int(numbers[0]) <= COUNTS[1]:
-        raise ConfigurationError(
-            f"{task} has no demonstration set {name!r}; write KIND-COUNT-SEED, for instance "
-            f"clean-6-0, with {COUNTS[0]} to {COUNTS[1]} demonstrations of the kind "
-            f"{', '.join(KINDS)}"
-        )
-    return kind, int(numbers[0]), int(numbers[1])
+    made = [
+        _attempt(task, variation, meant, int(styles[i]), i in outliers, rng)
+        for i, meant in enumerate(_meant(task, variation, count, rng))
+    ]
+    plans, outcomes = map(np.array, zip(*made, strict=True))
+    return Demonstrations(plans, outcomes, task.format, task.outcome_names, task.outcome_units)
 
 
 def _meant(task: ZooTask, variation: Variation, count: int, rng: np.random.Generator) -> Points:
@@ -242,7 +236,7 @@ def _meant(task: ZooTask, variation: Variation, count: int, rng: np.random.Gener
     shares = rng.uniform(size=(count if variation.scattered else 1, len(low)))
     while len(shares) < count:
         candidates = rng.uniform(size=(60, len(low)))
-        apart = np.linalg.norm(candidates[:, None] - shares, axis=-1).min(axis=1)
+        apart = norm(candidates[:, None] - shares, axis=-1).min(axis=1)
         shares = np.vstack([shares, candidates[np.argmax(apart)]])
     least, most = shares.min(axis=0), shares.max(axis=0)
     shares = _MARGIN + (1.0 - 2.0 * _MARGIN) * (shares - least) / (most - least)
@@ -280,11 +274,9 @@ def _draw(
     warp = variation.warp * rng.normal(size=_WARP_WAVES)
     warp *= min(1.0, _STEEPEST_WARP / max(float(np.abs(warp).sum()), 1e-9))
     # People come back to nearly the same home, and differ more in how they wind up.
-    posture = (
-        np.array([[0.5], [1.0]]) * np.array(task.posture) * rng.normal(size=(2, len(task.posture)))
-    )
+    differs = np.array([[0.5], [1.0]]) * np.array(task.posture)
+    posture = differs * rng.normal(size=differs.shape)
     noise = rng.normal(size=(task.horizon, len(task.posture)))
-    angles = np.array([unit == "rad" for unit in task.format.units])
     return Manner(
         rest=float(variation.rest[0] + rest * np.ptp(variation.rest)),
         cut=float(variation.cut[0] + cut * np.ptp(variation.cut)),
@@ -295,7 +287,7 @@ def _draw(
         pause=float(variation.pause * pause),
         posture=posture * (_ODD_POSTURE if outlier else variation.posture),
         style=1 if outlier else style,
-        noise=variation.jitter * noise * angles,
+        noise=variation.jitter * noise * task.is_angle,
     )
 
 
@@ -309,9 +301,9 @@ def _aim(task: ZooTask, manner: Manner, meant: Point) -> Point:
         return np.full(k, 10.0) if outcome is None else (outcome - meant) / extent
 
     starts = [np.array(start) for start in product((0.2, 0.5, 0.8), repeat=k)]
-    shares, off = min(((s, miss(s)) for s in starts), key=lambda found: _length(found[1]))
+    shares, off = min(((s, miss(s)) for s in starts), key=lambda found: norm(found[1]))
     for _ in range(_CORRECTIONS):
-        if _length(off) < _NEAR_ENOUGH:
+        if norm(off) < _NEAR_ENOUGH:
             break
         nudged = shares + _NUDGE * np.where(shares > 0.5, -1.0, 1.0) * np.eye(k)
         slopes = np.array([(miss(s) - off) / (s - shares).sum() for s in nudged]).T
@@ -319,13 +311,9 @@ def _aim(task: ZooTask, manner: Manner, meant: Point) -> Point:
         for part in (1.0, 0.5, 0.25, 0.125):  # shorter where the full correction is too bold
             tried = np.clip(shares + part * step, 0.0, 1.0)
             outcome = miss(tried)
-            if _length(outcome) < _length(off):
+            if norm(outcome) < norm(off):
                 shares, off = tried, outcome
                 break
         else:
             break
     return task.aims(shares)
-
-
-def _length(vector: Point) -> float:
-    return float(np.linalg.norm(vector))

@@ -71,6 +71,11 @@ def moving(path: Float[np.ndarray, "t ..."], dt: float) -> CubicSpline:
     return CubicSpline(np.arange(len(path)) * dt, path)
 
 
+def finely(path: CubicSpline) -> Float[np.ndarray, " t"]:
+    """Times of a path, eight a frame, among which a release is looked for."""
+    return np.linspace(path.x[0], path.x[-1], _PER_FRAME * (len(path.x) - 1) + 1)
+
+
 def first_passage(values: Float[np.ndarray, " t"], level: float, dt: float) -> float | None:
     """When values first pass a level upwards, by linear interpolation; None if they never do."""
     up = np.flatnonzero((values[:-1] < level) & (values[1:] >= level))
@@ -83,16 +88,11 @@ def first_passage(values: Float[np.ndarray, " t"], level: float, dt: float) -> f
 def lift_off(hand: CubicSpline, normals: Places) -> float | None:
     """When what lies in the hand leaves it: the hand no longer presses on it.
 
-    The force on it along the hand's normal n is m (a + g z) n, with a the hand's acceleration.
-
-    Args:
-        hand: Path of the hand.
-        normals: The hand's normal n at each of the path's frames, from the hand to the object.
-
-    Returns:
-        The time; None if it stays, or did not lie in the hand at first.
+    The force on it along the hand's normal n, which points to it and is given at each of the path's
+    frames, is m (a + g z) n, with a the hand's acceleration. None if it stays, or did not lie in
+    the hand at first.
     """
-    fine = np.linspace(hand.x[0], hand.x[-1], _PER_FRAME * (len(hand.x) - 1) + 1)
+    fine = finely(hand)
     pressed = hand(fine, 2) + np.array([0.0, 0.0, GRAVITY])
     force = np.sum(pressed * CubicSpline(hand.x, normals)(fine), axis=1)
     if force[0] <= 0.0:
@@ -123,11 +123,8 @@ def on_parabola(start: Place, velocity: Place, time: float) -> Place:
 def flight_in_air(start: Place, velocity: Place, drag: float, step: float = 0.01) -> Place | None:
     """Where a ball comes down to z = 0 against quadratic drag; None if it begins below.
 
-    Args:
-        start: In [m].
-        velocity: In [m/s].
-        drag: Deceleration over speed squared, in [1/m].
-        step: Of the classical Runge-Kutta rule, in [s].
+    It starts in [m] and [m/s]; drag is deceleration over speed squared, in [1/m], and `step` the
+    classical Runge-Kutta rule's, in [s].
     """
     if start[2] <= 0.0:
         return None
@@ -159,13 +156,8 @@ def hung(pivot: CubicSpline, length: float, until: float, step: float) -> tuple[
     """Place and velocity of a mass that hangs on a taut string from a moving pivot, from rest.
 
     With r from the pivot and G = g - a the gravity that the pivot feels, r'' = G + s r, where s
-    keeps |r| the string's length: s = -(|r'|^2 + G r) / |r|^2.
-
-    Args:
-        pivot: Path of the pivot, in [m].
-        length: Of the string, in [m].
-        until: When to look, in [s].
-        step: Of the classical Runge-Kutta rule, about, in [s].
+    keeps |r| the string's length [m]: s = -(|r'|^2 + G r) / |r|^2. It is looked at `until`, in [s];
+    the classical Runge-Kutta rule takes steps of about `step`, in [s].
     """
     n = max(math.ceil(until / step), 1)
     h = until / n

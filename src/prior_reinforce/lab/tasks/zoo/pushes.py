@@ -9,9 +9,9 @@ from jaxtyping import Float
 from scipy.optimize import brentq
 
 from prior_reinforce.arrays import Frames, Point
-from prior_reinforce.lab.tasks.zoo.base import ZooTask
+from prior_reinforce.lab.tasks.zoo.base import ZooTask, joints
 from prior_reinforce.lab.tasks.zoo.human import Strategy, Submovement, reach_and_strike
-from prior_reinforce.lab.tasks.zoo.physics import GRAVITY, Arm, first_passage, moving
+from prior_reinforce.lab.tasks.zoo.physics import GRAVITY, Arm, finely, first_passage, moving
 from prior_reinforce.plans.motions import PlanFormat
 
 
@@ -146,7 +146,7 @@ class Slide(ZooTask):
 
     def _execute(self, plan: Frames, disturbed: Float[np.ndarray, "2"]) -> Point | None:
         cue = moving(plan[:, 0], self.format.dt)
-        fine = np.linspace(0.0, cue.x[-1], 8 * (len(plan) - 1) + 1)
+        fine = finely(cue)
         # The disc leaves where the cue brakes harder than the table brakes the disc.
         ahead = np.where(cue(fine, 1) > 0.05, -cue(fine, 2) - self.braking(cue(fine)), -1.0)
         time = first_passage(ahead, 0.0, fine[1])
@@ -197,7 +197,7 @@ class Curl(ByIncrements):
 
     def _execute(self, plan: Frames, disturbed: Float[np.ndarray, "2"]) -> Point | None:
         hand = moving(np.cumsum(plan, axis=0), self.format.dt)
-        fine = np.linspace(0.0, hand.x[-1], 8 * (len(plan) - 1) + 1)
+        fine = finely(hand)
         velocity, change = hand(fine, 1)[:, :2], hand(fine, 2)[:, :2]
         speed = np.maximum(np.linalg.norm(velocity, axis=1), 1e-9)
         slower = -np.sum(velocity * change, axis=1) / speed
@@ -219,7 +219,7 @@ class Strike(ZooTask):
     """A putter on a hanging arm: reach back, wait, strike; 400 frames, the ball rolls on."""
 
     name = "zoo-strike"
-    format = PlanFormat(("joint1", "joint2", "joint3", "joint4"), ("rad",) * 4, 0.01)
+    format = PlanFormat(joints(4), ("rad",) * 4, 0.01)
     horizon = 400
     release = "the putter's touch"
     tolerance = 0.015

@@ -2,38 +2,52 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
 from jaxtyping import Float
+from numpy.typing import ArrayLike
+from scipy.interpolate import CubicSpline
 
 from prior_reinforce.arrays import Frames, Point
-from prior_reinforce.lab.tasks.zoo.base import ZooTask
+from prior_reinforce.lab.tasks.zoo import physics
+from prior_reinforce.lab.tasks.zoo.base import ZooTask, joints
 from prior_reinforce.lab.tasks.zoo.human import Strategy, Submovement, reach_and_strike
-from prior_reinforce.lab.tasks.zoo.physics import (
-    GRAVITY,
-    Arm,
-    first_passage,
-    flight,
-    flight_in_air,
-    landing,
-    lift_off,
-    moving,
-    on_parabola,
-)
+from prior_reinforce.lab.tasks.zoo.physics import GRAVITY, Arm, Place, first_passage, moving
 from prior_reinforce.plans.motions import PlanFormat
 
+_OPENING = 0.12
+"""How long a gripper takes to open, six frames, in [s]."""
 
-def _joints(n: int) -> tuple[str, ...]:
-    return tuple(f"joint{i + 1}" for i in range(n))
+
+class Throw(ZooTask):
+    """An arm swings, and a ball leaves its hand at some time, with the hand's velocity."""
+
+    arm: ClassVar[Arm]
+
+    @abstractmethod
+    def _leaves(self, plan: Frames, hand: CubicSpline) -> float | None:
+        """When the ball leaves, in [s]; None if it stays in the hand."""
+
+    def _flies(self, time: float, start: Place, velocity: Place) -> ArrayLike | None:
+        """Outcome of a ball that leaves then, there and so fast: here, where it comes down."""
+        return physics.landing(start, velocity)
+
+    def _execute(self, plan: Frames, disturbed: Float[np.ndarray, " m"]) -> ArrayLike | None:
+        hand = moving(self.arm.hand(plan), self.format.dt)
+        time = self._leaves(plan, hand)
+        if time is None:
+            return None
+        return self._flies(time, hand(time), hand(time, 1) * (1.0 + disturbed[0]))
 
 
-class Lob(ZooTask):
+class Lob(Throw):
     """A seven-joint arm lets a ball go at a fixed frame, whatever the arm does then: a clock."""
 
     name = "zoo-lob"
-    format = PlanFormat(_joints(7), ("rad",) * 7, 0.02)
+    format = PlanFormat(joints(7), ("rad",) * 7, 0.02)
     horizon = 75
     release = "the clock"
     tolerance = 0.015
@@ -53,24 +67,19 @@ class Lob(ZooTask):
         heading, swing = aims
         home = (0.0, -0.3, 0.0, 0.5, 0.0, 0.3, 0.0)
         wound = (heading, -0.9, 0.0, -0.5, 0.0, -0.4, 0.0)
-        share = (1.1, 0.6, 0.4) if style == 0 else (0.75, 0.95, 0.75)
-        shoulder, elbow, wrist = swing * np.array(share)
-        struck = (heading, shoulder - 0.9, 0.0, elbow - 0.5, 0.0, wrist - 0.4, 0.0)
+        shares = ((0.0, 1.1, 0.0, 0.6, 0.0, 0.4, 0.0), (0.0, 0.75, 0.0, 0.95, 0.0, 0.75, 0.0))
+        struck = wound + swing * np.array(shares[style])
         return reach_and_strike(home, wound, struck, reach=0.6, strike=0.7, overlap=0.1)
 
-    def _execute(self, plan: Frames, disturbed: Float[np.ndarray, "1"]) -> Point | None:
-        if len(plan) <= self.clock:
-            return None
-        hand = moving(self.arm.hand(plan), self.format.dt)
-        time = self.clock * self.format.dt
-        return landing(hand(time), hand(time, 1) * (1.0 + disturbed[0]))
+    def _leaves(self, plan: Frames, hand: CubicSpline) -> float | None:
+        return self.clock * self.format.dt if len(plan) > self.clock else None
 
 
-class Scoop(ZooTask):
+class Scoop(Throw):
     """A ball lies in a scoop on a seven-joint arm, and leaves it when the hand decelerates."""
 
     name = "zoo-scoop"
-    format = PlanFormat(_joints(7), ("rad",) * 7, 0.0125)
+    format = PlanFormat(joints(7), ("rad",) * 7, 0.0125)
     horizon = 140
     release = "the hand's deceleration"
     tolerance = 0.012
@@ -85,24 +94,19 @@ class Scoop(ZooTask):
         heading, swing = aims
         home = (0.0, -0.2, 0.0, -0.6, 0.0, -0.5, 0.0)
         wound = (heading, -0.5, 0.0, -0.5, 0.0, -0.35, 0.0)
-        share = (1.0, 0.7, 0.3) if style == 0 else (0.6, 0.7, 0.9)
-        shoulder, elbow, wrist = swing * np.array(share)
-        struck = (heading, shoulder - 0.5, 0.0, elbow - 0.5, 0.0, wrist - 0.35, 0.0)
+        shares = ((0.0, 1.0, 0.0, 0.7, 0.0, 0.3, 0.0), (0.0, 0.6, 0.0, 0.7, 0.0, 0.9, 0.0))
+        struck = wound + swing * np.array(shares[style])
         return reach_and_strike(home, wound, struck, reach=0.45, strike=0.55)
 
-    def _execute(self, plan: Frames, disturbed: Float[np.ndarray, "1"]) -> Point | None:
-        hand = moving(self.arm.hand(plan), self.format.dt)
-        time = lift_off(hand, self.arm.direction(plan, (1.0, 0.0, 0.0)))
-        if time is None:
-            return None
-        return landing(hand(time), hand(time, 1) * (1.0 + disturbed[0]))
+    def _leaves(self, plan: Frames, hand: CubicSpline) -> float | None:
+        return physics.lift_off(hand, self.arm.direction(plan, (1.0, 0.0, 0.0)))
 
 
-class GripperThrow(ZooTask):
+class GripperThrow(Throw):
     """Three joints and a gripper, whose opening is a channel of the plan: k = 3."""
 
     name = "zoo-gripper"
-    format = PlanFormat((*_joints(3), "gripper"), ("rad", "rad", "rad", "1"), 0.02)
+    format = PlanFormat((*joints(3), "gripper"), ("rad", "rad", "rad", "1"), 0.02)
     outcome_names = ("x", "y", "apex")
     outcome_units = ("m", "m", "m")
     horizon = 80
@@ -112,57 +116,44 @@ class GripperThrow(ZooTask):
     posture = (0.02, 0.04, 0.04, 0.0)
     aim_range = ((-0.4, 0.4), (1.2, 3.0), (-0.1, 0.45))
     arm = Arm.straight("zyy", 0.40, 0.30, 0.35)
-    opening = 0.12
-    """How long the gripper takes to open, six frames, in [s]."""
 
     def strategy(self, aims: Point, style: int) -> Strategy:
         """Lean back, swing, and open the gripper in the swing: early for a high throw."""
         heading, swing, late = aims
         home = (0.0, -0.2, 0.4, 0.0)
         wound = (heading, -0.8, -0.7, 0.0)
-        share = (0.6, 0.8) if style == 0 else (0.9, 0.35)
-        struck = (heading, -0.8 + swing * share[0], -0.7 + swing * share[1], 0.0)
-        opens = Submovement(0.7 + 0.35 * late, self.opening, (0, 0, 0, 1.0), by_hardware=True)
+        struck = wound + swing * np.array(((0.0, 0.6, 0.8, 0.0), (0.0, 0.9, 0.35, 0.0))[style])
+        opens = Submovement(0.7 + 0.35 * late, _OPENING, (0, 0, 0, 1.0), by_hardware=True)
         return reach_and_strike(home, wound, struck, 0.6, 0.6, more=(opens,))
 
-    def _execute(self, plan: Frames, disturbed: Float[np.ndarray, "1"]) -> Point | None:
-        time = first_passage(plan[:, 3], 0.5, self.format.dt)
-        if time is None:
-            return None
-        hand = moving(self.arm.hand(plan[:, :3]), self.format.dt)
-        start, velocity = hand(time), hand(time, 1) * (1.0 + disturbed[0])
-        landed = flight(start, velocity)
+    def _leaves(self, plan: Frames, hand: CubicSpline) -> float | None:
+        return first_passage(plan[:, 3], 0.5, self.format.dt)
+
+    def _flies(self, time: float, start: Place, velocity: Place) -> Point | None:
+        landed = physics.flight(start, velocity)
         if landed is None:
             return None
         apex = start[2] + max(velocity[2], 0.0) ** 2 / (2.0 * GRAVITY)
         return np.append(landed[0][:2], apex)
 
 
-class Latched(ZooTask):
+class Latched(Throw):
     """A latch lets the ball go where the hand's lean, the sum of all pitches, passes an angle."""
 
     release = "a latch at an angle of the hand"
-    arm: ClassVar[Arm]
     latch: ClassVar[float]
     """Lean of the hand at which the ball leaves, forwards from the vertical, in [rad]."""
 
-    def _leaves(
-        self, plan: Frames, faster: float
-    ) -> tuple[float, Float[np.ndarray, "3"], Float[np.ndarray, "3"]] | None:
-        """When the ball leaves, where, and how fast; None if the latch never opens."""
+    def _leaves(self, plan: Frames, hand: CubicSpline) -> float | None:
         pitches = np.array([axis == "y" for axis in self.arm.axes])
-        time = first_passage(plan[:, pitches].sum(axis=1), self.latch, self.format.dt)
-        if time is None:
-            return None
-        hand = moving(self.arm.hand(plan), self.format.dt)
-        return time, hand(time), hand(time, 1) * (1.0 + faster)
+        return first_passage(plan[:, pitches].sum(axis=1), self.latch, self.format.dt)
 
 
 class Bounce(Latched):
     """A ball that bounces once before it counts: where it comes down the second time."""
 
     name = "zoo-bounce"
-    format = PlanFormat(_joints(4), ("rad",) * 4, 0.0125)
+    format = PlanFormat(joints(4), ("rad",) * 4, 0.0125)
     horizon = 110
     tolerance = 0.012
     region = np.array([[1.20, -0.45], [2.00, 0.45]])
@@ -177,32 +168,24 @@ class Bounce(Latched):
     def strategy(self, aims: Point, style: int) -> Strategy:
         """Lean back and swing over; in style 1 the wrist does more."""
         heading, swing = aims
-        share = (0.5, 0.3, 0.2) if style == 0 else (0.3, 0.3, 0.4)
-        shoulder, elbow, wrist = swing * np.array(share)
         wound = (heading, -0.5, -0.4, -0.3)
-        struck = (heading, shoulder - 0.5, elbow - 0.4, wrist - 0.3)
+        struck = wound + swing * np.array(((0.0, 0.5, 0.3, 0.2), (0.0, 0.3, 0.3, 0.4))[style])
         return reach_and_strike((0.0, -0.3, -0.2, -0.1), wound, struck, 0.4, 0.5)
 
-    def _execute(self, plan: Frames, disturbed: Float[np.ndarray, "1"]) -> Point | None:
-        left = self._leaves(plan, float(disturbed[0]))
-        if left is None:
-            return None
-        _, start, velocity = left
-        first = flight(start, velocity)
+    def _flies(self, time: float, start: Place, velocity: Place) -> Point | None:
+        first = physics.flight(start, velocity)
         if first is None:
             return None
-        place, time = first
-        down = velocity[2] - GRAVITY * time
         after = velocity * self.slip
-        after[2] = -self.restitution * down
-        return landing(np.array([*place[:2], 0.0]), after)
+        after[2] = -self.restitution * (velocity[2] - GRAVITY * first[1])
+        return physics.landing(np.array([*first[0][:2], 0.0]), after)
 
 
 class Drag(Latched):
     """A light ball against the air, thrown by a planar arm of two links; k = 1, 40 frames."""
 
     name = "zoo-drag"
-    format = PlanFormat(_joints(2), ("rad",) * 2, 0.025)
+    format = PlanFormat(joints(2), ("rad",) * 2, 0.025)
     outcome_names = ("x",)
     outcome_units = ("m",)
     horizon = 40
@@ -218,15 +201,12 @@ class Drag(Latched):
 
     def strategy(self, aims: Point, style: int) -> Strategy:
         """Swing both joints; in style 1 the elbow follows with a whip."""
-        swing = float(aims[0])
-        share = (0.5, 0.5) if style == 0 else (0.25, 0.75)
         wound = (-0.8, -0.7)
-        struck = (-0.8 + share[0] * swing, -0.7 + share[1] * swing)
+        struck = wound + aims[0] * np.array(((0.5, 0.5), (0.25, 0.75))[style])
         return reach_and_strike((-0.4, -0.4), wound, struck, 0.3, 0.45, 0.05)
 
-    def _execute(self, plan: Frames, disturbed: Float[np.ndarray, "1"]) -> Point | None:
-        left = self._leaves(plan, float(disturbed[0]))
-        landed = None if left is None else flight_in_air(left[1], left[2], self.drag)
+    def _flies(self, time: float, start: Place, velocity: Place) -> Point | None:
+        landed = physics.flight_in_air(start, velocity, self.drag)
         return None if landed is None else landed[:1]
 
 
@@ -234,7 +214,7 @@ class Arrival(Latched):
     """Where a ball lands, in metres, and when after the plan's start, in seconds."""
 
     name = "zoo-arrival"
-    format = PlanFormat(_joints(3), ("rad",) * 3, 0.02)
+    format = PlanFormat(joints(3), ("rad",) * 3, 0.02)
     outcome_names = ("x", "arrival")
     outcome_units = ("m", "s")
     horizon = 90
@@ -251,26 +231,25 @@ class Arrival(Latched):
     def strategy(self, aims: Point, style: int) -> Strategy:
         """Swing, earlier or later; in style 1 with the wrist."""
         swing, early = aims
-        share = (0.45, 0.35, 0.2) if style == 0 else (0.3, 0.3, 0.4)
-        shoulder, elbow, wrist = swing * np.array(share)
         wound = (-0.6, -0.5, -0.2)
-        struck = (shoulder - 0.6, elbow - 0.5, wrist - 0.2)
+        struck = wound + swing * np.array(((0.45, 0.35, 0.2), (0.3, 0.3, 0.4))[style])
         swung = reach_and_strike((-0.3, -0.3, 0.0), wound, struck, 0.4, 0.5)
         return replace(swung, settle=float(early))
 
-    def _execute(self, plan: Frames, disturbed: Float[np.ndarray, "2"]) -> Point | None:
-        left = self._leaves(plan, float(disturbed[0]))
-        landed = None if left is None else flight(left[1], left[2])
-        if left is None or landed is None:
-            return None
-        return np.array([landed[0][0], left[0] + landed[1] + disturbed[1]])
+    def _flies(self, time: float, start: Place, velocity: Place) -> Point | None:
+        landed = physics.flight(start, velocity)
+        return None if landed is None else np.array([landed[0][0], time + landed[1]])
+
+    def _execute(self, plan: Frames, disturbed: Float[np.ndarray, "2"]) -> ArrayLike | None:
+        outcome = super()._execute(plan, disturbed)
+        return None if outcome is None else outcome + np.array([0.0, disturbed[1]])
 
 
-class Hoop(ZooTask):
+class Hoop(Throw):
     """Six joints of the usual industrial kind and a grip channel; through a window, k = 3."""
 
     name = "zoo-hoop"
-    format = PlanFormat((*_joints(6), "grip"), (*("rad",) * 6, "1"), 0.02)
+    format = PlanFormat((*joints(6), "grip"), (*("rad",) * 6, "1"), 0.02)
     outcome_names = ("y", "z", "flight")
     outcome_units = ("m", "m", "s")
     horizon = 100
@@ -292,30 +271,25 @@ class Hoop(ZooTask):
     )
     window = 1.5
     """The plane that it flies through stands at this x, in [m]."""
-    opening = 0.12
-    """How long the grip takes to open, six frames, in [s]."""
 
     def strategy(self, aims: Point, style: int) -> Strategy:
         """Swing shoulder, elbow and wrist, and let go: early for a long flight."""
         heading, swing, late = aims
-        share = (0.4, 0.35, 0.25) if style == 0 else (0.3, 0.25, 0.45)
-        shoulder, elbow, wrist = swing * np.array(share)
         home = (0.0, -0.4, 0.6, -0.4, 0.0, 0.0, 1.0)
         wound = (heading, -0.7, -0.3, -0.5, 0.0, 0.0, 1.0)
-        struck = (heading, shoulder - 0.7, elbow - 0.3, wrist - 0.5, 0.0, 0.0, 1.0)
-        opens = Submovement(0.85 + 0.35 * late, self.opening, (0,) * 6 + (-1.0,), by_hardware=True)
+        shares = ((0, 0.4, 0.35, 0.25, 0, 0, 0), (0, 0.3, 0.25, 0.45, 0, 0, 0))
+        struck = wound + swing * np.array(shares[style])
+        opens = Submovement(0.85 + 0.35 * late, _OPENING, (0,) * 6 + (-1.0,), by_hardware=True)
         return reach_and_strike(home, wound, struck, 0.75, 0.6, more=(opens,))
 
-    def _execute(self, plan: Frames, disturbed: Float[np.ndarray, "1"]) -> Point | None:
-        time = first_passage(-plan[:, 6], -0.5, self.format.dt)
-        if time is None:
-            return None
-        hand = moving(self.arm.hand(plan[:, :6]), self.format.dt)
-        start, velocity = hand(time), hand(time, 1) * (1.0 + disturbed[0])
+    def _leaves(self, plan: Frames, hand: CubicSpline) -> float | None:
+        return first_passage(-plan[:, 6], -0.5, self.format.dt)
+
+    def _flies(self, time: float, start: Place, velocity: Place) -> Point | None:
         if velocity[0] <= 0.1 or start[0] >= self.window:
             return None
         flies = float((self.window - start[0]) / velocity[0])
-        place = on_parabola(start, velocity, flies)
+        place = physics.on_parabola(start, velocity, flies)
         return None if place[2] < 0.0 else np.array([place[1], place[2], flies])
 
 
@@ -361,5 +335,5 @@ class Catapult(ZooTask):
         draw, elevation = (float(np.interp(time, frames, plan[:, i])) for i in (0, 1))
         speed = self.stiffness * draw * (1.0 + disturbed[0])
         velocity = speed * np.array([np.cos(elevation), 0.0, np.sin(elevation)])
-        landed = landing(np.array([0.0, 0.0, self.height]), velocity)
+        landed = physics.landing(np.array([0.0, 0.0, self.height]), velocity)
         return None if landed is None else landed[:1]

@@ -13,23 +13,19 @@ from jaxtyping import Float
 from scipy.interpolate import CubicSpline
 
 from prior_reinforce.arrays import Frames, Point
-from prior_reinforce.lab.tasks.zoo.base import ZooTask
+from prior_reinforce.lab.tasks.zoo.base import ZooTask, joints
 from prior_reinforce.lab.tasks.zoo.human import Strategy, reach_and_strike
-from prior_reinforce.lab.tasks.zoo.physics import GRAVITY, Arm, landing, moving
+from prior_reinforce.lab.tasks.zoo.physics import GRAVITY, Arm, finely, moving
+from prior_reinforce.lab.tasks.zoo.throws import Throw
 from prior_reinforce.plans.motions import PlanFormat
-
-_PER_FRAME = 8
-"""How finely the fastest moment is looked for."""
 
 
 def fastest(path: CubicSpline, least: float) -> float | None:
-    """When a path is fastest, by a parabola through three samples; None if slower than `least`.
+    """When a path [m] is fastest, by a parabola through three samples.
 
-    Args:
-        path: Places, in [m].
-        least: In [m/s]: who swings less has not thrown.
+    None if it is slower than `least` [m/s]: who swings less has not thrown.
     """
-    fine = np.linspace(path.x[0], path.x[-1], _PER_FRAME * (len(path.x) - 1) + 1)
+    fine = finely(path)
     speed = np.linalg.norm(np.atleast_2d(path(fine, 1).T), axis=0)
     i = int(np.clip(np.argmax(speed), 1, len(speed) - 2))
     if speed[i] < least:
@@ -40,21 +36,15 @@ def fastest(path: CubicSpline, least: float) -> float | None:
     return float(fine[i] + part * (fine[1] - fine[0]))
 
 
-class _Swung(ZooTask):
+class _Swung(Throw):
     """An arm lets go of a ball when its hand is fastest."""
 
     release = "the hand's fastest moment"
-    spread = (0.002,)
-    arm: Arm
     least = 1.5
     """Speed of the hand below which the ball stays in it, in [m/s]."""
 
-    def _execute(self, plan: Frames, disturbed: Float[np.ndarray, "1"]) -> Point | None:
-        hand = moving(self.arm.hand(plan), self.format.dt)
-        time = fastest(hand, self.least)
-        if time is None:
-            return None
-        return landing(hand(time), hand(time, 1) * (1.0 + disturbed[0]))
+    def _leaves(self, plan: Frames, hand: CubicSpline) -> float | None:
+        return fastest(hand, self.least)
 
 
 class Sidearm(_Swung):
@@ -62,7 +52,7 @@ class Sidearm(_Swung):
 
     name = "zoo-sidearm"
     demonstration_sets = ("ways-8-0", "ways-12-0", "warped-8-0", "mixed-8-0")
-    format = PlanFormat(("joint1", "joint2", "joint3"), ("rad",) * 3, 0.02)
+    format = PlanFormat(joints(3), ("rad",) * 3, 0.02)
     horizon = 140
     tolerance = 0.02
     region = np.array([[1.20, -0.30], [1.70, 0.30]])
@@ -84,7 +74,7 @@ class Overarm(_Swung):
     """A ball thrown over the shoulder, or underhand."""
 
     name = "zoo-overarm"
-    format = PlanFormat(("joint1", "joint2", "joint3"), ("rad",) * 3, 0.02)
+    format = PlanFormat(joints(3), ("rad",) * 3, 0.02)
     horizon = 110
     tolerance = 0.02
     region = np.array([[1.60, -0.35], [2.30, 0.35]])
@@ -124,8 +114,7 @@ class Bank(ZooTask):
 
     def strategy(self, aims: Point, style: int) -> Strategy:
         """Turn to the goal, draw the cue back and shoot; style 1: turn to its mirror image."""
-        stroke, heading = aims
-        heading += 0.0 if style == 0 else 0.75
+        stroke, heading = aims + np.array([0.0, 0.75 * style])
         return reach_and_strike((0.0, 0.0), (heading, -0.05), (heading, stroke - 0.05), 0.7, 0.35)
 
     def _execute(self, plan: Frames, disturbed: Float[np.ndarray, "2"]) -> Point | None:
@@ -136,12 +125,11 @@ class Bank(ZooTask):
         heading = float(moving(plan[:, 0], self.format.dt)(time)) + disturbed[1]
         speed = float(cue(time, 1)) * (1.0 + disturbed[0])
         way = speed**2 / (2.0 * self.friction * GRAVITY)
-        x, y = way * math.cos(heading), way * math.sin(heading)
-        if y <= self.cushion:
-            return np.array([x, y])
-        there = self.cushion / math.sin(heading)  # of the way, up to the cushion
-        turned = math.hypot(math.cos(heading), self.rebound * math.sin(heading))
+        cos, sin = math.cos(heading), math.sin(heading)
+        if way * sin <= self.cushion:
+            return np.array([way * cos, way * sin])
+        there = self.cushion / sin  # of the way, up to the cushion
+        turned = math.hypot(cos, self.rebound * sin)
         left = (way - there) * turned**2  # the puck comes off it more slowly
-        ahead, back = math.cos(heading) / turned, self.rebound * math.sin(heading) / turned
-        bounced = there * math.cos(heading) + left * ahead, self.cushion - left * back
-        return np.array(bounced)
+        ahead, back = cos / turned, self.rebound * sin / turned
+        return np.array([there * cos + left * ahead, self.cushion - left * back])
