@@ -5,7 +5,7 @@ import base64
 import jinja2
 import pytest
 
-from prior_reinforce.lab.experiments.recipes.base import Table
+from prior_reinforce.lab.experiments.recipes.tables import Table
 from prior_reinforce.report.html import data_uri, render
 
 

@@ -51,8 +51,7 @@ class Roots(Unit):
 
     seed: int
 
-    @property
-    def label(self):
+    def __str__(self):
         return f"roots {self.seed}"
 
     def run(self, folder: Path):
@@ -72,8 +71,7 @@ class Ends(Unit):
 
     how: str
 
-    @property
-    def label(self):
+    def __str__(self):
         return f"one that {self.how}s"
 
     def run(self, folder: Path):

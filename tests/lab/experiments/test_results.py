@@ -45,7 +45,7 @@ def test_rows_are_read_as_they_were_written_and_equal_rows_give_equal_bytes(tmp_
     read = read_results(tmp_path)
     assert read.made_by == {"trials": "this command", "other": "another"}
     one = read.where(recipe="trials")
-    np.testing.assert_array_equal(one.values(TRIALS), [[1, 11], [3, 2]])
+    np.testing.assert_array_equal(TRIALS.of(one.frame), [1, 11, 3, 2])
     np.testing.assert_allclose(next(one.texts("p_hit")), [0.212, 0.9])
     # By nothing but pandas, as the docs say.
     alone = pd.read_csv(path, comment="#")

@@ -17,7 +17,7 @@ verdict. A mean below the paper's is an observation, too: its arm and goals are 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -65,20 +65,22 @@ class Claim:
     prepare: Callable[[Results], Results] = lambda results: results
     """Makes rows that the measure is of."""
 
+    def sides(self, results: Results, a: Where | None = None) -> list[Results]:
+        """The rows that the measure is of: a, or these in its place, and b where there is one."""
+        sides = (a or self.a, self.b)
+        return [self.prepare(results.where(**of)) for of in sides if of is not None]
+
     def quantity(self, results: Results, a: Where | None = None) -> Interval:
         """The quantity, of these rows or the claim's own."""
-        of = self.prepare(results.where(**(a or self.a)))
-        if self.b is None:
-            return of.mean(self.measure)
-        return of.minus(self.prepare(results.where(**self.b)), self.measure)
+        of, *others = self.sides(results, a)
+        return of.minus(others[0], self.measure) if others else of.mean(self.measure)
 
     def p_value(self, results: Results) -> float:
         """One-sided, of the bound that is nearest to being broken."""
-        a = self.prepare(results.where(**self.a))
-        b = None if self.b is None else self.prepare(results.where(**self.b))
+        a, *others = self.sides(results)
         low, high = self.bounds
-        p = a.p_above(low, self.measure, b)
-        return p if np.isinf(high) else max(p, 1 - a.p_above(high, self.measure, b))
+        p = a.p_above(low, self.measure, *others)
+        return p if np.isinf(high) else max(p, 1 - a.p_above(high, self.measure, *others))
 
 
 @dataclass(frozen=True)
@@ -113,9 +115,7 @@ def judge(results: Results, claims: Sequence[Claim] | None = None) -> list[Judge
         sides = [results.where(**of) for of in (claim.a, claim.b or claim.a)]
         fewest = min(sides, key=lambda of: of.trainings)
         verdict = decide(claim, measured[i], fewest.trainings, of_all[i]) if run[i] else "not run"
-        control = None
-        if run[i] and claim.control is not None:
-            control = claim.quantity(results, claim.control)
+        control = claim.quantity(results, claim.control) if run[i] and claim.control else None
         judged.append(Judged(claim, measured[i], fewest.trained, p[i], of_all[i], verdict, control))
     return judged
 
@@ -162,9 +162,7 @@ _FORMS: tuple[tuple[Form, str, str, str, str], ...] = (
 )  # fmt: skip
 """Form; its adapter, with and without forgetting, and without; where its table of trials is."""
 _BASELINES = [
-    method.label
-    for method in KNOWN.values()
-    if method.kind == "baseline" and not method.label.endswith("aligned")
+    name for name, of in KNOWN.items() if of.kind == "baseline" and not name.endswith("aligned")
 ]
 _UNTRAINED = _generators("diffusion, untrained")
 _EYE = [row for row in ROWS if not row.by_model]
@@ -231,29 +229,19 @@ def _row(recipe: str, row: PaperRow, **more: Any) -> Where:
 CLAIMS: tuple[Claim, ...] = (
     *(claim for form in _FORMS for claim in _of_form(*form)),
     *(
-        Claim(
-            f"Timeline alignment improves {name} (trials, as recorded minus aligned).",
-            "baselines",
-            _generators(name),
-            _generators(f"{name}, aligned"),
-            margin=_QUARTER,
-        )
+        Claim(f"Timeline alignment improves {name} (trials, as recorded minus aligned).",
+              "baselines", _generators(name), _generators(f"{name}, aligned"), margin=_QUARTER)
         for name in _BASELINES
     ),
     *(
-        Claim(
-            f"Seeing by a VLM reduces the trials ({row.title}; eye minus VLM, a model's rows).",
-            "ours",
-            _row("trials", eye),
-            {**_row("trials", row), "perception": "vlm"},
-            margin=_QUARTER,
-        )
+        Claim(f"Seeing by a VLM reduces the trials ({row.title}; eye minus VLM, a model's rows).",
+              "ours", _row("trials", eye), {**_row("trials", row), "perception": "vlm"},
+              margin=_QUARTER)
         for row in ROWS
-        if row.by_model
         for eye in _EYE
-        if eye.task == row.task
+        if row.by_model and eye.task == row.task
     ),
-)
+)  # fmt: skip
 """Of the paper, each of both forms where it is about the method."""
 
 
@@ -272,35 +260,32 @@ def _mean(where: Where, measure: Measure) -> Callable[[Results], str]:
     return lambda results: str(results.where(**where).mean(measure))
 
 
-def _minus(a: Where, b: Where, measure: Measure) -> Callable[[Results], str]:
-    return lambda results: f"{results.where(**a).minus(results.where(**b), measure):+.2f}"
+def _minus(a: Where, b: Where, measure: Measure = TRIALS) -> Callable[[Results], str]:
+    """One minus the other, paired by training and number of the goal, whatever the task."""
 
+    def minus(results: Results) -> str:
+        of_a, of_b = (results.where(**of) for of in (a, b))
+        if of_a.empty or of_b.empty:
+            return ""
+        both = (replace(of, frame=of.frame.assign(task="both")) for of in (of_a, of_b))
+        return f"{next(both).minus(next(both), measure):+.2f}"
 
-def _shift(other: Where, first: Where) -> Callable[[Results], str]:
-    """Trials on changed hardware minus on the first, paired by training and number of the goal."""
-
-    def shift(results: Results) -> str:
-        a, b = (results.where(**of) for of in (other, first))
-        a, b = (Results(of.frame.assign(task="both"), {}) if not of.empty else of for of in (a, b))
-        return f"{a.minus(b, TRIALS):+.2f}"
-
-    return shift
+    return minus
 
 
 def _deviation(results: Results) -> str:
     eye, read = (results.where(**_row("trials", row)) for row in ROWS[:2])
     if eye.empty or read.empty:
         return ""
-    sd = [float(np.std(TRIALS.of(of.frame), ddof=1)) for of in (eye, read)]
-    return f"{sd[1]:.2f} against {sd[0]:.2f} by eye"
+    of_eye, of_read = (np.std(TRIALS.of(of.frame), ddof=1) for of in (eye, read))
+    return f"{of_read:.2f} against {of_eye:.2f} by eye"
 
 
-_FIRST_ROW = _row("trials", ROWS[0], unseen=False)
 OBSERVATIONS: tuple[Observation, ...] = (
     *(
         Observation(
-            f"{row.title}, {'camera' if row.by_model else 'eye'}: trials on "
-            f"{'unseen' if unseen else 'uniform'} goals; the paper's arm and goals are others.",
+            f"{row.title}, {row.looks}: trials on {'unseen' if unseen else 'uniform'} goals; the "
+            "paper's arm and goals are others.",
             f"{row.trials:.1f} ± {row.sd:.1f}",
             _mean(_row("trials", row, unseen=unseen), TRIALS),
         )
@@ -309,7 +294,7 @@ OBSERVATIONS: tuple[Observation, ...] = (
     ),
     *(
         Observation(
-            f"{row.title}, {'camera' if row.by_model else 'eye'}: first trials that hit.",
+            f"{row.title}, {row.looks}: first trials that hit.",
             '"often" inaccurate',
             _mean(_row("trials", row, unseen=False), FIRST),
         )
@@ -319,7 +304,7 @@ OBSERVATIONS: tuple[Observation, ...] = (
         Observation(
             f"{row.title} minus V1, trials, eye: the degradation on other hardware.",
             f'"small": {row.trials - ROWS[0].trials:+.1f}',
-            _shift(_row("trials", row, unseen=False), _FIRST_ROW),
+            _minus(_row("trials", row, unseen=False), _row("trials", ROWS[0], unseen=False)),
         )
         for row in ROWS[-2:]
     ),

@@ -6,13 +6,14 @@ import shutil
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from jaxtyping import Float
 
 from prior_reinforce.adapters import make_adapter
 from prior_reinforce.arrays import Points
+from prior_reinforce.environment import Task
 from prior_reinforce.files import in_place
 from prior_reinforce.generators import Generator, load_generator, make_generator
 from prior_reinforce.lab.experiments.protocol import (
@@ -22,7 +23,7 @@ from prior_reinforce.lab.experiments.protocol import (
     run_goals,
     unseen_goals,
 )
-from prior_reinforce.lab.experiments.results import as_text
+from prior_reinforce.lab.experiments.results import as_text, rows_of
 from prior_reinforce.lab.experiments.units import Unit, digest_of, result_of
 from prior_reinforce.lab.tasks import make_task
 from prior_reinforce.perception import make_perception
@@ -53,9 +54,7 @@ class PerceivedDemonstrations(Unit):
     model: VisionLanguageModelConfig | None = None
     """Endpoint to ask where `perception` is vlm."""
 
-    @property
-    def label(self) -> str:
-        """What it is, for a progress line."""
+    def __str__(self) -> str:
         return f"perceive {self.task} {self.demonstrations} by {self.perception}, {self.seed}"
 
     def run(self, folder: Path) -> Mapping[str, Any]:
@@ -83,18 +82,14 @@ class PerceivedDemonstrations(Unit):
 
     def rows(self, result: Mapping[str, Any]) -> list[dict[str, Any]]:
         """A row a demonstration."""
-        return [
-            {
-                "learned_on": self.task,
-                "set": self.demonstrations,
-                "seed": self.seed,
-                "perception": self.perception,
-                "demonstration": i,
-                "seen": as_text(seen),
-                "failed_readings": result["failed_readings"] if i == 0 else 0,
-            }
-            for i, seen in enumerate(result["outcomes_seen"])
-        ]
+        seen = result["outcomes_seen"]
+        told = {"learned_on": self.task, "set": self.demonstrations, "seed": self.seed}
+        return rows_of(
+            {**told, "perception": self.perception},
+            demonstration=range(len(seen)),
+            seen=map(as_text, seen),
+            failed_readings=[result["failed_readings"], *[0] * (len(seen) - 1)],
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,9 +121,7 @@ class Training(Unit):
     model: VisionLanguageModelConfig | None = None
     """Endpoint to ask where `perception` is vlm."""
 
-    @property
-    def label(self) -> str:
-        """What it is, for a progress line."""
+    def __str__(self) -> str:
         how = "" if self.perception is None else f" by {self.perception}"
         return f"learn {self.generator} on {self.task} {self.demonstrations}{how}, {self.seed}"
 
@@ -200,11 +193,27 @@ class Training(Unit):
 
 
 @dataclass(frozen=True)
-class Trials(Unit):
-    """Try goals with one learned generator and one adapter."""
+class OfTraining(Unit):
+    """What is done with one learned generator."""
 
     training: Training
     """What was learned."""
+    what: ClassVar[str]
+    """What is done, for a progress line."""
+
+    def __str__(self) -> str:
+        return f"{self.what} of {str(self.training).removeprefix('learn ')}"
+
+    @property
+    def columns(self) -> dict[str, Any]:
+        """What all its rows say: tried where it was learned."""
+        return {**self.training.columns, "task": self.training.task}
+
+
+@dataclass(frozen=True)
+class Trials(OfTraining):
+    """Try goals with one learned generator and one adapter."""
+
     task: str
     """Where it is tried; another hardware variant than the training's, perhaps."""
     adapter: str
@@ -220,9 +229,7 @@ class Trials(Unit):
     model: VisionLanguageModelConfig | None = None
     """Endpoint to ask where `perception` is vlm."""
 
-    @property
-    def label(self) -> str:
-        """What it is, for a progress line."""
+    def __str__(self) -> str:
         return (
             f"{self.task}: {self.training.generator} + {self.adapter}, {self.perception}, "
             f"set {self.training.demonstrations}, {self.training.seed}"
@@ -242,25 +249,19 @@ class Trials(Unit):
 
     def rows(self, result: Mapping[str, Any]) -> list[dict[str, Any]]:
         """A row a goal; results of before P(hit) was kept leave its cell empty."""
-        said = result.get("p_hit", [[None]] * len(result["goals"]))
-        return [
-            {
-                **self.training.columns,
-                "task": self.task,
-                "adapter": self.adapter,
-                "perception": self.perception,
-                "unseen": self.unseen,
-                "rounds": self.rounds,
-                "goal": i,
-                "place": as_text(place),
-                "solved_at": result["solved_at"][i],
-                "first_error": round(result["first_error"][i], 5),
-                "lost": result["lost"][i],
-                "failed_readings": result["failed_readings"][i],
-                "p_hit": None if said[i][0] is None else as_text(said[i], 3),
-            }
-            for i, place in enumerate(result["goals"])
-        ]
+        goals = result["goals"]
+        said = result.get("p_hit", [[None]] * len(goals))
+        tried = ("task", "adapter", "perception", "unseen", "rounds")
+        return rows_of(
+            {**self.columns, **{name: getattr(self, name) for name in tried}},
+            goal=range(len(goals)),
+            place=map(as_text, goals),
+            solved_at=result["solved_at"],
+            first_error=[round(error, 5) for error in result["first_error"]],
+            lost=result["lost"],
+            failed_readings=result["failed_readings"],
+            p_hit=[None if of[0] is None else as_text(of, 3) for of in said],
+        )
 
     def learned(self, folder: Path) -> LearnedGenerator:
         """What is tried: from the folder's models, or learned now."""
@@ -268,8 +269,7 @@ class Trials(Unit):
 
     def trials(self, folder: Path) -> list[GoalTrials]:
         """Run the protocol."""
-        task = make_task(self.task)
-        learned = self.learned(folder)
+        task, learned = make_task(self.task), self.learned(folder)
         rng = np.random.default_rng(GOAL_SEED)
         # Far from where demonstrations truly went, so that goals are the same for every perception.
         goals = (
@@ -293,19 +293,23 @@ class Trials(Unit):
             )
 
 
+def displaced(
+    task: Task, generator: Generator, conditions: Float[np.ndarray, "*n k"]
+) -> tuple[Float[np.ndarray, "*n k"], int]:
+    """How far from its condition each undisturbed throw comes down, [m], and how many are lost."""
+    plans = generator.generate(conditions.reshape(-1, conditions.shape[-1]))
+    rollouts = task.rollout(plans, None)
+    landed = np.array([rollout.outcome for rollout in rollouts]).reshape(conditions.shape)
+    return landed - conditions, sum(not rollout.valid for rollout in rollouts)
+
+
 @dataclass(frozen=True)
-class ZeroShot(Unit):
+class ZeroShot(OfTraining):
     """Generate for a dense grid of goals and for the demonstrations' own outcomes; throw once."""
 
-    training: Training
-    """What was learned."""
     spacing: float = 0.02
     """Spacing of the grid inside the outcomes' hull, in [m]."""
-
-    @property
-    def label(self) -> str:
-        """What it is, for a progress line."""
-        return f"zero shot of {self.training.label.removeprefix('learn ')}"
+    what = "zero shot"
 
     def run(self, folder: Path) -> Mapping[str, Any]:
         """Throw, with execution's disturbances switched off: the generator's error alone."""
@@ -316,29 +320,27 @@ class ZeroShot(Unit):
         if is_aligned(self.training.generator):
             prior = align(prior).demonstrations
         own_rms = np.sqrt(np.mean((own - prior.plans) ** 2, axis=(1, 2)))
-        shown = np.array([rollout.outcome for rollout in task.rollout(prior.plans, None)])
-        landed = np.array([rollout.outcome for rollout in task.rollout(own, None)])
-        grid = _grid(prior.outcomes_seen, self.spacing)
-        rollouts = task.rollout(generator.generate(grid), None)
-        misses = np.array([r.outcome for r in rollouts]) - grid
+        shown, landed = (
+            np.array([rollout.outcome for rollout in task.rollout(plans, None)])
+            for plans in (prior.plans, own)
+        )
+        misses, lost = displaced(task, generator, _within(prior.outcomes_seen, self.spacing))
         errors = np.linalg.norm(misses, axis=1)
+        reached = [in_tolerances(miss, task.tolerance) <= 1.0 for miss in misses]
         return {
             "own_rms_rad": own_rms.tolist(),
             "own_landing_from_demonstrated_m": np.linalg.norm(landed - shown, axis=1).tolist(),
-            "grid_points": len(grid),
+            "grid_points": len(misses),
             "grid_median_m": float(np.median(errors)),
             "grid_p90_m": float(np.percentile(errors, 90)),
-            "grid_within_tolerance": float(
-                np.mean([in_tolerances(miss, task.tolerance) <= 1.0 for miss in misses])
-            ),
-            "grid_lost": float(np.mean([not rollout.valid for rollout in rollouts])),
+            "grid_within_tolerance": float(np.mean(reached)),
+            "grid_lost": lost / len(misses),
         }
 
     def rows(self, result: Mapping[str, Any]) -> list[dict[str, Any]]:
         """A row a quantity, of a demonstration or of the grid."""
-        told = {**self.training.columns, "task": self.training.task}
         return [
-            {**told, "quantity": name, "demonstration": i, "value": value}
+            {**self.columns, "quantity": name, "demonstration": i, "value": value}
             for name, values in result.items()
             for i, value in enumerate(values if isinstance(values, list) else [values])
         ]
@@ -349,13 +351,11 @@ def is_aligned(choice: str) -> bool:
     return parse_choice(choice)[1].get("timing") == "align"
 
 
-def _grid(outcomes: Points, spacing: float) -> Float[np.ndarray, "m k"]:
+def _within(outcomes: Points, spacing: float) -> Float[np.ndarray, "m k"]:
     """Points of a square grid inside the outcomes' hull."""
     from scipy.spatial import Delaunay
 
-    axes = [
-        np.arange(low, high + spacing, spacing)
-        for low, high in zip(outcomes.min(axis=0), outcomes.max(axis=0), strict=True)
-    ]
+    ends = zip(outcomes.min(axis=0), outcomes.max(axis=0), strict=True)
+    axes = [np.arange(low, high + spacing, spacing) for low, high in ends]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(axes))
     return points[Delaunay(outcomes).find_simplex(points) >= 0]

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,6 +21,7 @@ from prior_reinforce.lab.experiments.claims import OBSERVATIONS, Judged, judge
 from prior_reinforce.lab.experiments.evaluation import GOAL_SEED
 from prior_reinforce.lab.experiments.recipes import RECIPES, Picture, Recipe, Table
 from prior_reinforce.lab.experiments.recipes.adaptation import later
+from prior_reinforce.lab.experiments.recipes.tables import Columns, mean_of
 from prior_reinforce.lab.experiments.recipes.trials import told
 from prior_reinforce.lab.experiments.results import (
     FIRST,
@@ -68,24 +69,25 @@ def write_evidence(folder: Path) -> tuple[Path, Path, list[Section]]:
             f"{', '.join(f'{name}.csv.gz' for name in RECIPES)}: run a recipe first"
         )
     drawn = {name: _section(RECIPES[name], of, folder / "pictures") for name, of in recipes.items()}
-    sections = [section for section in drawn.values() if section is not None]
     judged = judge(results)
-    missing = [recipe.title for name, recipe in RECIPES.items() if drawn.get(name) is None]
+    shown: dict[str, Any] = {
+        "counts": _counts(judged),
+        "claims": claims_table(judged),
+        "observations": observations_table(results),
+        "sections": [section for section in drawn.values() if section is not None],
+        "missing": [of.title for name, of in RECIPES.items() if drawn.get(name) is None],
+    }
     page = render(
         "evidence.html",
         package=_PACKAGE,
         title=_TITLE,
-        counts=_counts(judged),
-        claims=claims_table(judged),
-        observations=observations_table(results),
-        sections=sections,
-        missing=missing,
         unbroken=_unbroken,
         source=data_uri,
+        **shown,
     )
-    markdown = _markdown(sections, judged, results, missing, folder)
+    markdown = _markdown(**shown, folder=folder)
     html, plain = write(folder / "evidence.html", page), write(folder / "evidence.md", markdown)
-    return html, plain, sections
+    return html, plain, shown["sections"]
 
 
 def claims_table(judged: Sequence[Judged]) -> Table:
@@ -94,15 +96,14 @@ def claims_table(judged: Sequence[Judged]) -> Table:
     for one in judged:
         form = "ours" if one.claim.form == "baselines" else one.claim.form
         by_claim.setdefault(one.claim.says, {})[form] = one
-    columns: dict[str, Callable[[tuple[str, dict[str, Judged]]], object]] = {
-        "the paper says": lambda row: row[0],
-        "the paper's form": lambda row: _measured(row[1].get("the paper's form")),
-        "verdict": lambda row: _verdict(row[1].get("the paper's form")),
-        "ours": lambda row: _measured(row[1].get("ours")),
-        "control": lambda row: _control(row[1].get("ours")),
-        "verdict ": lambda row: _verdict(row[1].get("ours")),
+    columns: Columns = {
+        "the paper's form": lambda of: _measured(of.get("the paper's form")),
+        "verdict": lambda of: _verdict(of.get("the paper's form")),
+        "ours": lambda of: _measured(of.get("ours")),
+        "control": lambda of: _control(of.get("ours")),
+        "verdict ": lambda of: _verdict(of.get("ours")),
     }
-    return Table.of(list(by_claim.items()), columns)
+    return Table.of(("the paper says",), by_claim, columns)
 
 
 def _measured(of: Judged | None) -> str:
@@ -123,13 +124,9 @@ def _verdict(of: Judged | None) -> str:
 
 def observations_table(results: Results) -> Table:
     """What stands beside the paper's numbers without a verdict, where it was measured."""
-    measured = [(of, of.of(results)) for of in OBSERVATIONS]
-    columns: dict[str, Callable[[Any], object]] = {
-        "quantity": lambda row: row[0].says,
-        "paper": lambda row: row[0].paper,
-        "we measured": lambda row: row[1],
-    }
-    return Table.of([row for row in measured if row[1]], columns)
+    measured = {(of.says, of.paper): of.of(results) for of in OBSERVATIONS}
+    shown = {name: quantity for name, quantity in measured.items() if quantity}
+    return Table.of(("quantity", "paper"), shown, {"we measured": str})
 
 
 def headlines(results: Results) -> Mapping[str, Table]:
@@ -138,36 +135,30 @@ def headlines(results: Results) -> Mapping[str, Table]:
     after = later(results.where(recipe="adaptation"))
     if INCOMPLETE in results.made_by.get("adaptation", ""):
         after = after.where(recipe=())  # methods would be means of different tasks
-    trials: dict[str, Callable[[Any], object]] = {
-        "task": lambda row: row[0].title,
-        "perception": lambda row: "camera" if row[0].by_model else "eye",
-        "first trials that hit": lambda row: f"{row[1].where(unseen=False).mean(FIRST).value:.2f}",
-        "trials, simulated": lambda row: f"{row[1].where(unseen=False).mean(TRIALS):.2f}",
-        "trials, paper (real arm)": lambda row: (
-            f"{row[0].trials:.1f} ± {row[0].sd:.1f}" + (" (VLM)" if row[0].by_model else "")
+    trials: Columns = {
+        "first trials that hit": lambda of: f"{of[1].where(unseen=False).mean(FIRST).value:.2f}",
+        "trials, simulated": lambda of: f"{of[1].where(unseen=False).mean(TRIALS):.2f}",
+        "trials, paper (real arm)": lambda of: (
+            f"{of[0].trials:.1f} ± {of[0].sd:.1f}" + (" (VLM)" if of[0].by_model else "")
         ),
     }
-    four: dict[str, Callable[[Any], object]] = {
-        "behind or before": lambda row: row[0],
-        "method": lambda row: row[1],
-        "first trials that hit": lambda row: row[2].mean(FIRST),
-        "reached within 4 trials": lambda row: row[2].mean(reached(4)),
-        "trials": lambda row: row[2].mean(TRIALS),
-        "trainings": lambda row: row[2].trained,
+    four: Columns = {
+        "first trials that hit": mean_of(FIRST),
+        "reached within 4 trials": mean_of(reached(4)),
+        "trials": mean_of(TRIALS),
+        "trainings": lambda rows: rows.trained,
     }
-    afternoon: dict[str, Callable[[Any], object]] = {
-        "adapter": lambda row: row[0],
-        "trials a goal": lambda row: row[1].mean(TRIALS),
-    }
-    methods = [
-        (recipe, name, rows)
+    tasks = {(row.title, row.looks): (row, rows) for row, rows in told(of["trials"])}
+    methods = {
+        (recipe, name): rows
         for recipe in ("generators", "adapters")
         for name, rows in of[recipe].by("method").items()
-    ]
+    }
+    afternoon = {"trials a goal": mean_of(TRIALS)}
     return {
-        "trials": Table.of(told(of["trials"]), trials),
-        "methods": Table.of(methods, four),
-        "afternoon": Table.of(list(after.by("method").items()), afternoon),
+        "trials": Table.of(("task", "perception"), tasks, trials),
+        "methods": Table.of(("behind or before", "method"), methods, four),
+        "afternoon": Table.of(("adapter",), after.by("method"), afternoon),
     }
 
 
@@ -222,18 +213,19 @@ def _unbroken(text: str) -> str:
 
 
 def _markdown(
+    counts: Mapping[str, Mapping[str, int]],
+    claims: Table,
+    observations: Table,
     sections: Sequence[Section],
-    judged: Sequence[Judged],
-    results: Results,
     missing: Sequence[str],
     folder: Path,
 ) -> str:
     lines = [f"# {_TITLE}", ""]
-    for form, counts in _counts(judged).items():
-        said = ", ".join(f"{n} {verdict}" for verdict, n in counts.items())
+    for form, of_form in counts.items():
+        said = ", ".join(f"{n} {verdict}" for verdict, n in of_form.items())
         lines.append(f"- Tests of {form}: {said}.")
-    lines += ["", *_rows(claims_table(judged))]
-    lines += ["## Beside the paper's numbers", "", *_rows(observations_table(results))]
+    lines += ["", *_rows(claims)]
+    lines += ["## Beside the paper's numbers", "", *_rows(observations)]
     for section in sections:
         lines += [f"## {section.recipe.title}", "", f"Paper: {section.recipe.paper}.", ""]
         lines += [remark for text in section.remarks for remark in (text, "")]

@@ -26,15 +26,11 @@ from typing_extensions import Self
 
 from prior_reinforce.arrays import Plans, Points, as_plans
 from prior_reinforce.environment import Rollout, Task
-from prior_reinforce.errors import (
-    ConfigurationError,
-    FileFormatError,
-    InvalidDemonstrationsError,
-)
+from prior_reinforce.errors import ConfigurationError, FileFormatError, InvalidDemonstrationsError
 from prior_reinforce.files import in_place
 from prior_reinforce.generators import Generator, make_generator
 from prior_reinforce.generators.base import OnProgress
-from prior_reinforce.lab.experiments.evaluation import GOAL_SEED
+from prior_reinforce.lab.experiments.evaluation import GOAL_SEED, displaced
 from prior_reinforce.lab.experiments.protocol import perceive_demonstrations
 from prior_reinforce.lab.experiments.units import Unit, digest_of
 from prior_reinforce.lab.tasks import make_task
@@ -92,10 +88,8 @@ class Field:
     @cached_property
     def _splines(self) -> list[RectBivariateSpline]:
         """Bicubic, one a component."""
-        nx, ny, _ = self.displacement.shape
-        x, y = (
-            a + s * np.arange(n) for a, s, n in zip(self.low, self.spacing, (nx, ny), strict=True)
-        )
+        places = zip(self.low, self.spacing, self.displacement.shape, strict=False)
+        x, y = (a + s * np.arange(n) for a, s, n in places)
         return [RectBivariateSpline(x, y, self.displacement[..., j]) for j in range(2)]
 
     def at(self, conditions: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "n 2"]:
@@ -139,23 +133,20 @@ def measure(
     assert isinstance(task.tolerance, float), "both components are lengths"
     low, high = task.region[0] - _MARGIN, task.region[1] + _MARGIN
     counts = np.ceil((high - low) / SPACING).astype(int) + 1
-    axes = [np.linspace(a, b, n) for a, b, n in zip(low, high, counts, strict=True)]
-    grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-    conditions = grid.reshape(-1, 2)
-    rollouts = task.rollout(generator.generate(conditions), None)
-    if not all(rollout.valid for rollout in rollouts):
-        lost = sum(not rollout.valid for rollout in rollouts)
+    axes = [np.linspace(*ends) for ends in zip(low, high, counts, strict=True)]
+    conditions = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+    displacement, lost = displaced(task, generator, conditions)
+    if lost:
         raise ConfigurationError(
-            f"{lost} of {len(rollouts)} plans for {name} were lost; measure a smaller region"
+            f"{lost} of {counts.prod()} plans for {name} were lost; measure a smaller region"
         )
-    landed = np.array([rollout.outcome for rollout in rollouts]).reshape(grid.shape)
     rng = np.random.default_rng([seed, 6])
     n, times = _REPEATED
     again = np.repeat(generator.generate(task.sample_goals(n, rng)), times, axis=0)
     repeated = np.array([rollout.outcome for rollout in task.rollout(again, rng)])
     apart = repeated.reshape(n, times, 2).var(axis=1, ddof=1).mean(axis=0)
     return Field(
-        name, low, (high - low) / (counts - 1), landed - grid, np.sqrt(apart), task.region,
+        name, low, (high - low) / (counts - 1), displacement, np.sqrt(apart), task.region,
         task.tolerance, demonstrations.outcomes_seen, demonstrations.outcome_noise,
         demonstrations.outcome_correction,
     )  # fmt: skip
@@ -182,9 +173,7 @@ class MeasuredField(Unit):
     seed: int = GOAL_SEED
     """Seed of the draws; decisions are made on other seeds than the reported one."""
 
-    @property
-    def label(self) -> str:
-        """What it is, for a progress line."""
+    def __str__(self) -> str:
         return f"measure {self.task} {self.demonstrations}{self.count or ''} by {self.perception}"
 
     def run(self, folder: Path) -> Mapping[str, Any]:
@@ -192,7 +181,7 @@ class MeasuredField(Unit):
         prior = self._seen(make_task(self.learned_on))
         generator = make_generator(self.generator).fit(prior, seed=self.labels)
         seed = GOAL_SEED + self.labels
-        measured = measure(make_task(self.task), generator, prior, self.label, seed=seed)
+        measured = measure(make_task(self.task), generator, prior, str(self), seed=seed)
         with in_place(self._path(folder)) as unfinished:
             measured.save(unfinished)
         return {"noise_sd": measured.noise_sd.tolist()}
@@ -235,13 +224,9 @@ class MeasuredField(Unit):
         if self.demonstrations in task.demonstration_sets:
             return task.demonstrations(self.demonstrations)
         both = [task.demonstrations(name) for name in task.demonstration_sets]
-        pool = replace(
-            both[0],
-            plans=np.concatenate([d.plans for d in both]),
-            outcomes_seen=np.concatenate([d.outcomes_seen for d in both]),
-            outcome_noise=np.concatenate([d.outcome_noise for d in both]),
-            outcome_correction=np.concatenate([d.outcome_correction for d in both]),
-        )
+        of_all = ("plans", "outcomes_seen", "outcome_noise", "outcome_correction")
+        arrays: Any = {name: np.concatenate([getattr(d, name) for d in both]) for name in of_all}
+        pool = replace(both[0], **arrays)
         drawn = [self.seed, ord(self.demonstrations), *[attempt] * (attempt > 0)]
         order = np.random.default_rng(drawn).permutation(pool.n)
         return pool.only(tuple(sorted(order[: self.count or both[0].n])))

@@ -11,8 +11,8 @@ from __future__ import annotations
 
 import gzip
 import io
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -93,16 +93,24 @@ class Results:
         for name, value in equal.items():
             has = self.frame.get(name)
             if has is None:
-                return Results(self.frame.iloc[:0], self.made_by)
+                return replace(self, frame=self.frame.iloc[:0])
             keep &= has.isin(value if isinstance(value, tuple) else (value,)).to_numpy()
-        return Results(self.frame[keep], self.made_by)
+        return replace(self, frame=self.frame[keep])
+
+    def having(self, name: str) -> Results:
+        """The rows that have something in a column."""
+        return replace(self, frame=self.frame[self.frame[name].notna()])
 
     def by(self, name: str) -> dict[Any, Results]:
         """The rows of each value of a column, in the order in which they come."""
         if self.empty or name not in self.frame:
             return {}
-        grouped = self.frame.groupby(name, sort=False)
-        return {value: Results(rows, self.made_by) for value, rows in grouped}
+        groups = self.frame.groupby(name, sort=False)
+        return {value: replace(self, frame=rows) for value, rows in groups}
+
+    def first(self, name: str) -> Any:
+        """What the first row says in a column."""
+        return self.frame[name].iloc[0]
 
     @property
     def empty(self) -> bool:
@@ -135,27 +143,23 @@ class Results:
     def minus(self, other: Results, measure: Measure) -> Interval:
         """Mean of the difference, paired: over the trainings and goals that both have."""
         low, high = measure.within
-        return _estimate(self._pair(other, measure), (low - high, high - low))
+        return _estimate([self._pivot(measure), other._pivot(measure)], (low - high, high - low))
+
+    def beside(self, other: Results, measure: Measure = TRIALS) -> str:
+        """The difference as a table shows it; nothing where both are the same rows."""
+        if self.frame.equals(other.frame):
+            return ""
+        return f"{self.minus(other, measure):+.2f}"
 
     def p_above(self, bound: float, measure: Measure, other: Results | None = None) -> float:
         """One-sided p-value of "the mean (minus that of the other) is above the bound"."""
-        tables = [self._pivot(measure)] if other is None else self._pair(other, measure)
-        groups, weights = _groups(tables)
+        groups, weights = _groups([of._pivot(measure) for of in (self, other) if of is not None])
         return p_above(groups, bound, weights) if groups else float("nan")
-
-    def values(self, measure: Measure) -> Values:
-        """One number for each training, a row, and goal, a column."""
-        groups, _ = _groups([self._pivot(measure)])
-        (values,) = groups
-        return values
 
     def texts(self, name: str) -> Iterator[np.ndarray]:
         """Numbers of a text column, row by row."""
         for text in self.frame[name]:
             yield np.array(text.split(), dtype=float)
-
-    def _pair(self, other: Results, measure: Measure) -> list[pd.DataFrame]:
-        return [self._pivot(measure), other._pivot(measure)]
 
     def _pivot(self, measure: Measure) -> pd.DataFrame:
         """A row a training, a column a goal."""
@@ -194,6 +198,12 @@ def _estimate(tables: Sequence[pd.DataFrame], within: tuple[float, float]) -> In
     if not groups:
         return Interval(*[float("nan")] * 3)
     return mean_of_groups(groups, weights, within=within)
+
+
+def rows_of(shared: Row, **columns: Iterable[Any]) -> list[dict[str, Any]]:
+    """Rows from what they share and from columns, each with a value a row."""
+    cells = zip(*columns.values(), strict=True)
+    return [{**shared, **dict(zip(columns, of_row, strict=True))} for of_row in cells]
 
 
 def as_text(numbers: Any, digits: int = 5) -> str:

@@ -14,7 +14,7 @@ import traceback
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures.process import BrokenProcessPool
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
@@ -27,12 +27,7 @@ from prior_reinforce.registry import source_digest
 
 @dataclass(frozen=True)
 class Unit(ABC):
-    """A piece of work: a frozen dataclass of plain values."""
-
-    @property
-    @abstractmethod
-    def label(self) -> str:
-        """What it is, for a progress line."""
+    """A piece of work: a frozen dataclass of plain values; as text, what a progress line says."""
 
     @property
     def own_sources(self) -> tuple[str, ...]:
@@ -40,15 +35,14 @@ class Unit(ABC):
 
         When one of these files is edited, the unit runs anew.
         """
-        parts = [getattr(self, field.name) for field in fields(self)]
+        parts = vars(self).values()
         own = [source_digest(part) for part in parts if isinstance(part, str)]
         return (*own, *(s for part in parts if isinstance(part, Unit) for s in part.own_sources))
 
     @property
     def needs(self) -> tuple[Unit, ...]:
         """Units whose results or models it takes, to be run first."""
-        parts = [getattr(self, field.name) for field in fields(self)]
-        return tuple(part for part in parts if isinstance(part, Unit))
+        return tuple(part for part in vars(self).values() if isinstance(part, Unit))
 
     @abstractmethod
     def run(self, folder: Path) -> Mapping[str, Any]:
@@ -105,14 +99,14 @@ def run_units(
     for unit, reason in _outcomes(left, folder, workers):
         if reason is None:
             done += 1
-            progress(done, len(units), unit.label)
+            progress(done, len(units), str(unit))
         else:
             failed.append((unit, reason))
     if failed:
         unit, reason = failed[0]
         more = f", and {len(failed) - 1} more" if len(failed) > 1 else ""
         raise UnitFailedError(
-            f"{unit.label!r} failed: {reason}{more}; {done} of {len(units)} results are kept, mend "
+            f"{str(unit)!r} failed: {reason}{more}; {done} of {len(units)} results are kept, mend "
             f"it and run again (what happened: {_failure_path(folder, unit)})"
         )
     return [json.loads(result_path(folder, unit).read_text()) for unit in units]
@@ -120,9 +114,8 @@ def run_units(
 
 def result_of(folder: Path, unit: Unit) -> Mapping[str, Any]:
     """What a unit gave, within another one: kept, or run now and kept."""
-    if not result_path(folder, unit).is_file():
-        run_units([unit], folder, Workers(), lambda done, total, label: None)
-    result: Mapping[str, Any] = json.loads(result_path(folder, unit).read_text())["result"]
+    (kept,) = run_units([unit], folder, Workers(), lambda done, total, label: None)
+    result: Mapping[str, Any] = kept["result"]
     return result
 
 
@@ -145,27 +138,21 @@ def commit() -> str:
         As `git describe --dirty` gives it, with the hash of the difference where there is one;
         `not a checkout` where the package is in none, or there is no git.
     """
-    described = _git("describe", "--always", "--dirty")
-    if described is None or _git("ls-files", "--error-unmatch", Path(__file__).name) is None:
-        return "not a checkout"
-    if not described.endswith("-dirty"):
-        return described
-    return f"{described}-{hashlib.sha256((_git('diff', 'HEAD') or '').encode()).hexdigest()[:8]}"
-
-
-def _git(*arguments: str) -> str | None:
-    """What git says, or None where it cannot."""
     try:
-        done = subprocess.run(
-            ["git", *arguments],
-            capture_output=True,
-            text=True,
-            cwd=Path(__file__).parent,
-            check=False,
-        )
-    except OSError:
-        return None
-    return done.stdout.strip() if done.returncode == 0 else None
+        _git("ls-files", "--error-unmatch", Path(__file__).name)
+        described = _git("describe", "--always", "--dirty")
+        if not described.endswith("-dirty"):
+            return described
+        return f"{described}-{hashlib.sha256(_git('diff', 'HEAD').encode()).hexdigest()[:8]}"
+    except (OSError, subprocess.CalledProcessError):
+        return "not a checkout"
+
+
+def _git(*arguments: str) -> str:
+    command = ["git", *arguments]
+    here = Path(__file__).parent
+    done = subprocess.run(command, capture_output=True, text=True, cwd=here, check=True)
+    return done.stdout.strip()
 
 
 def _outcomes(units: Sequence[Unit], folder: Path, workers: Workers) -> Iterator[_Outcome]:

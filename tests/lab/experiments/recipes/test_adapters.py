@@ -19,8 +19,8 @@ def test_adapters_that_move_nothing_share_the_first_throw_and_differ_after(tmp_p
     methods = results.by("method")
     ours, none = methods["GP, m = 2"], methods["no adapter"]
     np.testing.assert_array_equal(
-        methods["proportional,gain=0.8"].values(TRIALS),  # ours, set by hand
-        methods["proportional, 0.8"].values(TRIALS),
+        TRIALS.of(methods["proportional,gain=0.8"].frame),  # ours, set by hand
+        TRIALS.of(methods["proportional, 0.8"].frame),
     )
     assert none.minus(methods["proportional, 0.8"], FIRST).value == 0.0
     assert ours.mean(reached(3)).value > none.mean(reached(3)).value

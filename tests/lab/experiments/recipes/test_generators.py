@@ -30,7 +30,7 @@ def test_recorded_and_aligned_stand_side_by_side(tmp_path, monkeypatch):
     assert list(methods) == [*QUICK, OWN]
     # The same class under its own name gives the same trials, to the last digit.
     np.testing.assert_array_equal(
-        methods[OWN].values(TRIALS), methods["nearest neighbours"].values(TRIALS)
+        TRIALS.of(methods[OWN].frame), TRIALS.of(methods["nearest neighbours"].frame)
     )
     # A DMP with its own clock is at the goal where neighbours out of time are nowhere.
     assert methods["nearest neighbours"].minus(methods["segmented DMP"], TRIALS).value > 0.3

@@ -19,14 +19,8 @@ from prior_reinforce.lab.experiments.recipes import (
     ways,
     zero_shot,
 )
-from prior_reinforce.lab.experiments.recipes.base import (
-    QUICK,
-    Picture,
-    Recipe,
-    Run,
-    Scale,
-    Table,
-)
+from prior_reinforce.lab.experiments.recipes.base import QUICK, Picture, Recipe, Run, Scale
+from prior_reinforce.lab.experiments.recipes.tables import Table
 
 RECIPES: Mapping[str, Recipe] = {
     recipe.name: recipe

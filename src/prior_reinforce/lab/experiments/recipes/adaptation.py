@@ -7,13 +7,15 @@ contact physics. Goals 2 to 8 count: before the first there is nothing to rememb
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import cycle
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
-from prior_reinforce.lab.experiments.recipes.base import Picture, Planned, Recipe, Scale, Table
+from prior_reinforce.lab.experiments.recipes.base import Picture, Planned, Recipe, Scale
+from prior_reinforce.lab.experiments.recipes.tables import Columns, Table, mean_of
 from prior_reinforce.lab.experiments.results import TRIALS, Results
 from prior_reinforce.lab.experiments.sequences import Afternoons
 
@@ -40,6 +42,8 @@ RULES = (
     (RIDGE, True, "ridge on the spline's weights, earlier goals too"),
 )
 """The adapters compared, whether earlier goals' trials serve them, and what each is called."""
+GENERATOR = "interpolation,timing=align"
+"""Behind every adapter."""
 OURS, OURS_ALONE = "Bayesian, earlier goals too", "Bayesian, each goal alone"
 GOALS = 8
 """Of an afternoon; the first does not count."""
@@ -50,36 +54,39 @@ _BINS = (0.0, 0.1, 0.3, 0.45, 0.6, 0.75, 0.9, 1.01)
 """Of the reliability table."""
 
 
-GENERATOR = "interpolation,timing=align"
-"""Behind every adapter."""
-
-
 def units(scale: Scale, include: Sequence[str] = ()) -> list[Planned]:
     """The same afternoons with every rule."""
     return afternoons(scale, [*RULES, *((choice, True, choice) for choice in include)])
 
 
 def afternoons(
-    scale: Scale, rules: Sequence[tuple[str, bool, str]], generator: str = GENERATOR
+    scale: Scale,
+    rules: Sequence[tuple[str, bool, str]],
+    generator: str = GENERATOR,
+    tasks: Sequence[str] = tuple(TASKS),
+    sequences: int | None = None,
 ) -> list[Planned]:
-    """Afternoons of every rule on every task; as many as the scale's goals fill, at least one."""
-    sequences = max(scale.goals // GOALS, 1)
+    """Afternoons of every rule on every task; None: as many as the scale's goals fill, or one."""
+    sequences = max(scale.goals // GOALS, 1) if sequences is None else sequences
     return [
         (
-            Afternoons(t, task, adapter, "eye", carried, sequences, GOALS, scale.rounds),
+            Afternoons(
+                training, task, sequences, adapter=adapter, carry_over=carried, goals=GOALS,
+                rounds=scale.rounds,
+            ),
             {"method": label},
         )
         for adapter, carried, label in rules
-        for task, learned_on in TASKS.items()
-        for t in scale.trainings(generator, learned_on, perception="eye")
-    ]
+        for task in tasks
+        for training in scale.trainings(generator, TASKS[task], perception="eye")
+    ]  # fmt: skip
 
 
 def later(results: Results) -> Results:
     """The goals that count: all but the first of an afternoon."""
     if results.empty:
         return results
-    return Results(results.frame[results.frame["goal"] > 0], results.made_by)
+    return replace(results, frame=results.frame[results.frame["goal"] > 0])
 
 
 def said_and_came(results: Results) -> pd.DataFrame:
@@ -87,16 +94,15 @@ def said_and_came(results: Results) -> pd.DataFrame:
 
     A goal that was not reached would have taken one trial more than there were rounds.
     """
-    told = results.frame[results.frame["p_hit"].notna()]
+    told = results.having("p_hit").frame
     said = told["p_hit"].str.split()
-    lengths = said.str.len().to_numpy()
-    number = np.concatenate([np.arange(n) for n in lengths]) if len(lengths) else np.zeros(0)
-    solved, needed = told["solved_at"].to_numpy(), TRIALS.of(told)
+    lengths = said.str.len().to_numpy(dtype=int)
+    number = np.concatenate([np.zeros(0), *map(np.arange, lengths)])
     return pd.DataFrame(
         {
             "p_hit": np.array(said.explode(), dtype=float),
-            "hit": np.repeat(solved, lengths) == number + 1,
-            "to_go": np.repeat(needed, lengths) - number,
+            "hit": np.repeat(told["solved_at"].to_numpy(), lengths) == number + 1,
+            "to_go": np.repeat(TRIALS.of(told), lengths) - number,
         }
     )
 
@@ -121,18 +127,13 @@ def reliability(results: Results) -> str:
 def table(results: Results) -> Table:
     """One row a rule."""
     counted = later(results)
-    methods, tasks = counted.by("method"), list(counted.by("task"))
-    ours = methods[OURS]
-    rows = [
-        (
-            name,
-            *(str(of.where(task=task).mean(TRIALS)) for task in tasks),
-            str(of.mean(TRIALS)),
-            "" if name == OURS else f"{ours.minus(of, TRIALS):+.2f}",
-        )
-        for name, of in methods.items()
-    ]
-    return Table(("adapter", *tasks, "mean", "ours minus it, mean"), tuple(rows))
+    methods = counted.by("method")
+    columns: Columns = {
+        **{task: mean_of(TRIALS, task=task) for task in counted.by("task")},
+        "mean": mean_of(TRIALS),
+        "ours minus it, mean": lambda of: methods[OURS].beside(of),
+    }
+    return Table.of(("adapter",), methods, columns)
 
 
 def draw(results: Results, folder: Path) -> list[Picture]:
@@ -141,38 +142,37 @@ def draw(results: Results, folder: Path) -> list[Picture]:
     from prior_reinforce.report.style import save_figure as save
 
     methods = results.by("method")
-    by_place = {
+    means = {name: later(of).mean(TRIALS) for name, of in methods.items()}
+    curves = {
         name: [of.where(goal=j).mean(TRIALS).value for j in range(GOALS)]
         for name, of in methods.items()
     }
+    places, dashes = range(1, GOALS + 1), cycle(_DASHES)
     with drawing():
         figure = new_figure(10.5, 5.2)
         left, right = figure.subplots(1, 2, width_ratios=(1.4, 1.0))
         for axes in (left, right):
             calm_axes(axes)
-        dashes = cycle(_DASHES)
-        for place, (name, of) in enumerate(methods.items()):
-            mean, curve = later(of).mean(TRIALS), by_place[name]
-            colour = GOAL if name == OURS else INK_SOFT
-            left.plot([mean.low, mean.high], [place, place], color=colour, linewidth=2)
-            left.plot([mean.value], [place], "o", color=colour)
-            places = range(1, GOALS + 1)
-            if of.frame["remembers"].iloc[0]:
+        for row, (name, of) in enumerate(methods.items()):
+            mean, colour = means[name], GOAL if name == OURS else INK_SOFT
+            left.plot([mean.low, mean.high], [row, row], color=colour, linewidth=2)
+            left.plot([mean.value], [row], "o", color=colour)
+            if of.first("remembers"):
                 style = {"linewidth": 2.5} if name == OURS else {"linestyle": next(dashes)}
-                right.plot(places, curve, color=colour, label=name, **style)
-            elif min(curve) < 2 * min(by_place[OURS]):
+                right.plot(places, curves[name], color=colour, label=name, **style)
+            elif min(curves[name]) < 2 * min(curves[OURS]):
                 first = not any(line.get_label() == _ALONE for line in right.lines)
-                label = _ALONE if first else None
-                right.plot(places, curve, color=INK_SOFT, alpha=0.35, linewidth=1, label=label)
+                faint = {"alpha": 0.35, "linewidth": 1, "label": _ALONE if first else None}
+                right.plot(places, curves[name], color=INK_SOFT, **faint)
         left.set_yticks(range(len(methods)), list(methods))
         left.invert_yaxis()
         left.set_xscale("log")
-        most = max(later(of).mean(TRIALS).high for of in methods.values())
+        most = max(mean.high for mean in means.values())
         ticks = [tick for tick in (1.5, 2, 2.5, 3, 5, 10) if tick < 1.2 * most]
         left.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
         left.minorticks_off()
         left.set_xlabel("trials a goal, goals 2 to 8, mean of the tasks")
-        right.set_xticks(range(1, GOALS + 1))
+        right.set_xticks(places)
         figure.legend(
             *right.get_legend_handles_labels(), frameon=False, fontsize=8.5, labelcolor=INK_SOFT,
             loc="outside lower center", ncols=3, title="right", alignment="left",
@@ -184,17 +184,16 @@ def draw(results: Results, folder: Path) -> list[Picture]:
         "tasks, with 95 % intervals over trainings and goals. Right: the mean by place of the "
         "goal, for rules whose best is within twice ours."
     )
-    name = results.frame["recipe"].iloc[0]
-    return [Picture(save(figure, folder / f"{name}.png"), caption)]
+    return [Picture(save(figure, folder / f"{results.first('recipe')}.png"), caption)]
 
 
 def remarks(results: Results) -> list[str]:
     """Who is ahead where nothing is remembered, and how far what is said can be trusted."""
     methods = later(results).by("method")
     alone = "; ".join(
-        f"{name} {methods[OURS_ALONE].minus(of, TRIALS):+.2f}"
+        f"{name} {methods[OURS_ALONE].beside(of)}"
         for name, of in methods.items()
-        if name != OURS_ALONE and not of.frame["remembers"].iloc[0]
+        if name != OURS_ALONE and not of.first("remembers")
     )
     return [
         f"Each goal alone, the Bayesian adapter minus: {alone}. V2 and V3 are in-sample for it: "
@@ -216,6 +215,5 @@ RECIPE = Recipe(
 )  # fmt: skip
 NETWORK = Recipe(
     "adaptation-network", "Trials from goal to goal, behind a network alone", "not in the paper",
-    behind_networks, table, draw, remarks,
-    apart=True,
+    behind_networks, table, draw, remarks, apart=True,
 )  # fmt: skip

@@ -9,17 +9,11 @@ paper's; docs/decisions-adapter.md).
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
-from prior_reinforce.lab.experiments.evaluation import Trials
-from prior_reinforce.lab.experiments.recipes.base import (
-    Picture,
-    Planned,
-    Recipe,
-    Scale,
-    Table,
-    table_by_round,
-)
+from prior_reinforce.lab.experiments.recipes.base import Picture, Planned, Recipe, Scale
+from prior_reinforce.lab.experiments.recipes.tables import Table, table_by_round
 from prior_reinforce.lab.experiments.results import Results
 
 ADAPTERS = {
@@ -31,21 +25,22 @@ ADAPTERS = {
     "no adapter": "frozen",
 }
 """The adapters compared by what each is called in tables and pictures."""
+_OURS = "GP, m = 2"
 
 
 def units(scale: Scale, include: Sequence[str] = (), generator: str = "diffusion") -> list[Planned]:
     """The same goals with every adapter."""
     compared = {**ADAPTERS, **{c: c for c in include if c not in ADAPTERS.values()}}
     return [
-        (Trials(t, t.task, choice, "amplified", scale.goals, rounds=scale.rounds), {"method": name})
+        (scale.trials(training, choice, "amplified"), {"method": name})
         for name, choice in compared.items()
-        for t in scale.trainings(generator, perception="eye")
+        for training in scale.trainings(generator, perception="eye")
     ]
 
 
 def table(results: Results) -> Table:
     """One row an adapter."""
-    return table_by_round(results.by("method"), "adapter", "GP, m = 2")
+    return table_by_round(results.by("method"), "adapter", _OURS)
 
 
 def draw(results: Results, folder: Path) -> list[Picture]:
@@ -53,15 +48,14 @@ def draw(results: Results, folder: Path) -> list[Picture]:
     from prior_reinforce.lab.experiments.recipes.charts import Line, Panel, curve, draw_success
 
     methods = results.by("method")
-    ours = methods["GP, m = 2"]
     lines = [
         Line(name, curve(rows), i, dashed=name not in ADAPTERS)
         for i, (name, rows) in enumerate(methods.items())
     ]
     minus = [
-        Line(name, curve(ours, rows), i, dashed=name not in ADAPTERS)
-        for i, (name, rows) in enumerate(methods.items())
-        if rows is not ours
+        replace(line, curve=curve(methods[_OURS], methods[line.label]))
+        for line in lines
+        if line.label != _OURS
     ]
     caption = (
         "Left: share of goals reached within so many rounds, a network alone behind every adapter, "
@@ -69,7 +63,7 @@ def draw(results: Results, folder: Path) -> list[Picture]:
         "difference; above zero the Gaussian process with m = 2 is ahead. Bars: 95 % intervals "
         "over trainings and goals."
     )
-    panels = [Panel("", lines), Panel("", minus, difference="GP, m = 2, minus it")]
+    panels = [Panel("", lines), Panel("", minus, difference=f"{_OURS}, minus it")]
     return [Picture(draw_success(panels, folder / "adapters.png"), caption)]
 
 

@@ -13,15 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from prior_reinforce.lab.experiments.recipes.base import (
-    TASK,
-    Picture,
-    Planned,
-    Recipe,
-    Scale,
-    Table,
-)
-from prior_reinforce.lab.experiments.results import Results
+from prior_reinforce.lab.experiments.recipes.base import TASK, Picture, Planned, Recipe, Scale
+from prior_reinforce.lab.experiments.recipes.tables import Columns, Table
+from prior_reinforce.lab.experiments.results import Results, rows_of
 from prior_reinforce.lab.experiments.units import Unit
 from prior_reinforce.lab.tasks import make_task
 from prior_reinforce.plans.alignment import align
@@ -41,9 +35,7 @@ class Aligned(Unit):
     demonstrations: str
     """Prior set."""
 
-    @property
-    def label(self) -> str:
-        """What it is, for a progress line."""
+    def __str__(self) -> str:
         return f"align {self.task} {self.demonstrations}"
 
     def run(self, folder: Path) -> Mapping[str, Any]:
@@ -60,18 +52,15 @@ class Aligned(Unit):
     def rows(self, result: Mapping[str, Any]) -> list[dict[str, Any]]:
         """A row a demonstration."""
         (starts, aligned_starts), (middles, aligned_middles) = result["start_s"], result["middle_s"]
-        columns = {
-            "shift_s": result["shift_s"],
-            "start_s": starts,
-            "aligned_start_s": aligned_starts,
-            "middle_s": middles,
-            "aligned_middle_s": aligned_middles,
-        }
-        told = {"learned_on": self.task, "set": self.demonstrations}
-        return [
-            {**told, "demonstration": i, **dict(zip(columns, values, strict=True))}
-            for i, values in enumerate(zip(*columns.values(), strict=True))
-        ]
+        return rows_of(
+            {"learned_on": self.task, "set": self.demonstrations},
+            demonstration=range(len(starts)),
+            shift_s=result["shift_s"],
+            start_s=starts,
+            aligned_start_s=aligned_starts,
+            middle_s=middles,
+            aligned_middle_s=aligned_middles,
+        )
 
 
 def _moments(moment: Callable[[Any], float], demonstrations: Demonstrations) -> list[float]:
@@ -89,25 +78,24 @@ def table(results: Results) -> Table:
     """One row a prior set; standard deviations over its demonstrations."""
 
     def sd(name: str) -> Callable[[Any], str]:
-        return lambda row: f"{1000 * row[1][name].std(ddof=0):.0f}"
+        return lambda of: f"{1000 * of[name].std(ddof=0):.0f}"
 
-    columns = {
-        "task": lambda row: row[0][0],
-        "set": lambda row: row[0][1],
-        "moved by up to [s]": lambda row: f"{row[1]['shift_s'].abs().max():.2f}",
+    columns: Columns = {
+        "moved by up to [s]": lambda of: f"{of['shift_s'].abs().max():.2f}",
         "starts, sd [ms]": sd("start_s"),
         "aligned": sd("aligned_start_s"),
         "middles, sd [ms]": sd("middle_s"),
         "aligned ": sd("aligned_middle_s"),
     }
-    return Table.of(list(results.frame.groupby(["learned_on", "set"], sort=False)), columns)
+    sets = results.frame.groupby(["learned_on", "set"], sort=False)
+    return Table.of(("task", "set"), dict(iter(sets)), columns)
 
 
 def draw(results: Results, folder: Path) -> list[Picture]:
     """Draw one joint of the shipped demonstrations, before and after."""
     from prior_reinforce.lab.experiments.recipes.charts import draw_alignment
 
-    name = results.frame["set"].iloc[0]
+    name = results.first("set")
     shown = make_task(TASK).demonstrations(name)
     joint = int(np.argmax(np.ptp(shown.plans, axis=1).mean(axis=0)))
     path = draw_alignment(

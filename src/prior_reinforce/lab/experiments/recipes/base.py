@@ -8,22 +8,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
 from prior_reinforce.adapters import ADAPTERS, make_adapter
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.generators import GENERATORS, make_generator
-from prior_reinforce.lab.experiments.evaluation import Training
-from prior_reinforce.lab.experiments.results import ROUNDS, TRIALS, Measure, Results, Row, reached
-from prior_reinforce.lab.experiments.statistics import Interval
+from prior_reinforce.lab.experiments.evaluation import Training, Trials
+from prior_reinforce.lab.experiments.recipes.tables import Table
+from prior_reinforce.lab.experiments.results import ROUNDS, Results, Row
 from prior_reinforce.lab.experiments.units import Unit, Workers, result_path, run_units
 from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
 
 TASK = "basketball-v1"
 """The task of all comparisons of methods, as in the paper."""
-_ROUNDS_SHOWN = (1, 2, 4, 8, 10)
 _SLOWEST = "diffusion-paper"
 """Takes forty times as long to learn as the next."""
 
@@ -67,6 +65,13 @@ class Scale:
             for seed in self.seeds
         ]
 
+    def trials(
+        self, training: Training, adapter: str, perception: str, *, task: str = "", **more: Any
+    ) -> Trials:
+        """Its goals with what was learned, on the same task or another; `more`: other settings."""
+        settings = {"goals": self.goals, "rounds": self.rounds, **more}
+        return Trials(training, task or training.task, adapter, perception, **settings)
+
 
 QUICK = Scale(goals=10, seeds=(0,), sets=("A",), variants=False, read_pictures=False)
 """One training a method of the paper, nothing read from pictures: decides no claim."""
@@ -89,7 +94,7 @@ class Run:
         """Run what units need, before all that need it; the slowest first, so no core waits."""
         level, levels = list(units), []
         while level := list(dict.fromkeys(need for unit in level for need in unit.needs)):
-            levels.append(sorted(level, key=lambda unit: _SLOWEST not in unit.label))
+            levels.append(sorted(level, key=lambda unit: _SLOWEST not in str(unit)))
         for needed in reversed(levels):
             run_units(needed, self.folder, self.workers, self.progress)
 
@@ -109,20 +114,6 @@ class Run:
             for (unit, names), of_unit in zip(planned, kept, strict=True)
             for row in unit.rows(of_unit["result"])
         ]
-
-
-@dataclass(frozen=True)
-class Table:
-    """Text in rows and columns, the same in the terminal, in Markdown and on the page."""
-
-    header: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
-
-    @classmethod
-    def of(cls, rows: Sequence[Any], columns: Mapping[str, Callable[[Any], object]]) -> Table:
-        """Make it from rows, and what each column shows of one."""
-        cells = tuple(tuple(str(show(row)) for show in columns.values()) for row in rows)
-        return cls(tuple(columns), cells)
 
 
 @dataclass(frozen=True)
@@ -191,26 +182,3 @@ def family_of(choice: str) -> Family:
         f"{choice} is neither a Generator nor an Adapter, and only these are compared side by "
         f"side: {problem}"
     )
-
-
-def table_by_round(methods: Mapping[str, Results], head: str, ours: str) -> Table:
-    """One row a method: shares reached by some rounds, trials, and how many fewer ours needs.
-
-    Args:
-        methods: Rows by what each method is called.
-        head: Of the first column.
-        ours: Which of them ours is.
-    """
-    columns: dict[str, Callable[[str], object]] = {head: lambda name: name}
-    for by in _ROUNDS_SHOWN:
-        columns[f"by round {by}"] = partial(_reached, methods, reached(by))
-    columns["trials"] = lambda name: methods[name].mean(TRIALS)
-    columns[f"{ours} minus it, trials"] = lambda name: (
-        f"{methods[ours].minus(methods[name], TRIALS):+.2f}" if name != ours in methods else ""
-    )
-    columns["trainings"] = lambda name: methods[name].trained
-    return Table.of(list(methods), columns)
-
-
-def _reached(methods: Mapping[str, Results], measure: Measure, name: str) -> Interval:
-    return methods[name].mean(measure)

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -39,6 +40,7 @@ _LARGEST_SHOWN = 10.0
 # The light part of matplotlib's Blues, on which dark arrows can be seen.
 _ERROR_COLOURS = ListedColormap(colormaps["Blues"](np.linspace(0.0, 0.62, 128)))
 _DEMONSTRATION = "#f0c800"
+_LEGEND: Any = {"frameon": False, "fontsize": 9.5, "labelcolor": INK}
 
 
 @dataclass(frozen=True)
@@ -53,6 +55,16 @@ class Line:
     dashed: bool = False
     each: Sequence[Sequence[float]] = ()
     """What each point of the curve is the mean of, where that is drawn instead of intervals."""
+
+    @property
+    def colour(self) -> str:
+        """Of its line and marks."""
+        return COLOURS[self.place % len(COLOURS)]
+
+    @property
+    def marker(self) -> str:
+        """Shape of its marks."""
+        return _MARKERS[self.place % len(_MARKERS)]
 
 
 def curve(results: Results, minus: Results | None = None) -> list[Interval]:
@@ -79,43 +91,38 @@ def draw_success(panels: Sequence[Panel], path: Path) -> Path:
     for axes, panel in zip(figure.subplots(1, len(panels), squeeze=False)[0], panels, strict=True):
         _draw_panel(axes, panel)
         axes.set_title(panel.title, loc="left", fontsize=12, color=INK)
-        axes.legend(
-            loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=2,
-            frameon=False, fontsize=9.5, labelcolor=INK,
-        )  # fmt: skip
+        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=2, **_LEGEND)
     return save_figure(figure, path)
 
 
 def _draw_panel(axes: Axes, panel: Panel) -> None:
     calm_axes(axes)
     lines, shares = panel.lines, not panel.difference
-    n_rounds = len(lines[0].curve)
+    rounds = np.arange(1, len(lines[0].curve) + 1)
     offsets = np.linspace(-_SPREAD / 2, _SPREAD / 2, len(lines)) if len(lines) > 1 else [0.0]
     for i, (line, offset) in enumerate(zip(lines, offsets, strict=True)):
-        value, low, high = np.array([(of.value, of.low, of.high) for of in line.curve]).T
+        value, around = _bars(line.curve)
         axes.errorbar(
-            np.arange(1, n_rounds + 1) + offset,
-            value,
-            yerr=[value - low, high - value],
-            color=COLOURS[line.place % len(COLOURS)],
-            marker=_MARKERS[line.place % len(_MARKERS)],
-            markersize=5.5,
-            linewidth=2.6 if shares and i == 0 else 1.5,
-            linestyle="--" if line.dashed else "-",
-            elinewidth=1.1,
-            zorder=10 - i,
-            label=line.label,
-            clip_on=False,
-        )
-    axes.set_xlim(0.5, n_rounds + 0.5)
+            rounds + offset, value, yerr=around, color=line.colour, marker=line.marker,
+            markersize=5.5, linewidth=2.6 if shares and i == 0 else 1.5,
+            linestyle="--" if line.dashed else "-", elinewidth=1.1, zorder=10 - i,
+            label=line.label, clip_on=False,
+        )  # fmt: skip
+    axes.set_xlim(0.5, len(rounds) + 0.5)
     if shares:
         axes.set_ylim(0, 1.02)
     else:
         axes.axhline(0.0, color=INK, linewidth=1.0)
     axes.set_ylabel(panel.difference or "share of goals reached")
-    axes.set_xticks(range(1, n_rounds + 1))
+    axes.set_xticks(rounds)
     axes.set_xlabel("round")
     axes.tick_params(labelcolor=INK_SOFT)
+
+
+def _bars(intervals: Sequence[Interval]) -> tuple[np.ndarray, np.ndarray]:
+    """Values, and how far their intervals reach below and above them."""
+    value, low, high = np.array([(of.value, of.low, of.high) for of in intervals]).T
+    return value, np.stack([value - low, high - value])
 
 
 @drawing()
@@ -126,22 +133,17 @@ def draw_kinds(kinds: Sequence[str], panels: Mapping[str, Sequence[Line]], path:
     for axes, (label, lines) in zip(subplots, panels.items(), strict=True):
         calm_axes(axes)
         for line, offset in zip(lines, np.linspace(-0.3, 0.3, len(lines)), strict=True):
-            colour = COLOURS[line.place % len(COLOURS)]
-            marker = _MARKERS[line.place % len(_MARKERS)]
+            look = {"marker": line.marker, "color": line.colour, "linestyle": ""}
             at = np.arange(len(kinds)) + offset
-            means = [point.value for point in line.curve]
-            axes.plot(at, means, marker, color=colour, markersize=9, label=line.label)
+            axes.plot(at, _bars(line.curve)[0], markersize=9, label=line.label, **look)
             for x, cells in zip(at, line.each, strict=True):
-                axes.plot([x] * len(cells), cells, marker, color=colour, markersize=4, alpha=0.45)
+                axes.plot([x] * len(cells), cells, markersize=4, alpha=0.45, **look)
         axes.set_xticks(range(len(kinds)), kinds)
         axes.set_ylim(bottom=0)
         axes.set_ylabel(label)
         axes.tick_params(labelcolor=INK_SOFT)
     handles, labels = subplots[0].get_legend_handles_labels()
-    figure.legend(
-        handles, labels, loc="outside lower center", ncols=len(labels),
-        frameon=False, fontsize=9.5, labelcolor=INK,
-    )  # fmt: skip
+    figure.legend(handles, labels, loc="outside lower center", ncols=len(labels), **_LEGEND)
     return save_figure(figure, path)
 
 
@@ -160,6 +162,7 @@ def draw_fields(
         path: PNG to write.
     """
     figure = new_figure(8.6, 5.0 * len(fields))
+    (x_low, y_low), (x_high, y_high) = 100 * region
     for axes, field in zip(
         figure.subplots(len(fields), 1, squeeze=False)[:, 0], fields, strict=True
     ):
@@ -167,46 +170,18 @@ def draw_fields(
         grid, arrows, outcomes = (100 * of for of in field)
         x, y = grid[:, 0, 0], grid[0, :, 1]
         colours = axes.pcolormesh(
-            y,
-            x,
-            np.linalg.norm(arrows, axis=-1),
-            cmap=_ERROR_COLOURS,
-            vmin=0,
-            vmax=_LARGEST_SHOWN,
-            shading="nearest",
-            rasterized=True,
-        )
+            y, x, np.linalg.norm(arrows, axis=-1), cmap=_ERROR_COLOURS, vmin=0,
+            vmax=_LARGEST_SHOWN, shading="nearest", rasterized=True,
+        )  # fmt: skip
         axes.quiver(
-            y,
-            x,
-            arrows[..., 1],
-            arrows[..., 0],
-            angles="xy",
-            scale_units="xy",
-            scale=1,
-            width=0.0022,
-            color=INK,
-            clip_on=True,
-        )
-        axes.plot(
-            *outcomes[:, ::-1].T,
-            "o",
-            markersize=11,
-            color=_DEMONSTRATION,
-            markeredgecolor=INK,
-            zorder=5,
-        )
-        (x_low, y_low), (x_high, y_high) = 100 * region
+            y, x, arrows[..., 1], arrows[..., 0], angles="xy", scale_units="xy", scale=1,
+            width=0.0022, color=INK, clip_on=True,
+        )  # fmt: skip
+        dots: Any = {"markersize": 11, "color": _DEMONSTRATION, "markeredgecolor": INK}
+        axes.plot(*outcomes[:, ::-1].T, "o", zorder=5, **dots)
+        dashes: Any = {"linestyle": "--", "edgecolor": INK, "linewidth": 1.2}
         axes.add_patch(
-            Rectangle(
-                (y_low, x_low),
-                y_high - y_low,
-                x_high - x_low,
-                fill=False,
-                linestyle="--",
-                edgecolor=INK,
-                linewidth=1.2,
-            )
+            Rectangle((y_low, x_low), y_high - y_low, x_high - x_low, fill=False, **dashes)
         )
         axes.set_aspect("equal")
         axes.set_xlim(y[-1], y[0])
@@ -273,19 +248,13 @@ def draw_rows(
         shown = [(row, of) for row, of in enumerate(mark.intervals) if of is not None]
         if not shown:
             continue
-        row, value, low, high = np.array([(row, of.value, of.low, of.high) for row, of in shown]).T
+        value, around = _bars([of for _, of in shown])
         axes.errorbar(
-            value,
-            row + offset,
-            xerr=[value - low, high - value],
-            fmt=mark.shape,
-            color=mark.colour,
-            markersize=6,
-            elinewidth=1.5,
-            label=name,
-        )
+            value, np.array([row for row, _ in shown]) + offset, xerr=around, fmt=mark.shape,
+            color=mark.colour, markersize=6, elinewidth=1.5, label=name,
+        )  # fmt: skip
     axes.set_yticks(range(len(labels)), labels, color=INK)
     axes.set_ylim(len(labels) - 0.4, -0.6)
     axes.set_xlabel(axis_label)
-    figure.legend(loc="outside lower center", frameon=False, fontsize=9.5, labelcolor=INK)
+    figure.legend(loc="outside lower center", **_LEGEND)
     return save_figure(figure, path)

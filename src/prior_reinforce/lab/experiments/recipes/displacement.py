@@ -15,21 +15,14 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
 from prior_reinforce.arrays import Points
-from prior_reinforce.lab.experiments.evaluation import Training
-from prior_reinforce.lab.experiments.recipes.base import (
-    TASK,
-    Picture,
-    Planned,
-    Recipe,
-    Scale,
-    Table,
-)
-from prior_reinforce.lab.experiments.results import Measure, Results
+from prior_reinforce.lab.experiments.evaluation import OfTraining, displaced
+from prior_reinforce.lab.experiments.recipes.base import TASK, Picture, Planned, Recipe, Scale
+from prior_reinforce.lab.experiments.recipes.tables import Table
+from prior_reinforce.lab.experiments.results import Measure, Results, column
 from prior_reinforce.lab.experiments.statistics import SHARE
-from prior_reinforce.lab.experiments.units import Unit
 from prior_reinforce.lab.tasks import make_task
 
 HIGH_ERROR = 0.05
@@ -38,20 +31,17 @@ in a trial or two, in [m]."""
 
 
 @dataclass(frozen=True)
-class Displacement(Unit):
-    """Where a dense grid of conditions lands, over the reachable region and beyond its edge."""
+class Displacement(OfTraining):
+    """Where a dense grid of conditions lands, over the reachable region and beyond its edge.
 
-    training: Training
-    """What was learned; its task has two-dimensional outcomes."""
+    The task that was learned has two-dimensional outcomes.
+    """
+
     spacing: float = 0.025
     """Spacing of the grid, in [m]."""
     margin: float = 0.05
     """How far the grid goes beyond the reachable region, in [m]."""
-
-    @property
-    def label(self) -> str:
-        """What it is, for a progress line."""
-        return f"displacement of {self.training.label.removeprefix('learn ')}"
+    what = "displacement"
 
     def run(self, folder: Path) -> Mapping[str, Any]:
         """Throw once for each condition, with execution's disturbances switched off."""
@@ -60,23 +50,20 @@ class Displacement(Unit):
         counts = np.round((high - low) / self.spacing).astype(int) + 1
         axes = [np.linspace(*ends) for ends in zip(low, high, counts, strict=True)]
         conditions = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-        plans = self.training.learned(folder).generator.generate(conditions.reshape(-1, len(axes)))
-        rollouts = task.rollout(plans, None)
-        landed = np.array([rollout.outcome for rollout in rollouts]).reshape(conditions.shape)
+        found, lost = displaced(task, self.training.learned(folder).generator, conditions)
         return {
             "axes_m": [axis.tolist() for axis in axes],
-            "displacements_m": np.round(landed - conditions, 5).tolist(),
-            "lost": sum(not rollout.valid for rollout in rollouts),
+            "displacements_m": np.round(found, 5).tolist(),
+            "lost": lost,
         }
 
     def rows(self, result: Mapping[str, Any]) -> list[dict[str, Any]]:
         """A row a condition: where it is, and where the throw landed from there, in [m]."""
-        x, y = result["axes_m"]
-        told = {**self.training.columns, "task": self.training.task}
+        told, (x, y) = self.columns, result["axes_m"]
         return [
-            {**told, "x": round(a, 5), "y": round(b, 5), "dx": off[0], "dy": off[1]}
+            {**told, "x": round(a, 5), "y": round(b, 5), "dx": dx, "dy": dy}
             for a, line in zip(x, result["displacements_m"], strict=True)
-            for b, off in zip(y, line, strict=True)
+            for b, (dx, dy) in zip(y, line, strict=True)
         ]
 
 
@@ -139,14 +126,14 @@ def measures(
     """Sum a field up; `outcomes` are where the demonstrations landed, `region` is reachable."""
     from scipy.spatial import Delaunay
 
-    x, y = conditions[:, 0, 0], conditions[0, :, 1]
     reachable = np.all((conditions > region[0] - 1e-9) & (conditions < region[1] + 1e-9), axis=-1)
     errors = np.linalg.norm(displacements, axis=-1)
     hull = Delaunay(outcomes).find_simplex(conditions) >= 0
-    steps = [
-        np.linalg.norm(np.diff(displacements, axis=a), axis=-1)[_both(reachable, a)] / np.diff(v)[0]
-        for a, v in ((0, x), (1, y))
-    ]
+    steps = []
+    for axis, places in enumerate((conditions[:, 0, 0], conditions[0, :, 1])):
+        both = np.delete(reachable, 0, axis) & np.delete(reachable, -1, axis)
+        change = np.linalg.norm(np.diff(displacements, axis=axis), axis=-1)
+        steps.append(change[both] / np.diff(places)[0])
     inside, outside = 100 * np.mean(errors[hull]), 100 * np.mean(errors[~hull])
     return {
         "high_error_area": float(np.mean(errors[reachable] > HIGH_ERROR)),
@@ -158,15 +145,10 @@ def measures(
     }
 
 
-def _both(mask: Bool[np.ndarray, "nx ny"], axis: int) -> Bool[np.ndarray, "mx my"]:
-    """Where a point and its next along an axis are both in the mask."""
-    return np.asarray(np.delete(mask, 0, axis) & np.delete(mask, -1, axis))
-
-
 def measure(name: str) -> Measure:
     """One of the measures of `summed`."""
     within = {"high_error_area": SHARE, "outside_minus_inside": (-np.inf, np.inf)}
-    return Measure(lambda rows: rows[name].to_numpy(), within.get(name, (0.0, np.inf)))
+    return column(name, within.get(name, (0.0, np.inf)))
 
 
 def table(results: Results) -> Table:
@@ -182,7 +164,7 @@ def table(results: Results) -> Table:
     cells = [(name, *(str(of.mean(m)) for m in heads.values())) for name, of in by.items()]
     if len(by) == 2:
         full, few = by.values()
-        cells.append(("difference", *(f"{few.minus(full, m):+.2f}" for m in heads.values())))
+        cells.append(("difference", *(few.beside(full, m) for m in heads.values())))
     return Table(("learned from", *heads), tuple(cells))
 
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
@@ -27,14 +27,8 @@ from prior_reinforce.lab.experiments.evaluation import (
     Trials,
     is_aligned,
 )
-from prior_reinforce.lab.experiments.recipes.base import (
-    Picture,
-    Planned,
-    Recipe,
-    Scale,
-    Table,
-    table_by_round,
-)
+from prior_reinforce.lab.experiments.recipes.base import Picture, Planned, Recipe, Scale
+from prior_reinforce.lab.experiments.recipes.tables import Table, table_by_round
 from prior_reinforce.lab.experiments.results import TRIALS, Results
 from prior_reinforce.lab.experiments.statistics import LEAST_TRAININGS
 from prior_reinforce.plans.motions import Demonstrations
@@ -69,10 +63,7 @@ class Method:
 
     def trials(self, scale: Scale) -> list[Trials]:
         """Trials of one training for each prior set and seed."""
-        return [
-            Trials(t, t.task, self.adapter, "amplified", scale.goals, rounds=scale.rounds)
-            for t in scale.trainings(self.generator)
-        ]
+        return [scale.trials(t, self.adapter, "amplified") for t in scale.trainings(self.generator)]
 
 
 class FreshNoise(Wrapper):
@@ -122,11 +113,8 @@ METHODS = (
     Method("diffusion", "diffusion", "method"),
     Method("diffusion, untrained", "diffusion,training_steps=0", "control"),
     Method("diffusion with correction", "diffusion,correction=spline", "other"),
-    Method(
-        "diffusion with correction, untrained",
-        "diffusion,correction=spline,training_steps=0",
-        "control",
-    ),
+    Method("diffusion with correction, untrained", "diffusion,correction=spline,training_steps=0",
+           "control"),
     Method("closed form", "interpolation", "control"),
     Method("nearest neighbours", "nearest"),
     Method("DMP", "dmp,segmented=false"),
@@ -137,7 +125,7 @@ METHODS = (
     Method("U-Net regression, aligned", "regression,timing=align"),
     Method("closed form, aligned", "interpolation,timing=align", "control"),
     Method("diffusion, no adapter", "diffusion", "other", "frozen"),
-)
+)  # fmt: skip
 """Ours, a network alone; its controls; the paper's baselines; and ours with no adapter."""
 
 
@@ -149,14 +137,13 @@ def with_papers_form(results: Results) -> Results:
     """Rows of this recipe, and those of the paper's form under the same conditions."""
     own = results.where(recipe="generators").by("method")
     theirs = results.where(recipe="papers-form", condition=AMPLIFIED).by("method")
-    frames = {name: of.frame for name, of in own.items()}
-    papers = {
-        label: theirs[name].frame.assign(method=label)
+    papers = [
+        theirs[name].frame.assign(method=label)
         for name, label in _OF_PAPERS_FORM.items()
         if name in theirs
-    }
-    shown = [*list(frames.values())[:1], *papers.values(), *list(frames.values())[1:]]
-    return Results(pd.concat(shown) if shown else results.frame.iloc[:0], results.made_by)
+    ]
+    first, *others = [of.frame for of in own.values()] or [results.frame.iloc[:0]]
+    return replace(results, frame=pd.concat([first, *papers, *others]))
 
 
 def units(scale: Scale, include: Sequence[str] = ()) -> list[Planned]:
@@ -170,9 +157,9 @@ def units(scale: Scale, include: Sequence[str] = ()) -> list[Planned]:
 
 def table(results: Results) -> Table:
     """One row a method."""
-    methods = results.by("method")
-    kinds = {name: _kind(name) for name in methods}
-    named = {name + _NOT_THE_PAPERS.get(kinds[name], ""): of for name, of in methods.items()}
+    named = {
+        name + _NOT_THE_PAPERS.get(_kind(name), ""): of for name, of in results.by("method").items()
+    }
     return table_by_round(named, "generator", OURS)
 
 
@@ -208,7 +195,7 @@ def draw(results: Results, folder: Path) -> list[Picture]:
             [
                 line(name, aligned=aligned)
                 for name, rows in methods.items()
-                if name == OURS or is_aligned(rows.frame["generator"].iloc[0]) == aligned
+                if name == OURS or is_aligned(rows.first("generator")) == aligned
             ],
         )
         for title, aligned in (("as recorded", False), ("aligned in time", True))
@@ -224,9 +211,10 @@ def draw(results: Results, folder: Path) -> list[Picture]:
 def remarks(results: Results) -> list[str]:
     """Name every generator that needs fewer trials than ours."""
     methods = results.by("method")
-    minus = {name: of.minus(methods[OURS], TRIALS) for name, of in methods.items()}
+    ours = methods[OURS]
+    minus = {name: of.minus(ours, TRIALS) for name, of in methods.items()}
     better = [f"{name} ({of:+.2f})" for name, of in minus.items() if of.high < 0]
-    if not better or methods[OURS].trainings < LEAST_TRAININGS:
+    if not better or ours.trainings < LEAST_TRAININGS:
         return []
     return [
         f"With fewer trials than {OURS} on this task (it minus ours): {', '.join(better)}. "

@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from jaxtyping import Float, UInt8
+from jaxtyping import Float
 from matplotlib.axes import Axes
 from matplotlib.patches import FancyArrowPatch, Rectangle
 
-from prior_reinforce.environment import KeyFrame, TableScene, Task
+from prior_reinforce.environment import KeyFrame, Picture, TableScene, Task
 from prior_reinforce.lab.tasks import make_task
 from prior_reinforce.perception.calibration import TableCalibration
 from prior_reinforce.report.style import GOAL, HIT, INK, drawing, new_figure, save_figure
@@ -38,6 +38,11 @@ _MARGIN = 0.07
 _MOST_TRIALS = 4
 """Trials shown; of more, the first three and the last."""
 _INCHES = 2.6  # of one panel
+_EXTENT = (0, _SIDE, _SIDE, 0)
+_ARROW: Any = {
+    "arrowstyle": "-|>", "mutation_scale": 14, "shrinkA": 0, "shrinkB": 0, "linewidth": 2.0,
+    "color": "black",
+}  # fmt: skip
 _HALO = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 2.0}
 
 
@@ -66,17 +71,17 @@ def draw_process(rows: Mapping[str, Row], path: Path) -> Path:
 
 
 def _draw_row(line: Sequence[Axes], row: Row, fine: Camera, coarse: Camera) -> None:
-    task, goal = make_task(row["task"]), np.array(row["goal"])
+    task, goal = make_task(row["task"]), row["goal"]
     model, scene = _scene_model(task), task.scene
     assert scene is not None
     calibration = coarse.calibrate(model, np.array(scene.marks), height=scene.plane_height)
     close_up = _close_up(row, scene, calibration)
     for axes, i in zip(line[1:], _shown(row["trials"]), strict=False):
-        state = np.array(row["trials"][i]["key_state"])
-        picture = fine.picture(KeyFrame(model, state, 0.0), goal)
+        picture = fine.picture(KeyFrame(model, row["trials"][i]["key_state"], 0.0), goal)
         if i == 0:
             _draw_table(line[0], row, picture, calibration, close_up)
-        _draw_trial(axes, row, i, picture, calibration, close_up)
+        axes.imshow(picture, extent=_EXTENT)
+        _draw_trial(axes, row, i, calibration, close_up)
 
 
 def _scene_model(task: Task) -> mujoco.MjModel:
@@ -108,16 +113,12 @@ def _close_up(row: Row, scene: TableScene, calibration: TableCalibration) -> _Co
 
 
 def _draw_table(
-    axes: Axes,
-    row: Row,
-    picture: UInt8[np.ndarray, "h w 3"],
-    calibration: TableCalibration,
-    close_up: _Corners,
+    axes: Axes, row: Row, picture: Picture, calibration: TableCalibration, close_up: _Corners
 ) -> None:
-    axes.imshow(picture[::2, ::2], extent=(0, _SIDE, _SIDE, 0))
-    across, down = calibration.to_pixels(np.array(row["demonstrated"])).T
+    axes.imshow(picture[::2, ::2], extent=_EXTENT)
+    across, down = calibration.to_pixels(row["demonstrated"]).T
     axes.scatter(across, down, s=26, marker="s", color="white", edgecolors=INK, linewidths=0.8)
-    _draw_goal(axes, calibration.to_pixels(np.array(row["goal"])))
+    _draw_goal(axes, calibration.to_pixels(row["goal"]))
     low, high = close_up
     axes.add_patch(Rectangle(tuple(low), *(high - low), fill=False, edgecolor=INK, linewidth=1.2))
     legend = "□ demonstrations   ★ goal"
@@ -125,41 +126,22 @@ def _draw_table(
 
 
 def _draw_trial(
-    axes: Axes,
-    row: Row,
-    i: int,
-    picture: UInt8[np.ndarray, "h w 3"],
-    calibration: TableCalibration,
-    close_up: _Corners,
+    axes: Axes, row: Row, i: int, calibration: TableCalibration, close_up: _Corners
 ) -> None:
-    trial, goal = row["trials"][i], np.array(row["goal"])
+    trial, goal = row["trials"][i], row["goal"]
     (left, top), (right, bottom) = close_up
-    axes.imshow(picture, extent=(0, _SIDE, _SIDE, 0))
     axes.set_xlim(left, right)
     axes.set_ylim(bottom, top)
     start = calibration.to_pixels(goal)
     _draw_goal(axes, start)
     if not trial["hit"] and np.any(trial["error_seen"]):
         end = calibration.to_pixels(goal + trial["error_seen"])
-        arrow = FancyArrowPatch(
-            tuple(start),
-            tuple(end),
-            arrowstyle="-|>",
-            mutation_scale=14,
-            shrinkA=0,
-            shrinkB=0,
-            linewidth=2.0,
-            color="black",
-        )
-        axes.add_patch(arrow)
+        axes.add_patch(FancyArrowPatch(tuple(start), tuple(end), **_ARROW))
     colour, width = (HIT, 5.0) if trial["hit"] else (INK, 1.2)
     said = _said(trial, last=i == len(row["trials"]) - 1)
     axes.set_title(f"trial {i + 1}: {said}", loc="left", fontsize=10, color=colour)
-    axes.add_patch(
-        Rectangle(
-            (0, 0), 1, 1, transform=axes.transAxes, fill=False, edgecolor=colour, linewidth=width
-        )
-    )
+    frame: Any = {"fill": False, "edgecolor": colour, "linewidth": width}
+    axes.add_patch(Rectangle((0, 0), 1, 1, transform=axes.transAxes, **frame))
 
 
 def _said(trial: Mapping[str, Any], *, last: bool) -> str:

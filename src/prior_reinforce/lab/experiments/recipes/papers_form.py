@@ -10,26 +10,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from prior_reinforce.lab.experiments.evaluation import Training, Trials
+from prior_reinforce.lab.experiments.evaluation import Training
 from prior_reinforce.lab.experiments.recipes.adapters import ADAPTERS
-from prior_reinforce.lab.experiments.recipes.base import (
-    TASK,
-    Planned,
-    Recipe,
-    Scale,
-    Table,
-    table_by_round,
-)
-from prior_reinforce.lab.experiments.recipes.displacement import (
-    Displacement,
-    widest_three,
-)
+from prior_reinforce.lab.experiments.recipes.base import Planned, Recipe, Scale
+from prior_reinforce.lab.experiments.recipes.displacement import Displacement, widest_three
 from prior_reinforce.lab.experiments.recipes.generators import (
     AMPLIFIED,
     FRESH,
     PAPERS_FORM,
     FreshNoiseTrials,
 )
+from prior_reinforce.lab.experiments.recipes.tables import Table, table_by_round
 from prior_reinforce.lab.experiments.results import Results
 
 _OF_THE_PAPER = "GP, one term, m = 2"
@@ -45,7 +36,8 @@ def units(scale: Scale, include: Sequence[str] = ()) -> list[Planned]:
     planned: list[Planned] = []
     for seed in scale.seeds:
         one = replace(scale, seeds=(seed,))
-        planned += [p for t in one.trainings(PAPERS_FORM) for p in _on_v1(t, scale, include)]
+        for t in one.trainings(PAPERS_FORM):
+            planned += _on_v1(t, scale, include)
         if seed not in scale.seeds[:_SEEDS]:
             continue
         for t in one.trainings(PAPERS_FORM):
@@ -58,33 +50,24 @@ def units(scale: Scale, include: Sequence[str] = ()) -> list[Planned]:
 
 
 def _on_v1(training: Training, scale: Scale, include: Sequence[str]) -> list[Planned]:
-    kinds = [(label, adapter, Trials) for label, adapter in ADAPTERS.items()]
-    kinds.append((FRESH, "frozen", FreshNoiseTrials))
-    kinds += [(choice, choice, Trials) for choice in include]
-    planned: list[Planned] = [
-        (
-            kind(training, TASK, adapter, "amplified", scale.goals, rounds=scale.rounds),
-            {"condition": AMPLIFIED, "method": label},
-        )
-        for label, adapter, kind in kinds
+    adapters = {**ADAPTERS, **{choice: choice for choice in include}}
+    tried = {name: scale.trials(training, of, "amplified") for name, of in adapters.items()}
+    tried[FRESH] = FreshNoiseTrials(**vars(tried["no adapter"]))
+    return [
+        *((unit, {"condition": AMPLIFIED, "method": name}) for name, unit in tried.items()),
+        *(p for task, label in _V1.items() for p in _by_eye(training, task, label, scale)),
+        (Displacement(training), {"method": "all demonstrations"}),
     ]
-    for task, label in _V1.items():
-        planned += _by_eye(training, task, label, scale)
-    return [*planned, (Displacement(training), {"method": "all demonstrations"})]
 
 
 def _by_eye(training: Training, task: str, label: str, scale: Scale) -> list[Planned]:
     """The paper's adapter by eye, on unseen goals and on uniform ones."""
-    return [
-        (
-            Trials(
-                training, task, ADAPTERS[_OF_THE_PAPER], "eye",
-                _UNSEEN_GOALS if unseen else scale.goals, unseen=unseen, rounds=scale.rounds,
-            ),
-            {"condition": f"{label}, by eye", "method": _OF_THE_PAPER},
-        )
-        for unseen in (True, False)
-    ]  # fmt: skip
+    adapter, names = ADAPTERS[_OF_THE_PAPER], {"condition": f"{label}, by eye"}
+    tried = [
+        scale.trials(training, adapter, "eye", task=task, goals=goals, unseen=unseen)
+        for unseen, goals in ((True, _UNSEEN_GOALS), (False, scale.goals))
+    ]
+    return [(unit, {**names, "method": _OF_THE_PAPER}) for unit in tried]
 
 
 def table(results: Results) -> Table:

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from prior_reinforce.lab.experiments.evaluation import Training, Trials
+from prior_reinforce.lab.experiments.evaluation import OfTraining, Training, Trials
 from prior_reinforce.lab.experiments.protocol import GoalTrials
-from prior_reinforce.lab.experiments.recipes.base import Picture, Planned, Recipe, Scale, Table
+from prior_reinforce.lab.experiments.recipes.base import Picture, Planned, Recipe, Scale
+from prior_reinforce.lab.experiments.recipes.tables import Table
 from prior_reinforce.lab.experiments.results import Results, as_text
-from prior_reinforce.lab.experiments.units import Unit
 from prior_reinforce.wording import to_words
 
 TASKS = {
@@ -30,40 +30,27 @@ misses with their corrections and a hit tell the whole story."""
 
 
 @dataclass(frozen=True)
-class Process(Unit):
+class Process(OfTraining):
     """All trials of a training's unseen goals, with what a camera needs to draw them."""
 
-    training: Training
-    """What was learned."""
     perception: str = "eye"
     """How errors are seen."""
     rounds: int = 10
     """Trials a goal at most."""
-
-    @property
-    def label(self) -> str:
-        """What it is, for a progress line."""
-        return f"process of {self.training.label.removeprefix('learn ')}"
+    what = "process"
 
     def run(self, folder: Path) -> Mapping[str, Any]:
         """Run the protocol as `Trials` does, and keep everything."""
-        trials = Trials(
-            self.training,
-            self.training.task,
-            "gp",
-            self.perception,
-            _GOALS,
-            unseen=True,
-            rounds=self.rounds,
-        )
+        of, seen = self.training, self.perception
+        trials = Trials(of, of.task, "gp", seen, _GOALS, unseen=True, rounds=self.rounds)
         return {"goals": [_kept(result) for result in trials.trials(folder)]}
 
     def rows(self, result: Mapping[str, Any]) -> list[dict[str, Any]]:
         """A row a trial."""
-        told = {**self.training.columns, "task": self.training.task, "perception": self.perception}
         return [
             {
-                **told,
+                **self.columns,
+                "perception": self.perception,
                 "goal": i,
                 "place": as_text(goal["goal"]),
                 "trial": j,
@@ -82,15 +69,13 @@ def _kept(result: GoalTrials) -> dict[str, Any]:
     for trial, rollout in zip(result.trials, result.rollouts, strict=True):
         assert trial.error_seen is not None
         assert rollout.key_frame is not None
-        trials.append(
-            {
-                "condition": trial.condition.tolist(),
-                "error_seen": trial.error_seen.tolist(),
-                "outcome": rollout.outcome.tolist(),
-                "hit": trial.hit,
-                "key_state": np.round(rollout.key_frame.state, 6).tolist(),
-            }
-        )
+        kept = {
+            "condition": trial.condition,
+            "error_seen": trial.error_seen,
+            "outcome": rollout.outcome,
+            "key_state": np.round(rollout.key_frame.state, 6),
+        }
+        trials.append({"hit": trial.hit, **{name: of.tolist() for name, of in kept.items()}})
     return {"goal": result.goal.tolist(), "trials": trials}
 
 
@@ -108,23 +93,18 @@ def shown(results: Results) -> dict[str, dict[str, Any]]:
     """Of each task the goal that is shown, with its trials; see `_SHOWN`."""
     chosen = {}
     for task, of_task in results.by("task").items():
-        goals = [goal.frame for goal in of_task.by("goal").values()]
-        reached = [goal for goal in goals if goal["hit"].iloc[-1]] or goals
-        goal = min(reached, key=lambda goal: abs(len(goal) - _SHOWN))
-        one = results.where(learned_on=task)
-        prior = Results(one.frame[one.frame["demonstration"].notna()], {})
+        goals = of_task.by("goal").values()
+        reached = [goal for goal in goals if goal.frame["hit"].iloc[-1]] or goals
+        goal = min(reached, key=lambda goal: abs(goal.n - _SHOWN))
+        prior = results.where(learned_on=task).having("demonstration")
+        told = (goal.texts("seen"), goal.texts("outcome"), goal.texts("key_state"))
         chosen[task] = {
             "task": task,
-            "goal": np.array(goal["place"].iloc[0].split(), dtype=float),
+            "goal": next(goal.texts("place")),
             "demonstrated": np.array(list(prior.texts("seen"))),
             "trials": [
-                {
-                    "error_seen": np.array(trial["seen"].split(), dtype=float),
-                    "outcome": np.array(trial["outcome"].split(), dtype=float),
-                    "key_state": np.array(trial["key_state"].split(), dtype=float),
-                    "hit": bool(trial["hit"]),
-                }
-                for _, trial in goal.iterrows()
+                {"error_seen": seen, "outcome": outcome, "key_state": state, "hit": bool(hit)}
+                for seen, outcome, state, hit in zip(*told, goal.frame["hit"], strict=True)
             ],
         }
     return chosen
@@ -132,19 +112,17 @@ def shown(results: Results) -> dict[str, dict[str, Any]]:
 
 def table(results: Results) -> Table:
     """What was seen of each trial."""
-    return Table(
-        ("task", "trial", "seen by eye", "truly off by"),
-        tuple(
-            (
-                TASKS[task] if number == 1 else "",
-                str(number),
-                "hit" if trial["hit"] else to_words(trial["error_seen"]),
-                f"{100 * np.linalg.norm(trial['outcome'] - row['goal']):.1f} cm",
-            )
-            for task, row in shown(results).items()
-            for number, trial in enumerate(row["trials"], start=1)
-        ),
-    )
+    rows = [
+        (
+            TASKS[task] if number == 1 else "",
+            str(number),
+            "hit" if trial["hit"] else to_words(trial["error_seen"]),
+            f"{100 * np.linalg.norm(trial['outcome'] - row['goal']):.1f} cm",
+        )
+        for task, row in shown(results).items()
+        for number, trial in enumerate(row["trials"], start=1)
+    ]
+    return Table(("task", "trial", "seen by eye", "truly off by"), tuple(rows))
 
 
 def draw(results: Results, folder: Path) -> list[Picture]:

@@ -10,11 +10,13 @@ from __future__ import annotations
 import string
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 
 from prior_reinforce.lab.experiments.fields import Change, MeasuredField
 from prior_reinforce.lab.experiments.recipes.adaptation import RIDGE, TASKS, later, reliability
-from prior_reinforce.lab.experiments.recipes.base import Picture, Planned, Recipe, Scale, Table
+from prior_reinforce.lab.experiments.recipes.base import Picture, Planned, Recipe, Scale
+from prior_reinforce.lab.experiments.recipes.tables import Table
 from prior_reinforce.lab.experiments.results import TRIALS, Results
 from prior_reinforce.lab.experiments.sequences import FieldAfternoons
 
@@ -160,18 +162,15 @@ CONDITIONS = (
 
 def units(scale: Scale, include: Sequence[str] = ()) -> list[Planned]:
     """The same afternoons with every rule; a quick run has one condition, of one field."""
-    conditions = CONDITIONS
+    conditions, rules = CONDITIONS, RULES if scale.variants else RULES[:_QUICK_RULES]
     if not scale.variants:
         first = CONDITIONS[0]
         conditions = (replace(first, fields=[first.fields[0][:1]], searches=False),)
-    known = RULES if scale.variants else RULES[:_QUICK_RULES]
     return [
         unit
-        for condition in conditions
+        for c in conditions
         for unit in tried(
-            condition,
-            [*known, *(Rule(choice, choice, not condition.alone) for choice in include)],
-            scale.rounds,
+            c, [*rules, *(Rule(choice, choice, not c.alone) for choice in include)], scale.rounds
         )
     ]
 
@@ -182,7 +181,8 @@ def tried(condition: Condition, rules: Sequence[Rule], rounds: int) -> list[Plan
     return [
         (
             FieldAfternoons(
-                of, rule.adapter, rule.carry_over, c.change, c.perception, c.goals, rounds
+                of, c.change, adapter=rule.adapter, carry_over=rule.carry_over,
+                perception=c.perception, goals=c.goals, rounds=rounds,
             ),
             {"condition": c.label, "method": rule.label},
         )
@@ -190,12 +190,17 @@ def tried(condition: Condition, rules: Sequence[Rule], rounds: int) -> list[Plan
         if c.tries(rule)
         for row in c.fields
         for of in (row[:2] if rule.search else row)
-    ]
+    ]  # fmt: skip
+
+
+def _compared(results: Results) -> dict[str, dict[str, Results]]:
+    """Rows that count, by condition and rule."""
+    return {name: of.by("method") for name, of in later(results).by("condition").items()}
 
 
 def table(results: Results) -> Table:
     """One row a condition, one column a rule: the mean, and ours minus it, which stands first."""
-    conditions = {name: of.by("method") for name, of in later(results).by("condition").items()}
+    conditions = _compared(results)
     labels = dict.fromkeys(label for rules in conditions.values() for label in rules)
 
     def cell(rules: dict[str, Results], label: str) -> str:
@@ -204,13 +209,11 @@ def table(results: Results) -> Table:
         ours, of = next(iter(rules.values())), rules[label]
         if of is ours:
             return str(of.mean(TRIALS))
-        return f"{of.mean(TRIALS).value:.2f} ({ours.minus(of, TRIALS):+.2f})"
+        return f"{of.mean(TRIALS).value:.2f} ({ours.beside(of)})"
 
-    rows = tuple(
-        (name, str(next(iter(rules.values())).n), *(cell(rules, label) for label in labels))
-        for name, rules in conditions.items()
-    )
-    return Table(("condition", "goals", *labels), rows)
+    rows = {(name, next(iter(of.values())).n): of for name, of in conditions.items()}
+    columns = {label: partial(cell, label=label) for label in labels}
+    return Table.of(("condition", "goals"), rows, columns)
 
 
 _DRAWN = {
@@ -228,16 +231,12 @@ def draw(results: Results, folder: Path) -> list[Picture]:
     from prior_reinforce.lab.experiments.recipes.charts import COLOURS, Mark, draw_rows
     from prior_reinforce.report.style import GOAL
 
-    conditions = {name: of.by("method") for name, of in later(results).by("condition").items()}
+    conditions = _compared(results)
     colours = [GOAL, *(colour for colour in COLOURS if colour != GOAL)]
-    marks = {
-        label: Mark(
-            shape,
-            colour,
-            [of[label].mean(TRIALS) if label in of else None for of in conditions.values()],
-        )
-        for (label, shape), colour in zip(_DRAWN.items(), colours, strict=False)
-    }
+    marks = {}
+    for (label, shape), colour in zip(_DRAWN.items(), colours, strict=False):
+        means = [of[label].mean(TRIALS) if label in of else None for of in conditions.values()]
+        marks[label] = Mark(shape, colour, means)
     label = "trials a goal, with 95 % intervals over sets of demonstrations and goals"
     path = draw_rows(list(conditions), marks, label, folder / "robustness.png")
     caption = (
@@ -251,17 +250,15 @@ def draw(results: Results, folder: Path) -> list[Picture]:
 def remarks(results: Results) -> list[str]:
     """Which rules took fewer trials than ours, and how far what ours says can be trusted."""
     behind = []
-    for condition, of in later(results).by("condition").items():
-        (_, ours), *others = of.by("method").items()
+    for condition, of in _compared(results).items():
+        (_, ours), *others = of.items()
         for rule, rows in others:
             minus = ours.minus(rows, TRIALS)
             behind += [f"{rule} in {condition!r} ({minus:+.2f})"] if minus.value > 0 else []
     condition, first = next(iter(results.by("condition").items()))
-    ours = next(iter(first.by("method").values()))
-    said = f"On fields, {condition}: {reliability(ours)}"
-    if not behind:
-        return [said]
-    return [f"With fewer trials than ours (ours minus it): {'; '.join(behind)}.", said]
+    said = f"On fields, {condition}: {reliability(next(iter(first.by('method').values())))}"
+    ahead = f"With fewer trials than ours (ours minus it): {'; '.join(behind)}."
+    return [ahead, said] if behind else [said]
 
 
 RECIPE = Recipe(

@@ -8,21 +8,14 @@ with a seed of its own, so intervals resample sets, seeds and goals.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
-from prior_reinforce.lab.experiments.evaluation import Training, Trials
-from prior_reinforce.lab.experiments.recipes.adaptation import GENERATOR, GOALS, RIDGE, TASKS, later
-from prior_reinforce.lab.experiments.recipes.base import (
-    TASK,
-    Picture,
-    Planned,
-    Recipe,
-    Scale,
-    Table,
-)
-from prior_reinforce.lab.experiments.recipes.generators import METHODS
+from prior_reinforce.lab.experiments.recipes.adaptation import RIDGE, TASKS, afternoons, later
+from prior_reinforce.lab.experiments.recipes.base import TASK, Picture, Planned, Recipe, Scale
+from prior_reinforce.lab.experiments.recipes.generators import METHODS, Method
+from prior_reinforce.lab.experiments.recipes.tables import Columns, Table, mean_of
 from prior_reinforce.lab.experiments.results import FIRST, TRIALS, Results, reached
-from prior_reinforce.lab.experiments.sequences import Afternoons
 
 SETS = tuple((f"v{k:02d}", k) for k in range(20))
 """Names and seeds (docs/reproduce.md)."""
@@ -42,91 +35,73 @@ _SEQUENCES, _MOST_GOALS = 2, 30
 _DEMONSTRATED = tuple(task for task, learned_on in TASKS.items() if task == learned_on)
 """Basketball's other variants are learned from the same demonstrations."""
 _CLOSED = tuple(m for m in METHODS if not m.generator.startswith(("diffusion", "regression")))
-_NETWORKS = tuple(m for m in METHODS[:2])
+
+
+def _scales(scale: Scale) -> list[Scale]:
+    """One for each set."""
+    goals = min(scale.goals, _MOST_GOALS)
+    return [replace(scale, goals=goals, sets=(name,), seeds=(seed,)) for name, seed in SETS]
 
 
 def units(scale: Scale, include: Sequence[str] = ()) -> list[Planned]:
     """Every adapter by eye where demonstrated; every generator without a network on V1."""
     rules = [*RULES, *((choice, True, choice) for choice in include)]
-    by_eye: list[Planned] = [
-        (
-            Afternoons(
-                Training(task, name, GENERATOR, seed, perception="eye"), task, adapter, "eye",
-                carried, _SEQUENCES, GOALS, scale.rounds,
-            ),
-            {"condition": _BY_EYE, "method": label},
-        )
-        for name, seed in SETS
-        for task in _DEMONSTRATED
-        for adapter, carried, label in rules
-    ]  # fmt: skip
-    return by_eye + _generators(scale, [(m.label, m.generator) for m in _CLOSED])
+    by_eye = [
+        (unit, {"condition": _BY_EYE, **names})
+        for one in _scales(scale)
+        for unit, names in afternoons(one, rules, tasks=_DEMONSTRATED, sequences=_SEQUENCES)
+    ]
+    return by_eye + _generators(scale, _CLOSED)
 
 
-def _generators(scale: Scale, methods: Sequence[tuple[str, str]]) -> list[Planned]:
+def _generators(scale: Scale, methods: Sequence[Method]) -> list[Planned]:
     """As the recipe `generators`, on drawn sets."""
-    goals = min(scale.goals, _MOST_GOALS)
     return [
-        (
-            Trials(
-                Training(TASK, name, choice, seed), TASK, "gp", "amplified", goals,
-                rounds=scale.rounds,
-            ),
-            {"condition": _EXACT, "method": label},
-        )
-        for name, seed in SETS
-        for label, choice in methods
-    ]  # fmt: skip
+        (unit, {"condition": _EXACT, "method": method.label})
+        for one in _scales(scale)
+        for method in methods
+        for unit in method.trials(one)
+    ]
 
 
 def table(results: Results) -> Table:
     """One row a method: trials on each task and in the mean, and ours minus it."""
-    tasks = list(results.by("task"))
-    rows = []
-    for condition, of in results.by("condition").items():
-        counted = later(of) if condition == _BY_EYE else of
-        methods = counted.by("method")
-        ours = next(iter(methods.values()))
-        for name, one in methods.items():
-            rows.append(
-                (
-                    condition,
-                    name,
-                    *(_said(one.where(task=task)) for task in tasks),
-                    str(one.mean(TRIALS)),
-                    "" if one is ours else f"{ours.minus(one, TRIALS):+.2f}",
-                    str(one.mean(FIRST)),
-                    str(one.mean(reached(4))),
-                    str(one.where(task=TASK).trainings),
-                )
-            )
-    header = (
-        "compared", "method", *tasks, "trials, mean", "the first row minus it", "first trials",
-        "within 4", "sets",
-    )  # fmt: skip
-    return Table(header, tuple(rows))
+    compared = _compared(results)
+    firsts = {condition: next(iter(methods.values())) for condition, methods in compared.items()}
+    columns: Columns = {
+        **{task: mean_of(TRIALS, task=task) for task in results.by("task")},
+        "trials, mean": mean_of(TRIALS),
+        "the first row minus it": lambda of: firsts[of.first("condition")].beside(of),
+        "first trials": mean_of(FIRST),
+        "within 4": mean_of(reached(4)),
+        "sets": lambda of: of.where(task=TASK).trainings,
+    }
+    rows = {(c, name): of for c, methods in compared.items() for name, of in methods.items()}
+    return Table.of(("compared", "method"), rows, columns)
 
 
-def _said(of: Results) -> str:
-    return "" if of.empty else str(of.mean(TRIALS))
+def _compared(results: Results) -> dict[str, dict[str, Results]]:
+    """Rows that count by condition and method."""
+    conditions = results.by("condition").items()
+    return {c: (later(of) if c == _BY_EYE else of).by("method") for c, of in conditions}
 
 
 def draw(results: Results, folder: Path) -> list[Picture]:
     """A picture a condition: means of all sets, with their intervals."""
     from prior_reinforce.lab.experiments.recipes.charts import COLOURS, Mark, draw_rows
 
-    recipe = results.frame["recipe"].iloc[0]
     pictures = []
-    for condition, of in results.by("condition").items():
-        methods = (later(of) if condition == _BY_EYE else of).by("method")
-        mark = Mark("o", COLOURS[0], [one.mean(TRIALS) for one in methods.values()])
-        name = f"{recipe}-{'adapters' if condition == _BY_EYE else 'generators'}.png"
+    for condition, methods in _compared(results).items():
+        mark = Mark("o", COLOURS[0], [of.mean(TRIALS) for of in methods.values()])
+        kind = "adapters" if condition == _BY_EYE else "generators"
         path = draw_rows(
-            list(methods), {"mean": mark}, f"trials a goal: {condition}", folder / name
-        )
+            list(methods), {"mean": mark}, f"trials a goal: {condition}",
+            folder / f"{results.first('recipe')}-{kind}.png",
+        )  # fmt: skip
+        n = results.where(condition=condition, task=TASK).trainings
         caption = (
-            f"Trials a goal ({condition}) in the mean of {of.where(task=TASK).trainings} drawn "
-            "prior sets a task, with 95 % intervals over sets, seeds and goals."
+            f"Trials a goal ({condition}) in the mean of {n} drawn prior sets a task, with 95 % "
+            "intervals over sets, seeds and goals."
         )
         pictures.append(Picture(path, caption))
     return pictures
@@ -134,7 +109,7 @@ def draw(results: Results, folder: Path) -> list[Picture]:
 
 def behind_networks(scale: Scale, include: Sequence[str] = ()) -> list[Planned]:
     """The same with a network, each learned once or shared with `trials`."""
-    return _generators(scale, [(m.label, m.generator) for m in _NETWORKS])
+    return _generators(scale, METHODS[:2])
 
 
 RECIPE = Recipe(
@@ -142,7 +117,6 @@ RECIPE = Recipe(
     family="adapter", apart=True,
 )  # fmt: skip
 NETWORK = Recipe(
-    "sets-network", "Twenty prior sets, a network alone", "not in the paper",
-    behind_networks,
+    "sets-network", "Twenty prior sets, a network alone", "not in the paper", behind_networks,
     table, draw, apart=True,
 )  # fmt: skip

@@ -10,11 +10,12 @@ more than there were rounds: never flattering.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from prior_reinforce.lab.experiments.evaluation import Training, Trials
-from prior_reinforce.lab.experiments.recipes.base import Picture, Planned, Recipe, Scale, Table
+from prior_reinforce.lab.experiments.evaluation import Training
+from prior_reinforce.lab.experiments.recipes.base import Picture, Planned, Recipe, Scale
+from prior_reinforce.lab.experiments.recipes.tables import Columns, Table
 from prior_reinforce.lab.experiments.results import FIRST, TRIALS, Results
 from prior_reinforce.lab.experiments.statistics import Interval
 from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
@@ -45,6 +46,11 @@ class PaperRow:
     trials: float
     sd: float
 
+    @property
+    def looks(self) -> str:
+        """Who looks, in a word."""
+        return "camera" if self.by_model else "eye"
+
     def sense(self, model: VisionLanguageModelConfig | None) -> str:
         """How it is seen; the camera stands in where no model is asked."""
         if not self.by_model:
@@ -74,42 +80,32 @@ def units(scale: Scale, include: Sequence[str] = (), generator: str = "diffusion
     for row in ROWS:
         if row.by_model and not scale.read_pictures:
             continue
-        learned = trainings(row, scale, generator)
+        learned, model = trainings(row, scale, generator), scale.model if row.by_model else None
         goals = min(scale.goals, _PICTURE_GOALS) if row.by_model else scale.goals
-        sense = row.perception(scale.model)
         planned += [(t.perceived, {}) for t in learned if t.perceived and t.task == row.task]
         planned += [
             (
-                Trials(
-                    training,
-                    row.task,
-                    adapter,
-                    sense,
-                    _UNSEEN_GOALS if unseen else goals,
-                    unseen=unseen,
-                    rounds=scale.rounds,
-                    model=training.model,
+                scale.trials(
+                    training, adapter, row.perception(scale.model), task=row.task, model=model,
+                    goals=_UNSEEN_GOALS if unseen else goals, unseen=unseen,
                 ),
                 {"method": adapter, "condition": f"{row.title}, {row.sense(scale.model)}"},
             )
             for adapter in ("gp", *include)
             for unseen in (True, False)
             for training in learned
-        ]
-    return planned  # fmt: skip
+        ]  # fmt: skip
+    return planned
 
 
 def trainings(row: PaperRow, scale: Scale, generator: str) -> list[Training]:
     """What a row's trials start from, its demonstrations perceived as the trials are."""
-    model = scale.model if row.by_model else None
-    return [
-        Training(
-            row.learned_on, name, generator, seed, perception=row.perception(scale.model),
-            model=model,
-        )
-        for name in scale.sets
-        for seed in scale.seeds[: _PICTURE_SEEDS if row.by_model else None]
-    ]  # fmt: skip
+    perception, model = row.perception(scale.model), scale.model if row.by_model else None
+    seeds = scale.seeds[: _PICTURE_SEEDS if row.by_model else None]
+    learned = replace(scale, seeds=seeds).trainings(
+        generator, row.learned_on, perception=perception
+    )
+    return [replace(training, model=model) for training in learned]
 
 
 def told(results: Results, method: str = "gp") -> list[tuple[PaperRow, Results]]:
@@ -130,37 +126,33 @@ def papers_procedure(of: Results) -> tuple[float, float, int]:
 
 def table(results: Results) -> Table:
     """The paper's columns, its own numbers beside them."""
-    methods = list(results.by("method"))
-    rows = [(row, of, method) for method in methods for row, of in told(results, method)]
 
-    def few(of: Results) -> Results:
-        return of.where(unseen=True)
-
-    def many(of: Results) -> Results:
-        return of.where(unseen=False)
+    def sense(row: PaperRow, of: Results, method: str) -> str:
+        seen = str(of.first("condition")).removeprefix(f"{row.title}, ")
+        return seen if method == "gp" else f"{seen}, {method}"
 
     def ten(of: Results) -> str:
         mean, sd, runs = papers_procedure(of)
         return f"{mean:.1f} ± {sd:.1f} ({runs})"
 
-    columns = {
-        "task": lambda r: r[0].title,
-        "sense": lambda r: (
-            r[1].frame["condition"].iloc[0].removeprefix(f"{r[0].title}, ")
-            + ("" if r[2] == "gp" else f", {r[2]}")
-        ),
+    rows = {
+        (row.title, sense(row, of, method)): (row, of, of.where(unseen=False))
+        for method in results.by("method")
+        for row, of in told(results, method)
+    }
+    columns: Columns = {
         "prior": lambda r: r[0].prior,
         "the paper's procedure: mean ± sd (runs)": lambda r: ten(r[1]),
-        "trials, unseen goals": lambda r: few(r[1]).mean(TRIALS),
-        "trials, uniform goals": lambda r: many(r[1]).mean(TRIALS),
-        "total": lambda r: f"{r[0].prior + many(r[1]).mean(TRIALS).value:.1f}",
+        "trials, unseen goals": lambda r: r[1].where(unseen=True).mean(TRIALS),
+        "trials, uniform goals": lambda r: r[2].mean(TRIALS),
+        "total": lambda r: f"{r[0].prior + r[2].mean(TRIALS).value:.1f}",
         "not reached": lambda r: f"{(r[1].frame['solved_at'] == 0).sum()} of {r[1].n}",
-        "first trials that hit, uniform goals": lambda r: many(r[1]).mean(FIRST),
+        "first trials that hit, uniform goals": lambda r: r[2].mean(FIRST),
         "paper: trials (total)": lambda r: (
             f"{r[0].trials:.1f} ± {r[0].sd:.1f} ({r[0].prior + r[0].trials:.1f})"
         ),
     }
-    return Table.of(rows, columns)
+    return Table.of(("task", "sense"), rows, columns)
 
 
 def draw(results: Results, folder: Path) -> list[Picture]:
@@ -168,11 +160,14 @@ def draw(results: Results, folder: Path) -> list[Picture]:
     from prior_reinforce.lab.experiments.recipes.charts import COLOURS, Mark, draw_rows
     from prior_reinforce.report.style import GOAL
 
+    def spread(mean: float, sd: float) -> Interval:
+        return Interval(mean, mean - sd, mean + sd)
+
     rows = told(results)
     many = [of.where(unseen=False).mean(TRIALS) for _, of in rows]
-    papers = [_spread(row.trials, row.sd) for row, _ in rows]
+    papers = [spread(row.trials, row.sd) for row, _ in rows]
     runs = [papers_procedure(of) for _, of in rows]
-    few = [_spread(mean, sd) for mean, sd, _ in runs]
+    few = [spread(mean, sd) for mean, sd, _ in runs]
     marks = {
         "paper, ten runs on a real arm: mean ± standard deviation of a run": Mark(
             "D", GOAL, papers
@@ -182,7 +177,7 @@ def draw(results: Results, folder: Path) -> list[Picture]:
         ),
         "ours, uniform goals: mean and its 95 % interval": Mark("o", COLOURS[0], many),
     }
-    labels = [of.frame["condition"].iloc[0] for _, of in rows]
+    labels = [of.first("condition") for _, of in rows]
     path = draw_rows(labels, marks, "Stage-2 trials to the first hit", folder / "trials.png")
     caption = (
         "Stage-2 trials to the first hit. Wide bars: how far single runs spread (standard "
@@ -192,10 +187,6 @@ def draw(results: Results, folder: Path) -> list[Picture]:
     if not results.where(perception=CAMERA).empty:
         caption += " The camera finds objects by colour; its rows are no evidence about VLMs."
     return [Picture(path, caption)]
-
-
-def _spread(mean: float, sd: float) -> Interval:
-    return Interval(mean, mean - sd, mean + sd)
 
 
 def remarks(results: Results) -> list[str]:

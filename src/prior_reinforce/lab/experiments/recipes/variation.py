@@ -8,11 +8,14 @@ makes of the demonstrations.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
-from prior_reinforce.lab.experiments.evaluation import Training, Trials
-from prior_reinforce.lab.experiments.recipes.base import Picture, Planned, Recipe, Scale, Table
-from prior_reinforce.lab.experiments.results import FIRST, TRIALS, Results
+from prior_reinforce.lab.experiments.evaluation import Training
+from prior_reinforce.lab.experiments.recipes.base import Picture, Planned, Recipe, Scale
+from prior_reinforce.lab.experiments.recipes.tables import Table
+from prior_reinforce.lab.experiments.results import FIRST, TRIALS, Measure, Results
 
 GENERATORS: tuple[tuple[str, str], ...] = (
     ("auto", "auto"),
@@ -34,32 +37,28 @@ def units(scale: Scale, include: Sequence[str] = ()) -> list[Planned]:
     known, sets, tasks = GENERATORS, SETS, TASKS
     if not scale.variants:
         known, sets, tasks = known[:_QUICK_GENERATORS], sets[:_QUICK_SETS], tasks[:_QUICK_TASKS]
-    goals = min(scale.goals, _GOALS)
+    some = replace(scale, goals=min(scale.goals, _GOALS))
     return [
         (
-            Trials(
-                Training(task, f"{name}-0", choice, seed=0), task, "bayes", "exact", goals,
-                rounds=scale.rounds,
-            ),
+            some.trials(Training(task, f"{name}-0", choice, seed=0), "bayes", "exact"),
             {"method": label, "condition": name},
         )
         for label, choice in (*known, *((choice, choice) for choice in include))
         for name in sets
         for task in tasks
-    ]  # fmt: skip
+    ]
 
 
 def table(results: Results) -> Table:
     """One row a kind of set, then one a task; first throws that hit, and trials."""
-    methods = results.by("method")
 
-    def cells(**of: str) -> list[str]:
-        rows = [method.where(**of) for method in methods.values()]
-        return [f"{row.mean(FIRST).value:.2f}; {row.mean(TRIALS).value:.2f}" for row in rows]
+    def shown(rows: Results, method: str) -> str:
+        of = rows.where(method=method)
+        return f"{of.mean(FIRST).value:.2f}; {of.mean(TRIALS).value:.2f}"
 
-    rows = [(name, *cells(condition=name)) for name in results.by("condition")]
-    rows += [(task, *cells(task=task)) for task in results.by("task")]
-    return Table(("demonstrations", *methods), tuple(rows))
+    rows = {**results.by("condition"), **results.by("task")}
+    columns = {name: partial(shown, method=name) for name in results.by("method")}
+    return Table.of(("demonstrations",), rows, columns)
 
 
 def draw(results: Results, folder: Path) -> list[Picture]:
@@ -67,21 +66,18 @@ def draw(results: Results, folder: Path) -> list[Picture]:
     from prior_reinforce.lab.experiments.recipes.charts import Line, draw_kinds
 
     kinds = list(results.by("condition"))
-    panels = {}
-    for label, measure in (("first throws that hit", FIRST), ("trials to a hit", TRIALS)):
-        panels[label] = [
-            Line(
-                method,
-                [rows.where(condition=kind).mean(measure) for kind in kinds],
-                place,
-                each=[
-                    [of.mean(measure).value for of in of_kind.by("task").values()]
-                    for of_kind in rows.by("condition").values()
-                ],
-            )
-            for place, (method, rows) in enumerate(results.by("method").items())
-        ]
-    path = draw_kinds([_in_words(kind) for kind in kinds], panels, folder / "variation.png")
+
+    def line(place: int, method: str, measure: Measure) -> Line:
+        of_kinds = [results.where(condition=kind, method=method) for kind in kinds]
+        each = [[of.mean(measure).value for of in rows.by("task").values()] for rows in of_kinds]
+        return Line(method, [rows.mean(measure) for rows in of_kinds], place, each=each)
+
+    panels = {
+        label: [line(i, method, measure) for i, method in enumerate(results.by("method"))]
+        for label, measure in (("first throws that hit", FIRST), ("trials to a hit", TRIALS))
+    }
+    names = ["{}\n{} demos".format(*kind.rsplit("-", 1)) for kind in kinds]
+    path = draw_kinds(names, panels, folder / "variation.png")
     caption = (
         f"Large: means over {len(results.by('task'))} tasks on which nothing was chosen, by what "
         "differs between the demonstrations and how many there are. Small: each task, "
@@ -89,12 +85,6 @@ def draw(results: Results, folder: Path) -> list[Picture]:
         "set a task and kind: no intervals."
     )
     return [Picture(path, caption)]
-
-
-def _in_words(name: str) -> str:
-    """A set's kind and number, on two lines."""
-    kind, count = name.rsplit("-", 1)
-    return f"{kind}\n{count} demos"
 
 
 RECIPE = Recipe(

@@ -9,8 +9,8 @@ exactly.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,10 +18,10 @@ import numpy as np
 
 from prior_reinforce.arrays import LARGEST, Plans
 from prior_reinforce.generators.patterns import motion_vectors
-from prior_reinforce.lab.experiments.evaluation import GOAL_SEED, Training, Trials
-from prior_reinforce.lab.experiments.recipes.base import Planned, Recipe, Scale, Table
-from prior_reinforce.lab.experiments.results import FIRST, TRIALS, Measure, Results
-from prior_reinforce.lab.experiments.units import Unit
+from prior_reinforce.lab.experiments.evaluation import GOAL_SEED, OfTraining, Training
+from prior_reinforce.lab.experiments.recipes.base import Planned, Recipe, Scale
+from prior_reinforce.lab.experiments.recipes.tables import Columns, Table, mean_of
+from prior_reinforce.lab.experiments.results import FIRST, TRIALS, Measure, Results, rows_of
 from prior_reinforce.lab.tasks import make_task
 from prior_reinforce.lab.tasks.zoo import SEVERAL_WAYS
 from prior_reinforce.plans.motions import Demonstrations
@@ -44,18 +44,12 @@ _GOALS = 20
 
 
 @dataclass(frozen=True)
-class Unlike(Unit):
+class Unlike(OfTraining):
     """Which plans for the goals are like no demonstration."""
 
-    training: Training
-    """What was learned."""
     goals: int
     """Number of goals, those of `Trials`."""
-
-    @property
-    def label(self) -> str:
-        """What it is, for a progress line."""
-        return f"plans of {self.training.label.removeprefix('learn ')}"
+    what = "plans"
 
     def run(self, folder: Path) -> Mapping[str, Any]:
         """Generate a plan for each goal, and hold it against the demonstrations."""
@@ -65,8 +59,8 @@ class Unlike(Unit):
 
     def rows(self, result: Mapping[str, Any]) -> list[dict[str, Any]]:
         """A row a goal."""
-        told = {**self.training.columns, "task": self.training.task}
-        return [{**told, "goal": i, "unlike": bool(is_)} for i, is_ in enumerate(result["unlike"])]
+        said = list(map(bool, result["unlike"]))
+        return rows_of(self.columns, goal=range(len(said)), unlike=said)
 
 
 def unlike(demonstrations: Demonstrations, plans: Plans) -> np.ndarray:
@@ -83,12 +77,9 @@ def unlike(demonstrations: Demonstrations, plans: Plans) -> np.ndarray:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # they advise on recordings; a wild plan is the point here
         both = Demonstrations(
-            np.concatenate([demonstrations.plans, plans]),
-            np.concatenate([outcomes, made_up]),
-            demonstrations.format,
-            demonstrations.outcome_names,
-            demonstrations.outcome_units,
-        )
+            np.concatenate([demonstrations.plans, plans]), np.concatenate([outcomes, made_up]),
+            demonstrations.format, demonstrations.outcome_names, demonstrations.outcome_units,
+        )  # fmt: skip
     motions = motion_vectors(both)
     apart = np.linalg.norm(motions[:, None] - motions[None, :n], axis=2)
     own = apart[:n] + np.where(np.eye(n, dtype=bool), np.inf, 0.0)
@@ -98,42 +89,45 @@ def unlike(demonstrations: Demonstrations, plans: Plans) -> np.ndarray:
 
 def units(scale: Scale, include: Sequence[str] = ()) -> list[Planned]:
     """The same goals with every generator on every set; a quick run on the first of each task."""
-    goals = min(scale.goals, _GOALS)
-    planned: list[Planned] = []
-    for label, choice in (*GENERATORS, *((choice, choice) for choice in include)):
-        for task, names in SETS.items():
-            for name in names if scale.variants else names[:1]:
-                learned = Training(task, name, choice, seed=0)
-                tried = Trials(learned, task, "bayes", "exact", goals, rounds=scale.rounds)
-                planned += [(unit, {"method": label}) for unit in (tried, Unlike(learned, goals))]
-    return planned
+    some = replace(scale, goals=min(scale.goals, _GOALS))
+    return [
+        (unit, {"method": label})
+        for label, choice in (*GENERATORS, *((choice, choice) for choice in include))
+        for task, names in SETS.items()
+        for learned in (
+            Training(task, name, choice, seed=0)
+            for name in (names if scale.variants else names[:1])
+        )
+        for unit in (some.trials(learned, "bayes", "exact"), Unlike(learned, some.goals))
+    ]
 
 
 def table(results: Results) -> Table:
     """One row a task and generator."""
-    tried = Results(results.frame[results.frame["solved_at"].notna()], results.made_by)
-    rows = [
-        (task, method, of, of_task.where(method=GENERATORS[0][0]))
+    tried = results.having("solved_at")
+    network = tried.where(method=GENERATORS[0][0])
+
+    def beside(measure: Measure) -> Callable[[Results], str]:
+        return lambda of: network.where(task=of.first("task")).beside(of, measure)
+
+    def alien(of: Results) -> str:
+        plans = results.where(task=of.first("task"), method=of.first("method"))
+        return f"{plans.frame['unlike'].astype(float).mean():.2f}"
+
+    rows = {
+        (task, method): of
         for task, of_task in tried.by("task").items()
         for method, of in of_task.by("method").items()
-    ]
-    columns = {
-        "task": lambda row: row[0],
-        "generator": lambda row: row[1],
-        "first throws that hit": lambda row: row[2].mean(FIRST),
-        "the network minus it": lambda row: _ahead(row[3], row[2], FIRST),
-        "trials": lambda row: row[2].mean(TRIALS),
-        "network minus it, trials": lambda row: _ahead(row[3], row[2], TRIALS),
-        "objects lost, a goal": lambda row: f"{row[2].frame['lost'].mean():.2f}",
-        "plans like no demonstration": lambda row: (
-            f"{results.where(task=row[0], method=row[1]).frame['unlike'].astype(float).mean():.2f}"
-        ),
     }
-    return Table.of(rows, columns)
-
-
-def _ahead(network: Results, of: Results, quantity: Measure) -> str:
-    return "" if of.frame.equals(network.frame) else f"{network.minus(of, quantity):+.2f}"
+    columns: Columns = {
+        "first throws that hit": mean_of(FIRST),
+        "the network minus it": beside(FIRST),
+        "trials": mean_of(TRIALS),
+        "network minus it, trials": beside(TRIALS),
+        "objects lost, a goal": lambda of: f"{of.frame['lost'].mean():.2f}",
+        "plans like no demonstration": alien,
+    }
+    return Table.of(("task", "generator"), rows, columns)
 
 
 RECIPE = Recipe(

@@ -9,7 +9,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from prior_reinforce.lab.experiments.evaluation import ZeroShot
-from prior_reinforce.lab.experiments.recipes.base import Planned, Recipe, Scale, Table
+from prior_reinforce.lab.experiments.recipes.base import Planned, Recipe, Scale
+from prior_reinforce.lab.experiments.recipes.tables import Columns, Table
 from prior_reinforce.lab.experiments.results import Results
 
 
@@ -27,19 +28,16 @@ def table(results: Results) -> Table:
     by = ["method", "set", "seed", "quantity"]
     of = results.frame.groupby(by, sort=False)["value"].agg(["median", "max"]).unstack("quantity")
     own = "own_landing_from_demonstrated_m"
-    columns = {
-        "generator": lambda row: row[0][0],
-        "set": lambda row: row[0][1],
-        "seed": lambda row: row[0][2],
-        "own plans, worst rms [mrad]": lambda row: f"{row[1]['max', 'own_rms_rad'] * 1e3:.1f}",
-        "own landing, median [cm]": lambda row: f"{row[1]['median', own] * 100:.1f}",
-        "worst [cm]": lambda row: f"{row[1]['max', own] * 100:.1f}",
-        "grid median [cm]": lambda row: f"{row[1]['max', 'grid_median_m'] * 100:.2f}",
-        "p90 [cm]": lambda row: f"{row[1]['max', 'grid_p90_m'] * 100:.2f}",
-        "within tolerance": lambda row: f"{row[1]['max', 'grid_within_tolerance']:.2f}",
-        "lost": lambda row: f"{row[1]['max', 'grid_lost']:.3f}",
+    columns: Columns = {
+        "own plans, worst rms [mrad]": lambda row: f"{row['max', 'own_rms_rad'] * 1e3:.1f}",
+        "own landing, median [cm]": lambda row: f"{row['median', own] * 100:.1f}",
+        "worst [cm]": lambda row: f"{row['max', own] * 100:.1f}",
+        "grid median [cm]": lambda row: f"{row['max', 'grid_median_m'] * 100:.2f}",
+        "p90 [cm]": lambda row: f"{row['max', 'grid_p90_m'] * 100:.2f}",
+        "within tolerance": lambda row: f"{row['max', 'grid_within_tolerance']:.2f}",
+        "lost": lambda row: f"{row['max', 'grid_lost']:.3f}",
     }
-    return Table.of(list(of.iterrows()), columns)
+    return Table.of(("generator", "set", "seed"), dict(of.iterrows()), columns)
 
 
 RECIPE = Recipe(
