@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import os
+import re
+import subprocess
+import sys
 
 os.environ.setdefault("MUJOCO_GL", "egl")
 
@@ -18,7 +21,7 @@ from prior_reinforce.environment import (
     Task,
     make_renderer,
 )
-from prior_reinforce.errors import ConfigurationError, RenderingUnavailableError
+from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.generators.interpolation import SmoothInterpolation
 from prior_reinforce.lab.tasks import TASKS, make_task
 from prior_reinforce.lab.tasks.curling import Curling
@@ -122,10 +125,22 @@ def test_a_picture_has_the_size_asked_for_and_the_scene_stays_as_it_was(small_sc
     assert (small_scene.vis.global_.offwidth, small_scene.vis.global_.offheight) == (64, 48)
 
 
-def test_no_opengl_is_named_with_the_remedy(small_scene, monkeypatch):
-    def fails(*_):
-        raise ImportError("no such library")
-
-    monkeypatch.setattr(mujoco, "Renderer", fails)
-    with pytest.raises(RenderingUnavailableError, match=r"no such library.*MUJOCO_GL=egl"):
-        make_renderer(small_scene, 64, 48)
+def test_no_opengl_is_named_with_the_remedy():
+    """In a program of its own: it is asked twice, at which MuJoCo's default library aborts."""
+    tries = """
+import mujoco
+from prior_reinforce.environment import RenderingUnavailableError, make_renderer
+for _ in range(3):
+    try:
+        make_renderer(mujoco.MjModel.from_xml_string("<mujoco/>"), 64, 48)
+    except RenderingUnavailableError as error:
+        print(error)
+"""
+    without = {"MUJOCO_GL", "DISPLAY", "WAYLAND_DISPLAY"}
+    env = {name: value for name, value in os.environ.items() if name not in without}
+    command = [sys.executable, "-W", "ignore", "-c", tries]
+    done = subprocess.run(command, env=env, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    said = done.stdout.splitlines()
+    assert len(said) == 3
+    assert all(re.search(r"OpenGL is not available \(.+\); .*MUJOCO_GL=egl", it) for it in said)

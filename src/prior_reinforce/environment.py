@@ -27,6 +27,9 @@ if TYPE_CHECKING:
 Picture = UInt8[np.ndarray, "_height _width 3"]
 """RGB, row by row from the top."""
 
+_without_opengl: list[str] = []
+"""Why this process draws nothing, once OpenGL has failed: asked again, some libraries abort it."""
+
 # Nine places around a 1 m x 1 m table whose near edge is 0.35 m from the robot's base axis (ours):
 # four would do, nine also tell how good the calibration is.
 _TABLE_MARKS = tuple((x, y) for x in (0.5, 0.85, 1.2) for y in (-0.4, 0.0, 0.4))
@@ -196,6 +199,8 @@ def make_renderer(model: mujoco.MjModel, width: int, height: int) -> mujoco.Rend
     """
     import mujoco
 
+    if _without_opengl:
+        raise RenderingUnavailableError(_without_opengl[0])
     # The frame buffer's size is part of the model, and the model is shared: draw a copy.
     drawn = copy.copy(model)
     screen = drawn.vis.global_
@@ -204,7 +209,8 @@ def make_renderer(model: mujoco.MjModel, width: int, height: int) -> mujoco.Rend
     try:
         return mujoco.Renderer(drawn, height, width)
     except Exception as error:  # each OpenGL backend fails with exceptions of its own
-        raise RenderingUnavailableError(
+        _without_opengl.append(
             f"no picture can be drawn, OpenGL is not available ({error}); on a machine without a "
             "display set MUJOCO_GL=egl and install libegl1 (or MUJOCO_GL=osmesa and libosmesa6)"
-        ) from error
+        )
+        raise RenderingUnavailableError(_without_opengl[0]) from error
