@@ -22,6 +22,8 @@ from prior_reinforce.readings import as_tolerance, in_tolerances
 from prior_reinforce.wording import say_reading
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from prior_reinforce.environment import Rollout, Task
     from prior_reinforce.lab.arms.fr3 import SimulatedFR3
     from prior_reinforce.lab.arms.ur import SimulatedUR
@@ -85,7 +87,7 @@ class Simulate:
             return
         from prior_reinforce.lab.arms.fr3 import SimulatedFR3
 
-        arm = SimulatedFR3(task, self.host, lambda rollout: self._say(task, rollout))
+        arm = SimulatedFR3(task, self.host, self._observer(task))
         self._serve(arm, task.name)
 
     def _serve(self, arm: SimulatedFR3 | SimulatedUR, what: str) -> None:
@@ -102,35 +104,42 @@ class Simulate:
     def _serve_so101(self, task: Task) -> None:
         from prior_reinforce.lab.arms.so101 import manifest_section, serve
 
+        say = self._observer(task)
         section = manifest_section(self.folder, leader=self.leader, lock_step=self.lock_step)
         signal.signal(signal.SIGTERM, signal.default_int_handler)
         with suppress(KeyboardInterrupt):
             serve(
                 self.folder,
-                lambda rollout: self._say(task, rollout),
+                say,
                 hand=self.hand,
                 leader=self.leader,
                 lock_step=0.01 if self.lock_step else None,
                 ready=lambda: print(f"{section}\n# so101 is served; Ctrl-C ends it", flush=True),
             )
 
-    def _say(self, task: Task, rollout: Rollout) -> None:
-        """Where the object went, and what an observer would call that."""
+    def _observer(self, task: Task) -> Callable[[Rollout], None]:
+        """Says where the object went, and what an observer would call that.
+
+        It is made before an arm is served: made at a landing, it kept the arm from answering.
+        """
         from prior_reinforce.perception import make_perception
 
-        names = task.outcome_names
+        names, goal, eye = task.outcome_names, np.array(self.goal), make_perception("eye")
         units = task.outcome_units or ("m",) * len(names)
-        if not rollout.valid:
-            print("the object went where no outcome is", flush=True)
-            return
-        said = say_outcome(rollout.outcome, names, units, digits=4)
-        if self.goal:
-            eye, rng = make_perception("eye"), np.random.default_rng(0)
-            error = rollout.outcome - np.array(self.goal)
-            seen = say_reading(eye.perceive(rollout, np.array(self.goal), rng), names, units)
-            hit = in_tolerances(error, as_tolerance(task.tolerance, names, units)) <= 1
-            said += f"; by eye: {seen}{', a hit' if hit else ''}"
-        print(f"the object came down at {said}", flush=True)
+        tolerance = as_tolerance(task.tolerance, names, units)
+
+        def say(rollout: Rollout) -> None:
+            if not rollout.valid:
+                print("the object went where no outcome is", flush=True)
+                return
+            said = say_outcome(rollout.outcome, names, units, digits=4)
+            if self.goal:
+                seen = eye.perceive(rollout, goal, np.random.default_rng(0))
+                hit = in_tolerances(rollout.outcome - goal, tolerance) <= 1
+                said += f"; by eye: {say_reading(seen, names, units)}{', a hit' if hit else ''}"
+            print(f"the object came down at {said}", flush=True)
+
+        return say
 
 
 def _record(task: PandaTask, folder: Path) -> None:
