@@ -87,8 +87,8 @@ class DiffusionGenerator(NetworkGenerator):
 
         return loss(network, codes, conditions, self.config, rng)
 
-    def _optimiser(self) -> Mapping[str, Any]:
-        return {"betas": _BETAS, "decay": self.config.decay}
+    def _optimiser(self, rng: torch.Generator) -> Mapping[str, Any]:
+        return {"betas": _BETAS, "decay": self.config.decay, "rng": rng}
 
     def _codes(self, learned: Learned, conditions: Tensor) -> Tensor:
         from prior_reinforce.generators.denoiser import sample

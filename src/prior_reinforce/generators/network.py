@@ -104,8 +104,8 @@ class NetworkGenerator(Generator):
     ) -> Callable[[], Tensor]:
         """Return what runs the network on a batch of codes (N, C, T) and conditions (N, k)."""
 
-    def _optimiser(self) -> Mapping[str, Any]:
-        """What is not the usual of `training.optimise`."""
+    def _optimiser(self, rng: torch.Generator) -> Mapping[str, Any]:
+        """What is not the usual of `training.optimise`; `rng` is what the loss may draw from."""
         return {}
 
     @abstractmethod
@@ -142,8 +142,8 @@ class NetworkGenerator(Generator):
             untrained = Learned(codec, scale, span, network.eval(), seed)
             before = self._missed(untrained, clean, known)
             rng = torch.Generator().manual_seed(seed)
-            loss, how = self._loss(network.train(), clean, known, rng), self._optimiser()
-            network = optimise(network, loss, self.config, progress, rng=rng, state=state, **how)
+            loss, how = self._loss(network.train(), clean, known, rng), self._optimiser(rng)
+            network = optimise(network, loss, self.config, progress, state=state, **how)
             self._learned = replace(untrained, network=network)
             after = self._missed(self._learned, clean, known)
         if state is not None:
