@@ -219,7 +219,8 @@ def correlation_lags(profiles: Profiles) -> Float[np.ndarray, " N"]:
 
 def best_correlations(profiles: Profiles) -> Float[np.ndarray, "N N"]:
     """Correlation of each two motions at the lag at which they agree best, at most 1."""
-    return _correlations(_cross_spectra(profiles)).max(axis=-1)
+    # One by one: all scans at once would be gigabytes for a hundred motions.
+    return np.stack([_correlations(row).max(axis=-1) for row in _cross_spectra(profiles)])
 
 
 def _cross_spectra(profiles: Profiles) -> Complex[np.ndarray, "N N F"]:
