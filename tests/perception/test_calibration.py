@@ -93,10 +93,11 @@ def test_a_tape_measured_camera_costs_almost_nothing_in_a_difference():
         (np.outer(np.arange(5.0), [1, 1]), np.outer(np.arange(5.0), [1, 2]), "on one line"),
         (np.ones((4, 2)), through_pinhole(at(CORNERS, 0.0)), "the same"),
         (CORNERS * [np.nan, 1], through_pinhole(at(CORNERS, 0.0)), "finite"),
+        (CORNERS * 1e200, through_pinhole(at(CORNERS, 0.0)), r"at most 1e\+06"),
         (CORNERS, through_pinhole(at(CORNERS, 0.0))[[0, 2, 1, 3]], "order"),
         (CORNERS, through_pinhole(at(CORNERS, 0.0))[[0, 3, 2, 1]], "order"),
     ],
-    ids=["three", "unequal", "flat", "line", "one place", "nan", "crossed", "mirrored"],
+    ids=["three", "unequal", "flat", "line", "one place", "nan", "vast", "crossed", "mirrored"],
 )
 def test_points_that_fix_no_camera_are_refused(points, pixels, message):
     with pytest.raises(ConfigurationError, match=message):

@@ -21,6 +21,7 @@ from jaxtyping import Float
 from numpy.typing import ArrayLike
 
 from prior_reinforce import files
+from prior_reinforce.arrays import LARGEST
 from prior_reinforce.errors import ConfigurationError, FileFormatError
 
 _Pairs = Float[np.ndarray, "n 2"]
@@ -88,9 +89,10 @@ class TableCalibration:
                 f"calibration points of shape {points.shape} and pixels of shape {seen.shape}: "
                 "expected (n, 2) for both, with n >= 4; click at least four known points"
             )
-        if not np.isfinite([points, seen]).all():
+        if not np.all(np.abs([points, seen]) <= LARGEST):
             raise ConfigurationError(
-                "calibration points and pixels must be finite; click them again"
+                f"calibration points and pixels must be finite, and at most {LARGEST:.0e}; click "
+                "them again"
             )
         homography = _direct_linear_transform(points, seen)
         fit_error = _rms(_map(np.linalg.inv(homography), seen) - points)
