@@ -6,7 +6,7 @@ So the command line, a saved model and a constructor all keep to them, and none 
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import Annotated, get_type_hints
+from typing import Annotated, Any, get_type_hints
 
 import msgspec
 import numpy as np
@@ -31,11 +31,20 @@ class Checked:
         hints = get_type_hints(type(self), include_extras=True)
         for each in fields(self):
             value = getattr(self, each.name)
-            value = value.item() if isinstance(value, np.generic) else value
+            if isinstance(value, list):  # which another could change
+                value = tuple(value)
+                object.__setattr__(self, each.name, value)
+            plain = tuple(map(_plain, value)) if isinstance(value, tuple) else _plain(value)
+            numbers = plain if isinstance(plain, tuple) else (plain,)
             try:
-                if isinstance(value, float) and not np.isfinite(value):
+                if any(isinstance(of, float) and not np.isfinite(of) for of in numbers):
                     raise msgspec.ValidationError("Expected a finite number")
                 if not isinstance(value, Checked):  # which has checked itself
-                    msgspec.convert(value, hints[each.name])
+                    msgspec.convert(plain, hints[each.name])
             except msgspec.ValidationError as error:
-                raise ConfigurationError(f"{each.name}: {error}, got {value!r}") from error
+                raise ConfigurationError(f"{each.name}: {error}, got {plain!r}") from error
+
+
+def _plain(value: Any) -> Any:
+    """Python's number for one of numpy."""
+    return value.item() if isinstance(value, np.generic) else value

@@ -29,14 +29,13 @@ import msgspec
 import numpy as np
 from jaxtyping import Float
 
-from prior_reinforce.arrays import LARGEST, Points
+from prior_reinforce.arrays import Points
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.plans.normalisation import Normalisation
 from prior_reinforce.plans.outcome_weights import smooth_weights
-from prior_reinforce.settings import Checked
+from prior_reinforce.settings import Checked, Positive
 
-Size = Annotated[float, msgspec.Meta(gt=0, lt=LARGEST)]
-Sizes = Annotated[tuple[Size, ...], msgspec.Meta(min_length=1)]
+Sizes = Annotated[tuple[Positive, ...], msgspec.Meta(min_length=1)]
 Probability = Annotated[float, msgspec.Meta(gt=0, lt=1)]
 
 _LESS = 2 / 3
@@ -67,16 +66,16 @@ class BayesianConfig(Checked):
 
     generator_sd: Sizes = (0.05, 0.2, 0.8)
     """a, by how much landing bends between demonstrations."""
-    generator_reach: Size = 1.4
+    generator_reach: Positive = 1.4
     """How far that reaches."""
-    hardware_sd: tuple[Size, Size] = (0.01, 0.3)
+    hardware_sd: tuple[Positive, Positive] = (0.01, 0.3)
     """What is different from the demonstrations' day: where nothing was changed, and where
     something was."""
-    hardware_reach: Size = 2.5
+    hardware_reach: Positive = 2.5
     """How far that reaches: shift and stretch."""
     p_changed: Probability = 0.2
     """Beforehand, the probability that something was changed."""
-    shift_sd: Size = 0.8
+    shift_sd: Positive = 0.8
     """By how much everything may be shifted when table, object or camera move."""
     p_change: Probability = 0.02
     """Probability that something changes between two trials, unsaid: a shift of everything, or as

@@ -69,7 +69,7 @@ class GaussianProcessConfig(Checked):
             )
         for name in ("demonstration_jitter_bounds", "amplitude_bounds", "length_scale_bounds"):
             low, high = getattr(self, name)
-            if not low <= high < np.inf:
+            if not low <= high:
                 raise ConfigurationError(
                     f"{name} must be two finite numbers, the smaller first, got {(low, high)}"
                 )
