@@ -21,7 +21,7 @@ from prior_reinforce.environment import (
     Task,
     make_renderer,
 )
-from prior_reinforce.errors import ConfigurationError
+from prior_reinforce.errors import ConfigurationError, RenderingUnavailableError
 from prior_reinforce.generators.interpolation import SmoothInterpolation
 from prior_reinforce.lab.tasks import TASKS, make_task
 from prior_reinforce.lab.tasks.curling import Curling
@@ -123,6 +123,12 @@ def test_a_picture_has_the_size_asked_for_and_the_scene_stays_as_it_was(small_sc
     rows, columns = np.nonzero(red > green + 50)
     np.testing.assert_allclose([rows.mean(), columns.mean()], [99.5, 159.5], atol=1.0)
     assert (small_scene.vis.global_.offwidth, small_scene.vis.global_.offheight) == (64, 48)
+
+
+def test_a_picture_that_is_too_large_is_refused_and_the_next_one_drawn(small_scene):
+    with pytest.raises(RenderingUnavailableError, match="framebuffer"):
+        make_renderer(small_scene, 100_000, 64)
+    make_renderer(small_scene, 64, 48).close()
 
 
 def test_no_opengl_is_named_with_the_remedy():

@@ -28,7 +28,7 @@ Picture = UInt8[np.ndarray, "_height _width 3"]
 """RGB, row by row from the top."""
 
 _without_opengl: list[str] = []
-"""Why this process draws nothing, once OpenGL has failed: asked again, some libraries abort it."""
+"""Why this process draws nothing: asked again for a platform library, MuJoCo's default aborts."""
 
 # Nine places around a 1 m x 1 m table whose near edge is 0.35 m from the robot's base axis (ours):
 # four would do, nine also tell how good the calibration is.
@@ -209,8 +209,10 @@ def make_renderer(model: mujoco.MjModel, width: int, height: int) -> mujoco.Rend
     try:
         return mujoco.Renderer(drawn, height, width)
     except Exception as error:  # each OpenGL backend fails with exceptions of its own
-        _without_opengl.append(
+        reason = (
             f"no picture can be drawn, OpenGL is not available ({error}); on a machine without a "
             "display set MUJOCO_GL=egl and install libegl1 (or MUJOCO_GL=osmesa and libosmesa6)"
         )
-        raise RenderingUnavailableError(_without_opengl[0]) from error
+        if "platform library" in str(error):
+            _without_opengl.append(reason)
+        raise RenderingUnavailableError(reason) from error
