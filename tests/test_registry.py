@@ -104,6 +104,7 @@ def test_ones_own_is_named_by_its_module():
     [
         ("spinnaker", "no sail 'spinnaker'; known are plain, rigged, stiff, missing, or give"),
         ("plain,reef=1", "plain,reef=1 has no setting 'reef'; it has area, cloth, wet"),
+        ("plain,area.x=1", "plain,area.x=1 has no setting 'area.x'; it has area, cloth, wet"),
         ("rigged,reef.x=1", "rigged,reef.x=1, reef, has no setting 'x'; it has"),
         ("plain,area=wide", "plain,area=wide: Expected `float`.*area"),
         ("rigged,mast=1", "has no setting 'mast'; it has battens, reef"),

@@ -179,6 +179,10 @@ def _arguments(kind: type[Any], settings: Mapping[str, Any], choice: str) -> dic
 
     hints = typing.get_type_hints(kind.__init__)
     hints.pop("return", None)
+    for name in settings:
+        if name not in hints:
+            known = ", ".join(hints) or "none"
+            raise ConfigurationError(f"{choice} has no setting {name!r}; it has {known}")
     fields = [(name, hints[name] if name in settings else Any, None) for name in hints]
     made = build(msgspec.defstruct(kind.__name__, fields), settings, choice)
     return {name: getattr(made, name) for name in settings}
