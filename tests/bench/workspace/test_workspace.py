@@ -2,6 +2,7 @@
 
 import copy
 import errno
+import io
 import os
 import pickle
 import shutil
@@ -530,13 +531,20 @@ def test_nothing_moves_where_an_interruption_came_first(workspace, tmp_path, mon
 def test_a_disk_that_fails_after_the_motion_is_no_sign_that_it_was_none(workspace, monkeypatch):
     """Network file systems say only when a file is closed that it did not fit."""
     number = ask(workspace).number
-    leave = supervision._Shown.__exit__
+    usual = Path.open
 
-    def full(*args):
-        leave(*args)
-        raise OSError(errno.EDQUOT, "quota exceeded")
+    class Full(io.FileIO):
+        def close(self):
+            was_open = not self.closed
+            super().close()
+            if was_open:
+                raise OSError(errno.EDQUOT, "quota exceeded")
 
-    monkeypatch.setattr(supervision._Shown, "__exit__", full)
+    def opened(path, mode="r", **options):
+        kept = path.name == supervision.OUTPUT_FILE and mode == "wb+"
+        return Full(path, "w+") if kept else usual(path, mode, **options)
+
+    monkeypatch.setattr(Path, "open", opened)
     with pytest.raises(OSError, match="quota"):
         workspace.execute(number, "cat {plan}", time_limit=60)
     assert trials(workspace)[0].stage is Stage.EXECUTING

@@ -13,6 +13,7 @@ opened, and all is checked before a folder of the wanted name is there.
 
 from __future__ import annotations
 
+import hashlib
 import re
 import struct
 import zipfile
@@ -91,7 +92,7 @@ def pack(workspace: Workspace, path: Path) -> str:
         with zipfile.ZipFile(unfinished, "w", zipfile.ZIP_STORED) as archive:
             for name, content in {_CONTENTS: described, **contents}.items():
                 archive.writestr(zipfile.ZipInfo(name), content)
-        return sha256(unfinished.read_bytes())
+        return _sha256_of(unfinished)
 
 
 def unpack(path: Path, folder: Path) -> str:
@@ -110,12 +111,21 @@ def unpack(path: Path, folder: Path) -> str:
                 with Workspace(unfinished) as workspace:
                     if workspace.state.demonstrations is not None:
                         workspace.demonstrations  # noqa: B018  (whether they are whole)
-        return sha256(path.read_bytes())
+        return _sha256_of(path)
     except FileNotFoundError:
         raise
     except (PriorReinforceError, *_DAMAGED) as error:
         reason = re.sub(r"\S*\.unfinished-[^/]*/", "", str(error))
         raise FileFormatError(f"{path} cannot be unpacked: {reason}") from error
+
+
+def _sha256_of(path: Path) -> str:
+    """Of a file that may be larger than memory."""
+    digest = hashlib.sha256()
+    with path.open("rb") as file:
+        while block := file.read(1 << 20):
+            digest.update(block)
+    return digest.hexdigest()
 
 
 def _named(events: Iterable[object]) -> list[str]:

@@ -16,6 +16,7 @@ busy computer changes no path; otherwise cycles follow the clock.
 from __future__ import annotations
 
 import asyncio
+import socket
 import struct
 import sys
 import time
@@ -105,11 +106,13 @@ class SimulatedUR:
         with ExitStack() as listening:
             for port, talk in talks.items():
                 try:
-                    server = await asyncio.start_server(self._and_close(talk), self.host, port)
+                    server = await asyncio.start_server(
+                        self._and_close(talk), self.host, port, family=socket.AF_INET
+                    )
                 except OSError as error:
                     raise ConfigurationError(
-                        f"cannot serve on {self.host} ({error.strerror}); stop what serves there, "
-                        "or give another --host, such as 127.0.77.2"
+                        f"cannot serve on {self.host} ({error.strerror or error}); stop what "
+                        "serves there, or give another --host, such as 127.0.77.2"
                     ) from error
                 listening.callback(server.close)
             ready()
