@@ -1,12 +1,14 @@
 """Known starts and tempos are found, whatever else differs between motions."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 
 from prior_reinforce.errors import InvalidDemonstrationsError
 from prior_reinforce.lab.tasks import make_task
 from prior_reinforce.plans.motions import Demonstrations, PlanFormat
-from prior_reinforce.plans.registration import correlation_lags
+from prior_reinforce.plans.registration import best_correlations, correlation_lags
 from prior_reinforce.plans.speeds import SMOOTHING, velocity_profiles
 from prior_reinforce.plans.timeline import decompose
 
@@ -144,3 +146,15 @@ def test_a_channel_that_moves_as_it_likes_does_not_time_the_others_whatever_its_
     plans = np.dstack([swings()[:, :, 0], size * turn])
     starts = decompose(demonstrations(plans), "start").numbers[:, 0]
     np.testing.assert_allclose(starts - starts.mean(), STARTS - STARTS.mean(), atol=0.3)
+
+
+def test_motions_are_compared_at_every_delay_without_all_of_their_scans_at_once():
+    centres = np.linspace(40, 160, 40)[:, None]
+    profiles = np.exp(-(((np.arange(200) - centres) / 10) ** 2))[:, :, None]
+    tracemalloc.start()
+    found = best_correlations(profiles)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    np.testing.assert_allclose(found, 1.0, atol=1e-3)  # one bump, at forty delays
+    all_at_once = 8 * 40 * 40 * 8 * 2 * 200  # bytes, at eight lags a frame
+    assert peak < all_at_once / 3

@@ -71,7 +71,7 @@ class GaussianProcessConfig(Checked):
             low, high = getattr(self, name)
             if not low <= high:
                 raise ConfigurationError(
-                    f"{name} must be two finite numbers, the smaller first, got {(low, high)}"
+                    f"{name} must be two numbers, the smaller first, got {(low, high)}"
                 )
 
 

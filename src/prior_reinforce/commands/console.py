@@ -106,15 +106,16 @@ class Console(OnWorkspace):
     def _say(self, folder: Path, token: str) -> None:
         """Show the link, and as a QR code where another device is to open it."""
         host = _own_address() if self.host in ("0.0.0.0", "::") else self.host
-        secure = self.certificate is not None
-        link = f"http{'s' * secure}://{host}:{self.port}/#{token}"
+        scheme = "http" if self.certificate is None else "https"
+        link = f"{scheme}://{host}:{self.port}/#{token}"
         print(f"console of {folder}: {link}", flush=True)
         if not _is_loopback(host):
             import segno
 
             segno.make(link).terminal(compact=True)
             camera = "; a browser gives its camera to this address only over https (docs: console)"
-            print(f"whoever has this link can move the arm{camera * (not secure)}", flush=True)
+            camera = "" if scheme == "https" else camera
+            print(f"whoever has this link can move the arm{camera}", flush=True)
 
 
 def _own_address() -> str:
