@@ -1,6 +1,6 @@
 """Processor time of one trial of the Bayesian adapter, beside a refit of the Gaussian process.
 
-    python benchmarks/bayesian_adapter.py [--repeats 20] [--seed 0]
+    python benchmarks/bayesian_adapter.py [--repeats 20] [--seed 0] [--trials 1 3 10 30 100 200]
 
 For each number of trials in memory, k = 2 and 3, seen by eye: one reading observed, the next
 condition proposed, and P(hit) evaluated; the same where the last trial was told as "a miss" and
@@ -25,7 +25,8 @@ from prior_reinforce.adapters.gaussian_process import GaussianProcessAdapter
 from prior_reinforce.arrays import Point
 from prior_reinforce.environment import Rollout
 from prior_reinforce.perception.eye import Eye
-from prior_reinforce.plans.motions import Demonstrations, PlanFormat
+from prior_reinforce.plans.motions import Demonstrations
+from prior_reinforce.plans.plan_format import PlanFormat
 from prior_reinforce.readings import Reading
 
 REGION = np.array([0.25, 0.50, 0.40])  # [m]
@@ -42,10 +43,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--repeats", type=int, default=20)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--trials", type=int, nargs="+", default=[1, 3, 10, 30, 100, 200])
     arguments = parser.parse_args()
     print("k  trials  one trial  after a miss  GP refit  ratio  all observed again")
     for k in (2, 3):
-        for n in (1, 3, 10, 30, 100, 200):
+        for n in arguments.trials:
             times = []
             for repeat in range(-2, arguments.repeats):  # two to warm up, not counted
                 rng = np.random.default_rng([arguments.seed, k, n, repeat + 2])

@@ -21,8 +21,9 @@ from pathlib import Path
 import numpy as np
 from playwright.sync_api import Page, sync_playwright
 
-from prior_reinforce.bench.workspace.workspace import Workspace
-from prior_reinforce.plans.motions import Demonstrations, PlanFormat
+from prior_reinforce.arm.workspace.workspace import Workspace
+from prior_reinforce.plans.motions import Demonstrations
+from prior_reinforce.plans.plan_format import PlanFormat
 
 CHROMIUM = "/usr/bin/chromium"
 

@@ -17,8 +17,8 @@ from pathlib import Path
 import numpy as np
 
 from prior_reinforce import make_task
-from prior_reinforce.bench.robots import check_plan, robot_limits
-from prior_reinforce.bench.robots.report import LimitReport
+from prior_reinforce.arm.robots import check_plan, robot_limits
+from prior_reinforce.arm.robots.report import LimitReport
 from prior_reinforce.generators import load_generator, make_generator
 from prior_reinforce.plans.motions import Plan
 

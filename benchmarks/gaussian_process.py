@@ -20,7 +20,8 @@ from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel
 
 from prior_reinforce.adapters.gaussian_process import GaussianProcessAdapter
-from prior_reinforce.plans.motions import Demonstrations, PlanFormat
+from prior_reinforce.plans.motions import Demonstrations
+from prior_reinforce.plans.plan_format import PlanFormat
 
 
 def observe(adapter: GaussianProcessAdapter, condition: np.ndarray, outcome: np.ndarray) -> None:

@@ -23,10 +23,10 @@ from numpy.typing import ArrayLike
 
 from prior_reinforce.adapters.gaussian_process import GaussianProcessAdapter
 from prior_reinforce.generators import make_generator
-from prior_reinforce.lab.experiments.protocol import run_goals
-from prior_reinforce.lab.tasks import make_task
 from prior_reinforce.perception.amplified import Amplified
 from prior_reinforce.readings import Reading
+from prior_reinforce.simulation.protocol import run_goals
+from prior_reinforce.simulation.tasks import make_task
 
 
 class Stopwatch:

@@ -16,7 +16,7 @@ from collections.abc import Callable
 import mujoco.rollout
 import numpy as np
 
-from prior_reinforce.lab.tasks.basketball import BasketballShot
+from prior_reinforce.simulation.tasks.basketball import BasketballShot
 
 
 def seconds(work: Callable[[], object]) -> float:

@@ -16,7 +16,7 @@ import time
 import numpy as np
 
 from prior_reinforce.generators import DiffusionConfig, make_generator
-from prior_reinforce.lab.tasks.basketball import BasketballShot
+from prior_reinforce.simulation.tasks.basketball import BasketballShot
 
 
 def main() -> None:

@@ -19,8 +19,8 @@ import numpy as np
 from scipy.spatial import Delaunay
 
 from prior_reinforce.generators import DiffusionConfig, Generator, make_generator
-from prior_reinforce.lab.tasks.basketball import BasketballShot
 from prior_reinforce.plans.motions import Demonstrations
+from prior_reinforce.simulation.tasks.basketball import BasketballShot
 
 N_TURNS = 3
 N_GOALS = 60

@@ -23,8 +23,8 @@ import joblib
 _TRAIN = """
 import sys, time
 from prior_reinforce.generators import DiffusionConfig, DiffusionGenerator, Timed
-from prior_reinforce.lab.tasks import make_task
-import prior_reinforce.generators.denoiser
+from prior_reinforce.simulation.tasks import make_task
+import prior_reinforce.generators.network.denoiser
 demos = make_task("basketball-v1").demonstrations("A")
 config = DiffusionConfig(training_steps=int(sys.argv[1]))
 began = time.monotonic()

@@ -1,0 +1,1 @@
+"""Adapters to compare with that have a name; others are in `rivals`."""

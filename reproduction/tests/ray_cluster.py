@@ -1,0 +1,97 @@
+"""Units on a Ray cluster of two local nodes, one of which is killed on the way.
+
+    python reproduction/tests/ray_cluster.py FOLDER
+
+A program of its own, because Ray warns, and stays around in the process that it was used in.
+"""
+
+import os
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import ray
+from quick_units import Ends, Roots, real_units, results
+from ray.cluster_utils import Cluster
+
+from prior_reinforce.registry import PLUGINS
+from reproduction import cluster as ray_tasks
+from reproduction.units import UnitFailedError, Workers, result_path, run_units
+
+MEMORY = 80 * 2**20
+
+LASTS = 2.0
+"""Seconds that a unit takes on the cluster: long enough to be killed in, on a busy machine too."""
+
+
+CONFIG = {"worker_niceness": 0}
+"""Ray runs its workers at 15, where tests at their side leave them no processor for minutes."""
+
+
+@dataclass(frozen=True)
+class Watched(Roots):
+    """Tells on which node it runs."""
+
+    def run(self, folder):
+        if ray.is_initialized():
+            node = ray.get_runtime_context().get_node_id()
+            (folder.parent / f"{self.seed} on {node}").touch()
+            time.sleep(LASTS)
+        return super().run(folder)
+
+
+def nodes_of(folder, unit):
+    return {path.name.split()[2] for path in folder.parent.glob(f"{unit.seed} on *")}
+
+
+def main(folder: Path) -> None:
+    os.environ[PLUGINS] = "quick_units"  # for the workers
+    watched = [Watched(seed) for seed in range(4)]
+    units = [*watched, *real_units()]
+    reference = folder / "reference"
+    run_units(units, reference, Workers(), lambda *_: None)
+
+    options = {
+        "num_cpus": 1,
+        "include_dashboard": False,
+        "object_store_memory": MEMORY,
+        "_system_config": CONFIG,
+    }
+    cluster = Cluster(initialize_head=True, head_node_args=options)
+    victim = cluster.add_node(num_cpus=1, object_store_memory=MEMORY)
+    shared = folder / "ray"
+
+    def running_on_the_victim():
+        return [
+            unit
+            for unit in watched
+            if nodes_of(shared, unit) == {victim.node_id} and not result_path(shared, unit).exists()
+        ]
+
+    killed_with = []
+
+    def progress(done, total, label):
+        while done >= 2 and not killed_with:
+            killed_with.extend(running_on_the_victim())
+            if killed_with:
+                cluster.remove_node(victim, allow_graceful=False)
+            time.sleep(0.01)
+
+    run_units(units, shared, Workers(ray=cluster.address), progress)
+    assert results(shared) == results(reference)
+    assert all(len(nodes_of(shared, unit)) == 2 for unit in killed_with)
+    print(f"{len(units)} units done, {len(killed_with)} of them twice")
+
+    ray_tasks._RETRIES = 0
+    for how in ("raise", "die"):
+        try:
+            run_units([Ends(how)], shared, Workers(ray=cluster.address), lambda *_: None)
+        except UnitFailedError as error:
+            print(error)
+    ray.shutdown()
+    cluster.shutdown()
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

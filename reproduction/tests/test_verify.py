@@ -1,0 +1,24 @@
+"""Shipped rows that are run again."""
+
+from dataclasses import replace
+
+from reproduction.__main__ import main
+from reproduction.recipes import RECIPES, Run
+from reproduction.recipes.base import QUICK
+from reproduction.results import write_rows
+
+
+def test_rows_that_do_not_come_out_again_are_counted(tmp_path, monkeypatch, capsys):
+    planned = [p for p in RECIPES["sets"].units(QUICK) if p[1]["method"] == "nearest neighbours"][
+        :1
+    ]
+    recipe = replace(RECIPES["sets"], units=lambda scale, include: planned)
+    monkeypatch.setattr("reproduction.verify.RECIPES", {"sets": recipe})
+    rows = [dict(row) for row in Run(tmp_path).rows(planned)]
+    arguments = ["verify", "--quick", "--sample", "4", "--results", str(tmp_path)]
+    for changed in (0, 1):
+        for row in rows:
+            row["solved_at"] += changed
+        write_rows(tmp_path, "sets", rows, "this")
+        assert main(arguments) == changed
+        assert f"{0 if changed else 4} of 4 rows agree (seed 0)" in capsys.readouterr().out

@@ -1,1 +1,0 @@
-"""Recipes for every table and figure of the paper: protocol, statistics, report."""

@@ -1,9 +1,0 @@
-"""Rows of planned units, as a page of evidence would read them."""
-
-from prior_reinforce.lab.experiments.recipes import Run
-from prior_reinforce.lab.experiments.results import read_results, write_rows
-
-
-def gather(folder, planned, name="recipe"):
-    write_rows(folder, name, Run(folder).rows(planned), "this command")
-    return read_results(folder).where(recipe=name)
