@@ -1,0 +1,1 @@
+"""Env: the paper's tasks in contact physics, and how a session is run on them."""
