@@ -1,0 +1,198 @@
+"""A picture of the table: calibrated by known points, and where the object lies in it.
+
+Files in the workspace: `camera.json`, the calibration; `pictures/table.jpg` and
+`pictures/trial-003.jpg`, the latest picture of the table and of a trial. A picture comes from any
+camera, and the page sends it: what shows the table to the browser is none of our business. Tags to
+be printed (`tags.svg`, 40 mm wide) are OpenCV's AprilTags of the family 36h11.
+"""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from msgspec import Struct
+
+from prior_reinforce.arm.console.verbs import Verbs
+from prior_reinforce.arm.console.view import State
+from prior_reinforce.environment import SeenObject, TableScene
+from prior_reinforce.errors import ConfigurationError, PerceptionFailedError
+from prior_reinforce.files import named_disk_errors, require_inside, sha256, write
+from prior_reinforce.perception.calibration import CAMERA_SD, TableCalibration
+from prior_reinforce.perception.colour_camera import ColourClient
+from prior_reinforce.perception.pictures import read_picture
+from prior_reinforce.perception.vlm import VisionLanguageModel
+from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
+
+LARGEST_PICTURE = 12_000_000
+"""Bytes; ours: a photograph of a telephone."""
+
+
+class Camera(Struct):
+    """What is known of the camera."""
+
+    points: list[list[float]]
+    """Known points (x, y) of the last calibration, or places to begin with, in [m]."""
+    picture: str = ""
+    """Hash of the latest picture; empty where there is none."""
+    to_table: list[list[float]] | None = None
+    """Homography from its pixels to the table, in [m]; None until it is calibrated."""
+    summary: str = ""
+    sd: float = CAMERA_SD
+    """Of each component of a place that is touched in the picture, in [m]."""
+
+
+class Calibrate(Struct, forbid_unknown_fields=True):
+    """Known points of the table, and where they are in the latest picture."""
+
+    points: list[tuple[float, float]]
+    """(x, y), in [m]."""
+    pixels: list[tuple[float, float]]
+    """(u, v), in [px] from the picture's top left corner."""
+
+
+class Look(Struct, forbid_unknown_fields=True):
+    """Find an object in the latest picture."""
+
+    words: str
+    """For instance `the orange ball`."""
+    size: float
+    """Longer side of a box around it, in [m]."""
+    by: Literal["colour", "model"] = "colour"
+
+
+class Found(Struct):
+    """A box to be accepted, or moved."""
+
+    box: list[float]
+    """Left, top, right, bottom, in [px]."""
+    place: list[float]
+    """What its centre stands on, (x, y) in [m]."""
+
+
+class Pictures:
+    """Pictures of a workspace's table."""
+
+    def __init__(self, verbs: Verbs, vlm: VisionLanguageModelConfig) -> None:
+        """Work on the workspace of these verbs; `vlm` says which model looks."""
+        self._verbs, self._vlm = verbs, vlm
+        self._folder = verbs.folder / "pictures"
+
+    def look_up(self) -> Camera:
+        """Say what is known of the camera."""
+        camera = Camera(_known_points(self._verbs.state()))
+        if (path := self._latest()) is not None:
+            camera.picture = sha256(path.read_bytes())[:16]
+        if (calibration := self._calibration()) is None:
+            return camera
+        camera.summary, camera.sd = calibration.summary(), calibration.sd
+        try:
+            here = calibration if path is None else calibration.in_picture(_size(path))
+        except ConfigurationError as error:
+            camera.summary = str(error)
+            return camera
+        if here is not calibration:
+            camera.summary += ", in a picture of another size that is scaled"
+        camera.to_table = np.linalg.inv(here.homography).tolist()
+        return camera
+
+    def keep(self, content: bytes) -> Camera:
+        """Keep a picture of the table, or of the trial that waits to be told."""
+        from PIL import Image
+
+        encoded = io.BytesIO()  # anew: nothing that a file hides goes into the workspace
+        Image.fromarray(read_picture(io.BytesIO(content))).save(encoded, "JPEG", quality=92)
+        trial = self._verbs.state().open_trial
+        name = "table.jpg" if trial is None else f"trial-{trial.number:03d}.jpg"
+        with named_disk_errors(self._folder):
+            write(require_inside(self._folder / name, self._verbs.folder), encoded.getvalue())
+        self._verbs.publish({"camera": name})
+        return self.look_up()
+
+    def file(self) -> Path:
+        """Return the latest picture."""
+        if (path := self._latest()) is None:
+            raise PerceptionFailedError("there is no picture yet; take one")
+        return path
+
+    def calibrate(self, body: Calibrate) -> Camera:
+        """Fit the table to known points in the latest picture, and keep the calibration."""
+        size = _size(self.file())
+        calibration = TableCalibration.fit(body.points, body.pixels, picture=size)
+        with named_disk_errors(self._verbs.folder):
+            calibration.save(require_inside(self._verbs.folder / "camera.json", self._verbs.folder))
+        self._verbs.publish({"camera": "calibrated"})
+        return self.look_up()
+
+    def tags(self) -> dict[int, list[float]]:
+        """Find printed tags: pixel of the centre of each, tag k lying on known point k."""
+        import cv2
+
+        grey = cv2.cvtColor(read_picture(self.file()), cv2.COLOR_RGB2GRAY)
+        family = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_APRILTAG_36h11)
+        corners, numbers, _ = cv2.aruco.ArucoDetector(family).detectMarkers(grey)
+        if numbers is None:
+            return {}
+        often = np.bincount(numbers.ravel())
+        if often.max() > 1:
+            raise PerceptionFailedError(
+                f"tag {often.argmax() + 1} is seen {often.max()} times; cover all but one"
+            )
+        found = zip(numbers.ravel(), corners, strict=True)
+        return {int(number) + 1: _crossing(four.reshape(4, 2)) for number, four in found}
+
+    def find(self, body: Look) -> Found:
+        """Find an object in the latest picture, by its colour or by a vision-language model."""
+        calibration = self._calibration()
+        if calibration is None:
+            raise ConfigurationError("the camera is not calibrated; touch the known points first")
+        wanted = SeenObject(body.words, body.size)
+        scene = TableScene(wanted, wanted, plane_height=calibration.height)
+        client = ColourClient(self._vlm.family) if body.by == "colour" else None
+        with VisionLanguageModel(scene, self._vlm, client=client, calibration=calibration) as model:
+            sighting = model.find(wanted, read_picture(self.file()))
+        if sighting.box is None or sighting.place is None:
+            raise PerceptionFailedError(f"{sighting.problem}; touch it in the picture")
+        return Found([*sighting.box], sighting.place.tolist())
+
+    def _calibration(self) -> TableCalibration | None:
+        path = require_inside(self._verbs.folder / "camera.json", self._verbs.folder)
+        return TableCalibration.load(path) if path.is_file() else None
+
+    def _latest(self) -> Path | None:
+        taken = (p for p in self._folder.glob("*.jpg") if not p.is_symlink())
+        return max(taken, key=lambda path: path.stat().st_mtime_ns, default=None)
+
+
+_PLACES = [[0.6, 0.3], [0.6, 0.0], [0.6, -0.3], [1.2, -0.3], [1.2, 0.0], [1.2, 0.3]]
+"""Known points to begin with, around where an arm with a reach of 0.9 m throws (ours). Six: with
+any one left out, the others fix the plane, so each tells how good the calibration is. Four corners
+and their middle do not: a corner left out, the others have three on a line."""
+
+
+def _known_points(state: State) -> list[list[float]]:
+    """Six points around the demonstrations, on a grid of 10 cm that is easy to measure."""
+    axes = [component.axis for component in state.components]
+    if not state.shown or not {0, 1} <= {*axes}:
+        return _PLACES
+    places = 10 * np.array(state.shown)[:, [axes.index(0), axes.index(1)]]
+    (a, b), (c, d) = np.floor(places.min(0)) / 10, np.ceil(places.max(0)) / 10
+    middle = (b + d) / 2
+    six = [[a, d], [a, middle], [a, b], [c, b], [c, middle], [c, d]]
+    return np.round(six, 2).tolist()
+
+
+def _size(path: Path) -> tuple[int, int]:
+    from PIL import Image
+
+    with Image.open(path) as image:  # which `keep` wrote, upright
+        return image.size
+
+
+def _crossing(corners: np.ndarray) -> list[float]:
+    """Where the diagonals of four corners meet: the centre of a square, however it is seen."""
+    one, other = (np.cross([*corners[i], 1.0], [*corners[i + 2], 1.0]) for i in (0, 1))
+    u, v, w = np.cross(one, other)
+    return [float(u / w), float(v / w)]

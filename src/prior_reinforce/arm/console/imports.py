@@ -1,0 +1,281 @@
+"""Demonstrations from the page: recordings dropped, looked through, each outcome touched.
+
+What was dropped lies in the workspace's `recordings/`, as it was recorded, and each touch is in
+`outcomes.csv` beside it before it is answered: the same folder that `prior-reinforce import` reads.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import threading
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from msgspec import Struct
+
+from prior_reinforce.arm.console.verbs import Seen, Verbs
+from prior_reinforce.arm.console.view import State
+from prior_reinforce.arm.recordings import Preprocessing, ReadOptions, Recordings, inspect, read
+from prior_reinforce.arm.recordings.naming import find_channels, numbered_like
+from prior_reinforce.arm.recordings.outcomes import (
+    OUTCOMES_FILE,
+    SD,
+    Outcomes,
+    in_units,
+    missing_outcomes,
+    outcomes_of,
+    write_outcome_table,
+)
+from prior_reinforce.arm.recordings.selection import Selection
+from prior_reinforce.arm.recordings.units import Ambiguity, say_names
+from prior_reinforce.arm.workspace.manifest import UNKNOWN
+from prior_reinforce.errors import (
+    FileFormatError,
+    InvalidDemonstrationsError,
+    InvalidFeedbackError,
+    PriorReinforceError,
+    WorkspaceError,
+)
+from prior_reinforce.files import named_disk_errors, require_inside, write
+
+LARGEST_FILE = 64_000_000
+"""Bytes of a file; ours: minutes of an arm at 1 kHz in any format, but no video."""
+_LARGEST_ALL, _MOST_FILES = 1_000_000_000, 2_000
+_PART = re.compile(r"\w[\w .()+=-]{0,99}")
+"""Of a path: nothing hidden, nothing that leads out, nothing that is no name elsewhere."""
+_DEEPEST = 6
+
+
+class Dropped(Struct):
+    """What was dropped, and what an import would make of it."""
+
+    files: int
+    text: str = ""
+    """What it holds, as `import --inspect` says."""
+    problem: str = ""
+    """Why it cannot be read; empty where it can."""
+    questions: list[str] = []
+    """What is only guessed of its units, for a person to confirm."""
+    recorded: list[str] = []
+    """Names of their columns, where a person has to say which are the joints."""
+    joints: list[str] = []
+    """Names in the plan that these are chosen for."""
+    episodes: dict[str, list[float] | None] = {}
+    """The recordings, and where the object of each landed, if that is known."""
+
+
+class Place(Struct, forbid_unknown_fields=True):
+    """Where a recording's object landed."""
+
+    episode: str
+    outcome: list[float] | None
+    """In the outcomes' units; None forgets it, and the episode is left out."""
+    sd: float = 0.0
+    """Standard deviation of each component, if it was measured."""
+
+
+class Columns(Struct, forbid_unknown_fields=True):
+    """Which recorded columns are the joints."""
+
+    names: list[str]
+    """In the plan's order."""
+
+
+class Take(Seen):
+    """Take the recordings in, in place of the demonstrations in use."""
+
+    confirmed: bool = False
+    """A person said that the guesses are right."""
+
+
+class _Found(NamedTuple):
+    """The recordings as they are read now."""
+
+    recordings: Recordings
+    selection: Selection
+    rows: dict[str, list[float]]
+    """Outcome and its standard deviation by episode, where they are known."""
+    unclear: tuple[Ambiguity, ...]
+    """What is only guessed of their units."""
+
+
+class _OtherNamesError(InvalidDemonstrationsError):
+    """The recordings call their columns otherwise than the plan."""
+
+    def __init__(self, joints: Sequence[str], recorded: Sequence[str]) -> None:
+        self.joints, self.recorded = list(joints), list(recorded)
+        super().__init__(
+            f"the recordings have no column {say_names(joints)}: choose those that are these joints"
+        )
+
+
+class Imports:
+    """The recordings that were dropped on a workspace."""
+
+    def __init__(self, verbs: Verbs) -> None:
+        """Work on the workspace of these verbs."""
+        self._verbs, self._workspace = verbs, verbs.workspace
+        self._folder = verbs.folder / "recordings"
+        self._lock = threading.RLock()
+        self._columns: tuple[str, ...] | None = None
+        """Chosen on the page for the joints; of the recordings that lie there."""
+
+    def drop(self, name: str, content: bytes) -> Dropped:
+        """Keep a file of the recordings; its name may have folders."""
+        parts = name.split("/")
+        if len(parts) > _DEEPEST or not all(_PART.fullmatch(part) for part in parts):
+            raise FileFormatError(f"{name[:80]!r} is no name of a recording; rename it")
+        with self._lock:
+            there = self._files()
+            size = sum(map(_size, there)) + len(content)
+            if size > _LARGEST_ALL or len(there) >= _MOST_FILES:
+                raise FileFormatError("more than the page takes; use: prior-reinforce import")
+            path = require_inside(self._folder / name, self._verbs.folder)
+            with named_disk_errors(self._folder):
+                write(path, content)
+        self._verbs.publish({"recordings": len(there) + 1})
+        return Dropped(len(there) + 1)
+
+    def look(self) -> Dropped:
+        """Say what the recordings hold, and what an import would make of them."""
+        with self._lock:
+            files = len(self._files())
+            manifest = self._workspace.manifest
+            if not files:
+                return Dropped(0)
+            try:
+                found, form = self._read(), Preprocessing(manifest.format.dt)
+                inspection = inspect(found.selection, form, manifest.robot, manifest.gate)
+            except _OtherNamesError as error:
+                return Dropped(
+                    files, problem=str(error), recorded=error.recorded, joints=error.joints
+                )
+            except PriorReinforceError as error:
+                return Dropped(files, problem=str(error))
+        places = {name: row[:-1] for name, row in found.rows.items()}
+        episodes = {name: places.get(name) for name in found.selection.episodes}
+        questions = [one.what for one in found.unclear]
+        return Dropped(files, inspection.text, questions=questions, episodes=episodes)
+
+    def place(self, body: Place) -> Dropped:
+        """Write down where a recording's object landed."""
+        manifest = self._workspace.manifest
+        names, units = manifest.outcome_format.names, manifest.outcome_format.units
+        with self._lock:
+            found = self._read()
+            if body.episode not in found.selection.episodes:
+                raise InvalidDemonstrationsError(f"there is no recording {body.episode[:80]!r}")
+            if body.outcome is not None and len(body.outcome) != len(names):
+                raise InvalidFeedbackError(f"an outcome is numbers: {', '.join(names)}")
+            rows = found.rows
+            rows.pop(body.episode, None)
+            if body.outcome is not None:
+                rows[body.episode] = [*body.outcome, body.sd]
+            cells = {episode: tuple(map(repr, row)) for episode, row in rows.items()}
+            table = found.recordings.outcome_places[0] / OUTCOMES_FILE
+            with named_disk_errors(self._folder):
+                write_outcome_table(table, cells, (*names, SD), (*units, units[0]))
+            self._verbs.publish({"recordings": len(rows)})
+            return self.look()
+
+    def columns(self, body: Columns) -> Dropped:
+        """Choose the recorded columns that are the joints, where they have other names."""
+        with self._lock:
+            before, self._columns = self._columns, tuple(body.names)
+            try:
+                self._read()
+            except PriorReinforceError:
+                self._columns = before
+                raise
+        self._verbs.publish({"recordings": 0})
+        return self.look()
+
+    def take(self, body: Take) -> State:
+        """Take the recordings with a known outcome in, as `prior-reinforce import` does."""
+        with self._lock, self._verbs.as_seen(body.seen):
+            found = self._read()
+            missing = [name for name in found.selection.episodes if name not in found.rows]
+            if not found.rows:
+                raise InvalidDemonstrationsError("no outcome is known yet; touch where they landed")
+            result = self._workspace.import_recordings(
+                found.recordings.source,
+                leave_out=missing,
+                take_guesses=body.confirmed,
+                joints=found.recordings.options.joints,
+            )
+            picture = self._verbs.folder / "demonstrations.png"
+            try:
+                with named_disk_errors(self._verbs.folder):
+                    result.preview.draw(picture)
+            except WorkspaceError as error:  # the demonstrations are taken in without it
+                with suppress(OSError):
+                    picture.unlink()
+                self._verbs.publish({"error": f"taken in, but there is no picture: {error}"})
+        return self._verbs.state()
+
+    def discard(self) -> Dropped:
+        """Forget the recordings; what was taken in stays."""
+        with self._lock, named_disk_errors(self._folder):
+            if self._folder.is_dir():
+                shutil.rmtree(require_inside(self._folder, self._verbs.folder))
+            self._columns = None
+            self._verbs.publish({"recordings": 0})
+            return self.look()
+
+    def _files(self) -> list[Path]:
+        """The files that lie there, no link followed; if too many, some more than are taken."""
+        found: list[Path] = []
+        for folder, _, names in os.walk(require_inside(self._folder, self._verbs.folder)):
+            found += (Path(folder, name) for name in names)
+            if len(found) > _MOST_FILES:
+                break
+        return found
+
+    def _read(self) -> _Found:
+        if not self._folder.is_dir():
+            raise InvalidDemonstrationsError("no recordings are here yet; drop some on the page")
+        there = [path for path in self._folder.iterdir() if path.name != OUTCOMES_FILE]
+        # A folder that was dropped alone is the recordings.
+        source = there[0] if len(there) == 1 and there[0].is_dir() else self._folder
+        manifest = self._workspace.manifest
+        form, names = manifest.format, manifest.outcome_format.names
+        own = () if form.names == UNKNOWN else (form.names, form.units)  # else as recorded
+        joints = self._columns or (own[0] if own else None)
+        recordings = read(require_inside(source, self._verbs.folder), ReadOptions(joints=joints))
+        first = recordings.episodes[0]
+        if joints is not None and first.named and _needs_choice(joints, first.names):
+            raise _OtherNamesError(form.names, first.names)
+        selection = recordings.select(*own)
+        try:
+            known = recordings.outcomes(None, names)
+        except InvalidDemonstrationsError:
+            known = Outcomes.none(names)
+        known, unclear = in_units(known, manifest.outcome_format.units, None)
+        unclear += recordings.ambiguities + selection.ambiguities
+        missing = missing_outcomes(selection.episodes, known)
+        placed = [episode for episode in selection.episodes if episode not in missing]
+        places, sds = outcomes_of(placed, known, partial=True)
+        rows = dict(zip(placed, np.column_stack([places, sds[:, :1]]).tolist(), strict=True))
+        return _Found(recordings, selection, rows, unclear)
+
+
+def _needs_choice(joints: Sequence[str], recorded: Sequence[str]) -> bool:
+    """Whether nothing but a person can say which recorded columns are the joints."""
+    try:
+        found = find_channels(joints, recorded) or numbered_like(joints, recorded)
+    except InvalidDemonstrationsError:  # several look like one
+        return True
+    return found is None
+
+
+def _size(path: Path) -> int:
+    """A file's bytes; 0 if it vanished meanwhile."""
+    try:
+        return path.lstat().st_size
+    except FileNotFoundError:
+        return 0

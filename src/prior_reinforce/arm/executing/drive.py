@@ -1,0 +1,341 @@
+"""The program that lets an executor move an arm: what the supervisor runs for `ask --execute`.
+
+    python -m prior_reinforce.arm.executing.drive REQUEST PLAN RESULT
+
+Once for all executors: a plan's columns become the arm's, where it stands is compared with the
+plan's first frame, the arm's limits are asked for, and a slow approach, a rehearsal and a trial are
+made as plans of the same kind. RESULT is the folder for what came of it: `result.json` and
+`executed.npz`, as any driver writes them, or `look.json` where nothing was to move.
+"""
+
+from __future__ import annotations
+
+import math
+import shlex
+import signal
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Literal
+
+import msgspec
+import numpy as np
+from jaxtyping import Float
+
+from prior_reinforce.arm.executing import EXECUTORS
+from prior_reinforce.arm.executing.base import (
+    ArmDescription,
+    ArmSettings,
+    Executor,
+    Guiding,
+    Motion,
+    begin_at,
+)
+from prior_reinforce.arm.executing.pose import compare_pose
+from prior_reinforce.arm.executing.result import (
+    NOT_MOVED_STATUS,
+    PATH_FILE,
+    RESULT_FILE,
+    DriverResult,
+)
+from prior_reinforce.arm.robots.gate import check_plan
+from prior_reinforce.arm.robots.gate_settings import GateSettings
+from prior_reinforce.arm.robots.limits import RobotLimits, is_joint, with_turns
+from prior_reinforce.arm.robots.plan_files import read_plan
+from prior_reinforce.errors import (
+    ConfigurationError,
+    FileFormatError,
+    InvalidPlanError,
+    PriorReinforceError,
+    RobotLimitError,
+)
+from prior_reinforce.extras import missing_extra
+from prior_reinforce.plans.motions import Plan
+from prior_reinforce.plans.plan_format import PlanFormat
+from prior_reinforce.registry import build
+from prior_reinforce.units import Kind, in_unit
+
+LOOK_FILE = "look.json"
+_SLOW: Mapping[Kind, float] = {"angle": 0.3, "length": 0.1, "share": 0.5}
+"""Largest speed of an approach, in [rad/s], [m/s] and [1/s]. Ours: a ninth of what the slowest
+joints of an FR3 do, at which a person steps back in time."""
+_WAY = "the way from where the arm stands to the plan's first frame"
+_PLAN = "the plan from where the arm stands"
+_APPROACH_DT, _SHORTEST = 0.02, 0.5
+"""Between frames of an approach, and its shortest duration, in [s]."""
+_START_TOLERANCE: Mapping[Kind, float] = {"angle": 0.002, "length": 0.0005, "share": 0.005}
+"""Distance from the first frame, in [rad], [m] and [1], up to which a plan is made to begin where
+the arm stands (`begin_at`); from farther off, the arm goes to the first frame slowly. Ours: what a
+servo at rest is off."""
+# Without the folder that the user happens to stand in: nothing there may be taken for a module.
+_START = f"import sys; sys.path[:] = filter(None, sys.path); import {__name__}; {__name__}.main()"
+
+
+class Request(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What is asked of the program."""
+
+    arm: ArmSettings
+    gate: GateSettings
+    """How far the arm may stand from the plan's first frame, and the box for its tool tip."""
+    motion: Motion | Literal["look"]
+    speed: float = 1.0
+    """Share of the plan's own speed."""
+    limits: RobotLimits | None = None
+    """Of the workspace's robot; the way to the plan's first frame is held against them too."""
+
+
+class Look(msgspec.Struct, frozen=True):
+    """`look.json`: the arm before anything moves."""
+
+    arm: ArmDescription
+    pose: dict[str, float]
+    """Where each of the plan's columns stands."""
+    there: bool
+    """Whether that is near enough to the plan's first frame."""
+    said: str
+    """How near, in words."""
+    approach: float
+    """How long a slow approach takes, in [s]."""
+    refused: str = ""
+    """Why this arm refuses the plan; empty if it does not."""
+    approach_refused: str = ""
+    """Why the gate refuses the slow approach."""
+
+
+def drive_command(request: Request) -> str:
+    """The command that fulfils a request, with `{plan}` and `{result}` to be filled in."""
+    text = msgspec.json.encode(request, enc_hook=lambda array: array.tolist()).decode()
+    words = [sys.executable, "-c", _START, text]
+    return f"{shlex.join(words)} {{plan}} {{result}}"
+
+
+def read_look(folder: Path) -> Look:
+    """Read `look.json`.
+
+    Raises:
+        FileFormatError: The program did not write it.
+    """
+    try:
+        return msgspec.json.decode((folder / LOOK_FILE).read_bytes(), type=Look)
+    except (OSError, msgspec.MsgspecError) as error:
+        raise FileFormatError(f"the arm's executor said nothing ({error}); ask again") from error
+
+
+def make_executor(settings: ArmSettings) -> Executor:
+    """Connect to an arm.
+
+    Raises:
+        ConfigurationError: There is no such executor or setting, or the arm does not answer.
+        MissingExtraError: Its library is not installed.
+    """
+    kind, config = _class_and_config(settings)
+    try:
+        return kind(config)
+    except ImportError as error:
+        raise missing_extra(error) or error from error
+
+
+def guiding_of(settings: ArmSettings) -> Guiding:
+    """What being guided would do to an arm; it is not connected to.
+
+    Raises:
+        ConfigurationError: There is no such executor or setting.
+    """
+    kind, config = _class_and_config(settings)
+    return kind.guiding(config)
+
+
+def _class_and_config(settings: ArmSettings) -> tuple[type[Executor], Any]:
+    kind = EXECUTORS.resolve(settings.executor)
+    return kind, build(kind.config_type, settings.options, f"[arm] {settings.executor}")
+
+
+def arms_columns(form: PlanFormat, arm: ArmDescription) -> list[int]:
+    """The arm's channel for each of a plan's columns.
+
+    Raises:
+        InvalidPlanError: A column is no channel of the arm, is in another unit, or two are one.
+    """
+    channels = []
+    for name, unit in zip(form.names, form.units, strict=True):
+        found = [i for i, own in enumerate(arm.columns) if name == own or is_joint(name, own)]
+        if not found or arm.units[found[0]] != unit:
+            has = ", ".join(map("{} [{}]".format, arm.columns, arm.units))
+            raise InvalidPlanError(
+                f"{arm.model} has no channel for {name} [{unit}]; it has {has}: name [plan]'s "
+                "columns so"
+            )
+        channels.append(found[0])
+    if len(set(channels)) < len(channels):
+        raise InvalidPlanError(f"two of {form.names} are one channel of {arm.model}; drop one")
+    return channels
+
+
+def approach(
+    pose: Float[np.ndarray, " d"], first: Float[np.ndarray, " d"], arm: ArmDescription
+) -> Plan:
+    """The slow way from one pose to another: a minimum-jerk motion of all channels together.
+
+    Raises:
+        InvalidPlanError: A channel is to move in a unit in which no slow speed is known.
+    """
+    far = np.abs(first - pose)
+    duration = _SHORTEST
+    for unit, distance in zip(arm.units, far, strict=True):
+        speed = in_unit(_SLOW, unit)
+        if distance > 0 and speed is None:
+            raise InvalidPlanError(
+                f"no slow speed is known in {unit}; move the arm to the plan's first frame"
+            )
+        # A minimum-jerk motion's peak is 15/8 of its mean speed.
+        duration = max(duration, 15 / 8 * float(distance) / (speed or 1.0))
+    n = math.ceil(duration / _APPROACH_DT)
+    s = np.arange(n + 1)[:, None] / n
+    frames = pose + (10 * s**3 - 15 * s**4 + 6 * s**5) * (first - pose)
+    return Plan(frames, PlanFormat(arm.columns, arm.units, _APPROACH_DT))
+
+
+class _Prepared:
+    """A plan in an arm's columns, and how the arm stands to it; nothing moves here."""
+
+    def __init__(self, executor: Executor, plan: Plan, request: Request) -> None:
+        self._executor, self._request, self._form = executor, request, plan.format
+        arm, pose = executor.describe(), executor.where()
+        if missing := [n for n, q in zip(arm.columns, pose, strict=True) if not math.isfinite(q)]:
+            raise ConfigurationError(f"{arm.model} does not say where {', '.join(missing)} stands")
+        self.arm, self._pose, self.channels = arm, pose, arms_columns(plan.format, arm)
+        """The arm, where it stands, and its channel of each of the plan's columns."""
+        form = with_turns(plan.format, request.limits)
+        plan = Plan(form.toward(plan.actions, pose[self.channels]), form)
+        frames = np.tile(pose, (plan.horizon, 1))
+        frames[:, self.channels] = plan.actions
+        own = PlanFormat(arm.columns, arm.units, plan.format.dt / request.speed)
+        self.plan = Plan(frames, own)
+        """Channels that the plan leaves out are held where they stand."""
+        self._here = dict(zip(plan.format.names, pose[self.channels].tolist(), strict=True))
+        first = plan.actions[0].tolist()
+        self._said, self._there = compare_pose(self._here, first, plan.format, request.gate)
+
+    @property
+    def to_start(self) -> Plan:
+        return approach(self._pose, self.plan.actions[0], self.arm)
+
+    @property
+    def near(self) -> bool:
+        """Whether the plan can begin where the arm stands."""
+        far = np.abs(self.plan.actions[0] - self._pose)
+        return bool(
+            np.all(far <= [in_unit(_START_TOLERANCE, unit) or 0.0 for unit in self.arm.units])
+        )
+
+    @property
+    def from_here(self) -> Plan:
+        """The plan as it is sent: from where the arm stands, if that is near."""
+        return begin_at(self.plan, self._pose) if self.near else self.plan
+
+    def check(self, name: str, motion: Plan) -> None:
+        """Hold a motion against the arm and, in the plan's own columns, the gate, box and all.
+
+        Raises:
+            RobotLimitError: It is refused; the message begins with its name.
+        """
+        self._executor.check(motion)
+        if self._request.limits is None:
+            return
+        own = Plan(motion.actions[:, self.channels], replace(self._form, dt=motion.format.dt))
+        refused = check_plan(own, self._request.limits, settings=self._request.gate).refusals
+        if refused:
+            raise RobotLimitError(
+                f"{name}: {refused}; move it nearer by hand or with its own program, then ask again"
+            )
+
+    def motions(self) -> dict[str, Plan]:
+        """What is to be executed, one after the other, by name; limits hold for all of it."""
+        if self._request.motion == "approach":
+            return {_WAY: self.to_start}
+        if not self._there:
+            raise ConfigurationError(f"{self._said}; move it there, or ask again with --approach")
+        whole = {_PLAN: self.from_here}
+        return whole if self.near else {_WAY: self.to_start, **whole}
+
+    def look(self) -> Look:
+        """How the arm stands to the plan."""
+
+        def refusal(check: Callable[[], None]) -> str:
+            try:
+                check()
+            except PriorReinforceError as error:
+                return str(error)
+            return ""
+
+        return Look(
+            arm=self.arm,
+            pose=self._here,
+            there=self._there,
+            said=self._said,
+            approach=float(self.to_start.times[-1]),
+            refused=refusal(lambda: self.check(_PLAN, self.from_here)),
+            approach_refused=refusal(lambda: self.check(_WAY, self.to_start)),
+        )
+
+
+def drive(request: Request, plan: Plan, folder: Path) -> DriverResult:
+    """Make one motion, or look; write what came of it."""
+    executor: Executor | None = None
+    asked_to_stop = moved = False
+
+    def stop(*_: object) -> None:
+        nonlocal asked_to_stop
+        asked_to_stop = True
+        if executor is not None:
+            executor.stop()
+
+    signal.signal(signal.SIGTERM, stop)  # whenever it comes
+    try:
+        executor = make_executor(request.arm)
+        try:
+            prepared = _Prepared(executor, plan, request)
+            if request.motion == "look":
+                (folder / LOOK_FILE).write_bytes(msgspec.json.encode(prepared.look()))
+                return DriverResult("done")
+            motions = prepared.motions()
+            for name, motion in motions.items():
+                prepared.check(name, motion)
+            for motion in motions.values():
+                if asked_to_stop:
+                    raise ConfigurationError("it was asked to stop before it moved; ask again")
+                print(f"{prepared.arm.model} moves for {motion.times[-1]:.2f} s", flush=True)
+                moved_before, moved = moved, True  # whatever happens now, it may have
+                path = executor.run(motion)
+                moved = moved_before or path.moved
+                if path.fault:
+                    break
+            if motion is [*motions.values()][-1] and len(path.t):
+                np.savez(folder / PATH_FILE, t=path.t, q=path.q[:, prepared.channels])
+        finally:
+            executor.close()
+    except Exception as error:
+        why = str(error) if isinstance(error, PriorReinforceError) else repr(error)
+        result = DriverResult("aborted" if moved else "not_moved", why)
+    else:
+        outcome: Any = "done" if not path.fault else "aborted" if moved else "not_moved"
+        result = DriverResult(outcome, path.fault)
+    (folder / RESULT_FILE).write_bytes(msgspec.json.encode(result))
+    return result
+
+
+def main() -> None:
+    """Fulfil the request of the command line."""
+    request = msgspec.json.decode(
+        sys.argv[1], type=Request, dec_hook=lambda _, numbers: np.array(numbers)
+    )
+    result = drive(request, read_plan(sys.argv[2]), Path(sys.argv[3]))
+    if result.reason:
+        print(result.reason, file=sys.stderr)
+    statuses = {"done": 0, "not_moved": NOT_MOVED_STATUS}
+    sys.exit(statuses.get(result.outcome, 1))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,340 @@
+"""Recordings in CSV of any dialect.
+
+A file an episode, or one with a column `episode`. One column may hold the time; all others are
+channels. Logs of libfranka and of RTDE are known by their columns.
+"""
+
+from __future__ import annotations
+
+import re
+import shlex
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from prior_reinforce.arm.recordings.clock import Clock, hold_together, rises, says_time
+from prior_reinforce.arm.recordings.naming import could_be_forgotten, find_channels, vectors
+from prior_reinforce.arm.recordings.options import ReadOptions
+from prior_reinforce.arm.recordings.recording import (
+    EPISODE_COLUMNS,
+    NO_COLUMN,
+    Episodes,
+    Positions,
+    Recording,
+    files_at,
+    moves_beside,
+    natural_order,
+    recorded,
+    unread,
+    without_units,
+)
+from prior_reinforce.arm.recordings.tables import Table, counts, read_table
+from prior_reinforce.arm.recordings.units import SECONDS, Ambiguity, say_names, split_unit
+from prior_reinforce.errors import ConfigurationError, FileFormatError
+
+SUFFIXES = (".csv", ".tsv")
+_WHEN_SAID = (*SUFFIXES, ".txt", ".dat", ".log")
+"""Read where the format is said, because much else has such names."""
+_TIMES = (
+    "t", "time", "times", "timestamp", "timestamps", "stamp", "elapsed", "elapsed_time", "duration",
+    "datetime", "date",
+)  # fmt: skip
+_FEWEST_COUNTS = 20
+"""Rows of which it can be said that a column counts them. Ours."""
+_SECONDS = re.compile(r"(?P<stem>.*?)(secs?|seconds|s)")
+
+
+class LogFormat(NamedTuple):
+    """A log whose columns are documented."""
+
+    name: str
+    columns: tuple[str, ...]
+    """Those that it is known by."""
+    key: str
+    """Which of its vectors is the measured motion."""
+    time_unit: str
+
+
+LOG_FORMATS = (
+    # libfranka, src/log.cpp: logToCSV writes time.toMSec(). First 0.9.2 and later, then of 2017.
+    LogFormat("libfranka's log", ("time", "success_rate", "state.q[0]"), "state.q", "ms"),
+    LogFormat("libfranka's log", ("duration", "success rate", "q[0]"), "q", "ms"),
+    # UR's rtde/csv_writer.py and ur_rtde's recorder: seconds since the controller started.
+    LogFormat("an RTDE log", ("timestamp", "actual_q_0"), "actual_q", "s"),
+)
+
+
+def read(source: Path, options: ReadOptions) -> Episodes:
+    """Read a CSV file, or every CSV file of a folder."""
+    paths = files_at(source, SUFFIXES) or files_at(source, _WHEN_SAID)
+    for path in paths:
+        if len(paths) > 1 and path.stem in (options.leave_out or ()):
+            yield path.stem, unread
+            continue
+        table = read_table(path, options.delimiter, options.decimal)
+        if not table.names or len(table) < 2:
+            raise FileFormatError(
+                f"{path} has {len(table)} frames; expected a line of column names and two frames "
+                "or more"
+            )
+        column, names, guessed = _throws(table, path.stem, options, alone=len(paths) == 1)
+        for episode in sorted(set(names), key=natural_order):
+            own = table.rows([i for i, name in enumerate(names) if name == episode])
+            yield episode, partial(_episode, own, episode, options, column, guessed)
+
+
+def _throws(
+    table: Table, stem: str, options: ReadOptions, *, alone: bool
+) -> tuple[int | None, Sequence[str], tuple[Ambiguity, ...]]:
+    """The column that says of which episode each row is, what it says, and what is only guessed.
+
+    In a single file without such a column, times that begin anew part the episodes; else a column
+    that numbers long stretches of rows may.
+    """
+    whole = [stem] * len(table)
+    if options.episode_column is not None:
+        if options.episode_column == NO_COLUMN:
+            return None, whole, ()
+        column = _named_column(table, options.episode_column, "--episode-column")
+        return column, table.cells[column], ()
+    names = [name.lower() for name in table.names if table.named]
+    for i, name in enumerate(names):
+        if name in EPISODE_COLUMNS:
+            return i, table.cells[i], ()
+    if not (alone and names):
+        return None, whole, ()
+    starts = _starts(table, options)
+    for i, cells in enumerate(table.cells):
+        changes = [k for k in range(len(cells)) if k == 0 or cells[k] != cells[k - 1]]
+        says = [cells[k] for k in changes]
+        if len(set(says)) < len(says) or len(says) < 2:
+            continue
+        if changes == starts:
+            return i, cells, ()
+        first = int(says[0]) if says[0].isdigit() else 0
+        names_them = table.is_text(i) or says == [str(first + k) for k in range(len(says))]
+        long = len(says) > 2 and min(np.diff([*changes, len(cells)])) >= _FEWEST_COUNTS
+        if names_them and long and len(starts) == 1:
+            name = table.names[i]
+            what = f"{table.where} is one file, and {name} numbers {len(says)} stretches of rows"
+            option = f"--episode-column {shlex.quote(name)}"
+            what += f": it looks as if these were the episodes (if it is one: {NO_COLUMN})"
+            return i, cells, (Ambiguity(what, option),)
+    if len(starts) == 1:
+        return None, whole, ()
+    numbers = np.searchsorted(starts, np.arange(len(table)), side="right") - 1
+    return None, [f"{stem}-{number}" for number in numbers], ()
+
+
+def _starts(table: Table, options: ReadOptions) -> list[int]:
+    """Rows in which the time begins anew, with the first."""
+    bare = [split_unit(name, SECONDS)[0].lower() for name in table.names]
+    time = next((i for i, name in enumerate(bare) if name in _TIMES), None)
+    if options.time_column in (*table.names, *bare):
+        time = _named_column(table, str(options.time_column), "--time-column")
+    if time is None or options.time_column == NO_COLUMN or not table.is_number(time):
+        return [0]
+    times = table.values[:, time]
+    steps = np.diff(times)
+    falls = (np.flatnonzero(steps < 0) + 1).tolist()
+    anew = np.all(np.abs(times[falls] - times[0]) <= 2 * np.median(np.abs(steps)))
+    long = np.min(np.diff([0, *falls, len(times)])) >= _FEWEST_COUNTS
+    return [0, *falls] if anew and long else [0]
+
+
+def _named_column(table: Table, name: str, option: str) -> int:
+    """A column by its name, with or without the unit in it, or by its number from 1."""
+    bare = [split_unit(n, SECONDS)[0] for n in table.names]
+    for names in (table.names, bare):
+        if name in names:
+            return names.index(name)
+    if name.isdigit() and 1 <= int(name) <= len(table.names):
+        return int(name) - 1
+    raise ConfigurationError(
+        f"{table.where} has no column {name!r} for {option}; it has {say_names(table.names)}"
+    )
+
+
+def _episode(
+    table: Table,
+    episode: str,
+    options: ReadOptions,
+    episode_column: int | None,
+    guessed: tuple[Ambiguity, ...],
+) -> Recording:
+    log = next((g for g in LOG_FORMATS if set(g.columns) <= set(table.names)), None)
+    joints = options.joints if table.named else None
+    found = None if joints is None else find_channels(joints, table.names)
+    times = _time_columns(table, options, [episode_column, *(found or ())])
+    aside = {*times.columns, *times.held, episode_column}
+    others = [i for i in range(len(table.names)) if i not in aside]
+    channels, named = _channels(table, others, options, log)
+    remarks = []
+    if log is not None:
+        remarks.append(f"{log.name}: time in {log.time_unit}, motion is {log.key} (measured)")
+    clock = _clock(table, episode, times, options, log and log.time_unit)
+    rising = [i for i in channels if channels == others and table.named and _counts(table, i)]
+    rising = [] if options.joints else rising
+    texts = [i for i in channels if table.is_text(i) and options.key is None and found is None]
+    called = [name or f"column {i + 1}" for i, name in enumerate(table.names)]
+    for left, why in (
+        (rising, "rises with every row, as times and counters do"),
+        (texts, "holds no number"),
+    ):
+        channels = [i for i in channels if i not in left]
+        said = say_names([called[i] for i in left])
+        remarks += [f"{said} left out, which {why}"] * bool(left)
+    names, units = without_units([called[i] for i in channels])
+    motion = table.columns(channels)
+    return recorded(
+        episode,
+        clock,
+        motion,
+        names if named else (),
+        remarks=tuple(remarks),
+        units=tuple(table.units[i] or u for i, u in zip(channels, units, strict=True)),
+        ambiguities=(*guessed, *times.guessed, *clock.ambiguities),
+        columns=names if table.named else (),
+        left_out=_unread_motion(table, others, channels, motion),
+    )
+
+
+def _unread_motion(
+    table: Table, others: Sequence[int], channels: Sequence[int], motion: Positions
+) -> dict[str, tuple[float, float]]:
+    """Range of each column of numbers that moves and is not read, such as a gripper's."""
+    rest = {table.names[i]: i for i in others if i not in channels and table.is_number(i)}
+    moving = could_be_forgotten([*rest], [table.names[i] for i in channels])
+    return moves_beside(
+        ("",), {"": motion} | {name: table.values[:, rest[name]] for name in rest if name in moving}
+    )
+
+
+class _Times(NamedTuple):
+    """Which columns are the time."""
+
+    columns: tuple[int, ...] = ()
+    """None, one, or seconds and nanoseconds."""
+    guessed: tuple[Ambiguity, ...] = ()
+    held: tuple[int, ...] = ()
+    """Columns that must agree with it."""
+
+
+def _time_columns(table: Table, options: ReadOptions, others: Sequence[int | None]) -> _Times:
+    """The columns of times; whatever rises steadily, and is no joint, may be one."""
+    if options.time_column == NO_COLUMN:
+        return _Times()
+    if options.time_column is not None:
+        return _Times((_named_column(table, options.time_column, "--time-column"),))
+    if (pair := _seconds_and_nanoseconds(table)) is not None:
+        return _Times(pair)
+    names = [split_unit(name, SECONDS)[0] if table.named else "" for name in table.names]
+    rising = [i for i in range(len(names)) if i not in others and _rises(table, i)]
+    known = [i for i, name in enumerate(names) if name.lower() in _TIMES and i not in others]
+    called = [i for i in rising if says_time(table.names[i])] if table.named else []
+    if known or called:
+        time = [*known, *called][0]
+        held = [i for i in range(len(names)) if i not in (time, *others) and table.is_number(i)]
+        held = [i for i in held if says_time(table.names[i]) and counts(table.values[:, i])]
+        return _Times((time,), (), tuple(held))
+    nameless = [i for i in rising if table.named and _has_no_name(table, i)]
+    if nameless and table.nanoseconds(nameless[0]) is not None:
+        return _Times((nameless[0],))
+    if rising and len(names) > 1 and options.rate is None:
+        first = rising[0]
+        shown = table.names[first] if table.named and table.names[first] else f"{first + 1}"
+        column = f"column {first + 1}" if shown.isdigit() else shown
+        what = f"{table.where} names no column of times, and {column} looks like the time"
+        return _Times((first,), (Ambiguity(what, f"--time-column {shlex.quote(shown)}"),))
+    return _Times()
+
+
+def _seconds_and_nanoseconds(table: Table) -> tuple[int, int] | None:
+    """Two columns that are one time, as ROS writes it: `stamp.sec` and `stamp.nanosec`."""
+    ends = {name.lower(): i for i, name in enumerate(table.names) if table.named}
+    for name, i in ends.items():
+        if (match := _SECONDS.fullmatch(name)) is None:
+            continue
+        for ending in ("nanosec", "nanosecs", "nsec", "nsecs", "nanoseconds", "ns"):
+            j = ends.get(match["stem"] + ending)
+            if j is not None and table.is_number(i) and table.is_number(j):
+                whole, part = table.values[:, i], table.values[:, j]
+                if np.all(whole % 1 == 0) and np.all((part >= 0) & (part < 1e9)):
+                    return i, j
+    return None
+
+
+def _has_no_name(table: Table, column: int) -> bool:
+    """Whether a column has no name, as pandas writes an index."""
+    return not table.names[column] or table.names[column].startswith("Unnamed:")
+
+
+def _counts(table: Table, column: int) -> bool:
+    """Whether a column rises by one step all along, which no joint does."""
+    values = table.values[:, column]
+    if _has_no_name(table, column):
+        return _rises(table, column)
+    steps = np.diff(values)
+    long = len(values) >= _FEWEST_COUNTS and table.is_number(column)
+    return long and bool(np.all(steps > 0) and steps.max() < 1.5 * np.median(steps))
+
+
+def _rises(table: Table, column: int) -> bool:
+    stamps = table.nanoseconds(column)
+    if stamps is None and not table.is_number(column):
+        return False
+    return rises(table.values[:, column] if stamps is None else stamps.astype(float))
+
+
+def _clock(
+    table: Table, episode: str, times: _Times, options: ReadOptions, unit: str | None
+) -> Clock:
+    if not times.columns:
+        return options.clock(episode, len(table))
+    time = times.columns[0]
+    dates, name = table.nanoseconds(time), table.names[time] or f"column {time + 1}"
+    stamps, unit = (dates, "ns") if dates is not None else (table.numbers(time), unit)
+    if len(times.columns) == 2:
+        whole, part = (table.values[:, i] for i in times.columns)
+        stamps, unit = (whole - whole[0]) * 1e9 + part, "ns"
+        name = f"{name} and {table.names[times.columns[1]]}"
+    unit = unit or table.units[time]
+    clock = options.clock(episode, len(table), stamps=stamps, name=name, unit=unit)
+    held = {table.names[i]: table.values[:, i] for i in times.held if table.is_number(i)}
+    hold_together(table.where, {name: clock.times, **held})
+    return clock
+
+
+def _channels(
+    table: Table, others: Sequence[int], options: ReadOptions, log: LogFormat | None
+) -> tuple[list[int], bool]:
+    """Columns of the motion, and whether their names are those of joints.
+
+    Only these need to be numbers in every row; a log may carry others beside them.
+    """
+    names, joints = [table.names[i] for i in others], options.joints or ()
+    if not table.named:
+        return list(others), False
+    if options.key is None and joints:
+        found = find_channels(joints, names)
+        if found is not None:
+            return [others[i] for i in found], True
+    keys, groups = options.key or ((log.key,) if log else ()), vectors(names)
+    if not keys:
+        return list(others), True
+    columns = []
+    for key in keys:
+        if key not in groups and key not in names:
+            raise FileFormatError(
+                f"{table.where} has no columns {key}_0, {key}_1, ...; numbered columns are "
+                f"{', '.join(groups) or 'none'}: say which with --key"
+            )
+        columns += [others[i] for i in groups.get(key, ())] or [others[names.index(key)]]
+    by_name = {j: others[i] for j in joints for i in find_channels((j,), names) or ()}
+    if len(columns) + len(by_name) == len(joints):  # a gripper beside a log's joints
+        rest = iter(columns)
+        columns = [by_name[j] if j in by_name else next(rest) for j in joints]
+    return columns, False

@@ -1,0 +1,455 @@
+"""From a recording on disk to `Demonstrations` and a preview.
+
+A format is a file beside this one and a line of `FORMATS`.
+"""
+
+from __future__ import annotations
+
+import functools
+import os
+import warnings
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from prior_reinforce.arm.recordings import csv, hdf5, lerobot, npz, ros, zarr
+from prior_reinforce.arm.recordings.bounds import check_numbers
+from prior_reinforce.arm.recordings.inspection import Inspection, inspect
+from prior_reinforce.arm.recordings.options import ReadOptions
+from prior_reinforce.arm.recordings.outcomes import (
+    OUTCOMES_FILE,
+    Outcomes,
+    in_units,
+    outcomes_of,
+    read_outcomes,
+    table_beside,
+)
+from prior_reinforce.arm.recordings.preprocessing import Preprocessing, at_rests, copies
+from prior_reinforce.arm.recordings.preview import Preview
+from prior_reinforce.arm.recordings.recording import Episodes, Recording, has_files, refuse_pointers
+from prior_reinforce.arm.recordings.selection import Selection, select
+from prior_reinforce.arm.recordings.units import Ambiguity, listed, raise_if_ambiguous
+from prior_reinforce.arm.robots import GateSettings, RobotLimits
+from prior_reinforce.errors import ConfigurationError, FileFormatError, InvalidDemonstrationsError
+from prior_reinforce.extras import check_installed
+from prior_reinforce.formats import OutcomeFormat
+from prior_reinforce.plans.motions import Demonstrations
+from prior_reinforce.plans.plan_format import PlanFormat
+from prior_reinforce.plans.symmetry import Symmetry
+from prior_reinforce.plans.whole_turns import TURN
+from prior_reinforce.wording import as_html
+
+_REST, _MOST_MOTIONS = 0.5, 3
+"""Rest in [s] after which another throw may begin, and motions of one throw: there and back, with a
+pause. Ours."""
+
+
+@dataclass(frozen=True)
+class Format:
+    """How recordings of one format are recognised and read."""
+
+    read: Callable[[Path, ReadOptions], Episodes]
+    recognises: Callable[[Path], bool]
+    """From names and layout alone; nothing large is opened."""
+    library: str = ""
+    """Optional library that reading needs, one of `extras.EXTRA_OF`."""
+    options: frozenset[str] = frozenset({"key"})
+    """Fields of `ReadOptions` that apply to this format, beside those that apply to all."""
+    whole: bool = False
+    """A folder laid out like this is this format, whatever else lies in it."""
+
+
+def _with_suffix(suffixes: tuple[str, ...]) -> Callable[[Path], bool]:
+    return lambda source: has_files(source, suffixes)
+
+
+_ARRAYS = frozenset({"key", "time_column"})
+_OPTIONAL = _ARRAYS | {"episode_column", "delimiter", "decimal"}
+FORMATS: Mapping[str, Format] = {
+    "npz": Format(npz.read, _with_suffix(npz.SUFFIXES), options=_ARRAYS),
+    "csv": Format(csv.read, _with_suffix(csv.SUFFIXES), options=_OPTIONAL),
+    "lerobot": Format(lerobot.read, lerobot.recognises, "pyarrow", _ARRAYS, whole=True),
+    "hdf5": Format(hdf5.read, hdf5.recognises, "h5py", _ARRAYS),
+    "ros": Format(ros.read, ros.recognises, "rosbags", _ARRAYS),
+    "zarr": Format(zarr.read, zarr.recognises, "zarr", _ARRAYS, whole=True),
+}
+"""What can be read. `hdf5` covers robomimic, ManiSkill and ALOHA; `ros` ROS 1 bags, ROS 2 sqlite
+bags and MCAP; `zarr` is the replay buffer of Diffusion Policy."""
+
+
+@dataclass(frozen=True, eq=False)
+class ImportResult:
+    """What an import gives; nothing is on disk yet."""
+
+    demonstrations: Demonstrations
+    """Ready to be learned from: `demonstrations.save(path)`."""
+    episodes: tuple[str, ...]
+    """Name of each demonstration in its source, in order."""
+    preview: Preview
+    """`preview.text` to print, `preview.draw(path)` to look at."""
+
+    def __repr__(self) -> str:
+        """What was made of the recordings."""
+        return f"ImportResult({self.demonstrations.n} of {self.preview.source})"
+
+    def _repr_html_(self) -> str:
+        return as_html(self.preview.text)
+
+
+def import_demonstrations(
+    source: str | os.PathLike[str],
+    *,
+    outcomes: str | os.PathLike[str] | Mapping[str, Sequence[float]] | None = None,
+    outcome_names: Sequence[str] | None = None,
+    outcome_units: Sequence[str] | None = None,
+    outcome_unit: str | None = None,
+    names: Sequence[str] | None = None,
+    plan_units: Sequence[str] | None = None,
+    preprocessing: Preprocessing | None = None,
+    robot: RobotLimits | None = None,
+    gate: GateSettings | None = None,
+    take_guesses: bool = False,
+    declared: Callable[[PlanFormat], Symmetry | None] = lambda _: None,
+    **options: Any,
+) -> ImportResult:
+    """Read, join with the outcomes, select joints, trim, resample, and preview.
+
+    Args:
+        source: A file, or the folder that holds the recording.
+        outcomes: Where each demonstration's object landed: a CSV `episode,x,y[,z][,sd]`, or numbers
+            by episode name. None takes `outcomes.csv` beside or inside the source.
+        outcome_names: Names of the k components, in order, matched to the CSV's columns; None
+            takes those as they stand.
+        outcome_units: Unit of each component; None takes those in the table's head, or metres.
+        outcome_unit: Unit of the table's columns that name none (`x_cm` does); None takes the
+            component's own, and is an error where no arm could have reached the outcomes.
+        names: What to call the joints in the plan format; None keeps the recorded names.
+        plan_units: Unit of each joint in the plan; None is radians for angles, metres for lengths.
+        preprocessing: Time step, horizon and trimming; None takes the defaults.
+        robot: Limits that every demonstration is checked against; None checks none.
+        gate: The gate's settings for that check.
+        take_guesses: Infer missing or implausible units, times and names instead of raising.
+        declared: Says how motions of a format may be moved, if they may.
+        options: Fields of `ReadOptions`.
+
+    Raises:
+        FileFormatError: As in `read_recordings`, or a damaged `outcomes.csv`.
+        InvalidDemonstrationsError: Missing outcomes or joints, or motions that teach nothing.
+        UnclearUnitsError: Units, times or names that are unclear, with the options that settle it.
+        ConfigurationError: Settings that contradict each other.
+        MissingExtraError: The format's optional library is not installed.
+    """
+    recordings = read(source, ReadOptions(**options))
+    selection = recordings.select(names, plan_units)
+    ambiguities = recordings.ambiguities + selection.ambiguities
+    try:
+        known = recordings.outcomes(outcomes, outcome_names)
+    except InvalidDemonstrationsError as missing:
+        raise_if_ambiguous(() if take_guesses else ambiguities, also=str(missing))
+        raise
+    if not isinstance(outcomes, Mapping):
+        known, unclear = in_units(known, outcome_units, outcome_unit)
+        ambiguities += unclear
+    raise_if_ambiguous(() if take_guesses else ambiguities)
+    partial = not {"episodes", "leave_out"}.isdisjoint(recordings.options.given)
+    outcomes_of(selection.episodes, known, partial=partial)  # before the work of the next line
+    inspection = inspect(selection, preprocessing, robot, gate)
+    names = outcome_names if outcome_names is not None or not known.named else known.names
+    units = tuple(outcome_units or [unit or "m" for unit in known.units])
+    names = OutcomeFormat.metres(len(units)).names if names is None else names
+    form = OutcomeFormat(tuple(names), units)
+    return recordings.demonstrations(inspection, known, form, partial=partial, declared=declared)
+
+
+def inspect_recordings(
+    source: str | os.PathLike[str],
+    *,
+    names: Sequence[str] | None = None,
+    plan_units: Sequence[str] | None = None,
+    preprocessing: Preprocessing | None = None,
+    robot: RobotLimits | None = None,
+    gate: GateSettings | None = None,
+    **options: Any,
+) -> Inspection:
+    """Report what recordings hold, and what an import would make of them; no outcomes are needed.
+
+    Missing or implausible units, times and names are inferred, and listed as ambiguous. Arguments
+    and errors are those of `import_demonstrations`.
+    """
+    recordings = read(source, ReadOptions(**options))
+    selection = recordings.select(names, plan_units)
+    found = inspect(selection, preprocessing, robot, gate)
+    return replace(found, ambiguities=recordings.ambiguities + selection.ambiguities)
+
+
+def read_recordings(
+    source: str | os.PathLike[str], *, take_guesses: bool = False, **options: Any
+) -> list[Recording]:
+    """Read every episode as recorded, for instance to ask for each one's outcome.
+
+    Args:
+        source: A file, or the folder that holds the recording.
+        take_guesses: Infer a missing or implausible unit of the times instead of raising.
+        options: Fields of `ReadOptions`.
+
+    Raises:
+        ConfigurationError: An unknown format, an option that the format has no use for, or one
+            that contradicts the recording.
+        UnclearUnitsError: The times name no unit, and cannot be seconds.
+        FileFormatError: Missing, truncated, too large, of another format, or ambiguous without
+            `key`.
+        InvalidDemonstrationsError: An episode that cannot be used, or one asked for that is not
+            there.
+        MissingExtraError: The format's optional library is not installed.
+    """
+    recordings = read(source, ReadOptions(**options))
+    raise_if_ambiguous(() if take_guesses else recordings.ambiguities)
+    return list(recordings.episodes)
+
+
+@dataclass(frozen=True, eq=False)
+class Recordings:
+    """The episodes of a source, read once: to be inspected, and turned into demonstrations."""
+
+    source: Path
+    format: str
+    """A name of `FORMATS`."""
+    options: ReadOptions
+    episodes: tuple[Recording, ...]
+    """Those that were asked for, in order."""
+
+    @property
+    def ambiguities(self) -> tuple[Ambiguity, ...]:
+        """What is only guessed of the times: the first episode's, for all with the same remedy."""
+        by_option = {one.option: one for r in reversed(self.episodes) for one in r.ambiguities}
+        unsaid = {"rests", "episodes", "leave_out"}.isdisjoint(self.options.given)
+        if len(self.episodes) > 1 or not unsaid or by_option:
+            return tuple(by_option.values())
+        count = len(at_rests(self.episodes[0], _REST))
+        what = (
+            f"{self.episodes[0].episode} holds {count} motions with rests of {_REST:g} s or more "
+            "between: it looks like several throws (if it is one: --rests 0)"
+        )
+        return (Ambiguity(what, f"--rests {_REST:g}"),) * (count > _MOST_MOTIONS)
+
+    @property
+    def outcome_places(self) -> list[Path]:
+        """Folders in which a table of outcomes may stand; a new one is written to the first.
+
+        A folder of recordings has it inside; a file, or a data set that is a folder, beside it.
+        """
+        if self.source.is_file():
+            return [self.source.parent]
+        alone = FORMATS[self.format].whole or (self.source / "metadata.yaml").is_file()
+        return [self.source.parent, self.source] if alone else [self.source]
+
+    def select(
+        self, names: Sequence[str] | None = None, plan_units: Sequence[str] | None = None
+    ) -> Selection:
+        """Return the channels of the plan, as in `selection.select`."""
+        options = self.options
+        return select(
+            self.episodes,
+            options.joints,
+            names,
+            options.units,
+            plan_units,
+            normalised=self.format == "lerobot",
+        )
+
+    def outcomes(
+        self,
+        given: str | os.PathLike[str] | Mapping[str, Sequence[float]] | None = None,
+        names: Sequence[str] | None = None,
+    ) -> Outcomes:
+        """Find outcomes: those given, a table beside the recordings, or the recordings' own.
+
+        Args:
+            given: A table, or numbers by episode.
+            names: Components wanted, in order; None takes them as they stand.
+
+        Raises:
+            ConfigurationError: The given outcomes are not numbers.
+            InvalidDemonstrationsError: There are no outcomes, or a component is missing.
+            FileFormatError: The table is missing or damaged.
+        """
+        if isinstance(given, Mapping):
+            try:
+                numbers = {str(name): tuple(map(float, value)) for name, value in given.items()}
+            except (TypeError, ValueError) as error:
+                raise ConfigurationError(
+                    f"outcomes must be numbers by episode, such as {{'0': (0.9, 0.1)}}: {error}"
+                ) from error
+            return Outcomes.of_numbers("the given outcomes", numbers)
+        places = self.outcome_places
+        path = Path(given) if given is not None else table_beside(places)
+        if path is not None:
+            found = read_outcomes(path, names)
+            return found if names is None else found.only(names)
+        own = {r.episode: r.outcome.tolist() for r in self.episodes if r.outcome is not None}
+        if own:
+            return Outcomes.of_numbers("the recording itself", own)
+        above = table_beside([place.parent for place in places])
+        hint = f" ({above} is not beside them: name it with --outcomes if it is theirs)"
+        raise InvalidDemonstrationsError(
+            f"no outcomes for episodes {listed([r.episode for r in self.episodes])}, and no "
+            "recording format says where the object landed; write "
+            f"{places[0] / OUTCOMES_FILE} with the columns episode,x,y (import --inspect writes "
+            f"one to fill in), or name a table with --outcomes{hint if above else ''}"
+        )
+
+    def demonstrations(
+        self,
+        inspection: Inspection,
+        outcomes: Outcomes,
+        form: OutcomeFormat,
+        *,
+        partial: bool,
+        declared: Callable[[PlanFormat], Symmetry | None] = lambda _: None,
+    ) -> ImportResult:
+        """Join plans with outcomes.
+
+        Args:
+            inspection: What becomes of these recordings, or of some of them.
+            outcomes: In the wanted units.
+            form: What their numbers mean.
+            partial: Only some episodes were asked for, so outcomes of others are no mistake.
+            declared: Says how motions of a format may be moved, if they may.
+
+        Raises:
+            InvalidDemonstrationsError: As in `outcomes_of`, or a motion that comes twice.
+        """
+        selection, processed = inspection.selection, inspection.processed
+        seen, sd = outcomes_of(selection.episodes, outcomes, partial=partial)
+        if inspection.copies:
+            raise InvalidDemonstrationsError(inspection.copies)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # the preview's remarks say it, with the option to give
+            demonstrations = Demonstrations(
+                processed.plans,
+                seen,
+                inspection.format,
+                form,
+                sd,
+                symmetry=declared(inspection.format),
+            )
+        title = f"{self.source.name} ({self.format})"
+        preview = Preview(title, inspection, demonstrations, outcomes.where)
+        return ImportResult(demonstrations, preview.episodes, preview)
+
+
+def read(source: str | os.PathLike[str], options: ReadOptions | None = None) -> Recordings:
+    """Read the episodes of a source once; left-out episodes are not read.
+
+    As `read_recordings`, but ambiguous times are inferred, and never raise UnclearUnitsError.
+    """
+    source, options = Path(source), options or ReadOptions()
+    if options.format not in (None, *FORMATS):
+        raise ConfigurationError(
+            f"unknown format {options.format!r}; give one of {', '.join(FORMATS)}"
+        )
+    if not source.exists():
+        raise FileFormatError(f"no recording at {source}; give the path of a file or a folder")
+    refuse_pointers(source)
+    kind = options.format or detect_format(source)
+    for name in sorted(_OPTIONAL & options.given.keys() - FORMATS[kind].options):
+        option = name.replace("_", "-")
+        raise ConfigurationError(f"--{option} {options.given[name]} has no use for {kind}; drop it")
+    if FORMATS[kind].library:
+        check_installed(FORMATS[kind].library)
+    there: list[str] = []
+    read_ones: dict[str, Recording] = {}
+    numbers = 0
+    for name, episode in _cut(FORMATS[kind], source, options):
+        there.append(name)
+        if not options.leaves_out(name):
+            read_ones[name] = episode()
+            numbers += read_ones[name].positions.size
+            check_numbers(source, "all of it", (numbers,))
+    twice = sorted(name for name, n in Counter(there).items() if n > 1)
+    if twice:
+        raise InvalidDemonstrationsError(
+            f"{source} holds more than one episode named {', '.join(twice)}; rename their files"
+        )
+    if not there:
+        raise FileFormatError(f"{source} holds no episode of format {kind}; say its format")
+    wanted = there if options.episodes is None else options.episodes
+    missing = [e for e in (*wanted, *(options.leave_out or ())) if e not in there]
+    if missing or not read_ones:
+        what = f"no episode {', '.join(missing)}" if missing else "no episode is left"
+        names = ", ".join(there)
+        raise InvalidDemonstrationsError(f"{what} in {source}; it has {names}: name those")
+    chosen = tuple(read_ones[name] for name in wanted if name in read_ones)
+    return Recordings(source, kind, options, chosen)
+
+
+def _cut(format: Format, source: Path, options: ReadOptions) -> Episodes:
+    """Every episode of a source, or of those every part between rests."""
+    if not options.rests:
+        yield from format.read(source, options)
+        return
+    for _, episode in format.read(source, replace(options, episodes=None, leave_out=None)):
+        for part in at_rests(episode(), options.rests):
+            yield part.episode, functools.partial(replace, part)
+
+
+def appended(before: Demonstrations, more: Demonstrations) -> Demonstrations:
+    """Return demonstrations with more of them; the shorter motions hold their last pose.
+
+    Raises:
+        InvalidDemonstrationsError: They mean other numbers, or have a motion twice.
+    """
+    for what, one, other in (
+        ("plans of", before.format, more.format),
+        ("outcomes", before.outcome_format.names, more.outcome_format.names),
+        ("outcomes in", before.outcome_format.units, more.outcome_format.units),
+    ):
+        if one != other:
+            raise InvalidDemonstrationsError(
+                f"the demonstrations so far have {what} {one}, the new ones {other}; import all "
+                "together"
+            )
+    for i, (name, unit) in enumerate(zip(more.format.names, more.format.units, strict=True)):
+        apart = np.median(more.plans[:, 0, i]) - np.median(before.plans[:, 0, i])
+        if unit in TURN and abs(apart) > 0.9 * TURN[unit]:
+            raise InvalidDemonstrationsError(
+                f"{name} of the new demonstrations starts {apart:.3g} {unit} from where it did so "
+                "far, about a turn; import all together"
+            )
+    horizon = max(before.horizon, more.horizon)
+    plans = [
+        np.pad(d.plans, ((0, 0), (0, horizon - d.horizon), (0, 0)), mode="edge")
+        for d in (before, more)
+    ]
+    said = [f"demonstration {i} so far" for i in range(before.n)]
+    said += [f"new one {i}" for i in range(more.n)]
+    if twice := copies(np.concatenate(plans), said):
+        raise InvalidDemonstrationsError(twice)
+    both: dict[str, Any] = {
+        name: np.concatenate([getattr(before, name), getattr(more, name)])
+        for name in ("outcomes_seen", "outcome_noise", "outcome_correction")
+    }
+    return replace(more, plans=np.concatenate(plans), **both)
+
+
+def detect_format(source: Path) -> str:
+    """Return the one of `FORMATS` that a file or a folder looks like, or raise FileFormatError."""
+    found = [name for name, format in FORMATS.items() if format.recognises(source)]
+    found = [name for name in found if FORMATS[name].whole] or found
+    if len(found) != 1:
+        for folder in sorted(source.iterdir()) if source.is_dir() and not found else ():
+            within = [name for name in FORMATS if FORMATS[name].recognises(folder)]
+            if folder.is_dir() and within:
+                raise FileFormatError(
+                    f"{source} itself holds no recordings; name {folder}, which looks like "
+                    f"{' or '.join(within)}"
+                )
+        raise FileFormatError(
+            f"{source} looks like {' and '.join(found) or 'no format that can be read'}; say its "
+            f"format, one of {', '.join(FORMATS)}"
+        )
+    return found[0]

@@ -1,0 +1,239 @@
+"""LeRobot data sets on disk, version 3.0 and 2.1, read with pyarrow alone.
+
+Layout (lerobot 0.6.1, datasets/utils.py): `meta/info.json`, episodes listed in
+`meta/episodes/**.parquet` (2.1: `meta/episodes.jsonl`), frames in `data/**.parquet`. Frames are
+collected by their own `episode_index`: the listed file pointers can be stale in converted data
+(huggingface/lerobot issue 2401), a file may hold several episodes, an episode several files. A file
+of a recorder (0.4.4) that ended without `finalize()` has no footer, and cannot be read.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Shaped
+
+from prior_reinforce.arm.recordings.bounds import check_bytes, check_numbers
+from prior_reinforce.arm.recordings.clock import Clock, Times
+from prior_reinforce.arm.recordings.options import ReadOptions
+from prior_reinforce.arm.recordings.recording import (
+    NO_COLUMN,
+    Episodes,
+    Positions,
+    Recording,
+    joined,
+    moves_beside,
+    named_damage,
+    recorded,
+)
+from prior_reinforce.errors import FileFormatError
+
+FrameNumbers = Shaped[np.ndarray, " T"]
+Frames = tuple[FrameNumbers, Times | None, dict[str, Positions]]
+"""Numbers, stamps and features of an episode's frames."""
+_MEASURED, _COMMANDED, _STAMPS = "observation.state", "action", "timestamp"
+_OWN = (_STAMPS, "frame_index", "episode_index", "index", "task_index")
+"""Features that every data set has."""
+_LATE = 0.5
+"""Periods by which a frame may be stamped late and still count as even. Ours."""
+
+
+def recognises(source: Path) -> bool:
+    """Whether a path looks like this format."""
+    return (source / "meta" / "info.json").is_file()
+
+
+def read(source: Path, options: ReadOptions) -> Episodes:
+    """Read every episode of a data set's folder."""
+    info_path = source / "meta" / "info.json"
+    with named_damage(info_path, "LeRobot's meta/info.json"):
+        check_bytes(info_path, info_path.stat().st_size)
+        info = json.loads(info_path.read_text(encoding="utf-8"))
+        features = dict(info["features"])
+        rate = float(info["fps"])
+        keys = tuple(_column(source, features, key) for key in options.key or (None,))
+        key, widths = keys[0], _widths(features)
+        narrow = [n for n, width in widths.items() if 0 < width < widths.get(key, 0)]
+        narrow = [name for name in narrow if name not in (*keys, *_OWN)]
+    remarks: tuple[str, ...] = ()
+    if options.key is None and key == _MEASURED and _COMMANDED in features:
+        remarks = (f"motion is {_MEASURED} (measured); key {_COMMANDED} has the commanded one",)
+    lengths, frames = _listed_lengths(source), _frames(source, (*keys, *narrow))
+
+    def episode_of(number: int) -> Recording:
+        index, stamps, arrays = frames.get(number, (np.zeros(0), None, {}))
+        listed = lengths.get(number, len(index))
+        if len(index) != listed or listed == 0:
+            raise FileFormatError(
+                f"{source}: episode {number} has {len(index)} of {listed} listed frames under "
+                "data/; copy the data set again, or name only the other episodes"
+            )
+        positions, names = joined(keys, arrays, _names(features[key], arrays[key].shape[1]))
+        beside = moves_beside(keys, arrays)
+        clock = _clock(str(number), index, stamps, rate, options)
+        return recorded(str(number), clock, positions, names, remarks=remarks, left_out=beside)
+
+    for number in sorted(lengths.keys() | frames.keys()):
+        yield str(number), partial(episode_of, number)
+
+
+def _clock(
+    episode: str, index: FrameNumbers, stamps: Times | None, rate: float, options: ReadOptions
+) -> Clock:
+    """Times by the frames' own numbers, since some may be missing, if their stamps agree with it.
+
+    LeRobot writes number / fps as `timestamp`; converters and other recorders write when a frame
+    was taken, which counts where the rate is right and frames came late.
+    """
+    if stamps is not None and options.time_column != NO_COLUMN and len(index) > 1:
+        # With a rate from the command line, stamps are asked for by name only.
+        asked = options.time_column == _STAMPS
+        own = None if asked else rate
+        even = np.abs(stamps - stamps[0] - (index - index[0]) / rate).max() <= _LATE / rate
+        if asked or (not even and options.rate is None):
+            return options.clock(
+                episode, len(index), stamps=stamps, name=_STAMPS, unit="s", own_rate=own,
+                rate_name="fps of meta/info.json",
+            )  # fmt: skip
+    clock = options.clock(episode, len(index), rate_name="fps", own_rate=rate)
+    return replace(clock, times=index * clock.period)
+
+
+def _widths(features: dict[str, Any]) -> dict[str, int]:
+    """Numbers a frame of each feature that has one or several in a row."""
+    return {
+        name: int(feature["shape"][0])
+        for name, feature in features.items()
+        if isinstance(feature, dict)
+        and str(feature.get("dtype", "")).startswith(("float", "int", "uint"))
+        and isinstance(feature.get("shape"), list)
+        and len(feature["shape"]) == 1
+    }
+
+
+def _column(source: Path, features: dict[str, Any], key: str | None) -> str:
+    vectors = [n for n, width in _widths(features).items() if width > 1]
+    vectors = [name for name in vectors if features[name]["dtype"].startswith("float")]
+    if key is None and (_MEASURED in vectors or len(vectors) == 1):
+        return _MEASURED if _MEASURED in vectors else vectors[0]
+    if key is None or key not in features:
+        raise FileFormatError(
+            f"{source} has no feature {key or _MEASURED}; features of numbers are {vectors}: say "
+            "which with the key"
+        )
+    return key
+
+
+def _listed_lengths(source: Path) -> dict[int, int]:
+    """Frames of each episode according to the metadata; empty where it lists none."""
+    lengths: dict[int, int] = {}
+    for path in sorted((source / "meta" / "episodes").glob("**/*.parquet")):
+        with named_damage(path, "LeRobot's list of episodes"):
+            table = _table(path, ["episode_index", "length"]).to_pydict()
+            pairs = zip(table["episode_index"], table["length"], strict=True)
+            lengths.update({int(episode): int(length) for episode, length in pairs})
+    path = source / "meta" / "episodes.jsonl"
+    if path.is_file():
+        with named_damage(path, "LeRobot's list of episodes"):
+            rows = map(json.loads, path.read_text(encoding="utf-8").splitlines())
+            lengths.update({int(row["episode_index"]): int(row["length"]) for row in rows})
+    return lengths
+
+
+def _frames(source: Path, keys: tuple[str, ...]) -> dict[int, Frames]:
+    """Frame numbers, stamps if there are any, and features of each episode, in time order."""
+    paths = sorted((source / "data").glob("**/*.parquet"))
+    if not paths:
+        raise FileFormatError(
+            f"{source} has no data/**.parquet; copy the whole data set, not only meta/"
+        )
+    parts = []
+    for path in paths:
+        with named_damage(path, "LeRobot frames, complete once its recorder called finalize()"):
+            table = _table(path, ["episode_index", "frame_index", _STAMPS, *keys])
+            episode = table["episode_index"].to_numpy().astype(np.int64)
+            index = table["frame_index"].to_numpy().astype(np.int64)
+            if len(episode) > 0:
+                there = _STAMPS in table.column_names
+                stamps = _rows(table[_STAMPS])[:, 0] if there else np.full(len(index), np.nan)
+                parts.append((episode, index, stamps, *(_rows(table[key]) for key in keys)))
+    if not parts:
+        return {}
+    with named_damage(source, f"LeRobot data with one width of {keys[0]}"):
+        episode, index, stamps, *values = map(np.concatenate, zip(*parts, strict=True))
+    order = np.argsort(index, kind="stable")
+    own = {number: order[episode[order] == number] for number in np.unique(episode).tolist()}
+    said = bool(np.all(np.isfinite(stamps)))
+    return {
+        number: (
+            index[rows],
+            stamps[rows] if said else None,
+            {key: value[rows] for key, value in zip(keys, values, strict=True)},
+        )
+        for number, rows in own.items()
+    }
+
+
+def _table(path: Path, columns: list[str]) -> Any:
+    """Columns of a Parquet file, unless its footer claims more than a recording has."""
+    import pyarrow.parquet as parquet
+
+    file = parquet.ParquetFile(path)
+    groups = [file.metadata.row_group(i) for i in range(file.metadata.num_row_groups)]
+    parts = [group.column(j) for group in groups for j in range(group.num_columns)]
+    columns = [name for name in columns if name != _STAMPS or name in file.schema_arrow.names]
+    read = [part for part in parts if part.path_in_schema.split(".")[0] in {*columns}]
+    check_numbers(path, "its columns", [sum(part.num_values for part in read)])
+    check_bytes(path, sum(part.total_uncompressed_size for part in read), "unpacks to")
+    return file.read(columns=columns)
+
+
+def _rows(column: Any) -> Positions:
+    """A column of lists of one length as rows, of numbers as a single channel."""
+    import pyarrow as pa
+    import pyarrow.compute as compute
+
+    kind = column.type
+    if not (pa.types.is_list(kind) or pa.types.is_large_list(kind) or hasattr(kind, "list_size")):
+        return np.asarray(column.to_numpy(), dtype=np.float64)[:, None]
+    widths = compute.list_value_length(column).unique().to_pylist()
+    if len(widths) != 1 or not widths[0]:
+        raise ValueError(f"rows of {widths} numbers")
+    flat = compute.list_flatten(column).to_numpy()
+    return np.asarray(flat, dtype=np.float64).reshape(-1, widths[0])
+
+
+def _names(feature: dict[str, Any], count: int) -> tuple[str, ...]:
+    """Channel names in every form that writers give them; none where they do not fit."""
+    names = _flat(feature.get("names"))
+    if len(set(names)) < len(names):  # two arms whose joints have one name each
+        names = _flat(feature.get("names"), "")
+    return tuple(names) if len(names) == count else ()
+
+
+def _flat(names: Any, group: str | None = None) -> list[str]:
+    """Names of a list, of `{name: index}` or `{index: name}`, or of groups of any of these.
+
+    With `group`, each name begins with the names of its groups.
+    """
+    if isinstance(names, list) and all(isinstance(name, str) for name in names):
+        return [f"{group}{name}" if group else name for name in names]
+    if isinstance(names, list):
+        return [name for part in names for name in _flat(part, group)]
+    if not isinstance(names, dict):
+        return []
+    numbers = sorted(map(str, range(len(names))))
+    if names and sorted(map(str, names)) == numbers:
+        return _flat([names[key] for key in sorted(names, key=int)], group)
+    if names and sorted(map(str, names.values())) == numbers:
+        return _flat(sorted(names, key=lambda name: int(names[name])), group)
+    return [
+        name
+        for key, part in names.items()
+        for name in _flat(part, None if group is None else f"{group}{key}.")
+    ]

@@ -1,0 +1,138 @@
+"""Recordings in NPZ or NPY: a file an episode, or one file whose motion has shape (N, T, D).
+
+An NPY holds the motion alone. Arrays of an NPZ: the motion (`key`, or `q`, `plans`, `positions`,
+`actions`), `t` or `dt` or `rate`, and optionally `joint_names` or `names`, and `outcome`,
+`outcomes` or `outcomes_seen`.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from prior_reinforce.arm.recordings.bounds import MOST_BYTES, check_bytes
+from prior_reinforce.arm.recordings.options import ReadOptions
+from prior_reinforce.arm.recordings.recording import (
+    EPISODE_COLUMNS,
+    NO_COLUMN,
+    Episodes,
+    Recording,
+    files_at,
+    joined,
+    moves_beside,
+    named_damage,
+    recorded,
+    unread,
+)
+from prior_reinforce.errors import FileFormatError
+from prior_reinforce.files import open_npz
+
+Arrays = Mapping[str, np.ndarray]
+SUFFIXES = (".npz", ".npy")
+_MOTION_KEYS = ("q", "plans", "positions", "actions")
+_OUTCOME_KEYS = ("outcome", "outcomes", "outcomes_seen")
+
+
+def read(source: Path, options: ReadOptions) -> Episodes:
+    """Read a file, or every one of a folder as an episode."""
+    paths = files_at(source, SUFFIXES)
+    for path in paths:
+        if len(paths) > 1 and options.leaves_out(path.stem):
+            yield path.stem, unread
+        else:
+            yield from _each(path, _arrays(path), options)
+
+
+def _each(path: Path, arrays: Arrays, options: ReadOptions) -> Episodes:
+    """Every episode of a file; an array `episode` of numbers says of which each frame is."""
+    said = next((name for name in arrays if name.lower() in EPISODE_COLUMNS), None)
+    if said is None or arrays[said].ndim != 1 or len(set(arrays[said].tolist())) < 2:
+        yield from _episodes(path, arrays, path.stem, options)
+        return
+    numbers, rest = arrays[said], {k: v for k, v in arrays.items() if k != said}
+    for number in sorted(set(numbers.tolist())):
+        rows = np.flatnonzero(numbers == number)
+        own = {k: v[rows] if v.shape[:1] == numbers.shape else v for k, v in rest.items()}
+        yield from _episodes(path, own, str(number), options)
+
+
+def _episodes(path: Path, arrays: Arrays, name: str, options: ReadOptions) -> Episodes:
+    keys = options.key or tuple(name for name in _MOTION_KEYS if name in arrays)[:1]
+    key = next((name for name in keys if name not in arrays), None)
+    if not keys or key is not None:
+        raise FileFormatError(
+            f"{path} has no array {key or ' or '.join(_MOTION_KEYS)}; it holds "
+            f"{sorted(arrays)}: say which with --key"
+        )
+    motions = arrays[keys[0]]
+    for key in keys:
+        least = 1 if key != keys[0] else 2
+        if not least <= arrays[key].ndim <= 3 or arrays[key].dtype.kind not in "fiu":
+            raise FileFormatError(
+                f"{path}: {key} has shape {arrays[key].shape} and type {arrays[key].dtype}, "
+                "expected numbers of shape (T, D) or (N, T, D)"
+            )
+    outcomes = next((arrays[name] for name in _OUTCOME_KEYS if name in arrays), None)
+    episodes, several = [name], motions.ndim == 3
+    if motions.ndim == 2:
+        motions, outcomes = motions[None], None if outcomes is None else outcomes.reshape(1, -1)
+    else:
+        episodes = [str(index) for index in range(len(motions))]
+    if outcomes is not None and (
+        outcomes.ndim != 2 or len(outcomes) != len(motions) or outcomes.dtype.kind not in "fiu"
+    ):
+        raise FileFormatError(
+            f"{path}: outcomes have shape {outcomes.shape}, expected numbers of shape "
+            f"({len(motions)}, k)"
+        )
+    names = tuple(map(str, np.ravel(arrays.get("joint_names", arrays.get("names", ())))))
+
+    def episode_of(index: int) -> Recording:
+        outcome = None if outcomes is None else outcomes[index]
+        there = {
+            name: array[index] if several and len(array) == len(motions) else array
+            for name, array in arrays.items()
+            if array.ndim > several and array.dtype.kind in "fiu"
+        }
+        rate = {} if options.time_column == NO_COLUMN else _rate(path, arrays)
+        clock = options.clock_among(path, episodes[index], motions.shape[1], there, **rate)
+        with_names = names if len(names) == motions.shape[2] or len(keys) == 1 else ()
+        positions, said = joined(keys, there, with_names)
+        beside = moves_beside((*keys, *_OUTCOME_KEYS), there)
+        return recorded(
+            episodes[index], clock, positions, said or names, outcome=outcome, left_out=beside
+        )
+
+    for index, episode in enumerate(episodes):
+        yield episode, partial(episode_of, index)
+
+
+def _arrays(path: Path) -> Arrays:
+    """Everything in a file; of our own demonstrations and plans also their metadata."""
+    if path.suffix.lower() == ".npy":
+        check_bytes(path, path.stat().st_size)
+        with named_damage(path, "NPY with plain numbers"), path.open("rb") as file:
+            return {_MOTION_KEYS[0]: np.load(file, allow_pickle=False)}
+    remedy = "it must be an NPZ with plain number arrays; copy it again, or say its format"
+    with open_npz(path, remedy, MOST_BYTES) as archive:
+        content = {name: np.asarray(archive[name]) for name in archive.files}
+        if "metadata" in content:
+            metadata = json.loads(str(content.pop("metadata")))
+            form = metadata.get("format", metadata)
+            content.setdefault("dt", np.array(float(form["dt"])))
+            content.setdefault("names", np.array(form.get("names") or form.get("joint_names")))
+        return content
+
+
+def _rate(path: Path, arrays: Arrays) -> dict[str, Any]:
+    """The rate that a file declares, if any, as `clock_of` takes it."""
+    said = next((n for n in ("dt", "rate") if n in arrays), "")
+    with named_damage(path, "NPZ with times t, or dt, or rate"):
+        number = float(arrays[said]) if said else 0.0
+    own = (1 / number if said == "dt" and number else number) if said else None
+    return {"own_rate": own, "rate_name": said}

@@ -1,0 +1,342 @@
+"""Where each demonstration's object landed: from a table, since no recording format holds it.
+
+`outcomes.csv` has a line of column names, `episode` among them; every other column is a component
+of the outcome, except `source`, `note`, `comment`, and `sd`, the standard deviation of the row's
+components. A column `x_cm` or `x [mm]` is converted to `x` in metres, an angle likewise to radians,
+and a time to seconds; any other unit in brackets is kept: `volume [ml]`.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+
+from prior_reinforce.arm.recordings.recording import EPISODE_COLUMNS
+from prior_reinforce.arm.recordings.tables import Table, read_table
+from prior_reinforce.arm.recordings.units import (
+    CHANNEL_UNITS,
+    Ambiguity,
+    conversion,
+    is_possible,
+    judge_unit,
+    known_unit,
+    listed,
+    split_unit,
+)
+from prior_reinforce.arrays import Points
+from prior_reinforce.errors import ConfigurationError, FileFormatError, InvalidDemonstrationsError
+from prior_reinforce.files import as_cell, from_cell, write
+from prior_reinforce.units import base_of
+
+OUTCOMES_FILE = "outcomes.csv"
+SD = "sd"
+"""Column of the standard deviation of a row's components."""
+_HUNDREDS = re.compile(r"[+-]?[1-9]\d\d+")
+_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}([.,]\d{3})+")
+SOURCE = "source"
+_NOT_COMPONENTS = (SD, SOURCE, "note", "notes", "comment", "comments")
+
+
+@dataclass(frozen=True, eq=False)
+class Outcomes:
+    """Outcomes by episode or by trial."""
+
+    where: str
+    """Their source, for messages."""
+    episodes: tuple[str, ...]
+    """Names of the n rows."""
+    values: Points
+    """The components, shape (n, k); nan in a row without an outcome."""
+    sd: Float[np.ndarray, " n"]
+    """Standard deviation of each row's components; 0 where it is not said."""
+    names: tuple[str, ...]
+    """Names of the k components."""
+    units: tuple[str | None, ...]
+    """Unit of each component; None if the source names none."""
+    sd_unit: str | None = None
+    """Unit of `sd`; None for that of the first component."""
+    named: bool = True
+    """Whether the source names the components."""
+    sources: tuple[str, ...] = ()
+    """Cells by row of a column `source`, if there is one: whose answers they are."""
+
+    def only(self, names: Sequence[str]) -> Outcomes:
+        """Return some of the components, in that order.
+
+        Raises:
+            InvalidDemonstrationsError: One is missing.
+        """
+        missing = [name for name in names if name not in self.names]
+        if missing:
+            raise InvalidDemonstrationsError(
+                f"{self.where} has no column {', '.join(missing)}; it has "
+                f"{', '.join(self.names)}: rename or add it"
+            )
+        at = [self.names.index(name) for name in names]
+        units = tuple(self.units[i] for i in at)
+        return replace(self, values=self.values[:, at], names=tuple(names), units=units)
+
+    @classmethod
+    def none(cls, names: Sequence[str]) -> Outcomes:
+        """No outcomes of these components."""
+        k = len(names)
+        return cls("nothing", (), np.zeros((0, k)), np.zeros(0), tuple(names), (None,) * k)
+
+    @classmethod
+    def of_numbers(cls, where: str, numbers: Mapping[str, Sequence[float]]) -> Outcomes:
+        """Outcomes that are numbers by episode.
+
+        Raises:
+            InvalidDemonstrationsError: Different numbers of components.
+        """
+        lengths = set(map(len, numbers.values())) or {0}
+        if len(lengths) != 1 or (0 in lengths and numbers):
+            raise InvalidDemonstrationsError(
+                f"outcomes in {where} have {sorted(lengths)} components, expected one number for "
+                "all, at least 1; complete them"
+            )
+        n, k = len(numbers), lengths.pop()
+        values = np.array([*numbers.values()], dtype=np.float64).reshape(n, k)
+        names = tuple(map(str, range(1, k + 1)))
+        return cls(where, (*numbers,), values, np.zeros(n), names, (None,) * k, named=False)
+
+
+def table_beside(places: Sequence[Path]) -> Path | None:
+    """Return the table of outcomes in one of the folders; None if there is none."""
+    return next((f / OUTCOMES_FILE for f in places if (f / OUTCOMES_FILE).is_file()), None)
+
+
+def write_outcome_table(
+    path: Path,
+    rows: Mapping[str, Sequence[object]],
+    names: Sequence[str],
+    units: Sequence[str],
+    beside: str = "note",
+) -> None:
+    """Write a table of outcomes as a CSV, with the units known here in its head.
+
+    Cells by episode are components, then that of the column `beside`; missing ones stay empty.
+    """
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    known = zip(names, units, strict=True)
+    heads = [f"{name} [{unit}]" if unit in CHANNEL_UNITS else name for name, unit in known]
+    writer.writerow(map(as_cell, ["episode", *heads, beside]))
+    for episode, cells in rows.items():
+        filled = [*cells, *[""] * (len(names) + 1 - len(cells))]
+        writer.writerow([as_cell(episode), *filled])
+    write(path, text.getvalue())
+
+
+def read_outcomes(path: Path, names: Sequence[str] | None = None) -> Outcomes:
+    """Read a table of outcomes, a CSV of any dialect; rows with empty cells are skipped.
+
+    `names` are the components wanted; None takes all columns but the index and notes.
+    FileFormatError if it is no such table, or a cell is no number.
+    """
+    example = "episode,x,y"
+    if not path.is_file():
+        raise FileFormatError(f"no table at {path}; give the path of a table {example}")
+    table = read_table(path, head=EPISODE_COLUMNS)
+    split = [split_unit(name) for name in table.names]
+    # `distance_in` is in inches where there is a `distance`; elsewhere `plug_in` is no length.
+    wanted = {f"{name}_in": (name, "in") for name in names or ()}
+    split = [wanted.get(name, (name, unit)) for name, unit in split]
+    lower = [name.lower() for name, _ in split]
+    key = next((i for i, name in enumerate(lower) if name in EPISODE_COLUMNS), None)
+    if key is None and table.named and lower[0] not in _NOT_COMPONENTS and table.is_text(0):
+        key = 0  # by its cells, whatever it is called
+    other = (*_NOT_COMPONENTS, *EPISODE_COLUMNS)
+    columns = [i for i, name in enumerate(lower) if i != key and name not in other]
+    if names is not None and set(names) <= {split[i][0] for i in columns}:
+        columns = [i for i in columns if split[i][0] in names]
+    kept = [split[i][0] for i in columns]
+    if key is None or not columns or len(set(kept)) != len(kept):
+        raise FileFormatError(
+            f"{path} begins with {','.join(table.names)!r:.200}, expected column names such as "
+            f"{example}"
+        )
+    _doubt_thousands(path, table, columns)
+    units = [table.units[i] or split[i][1] for i in columns]
+    scale = [base_of(unit)[1] if unit else 1.0 for unit in units]
+    sd, source = (lower.index(name) if name in lower else None for name in (SD, SOURCE))
+    cells = table.cells
+    rows, sources = list[str](), list[str]()
+    places, sds = list[list[float]](), list[float]()
+    for row, name in enumerate(map(from_cell, cells[key])):
+        if name in rows:
+            line = table.lines[row]
+            raise FileFormatError(f"{path}, line {line}: episode {name} again; drop one of them")
+        if not any(cells[i][row] for i in columns):
+            continue
+        rows.append(name)
+        sources += [] if source is None else [cells[source][row]]
+        places += ([_finite(path, table, row, i) * s for i, s in zip(columns, scale, strict=True)],)
+        sds.append(0.0 if sd is None or not cells[sd][row] else _finite(path, table, row, sd))
+    sd_unit = None if sd is None else table.units[sd] or split[sd][1] or (units or [None])[0]
+    bare = tuple(base_of(unit)[0] if unit else None for unit in units)
+    values = np.array(places).reshape(len(rows), len(kept))
+    found = Outcomes(str(path), (*rows,), values, np.array(sds), (*kept,), bare, sd_unit)
+    return replace(found, sources=tuple(sources))
+
+
+def _doubt_thousands(path: Path, table: Table, columns: Sequence[int]) -> None:
+    """Refuse `1.488` beside `-302`: is that one and a half, or one and a half thousand?
+
+    FileFormatError if every number with a decimal sign may be a whole one of four digits or more.
+    """
+    cells = [(table.cells[i][row], row, i) for i in columns for row in range(len(table))]
+    signed = [each for each in cells if table.decimal in each[0]]
+    whole = [cell for cell, _, _ in cells if _HUNDREDS.fullmatch(cell)]
+    if signed and whole and all(_THOUSANDS.fullmatch(cell) for cell, _, _ in signed):
+        cell, row, column = signed[0]
+        raise FileFormatError(
+            f"{path}, line {table.lines[row]}: {table.names[column]} is {cell!r} beside "
+            f"{whole[0]!r}; if that is a thousand, write it without a sign, else write {cell}0"
+        )
+
+
+def _finite(path: Path, table: Table, row: int, column: int) -> float:
+    value = float(table.values[row, column])
+    if not math.isfinite(value):
+        raise FileFormatError(
+            f"{path}, line {table.lines[row]}: {table.names[column]} is "
+            f"{table.cells[column][row][:40]!r}, expected a finite number; measure that outcome, "
+            "or empty the whole row's numbers"
+        )
+    return value
+
+
+def in_units(
+    outcomes: Outcomes, wanted: Sequence[str] | None, given: str | None
+) -> tuple[Outcomes, tuple[Ambiguity, ...]]:
+    """Convert outcomes to the wanted units; also return what is only inferred of their units.
+
+    `wanted` None takes the stated units, or metres. `given` is the unit of components whose source
+    states none, or of all to confirm an ambiguous one; None takes the wanted unit, or if no arm
+    reaches that far, a plausible one.
+
+    Raises:
+        ConfigurationError: A unit that cannot be converted, `given` has no use, or one `sd` for
+            components of several units.
+        InvalidDemonstrationsError: A stated unit is impossible.
+    """
+    said, where, given = outcomes.units, outcomes.where, given and (known_unit(given) or given)
+    if wanted is None:
+        wanted = [base_of(unit or given or "m")[0] for unit in said]
+    if len(wanted) != len(said):
+        return outcomes, ()  # refused when they are joined with the demonstrations
+    if given is not None and None not in said and given not in said:
+        raise ConfigurationError(
+            f"--outcome-unit {given} has no use, since {where} says its units; drop it"
+        )
+    if outcomes.sd.any() and len(set(wanted)) > 1:
+        raise ConfigurationError(
+            f"{SD} in {where} is one number for components in {', '.join(wanted)}; leave that "
+            "column out"
+        )
+    reach = np.abs(outcomes.values).max(axis=0, initial=0.0, where=~np.isnan(outcomes.values))
+    scale, unclear = [], dict[str, list[str]]()
+    for name, own, spelt, largest in zip(outcomes.names, said, wanted, reach, strict=True):
+        unit = known_unit(spelt) or spelt
+        recorded = own or given or judge_unit(unit, largest) or unit
+        if base_of(recorded)[0] != base_of(unit)[0]:
+            raise ConfigurationError(
+                f"{name} in {where} is in {recorded}, but its unit is to be {spelt}; correct "
+                "either (a workspace has it in workspace.toml, [outcome])"
+            )
+        scale.append(conversion(recorded, unit, f"{name} in {where}"))
+        most = largest * scale[-1]
+        looks = judge_unit(unit, most)
+        rename = f"if that is in {looks}, call its column {name} [{looks}]"
+        if not is_possible(unit, most):
+            raise InvalidDemonstrationsError(
+                f"in {where}, {name} is said to be in {recorded} and would reach {most:.4g} "
+                f"{unit}, too far for an arm; {rename}"
+            )
+        if own is None and given is None and recorded != unit:
+            unclear.setdefault(recorded, []).append(f"{name} reaches {largest:.4g}")
+        elif own is not None and given != unit and looks != unit:
+            unclear.setdefault(unit, []).append(f"{name} reaches {most:.4g} {unit} ({rename})")
+    inches = " (or inches: --outcome-unit in)"
+    ambiguities = tuple(
+        Ambiguity(
+            f"in {where}, {' and '.join(reached)}, too far for an arm"
+            + (f": it looks like {unit}{inches * (unit == 'cm')}" if unit not in said else ""),
+            f"--outcome-unit {unit}",
+        )
+        for unit, reached in unclear.items()
+    )
+    first = known_unit(wanted[0]) or wanted[0] if wanted else ""
+    sd_scale = conversion(outcomes.sd_unit, first, SD) if outcomes.sd_unit else [*scale, 1.0][0]
+    values, sd = outcomes.values * np.array(scale), outcomes.sd * sd_scale
+    converted = replace(outcomes, values=values, sd=sd, units=tuple(wanted), sd_unit=first)
+    return converted, ambiguities
+
+
+def missing_outcomes(episodes: Sequence[str], outcomes: Outcomes) -> list[str]:
+    """Return the episodes that a table lacks, by the rule of `outcomes_of`."""
+    picked = _matched(episodes, outcomes.episodes)
+    return [episode for episode in episodes if episode not in picked]
+
+
+def outcomes_of(
+    episodes: Sequence[str], outcomes: Outcomes, *, partial: bool
+) -> tuple[Points, Points]:
+    """Return each episode's outcome in order, and its standard deviation, each (N, k).
+
+    Episodes are matched by name, else by the number at the end of their names (`3` is `demo_003`).
+    With `partial`, outcomes of other episodes are no mistake.
+
+    Raises:
+        InvalidDemonstrationsError: Outcomes that are missing, not finite, or of unknown episodes;
+            each is named.
+    """
+    there = outcomes.episodes
+    picked, missing = _matched(episodes, there), missing_outcomes(episodes, outcomes)
+    if missing:
+        raise InvalidDemonstrationsError(
+            f"no outcome for episodes {listed(missing)} in {outcomes.where} (it has "
+            f"{listed(there) or 'none'}); measure and add them, or leave those episodes out"
+        )
+    unknown = [name for name in there if name not in picked.values()]
+    if unknown and not partial:
+        raise InvalidDemonstrationsError(
+            f"{outcomes.where} names episodes {listed(unknown)} that were not found (there are "
+            f"{listed(episodes)}); correct the names, or record them again"
+        )
+    rows = [there.index(picked[episode]) for episode in episodes]
+    values = outcomes.values[rows]
+    for episode, row in zip(episodes, values, strict=True):
+        if not np.all(np.isfinite(row)):
+            raise InvalidDemonstrationsError(
+                f"the outcome of episode {episode} is {row.tolist()}, expected finite numbers; "
+                "measure it, or leave that episode out"
+            )
+    return values, np.tile(outcomes.sd[rows, None], values.shape[1])
+
+
+def _matched(episodes: Sequence[str], names: Sequence[str]) -> dict[str, str]:
+    """Name in the table by episode; a number at the end of two names matches none."""
+    numbers, there = list(map(_digits_at_end, episodes)), list(map(_digits_at_end, names))
+    picked: dict[str, str] = {}
+    for episode, number in zip(episodes, numbers, strict=True):
+        if episode in names:
+            picked[episode] = episode
+        elif number and numbers.count(number) == 1 and there.count(number) == 1:
+            picked[episode] = names[there.index(number)]
+    return picked
+
+
+def _digits_at_end(name: str) -> str:
+    """The number at the end of a name, without leading zeros; empty if there is none."""
+    match = re.search(r"0*([0-9]+)$", name)
+    return match[1] if match else ""

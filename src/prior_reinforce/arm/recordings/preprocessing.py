@@ -1,0 +1,346 @@
+"""From recordings of any channels, rate and length to plans of one format and one horizon."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from enum import IntEnum
+from itertools import pairwise
+from typing import Annotated
+
+import numpy as np
+from jaxtyping import Float
+from msgspec import Meta
+
+from prior_reinforce.arm.recordings.clock import LONGEST
+from prior_reinforce.arm.recordings.recording import Recording
+from prior_reinforce.arm.recordings.units import say_names
+from prior_reinforce.arrays import Frames, Plans, Point
+from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
+from prior_reinforce.plans.signals import Signals, analyse, moving_ends, moving_rows
+from prior_reinforce.plans.speeds import Channels
+from prior_reinforce.settings import Checked, NonNegative, Positive
+
+_ON_GRID = 0.02
+"""A frame within this share of a time step of where it should be is taken as recorded. Ours: at
+2 rad/s and 100 Hz that is 0.4 mrad, below the servo's own error."""
+_OVERSHOOT = 0.01
+"""A spline that leaves a channel's recorded range by more than this share of it is refused."""
+_NOISE_OVERSHOOT = 5.0
+"""And by more than so many standard deviations of its noise: splines leave the range of noise by
+about as much as there is noise. Ours."""
+_WHOLE_RATE = 0.005
+"""A median period this share from a whole rate is that rate. Ours: clocks drift by less."""
+_GAP = 3
+"""Time without a frame is a gap from so many periods on. Ours: less is jitter of a recorder."""
+_STANDSTILL = 8
+"""And so many where the arm may have stood still. Ours: recorders that lose frames lose fewer."""
+_LITTLE, _SPARSE = 0.5, 0.1
+"""Share of a channel's largest step that is little across a gap, and share of steps that are late
+where a recorder writes changes only. Ours."""
+_FEWEST_FRAMES = 5
+"""Frames of which it can be said whether a channel moves at the ends."""
+_MANY_FRAMES, _ENOUGH_FRAMES = 400, 140
+"""Frames of a plan that are remarked on, and those that suffice: the throws of our own tasks have
+140 (ours). Learning takes time with every frame."""
+_MOST_FRAMES = 100_000
+"""Longest plan that is made; more is a wrong time step far more often than a motion."""
+
+
+@dataclass(frozen=True)
+class Preprocessing(Checked):
+    """How recordings become plans. Time is never stretched: a retimed throw is another throw."""
+
+    dt: Positive | None = None
+    """Time between two frames of a plan, in [s]; None takes the recordings' median period."""
+    horizon: Annotated[int, Meta(ge=2)] | None = None
+    """Frames of every plan; None takes the longest recording's. Shorter ones hold their last pose;
+    a longer one is an error, never cut."""
+    trim: bool = True
+    """Drop the still time before the first and after the last movement of each recording."""
+    smooth: Positive | None = None
+    """Frequency above which plans are smoothed, in [Hz]: a Butterworth filter of order 2, run
+    forwards and backwards, so that nothing is delayed. Steps and switches, such as grippers, are
+    left alone. None keeps every frame as recorded."""
+    margin: NonNegative = 0.1
+    """Still time that trimming keeps at either end, in [s]. Ours: enough for the plan to start
+    and end at rest at 30 frames a second."""
+
+
+@dataclass(frozen=True, eq=False)
+class Preprocessed:
+    """Plans, and how they were made."""
+
+    plans: Plans
+    dt: float
+    """Time between two frames, in [s]."""
+    starts: tuple[float, ...]
+    """Where in its recording each plan starts, in [s]."""
+    ends: tuple[float, ...]
+    """Where in its recording each plan ends, in [s], before the last pose is held."""
+    held: int
+    """How many plans hold their last pose to reach the horizon."""
+    held_channels: tuple[int, ...]
+    """Channels that no recording moves, noise aside."""
+    noise: Channels
+    """Standard deviation of each channel's noise at rest, in its unit."""
+    smoothed: Float[np.ndarray, "N 2 D"] | None
+    """What smoothing changed in each plan: rms and largest change; None where nothing was."""
+    remarks: tuple[str, ...]
+    """Warnings, the most important first: `episodes: what`."""
+
+
+def preprocess(
+    recordings: Sequence[Recording], units: Sequence[str], settings: Preprocessing
+) -> Preprocessed:
+    """Trim, resample and bring to one horizon.
+
+    Args:
+        recordings: N of them, each with the same D channels.
+        units: Of the D channels.
+        settings: How to trim, resample and smooth them.
+
+    Raises:
+        InvalidDemonstrationsError: An episode that never moves, or is longer than the horizon.
+    """
+    dt = settings.dt or _common_dt(recordings)
+    recordings = [_held_while_unchanged(recording) for recording in recordings]
+    every, units = [r.positions for r in recordings], tuple(units)
+    signals = analyse(every, units, float(np.median([r.period for r in recordings])))
+    spans = [(0.0, r.duration) for r in recordings]
+    if settings.trim:
+        spans = [_moving_span(r, signals.trim_band, settings.margin) for r in recordings]
+    sampled = [_resample(r, *s, dt, signals) for r, s in zip(recordings, spans, strict=True)]
+    pieces, changes = [piece for piece, _ in sampled], None
+    if settings.smooth is not None:
+        of_plans = analyse(pieces, units, dt)
+        smooth = [
+            _smoothed(recording, piece, dt, settings.smooth, units, of_plans)
+            for recording, piece in zip(recordings, pieces, strict=True)
+        ]
+        off = [after - before for before, after in zip(pieces, smooth, strict=True)]
+        changes = np.array([[np.sqrt(np.mean(o**2, axis=0)), np.abs(o).max(axis=0)] for o in off])
+        pieces = smooth
+    longest = max(map(len, pieces))
+    horizon = settings.horizon or longest
+    remarks: dict[tuple[_Kind, str], list[str]] = {}
+    for recording, (piece, jumping), span in zip(recordings, sampled, spans, strict=True):
+        if len(piece) > horizon:
+            raise InvalidDemonstrationsError(
+                f"episode {recording.episode} has {len(piece)} frames, more than the horizon "
+                f"{horizon}; give a horizon of {longest}, or a larger dt (motions are never cut)"
+            )
+        held = len(piece) < horizon
+        for remark in _remarks(recording, span, units, signals, jumping, held=held):
+            remarks.setdefault(remark, []).append(recording.episode)
+    longest_motion = max(end - start for start, end in spans)
+    if longest_motion > LONGEST:
+        what = (
+            f"motions take up to {longest_motion:.3g} s, and throws take seconds: cut the "
+            "recordings, or say in which unit their times are (--time-unit)"
+        )
+        remarks[_Kind.SLOW, what] = []
+    elif horizon > _MANY_FRAMES:
+        fewer = dt * horizon / _ENOUGH_FRAMES
+        what = f"{horizon} frames are many; dt {fewer:.2g} s makes {_ENOUGH_FRAMES}"
+        remarks[_Kind.LONG, what] = []
+    return Preprocessed(
+        np.stack([np.pad(p, ((0, horizon - len(p)), (0, 0)), mode="edge") for p in pieces]),
+        dt,
+        tuple(start for start, _ in spans),
+        tuple(end for _, end in spans),
+        sum(len(piece) < horizon for piece in pieces),
+        tuple(np.flatnonzero(signals.held).tolist()),
+        signals.noise,
+        changes,
+        tuple(
+            f"{'all' if len(e) in (0, len(every)) and len(every) > 1 else ', '.join(e)}: {what}"
+            for (_, what), e in sorted(remarks.items(), key=lambda item: item[0][0])
+        ),
+    )
+
+
+def at_rests(recording: Recording, rest: float) -> list[Recording]:
+    """Cut a recording wherever nothing moves for `rest` in [s], into `NAME-0`, `NAME-1`, ..."""
+    from scipy.ndimage import maximum_filter1d, minimum_filter1d
+
+    q, size = recording.positions, max(2, math.ceil(rest / recording.period))
+    if len(q) <= size:
+        return [recording]
+    band = analyse([q], [unit or "rad" for unit in recording.units], recording.period).trim_band
+    spread = maximum_filter1d(q, size, axis=0) - minimum_filter1d(q, size, axis=0)
+    still = np.all(spread[size // 2 : len(q) - (size - 1) // 2] <= band, axis=1)
+    covered = np.cumsum(np.append(still, np.zeros(size)) - np.append(np.zeros(size), still))
+    moves = (covered[: len(q)] == 0).astype(int)
+    begins, ends = (np.flatnonzero(np.diff(moves, prepend=0, append=0) == sign) for sign in (1, -1))
+    cuts = [0, *((begins[1:] + ends[:-1]) // 2).tolist(), len(q)]
+    return [
+        replace(
+            recording,
+            episode=f"{recording.episode}-{i}",
+            times=recording.times[a:b],
+            positions=q[a:b],
+        )
+        for i, (a, b) in enumerate(pairwise(cuts))
+    ]
+
+
+def copies(plans: Plans, names: Sequence[str]) -> str:
+    """Name two motions that are identical to the last bit, as no two recordings are; else "".
+
+    Either a file was copied, or one plan was executed twice and its outcomes differ by noise alone.
+    """
+    first: dict[bytes, str] = {}
+    for plan, name in zip(plans, names, strict=True):
+        other = first.setdefault(plan.tobytes(), name)
+        if other != name:
+            return (
+                f"{other} and {name} are one motion to the last number; if a file was copied, drop "
+                "it, and if one plan was executed twice, give it once, with the middle of where it "
+                "landed (--leave-out)"
+            )
+    return ""
+
+
+_Kind = IntEnum("_Kind", ["SLOW", "ENDS", "GAP", "READING", "STEP", "LONG"])
+"""What a remark is about, the most important first."""
+
+
+def _remarks(
+    recording: Recording,
+    span: tuple[float, float],
+    units: tuple[str, ...],
+    signals: Signals,
+    jumping: Sequence[str],
+    *,
+    held: bool,
+) -> Iterator[tuple[_Kind, str]]:
+    """Warnings about one episode: gaps, jumps, and ends in mid-swing."""
+    t, steps = recording.times, np.diff(recording.times)
+    within = (t[1:] > span[0]) & (t[:-1] < span[1])
+    still = np.all(np.diff(recording.positions, axis=0) == 0, axis=1)
+    worst = int(np.argmax(np.where(within & ~still, steps, 0.0)))
+    if not still[worst] and steps[worst] > _GAP * recording.period:
+        yield _Kind.GAP, f"nothing recorded for {steps[worst]:.3f} s at {t[worst]:.2f} s"
+    if jumping:
+        yield _Kind.STEP, f"{', '.join(jumping)} jumps; no spline goes through it"
+    for remark in recording.remarks:
+        yield _Kind.READING, remark
+    kept = (t >= span[0]) & (t <= span[1])
+    if np.count_nonzero(kept) < _FEWEST_FRAMES:
+        return
+    starts, ends = moving_ends(t[kept], recording.positions[kept], units, signals)
+    then = ", then holds its last pose" if held else ""
+    for moving, what in ((starts, "starts in motion"), (ends, f"ends in motion{then}")):
+        if np.any(moving):
+            names = [recording.names[i] for i in np.flatnonzero(moving)]
+            yield _Kind.ENDS, f"{what} ({say_names(names)})"
+
+
+def _smoothed(
+    recording: Recording,
+    frames: Frames,
+    dt: float,
+    frequency: float,
+    units: tuple[str, ...],
+    signals: Signals,
+) -> Frames:
+    """Frames without what is faster than a frequency, but for steps and switches."""
+    from scipy.signal import butter, sosfiltfilt
+
+    if frequency >= 0.5 / dt:
+        raise ConfigurationError(
+            f"--smooth {frequency:g} Hz is no less than half the plans' {1 / dt:g} Hz, where "
+            "nothing is faster; give less, or leave it out"
+        )
+    if frequency * len(frames) * dt < 1:
+        raise ConfigurationError(
+            f"--smooth {frequency:g} Hz takes out all that is faster than {1 / frequency:.3g} s, "
+            f"and episode {recording.episode} is {len(frames) * dt:.3g} s long; give more Hz"
+        )
+    sections = butter(2, frequency, fs=1 / dt, output="sos")
+    pad = min(len(frames) - 1, math.ceil(1 / (frequency * dt)))
+    # Mirrored at an end, a channel keeps its rest there; turned about it, its speed.
+    at_rest, moving = (
+        np.asarray(sosfiltfilt(sections, frames, axis=0, padtype=padding, padlen=pad))
+        for padding in ("even", "odd")
+    )
+    starts, ends = moving_ends(np.arange(len(frames)) * dt, frames, units, signals)
+    smooth = np.where(starts | ends, moving, at_rest)
+    return np.where(signals.jumps, frames, smooth)
+
+
+def _held_while_unchanged(recording: Recording) -> Recording:
+    """A recording that was written at changes only, with the poses that it held in between.
+
+    A gap across which every channel changes by little was no loss of frames in mid-swing: by less
+    than a frame of its swing, where frames are missing all over, else by much less.
+    """
+    t, q, period = recording.times, recording.positions, recording.period
+    steps, waits = np.abs(np.diff(q, axis=0)), np.diff(t)
+    long = waits > _STANDSTILL * period
+    share = 1.5 if np.mean(waits > 1.5 * period) > _SPARSE else _LITTLE
+    held = long & np.all(steps <= share * steps[~long].max(axis=0, initial=0.0), axis=1)
+    if not np.any(held):
+        return recording
+    kept = [np.arange(t[i] + period, t[i + 1] - period / 2, period) for i in np.flatnonzero(held)]
+    at = np.repeat(np.flatnonzero(held) + 1, [len(times) for times in kept])
+    remark = f"written at changes only: held still in between, up to {waits[held].max():.2f} s"
+    return replace(
+        recording,
+        times=np.insert(t, at, np.concatenate(kept)),
+        positions=np.insert(q, at, q[at - 1], axis=0),
+        remarks=(*recording.remarks, remark),
+    )
+
+
+def _common_dt(recordings: Sequence[Recording]) -> float:
+    """Median period, snapped to a whole rate that is within half a per cent of it."""
+    period = float(np.median([recording.period for recording in recordings]))
+    rate = round(1 / period)
+    return 1 / rate if rate > 0 and abs(rate * period - 1) < _WHOLE_RATE else period
+
+
+def _moving_span(recording: Recording, still: Point, margin: float) -> tuple[float, float]:
+    """From when to when a recording is kept, in [s]: its motion and a margin."""
+    t, rows = recording.times, moving_rows(recording.positions, still)
+    if rows is None:
+        raise InvalidDemonstrationsError(
+            f"episode {recording.episode} never moves by more than {still.max():.2g} from its "
+            "first pose; leave it out, or import without trimming"
+        )
+    # The last frame within the still band before the motion, and the first one after it.
+    before, after = rows[0] - 1, min(rows[1] + 1, len(t) - 1)
+    first = np.searchsorted(t, t[before] - margin, side="right") - 1
+    last = np.searchsorted(t, t[after] + margin)
+    return float(t[max(first, 0)]), float(t[min(last, len(t) - 1)])
+
+
+def _resample(
+    recording: Recording, start: float, end: float, dt: float, signals: Signals
+) -> tuple[Frames, list[str]]:
+    """Frames at start, start + dt, ... until the end is covered, and names of stepwise channels."""
+    t, q = recording.times, recording.positions
+    count = max(2, math.ceil((end - start) / dt - _ON_GRID) + 1)
+    if count > _MOST_FRAMES:
+        raise InvalidDemonstrationsError(
+            f"episode {recording.episode} makes {count} frames at dt {dt:g} s; give a larger dt, "
+            "or cut the recording"
+        )
+    grid = start + np.arange(count) * dt
+    nearest = np.clip(np.searchsorted(t, grid - dt / 2), 0, len(t) - 1)
+    if np.all(np.abs(t[nearest] - grid) <= _ON_GRID * dt):
+        return q[nearest], []
+    from scipy.interpolate import CubicSpline, PchipInterpolator
+
+    at = np.clip(grid, t[0], t[-1])
+    frames = CubicSpline(t, q)(at) if len(t) > 3 else PchipInterpolator(t, q)(at)
+    low, high = q.min(axis=0), q.max(axis=0)
+    beyond = np.maximum(low - frames.min(axis=0), frames.max(axis=0) - high)
+    stepwise = (beyond > _OVERSHOOT * (high - low)) & (beyond > _NOISE_OVERSHOOT * signals.noise)
+    stepwise &= ~signals.held
+    if np.any(stepwise):
+        # PCHIP never leaves the range of its neighbours: right for grippers and switches.
+        frames[:, stepwise] = PchipInterpolator(t, q[:, stepwise])(at)
+    return frames, [n for n, s in zip(recording.names, stepwise, strict=True) if s]

@@ -1,0 +1,267 @@
+"""One episode as recorded, and what the readers of all formats share."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from prior_reinforce.arm.recordings.bounds import check_names
+from prior_reinforce.arm.recordings.clock import Clock, Times, says_time
+from prior_reinforce.arm.recordings.units import CHANNEL_UNITS, Ambiguity, say_names, split_unit
+from prior_reinforce.arm.robots.limits import says_no_position
+from prior_reinforce.arrays import Point
+from prior_reinforce.errors import FileFormatError, InvalidDemonstrationsError, PriorReinforceError
+from prior_reinforce.files import without_advice
+
+Positions = Float[np.ndarray, "T D"]
+"""D channels at T times, in their units."""
+Episodes = Iterable[tuple[str, Callable[[], "Recording"]]]
+"""What a format's reader yields: names, and how to read each; left-out episodes are never read."""
+_POINTER = b"version https://git-lfs.github.com/spec/"
+_LARGEST_POINTER, _MOST_FILES = 1024, 5_000
+"""Bytes of a Git LFS pointer (its specification), and files that are looked through for one."""
+NO_COLUMN = "none"
+"""Value of `time_column` by which no times are read, and of `episode_column`."""
+EPISODE_COLUMNS = tuple(
+    name + ending
+    for name in ("episode", "throw", "trial", "demo", "run", "wurf", "versuch", "essai", "tiro")
+    for ending in ("", "_id", "_index", "_number")
+)
+"""Names of a column that says of which episode a row is."""
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """One demonstration before trimming and resampling: uneven times, any channels."""
+
+    episode: str
+    """Name within its source, by which outcomes and messages refer to it."""
+    times: Times
+    """Time of each frame from the first, strictly increasing."""
+    positions: Positions
+    """Positions in the recorder's units."""
+    names: tuple[str, ...] = ()
+    """Names of the D channels as recorded, without units (`x_cm` is `x`); `joint1`, `joint2`, ...
+    if the file names none."""
+    outcome: Point | None = None
+    """Where the object landed, for the rare file that holds it."""
+    remarks: tuple[str, ...] = ()
+    """Notes on how it was read."""
+    units: tuple[str | None, ...] = ()
+    """Unit of each channel in the file; None if it states none. Empty takes those in the names."""
+    clock: str = ""
+    """Source of the times, for a person: `t in ms`."""
+    ambiguities: tuple[Ambiguity, ...] = ()
+    """What is only inferred of the times."""
+    columns: tuple[str, ...] = ()
+    """The file's own names of the D channels, if not `names`: numbered columns that are taken as
+    the joints in order."""
+    left_out: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    """Least and greatest value of other channels that move, by name."""
+    named: bool = field(init=False)
+    """Whether the file names the channels."""
+
+    def __post_init__(self) -> None:
+        """Copy and check.
+
+        Raises:
+            InvalidDemonstrationsError: Shapes that do not fit, fewer than two frames, repeated
+                names, or times that are not finite or do not increase.
+            FileFormatError: Names that are too long.
+        """
+        check_names("a recording", (self.episode, *self.names, *self.columns))
+        episode = f"episode {self.episode}"
+        try:
+            times = np.array(self.times, dtype=np.float64)
+            positions = np.array(self.positions, dtype=np.float64)
+        except (TypeError, ValueError, OverflowError) as error:
+            raise InvalidDemonstrationsError(
+                f"{episode} must hold numbers: {error}; mend or drop it"
+            ) from error
+        width = positions.shape[1] if positions.ndim == 2 else 0
+        names = tuple(map(str, self.names)) or tuple(f"joint{i + 1}" for i in range(width))
+        names, units = without_units(names) if not self.units else (names, tuple(self.units))
+        fits = positions.shape == (times.size, len(names)) and len(names) > 0
+        if times.ndim != 1 or not fits or times.size < 2:
+            raise InvalidDemonstrationsError(
+                f"{episode} has times {times.shape} and positions {positions.shape} for "
+                f"{len(names)} channels; expected (T,) and (T, {len(names)}) with T >= 2: mend or "
+                "drop it"
+            )
+        repeated = [name for name, count in Counter(names).items() if count > 1]
+        if repeated:
+            raise InvalidDemonstrationsError(
+                f"{episode} repeats a channel name: {say_names(repeated)}; rename the channels"
+            )
+        bad = np.flatnonzero(~np.isfinite(times))
+        if bad.size:
+            raise InvalidDemonstrationsError(
+                f"{episode}: time is {times[bad[0]]} at frame {bad[0]}, expected a finite number; "
+                "mend or drop that episode"
+            )
+        # A frame that repeats the one before, time and all; another at the same time is an error.
+        same = (np.diff(times) == 0) & np.all(np.diff(positions, axis=0) == 0, axis=1)
+        remarks = self.remarks
+        if np.any(same) and not np.all(same):
+            kept = np.concatenate([[True], ~same])
+            times, positions = times[kept], positions[kept]
+            remarks += (f"{same.sum()} frames were recorded twice; once is kept",)
+        if np.any(np.diff(times) <= 0):
+            frame = int(np.argmax(np.diff(times) <= 0)) + 1
+            raise InvalidDemonstrationsError(
+                f"{episode}: time does not increase at frame {frame} ({times[frame - 1]:g} s, then "
+                f"{times[frame]:g} s); sort or drop those frames"
+            )
+        times -= times[0]
+        times.setflags(write=False)
+        positions.setflags(write=False)
+        checked = {
+            "times": times, "positions": positions, "named": bool(self.names), "names": names,
+            "units": units, "columns": tuple(self.columns) or names, "remarks": remarks,
+        }  # fmt: skip
+        if self.outcome is not None:
+            checked["outcome"] = np.atleast_1d(np.array(self.outcome, dtype=np.float64))
+        for name, value in checked.items():
+            object.__setattr__(self, name, value)
+
+    @property
+    def duration(self) -> float:
+        """Time from the first to the last frame, in [s]."""
+        return float(self.times[-1])
+
+    @property
+    def period(self) -> float:
+        """Median time between two frames, in [s]."""
+        return float(np.median(np.diff(self.times)))
+
+
+def recorded(
+    episode: str, clock: Clock, positions: Positions, names: tuple[str, ...] = (), **more: Any
+) -> Recording:
+    """Return a recording at the times of a clock; `more` are further fields."""
+    said = {"clock": clock.source, "ambiguities": clock.ambiguities} | more
+    return Recording(episode, clock.times, positions, names, **said)
+
+
+def joined(
+    keys: Sequence[str], arrays: Mapping[str, np.ndarray], names: Sequence[str] = ()
+) -> tuple[Positions, tuple[str, ...]]:
+    """Put arrays (T,) and (T, D) of the same frames side by side; `names` are of the first.
+
+    Returns the positions, and their names; none where neither the file nor several keys name them.
+    """
+    columns = [arrays[key] if arrays[key].ndim > 1 else arrays[key][:, None] for key in keys]
+    if len({len(column) for column in columns}) > 1:
+        each = ", ".join(f"{key} has {len(arrays[key])}" for key in keys)
+        raise FileFormatError(f"the arrays have different frames: {each}; take one of them")
+    first = columns[0].shape[1]
+    said = list(names) if len(names) == first else []
+    if len(keys) > 1:
+        said = said or [f"joint{i + 1}" for i in range(first)]
+        for key, column in zip(keys[1:], columns[1:], strict=True):
+            width = column.shape[1]
+            said += [key if width == 1 else f"{key}_{i}" for i in range(width)]
+    return np.concatenate(columns, axis=1).astype(np.float64), tuple(said)
+
+
+def moves_beside(
+    keys: Sequence[str], arrays: Mapping[str, np.ndarray]
+) -> dict[str, tuple[float, float]]:
+    """Return the range of each array of the same frames that moves and is not taken.
+
+    Velocities, times and the like are no positions, and what is as wide as the motion is another
+    reading of it, such as its commands.
+    """
+    motion, found = arrays[keys[0]], {}
+    width = motion.shape[1] if motion.ndim > 1 else 1
+    for name, values in arrays.items():
+        if name in keys or values.ndim not in (1, 2) or len(values) != len(motion):
+            continue
+        narrow = values.ndim == 1 or values.shape[1] < max(width, 2)
+        own = name.rpartition("/")[2]
+        if not narrow or values.dtype.kind not in "fiu" or says_no_position(own):
+            continue
+        columns = values.reshape(len(values), -1).astype(np.float64)
+        columns = columns[:, np.all(np.isfinite(columns), axis=0)]
+        moving = columns[:, np.ptp(columns, axis=0) > 0] if len(columns) > 1 else columns[:, :0]
+        if moving.size and not says_time(own) and not np.all(np.diff(moving, axis=0) > 0):
+            found[name] = float(moving.min()), float(moving.max())
+    return found
+
+
+def unread() -> Recording:
+    """Stand for an episode that was left out before any of it was read."""
+    raise AssertionError("left-out episodes are never read")
+
+
+def without_units(names: Sequence[str]) -> tuple[tuple[str, ...], tuple[str | None, ...]]:
+    """Return names without units, and the units; names that would then coincide all stay."""
+    split = [split_unit(name, CHANNEL_UNITS) for name in names]
+    bare = tuple(name for name, _ in split)
+    units = tuple(unit for _, unit in split)
+    return (bare if len(set(bare)) == len(set(names)) else tuple(names)), units
+
+
+@contextmanager
+def named_damage(path: Path, what: str) -> Iterator[None]:
+    """Turn whatever a format's library raises on a damaged file into one FileFormatError.
+
+    Broad on purpose: parsers raise anything on damaged bytes (struct.error, UnicodeDecodeError,
+    RuntimeError, KeyError, their own classes). Keep only parsing inside.
+    """
+    try:
+        yield
+    except PriorReinforceError:
+        raise
+    except Exception as error:
+        words = without_advice(error).split("\n")[0][:200] or "no reason given"
+        raise FileFormatError(
+            f"cannot read {path} as {what} ({type(error).__name__}: {words}); it is damaged or "
+            "something else: copy it again from where it was recorded, or say its format"
+        ) from error
+
+
+def refuse_pointers(source: Path) -> None:
+    """Raise FileFormatError if a file is what Git LFS leaves in the place of one."""
+    for path in [source] if source.is_file() else islice(sorted(source.rglob("*")), _MOST_FILES):
+        if path.is_file() and path.stat().st_size < _LARGEST_POINTER:
+            with path.open("rb") as file:
+                if file.read(len(_POINTER)) == _POINTER:
+                    raise FileFormatError(
+                        f"{path} is a Git LFS pointer, not the file itself; fetch it: git lfs pull"
+                    )
+
+
+def natural_order(name: object) -> tuple[tuple[int, str], ...]:
+    """Return a sort key by which `demo_10` follows `demo_9`."""
+    parts = re.split(r"([0-9]+)", str(name))
+    # By length and digits: Python makes no number of 5,000 digits.
+    digits = [part.lstrip("0") if i % 2 else part for i, part in enumerate(parts)]
+    return tuple((len(d), d) if i % 2 else (-1, d) for i, d in enumerate(digits))
+
+
+def files_at(source: Path, suffixes: tuple[str, ...]) -> list[Path]:
+    """Return a file itself, or a folder's files with one of the suffixes, in natural order."""
+    if not source.is_dir():
+        return [source]
+    found = [path for path in source.iterdir() if path.is_file() and has_suffix(path, suffixes)]
+    return sorted((path for path in found if path.stem != "outcomes"), key=natural_order)
+
+
+def has_suffix(path: Path, suffixes: tuple[str, ...]) -> bool:
+    """Whether a name ends in one of the suffixes, in capitals or not."""
+    return path.suffix.lower() in suffixes
+
+
+def has_files(source: Path, suffixes: tuple[str, ...]) -> bool:
+    """Whether a file has one of the suffixes, or a folder holds one that has."""
+    return bool(files_at(source, suffixes)) and (source.is_dir() or has_suffix(source, suffixes))

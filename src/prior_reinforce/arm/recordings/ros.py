@@ -1,0 +1,321 @@
+"""ROS 1 bags, ROS 2 sqlite bags and MCAP, read with rosbags (no ROS needed).
+
+A sensor_msgs/JointState topic gives one episode a bag; a trajectory_msgs/JointTrajectory topic one
+a message. Joints are matched by name in every message, because nothing fixes their order.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Hashable, Sequence
+from functools import partial
+from itertools import pairwise
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from prior_reinforce.arm.recordings.bounds import check_names, check_numbers
+from prior_reinforce.arm.recordings.clock import Times
+from prior_reinforce.arm.recordings.naming import find_channels
+from prior_reinforce.arm.recordings.options import ReadOptions
+from prior_reinforce.arm.recordings.recording import (
+    Episodes,
+    Positions,
+    Recording,
+    has_suffix,
+    named_damage,
+    natural_order,
+    recorded,
+    unread,
+)
+from prior_reinforce.arm.recordings.units import say_names
+from prior_reinforce.errors import ConfigurationError, FileFormatError
+from prior_reinforce.files import require_inside
+
+_SUFFIXES = (".bag", ".mcap", ".db3")
+_BAG = "a ROS bag, complete once its recorder ended (else: mcap recover, or ros2 bag reindex)"
+_HEADER, _RECORDER = "header", "recorder"
+_JUMP, _DRIFT = 1e8, 0.05
+"""By how much the two clocks of a bag may part within a message, in [ns], and drift apart as a
+share. Ours: queues hold messages for some 10 ms."""
+_MOVES, _LEAP, _OFTEN = 0.02, 0.5, 0.05
+"""Range in [rad] or [m] that is a motion; part of it that is a leap; share of frames in which no
+joint leaps, but two publishers do in turn. Ours."""
+_STATE, _TRAJECTORY = "sensor_msgs/msg/JointState", "trajectory_msgs/msg/JointTrajectory"
+
+
+class Message(NamedTuple):
+    """A message of a topic."""
+
+    stamp: int
+    """When the recorder got it, in [ns]."""
+    publisher: int
+    """Number of its connection."""
+    content: Any
+
+    @property
+    def positions(self) -> dict[str, float]:
+        """Position by joint."""
+        return dict(zip(self.content.name, self.content.position, strict=True))
+
+
+def recognises(source: Path) -> bool:
+    """Whether a path looks like a bag, or a folder that holds one."""
+    return bool(_bags_at(source))
+
+
+def read(source: Path, options: ReadOptions) -> Episodes:
+    """Read a bag, or every bag of a folder."""
+    from rosbags.highlevel import AnyReader
+    from rosbags.typesys import Stores, get_typestore
+
+    bags = _bags_at(source)
+    if not bags:
+        raise FileFormatError(
+            f"{source} is no bag and holds none; expected .bag, .mcap, .db3 or a ROS 2 bag's folder"
+        )
+    for bag in bags:
+        name = bag.name if bag.is_dir() else bag.stem
+        wanted = options.episodes or (name,)
+        if name in (options.leave_out or ()) or not any(
+            e == name or e.startswith(f"{name}-") for e in wanted
+        ):
+            yield name, unread
+            continue
+        # A link inside could name any file of this machine.
+        for path in bag.iterdir() if bag.is_dir() else ():
+            require_inside(path, bag)
+        files = _files_of(bag) if bag.is_dir() else [bag]
+        if len(files) > 1:
+            raise FileFormatError(
+                f"{bag} holds {len(files)} files of a bag and no metadata.yaml, as a recorder that "
+                f"was killed leaves it; write it anew: ros2 bag reindex {bag}"
+            )
+        with named_damage(bag, _BAG):
+            # Bags from before ROS 2 Iron carry no definitions; these two messages never changed.
+            definitions = get_typestore(Stores.LATEST)
+            with AnyReader(files, default_typestore=definitions) as reader:
+                check_numbers(bag, "all topics", (reader.message_count,))
+                topics = [_topic(bag, reader, key) for key in options.key or (None,)]
+                messages, *beside = (
+                    [
+                        Message(stamp, connection.id, reader.deserialize(raw, connection.msgtype))
+                        for connection, stamp, raw in reader.messages(connections=connections)
+                    ]
+                    for connections, _ in topics
+                )
+                (connections, kind), *_ = topics
+                there = {c.topic for c in reader.connections if _may_move(c)}
+                unread_topics = sorted(there - {of_topic[0].topic for of_topic, _ in topics})
+        if not messages:
+            raise FileFormatError(
+                f"{bag}: topic {connections[0].topic} has no messages; drop that bag, or leave it "
+                "out with --leave-out"
+            )
+        if kind == _STATE:
+            yield name, partial(_states, bag, name, messages, options, beside, unread_topics)
+            continue
+        for index, message in enumerate(messages):
+            episode = name if len(messages) == 1 else f"{name}-{index}"
+            yield episode, partial(_trajectory, bag, episode, message.content, options)
+
+
+def _bags_at(source: Path) -> list[Path]:
+    """The bags a path stands for: itself, or those of its folder; empty if there are none."""
+    if not source.is_dir() or (source / "metadata.yaml").is_file():
+        return [source] if _is_bag(source) else []
+    found = source.iterdir()
+    return sorted(filter(_is_bag, found), key=natural_order)
+
+
+def _is_bag(path: Path) -> bool:
+    return (path.is_file() and has_suffix(path, _SUFFIXES)) or _files_of(path) != []
+
+
+def _files_of(folder: Path) -> list[Path]:
+    """What to open of a bag's folder: itself, or its only file where its recorder was killed."""
+    if not folder.is_dir():
+        return []
+    if (folder / "metadata.yaml").is_file():
+        return [folder]
+    return [path for path in folder.iterdir() if path.is_file() and has_suffix(path, _SUFFIXES)]
+
+
+def _may_move(connection: Any) -> bool:
+    """Whether a topic that is not read could hold a part of the motion."""
+    says = re.search("grip|finger|hand|jaw", connection.topic, re.IGNORECASE)
+    number = connection.msgtype.startswith("std_msgs/msg/Float")
+    return connection.msgtype == _STATE or (number and says is not None)
+
+
+def _topic(bag: Path, reader: Any, key: str | None) -> tuple[list[Any], str]:
+    usable = {c.topic: c.msgtype for c in reader.connections if c.msgtype in (_STATE, _TRAJECTORY)}
+    if key is None and len(usable) == 1:
+        key = next(iter(usable))
+    if key not in usable:
+        listed = ", ".join(f"{topic} ({kind})" for topic, kind in sorted(usable.items()))
+        raise FileFormatError(
+            f"{bag}: {'no joint topic ' + key if key else f'{len(usable)} joint topics'}; topics "
+            f"of JointState or JointTrajectory are {listed or 'none'}: say which with the key"
+        )
+    return [c for c in reader.connections if c.topic == key], usable[key]
+
+
+def _states(
+    bag: Path,
+    name: str,
+    messages: list[Message],
+    options: ReadOptions,
+    beside: Sequence[list[Message]],
+    unread_topics: Sequence[str],
+) -> Recording:
+    """One episode of JointStates of one publisher.
+
+    Joints that other messages or topics hold are taken at the first ones' times.
+    """
+    every = list(dict.fromkeys(joint for m in messages for joint in m.content.name))
+    check_names(bag, every)
+    if not any(every):
+        raise FileFormatError(
+            f"{bag}: its messages name no joint, so nothing says which number is which; record "
+            "again with names (the driver's or the bridge's setting), or write the positions as CSV"
+        )
+    # Messages are matched by recorded names only.
+    found = None if options.joints is None else find_channels(options.joints, every)
+    wanted = options.joints if found is None else tuple(every[i] for i in found)
+    if wanted is None:
+        wanted = Counter(tuple(sorted(m.content.name)) for m in messages).most_common(1)[0][0]
+    kept = [m for m in messages if set(wanted) <= set(m.content.name)]
+    if not kept:
+        raise FileFormatError(
+            f"{bag}: no message holds all of {list(wanted)}; joints in it are {say_names(every)}: "
+            "name those"
+        )
+    kept, remarks = _of_one_publisher(bag, [m for m in kept if len(m.content.position)], wanted)
+    if len(kept) < len(messages):
+        remarks.append(f"{len(messages) - len(kept)} messages without all joints skipped")
+    if unread_topics:
+        remarks.append(f"not read: topics {', '.join(unread_topics)} (--key given again takes one)")
+    # Other channels of these messages, such as fingers, stay available by name.
+    names = tuple(n for n in kept[0].content.name if all(n in m.content.name for m in kept))
+    with named_damage(bag, _BAG):
+        positions = _positions(kept, names)
+        came = [m.stamp for m in kept]
+        others = [m for m in messages if not set(wanted) <= set(m.content.name)]
+        for of_topic in (others, *beside):
+            own = [m for m in of_topic if len(m.content.position)]
+            for joint in dict.fromkeys(n for m in own for n in m.content.name if n not in names):
+                at, values = zip(
+                    *((m.stamp, m.positions[joint]) for m in own if joint in m.positions),
+                    strict=True,
+                )
+                names = (*names, joint)
+                positions = np.column_stack([positions, np.interp(came, at, values)])
+    header = [m.content.header.stamp for m in kept]
+    sent = [stamp.sec * 10**9 + stamp.nanosec for stamp in header]
+    times, source, said = _clock_of(bag, sent, came, options.time_column)
+    clock = options.clock(name, len(kept), stamps=times, name=source, unit="ns")
+    return recorded(name, clock, positions, names, remarks=(*remarks, *said))
+
+
+def _of_one_publisher(
+    bag: Path, messages: list[Message], wanted: Sequence[str]
+) -> tuple[list[Message], list[str]]:
+    """The messages of the only publisher whose joints move, and what is said of others.
+
+    Publishers of one topic are told apart by connection (ROS 1), frame, and which joints they name.
+    FileFormatError if none has positions, or several move.
+    """
+    if not messages:
+        raise FileFormatError(
+            f"{bag}: its messages hold no positions (velocities or efforts alone); record the "
+            "topic that has positions, or say it with --key"
+        )
+    groups: dict[Hashable, list[Message]] = {}
+    for m in messages:
+        key = m.publisher, m.content.header.frame_id, frozenset(m.content.name)
+        groups.setdefault(key, []).append(m)
+    spans = [(own[0].stamp, own[-1].stamp) for own in groups.values()]
+    each = [messages]  # of one that came again, one after the other
+    if any(start <= end for (_, end), (start, _) in pairwise(sorted(spans))):
+        each = [
+            own for own in groups.values() if np.ptp(_positions(own, wanted), axis=0).max() > _MOVES
+        ]
+    if len(each) != 1 or _leaps(each[0], wanted):
+        counts = " and ".join(str(len(own)) for own in groups.values())
+        raise FileFormatError(
+            f"{bag}: its messages ({counts}) are of several publishers that disagree about the "
+            "same joints; record one of them alone (`ros2 topic info -v TOPIC` names them), or "
+            "write its positions as CSV"
+        )
+    rest = len(messages) - len(each[0])
+    return each[0], [f"{rest} messages of another publisher, whose joints hold still"] * (rest > 0)
+
+
+def _positions(messages: list[Message], joints: Sequence[str]) -> Positions:
+    rows = [[at[joint] for joint in joints] for at in (m.positions for m in messages)]
+    return np.array(rows, dtype=float)
+
+
+def _leaps(messages: list[Message], joints: Sequence[str]) -> bool:
+    """Whether a joint leaps time and again, as two publishers in turn make it do."""
+    q = _positions(messages, joints)
+    ranges = np.maximum(np.ptp(q, axis=0), _MOVES)
+    steps = np.diff(q, axis=0) / ranges
+    there, back = (np.mean(sign * steps > _LEAP, axis=0) for sign in (1, -1))
+    return bool(np.any(np.minimum(there, back) > _OFTEN))
+
+
+def _clock_of(
+    bag: Path, header: list[int], recorder: list[int], asked: str | None
+) -> tuple[Times, str, list[str]]:
+    """The times of messages: as they were stamped, unless that clock is unusable or jumps.
+
+    The recorder's clock holds them in a queue, and so is late and uneven; but where the header's
+    jumps and the recorder's does not, the header's was set meanwhile.
+    """
+    sent, came = _since_first(header), _since_first(recorder)
+    names = {_HEADER: (sent, "header stamps"), _RECORDER: (came, "the recorder's stamps")}
+    if asked not in (None, *names):
+        raise ConfigurationError(
+            f"--time-column {asked} is no clock of a bag; give {_HEADER} or {_RECORDER}"
+        )
+    if asked is not None:
+        return *names[asked], []
+    if header[0] <= 0 or np.any(np.diff(sent) < 0) or sent[-1] == 0:
+        why = "header stamps unusable, times are those of the recorder"
+        return *names[_RECORDER], [why]
+    period = float(np.median(np.diff(sent)))
+    apart = np.diff(sent - came)
+    frame = int(np.argmax(np.abs(apart)))
+    jump, rest = apart[frame], float(np.sum(apart) - apart[frame])
+    if abs(jump) > max(_JUMP, 3 * period) and abs(rest) < abs(jump) / 2:
+        if np.diff(came)[frame] <= 3 * max(period, float(np.median(np.diff(came)))):
+            why = (
+                f"header stamps jump by {jump * 1e-9:+.3f} s at {came[frame] * 1e-9:.2f} s, the "
+                "recorder's do not: times are those of the recorder"
+            )
+            return *names[_RECORDER], [why]
+    elif abs(sent[-1] - came[-1]) > max(_JUMP, _DRIFT * came[-1]) and came[-1] > 0:
+        raise FileFormatError(
+            f"{bag}: header stamps last {sent[-1] * 1e-9:.3g} s, the recorder's "
+            f"{came[-1] * 1e-9:.3g} s; say which are right: --time-column {_HEADER}, or {_RECORDER}"
+        )
+    return *names[_HEADER], []
+
+
+def _since_first(stamps: list[int]) -> Times:
+    """Nanoseconds since the first stamp; since 1970 they would be 256 ns coarse as floats."""
+    return np.array([stamp - stamps[0] for stamp in stamps], dtype=np.float64)
+
+
+def _trajectory(bag: Path, episode: str, message: Any, options: ReadOptions) -> Recording:
+    with named_damage(bag, _BAG):
+        times = [p.time_from_start.sec + p.time_from_start.nanosec * 1e-9 for p in message.points]
+        positions = np.array([p.positions for p in message.points], dtype=np.float64)
+        positions = positions.reshape(len(times), -1)
+        stamps, name = np.array(times), "time_from_start"
+        clock = options.clock(episode, len(times), stamps=stamps, name=name, unit="s")
+        return recorded(episode, clock, positions, tuple(message.joint_names))

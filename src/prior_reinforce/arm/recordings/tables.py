@@ -1,0 +1,324 @@
+"""Tables as people export them: CSV of any dialect.
+
+Encoding, delimiter and decimal sign are inferred from its lines: the pair that makes most
+cells numbers, in rows of one width. (`csv.Sniffer` knows no decimal comma.) Comment lines (`#`,
+`%`, `//`) are dropped, except one right above the first row that names the columns, as
+`numpy.savetxt` writes it.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+import re
+from collections import Counter
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+from datetime import datetime, timedelta
+from functools import cached_property
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from prior_reinforce.arm.recordings.bounds import check_bytes, check_names, check_table
+from prior_reinforce.arm.recordings.recording import named_damage
+from prior_reinforce.arm.recordings.units import known_unit, split_unit
+from prior_reinforce.errors import FileFormatError
+
+Column = Float[np.ndarray, " T"]
+"""Numbers of T rows."""
+DELIMITERS = {"comma": ",", "semicolon": ";", "tab": "\t", "space": r"\s+"}
+"""How the command line names what stands between two cells."""
+_COMMENTS = ("#", "%", "//")
+_SAMPLE = 40
+"""Lines from which a dialect is inferred."""
+_WESTERN = set("°µ²³äöüÄÖÜßàâçéèêëîïôùûñÀÉÈáíóúãõåæøÅÆØ")
+"""Non-ASCII characters in tables that a Western Excel saves in its own code page."""
+_COMMA = re.compile(r"[+-]?(0,\d{3}|\d+,(\d{1,2}|\d{4,}))")
+_LIST = re.compile(r"\s*[\[(]\s*[-+.\deE]+([,\s]+[-+.\deE]+)+\s*[\])]\s*")
+_DATE = re.compile(r"\d{4}-\d\d-\d\d|\d{1,2}:\d\d")
+_MOMENT = re.compile(
+    r"(\d{4})-?(\d\d)-?(\d\d)(?:[T ](\d\d):?(\d\d)(?::?(\d\d)(?:[.,](\d{1,9})\d*)?)?)?"
+    r" ?(?:Z|UTC|([+-]\d\d):?(\d\d)?)?"
+)
+"""ISO 8601."""
+_SPAN = re.compile(r"([+-]?)(?:(\d+) days? \+?)?(\d+):([0-5]\d):([0-5]\d)(?:[.,](\d{1,9})\d*)?")
+_SECOND_ROW_OF_UNITS = re.compile(r"[\[(]?[A-Za-zµμ°/^*·0-9.%-]{0,12}[\])]?")
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """Rows of cells under names."""
+
+    where: str
+    """File, and sheet where it has several, for messages."""
+    names: tuple[str, ...]
+    """Names of the columns; `column 1`, ... where the file has no line of names."""
+    named: bool
+    """Whether the file names them."""
+    units: tuple[str | None, ...]
+    """From a row of units under the names; None where it says none."""
+    cells: tuple[Sequence[str], ...]
+    """Texts by column; whole numbers of a workbook without `.0`."""
+    lines: tuple[int, ...]
+    """Line or row of the file that each row stands in, from 1."""
+    decimal: str = "."
+
+    def __len__(self) -> int:
+        """Number of rows."""
+        return len(self.lines)
+
+    def rows(self, kept: Sequence[int]) -> Table:
+        """Return the table with some of its rows."""
+        cells = tuple([column[i] for i in kept] for column in self.cells)
+        return replace(self, cells=cells, lines=tuple(self.lines[i] for i in kept))
+
+    @cached_property
+    def values(self) -> Float[np.ndarray, "T C"]:
+        """The cells as numbers; nan where one is none."""
+        columns = [[_number(cell, self.decimal) for cell in column] for column in self.cells]
+        return np.array(columns, dtype=float).reshape(len(self.names), len(self)).T
+
+    def numbers(self, column: int) -> Column:
+        """Return a column as numbers; FileFormatError names the line of a cell that is none."""
+        for i in np.flatnonzero(np.isnan(self.values[:, column])).tolist():
+            text = self.cells[column][i]
+            if text.lower() not in ("nan", "+nan", "-nan"):
+                raise FileFormatError(
+                    f"{self.where}, line {self.lines[i]}: {self.names[column]} is {text[:40]!r}, "
+                    "expected a number; mend that cell, or keep other columns"
+                )
+        return self.values[:, column]
+
+    def columns(self, chosen: Sequence[int]) -> Float[np.ndarray, "T D"]:
+        """Return some columns as numbers, as `numbers` does."""
+        return np.column_stack([self.numbers(i) for i in chosen] or [np.zeros((0, 0))])
+
+    def is_number(self, column: int) -> bool:
+        """Whether every cell of a column is a number."""
+        return not np.any(np.isnan(self.values[:, column]))
+
+    def is_text(self, column: int) -> bool:
+        """Whether no cell of a column is a number."""
+        return bool(np.all(np.isnan(self.values[:, column])))
+
+    def nanoseconds(self, column: int) -> Int[np.ndarray, " T"] | None:
+        """Return dates or times of day from the first on, in [ns]; None where it holds others."""
+        if self.is_number(column):
+            return None
+        found = [_moment(cell) for cell in self.cells[column]]
+        if None in found:
+            found = [_span(cell) for cell in self.cells[column]]
+        if None in found:
+            return None
+        return np.array([time - found[0] for time in found], dtype=np.int64)  # type: ignore[operator]
+
+
+def read_table(
+    path: Path, delimiter: str | None = None, decimal: str | None = None, head: Collection[str] = ()
+) -> Table:
+    """Read a CSV; its delimiter (a name in `DELIMITERS` or itself) and decimal sign are inferred.
+
+    The line of names has one of `head`, and rows above are titles. FileFormatError if it is none.
+    """
+    with named_damage(path, "a table"):
+        return _read_csv(path, DELIMITERS.get(delimiter or "", delimiter), decimal, head)
+
+
+def _read_csv(
+    path: Path, delimiter: str | None, decimal: str | None, head: Collection[str]
+) -> Table:
+    check_bytes(path, path.stat().st_size)
+    with path.open("rb") as file:  # counted before they are split, which takes far more memory
+        check_table(
+            path, sum(block.count(b"\n") for block in iter(lambda: file.read(2**20), b"")), 1
+        )
+    kept = [(i, line) for i, line in enumerate(_decoded(path).splitlines(), 1) if line.strip()]
+    data = [(i, line) for i, line in kept if not line.lstrip().startswith(_COMMENTS)]
+    if not data:
+        return Table(str(path), (), False, (), (), ())
+    # A first line `sep=;` is Excel's own.
+    said = re.fullmatch(r"sep=(.)", data[0][1].strip())
+    if said and len(data) > 1:
+        delimiter, data = delimiter or said[1], data[1:]
+    sample = [line for _, line in data[:_SAMPLE]]
+    check_table(path, 1, 1 + max(line.count(mark) for line in sample for mark in ",;\t"))
+    delimiter, decimal = _dialect(sample, delimiter, decimal)
+    check_table(path, len(data), max(len(_split(line, delimiter)) for _, line in data))
+    mark, lines = delimiter, [line for _, line in data]
+    if delimiter == DELIMITERS["space"]:
+        mark, lines = " ", [line.strip().replace("\t", " ") for line in lines]
+    cells = csv.reader(
+        (f"{line}\n" for line in lines), delimiter=mark, skipinitialspace=True, strict=True
+    )
+    rows = [(data[cells.line_num - 1][0], [cell.strip() for cell in row]) for row in cells]
+    width = max(len(row) for _, row in rows)
+    rows = [(i, row + [""] * (width - len(row))) for i, row in rows]
+    above = [line for i, line in kept if i == data[0][0] - 1 and (i, line) not in data]
+    title = [c.strip() for c in _split(above[0].lstrip(" #%/"), delimiter)] if above else []
+    return _table(str(path), rows, head, decimal, title)
+
+
+def _decoded(path: Path) -> str:
+    content = path.read_bytes()
+    if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        return content.decode("utf-16")
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        text = content.decode("cp1252", errors="replace")
+        if not {c for c in text if ord(c) > 126} <= _WESTERN:
+            raise FileFormatError(
+                f"{path} is no text in UTF-8; save it as CSV in UTF-8, or say its format"
+            ) from None
+    if "\0" in text:
+        raise FileFormatError(f"{path} is no text; expected a CSV: say its format")
+    return text
+
+
+def _split(line: str, delimiter: str) -> list[str]:
+    return line.split() if delimiter == r"\s+" else line.split(delimiter)
+
+
+def _dialect(lines: Sequence[str], delimiter: str | None, decimal: str | None) -> tuple[str, str]:
+    """Delimiter and decimal sign under which the lines are rows of one width and mostly numbers."""
+    body = lines[min(1, len(lines) - 1) :]
+
+    def score(dialect: tuple[str, str]) -> tuple[float, int]:
+        rows = [_split(line.rstrip(";,"), dialect[0]) for line in body]
+        cells = [cell for row in rows for cell in row if cell.strip()]
+        numeric = sum(_is_number(cell, dialect[1]) for cell in cells) / max(len(cells), 1)
+        width, often = Counter(map(len, rows)).most_common(1)[0]
+        return round(numeric * often / len(rows), 2), width
+
+    delimiters = [delimiter] if delimiter else [",", ";", "\t", "|", r"\s+"]
+    pairs = product(delimiters, [decimal] if decimal else [".", ","])
+    return max((pair for pair in pairs if pair[0] != pair[1]), key=score, default=(",", "."))
+
+
+def _number(text: str, decimal: str = ".") -> float:
+    """The number that a text is; nan if it is none.
+
+    A point beside a decimal comma would separate thousands: no number, rather than another one.
+    """
+    if "_" in text or (decimal == "," and "." in text):
+        return math.nan
+    try:
+        return float(text.replace(decimal, "."))
+    except ValueError:
+        return math.nan
+
+
+def _moment(text: str) -> int | None:
+    """A date as a number of [ns], in UTC unless it says otherwise; None if it is none."""
+    if (found := _MOMENT.fullmatch(text)) is None:
+        return None
+    year, month, day, hour, minute, second = (int(part or 0) for part in found.groups()[:6])
+    fraction, zone, more = found.groups()[6:]
+    try:
+        moment = datetime(year, month, day, hour, minute, second)
+    except ValueError:  # the 31st of February
+        return None
+    hours = timedelta(hours=int(zone or 0), minutes=int(f"{(zone or '+')[0]}{more or 0}"))
+    whole = (moment - datetime.min - hours) // timedelta(seconds=1)
+    return whole * 10**9 + int((fraction or "").ljust(9, "0"))
+
+
+def _span(text: str) -> int | None:
+    """A time of day, or since a start, as a number of [ns]; None if it is none."""
+    if (found := _SPAN.fullmatch(text)) is None:
+        return None
+    days, hours, minutes, seconds = (int(part or 0) for part in found.groups()[1:5])
+    whole = ((24 * days + hours) * 60 + minutes) * 60 + seconds
+    return (whole * 10**9 + int((found[6] or "").ljust(9, "0"))) * (-1 if found[1] == "-" else 1)
+
+
+def _is_number(text: str, decimal: str) -> bool:
+    text = text.strip().strip('"')
+    return text.lower() == "nan" or not math.isnan(_number(text, decimal))
+
+
+def _table(
+    where: str,
+    rows: list[tuple[int, list[str]]],
+    head: Collection[str],
+    decimal: str = ".",
+    title: Sequence[str] = (),
+) -> Table:
+    """Names, units and cells of rows of one width, with the numbers of their lines.
+
+    `title` are the cells of a comment right above: names, if there are as many as columns.
+    """
+    above = [any(cell.lower() in head for cell in row) for _, row in rows[:_SAMPLE]]
+    rows = rows[above.index(True) if any(above) else 0 :]
+    first = rows[0][1]
+    units: list[str | None] = [None] * len(first)
+    names, named = [f"column {i}" for i in range(1, len(first) + 1)], True
+    if not any(_is_number(c, decimal) or _DATE.match(c) for c in first):
+        names, rows = first, rows[1:]
+    elif len(title) == len(first):
+        names = list(title)
+    else:
+        named = False
+    if named and len(rows) > 1 and _are_units(rows[0][1], decimal):
+        units, rows = [known_unit(c) for c in rows[0][1]], rows[1:]
+    check_names(where, names)
+    columns = [[row[i] for _, row in rows] for i in range(len(names))]
+    names, units, columns = _without_lists(where, names, units, columns)
+    kept = [i for i, name in enumerate(names) if not _is_padding(name, columns[i])]
+    return Table(
+        where,
+        tuple(names[i] for i in kept),
+        named,
+        tuple(units[i] for i in kept),
+        tuple(columns[i] for i in kept),
+        tuple(number for number, _ in rows),
+        decimal,
+    )
+
+
+def _without_lists(
+    where: str, names: list[str], units: list[str | None], columns: list[list[str]]
+) -> tuple[list[str], list[str | None], list[list[str]]]:
+    """Columns of lists, `[1.0, 2.0]` in a cell, as a column for each of their numbers."""
+    parts: list[tuple[str, str | None, list[str]]] = []
+    for name, unit, column in zip(names, units, columns, strict=True):
+        if not (column and all(_LIST.fullmatch(cell) for cell in column)):
+            parts.append((name, unit, column))
+            continue
+        rows = [cell.strip("[]() ").replace(",", " ").split() for cell in column]
+        if len(set(map(len, rows))) > 1:
+            raise FileFormatError(
+                f"{where}: column {name} holds lists of {min(map(len, rows))} to "
+                f"{max(map(len, rows))} numbers; write one column a joint"
+            )
+        bare, own = split_unit(name)
+        parts += [
+            (f"{bare}_{i}", unit or own, [row[i] for row in rows]) for i in range(len(rows[0]))
+        ]
+    check_table(Path(where), len(columns[0]) if columns else 0, len(parts))
+    return [p[0] for p in parts], [p[1] for p in parts], [p[2] for p in parts]
+
+
+def _are_units(cells: list[str], decimal: str) -> bool:
+    return (
+        any(known_unit(cell) for cell in cells)
+        and all(_SECOND_ROW_OF_UNITS.fullmatch(cell) for cell in cells)
+        and not any(_is_number(cell, decimal) for cell in cells)
+    )
+
+
+def _is_padding(name: str, column: Sequence[str]) -> bool:
+    """Whether a column is what a trailing delimiter leaves, or the running count of pandas."""
+    numbered = name.startswith("column ")
+    unnamed = not name or name.startswith("Unnamed:") or name == "index"
+    if not (numbered or unnamed):
+        return False
+    return not any(column) or (unnamed and list(column) == [str(i) for i in range(len(column))])
+
+
+def counts(values: Column) -> bool:
+    """Whether a column counts rows or tells the time: it increases with every row."""
+    return bool(np.all(np.diff(values) > 0))

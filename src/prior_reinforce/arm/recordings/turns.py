@@ -1,0 +1,185 @@
+"""Bring recordings whose numbers are a turn, or a sign, apart together (`plans.whole_turns`).
+
+Within an episode, an angle that passes the end of its recorder's range is continued. Across
+episodes, starts are brought as near to each other as whole turns can, within the robot's limits.
+What cannot be decided is refused.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from prior_reinforce.arm.recordings.selection import Selection
+from prior_reinforce.arm.recordings.units import is_no_angle, listed
+from prior_reinforce.arm.robots.limits import RobotLimits, is_joint, with_turns
+from prior_reinforce.errors import InvalidDemonstrationsError
+from prior_reinforce.plans.plan_format import PlanFormat
+from prior_reinforce.plans.whole_turns import TURN, other_form
+
+Channel = Float[np.ndarray, " T"]
+"""An angle at T frames."""
+Spans = Float[np.ndarray, "N 3"]
+"""First, lowest and highest value of an angle in each of N episodes."""
+_NEXT = 0.3
+"""Of a step across the end of a range, what is left without the turn, in [rad], beside what the
+frames around it step. Ours: an encoder's noise, and one lost frame at 10 rad/s and 30 Hz."""
+_NORM = 0.05
+"""By which the four numbers of a quaternion may miss length 1."""
+_MOST_TURNS = 3
+
+
+def aligned(selection: Selection, limits: RobotLimits | None) -> tuple[Selection, PlanFormat]:
+    """Return the recordings brought together, and what their channels mean; `dt` is 1 s.
+
+    The robot's joints keep to its limits, where they are known. InvalidDemonstrationsError where it
+    cannot be told which way round a joint went, or which of two turns an episode is in.
+    """
+    form = with_turns(PlanFormat(selection.names, selection.units, 1.0), limits)
+    motions = [np.array(recording.positions) for recording in selection.recordings]
+    form = replace(form, attitudes=tuple(_unit_length(form, motions)))
+    said: list[str] = []
+    for group in form.attitudes:
+        said += _align_attitude(selection, motions, group)
+    of_attitudes = {name for group in form.attitudes for name in group}
+    for i, (name, unit) in enumerate(zip(form.names, form.units, strict=True)):
+        if unit in TURN and name not in of_attitudes and not is_no_angle(name):
+            said += _align_angle(selection, motions, i, limits)
+    recordings = tuple(
+        replace(recording, positions=motion)
+        for recording, motion in zip(selection.recordings, motions, strict=True)
+    )
+    remarks = (*selection.remarks, *said)
+    return replace(selection, recordings=recordings, remarks=remarks), form
+
+
+def _unit_length(form: PlanFormat, motions: Sequence[np.ndarray]) -> Iterator[tuple[str, ...]]:
+    """Attitudes, without those called like a quaternion whose numbers have not length 1."""
+    for group in form.attitudes:
+        columns = [form.names.index(name) for name in group]
+        lengths = np.concatenate([np.linalg.norm(m[:, columns], axis=1) for m in motions])
+        if len(group) == 3 or np.all(np.abs(lengths - 1) < _NORM):
+            yield group
+
+
+def _align_attitude(
+    selection: Selection, motions: Sequence[np.ndarray], group: tuple[str, ...]
+) -> Iterator[str]:
+    columns = [selection.names.index(name) for name in group]
+    what, passed, turned = ", ".join(group), list[str](), list[str]()
+    first: np.ndarray | None = None
+    for episode, motion in zip(selection.episodes, motions, strict=True):
+        own = motion[:, columns]
+        kept = own.copy()
+        for t in range(1, len(own)):
+            forms = (own[t], other_form(own[t]))
+            kept[t] = min(forms, key=lambda form: float(np.linalg.norm(form - kept[t - 1])))
+        if np.any(kept != own):
+            passed.append(episode)
+        first = kept[0] if first is None else first
+        near, far = (float(np.linalg.norm(form - first)) for form in (kept[0], other_form(kept[0])))
+        if far < near:
+            kept = other_form(kept)
+            turned.append(episode)
+        if abs(far - near) < _NEXT and max(far, near) > 1:
+            raise InvalidDemonstrationsError(
+                f"episode {episode} starts half a turn from {selection.episodes[0]} in {what}: "
+                "which way lies between them cannot be told; leave one out (--leave-out)"
+            )
+        motion[:, columns] = kept
+    if passed:
+        yield f"{listed(passed)}: {what} change their sign within the motion, which is one attitude"
+    if turned:
+        yield f"{listed(turned)}: {what} have the other sign, and are taken as the same attitude"
+
+
+def _align_angle(
+    selection: Selection, motions: Sequence[np.ndarray], channel: int, limits: RobotLimits | None
+) -> Iterator[str]:
+    name, turn = selection.names[channel], TURN[selection.units[channel]]
+    low, high = _range(name, limits)
+    passed = list[str]()
+    for episode, motion in zip(selection.episodes, motions, strict=True):
+        unwrapped = _continued(motion[:, channel], turn)
+        if np.any(unwrapped != motion[:, channel]):
+            passed.append(episode)
+        motion[:, channel] = unwrapped
+        step = np.abs(np.diff(unwrapped))
+        if np.isfinite(low) and step.max() > turn / 2:
+            raise InvalidDemonstrationsError(
+                f"episode {episode}: {name} steps by {step.max():.3g} {selection.units[channel]} "
+                f"at frame {int(np.argmax(step)) + 1}, which no joint does in one frame; mend that "
+                "frame, or drop that episode (--leave-out)"
+            )
+    if passed:
+        yield f"{listed(passed)}: {name} passes the end of its range, and is continued"
+    spans = np.array([[m[0, channel], m[:, channel].min(), m[:, channel].max()] for m in motions])
+    shifts = _shifts(spans, turn, low, high)
+    if shifts is None:
+        raise InvalidDemonstrationsError(
+            f"{name} starts all round the circle, from {spans[:, 0].min():.3g} to "
+            f"{spans[:, 0].max():.3g} {selection.units[channel]}: which of two turns an episode is "
+            "in cannot be told; import those apart that start elsewhere (--leave-out)"
+        )
+    for shift in sorted(set(shifts.tolist()) - {0}):
+        moved = [e for e, k in zip(selection.episodes, shifts, strict=True) if k == shift]
+        turns = f"{abs(shift)} turn{'s' * (abs(shift) > 1)} {'higher' if shift > 0 else 'lower'}"
+        yield f"{listed(moved)}: {name} is taken {turns}, as the others have it: the same pose"
+    for motion, shift in zip(motions, shifts, strict=True):
+        motion[:, channel] += shift * turn
+
+
+def _range(name: str, limits: RobotLimits | None) -> tuple[float, float]:
+    """Where a channel may be; anywhere if it is no joint of the robot."""
+    for i, joint in enumerate(() if limits is None else limits.joint_names):
+        if limits is not None and is_joint(name, joint):
+            return float(limits.lower[i]), float(limits.upper[i])
+    return -np.inf, np.inf
+
+
+def _continued(values: Channel, turn: float) -> Channel:
+    """An angle without whole turns within one frame; a switch that steps further stays."""
+    steps = np.diff(values)
+    left = steps - turn * np.round(steps / turn)
+    around = np.abs(left[np.maximum(np.arange(len(left)) - 1, 0)])
+    around = np.maximum(around, np.abs(left[np.minimum(np.arange(len(left)) + 1, len(left) - 1)]))
+    wraps = (np.abs(steps) > turn / 2) & (np.abs(left) <= 2 * around + _NEXT * turn / TURN["rad"])
+    if not np.any(wraps):
+        return values
+    turns = np.round(steps / turn) * wraps
+    return values - turn * np.concatenate([[0.0], np.cumsum(turns)])
+
+
+def _shifts(spans: Spans, turn: float, low: float, high: float) -> Int[np.ndarray, " N"] | None:
+    """Turns by which each episode is shifted; None where that cannot be told."""
+    n, slack = len(spans), 1e-3 * turn
+    turns = np.arange(-_MOST_TURNS, _MOST_TURNS + 1)
+    fits = (spans[:, 1, None] + turns * turn >= low - slack) & (
+        spans[:, 2, None] + turns * turn <= high + slack
+    )
+    starts = np.sort(np.mod(spans[:, 0], turn))
+    gaps = np.diff(np.append(starts, starts[0] + turn))
+    cut = starts[(int(np.argmax(gaps)) + 1) % n]  # the first after the widest gap
+    base = np.mod(spans[:, 0] - cut, turn) + cut  # within one turn from there
+    base = np.where(base - cut > turn - 1e-9, cut, base)
+    found = []
+    for k in turns:
+        shift = np.round((base + k * turn - spans[:, 0]) / turn).astype(int)
+        if np.all(np.abs(shift) <= _MOST_TURNS) and np.all(fits[np.arange(n), shift + _MOST_TURNS]):
+            middle = abs(float(np.mean(spans[:, 0] + shift * turn)))
+            found.append((int(np.count_nonzero(shift)), middle, shift))
+    if found:
+        best = min(found, key=lambda each: each[:2])[2]
+        if not np.any(best) or turn - gaps.max() <= turn / 2:
+            return np.asarray(best)
+        if np.isinf(high):
+            return None
+    # Limits part them: each stays, or where it cannot be, is in the only turn in which it can.
+    each = np.zeros(n, dtype=int)
+    for i in range(n):
+        if not fits[i, _MOST_TURNS] and fits[i].any():
+            each[i] = min(turns[fits[i]].tolist(), key=abs)
+    return each

@@ -1,0 +1,145 @@
+"""Units of recordings: read from names, converted, and judged by what an arm can do.
+
+No guess is silent. Each is an `Ambiguity`: what is implausible, what it looks like, and the option
+that settles it.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+from prior_reinforce.errors import ConfigurationError, UnclearUnitsError
+from prior_reinforce.units import STATED, UNITS, factor, spelt, units_of
+
+SECONDS = units_of("time")
+"""Units of time, in [s]."""
+CHANNEL_UNITS = (*units_of("angle"), *units_of("length"))
+"""Units that a channel's name may carry: angles and lengths."""
+_UNITS = (*CHANNEL_UNITS, *SECONDS)
+_SLOWEST, _FASTEST = 5.0, 5000.0
+"""Frames a second at which arms are recorded. Ours: teleoperation at 10 Hz is the slowest in use,
+libfranka's and RTDE's logs have 1000 and 500."""
+_PLAUSIBLE: Mapping[str, Mapping[str, tuple[float, float]]] = {
+    "rad": {unit: (0.0, UNITS[unit].largest) for unit in ("rad", "deg")},
+    "m": {unit: (0.0, UNITS[unit].largest) for unit in ("m", "cm", "mm")},
+    "period": {u: (1 / (_FASTEST * scale), 1 / (_SLOWEST * scale)) for u, scale in SECONDS.items()},
+}
+"""Units that angles, lengths and periods may be in, the likeliest first, with the least and the
+greatest number: of angles and lengths the largest one, of periods the time between two frames.
+Ours: no joint turns two turns; above 300, millimetres are likelier than an arm of three metres."""
+_NO_ANGLE = re.compile(
+    r"grip|jaw|finger|width|claw|opening|suction|robotiq|wsg|greifer|pince|夹爪|夹具", re.I
+)
+_BRACKETS = re.compile(r"(?P<name>.+?)\s*[\[(]\s*(?P<unit>[^\[\]()]+?)\s*[\])]")
+_ENDING = re.compile(r"(?P<name>.+?)[_ ](?P<unit>[a-zµμ°]+)")
+
+
+@dataclass(frozen=True)
+class Ambiguity:
+    """Something that a recording does not state, and whose default is implausible."""
+
+    what: str
+    """What is implausible, and what it looks like: a clause."""
+    option: str
+    """The option that confirms what it looks like, for instance `--time-unit ms`."""
+
+
+def raise_if_ambiguous(ambiguities: Iterable[Ambiguity], also: str = "") -> None:
+    """Raise UnclearUnitsError if anything is ambiguous, with all options that settle it.
+
+    `also` are other problems, so that all are reported at once.
+    """
+    found = list(dict.fromkeys(ambiguities))
+    if found:
+        options = " ".join(dict.fromkeys(one.option for one in found))
+        what = "; ".join(one.what for one in found)
+        raise UnclearUnitsError(what, options, also)
+
+
+def known_unit(text: str) -> str | None:
+    """Return the unit that a text spells, for instance `deg` for `°`; None if it spells none."""
+    unit = spelt(text.strip().strip("[]()").strip())
+    return unit if unit in _UNITS else None
+
+
+def is_no_angle(name: str) -> bool:
+    """Whether a channel's name says that it is no angle unless its unit is said: a gripper's."""
+    return _NO_ANGLE.search(name) is not None
+
+
+def split_unit(column: str, among: Collection[str] | None = None) -> tuple[str, str | None]:
+    """Split a column's name `x_cm`, `q0 [deg]` or `time (ms)` into the name and the unit in it.
+
+    `among` are units that may stand there; None takes all, and in square brackets any word at all:
+    `volume [ml]`. Without such a unit, the whole name and None.
+    """
+    for pattern in (_BRACKETS, _ENDING):
+        match = pattern.fullmatch(column.strip())
+        unit = match and known_unit(match["unit"])
+        if match is None or (pattern is _ENDING and match["unit"] == "in"):
+            continue  # `plug_in` is no length
+        if unit in (among or _UNITS):
+            return match["name"].strip(), unit
+        if among is None and column.strip().endswith("]"):
+            return match["name"].strip(), match["unit"]
+    return column, None
+
+
+def conversion(recorded: str, wanted: str, name: str) -> float:
+    """Return the factor from one unit to another.
+
+    Raises:
+        ConfigurationError: One cannot be converted to the other.
+    """
+    scale = factor(recorded, wanted)
+    if scale is None:
+        raise ConfigurationError(
+            f"{name} is recorded in {recorded}, but plans are in {wanted}; say its unit with "
+            "--units, or correct the plan's units"
+        )
+    return scale
+
+
+def judge_unit(unit: str, number: float, *, period: bool = False) -> str | None:
+    """Return the unit that a number looks like: the same if that is plausible, None if none fits.
+
+    The number is the largest absolute angle or length in `rad` or `m` (other units are plausible
+    all), or a `period` between two frames in a unit of time.
+    """
+    ranges = _PLAUSIBLE.get("period" if period else unit, {unit: (0.0, float("inf"))})
+    fitting = [u for u, (low, high) in ranges.items() if low <= number <= high]
+    return unit if unit in fitting else next(iter(fitting), None)
+
+
+def is_possible(unit: str, number: float) -> bool:
+    """Return whether an angle or a length can be in a unit if that is stated explicitly."""
+    return unit not in _PLAUSIBLE or number <= STATED * _PLAUSIBLE[unit][unit][1]
+
+
+def say_names(names: Sequence[str]) -> str:
+    """Abbreviate a list of names: `q[0] to q[6], t`; consecutive numbers are one group."""
+    groups: list[list[str]] = []
+    for name in names:
+        if groups and _follows(groups[-1][-1], name):
+            groups[-1].append(name)
+        else:
+            groups.append([name])
+    return listed([g[0] if len(g) == 1 else f"{g[0]} to {g[-1]}" for g in groups])
+
+
+def listed(items: Sequence[str], separator: str = ", ") -> str:
+    """Join up to twelve items, and count the rest."""
+    more = f" and {len(items) - 12} more" if len(items) > 12 else ""
+    return separator.join(items[:12]) + more
+
+
+def _follows(before: str, name: str) -> bool:
+    """Whether the names differ in one number only, which is one higher in the second."""
+    one, two = re.split(r"(\d+)", before), re.split(r"(\d+)", name)
+    differ = [(a, b) for a, b in zip(one, two, strict=False) if a != b]
+    if len(one) != len(two) or len(differ) != 1:
+        return False
+    ((a, b),) = differ
+    return a.isdigit() and b.isdigit() and int(b) == int(a) + 1

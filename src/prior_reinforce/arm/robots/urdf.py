@@ -1,0 +1,224 @@
+"""Limits and kinematics of any serial arm from its URDF: which of its joints are the arm's."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from prior_reinforce.arm.robots.limits import PerJoint, RobotLimits
+from prior_reinforce.arm.robots.urdf_file import RATES, TURNING, TYPES, Joint, read_joints
+from prior_reinforce.errors import ConfigurationError, FileFormatError, UnclearFlangeError
+from prior_reinforce.plans.kinematics import Chain, Pose
+
+_MOST_NAMED, _MOST_JOINTS = 40, 100
+"""Links in a message, and turning joints of one arm (ours)."""
+_TIPS = ("tool0", "flange", "link_eef")
+"""Links that are the flange by ROS's conventions (REP 199) and UFACTORY's; the first there is."""
+_JAW = re.compile("grip|jaw|finger|claw|knuckle|thumb|pinch|tong", re.IGNORECASE)
+_OF_AN_ARM = re.compile("wrist|elbow|shoulder|arm|roll|pitch|yaw|rotat", re.IGNORECASE)
+
+
+def read_urdf(
+    path: Path,
+    tip: str | None = None,
+    base: str | None = None,
+    hold: Mapping[str, float] | None = None,
+) -> RobotLimits:
+    """Read the limits and the kinematics of an arm.
+
+    Soft limits of a `safety_controller` narrow a joint's range.
+
+    Args:
+        path: Of a URDF; meshes that it names are not read.
+        tip: The link that is the flange; None takes `tool0`, `flange` or `link_eef`, else the link
+            that the last turning joint of the longest chain moves.
+        base: The link that is the base frame, for instance above a lift; None takes the root.
+        hold: Joints that stand still, and where, in [rad] and [m].
+
+    Returns:
+        Its limits; of accelerations and jerks where the file states every joint's.
+
+    Raises:
+        FileFormatError: No URDF, a damaged one, or one without such a chain.
+        ConfigurationError: No such link, or a joint without limits.
+        UnclearFlangeError: A gripper's joint may be one of the arm's, or there are several arms.
+    """
+    name, joints, links = read_joints(path)
+    moving, hold = {joint.child: joint for joint in joints}, dict(hold or {})
+    try:
+        if unknown := hold.keys() - {joint.name for joint in joints}:
+            raise ConfigurationError(f"it has no joint {min(unknown)!r} to hold")
+        for link in {tip, base} - {None, *links}:
+            few = ", ".join(links[:_MOST_NAMED])
+            raise ConfigurationError(f"it has no link {link!r}; it has {few}")
+        tip = _flange(links, moving, base, hold) if tip is None else tip
+        chain = _path(tip, moving, base)
+        if base is not None and (not chain or chain[0].parent != base):
+            raise ConfigurationError(f"link {base} is not on the way to {tip}; say another --base")
+        turning = [joint for joint in chain if joint.name not in hold and joint.type in TURNING]
+        _refuse_other(chain, turning, tip, hold)
+        limits = np.array([joint.limits() for joint in turning])
+        acceleration, jerk = (_rates(key, turning) for key in RATES)
+        kinematics = _chain(chain, hold)
+    except (ConfigurationError, FileFormatError) as error:
+        error.args = (f"{path}: {error}",)
+        raise
+    source = f"{path.name}, from {chain[0].parent} to {tip}"
+    source += "".join(f", {name} held at {position:g}" for name, position in hold.items())
+    source += ", soft limits too" * any("safety_controller" in joint.parts for joint in turning)
+    over = [f"{what} of joint {joint.name}" for joint in joints for what in joint.unknown]
+    if over:
+        source += f"; passed over: {', '.join(over[:3])}"
+        source += f" and {len(over) - 3} more" * (len(over) > 3)
+    return RobotLimits(
+        robot=name,
+        firmware="any",
+        source=source,
+        joint_names=tuple(joint.name for joint in turning),
+        lower=limits[:, 0],
+        upper=limits[:, 1],
+        velocity=limits[:, 2],
+        acceleration=acceleration,
+        jerk=jerk,
+        chain=kinematics,
+    )
+
+
+def _path(link: str, moving: Mapping[str, Joint], base: str | None = None) -> list[Joint]:
+    """The joints from the base, or the root, to a link."""
+    found = list[Joint]()
+    while link in moving and link != base:
+        found.append(moving[link])
+        link = found[-1].parent
+    return found[::-1]
+
+
+def _flange(
+    links: Sequence[str], moving: Mapping[str, Joint], base: str | None, hold: Mapping[str, float]
+) -> str:
+    """The link that `read_urdf` takes for the flange.
+
+    Raises:
+        UnclearFlangeError: Several may be it, or a gripper's joint turns as the arm's own do.
+    """
+    for tip in _TIPS:
+        if tip in links:
+            return tip
+    start = links[0] if base is None else base
+    turns, of_jaw, jaws = {start: 0}, {start: False}, list[str]()
+    """How many of the arm's joints turn up to a link; whether a joint called jaw is among them."""
+    ends = list[str]()
+    for link in links:
+        joint = moving.get(link)
+        if joint is None or joint.parent not in turns or link == start:
+            continue
+        free = joint.free and joint.name not in hold
+        jaws += [link] if free and _JAW.search(joint.name) else []
+        of_jaw[link] = of_jaw[joint.parent] or link in jaws[-1:]
+        turns[link] = turns[joint.parent] + (free and not of_jaw[link])
+        ends += [link] if free and not of_jaw[link] else []
+    most = max(turns.values())
+    ends = [link for link in ends if turns[link] == most]
+    named = [n for n in turns if turns[n] == most and n.endswith(tuple(f"_{t}" for t in _TIPS))]
+    if len(named) == 1 and not of_jaw[named[0]]:
+        return named[0]
+    last = [joint for joint in _path(ends[0], moving, start) if joint.free] if ends else []
+    if len(ends) == 1:
+        followed = {joint.mimics for joint in moving.values()}
+        jaw = _JAW.search(last[-1].child) and not _OF_AN_ARM.search(last[-1].name)
+        if len(last) > 1 and (jaw or last[-1].name in followed):
+            jaws = [last.pop().child]
+        elif not any(moving[ends[0]] in _path(link, moving, start) for link in jaws[:_MOST_NAMED]):
+            return ends[0]
+    else:  # fingers share most of their joints, two arms few
+        paths = [{*_path(link, moving, start)} for link in ends[:_MOST_NAMED]]
+        last = [joint for joint in last if all(joint in path for path in paths)]
+        jaws = ends
+        if 2 * len(last) < most or not last:
+            raise UnclearFlangeError(
+                f"it ends in {', '.join(ends[:_MOST_NAMED]) or 'no turning joint'}; say which link "
+                "is the flange with --tip"
+            )
+    proposed = last[-1].child
+    rigid = {proposed: None}
+    for link in links:
+        if link in moving and moving[link].type == "fixed" and moving[link].parent in rigid:
+            rigid[link] = None
+    fixed = ", ".join([*rigid][1:_MOST_NAMED])
+    also = f", or one that is fixed to it: {fixed}" * bool(fixed)
+    raise UnclearFlangeError(
+        f"joint {moving[jaws[0]].name} looks like a gripper's; say which link is the flange with "
+        f"--tip: {proposed}, which the arm's last joint {last[-1].name} moves{also}",
+        proposed,
+    )
+
+
+def _refuse_other(
+    chain: Sequence[Joint], turning: Sequence[Joint], tip: str, hold: Mapping[str, float]
+) -> None:
+    """Refuse a chain without turning joints, or with others that are not held."""
+    if not turning:
+        raise FileFormatError(f"no joint turns between the base and {tip}; say --tip")
+    if len(turning) > _MOST_JOINTS:
+        raise FileFormatError(
+            f"{len(turning)} joints turn between the base and {tip}, and an arm has at most "
+            f"{_MOST_JOINTS}; say --base or --tip"
+        )
+    other = [j for j in chain if j.type in TYPES[3:] and j.name not in hold]
+    if other:
+        first, last = chain.index(other[0]), chain.index(other[-1])
+        says = [f"--base {other[-1].child} for what is behind it"] * any(
+            j in turning for j in chain[last:]
+        )
+        says += [f"--tip {other[0].parent} for what is before"] * any(
+            j in turning for j in chain[:first]
+        )
+        holds = "--hold " + " ".join(f"{joint.name}=0" for joint in other)
+        raise FileFormatError(
+            f"{other[-1].name} is {other[-1].type}, and arms of turning joints are known only; say "
+            f"{', or '.join([*says, holds])} if it stands still"
+        )
+
+
+def _rates(key: str, turning: Sequence[Joint]) -> PerJoint | None:
+    """The accelerations or jerks that the file states; None where it states none."""
+    values = [joint.number("limit", key) for joint in turning]
+    said = [value for value in values if value is not None]
+    if said and len(said) < len(values):
+        raise turning[values.index(None)].error(
+            f"states no {key} in its <limit>, as others do; write it there, or take theirs out"
+        )
+    for joint, value in zip(turning, said, strict=False):
+        if not 0 < value <= RATES[key]:
+            raise joint.error(f"has {key}={value:g} in its <limit>; write the maker's there")
+    return np.array(said) if said else None
+
+
+def _chain(joints: Sequence[Joint], hold: Mapping[str, float]) -> Chain:
+    """Origins of the turning joints, with the fixed ones before each taken in."""
+    origins: list[Pose] = []
+    axes: list[tuple[float, float, float]] = []
+    since = np.eye(4)
+    for joint in joints:
+        since = since @ joint.pose(hold.get(joint.name))
+        if joint.type in TURNING and joint.name not in hold:
+            origins.append(_pose(since))
+            axes.append(joint.axis())
+            since = np.eye(4)
+    return Chain(tuple(origins), tuple(axes), _pose(since))
+
+
+def _pose(transform: np.ndarray) -> Pose:
+    """Translation, and roll, pitch and yaw of Rz(yaw) Ry(pitch) Rx(roll)."""
+    r = transform[:3, :3]
+    pitch = math.atan2(-r[2, 0], math.hypot(r[0, 0], r[1, 0]))
+    if math.hypot(r[0, 0], r[1, 0]) < 1e-9:  # yaw and roll turn about one axis
+        roll, yaw = math.atan2(-r[1, 2], r[1, 1]), 0.0
+    else:
+        roll, yaw = math.atan2(r[2, 1], r[2, 2]), math.atan2(r[1, 0], r[0, 0])
+    x, y, z = transform[:3, 3].tolist()
+    return (x, y, z, roll, pitch, yaw)

@@ -1,0 +1,276 @@
+"""Joints and links of a URDF, read strictly where they are of the arm.
+
+Ours rather than a library's: yourdfpy, urdfdom and MuJoCo pass over what they do not understand and
+take defaults for what is missing; with one character gone, an arm has another axis or fewer joints.
+Here, XML that is not well formed is an error, and so is a joint of the arm that lacks something or
+has a word that is nearly one of URDF's (wiki.ros.org/urdf/XML). What else is unknown, and whatever
+stands in other joints, cannot move the flange: it is passed over, and named.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass
+from difflib import get_close_matches
+from functools import cached_property
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+
+from prior_reinforce.arm.robots.limits import ENDLESS
+from prior_reinforce.errors import ConfigurationError, FileFormatError
+from prior_reinforce.plans.kinematics import rotation, rotations_about
+
+TURNING = ("revolute", "continuous")
+TYPES = (*TURNING, "fixed", "prismatic", "floating", "planar")
+RATES = {"acceleration": 1e3, "jerk": 5e5}
+"""Limits that some files state beside URDF's own (Drake, newer urdfdom), and what no joint does, in
+[rad/s^2] and [rad/s^3]. Ours: those of a joint at `_FASTEST` by the gate's own rule, twice."""
+_ATTRIBUTES = {
+    "parent": {"link"},
+    "child": {"link"},
+    "origin": {"xyz", "rpy"},
+    "axis": {"xyz"},
+    "limit": {"lower", "upper", "effort", "velocity", *RATES},
+    "mimic": {"joint", "multiplier", "offset"},
+    "safety_controller": {"soft_lower_limit", "soft_upper_limit", "k_position", "k_velocity"},
+}
+"""What a joint may say that matters to its motion."""
+_ELSEWHERE = ("dynamics", "calibration")
+"""What else URDF lets it say."""
+_NEARLY = 0.74
+"""Share of two words' letters that agree from which one is a slip of the other (ours): `axs`."""
+_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?", re.ASCII)
+_LENGTH_OF_AXIS = 0.01
+"""By how much an axis may differ from length 1: two written digits."""
+_LONGEST_NAME, _LONGEST_PROBLEM, _LONGEST_WORD = 200, 400, 40
+_LARGEST_FILE = 20_000_000
+"""Bytes (ours): several times what the largest humanoids have."""
+_FASTEST, _FARTHEST = 30.0, 10.0
+"""What no joint does, in [rad/s], and how long no link is, in [m]. Ours: several times what is on
+the market; a lost decimal point is mostly more."""
+_XACRO = "make a URDF of its xacro: xacro arm.urdf.xacro > arm.urdf"
+
+
+def read_joints(path: Path) -> tuple[str, list[Joint], list[str]]:
+    """Read the robot's name, every joint, and every link from the root outwards.
+
+    Raises:
+        FileFormatError: It is no URDF, or its links do not all hang from one root.
+    """
+    if not path.is_file():
+        raise FileFormatError(f"no URDF at {path}; give the path of a .urdf file")
+    if path.name.endswith(".xacro"):
+        raise FileFormatError(f"{path} is a xacro; make a URDF of it: xacro {path} > arm.urdf")
+    try:
+        if path.stat().st_size > _LARGEST_FILE:
+            raise ValueError(f"it has more than {_LARGEST_FILE / 1e6:g} MB, as no URDF has")
+        root = ElementTree.parse(path, ElementTree.XMLParser(target=_Builder())).getroot()
+        joints = _joints_of(root)
+        return root.get("name") or path.stem, joints, _links_of(root, joints)
+    except (ElementTree.ParseError, OSError, ValueError, LookupError) as error:
+        problem = str(error)[:_LONGEST_PROBLEM]
+        raise FileFormatError(
+            f"cannot read {path} as URDF: {problem}; mend it there, or export it again"
+        ) from error
+
+
+@dataclass(frozen=True, eq=False)
+class Joint:
+    """A joint, of which only the ends are read before it is known to be of the arm."""
+
+    name: str
+    type: str
+    parent: str
+    child: str
+    mimics: str | None
+    """Name of the joint that it follows."""
+    element: ElementTree.Element
+    namespace: str
+
+    @property
+    def free(self) -> bool:
+        """Whether it turns by itself."""
+        return self.type in TURNING and self.mimics is None
+
+    def error(self, problem: str) -> ConfigurationError:
+        """Return what to raise where something is wrong with it."""
+        return ConfigurationError(f"joint {self.name} {problem}")
+
+    @cached_property
+    def parts(self) -> dict[str, dict[str, str]]:
+        """Attributes by element, with nothing in it that is nearly known or said twice."""
+        for text in (self.element.text, *(part.tail for part in self.element)):
+            if text and text.strip():  # an element that lacks its bracket
+                raise FileFormatError(f"text in joint {self.name}: {text.strip()[:80]!r}")
+        if self.type not in TYPES:
+            raise self.error(f"has type {self.type[:80]!r}; give one of {', '.join(TYPES)}")
+        found: dict[str, dict[str, str]] = {}
+        for tag, attributes in self._elements():
+            if tag in found:
+                raise self.error(f"has two <{tag}>; take one out")
+            found[tag] = attributes
+        for tag, attributes in found.items():
+            words = _ATTRIBUTES.get(tag, ())
+            for key in attributes.keys() - words:
+                self._refuse_slip(key, words - attributes.keys() if words else (), f" in <{tag}>")
+            if tag not in (*_ATTRIBUTES, *_ELSEWHERE):
+                self._refuse_slip(
+                    f"<{tag}>", [f"<{known}>" for known in _ATTRIBUTES.keys() - found]
+                )
+        return found
+
+    @cached_property
+    def unknown(self) -> list[str]:
+        """What is said of it that URDF does not know."""
+        words = [key for key in self.element.attrib if key not in ("name", "type")]
+        for tag, attributes in self._elements():
+            if tag not in (*_ATTRIBUTES, *_ELSEWHERE):
+                words.append(f"<{tag}>")
+            elif tag in _ATTRIBUTES:
+                words += [f"{key} in <{tag}>" for key in attributes.keys() - _ATTRIBUTES[tag]]
+        return [word.rpartition("}")[2][:80] for word in words]
+
+    def _elements(self) -> Iterable[tuple[str, dict[str, str]]]:
+        """Tags and attributes; URDF's own words and those of rates without a namespace."""
+        for part in self.element:
+            pairs = ((key, key.rpartition("}")[2], value) for key, value in part.items())
+            attributes = {word if word in RATES else key: value for key, word, value in pairs}
+            yield part.tag.removeprefix(self.namespace), attributes
+
+    def _refuse_slip(self, word: str, known: Iterable[str], where: str = "") -> None:
+        if near := _nearly(word, known):
+            raise self.error(f"has an unknown {word}{where}; is it {near}?")
+
+    def number(self, part: str, key: str) -> float | None:
+        """One number; None where it is not said."""
+        return self.vector(part, key, 1)[0] if key in self.parts.get(part, {}) else None
+
+    def vector(self, part: str, key: str, n: int = 3) -> list[float]:
+        """So many numbers; zeros where they are not said."""
+        text = self.parts.get(part, {}).get(key, "0 " * n)
+        words = text.split()
+        values = [float(word) for word in words if _NUMBER.fullmatch(word)]
+        if not (len(values) == len(words) == n and np.all(np.isfinite(values))):
+            wants = "a finite number" if n == 1 else f"{n} finite numbers"
+            wants += f", or {_XACRO}" * ("${" in text)
+            raise self.error(f'has <{part} {key}="{text[:80]}">; give {wants}')
+        return values
+
+    def pose(self, position: float | None) -> np.ndarray:
+        """Pose of the frame behind it in the frame before, 4 x 4, with the joint at 0 or held."""
+        if self.type in TURNING and "origin" not in self.parts:
+            raise self.error('has no <origin>; write <origin xyz="0 0 0" rpy="0 0 0"/> if it is so')
+        pose = np.eye(4)
+        roll, pitch, yaw = self.vector("origin", "rpy")
+        pose[:3, :3], pose[:3, 3] = rotation(roll, pitch, yaw), self.vector("origin", "xyz")
+        if np.abs(pose[:3, 3]).max() > _FARTHEST or max(map(abs, (roll, pitch, yaw))) > 7:
+            raise self.error(f"has an <origin> beyond {_FARTHEST:g} m or a turn; look for its dots")
+        if position and self.type in TURNING:
+            pose[:3, :3] = pose[:3, :3] @ rotations_about(self.axis(), np.array([position]))[0]
+        elif position and self.type == "prismatic":
+            pose[:3, 3] += pose[:3, :3] @ self.axis() * position
+        elif position:
+            raise self.error(f"is {self.type}, and can be held at 0 alone")
+        return pose
+
+    def axis(self) -> tuple[float, float, float]:
+        """About which it turns."""
+        x, y, z = self.vector("axis", "xyz")
+        length = math.hypot(x, y, z)
+        if abs(length - 1) > _LENGTH_OF_AXIS:
+            raise self.error('needs an axis of length 1, such as <axis xyz="0 0 1"/>')
+        return x / length, y / length, z / length
+
+    def limits(self) -> tuple[float, float, float]:
+        """Lowest and highest position, and largest speed."""
+        if "mimic" in self.parts:
+            raise self.error("follows another (<mimic>), and so is no joint of its own; say --tip")
+        velocity = self.number("limit", "velocity")
+        if not velocity or not 0 < velocity <= _FASTEST:
+            says = "no velocity limit" if not velocity else f"a velocity limit of {velocity:g}"
+            raise self.error(f"has {says}; write the maker's, in [rad/s], into its <limit>")
+        low, high = self.number("limit", "lower"), self.number("limit", "upper")
+        if self.type == "continuous":
+            low, high = -ENDLESS, ENDLESS
+        soft = [self.number("safety_controller", f"soft_{end}_limit") for end in ("lower", "upper")]
+        if low is not None and high is not None:
+            low = low if soft[0] is None else max(low, soft[0])
+            high = high if soft[1] is None else min(high, soft[1])
+        if low is None or high is None or not -ENDLESS <= low < high <= ENDLESS:
+            raise self.error(
+                f"has no range within {ENDLESS:.4g} rad; write lower and upper into its <limit>"
+            )
+        return low, high, velocity
+
+
+class _Builder(ElementTree.TreeBuilder):
+    def doctype(self, name: str, pubid: str | None, system: str | None) -> None:
+        """Entities stand for other text, which a URDF needs none of."""
+        raise ValueError("it has a DOCTYPE, which no URDF has")
+
+
+def _nearly(word: str, known: Iterable[str]) -> str | None:
+    """What a word is a slip of."""
+    return next(iter(get_close_matches(word[:_LONGEST_WORD], known, 1, _NEARLY)), None)
+
+
+def _name(element: ElementTree.Element) -> str:
+    name = element.get("name", "")
+    if not (name and name.isprintable() and len(name) <= _LONGEST_NAME):
+        raise ValueError(f"a <{element.tag}> has no name, or one that is none: {name[:80]!r}")
+    if "${" in name:
+        raise ValueError(f"{name[:80]!r} is left of a xacro: {_XACRO}")
+    return name
+
+
+def _joints_of(robot: ElementTree.Element) -> list[Joint]:
+    """Every joint, with its type and its ends."""
+    space = "".join(robot.tag.rpartition("}")[:2])
+    if robot.tag.removeprefix(space) != "robot":
+        raise ValueError(f"it begins with <{robot.tag[:80]}>, not <robot>")
+    if any("xacro}" in element.tag for element in robot.iter()):
+        raise ValueError(f"it has elements of xacro: {_XACRO}")
+    found: dict[str, Joint] = {}
+    for element in robot.findall(f"{space}joint"):
+        name, kind = _name(element), element.get("type", "")
+        if not kind or (kind not in TYPES and _nearly(kind, TYPES)):
+            raise ValueError(f"joint {name} has no type, or none of {', '.join(TYPES)}")
+        parent, child, mimic = (element.find(space + tag) for tag in ("parent", "child", "mimic"))
+        ends = [end.get("link", "") for end in (parent, child) if end is not None]
+        if len(ends) != 2 or not all(ends):
+            raise ValueError(f"joint {name} has no <parent link> or <child link>")
+        if name in found:
+            raise ValueError(f"two joints are called {name}")
+        follows = None if mimic is None else mimic.get("joint", "")
+        found[name] = Joint(name, kind, ends[0], ends[1], follows, element, space)
+    if not found:
+        raise ValueError("it has no joint, and so is no arm")
+    return list(found.values())
+
+
+def _links_of(robot: ElementTree.Element, joints: list[Joint]) -> list[str]:
+    """Every link, from the root outwards; all hang from one root."""
+    elements = robot.findall(f"{joints[0].namespace}link")
+    names = {_name(element) for element in elements}
+    moved = Counter(joint.child for joint in joints)
+    if len(names) < len(elements) or max(moved.values()) > 1:
+        raise ValueError("two links have one name, or two joints move one link")
+    behind: dict[str, list[str]] = {name: [] for name in names}
+    for joint in joints:
+        for end in (joint.parent, joint.child):
+            if end not in names:
+                raise ValueError(f"joint {joint.name} names {end[:80]!r}, which is no link")
+        behind[joint.parent].append(joint.child)
+    reached = [name for name in behind if name not in moved]
+    if len(reached) != 1:
+        raise ValueError(f"{len(reached)} links hang from no joint instead of one")
+    for link in reached:
+        reached += behind[link]
+    if len(reached) < len(names):
+        raise ValueError("its joints form a loop")
+    return reached

@@ -1,0 +1,60 @@
+"""What the moved demonstrations of a workspace can reach, and what they are turned about."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from prior_reinforce.arm.robots import RobotLimits, match_joints
+from prior_reinforce.arm.workspace.sessions import model_in_use
+from prior_reinforce.errors import OutOfReachError
+from prior_reinforce.generators.reach import reach, refusal, region_around
+from prior_reinforce.parsing import as_place
+from prior_reinforce.plans.motions import Demonstrations
+from prior_reinforce.plans.symmetry import Polar, find_axis, hand_paths
+from prior_reinforce.wording import say_place
+
+if TYPE_CHECKING:
+    from prior_reinforce.arm.workspace.workspace import Workspace
+
+
+def require_reach(workspace: Workspace, goal: ArrayLike) -> None:
+    """Do nothing if moved demonstrations can reach a goal within the robot's limits of now.
+
+    Nothing is known of it before a model of ours is learned, or without symmetry or robot.
+
+    Raises:
+        OutOfReachError: They cannot; with the nearest goal that they can reach.
+    """
+    training, form = workspace.state.training, workspace.manifest.outcome_format
+    if training is None or workspace.state.stale or workspace.manifest.robot is None:
+        return
+    shown, place = workspace.demonstrations, as_place(goal, form)
+    if shown.symmetry is None:
+        return
+    generator = model_in_use(workspace.standing, workspace.store)
+    if why := refusal(generator, place, workspace.refusals):
+        region = region_around(shown)
+        region = np.stack([np.minimum(region[0], place), np.maximum(region[1], place)])
+        possible = reach(generator, region, workspace.refusals)
+        nearest = possible.nearest(generator, place, workspace.refusals)
+        raise OutOfReachError(
+            f"goal {say_place(place, form)} is out of reach: {why}; the nearest that can be "
+            f"reached is {say_place(nearest, form)}; demonstrate nearer to reach farther"
+        )
+
+
+def axis_of(demonstrations: Demonstrations, robot: RobotLimits | None) -> list[str]:
+    """What several demonstrations say of the axis that motions are turned about, in a line."""
+    symmetry = demonstrations.symmetry
+    if symmetry is None or not isinstance(symmetry.chart, Polar):
+        return []
+    joints = dict[int, int]() if robot is None else match_joints(demonstrations.format, robot)
+    columns = [joints[row] for row in sorted(joints)]
+    chain = None if robot is None else robot.chain
+    paths = hand_paths(symmetry, demonstrations.plans, chain, columns)
+    seen = demonstrations.outcomes_seen
+    found = None if paths is None else find_axis(paths, seen, symmetry.chart)
+    return [] if found is None else [str(found)]

@@ -1,0 +1,212 @@
+"""Writing the manifest of a new workspace, and the columns that its first import brings."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from prior_reinforce.arm.robots import RobotLimits, robot_limits
+from prior_reinforce.arm.robots.presets import GRIPPERS, PRESETS
+from prior_reinforce.arm.robots.urdf import read_urdf
+from prior_reinforce.arm.workspace.declared import read_object
+from prior_reinforce.arm.workspace.manifest import LIMIT_LISTS, UNKNOWN
+from prior_reinforce.errors import ConfigurationError
+from prior_reinforce.registry import parse_choice
+from prior_reinforce.settings import tomllib
+
+TEMPLATE = Path(__file__).with_name("template.toml").read_text(encoding="utf-8")
+"""The manifest that `new` writes, for `format` to fill in."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class NewWorkspace:
+    """What a new workspace is about."""
+
+    name: str | None = None
+    """Name of the task; the folder's name if not given."""
+    robot: str | RobotLimits = "panda"
+    """Whose limits hold: a preset, the path of a .urdf, limits, or none."""
+    tip: str | None = None
+    """Link of the URDF that is the flange; tool0, flange or the last that turns if not given."""
+    base: str | None = None
+    """Link of the URDF that is the base frame, for instance above a lift; its root if not given."""
+    hold: tuple[str, ...] = ()
+    """Joints of the URDF that stand still, and where, in [rad] or [m]: lift=0.2."""
+    action_names: tuple[str, ...] | None = None
+    """Names of the action dimensions; the robot's joints if not given, with no robot those that
+    the first import has."""
+    action_units: tuple[str, ...] = ("rad",)
+    """Unit of each action dimension; a single one holds for all."""
+    gripper: str | None = None
+    """Unit of a gripper's opening, one more dimension: percent, m, steps, ..., or none; an SO-101
+    has one in percent if not given."""
+    dt: float = 0.0125
+    """Time between two frames of a plan, in seconds."""
+    outcome_names: tuple[str, ...] = ("x", "y")
+    """Names of the outcome's components."""
+    outcome_units: tuple[str, ...] = ("m",)
+    """Unit of each component; a single one holds for all."""
+    tolerance: float | Sequence[float] = 0.015
+    """Largest distance from the goal that counts as reached, in the outcome's units: one number,
+    or one for each component, which mixed units need."""
+    symmetry: str | None = None
+    """Where the object is before it leaves, so that one demonstration is enough: carried (by the
+    arm, a throw), a place such as "0.43 0" (it lies there, pushed or struck), anywhere (the motion
+    may happen anywhere on the table; poses alone), or none."""
+    box: tuple[float, float, float, float, float, float] | None = None
+    """Two corners, x y z x y z in metres, of the box that the tool tip must stay in: a turned
+    motion sweeps other parts of the room."""
+    no_box: bool = False
+    """No such box is wanted."""
+    arm: str | None = None
+    """What drives the arm, with its settings ([arm] of the manifest): fr3,host=172.16.0.2,
+    ur,host=192.168.1.10 or lerobot,robot.type=so101_follower,robot.port=/dev/ttyACM0."""
+
+    def manifest(self, folder: str) -> str:
+        """Return the text of its manifest; the folder's name is the task's if it has none.
+
+        Raises:
+            ConfigurationError: A setting that has no use, or an unknown robot.
+            FileFormatError: The URDF cannot be read.
+        """
+        robot = self.robot
+        known = robot if isinstance(robot, str) else robot.robot
+        is_file = known.lower().endswith((".urdf", ".xml", ".xacro"))
+        if not is_file and (self.tip, self.base, self.hold) != (None, None, ()):
+            raise ConfigurationError(
+                f"--tip, --base and --hold are of a URDF, and --robot is {known}; drop them"
+            )
+        if isinstance(robot, str) and robot != "none":
+            robot = self.described(Path(robot)) if is_file else robot_limits(robot)
+        own, unit = GRIPPERS.get(known.lower(), ("gripper", "none"))
+        unit = self.gripper or (unit if self.action_names is None else "none")
+        names: Sequence[str] | None = self.action_names
+        if names is None:
+            names = UNKNOWN if isinstance(robot, str) else robot.joint_names
+        if tuple(names) == UNKNOWN and unit != "none":
+            raise ConfigurationError(
+                "--gripper adds a column to an arm's joints, and --robot is none; name all columns "
+                "with --action-names, or drop it: the first import then takes what was recorded"
+            )
+        units = _spread(self.action_units, len(names))
+        if unit != "none":
+            names, units = (*names, own), (*units, unit)
+        given = None
+        if isinstance(robot, RobotLimits) and (is_file or robot.robot not in PRESETS):
+            given = robot
+        numbers = np.atleast_1d(self.tolerance).tolist()
+        text = TEMPLATE.format(
+            name=_toml(self.name or folder)[1:-1],
+            names=_toml(names),
+            units=_toml(units),
+            dt=self.dt,
+            outcome_names=_toml(self.outcome_names),
+            outcome_units=_toml(_spread(self.outcome_units, len(self.outcome_names))),
+            tolerance=numbers[0] if len(numbers) == 1 else numbers,
+            robot="given" if given is not None else known,
+        )
+        text = self._with_symmetry(text)
+        if self.arm is not None:
+            text = text[: text.index("# [arm]")] + _section_of(self.arm)
+        if given is None:
+            return text
+        start, end = text.index("# joint_names ="), text.index("# The program's own lines")
+        return text[:start] + _written_out(given) + "\n" + text[end:]
+
+    def described(self, path: Path) -> RobotLimits:
+        """Read the URDF that is the robot.
+
+        Raises:
+            ConfigurationError: `hold` is not name=number, or the URDF's flange is not clear.
+            FileFormatError: The URDF cannot be read.
+        """
+        held = dict[str, float]()
+        for said in self.hold:
+            name, _, position = said.rpartition("=")
+            try:
+                held[name] = float(position)
+            except ValueError:
+                held[name] = math.nan
+            if not (name and math.isfinite(held[name])):
+                raise ConfigurationError(f"--hold must be a joint and where: lift=0.2; got {said}")
+        return read_urdf(path, self.tip, self.base, held)
+
+    def _with_symmetry(self, text: str) -> str:
+        """The text with what was said of the object and the box."""
+        said: dict[str, object] = {}
+        if self.box is not None:
+            low, high = [*self.box[:3]], [*self.box[3:]]
+            said = {"workspace_low": low, "workspace_high": high}
+        where = None if self.symmetry is None else read_object(self.symmetry)
+        # Neither a turn nor a shift: what is left is the tempo, which says one number.
+        if where is not None and (where != "none" or len(self.outcome_names) == 1):
+            text = text.replace("# [symmetry]", "[symmetry]")
+            said["object"] = json.dumps(where)
+        if self.no_box:
+            said["no_box"] = "true"
+        for key, value in said.items():
+            text = re.sub(rf"^# {key} = \S.*?(?=\s*(#|$))", f"{key} = {value}", text, flags=re.M)
+        return text
+
+
+def _section_of(arm: str) -> str:
+    """What drives the arm, as the manifest says it."""
+    name, settings = parse_choice(arm)
+    lines = ["[arm]", f"executor = {_toml(name)}"]
+    for key, value in settings.items():
+        try:
+            tomllib.loads(f"{key} = {value}")
+        except tomllib.TOMLDecodeError:  # a word
+            value = _toml(value)
+        lines.append(f"{key} = {value}")
+    return "".join(f"{line}\n" for line in lines)
+
+
+def with_columns(text: str, names: Sequence[str], units: Sequence[str]) -> str:
+    """Return a manifest's text with the columns of a plan that were not known when it was made."""
+    start = text.index("[plan]")
+    head, plan = text[:start], text[start:]
+    for key, values in (("names", names), ("units", units)):
+        said = f"{key} = {_toml(values)}".replace("\\", r"\\")
+        plan = re.sub(rf"^[ \t]*{key}[ \t]*=[^\[]*\[[^\]]*\]", said, plan, count=1, flags=re.M)
+    return head + plan
+
+
+def _spread(values: Sequence[str], n: int) -> tuple[str, ...]:
+    return tuple(values) * n if len(values) == 1 else tuple(values)
+
+
+def _written_out(robot: RobotLimits) -> str:
+    """An arm's numbers as lines of the manifest."""
+    lines = [f"source = {_toml(robot.source)}", f"joint_names = {_toml(robot.joint_names)}"]
+    for key in LIMIT_LISTS:
+        values = getattr(robot, key)
+        if values is None:
+            lines.append(
+                f"# {key} = []  # not published; the gate compares with the demonstrations"
+            )
+        else:
+            lines.append(f"{key} = {_rounded(values, 9)}")
+    if robot.chain is not None:
+        lines.append(
+            "# Of each joint: x, y, z [m], roll, pitch, yaw [rad] in the frame before, axis."
+        )
+        pairs = zip(robot.chain.origins, robot.chain.axes, strict=True)
+        rows = [f"  {_rounded((*origin, *axis), 12)}," for origin, axis in pairs]
+        lines += ["kinematics = [", *rows, "]", f"flange = {_rounded(robot.chain.flange, 12)}"]
+    return "".join(f"{line}\n" for line in lines)
+
+
+def _rounded(values: Iterable[float], digits: int) -> list[float]:
+    return [float(f"{value:.{digits}g}") for value in values]
+
+
+def _toml(value: str | Sequence[str]) -> str:
+    """A text, or a list of them, as TOML wants it: JSON's, but for one control character."""
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")

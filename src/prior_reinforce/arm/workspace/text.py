@@ -1,0 +1,184 @@
+"""A workspace in words for a person: what became of a trial, and the command that comes next."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+
+from prior_reinforce.arm.workspace.events import Moved, Moving
+from prior_reinforce.arm.workspace.manifest import Manifest, workspace_around
+from prior_reinforce.arm.workspace.state import Standing
+from prior_reinforce.session.trials import Stage, State, Trial
+from prior_reinforce.terminal import plain
+from prior_reinforce.wording import error_example, say_reading
+
+_POOR_TRIALS = 3
+_POOR_CHANCE = 0.35
+"""Probability of a hit below which another trial like the last ones is no good plan (ours): words
+by eye leave a chance of a half where all else is known."""
+_OUTDATED = (
+    "planned before your correction; if it was not thrown yet, void it and ask for a new plan"
+)
+"""What to do about a trial whose plan knows nothing of what was amended or voided since."""
+
+
+def say_trial(now: Standing, trial: Trial) -> str:
+    """Say what became of a trial, in a line."""
+    return plain(_say_trial(now, trial))
+
+
+def _say_trial(now: Standing, trial: Trial) -> str:
+    if trial.reading is not None:
+        seen = say_reading(trial.reading, now.manifest.outcome_format)
+        seen = f"reached ({seen})" if trial.hit else seen
+        return f"{seen}, {trial.surprise}" if trial.surprise else seen
+    match now.state.stage(trial):
+        case "voided":
+            return f"void: {trial.note}" if trial.note else "void"
+        case "executing" if now.moving:
+            return "is executing now"
+        case "executing":
+            began = now.state.executions[trial.number]
+            if isinstance(began, Moving) and began.folder and not began.by:
+                return (
+                    f"its plan was executed, as executions/{began.folder} shows, of which the "
+                    "journal, restored from a copy, knows nothing: was that this trial, did the "
+                    "arm move?"
+                )
+            return "was executing when the program stopped: did the arm move?"
+        case "executed":
+            return f"executed, {execution_warning(now, trial) or 'waits to be told'}"
+    waits = "asked for, waits to be executed and told"
+    if cut_off := now.state.cut_off.get(trial.number):
+        if now.moving:
+            return f"the arm makes its {cut_off} now"
+        waits = f"its {cut_off} was not made to its end; it waits to be executed and told"
+    return f"{waits}; {_OUTDATED}" if trial.outdated else waits
+
+
+def say_expectation(now: Standing, trial: Trial) -> list[str]:
+    """Say what the adapter expected of a trial, and after poor ones what would help."""
+    state = now.state
+    if trial.p_hit is None or trial.expected_trials is None:
+        return []
+    lines = [
+        f"{100 * trial.p_hit:.0f} % chance to hit; about {trial.expected_trials:.1f} trials to go"
+    ]
+    if trial.remark:
+        lines.append(trial.remark)
+    told = [known for known in state.trials if known.stage is Stage.TOLD]
+    shown, moved = state.demonstrations, now.manifest.symmetry
+    if not told and shown is not None and shown.n == 1 and moved and trial.expected_sd is not None:
+        form = now.manifest.outcome_format
+        sd = ", ".join(
+            f"{name} +- {100 * value:.0f} cm" if unit == "m" else f"{name} +- {value:.2g} {unit}"
+            for name, value, unit in zip(form.names, trial.expected_sd, form.units, strict=True)
+        )
+        lines.append(f"this trial tells how {moved.distance} carries: expect {sd}")
+    if told and told[-1].surprise:
+        lines.append(f"trial {told[-1].number} was {told[-1].surprise}")
+    missed = sum(known.goal_number == trial.goal_number for known in told)
+    if missed >= _POOR_TRIALS and not state.solved and trial.p_hit < _POOR_CHANCE:
+        lines.append(
+            "what would help: a demonstration near this goal, or a finer look at the next trial "
+            '("5.2 +- 0.3 cm long")'
+        )
+    return lines
+
+
+def say_outdated(state: State) -> list[str]:
+    """Say so where the trial that waits was planned before a correction."""
+    trial = state.open_trial
+    return [f"trial {trial.number} was {_OUTDATED}"] if trial and trial.outdated else []
+
+
+def say_warning(now: Standing, trial: Trial) -> str:
+    """What the last motion of an open trial came to; why a reading of a trial might mislead."""
+    latest = now.state.moves.get(trial.number) if trial.open else None
+    if isinstance(latest, Moving) and latest.motion != "trial" and not now.moving:
+        return "its result was not recorded"
+    if isinstance(latest, Moved) and latest.outcome == "not_moved":
+        return plain(f"nothing moved: {latest.reason}") if latest.reason else "nothing moved"
+    if isinstance(latest, Moved) and latest.motion != "trial":
+        begun = "" if latest.outcome == "done" else "the arm only began to move: "
+        return begun and plain(begun + latest.reason)
+    return execution_warning(now, trial)
+
+
+def execution_warning(now: Standing, trial: Trial) -> str:
+    """Why a reading of a trial might mislead: it was aborted, or went another way than planned."""
+    ended, gate = now.state.executions.get(trial.number), now.manifest.gate
+    if not isinstance(ended, Moved) or ended.outcome == "not_moved":
+        return ""
+    warnings = []
+    if ended.outcome == "aborted":
+        warnings.append(f"but aborted: {ended.reason or 'no reason was given'}")
+    for which, distances, says in (
+        (0, ended.start_error, "but began {} from the plan's first frame, more than {:g}"),
+        (1, ended.tracking_rms, "but went {} rms off the plan, more than {:g}"),
+    ):
+        for unit, distance in distances.items():
+            allowed = gate.errors_of(unit)
+            if allowed is not None and distance > allowed[which]:
+                warnings.append(says.format(f"{distance:.3g} {unit}", allowed[which]))
+    return plain("; ".join(warnings))
+
+
+def call(folder: Path, command: str, *words: object) -> str:
+    """A command as it is typed here: within the workspace, it need not be named."""
+    here = workspace_around(Path())
+    is_here = here is not None and here.resolve() == folder.resolve()
+    named = () if is_here else (shlex.quote(str(folder)),)
+    return " ".join(map(str, ("prior-reinforce", command, *named, *words)))
+
+
+def next_step(now: Standing) -> str:
+    """The command that comes next; see `Standing.step`."""
+    state, trial, folder = now.state, now.state.open_trial, now.folder
+    if trial is None:
+        match now.step:
+            case "import":
+                return call(folder, "import", "RECORDINGS")
+            case "learn":
+                return call(folder, "learn")
+            case "goal":
+                return goal_step(now)
+            case "reached":
+                return f"{goal_step(now)}, or {call(folder, 'report')}"
+        return call(folder, "ask")
+    tell = call(folder, "tell", trial.number, tell_example(now.manifest))
+    match now.step:
+        case "settle":
+            did_not_move = call(folder, "ask", "--arm-did-not-move")
+            if state.stage(trial) == "executing":
+                return f"if it moved: {tell}; if not: {did_not_move}"
+            void = call(folder, "void", trial.number, "--reason WHY")
+            return f"{void}; if it failed before the arm moved: {did_not_move}"
+        case "execute" if now.manifest.driven_by or trial.number in state.executions:
+            return execute_step(now, trial)
+    return f"{tell} (or --hit)"
+
+
+def goal_step(now: Standing) -> str:
+    """The command that sets a goal."""
+    place = " ".join(name.upper() for name in now.manifest.outcome_format.names)
+    return call(now.folder, "goal", place)
+
+
+def execute_step(now: Standing, trial: Trial) -> str:
+    """The command that executes a trial that waits: after a motion that was cut off, slowly."""
+    arm = now.manifest.driven_by
+    if arm is None:
+        return call(now.folder, "ask", '--run "COMMAND {plan}"')
+    flags = ["--execute"]
+    if trial.number in now.state.cut_off:
+        flags.append("--approach")
+    return call(now.folder, "ask", *flags)
+
+
+def tell_example(manifest: Manifest) -> str:
+    """How an error of this task can be told."""
+    form = manifest.outcome_format
+    if example := error_example(form):
+        return f'--error "{example}"'
+    return "--error " + " ".join(f"D{name.upper()}" for name in form.names)

@@ -1,0 +1,353 @@
+"""A workspace as plain data, which `--json`, `status`, the console and the report render.
+
+The structs are the JSON schema (`msgspec.json.schema(StatusView)`): a field is added now and then,
+none is renamed or changes its meaning within a major version. Numbers are in the manifest's units;
+what is not known is null. The whole reading of a trial, its interval and its sd, is in the journal.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+from typing import Any
+
+import numpy as np
+from msgspec import Struct, structs
+
+from prior_reinforce.arm.workspace.manifest import UNKNOWN
+from prior_reinforce.arm.workspace.state import Standing, Step
+from prior_reinforce.arm.workspace.store import Store
+from prior_reinforce.arm.workspace.text import goal_step, next_step, say_trial, say_warning
+from prior_reinforce.files import as_cell
+from prior_reinforce.formats import OutcomeFormat
+from prior_reinforce.session.trials import Goal, Stage, State, Trial
+from prior_reinforce.terminal import plain
+from prior_reinforce.wording import as_html, say_place, say_reading, say_tolerance
+
+_TRIALS_SHOWN = 3
+
+
+class View(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What programs are told."""
+
+
+class GoalView(View, frozen=True):
+    """One goal."""
+
+    number: int
+    """From 1."""
+    goal: list[float]
+    tolerance: list[float]
+    """Of each component."""
+    adapter: str
+    earlier_trials: bool
+    """Whether the adapter also learns from earlier goals' trials."""
+    new_hardware: str | None
+    """What was changed before it; null where nothing was."""
+    told: int
+    """Trials told, voided ones not counted."""
+    reached_after: int | None
+    """Trials until it was reached; null where it was not."""
+
+
+class TrialView(View, frozen=True):
+    """One trial."""
+
+    number: int
+    """From 1, over all goals."""
+    goal: int
+    """Number of its goal."""
+    stage: str
+    """asked, executing, executed, told or voided."""
+    line: str
+    """What became of it, in words."""
+    warning: str | None
+    """Why a reading of it might mislead; of one that waits, what its last motion came to."""
+    condition: list[float]
+    """The outcome that the generator was asked for."""
+    outcome: list[float] | None
+    """Where the object ended, as far as that was told."""
+    error: list[float] | None
+    """What was seen, outcome minus goal; of a direction alone, what it is taken to be."""
+    seen: str | None
+    """The same in words."""
+    said: str | None
+    """The same in the words that were typed."""
+    hit: bool | None
+    """Null unless told."""
+    reason: str | None
+    """Why it was voided."""
+    p_hit: float | None
+    """Probability that it hits, as expected when it was asked for."""
+    expected_trials: float | None
+    """Trials until the goal is reached, this one included, likewise."""
+    surprise: str | None
+    """What is odd about what was told of it."""
+    outdated: bool
+    """Whether it was planned before a correction."""
+    model: str
+    plan: str
+    """Path of the plan's file."""
+    sha256: str
+    """Of the plan's file."""
+    asked: str
+    """When its plan was given out, ISO 8601, UTC."""
+    told: str | None
+    """When its result was told last, likewise."""
+
+
+class StatusView(View, frozen=True):
+    """Where a workspace stands."""
+
+    task: str
+    folder: str
+    tolerance: list[float]
+    outcome_names: list[str]
+    outcome_units: list[str]
+    action_names: list[str]
+    action_units: list[str]
+    dt: float
+    """Time between two frames of a plan, in [s]."""
+    robot: str | None
+    """Null where no limits are checked."""
+    demonstrations: int
+    source: str | None
+    """What they were imported from."""
+    model: str | None
+    generator: str | None
+    remarks: list[str]
+    """What the fit could not do."""
+    stale: bool
+    """Whether the model must be learned (again)."""
+    goals: list[GoalView]
+    trials: list[TrialView]
+    """All of them, of all goals."""
+    solved: bool
+    """Whether the latest goal is reached."""
+    open_trial: TrialView | None
+    """The trial that waits to be told."""
+    step: Step
+    """What comes next."""
+    next: str
+    """The command that comes next."""
+    nearer: str | None
+    """What comes next if the gate refuses it, since the goal lies far outside what was shown."""
+    text: str = ""
+    """The same for a person, as `status` prints it."""
+
+    @property
+    def outcome_format(self) -> OutcomeFormat:
+        """What the numbers of an outcome mean, with the tolerance."""
+        return OutcomeFormat((*self.outcome_names,), (*self.outcome_units,), (*self.tolerance,))
+
+    def __repr__(self) -> str:
+        return self.text
+
+    def _repr_html_(self) -> str:
+        return as_html(self.text)
+
+
+class AskView(View, frozen=True):
+    """The trial that was asked for."""
+
+    trial: TrialView
+    first_pose: dict[str, float]
+    """Where the plan begins, by action name."""
+    gate: dict[str, Any] | None
+    """The gate's verdict of now; null where the manifest names no robot."""
+    written: str | None
+    """Where --out put the plan."""
+    execution: dict[str, Any] | None
+    """How the command of --run ended; null where none was run."""
+    next: str
+
+
+class InspectView(View, frozen=True):
+    """What recordings hold, and what an import would make of them."""
+
+    source: str
+    format: str
+    episodes: list[str]
+    findings: dict[str, str]
+    """The essentials by topic, in words."""
+    remarks: list[str]
+    unclear: list[str]
+    """What is only guessed; `next` has the options that settle it."""
+    outcomes: str | None
+    """The table of outcomes; null where the recordings hold them."""
+    outcomes_missing: list[str]
+    """Episodes without one."""
+    next: str
+    """The command to type next."""
+
+
+class AdviceView(View, frozen=True):
+    """Where first throws would hit, and what would teach most."""
+
+    mean_p_hit: float
+    """Over the demonstrated region."""
+    best: list[float]
+    """Where a first throw hits most probably."""
+    best_p_hit: float
+    worst: list[float]
+    worst_p_hit: float
+    throw: list[float] | None
+    """The throw that teaches most, and the share of what is unknown that it takes away; null where
+    demonstrations are moved, for what is learned of a move serves everywhere."""
+    throw_teaches: float
+    reached: float | None
+    """Share of the region that can be reached within the arm's limits; null without a symmetry."""
+    demonstration: list[float] | None
+    """The outcome of the demonstration that teaches most; null where none would."""
+    demonstration_teaches: float
+    picture: str | None
+
+
+def trial_view(now: Standing, store: Store, trial: Trial) -> TrialView:
+    """Return a trial as plain data."""
+    reading, seen, outcome = trial.reading, None, None
+    file = store.plan_file(now.state.plan_files[trial.number])
+    if reading is not None:
+        seen = say_reading(reading, now.manifest.outcome_format)
+    if reading is not None and reading.has_number:
+        outcome = (now.state.goal_of(trial).goal + reading.error_seen).tolist()
+    return TrialView(
+        number=trial.number,
+        goal=trial.goal_number,
+        stage=now.state.stage(trial),
+        line=say_trial(now, trial),
+        warning=say_warning(now, trial) or None,
+        condition=trial.condition.tolist(),
+        outcome=outcome,
+        error=reading.error_seen.tolist() if reading is not None else None,
+        seen=seen,
+        said=reading.said or None if reading is not None else None,
+        hit=trial.hit if reading is not None else None,
+        reason=trial.note or None,
+        p_hit=trial.p_hit,
+        expected_trials=trial.expected_trials,
+        surprise=trial.surprise or None,
+        outdated=trial.outdated,
+        model=trial.model,
+        plan=str(file.path),
+        sha256=file.sha256,
+        asked=trial.asked_at,
+        told=trial.told_at or None,
+    )
+
+
+def status_view(now: Standing, store: Store) -> StatusView:
+    """Return where a workspace stands.
+
+    Raises:
+        FileFormatError: The demonstrations are missing or damaged.
+    """
+    state, manifest, outcomes = now.state, now.manifest, now.manifest.outcome_format
+    training, form, imported = state.training, manifest.format, state.demonstrations
+    trials = [trial_view(now, store, trial) for trial in state.trials]
+    nearer = None
+    if imported is not None and now.step == "ask" and not state.current:
+        shown = store.demonstrations(imported.sha256)
+        far = np.any(shown.far_outside(state.goals[-1].goal))
+        nearer = f"a goal nearer to the demonstrations: {goal_step(now)}" if far else None
+    view = StatusView(
+        task=manifest.name,
+        folder=str(now.folder),
+        tolerance=[*outcomes.tolerance],
+        outcome_names=[*outcomes.names],
+        outcome_units=[*outcomes.units],
+        action_names=[*form.names],
+        action_units=[*form.units],
+        dt=form.dt,
+        robot=manifest.robot.robot if manifest.robot is not None else None,
+        demonstrations=imported.n if imported is not None else 0,
+        source=imported.source if imported is not None else None,
+        model=training.model if training is not None else None,
+        generator=training.generator if training is not None else None,
+        remarks=[*training.remarks] if training is not None else [],
+        stale=state.stale,
+        goals=[_goal_view(state, goal) for goal in state.goals],
+        trials=trials,
+        solved=state.solved,
+        open_trial=trials[-1] if state.open_trial is not None else None,
+        step=now.step,
+        next=next_step(now),
+        nearer=nearer,
+    )
+    return structs.replace(view, text=describe(view))
+
+
+def _goal_view(state: State, goal: Goal) -> GoalView:
+    told = [t for t in state.trials_of(goal.number) if t.stage is Stage.TOLD]
+    hits = [count for count, trial in enumerate(told, start=1) if trial.hit]
+    return GoalView(
+        number=goal.number,
+        goal=goal.goal.tolist(),
+        tolerance=goal.tolerance.tolist(),
+        adapter=goal.adapter,
+        earlier_trials=goal.carry_over,
+        new_hardware=goal.new_hardware,
+        told=len(told),
+        reached_after=hits[0] if hits else None,
+    )
+
+
+def describe(view: StatusView) -> str:
+    """Say where a workspace stands: ten lines, and one for each earlier goal and remark."""
+    columns, n, model = f"{len(view.action_names)} numbers", view.demonstrations, "none yet"
+    if tuple(view.action_names) == UNKNOWN:
+        columns = "what the first import has"
+    if view.model is not None:
+        model = f"{view.model}, {view.generator}" + ", of other demonstrations" * view.stale
+    robot = view.robot or "none, no limits are checked"
+    rows = [
+        ("task", f"{view.task}, tolerance {say_tolerance(view.outcome_format)}"),
+        ("plans", f"{columns} a frame, a frame every {view.dt * 1000:g} ms; robot: {robot}"),
+        ("demonstrations", f"{n} from {view.source}" if n else "none yet"),
+        ("model", model),
+        *(("  note", remark) for remark in view.remarks),
+        *((f"goal {goal.number}", _say_goal(view, goal)) for goal in view.goals),
+    ]
+    current = [trial for trial in view.trials if trial.goal == len(view.goals)]
+    shown = current[-_TRIALS_SHOWN:]
+    if earlier := len(current) - len(shown):
+        rows.append((f"  {earlier} more", "before these; all are in the report"))
+    rows += [(f"  trial {trial.number}", trial.line) for trial in shown]
+    refused = "" if view.nearer is None else f"; if it refuses, {view.nearer}"
+    rows.append(("next", view.next + refused))
+    return "\n".join(plain(f"{name:<15} {text}") for name, text in rows)
+
+
+def _say_goal(view: StatusView, goal: GoalView) -> str:
+    place = say_place(goal.goal, view.outcome_format)
+    n, hits = view.demonstrations, goal.reached_after
+    if hits is not None:
+        total = f"N = {n} demonstrations + {hits} = {n + hits}"
+        return f"{place}: reached in {_say_count(hits)} ({total})"
+    if goal.number < len(view.goals):
+        return f"{place}: not reached in {_say_count(goal.told)}"
+    changed = f", new hardware: {goal.new_hardware}" if goal.new_hardware is not None else ""
+    carried = ", with earlier goals' trials" if goal.earlier_trials else ""
+    so_far = f"not reached yet, {_say_count(goal.told)} told"
+    return f"{place}: {so_far}; adapter {goal.adapter}{carried}{changed}"
+
+
+def _say_count(trials: int) -> str:
+    return "1 trial" if trials == 1 else f"{trials} trials"
+
+
+def trials_table(view: StatusView) -> str:
+    """Return all trials as CSV: a row each, vectors a column a component with its unit."""
+    components = [f"{n} [{u}]" for n, u in zip(view.outcome_names, view.outcome_units, strict=True)]
+    vectors = [f"{v} {each}" for v in ("goal", "condition", "error") for each in components]
+    columns = ["stage", "hit", "said", "reason", "p_hit", "expected_trials", "model"]
+    columns += ["asked", "told"]
+    text = io.StringIO()
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow(map(as_cell, ("trial", "number of goal", *vectors, *columns)))
+    for trial in view.trials:
+        error = [None] * len(components) if trial.error is None else trial.error
+        row = [trial.number, trial.goal, *view.goals[trial.goal - 1].goal, *trial.condition]
+        row += [*error, *(getattr(trial, name) for name in columns)]
+        table.writerow(as_cell(cell) if isinstance(cell, str) else cell for cell in row)
+    return text.getvalue()

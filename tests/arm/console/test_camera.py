@@ -1,0 +1,189 @@
+import io
+import re
+from importlib import resources
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from prior_reinforce.arm.console.camera import Calibrate, Look, Pictures
+from prior_reinforce.arm.console.verbs import Ask, SetGoal
+from prior_reinforce.errors import ConfigurationError, FileFormatError, PerceptionFailedError
+from prior_reinforce.perception.calibration import CAMERA_SD
+from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
+from tests.arm.console.pictures import jpeg, pixel
+
+KNOWN = [[0.6, 0.4], [0.6, 0.0], [0.6, -0.4], [1.2, -0.4], [1.2, 0.0], [1.2, 0.4]]
+
+
+@pytest.fixture
+def pictures(verbs):
+    endpoint = "http://127.0.0.1:9/v1"  # the discard port: nothing answers
+    return Pictures(verbs, VisionLanguageModelConfig(base_url=endpoint, max_retries=0))
+
+
+def calibrated(pictures, points=KNOWN):
+    pictures.keep(jpeg(ball=(0.93, 0.07)))
+    return pictures.calibrate(Calibrate([*points], [pixel(p) for p in points]))
+
+
+def to_table(camera, pixel):
+    u, v, w = np.array(camera.to_table) @ [*pixel, 1.0]
+    return u / w, v / w
+
+
+def test_before_anything_there_are_places_to_begin_with(pictures):
+    camera = pictures.look_up()
+    assert (camera.picture, camera.to_table) == ("", None)
+    assert camera.points == [
+        [0.8, 0.2],
+        [0.8, 0.0],
+        [0.8, -0.2],
+        [1.0, -0.2],
+        [1.0, 0.0],
+        [1.0, 0.2],
+    ]
+    with pytest.raises(PerceptionFailedError, match="no picture"):
+        pictures.file()
+
+
+def test_a_calibration_maps_pixels_to_the_table_and_is_kept(pictures, verbs):
+    camera = calibrated(pictures)
+    for place in ([0.7, 0.3], [1.1, -0.35]):
+        np.testing.assert_allclose(to_table(camera, pixel(place)), place, atol=1e-6)
+    assert Pictures(verbs, VisionLanguageModelConfig()).look_up().to_table == camera.to_table
+    assert camera.sd == CAMERA_SD
+    assert "calibrated to 0.00 cm" in camera.summary
+
+
+def test_a_point_that_was_touched_wrongly_shows_in_the_residual_and_in_what_is_told(pictures):
+    pictures.keep(jpeg())
+    touched = [pixel(point) for point in KNOWN]
+    touched[2][0] += 25
+    camera = pictures.calibrate(Calibrate(KNOWN, touched))
+    assert camera.sd > 0.01
+    assert f"{100 * camera.sd:.2f} cm" in camera.summary
+
+
+@pytest.mark.parametrize("points", [KNOWN[:3], [[0.6, 0.0]] * 4, KNOWN[::-1]])
+def test_points_that_fix_no_plane_are_refused(pictures, points):
+    pictures.keep(jpeg())
+    with pytest.raises(ConfigurationError):
+        pictures.calibrate(Calibrate(points, [pixel(p) for p in KNOWN[: len(points)]]))
+    assert pictures.look_up().to_table is None
+
+
+def test_printed_tags_on_the_known_points_are_found_at_their_centres(pictures):
+    pictures.keep(jpeg(tags=KNOWN))
+    tags = pictures.tags()
+    assert [*sorted(tags)] == [1, 2, 3, 4, 5, 6]
+    touched = [tags[number] for number in sorted(tags)]
+    np.testing.assert_allclose(touched, [pixel(point) for point in KNOWN], atol=1.0)
+    camera = pictures.calibrate(Calibrate(KNOWN, touched))
+    assert camera.sd < 0.004
+    np.testing.assert_allclose(to_table(camera, pixel([0.8, 0.2])), [0.8, 0.2], atol=0.002)
+
+
+def test_the_sheet_that_is_printed_has_these_tags_with_their_centres_where_they_are(pictures):
+    """At 10 px a millimetre; each tag is a path of rectangles of so many modules."""
+    drawn = resources.files("prior_reinforce.arm.console").joinpath("tags.svg").read_text()
+    sheet = np.full((2100, 1900), 255, np.uint8)
+    centres = []
+    for left, top, path in re.findall(r'translate\((\d+) (\d+)\)"><path.* d="(.*?)"', drawn):
+        for column, row, wide in re.findall(r"M(\d) (\d)h(\d)v1", path):
+            u, v = (10 * (int(at) + 5 * int(k)) for at, k in ((left, column), (top, row)))
+            sheet[v : v + 50, u : u + 50 * int(wide)] = 0
+        centres.append([10 * int(left) + 200, 10 * int(top) + 200])
+    encoded = io.BytesIO()
+    Image.fromarray(sheet).save(encoded, "PNG")
+    pictures.keep(encoded.getvalue())
+    tags = pictures.tags()
+    assert [*sorted(tags)] == [1, 2, 3, 4, 5, 6]
+    np.testing.assert_allclose([tags[number] for number in sorted(tags)], centres, atol=2)
+
+
+def test_no_tag_is_no_error(pictures):
+    pictures.keep(jpeg())
+    assert pictures.tags() == {}
+
+
+def test_the_ball_is_found_by_its_colour(pictures):
+    with pytest.raises(ConfigurationError, match="not calibrated"):
+        pictures.find(Look("the orange ball", 0.04))
+    calibrated(pictures)
+    found = pictures.find(Look("the orange ball", 0.04))
+    np.testing.assert_allclose(found.place, [0.93, 0.07], atol=0.003)
+    left, top, right, bottom = found.box
+    u, v = pixel([0.93, 0.07])
+    assert left < u < right
+    assert top < v < bottom
+    with pytest.raises(PerceptionFailedError, match="touch it"):
+        pictures.find(Look("the blue ball", 0.04))
+    with pytest.raises(PerceptionFailedError, match="is the server running"):
+        pictures.find(Look("the orange ball", 0.04, "model"))
+
+
+def test_a_picture_is_of_the_trial_that_waits(pictures, verbs):
+    pictures.keep(jpeg())
+    assert pictures.file().name == "table.jpg"
+    state = verbs.goal(SetGoal(seen=verbs.state().id, goal=[0.9, 0.0]))
+    verbs.ask(Ask(seen=state.id))
+    pictures.keep(jpeg())
+    assert pictures.file().name == "trial-001.jpg"
+
+
+@pytest.mark.parametrize("content", [b"", b"<svg onload=alert(1)>", b"GIF89a" + b"0" * 99])
+def test_what_is_no_picture_is_refused(pictures, content):
+    with pytest.raises(FileFormatError, match="cannot read that as a picture"):
+        pictures.keep(content)
+    assert pictures.look_up().picture == ""
+
+
+def test_a_flood_of_pixels_is_refused_before_it_is_unpacked(pictures):
+    encoded = io.BytesIO()
+    Image.new("1", (20_000, 20_000)).save(encoded, "PNG")
+    assert len(encoded.getvalue()) < 100_000
+    with pytest.raises(FileFormatError, match="cannot read that as a picture"):
+        pictures.keep(encoded.getvalue())
+
+
+def test_what_a_picture_hides_does_not_come_in(pictures):
+    pictures.keep(jpeg() + b"<script>alert(1)</script>")
+    assert b"script" not in pictures.file().read_bytes()
+
+
+def test_the_calibration_is_scaled_to_a_picture_of_its_shape_and_kept_from_others(pictures):
+    camera = calibrated(pictures)
+    picture = Image.open(io.BytesIO(jpeg(ball=(0.93, 0.07))))
+
+    def shown(size, **how):
+        encoded = io.BytesIO()
+        picture.resize(size).save(encoded, "JPEG", **how)
+        return pictures.keep(encoded.getvalue())
+
+    smaller = shown((640, 360))
+    assert "another size" in smaller.summary
+    at = np.array(pixel([0.8, 0.2])) / 2
+    np.testing.assert_allclose(to_table(smaller, at), [0.8, 0.2], atol=1e-6)
+    found = pictures.find(Look("the orange ball", 0.04))
+    np.testing.assert_allclose(found.place, [0.93, 0.07], atol=0.005)
+    for size in ((720, 1280), (960, 720)):
+        other = shown(size)
+        assert other.to_table is None
+        assert "calibrate again" in other.summary
+        with pytest.raises(ConfigurationError, match="calibrate again"):
+            pictures.find(Look("the orange ball", 0.04))
+    assert shown((1280, 720)).to_table == camera.to_table
+
+
+def test_a_tag_that_is_seen_twice_is_named(pictures):
+    other = jpeg(tags=[*KNOWN[:2]])
+    left, right = (Image.open(io.BytesIO(content)) for content in (other, jpeg(tags=[KNOWN[4]])))
+    both = Image.new("RGB", (2560, 720))
+    both.paste(left, (0, 0))
+    both.paste(right, (1280, 0))
+    encoded = io.BytesIO()
+    both.save(encoded, "PNG")
+    pictures.keep(encoded.getvalue())
+    with pytest.raises(PerceptionFailedError, match="tag 1 is seen 2 times"):
+        pictures.tags()

@@ -1,0 +1,344 @@
+"""What is done once for every executor: columns, start pose, limits, approach, stopping."""
+
+import json
+import signal
+import subprocess
+import sys
+from dataclasses import replace
+
+import msgspec
+import numpy as np
+import pytest
+
+from prior_reinforce.arm.executing.arguments import split_command
+from prior_reinforce.arm.executing.base import ArmDescription, ArmSettings, begin_at
+from prior_reinforce.arm.executing.command import run_command
+from prior_reinforce.arm.executing.drive import (
+    Request,
+    approach,
+    arms_columns,
+    drive,
+    drive_command,
+    make_executor,
+    read_look,
+)
+from prior_reinforce.arm.robots.gate_settings import GateSettings
+from prior_reinforce.arm.robots.limits import RobotLimits
+from prior_reinforce.arm.robots.plan_files import write_plan
+from prior_reinforce.errors import (
+    ConfigurationError,
+    FileFormatError,
+    InvalidPlanError,
+    MissingExtraError,
+)
+from prior_reinforce.plans.kinematics import Chain
+from prior_reinforce.plans.motions import Plan
+from prior_reinforce.plans.plan_format import PlanFormat
+from tests.arm.executing import toy_arm
+from tests.attacks.harness import wait_until
+
+TOY = toy_arm.TOY
+FORM = PlanFormat(("arm_joint2", "arm_joint1"), ("rad", "rad"), 0.02)
+PHASE = np.linspace(0, 1, 24)[:, None]
+SWING = (10 * PHASE**3 - 15 * PHASE**4 + 6 * PHASE**5) * [0.4, 1.0]
+PLAN = Plan(SWING, FORM)
+ARM = ArmDescription("toy", "", ("joint1", "joint2"), ("rad", "rad"), 100.0, (), ())
+
+
+@pytest.fixture
+def arm(tmp_path, toy_plugin):
+    """Drives a toy arm; `.motions()` are its motions, `.pose()` is where it stands."""
+    before = signal.getsignal(signal.SIGTERM)
+
+    class Arm:
+        folder = tmp_path / "arm"
+
+        gate, limits = GateSettings(), None
+
+        def request(self, motion="trial", speed=1.0, **options):
+            settings = ArmSettings(TOY, {"folder": str(self.folder)} | options)
+            return Request(settings, self.gate, motion, speed, self.limits)
+
+        def drive(self, motion="trial", plan=PLAN, speed=1.0, **options):
+            self.result = tmp_path / f"result-{len(list(tmp_path.iterdir()))}"
+            self.result.mkdir()
+            return drive(self.request(motion, speed, **options), plan, self.result)
+
+        def motions(self):
+            path = self.folder / "motions"
+            return len(path.read_text().split()) if path.exists() else 0
+
+        def pose(self):
+            return [float(word) for word in (self.folder / "pose").read_text().split()]
+
+        def stands(self, *pose):
+            (self.folder / "pose").write_text(" ".join(map(str, pose)))
+
+        def path(self):
+            with np.load(self.result / "executed.npz") as archive:
+                return archive["t"], archive["q"]
+
+    Arm.folder.mkdir()
+    yield Arm()
+    signal.signal(signal.SIGTERM, before)
+
+
+def test_a_plans_columns_become_the_arms_and_back(arm):
+    result = arm.drive()
+    assert (result.outcome, result.reason) == ("done", "")
+    assert arm.pose() == pytest.approx([1.0, 0.4])
+    t, q = arm.path()
+    assert t[-1] == pytest.approx(0.46)
+    assert q[-1] == pytest.approx([0.4, 1.0])
+    assert json.loads((arm.result / "result.json").read_bytes())["outcome"] == "done"
+
+
+def test_a_channel_that_the_plan_leaves_out_is_held(arm):
+    arm.stands(0.7, 0.0)
+    only = Plan(SWING[:, :1], PlanFormat(("joint2",), ("rad",), 0.02))
+    assert arm.drive(plan=only).outcome == "done"
+    assert arm.pose() == pytest.approx([0.7, 0.4])
+    assert arm.path()[1].shape[1] == 1
+
+
+@pytest.mark.parametrize(
+    ("names", "units", "says"),
+    [
+        (("joint1", "joint3"), ("rad", "rad"), "no channel for joint3"),
+        (("joint1", "joint2"), ("rad", "m"), r"no channel for joint2 \[m\]"),
+        (("joint1", "a_joint1"), ("rad", "rad"), "are one channel"),
+    ],
+)
+def test_columns_are_never_guessed(names, units, says):
+    with pytest.raises(InvalidPlanError, match=says):
+        arms_columns(PlanFormat(names, units, 0.01), ARM)
+
+
+@pytest.mark.slow
+def test_an_arm_that_stands_elsewhere_is_not_moved_unasked(arm):
+    arm.stands(0.0, 0.3)
+    result = arm.drive()
+    assert result.outcome == "not_moved"
+    assert "0.3 rad (arm_joint2) from the start pose; 0.02 is allowed" in result.reason
+    assert "--approach" in result.reason
+    assert arm.motions() == 0
+    assert arm.drive("approach").outcome == "done"
+    assert arm.pose() == pytest.approx([0.0, 0.0])
+    assert arm.drive().outcome == "done"
+
+
+def test_what_is_left_within_the_tolerance_is_closed_slowly_first(arm):
+    arm.stands(0.0, 0.015)
+    assert arm.drive().outcome == "done"
+    assert arm.motions() == 2
+    assert arm.path()[1][0] == pytest.approx([0.0, 0.0], abs=1e-12)
+
+
+def test_an_approach_is_slow_and_at_rest_at_both_ends():
+    plan = approach(np.array([0.0, 0.0]), np.array([0.6, -0.1]), ARM)
+    speeds = np.abs(np.diff(plan.actions, axis=0)) / plan.format.dt
+    assert speeds.max() == pytest.approx(0.3, rel=0.01)
+    assert speeds[[0, -1]].max() < 0.001
+    assert plan.actions[-1] == pytest.approx([0.6, -0.1])
+    odd = ArmDescription("odd", "", ("joint1", "valve"), ("rad", "steps"), 100.0, (), ())
+    with pytest.raises(InvalidPlanError, match="no slow speed is known in steps"):
+        approach(np.zeros(2), np.ones(2), odd)
+
+
+def test_a_motion_begins_where_the_arm_stands_and_is_its_plan_soon_after():
+    pose = np.array([0.002, -0.001])
+    for form in (PLAN.format, PlanFormat(PLAN.format.names, PLAN.format.units, 0.004)):
+        begun = begin_at(Plan(SWING, form), pose)
+        assert begun.actions[0].tolist() == pose.tolist()
+        blended = form.dt * np.arange(len(SWING)) < min(0.2, form.dt * (len(SWING) - 1)) - 1e-9
+        np.testing.assert_array_equal(begun.actions[~blended], SWING[~blended])
+        assert np.abs(begun.actions - SWING).max() == pytest.approx(0.002)
+
+
+@pytest.mark.slow
+def test_the_plan_is_held_against_the_gate_as_it_begins_where_the_arm_stands(arm):
+    """It keeps from a joint's end by 1 mrad, and the arm stands 1.9 mrad off."""
+    arm.limits = replace(IN_PLANE, lower=[-0.001, -0.001])
+    assert arm.drive().outcome == "done"
+    arm.stands(-0.0019, 0.0)
+    moved = arm.motions()
+    result = arm.drive()
+    assert result.outcome == "not_moved"
+    assert result.reason.startswith("the plan from where the arm stands: position: joint1 at -0.00")
+    assert arm.motions() == moved
+    arm.drive("look")
+    assert read_look(arm.result).refused == result.reason
+
+
+def test_a_rehearsal_is_the_same_path_at_a_fraction_of_the_speed(arm):
+    assert arm.drive("rehearsal", speed=0.25).outcome == "done"
+    t, q = arm.path()
+    assert t[-1] == pytest.approx(4 * 0.46)
+    assert q[-1] == pytest.approx([0.4, 1.0])
+
+
+@pytest.mark.slow
+def test_a_limit_of_the_arm_refuses_before_anything_moves(arm):
+    arm.stands(0.0, 0.015)  # what is left to close would pass
+    fastest = 15 / 8 * 1.0 / 0.46
+    assert arm.drive(fastest=0.99 * fastest).outcome == "not_moved"
+    assert arm.motions() == 0
+    assert arm.drive("rehearsal", speed=0.9, fastest=0.99 * fastest).outcome == "done"
+    arm.stands(0.0, 0.0)
+    assert arm.drive(fastest=1.01 * fastest).outcome == "done"
+
+
+@pytest.mark.parametrize(
+    ("kind", "outcome", "reason"),
+    [
+        ("faults", "aborted", toy_arm.FAULT),
+        ("jams", "not_moved", "brakes are closed"),
+        ("raises", "aborted", "ZeroDivisionError"),
+        ("dead", "not_moved", "the arm does not answer"),
+    ],
+)
+def test_a_fault_is_told_in_the_arms_words(arm, kind, outcome, reason):
+    result = arm.drive(kind=kind)
+    assert result.outcome == outcome
+    assert reason in result.reason
+    if kind == "faults":
+        assert 0 < arm.path()[0][-1] < 0.46
+
+
+def test_a_fault_on_the_way_to_the_start_is_no_measured_plan(arm):
+    arm.stands(0.0, 0.015)
+    assert arm.drive(kind="faults").outcome == "aborted"
+    assert not (arm.result / "executed.npz").exists()
+    assert arm.motions() == 1
+
+
+def test_a_look_moves_nothing_and_says_how_the_arm_stands(arm):
+    arm.stands(0.2, 0.3)
+    arm.drive("look", fastest=0.1)
+    look = read_look(arm.result)
+    assert look.pose == {"arm_joint2": 0.3, "arm_joint1": 0.2}
+    assert not look.there
+    assert "; 0.02 is allowed" in look.said
+    assert "more than 0.1" in look.refused
+    assert look.approach == pytest.approx(15 / 8 * 0.3 / 0.3, abs=0.02)
+    assert arm.motions() == 0
+    with pytest.raises(FileFormatError, match="ask again"):
+        read_look(arm.folder)
+
+
+@pytest.mark.slow
+def test_asked_to_stop_it_stops_in_mid_swing_and_says_so(arm, tmp_path):
+    file = write_plan(PLAN, tmp_path / "plan.npz")
+    words = split_command(drive_command(arm.request(seconds=20.0)), file.path, tmp_path)
+    with subprocess.Popen(words) as program:
+        assert wait_until(lambda: (arm.folder / "pose").exists() and sum(arm.pose()) > 0.01, 60)
+        program.send_signal(signal.SIGTERM)
+    assert json.loads((tmp_path / "result.json").read_bytes()) == {
+        "outcome": "aborted",
+        "reason": "stopped on request",
+        "start_error": {},
+        "tracking_rms": {},
+    }
+    assert 0 < sum(arm.pose()) < 1.4
+
+
+def test_asked_to_stop_before_it_moves_it_does_not(arm, monkeypatch):
+    monkeypatch.setattr(toy_arm.ToyArm, "check", lambda *_: signal.raise_signal(signal.SIGTERM))
+    result = arm.drive()
+    assert result.outcome == "not_moved"
+    assert result.reason == "it was asked to stop before it moved; ask again"
+    assert arm.motions() == 0
+
+
+@pytest.mark.slow
+def test_the_program_says_how_it_ended_by_its_status(arm, tmp_path):
+    file = write_plan(PLAN, tmp_path / "plan.npz")
+    for kind, status, outcome in (("works", 0, "done"), ("dead", 75, "not_moved")):
+        arm.stands(0.0, 0.0)
+        result = run_command(drive_command(arm.request(kind=kind)), file, time_limit=60)
+        assert (result.exit_status, result.outcome) == (status, outcome)
+    for kind, status, reason in (("faults", 1, toy_arm.FAULT), ("crashes", 3, "status 3")):
+        arm.stands(0.0, 0.0)
+        result = run_command(drive_command(arm.request(kind=kind)), file, time_limit=60)
+        assert (result.exit_status, result.outcome) == (status, "aborted")
+        assert reason in result.reason
+
+
+@pytest.mark.slow
+def test_the_folder_that_a_user_stands_in_is_no_place_for_modules(arm, tmp_path, monkeypatch):
+    (tmp_path / "msgspec.py").write_text("raise SystemExit('taken for the library')")
+    monkeypatch.chdir(tmp_path)
+    file = write_plan(PLAN, tmp_path / "plan.npz")
+    assert run_command(drive_command(arm.request()), file, time_limit=60).outcome == "done"
+
+
+def test_settings_are_held_against_their_types(arm):
+    with pytest.raises(ConfigurationError, match=r"\[arm\] .*has no setting 'hots'"):
+        make_executor(ArmSettings(TOY, {"folder": "x", "hots": 1}))
+    with pytest.raises(ConfigurationError, match="Expected `float`"):
+        make_executor(ArmSettings(TOY, {"folder": "x", "fastest": "quick"}))
+    with pytest.raises(ConfigurationError, match="no executor 'r2d2'"):
+        make_executor(ArmSettings("r2d2"))
+
+
+@pytest.mark.parametrize(("name", "library"), [("fr3", "pylibfranka"), ("ur", "rtde_receive")])
+def test_a_library_that_is_missing_is_named_with_its_extra(name, library, monkeypatch):
+    monkeypatch.setitem(sys.modules, library, None)
+    with pytest.raises(MissingExtraError, match=rf"pip install -e '\.\[{name}\]'"):
+        make_executor(ArmSettings(name, {"host": "127.0.99.9"}))
+
+
+ONE = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+LINKS = Chain(((0.0,) * 6, ONE), ((0.0, 0.0, 1.0),) * 2, ONE)
+"""Two links of a metre in the plane: with joint 2 at 0 they are stretched."""
+IN_PLANE = RobotLimits(
+    "toy", "1.0", "ours", ("joint1", "joint2"), [-3.1] * 2, [3.1] * 2, [5.0] * 2, chain=LINKS
+)
+BOX = GateSettings(box_low=(-2.1, -0.5, -0.1), box_high=(2.1, 2.1, 0.1), tool_tip=(0.0, 0.0, 0.0))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("pose", "says"),
+    [
+        ((0.0, -3.0), "box: tool tip at y"),  # both ends are in the box, and not what is between
+        ((-1.2, 0.0), "box: tool tip at y"),
+        ((0.0, 3.2), "position: joint2 at 3.200"),
+    ],
+)
+def test_the_way_to_the_start_is_held_against_the_gate(arm, pose, says, tmp_path):
+    arm.gate, arm.limits = BOX, IN_PLANE
+    arm.stands(*pose)
+    assert arm.drive("look").reason == ""
+    look = read_look(arm.result)
+    assert says in look.approach_refused
+    assert not look.refused
+    result = arm.drive("approach")
+    assert result.outcome == "not_moved"
+    assert result.reason.startswith("the way from where the arm stands to the plan's first frame: ")
+    assert says in result.reason
+    assert arm.motions() == 0
+    arm.stands(0.5, 0.1)
+    file = write_plan(PLAN, tmp_path / "plan.npz")
+    command = drive_command(arm.request("approach"))  # limits and box travel with it
+    assert run_command(command, file, time_limit=60).outcome == "done"
+    arm.stands(*pose)
+    again = run_command(command, file, time_limit=60)
+    assert (again.outcome, again.reason) == ("not_moved", result.reason)
+
+
+def test_a_request_survives_its_way_through_the_command_line(arm):
+    request = arm.request("rehearsal", 0.2, kind='it\'s "{quoted}"')
+    again = msgspec.json.decode(msgspec.json.encode(request), type=Request)
+    assert again == request
+    assert sys.executable in drive_command(request)
+
+
+def test_an_arm_that_does_not_say_where_a_joint_stands_is_not_moved(arm):
+    arm.folder.mkdir(exist_ok=True)
+    (arm.folder / "pose").write_text("0.0 nan")
+    for motion in ("trial", "approach"):
+        result = arm.drive(motion)
+        assert result.outcome == "not_moved"
+        assert "toy does not say where joint2 stands" in result.reason
+    assert arm.motions() == 0

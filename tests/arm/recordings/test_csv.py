@@ -1,0 +1,287 @@
+"""CSV files come back as the motions that were written, and say what is wrong with them."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from prior_reinforce.arm.recordings import import_demonstrations, read_recordings
+from prior_reinforce.errors import (
+    ConfigurationError,
+    FileFormatError,
+    InvalidDemonstrationsError,
+    PriorReinforceError,
+    UnclearUnitsError,
+)
+from tests.arm.recordings.recorded import (
+    AS_IS,
+    JOINTS,
+    N,
+    check_motions,
+    sampled,
+    write_csv,
+    write_outcomes,
+)
+
+
+@pytest.mark.slow
+def test_csv(tmp_path):
+    write_outcomes(write_csv(tmp_path))
+    check_motions(import_demonstrations(tmp_path, preprocessing=AS_IS), 100, tolerance=0)
+
+
+def test_csv_with_a_column_of_episodes_and_text_beside(tmp_path):
+    lines = ["episode,time,joint2,phase,joint1"]
+    for episode in ("b10", "b9"):
+        lines += [f"{episode},{k / 10},{k + len(episode)},swing,{-k}" for k in range(5)]
+    (tmp_path / "log.csv").write_text("\n".join(lines))
+    recordings = read_recordings(tmp_path / "log.csv", joints=["joint1", "joint2"])
+    assert [r.episode for r in recordings] == ["b9", "b10"]
+    np.testing.assert_array_equal(recordings[0].positions[:, 0], -np.arange(5))
+    np.testing.assert_array_equal(recordings[1].positions[:, 1], np.arange(5) + 3)
+    assert recordings[0].remarks == ()
+    every = read_recordings(tmp_path / "log.csv")[0]
+    assert every.names == ("joint2", "joint1")
+    assert every.remarks == ("phase left out, which holds no number",)
+    text = (tmp_path / "log.csv").read_text().replace("-3", "three")
+    (tmp_path / "log.csv").write_text(text)
+    with pytest.raises(FileFormatError, match="line 10: joint1 is 'three', expected a number"):
+        read_recordings(tmp_path / "log.csv")
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("", "has 0 frames"),
+        ("t,a\n0,1\n", "has 1 frames"),
+        ("t,a\n0,1\n0.1\n", "line 3: a is ''"),
+        ("t,a\n0,1\n0.1,x\n", "line 3: a is 'x'"),
+        ("a,b\n0,1\n1,2\n", "give the rate"),
+        ("t,a\n0.1,1\n0.0,2\n", "time does not increase"),
+        ("t,a,b,a\n0,1,1,1\n0.1,2,2,2\n", "repeats a channel name: a; rename"),
+        ('t,a\n0,"1\n0.1,2\n', "as a table .*unexpected end of data"),
+        ("t\n0\n1\n", "for 0 channels"),
+    ],
+)
+def test_csv_of_other_content(tmp_path, text, says):
+    (tmp_path / "bad.csv").write_text(text)
+    with pytest.raises(PriorReinforceError, match=says):
+        read_recordings(tmp_path / "bad.csv")
+
+
+def libfranka_log(path, q):
+    """As libfranka 0.9.2 was seen to write it: `time` in ms since the robot started, six digits."""
+    vectors = {"state.q": q, "state.q_d": q, "state.dq": 0 * q, "cmd.q_d": q + 1}
+    names = ["time", "success_rate"]
+    names += [f"{name}[{i}]" for name in vectors for i in range(7)]
+    lines = [",".join(names)]
+    for k, row in enumerate(np.column_stack(list(vectors.values()))):
+        lines.append(f"{123456789 + k},1,{','.join(f'{v:.6g}' for v in row)}")
+    path.write_text("\n".join(lines) + "\n")
+
+
+@pytest.mark.slow
+def test_libfrankas_log_is_known_by_its_columns(tmp_path):
+    libfranka_log(tmp_path / "0.csv", sampled(0, 1000)[1])
+    (recording,) = read_recordings(tmp_path, joints=JOINTS)
+    assert recording.period == pytest.approx(0.001)
+    assert recording.duration == pytest.approx(1.7)
+    np.testing.assert_allclose(recording.positions, sampled(0, 1000)[1], atol=1e-5)
+    assert recording.remarks == ("libfranka's log: time in ms, motion is state.q (measured)",)
+    commanded = read_recordings(tmp_path, key="cmd.q_d")[0]
+    np.testing.assert_allclose(commanded.positions, recording.positions + 1, atol=2e-5)
+    with pytest.raises(ConfigurationError, match="time is in ms, but --time-unit says s"):
+        read_recordings(tmp_path, time_unit="s")
+    with pytest.raises(ConfigurationError, match="time in ms says 1000 Hz"):
+        read_recordings(tmp_path, rate=100)
+
+
+@pytest.mark.slow
+def test_a_numbered_group_keeps_what_its_columns_are_called(tmp_path):
+    for i in range(N):
+        t, q = sampled(i, 100)
+        rows = np.column_stack([t, q, q + 1])
+        header = ",".join(["t", *(f"q{k}" for k in range(7)), *(f"tau{k}" for k in range(7))])
+        np.savetxt(tmp_path / f"{i}.csv", rows, delimiter=",", header=header, comments="")
+    recording = read_recordings(tmp_path, key="q")[0]
+    assert recording.names == JOINTS
+    assert recording.columns == tuple(f"q{k}" for k in range(7))
+
+
+@pytest.mark.slow
+def test_the_log_of_the_first_libfranka_is_known_by_its_columns(tmp_path):
+    """Its `logToCSV` gives commands the names of the state's vectors, after an empty column."""
+    q = sampled(0, 1000)[1]
+    vectors = [", ".join(f"{name}[{i}]" for i in range(7)) for name in ("q", "q_d", "tau_J")]
+    lines = [f"duration, success rate, {','.join(vectors)},sent commands,{vectors[1]}"]
+    for k, row in enumerate(q):
+        cells = ",".join(f"{v:.6g}" for v in row)
+        lines.append(f"{5000 + k},1,{cells},{cells},{cells},,{cells}")
+    (tmp_path / "0.csv").write_text("\n".join(lines) + "\n")
+    (recording,) = read_recordings(tmp_path, joints=JOINTS)
+    np.testing.assert_allclose(recording.positions, q, atol=1e-5)
+    np.testing.assert_allclose(recording.times, np.arange(len(q)) / 1000)
+
+
+def test_an_rtde_log_is_known_by_its_columns(tmp_path):
+    """As UR's own recorder writes it: blanks between cells, seconds since the start."""
+    t, q = sampled(0, 500)
+    names = [
+        "timestamp",
+        *(f"target_q_{i}" for i in range(6)),
+        *(f"actual_q_{i}" for i in range(6)),
+    ]
+    rows = np.column_stack([t + 4711.5, q[:, :6] + 1, q[:, :6]])
+    np.savetxt(tmp_path / "0.csv", rows, header=" ".join(names), comments="", fmt="%.9f")
+    (recording,) = read_recordings(tmp_path)
+    np.testing.assert_allclose(recording.positions, q[:, :6], atol=1e-8)
+    assert recording.period == pytest.approx(0.002)
+    assert not recording.named  # six columns are any six joints, in order
+
+
+def test_an_rtde_log_of_an_arm_at_rest_keeps_its_rows(tmp_path):
+    t, names = np.arange(50) / 500, ["timestamp", "actual_q_0", "actual_q_1"]
+    q = np.column_stack([np.round(np.linspace(0, 1e-4, 50), 5), np.ones(50)])  # whole 10 urad
+    pd.DataFrame(np.column_stack([t, q]), columns=names).to_csv(tmp_path / "0.csv", index=False)
+    (recording,) = read_recordings(tmp_path)
+    np.testing.assert_allclose(recording.positions, q)
+    assert len(recording.remarks) == 1
+
+
+def rtde_log(path, t, q):
+    names = ["timestamp", *(f"actual_q_{i}" for i in range(q.shape[1]))]
+    pd.DataFrame(np.column_stack([t + 512.0, q]), columns=names).to_csv(path, index=False)
+
+
+def repeated(t, q):
+    """Every seventh row twice, as ur_rtde's recorder writes them."""
+    twice = np.repeat(np.arange(len(t)), 1 + (np.arange(len(t)) % 7 == 0))
+    return t[twice], q[twice]
+
+
+@pytest.mark.parametrize("recorder", [lambda t, q: (t, q), repeated], ids=["ur", "ur_rtde"])
+@pytest.mark.parametrize(
+    ("rate", "digits"),
+    [(500, 3), (20, 5), (10, 5)],  # coarse at the arm's cycle; slow, so that a rest comes at once
+)
+def test_right_rows_of_an_rtde_log_are_kept(tmp_path, recorder, rate, digits):
+    t, q = sampled(0, rate)
+    q = np.round(q[:, :6], digits)
+    rtde_log(tmp_path / "0.csv", *recorder(t, q))
+    (recording,) = read_recordings(tmp_path)
+    np.testing.assert_allclose(recording.times, t, atol=1e-9)
+    np.testing.assert_array_equal(recording.positions, q)
+
+
+def test_an_rtde_log_without_a_repeated_row_is_of_another_recorder(tmp_path):
+    """Positions of an arm at 125 Hz with times at 500 Hz."""
+    t, q = sampled(0, 500)
+    q = np.round(q[:, :6], 6)[np.arange(len(t)) // 4 * 4]
+    rtde_log(tmp_path / "0.csv", t, q)
+    (recording,) = read_recordings(tmp_path)
+    np.testing.assert_array_equal(recording.positions, q)
+
+
+@pytest.mark.slow
+def test_an_index_without_a_name_is_the_time(tmp_path):
+    """As `DataFrame.to_csv` writes one: of dates it is taken, of numbers only when it is said."""
+    t, q = sampled(0, 100)
+    start = pd.Timestamp("2026-11-21T10:00", tz="Europe/Berlin")
+    frame = pd.DataFrame(q, columns=JOINTS, index=start + pd.to_timedelta(t, unit="s"))
+    frame.to_csv(tmp_path / "0.csv")
+    (recording,) = read_recordings(tmp_path)
+    np.testing.assert_allclose(recording.times, t, atol=1e-9)
+    assert (recording.names, recording.clock) == (JOINTS, "column 1 in ns")
+    frame.set_axis(1000 * t).to_csv(tmp_path / "0.csv")
+    with pytest.raises(UnclearUnitsError) as caught:
+        read_recordings(tmp_path)
+    assert caught.value.options == "--time-column 1 --time-unit ms"
+    (recording,) = read_recordings(tmp_path, time_column="1", time_unit="ms")
+    np.testing.assert_allclose(recording.times, t, atol=1e-9)
+    frame.set_axis(np.arange(len(t)) + 40).to_csv(tmp_path / "0.csv")  # rows that were cut out
+    (recording,) = read_recordings(tmp_path, rate=100, joints=JOINTS)
+    np.testing.assert_allclose(recording.positions, q)
+    assert recording.remarks == ()
+    for how in ({}, {"time_column": "none"}):
+        (recording,) = read_recordings(tmp_path, rate=100, **how)
+        assert recording.names == JOINTS
+        np.testing.assert_allclose(recording.positions, q)
+        why = "column 1 left out, which rises with every row, as times and counters do"
+        assert recording.remarks == (why,)
+
+
+def test_a_channel_without_a_name_is_called_by_its_number(tmp_path):
+    (tmp_path / "a.csv").write_text(",b\n0,1\n5,2\n3,4\n")
+    (recording,) = read_recordings(tmp_path, rate=100)
+    assert recording.names == ("column 1", "b")
+
+
+@pytest.mark.slow
+def test_columns_without_names_are_in_order_and_their_time_is_a_doubt(tmp_path):
+    for i in range(N):
+        t, q = sampled(i, 100)
+        np.savetxt(tmp_path / f"{i}.csv", np.column_stack([1000 * t, np.rad2deg(q)]), delimiter=",")
+    write_outcomes(tmp_path)
+    with pytest.raises(UnclearUnitsError) as caught:
+        import_demonstrations(tmp_path, joints=JOINTS)
+    assert caught.value.options == "--time-column 1 --time-unit ms --units deg"
+    said = {"time_column": "1", "time_unit": "ms", "units": ["deg"]}
+    result = import_demonstrations(tmp_path, joints=JOINTS, preprocessing=AS_IS, **said)
+    check_motions(result, 100, tolerance=1e-12)
+
+
+def test_dates_count_as_times(tmp_path):
+    t, q = sampled(0, 100)
+    start = pd.Timestamp("2026-11-21T10:59:59.5")
+    frame = pd.DataFrame(q, columns=JOINTS)
+    frame.insert(0, "timestamp", start + pd.to_timedelta(t, unit="s"))
+    frame.to_csv(tmp_path / "0.csv", index=False, date_format="%Y-%m-%dT%H:%M:%S.%f")
+    (recording,) = read_recordings(tmp_path)
+    np.testing.assert_allclose(recording.times, t, atol=2e-6)
+
+
+def test_a_column_of_throws_by_another_name(tmp_path):
+    (tmp_path / "log.csv").write_text("throw_id,t,a\n1,0,1\n1,.1,2\n2,0,1\n2,.1,2\n")
+    assert [r.episode for r in read_recordings(tmp_path)] == ["1", "2"]
+    (tmp_path / "log.csv").write_text("wurf,t,a\n1,0,1\n1,.1,2\n2,0,1\n2,.1,2\n")
+    assert len(read_recordings(tmp_path, episode_column="wurf")) == 2
+    with pytest.raises(
+        ConfigurationError, match="no column 'nr' for --episode-column; it has wurf"
+    ):
+        read_recordings(tmp_path, episode_column="nr")
+
+
+def test_the_column_of_times_may_be_named_or_left_unread(tmp_path):
+    (tmp_path / "a.csv").write_text("clock,t,a\n0,5,1\n10,5,2\n20,5,4\n")
+    (recording,) = read_recordings(tmp_path, time_column="clock", time_unit="ms", joints=["a"])
+    np.testing.assert_allclose(recording.times, [0, 0.01, 0.02])
+    (recording,) = read_recordings(tmp_path, time_column="none", rate=50, joints=["a"])
+    np.testing.assert_allclose(recording.times, [0, 0.02, 0.04])
+
+
+def test_joints_by_the_gates_names_and_a_refusal_that_is_short(tmp_path):
+    names = [f"panda_joint{i}" for i in range(1, 8)]
+    t, q = sampled(0, 100)
+    table = np.column_stack([t, q])
+    header = ",".join(["t", *names])
+    np.savetxt(tmp_path / "0.csv", table, delimiter=",", header=header, comments="")
+    (recording,) = read_recordings(tmp_path, joints=JOINTS)
+    assert recording.names == tuple(names)
+    (other,) = read_recordings(tmp_path, key="panda_joint")
+    np.testing.assert_array_equal(other.positions, recording.positions)
+    with pytest.raises(FileFormatError, match=r"no columns q_0, q_1, .*; numbered columns are pan"):
+        read_recordings(tmp_path, key="q")
+    with pytest.raises(InvalidDemonstrationsError) as caught:
+        import_demonstrations(tmp_path, joints=[f"A{i}" for i in range(1, 8)])
+    assert str(caught.value) == (
+        "episode 0 has no joint A1 to A7; it has panda_joint1 to panda_joint7: give the recorded "
+        "names in the plan's order with --joints, or numbered columns at once: --key panda_joint"
+    )
+
+
+def test_other_endings_are_read_where_the_format_is_said(tmp_path):
+    write_csv(tmp_path)
+    for path in list(tmp_path.glob("*.csv")):
+        path.rename(path.with_suffix(".txt"))
+    with pytest.raises(FileFormatError, match="no format that can be read"):
+        read_recordings(tmp_path)
+    assert len(read_recordings(tmp_path, format="csv")) == N

@@ -1,0 +1,134 @@
+"""robomimic data sets, and what ALOHA and ManiSkill write."""
+
+import h5py
+import numpy as np
+import pytest
+
+from prior_reinforce.arm.recordings import import_demonstrations, read_recordings
+from prior_reinforce.errors import FileFormatError
+from tests.arm.recordings.recorded import (
+    AS_IS,
+    JOINTS,
+    check_motions,
+    sampled,
+    write_outcomes,
+    write_robomimic,
+)
+
+
+@pytest.mark.slow
+def test_robomimic(tmp_path):
+    path = write_robomimic(tmp_path)
+    write_outcomes(tmp_path)
+    result = import_demonstrations(path, joints=JOINTS, preprocessing=AS_IS)
+    check_motions(result, 20, tolerance=0)
+    other = import_demonstrations(path, key="obs/other_joints", preprocessing=AS_IS)
+    np.testing.assert_allclose(other.demonstrations.plans, result.demonstrations.plans + 1)
+    with pytest.raises(FileFormatError, match=r"'actions', 'obs/other_joints', 'obs/robot0_jo"):
+        read_recordings(path, key="obs/joints")
+
+
+@pytest.mark.slow
+def test_robomimic_without_a_rate_asks_for_it(tmp_path):
+    path = write_robomimic(tmp_path, rate=None)
+    write_outcomes(tmp_path)
+    with pytest.raises(FileFormatError, match="give the rate"):
+        import_demonstrations(path)
+    check_motions(import_demonstrations(path, rate=20, preprocessing=AS_IS), 20, tolerance=0)
+
+
+def test_robomimic_with_frames_missing(tmp_path):
+    path = write_robomimic(tmp_path)
+    with h5py.File(path, "a") as file:
+        file["data/demo_2"].attrs["num_samples"] = 99
+    with pytest.raises(FileFormatError, match="demo_2 declares 99 samples"):
+        read_recordings(path)
+
+
+@pytest.mark.parametrize("form", ["ALOHA", "ManiSkill"])
+def test_other_layouts_of_hdf5(tmp_path, form):
+    q = [sampled(i, 20)[1] for i in range(3)]
+    if form == "ALOHA":
+        source, names = tmp_path, ("episode_0", "episode_1", "episode_2")
+        for name, motion in zip(names, q, strict=True):
+            with h5py.File(tmp_path / f"{name}.hdf5", "w") as file:
+                file["observations/qpos"], file["action"] = motion, motion + 1
+    else:
+        source, names = tmp_path / "trajectory.h5", ("traj_0", "traj_1", "traj_2")
+        with h5py.File(source, "w") as file:
+            for name, motion in zip(names, q, strict=True):
+                file[f"{name}/obs/agent/qpos"], file[f"{name}/actions"] = motion, motion[:-1]
+    recordings = read_recordings(source, rate=20)
+    assert tuple(r.episode for r in recordings) == names
+    for recording, motion in zip(recordings, q, strict=True):
+        np.testing.assert_allclose(recording.positions, motion)
+
+
+KEY = "data/demo_0/obs/robot0_joint_pos"
+
+
+def foreign(tmp_path, how):
+    """A robomimic file whose first episode stands in another file."""
+    path, other = write_robomimic(tmp_path), tmp_path / "other.h5"
+    with h5py.File(path, "a") as file:
+        numbers = np.array(file[KEY])
+        with h5py.File(other, "w") as secret:
+            secret["numbers"] = numbers
+        numbers.tofile(tmp_path / "raw")
+        del file[KEY]
+        if how == "external link":
+            file[KEY] = h5py.ExternalLink(str(other), "/numbers")
+        elif how == "soft link to an external link":
+            file["aside"] = h5py.ExternalLink(str(other), "/numbers")
+            file[KEY] = h5py.SoftLink("/aside")
+        elif how == "external episode":
+            file["moved"] = file["data/demo_0"]
+            del file["data/demo_0"]
+            file["data/demo_0"] = h5py.ExternalLink(str(other), "/")
+        elif how == "external storage":
+            where = [(str(tmp_path / "raw"), 0, numbers.nbytes)]
+            file.create_dataset(KEY, numbers.shape, numbers.dtype, external=where)
+        elif how == "virtual data set":
+            layout = h5py.VirtualLayout(numbers.shape, numbers.dtype)
+            layout[:] = h5py.VirtualSource(str(other), "numbers", numbers.shape)
+            file.create_virtual_dataset(KEY, layout)
+        else:
+            file["aside"] = h5py.SoftLink("/round")
+            file["round"] = h5py.SoftLink("/aside")
+            file[KEY] = h5py.SoftLink("/aside")
+    return path
+
+
+@pytest.mark.parametrize(
+    "how",
+    [
+        "external link",
+        "soft link to an external link",
+        "external episode",
+        "external storage",
+        "virtual data set",
+        "links in a circle",
+    ],
+)
+def test_numbers_of_another_file_are_not_read(tmp_path, how):
+    path = foreign(tmp_path, how)
+    with pytest.raises(FileFormatError, match=r"another file.*not read"):
+        read_recordings(path)
+
+
+def test_a_link_within_the_file_is_followed(tmp_path):
+    path = write_robomimic(tmp_path)
+    expected = read_recordings(path)[0].positions
+    with h5py.File(path, "a") as file:
+        file.move(KEY, "aside")
+        file[KEY] = h5py.SoftLink("/aside")
+    np.testing.assert_array_equal(read_recordings(path)[0].positions, expected)
+
+
+def test_a_header_that_claims_too_much_is_not_read(tmp_path):
+    path = write_robomimic(tmp_path)
+    with h5py.File(path, "a") as file:
+        del file[KEY], file["data/demo_0"].attrs["num_samples"]
+        file.create_dataset(KEY, (10**12, 7), "f8", chunks=(1000, 7))
+    with pytest.raises(FileFormatError, match="no recording of throws"):
+        read_recordings(path)

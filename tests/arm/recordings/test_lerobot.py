@@ -1,0 +1,70 @@
+"""LeRobot data sets in the layouts of both versions."""
+
+import numpy as np
+import pytest
+
+from prior_reinforce.arm.recordings import import_demonstrations
+from prior_reinforce.errors import FileFormatError
+from tests.arm.recordings.recorded import (
+    AS_IS,
+    JOINTS,
+    OUTCOMES,
+    N,
+    check_motions,
+    write_lerobot,
+    write_outcomes,
+)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("version", ["v3.0", "v2.1"])
+@pytest.mark.parametrize("stale", [False, True])
+def test_lerobot(tmp_path, version, stale):
+    folder = write_lerobot(tmp_path / "set", version=version, stale=stale)
+    write_outcomes(tmp_path)
+    result = import_demonstrations(folder, joints=JOINTS, preprocessing=AS_IS)
+    check_motions(result, 100, tolerance=1e-6)
+    assert any("observation.state (measured)" in remark for remark in result.preview.remarks)
+    commanded = import_demonstrations(folder, key="action", joints=JOINTS, preprocessing=AS_IS)
+    np.testing.assert_allclose(
+        commanded.demonstrations.plans, result.demonstrations.plans + 1, atol=1e-6
+    )
+
+
+@pytest.mark.parametrize("nesting", [{"motors": [*JOINTS, "gripper"]}, ["only", "two"]])
+def test_lerobot_names_may_be_nested_or_useless(tmp_path, nesting):
+    folder = write_lerobot(tmp_path / "set", names=nesting)
+    write_outcomes(tmp_path)
+    result = import_demonstrations(folder, joints=[*JOINTS, "gripper"], preprocessing=AS_IS)
+    np.testing.assert_allclose(result.demonstrations.plans[..., 7], 0.04, atol=1e-7)
+
+
+def test_lerobot_with_a_missing_episode(tmp_path):
+    folder = write_lerobot(tmp_path / "set", skip=[3])
+    write_outcomes(tmp_path)
+    with pytest.raises(FileFormatError, match="episode 3 has 0 of 171 listed frames"):
+        import_demonstrations(folder, joints=JOINTS)
+    rest = [str(i) for i in range(N) if i != 3]
+    result = import_demonstrations(folder, joints=JOINTS, episodes=rest)
+    assert result.episodes == tuple(rest)
+    np.testing.assert_allclose(result.demonstrations.outcomes_seen[3], OUTCOMES["4"])
+
+
+def test_lerobot_whose_recorder_was_not_finalized(tmp_path):
+    folder = write_lerobot(tmp_path / "set")
+    path = folder / "data" / "chunk-000" / "file-000.parquet"
+    path.write_bytes(path.read_bytes()[:-5000])  # its footer was never written
+    with pytest.raises(FileFormatError, match=r"file-000\.parquet .* called finalize\(\)"):
+        import_demonstrations(folder, joints=JOINTS)
+
+
+@pytest.mark.parametrize("table", [True, False])
+def test_the_folder_above_a_data_set_names_it(tmp_path, table):
+    above = tmp_path / "above"
+    write_lerobot(above / "throws")
+    if table:  # which alone looks like a folder of CSV
+        write_outcomes(above)
+    with pytest.raises(FileFormatError) as refused:
+        import_demonstrations(above)
+    assert "say its format" not in str(refused.value)
+    assert f"name {above / 'throws'}, which looks like lerobot" in str(refused.value)

@@ -1,0 +1,120 @@
+"""NPZ files come back as the motions that were written, and say what is wrong with them."""
+
+import numpy as np
+import pytest
+
+from prior_reinforce.arm.recordings import import_demonstrations, read_recordings
+from prior_reinforce.arm.robots.plan_files import write_plan
+from prior_reinforce.errors import FileFormatError, PriorReinforceError
+from prior_reinforce.plans.motions import Plan
+from tests.arm.recordings.recorded import (
+    AS_IS,
+    JOINTS,
+    OUTCOMES,
+    N,
+    check_motions,
+    throw,
+    write_npz,
+    write_outcomes,
+)
+
+
+def test_npz(tmp_path):
+    write_outcomes(write_npz(tmp_path))
+    result = import_demonstrations(tmp_path, preprocessing=AS_IS)
+    check_motions(result, 100, tolerance=0)
+    assert result.demonstrations.format.names == JOINTS
+    assert result.episodes == tuple(f"throw_{i}" for i in range(N))
+
+
+def test_npz_of_one_array_with_its_own_outcomes(tmp_path):
+    t = np.arange(171) / 100
+    plans = np.stack([throw(i, t) for i in range(N)])
+    np.savez(tmp_path / "all.npz", q=plans, dt=0.01, outcomes=np.array(list(OUTCOMES.values())))
+    result = import_demonstrations(tmp_path / "all.npz", preprocessing=AS_IS)
+    np.testing.assert_array_equal(result.demonstrations.plans, plans)
+    assert result.episodes == tuple(OUTCOMES)
+
+
+def test_our_own_demonstrations_and_plans_come_back(tmp_path):
+    write_outcomes(write_npz(tmp_path))
+    demos = import_demonstrations(tmp_path, preprocessing=AS_IS).demonstrations
+    demos.save(tmp_path / "saved.npz")
+    again = import_demonstrations(
+        tmp_path / "saved.npz",
+        outcomes={str(i): OUTCOMES[str(i)] for i in range(N)},
+        preprocessing=AS_IS,
+    ).demonstrations
+    np.testing.assert_array_equal(again.plans, demos.plans)
+    assert again.format == demos.format
+    write_plan(Plan(demos.plans[2], demos.format), tmp_path / "plan.npz")
+    (recording,) = read_recordings(tmp_path / "plan.npz")
+    np.testing.assert_array_equal(recording.positions, demos.plans[2])
+    assert recording.names == JOINTS
+
+
+def test_pickled_objects_are_never_loaded(tmp_path):
+    np.savez(tmp_path / "bad.npz", q=np.array([{"a": 1}, None], dtype=object), dt=0.01)
+    with pytest.raises(FileFormatError, match="plain number arrays"):
+        read_recordings(tmp_path / "bad.npz")
+
+
+@pytest.mark.parametrize(
+    ("arrays", "says"),
+    [
+        ({"q": np.zeros((5, 2))}, "give the rate"),
+        ({"angles": np.zeros((5, 2)), "dt": 0.01}, r"no array q .* it holds \['angles', 'dt'\]"),
+        ({"q": np.zeros(5), "dt": 0.01}, r"expected numbers of shape \(T, D\)"),
+        ({"q": np.zeros((5, 2)), "t": np.zeros(4)}, "has 5 frames, but t of shape"),
+        ({"q": np.zeros((5, 2)), "t": np.zeros(5)}, "time does not increase at frame 1"),
+        ({"q": np.zeros((5, 2)), "t": np.full(5, np.nan)}, "time is nan at frame 0"),
+        ({"q": np.zeros((5, 2)), "dt": np.zeros(3)}, "times t, or dt, or rate"),
+        ({"q": np.zeros((5, 2)), "dt": 0.01, "names": np.array(["a", "a"])}, "repeats a channel"),
+        ({"q": np.zeros((5, 2)), "dt": 0.01, "names": np.array(["a"])}, "for 1 channels"),
+        ({"q": np.array([["a", "b"]] * 5), "dt": 0.01}, "expected numbers"),
+        ({"q": np.zeros((2, 5, 2)), "dt": 0.01, "outcomes": np.zeros(3)}, "outcomes have shape"),
+    ],
+)
+def test_npz_of_other_content(tmp_path, arrays, says):
+    np.savez(tmp_path / "bad.npz", **arrays)
+    with pytest.raises(PriorReinforceError, match=says):
+        read_recordings(tmp_path / "bad.npz")
+
+
+def test_a_bare_array_is_the_motion_alone(tmp_path):
+    np.save(tmp_path / "throw_0.npy", np.arange(10.0).reshape(5, 2))
+    with pytest.raises(PriorReinforceError, match="give the rate"):
+        read_recordings(tmp_path)
+    (recording,) = read_recordings(tmp_path, rate=50, joints=["a", "b"])
+    np.testing.assert_array_equal(recording.positions[4], [8, 9])
+    assert (recording.episode, recording.named, recording.duration) == ("throw_0", False, 0.08)
+
+
+def test_the_array_of_times_may_be_named(tmp_path):
+    arrays = {"q": np.eye(3), "clock": np.arange(3) * 10.0}
+    np.savez(tmp_path / "a.npz", **arrays)
+    (recording,) = read_recordings(tmp_path, time_column="clock", time_unit="ms")
+    np.testing.assert_allclose(recording.times, [0, 0.01, 0.02])
+    with pytest.raises(FileFormatError, match=r"no array t; it holds \['clock', 'q'\]"):
+        read_recordings(tmp_path, time_column="t")
+
+
+def test_times_may_be_a_column(tmp_path):
+    """As a log of panda_py is, whose `get_log` has an array for each time too."""
+    t = np.arange(171) / 100
+    np.savez(tmp_path / "0.npz", q=list(throw(0, t)), tau_J=throw(1, t), time=t[:, None])
+    (recording,) = read_recordings(tmp_path)
+    np.testing.assert_allclose(recording.times, t)
+
+
+@pytest.mark.parametrize("suffix", ["npz", "npy"])
+def test_python_objects_are_named_without_advice_to_load_them_all_the_same(tmp_path, suffix):
+    path = tmp_path / f"throw.{suffix}"
+    objects = np.array([[{}, 1.0]] * 3, dtype=object)
+    if suffix == "npz":
+        np.savez(path, q=objects, dt=0.01)
+    else:
+        np.save(path, objects)
+    with pytest.raises(FileFormatError, match="it holds Python objects") as caught:
+        read_recordings(path, rate=100)
+    assert "allow_pickle" not in str(caught.value)

@@ -1,0 +1,338 @@
+"""Outcomes beside a recording: matched, converted, and every one that is missing is named."""
+
+import numpy as np
+import pytest
+
+from prior_reinforce.arm.recordings import import_demonstrations
+from prior_reinforce.arm.recordings.outcomes import (
+    missing_outcomes,
+    read_outcomes,
+    write_outcome_table,
+)
+from prior_reinforce.errors import (
+    ConfigurationError,
+    FileFormatError,
+    InvalidDemonstrationsError,
+    UnclearUnitsError,
+)
+from tests.arm.recordings.recorded import OUTCOMES, write_csv, write_outcomes
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory):
+    """Six CSV throws without outcomes; copy nothing into it."""
+    return write_csv(tmp_path_factory.mktemp("throws"))
+
+
+def table(tmp_path, text):
+    path = tmp_path / "outcomes.csv"
+    path.write_text(text)
+    return path
+
+
+def test_without_outcomes_every_episode_is_named(recording):
+    with pytest.raises(InvalidDemonstrationsError, match=r"episodes 0, 1, 2, 3, 4, 5.*outcomes.cs"):
+        import_demonstrations(recording)
+
+
+def test_those_that_are_missing_are_named(recording, tmp_path):
+    path = table(tmp_path, "episode,x,y\n0,0.8,0.1\n1,0.9,0.2\n3,0.9,-0.1\n4,,\n5,1,0\n")
+    with pytest.raises(InvalidDemonstrationsError, match="no outcome for episodes 2, 4 in"):
+        import_demonstrations(recording, outcomes=path)
+
+
+def test_those_of_no_episode_are_named(recording, tmp_path):
+    path = write_outcomes(tmp_path, OUTCOMES | {"17": (1.0, 1.0)})
+    with pytest.raises(InvalidDemonstrationsError, match="names episodes 17 that were not found"):
+        import_demonstrations(recording, outcomes=path)
+
+
+def test_where_there_is_no_table_it_is_said_what_writes_one(recording):
+    with pytest.raises(
+        InvalidDemonstrationsError, match=r"outcomes.csv with .* \(import --inspect writes one"
+    ):
+        import_demonstrations(recording)
+
+
+def test_given_numbers(recording):
+    result = import_demonstrations(recording, outcomes=OUTCOMES)
+    np.testing.assert_array_equal(result.demonstrations.outcomes_seen, list(OUTCOMES.values()))
+    with pytest.raises(ConfigurationError, match="must be numbers"):
+        import_demonstrations(recording, outcomes={"0": ["far", 1]})
+    with pytest.raises(InvalidDemonstrationsError, match="finite numbers"):
+        import_demonstrations(recording, outcomes=OUTCOMES | {"2": (float("nan"), 0.0)})
+    with pytest.raises(InvalidDemonstrationsError, match="components"):
+        import_demonstrations(recording, outcomes=OUTCOMES | {"2": (1.0,)})
+
+
+def test_centimetres_in_a_columns_name_are_converted(tmp_path):
+    path = table(tmp_path, "episode,x_cm,y [mm],z_m,t,source,comment\n0,92,-50,0.3,1.5,tape,ok\n")
+    outcomes = read_outcomes(path)
+    assert outcomes.names == ("x", "y", "z", "t")
+    np.testing.assert_allclose(outcomes.values, [(0.92, -0.05, 0.3, 1.5)])
+    assert (outcomes.episodes, *outcomes.sd) == (("0",), 0.0)
+    assert outcomes.units == ("m", "m", "m", None)
+
+
+def test_centimetres_that_nobody_names_are_refused_until_said(recording, tmp_path):
+    cm = {name: (100 * x, 100 * y) for name, (x, y) in OUTCOMES.items()}
+    path = write_outcomes(tmp_path, cm)
+    with pytest.raises(
+        UnclearUnitsError, match=r"x reaches 105 and y reaches 14, too far for an arm"
+    ):
+        import_demonstrations(recording, outcomes=path)
+    for said in ({"outcome_unit": "cm"}, {"take_guesses": True}):
+        result = import_demonstrations(recording, outcomes=path, **said)
+        np.testing.assert_allclose(result.demonstrations.outcomes_seen, list(OUTCOMES.values()))
+    named = table(tmp_path, path.read_text().replace("x,y", "x_cm,y_cm"))
+    with pytest.raises(ConfigurationError, match="--outcome-unit cm has no use"):
+        import_demonstrations(recording, outcomes=named, outcome_unit="cm")
+
+
+def test_an_angle_is_converted_to_the_unit_of_the_outcome(recording, tmp_path):
+    text = "\n".join(["episode,angle_deg", *(f"{i},{10 * i + 1}" for i in range(6))])
+    path = table(tmp_path, text)
+    kept = import_demonstrations(recording, outcomes=path, outcome_units=["deg"]).demonstrations
+    np.testing.assert_allclose(kept.outcomes_seen[:, 0], 10 * np.arange(6) + 1)
+    radians = import_demonstrations(recording, outcomes=path, outcome_units=["rad"]).demonstrations
+    np.testing.assert_allclose(radians.outcomes_seen[:, 0], np.deg2rad(10 * np.arange(6) + 1))
+
+
+def test_columns_in_another_order_are_matched_by_name(recording, tmp_path):
+    lines = ["y,episode,x"] + [f"{y},{name},{x}" for name, (x, y) in OUTCOMES.items()]
+    path = table(tmp_path, "\n".join(lines))
+    named = import_demonstrations(recording, outcomes=path, outcome_names=("x", "y"))
+    np.testing.assert_allclose(named.demonstrations.outcomes_seen, list(OUTCOMES.values()))
+    as_written = import_demonstrations(recording, outcomes=path).demonstrations
+    assert as_written.outcome_format.names == ("y", "x")
+    one = import_demonstrations(recording, outcomes=path, outcome_names=("x",)).demonstrations
+    np.testing.assert_allclose(one.outcomes_seen[:, 0], [x for x, _ in OUTCOMES.values()])
+    with pytest.raises(InvalidDemonstrationsError, match="no column z; it has y, x"):
+        import_demonstrations(recording, outcomes=path, outcome_names=("x", "z"))
+
+
+def test_episodes_are_matched_by_their_number(recording, tmp_path):
+    named = {f"demo_{int(name):04d}": values for name, values in OUTCOMES.items()}
+    result = import_demonstrations(recording, outcomes=write_outcomes(tmp_path, named))
+    np.testing.assert_allclose(result.demonstrations.outcomes_seen, list(OUTCOMES.values()))
+
+
+def test_numbers_that_two_names_share_match_nothing(recording, tmp_path):
+    named = {f"a{name}": values for name, values in OUTCOMES.items()} | {"b3": (2.0, 2.0)}
+    with pytest.raises(InvalidDemonstrationsError, match="no outcome for episodes 3 in"):
+        import_demonstrations(recording, outcomes=write_outcomes(tmp_path, named))
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("", "expected column names"),
+        ("a,b\n1,2\n", "expected column names"),
+        ("episode\n1\n", "expected column names"),
+        ("episode,x,x\n1,2,3\n", "expected column names"),
+        ("episode,x,y\n1,2\n", "line 2: y is '', expected a finite number"),
+        ("episode,x,y\n1,2,3\n1,2,4\n", "line 3: episode 1 again"),
+        ("episode,x,y\n1,5cm,3\n", "line 2: x is '5cm', expected a finite number"),
+        ("episode,x,y\n1,inf,3\n", "line 2: x is 'inf', expected a finite number"),
+        ("episode,x,y\n1,2,\n", "line 2: y is '', expected a finite number"),
+    ],
+)
+def test_tables_that_cannot_be_read(tmp_path, text, says):
+    with pytest.raises(FileFormatError, match=says):
+        read_outcomes(table(tmp_path, text))
+
+
+def test_a_table_in_another_encoding(tmp_path):
+    path = tmp_path / "outcomes.csv"
+    path.write_bytes(b"episode,x\n\xff\xfe,1\n")
+    with pytest.raises(FileFormatError, match="CSV in UTF-8"):
+        read_outcomes(path)
+    with pytest.raises(FileFormatError, match="no table at"):
+        read_outcomes(tmp_path / "missing.csv")
+
+
+def test_only_a_table_that_stands_beside_the_recordings_is_taken(tmp_path):
+    folder = tmp_path / "today"
+    folder.mkdir()
+    write_outcomes(write_csv(folder).parent)  # in the folder above
+    with pytest.raises(InvalidDemonstrationsError) as caught:
+        import_demonstrations(folder)
+    assert f"write {folder}/outcomes.csv" in str(caught.value)
+    assert f"({tmp_path}/outcomes.csv is not beside them: name it with --outcomes" in str(
+        caught.value
+    )
+    named = import_demonstrations(folder, outcomes=tmp_path / "outcomes.csv")
+    assert f"from {tmp_path}/outcomes.csv" in named.preview.text
+
+
+def test_a_table_to_fill_in_has_the_episodes_names_and_the_units(tmp_path):
+    path = tmp_path / "outcomes.csv"
+    write_outcome_table(path, {"throw_1": (), "a,b": ()}, ["x", "turns"], ["m", "counts"])
+    assert path.read_text() == 'episode,x [m],turns,note\nthrow_1,,,\n"a,b",,,\n'
+    assert read_outcomes(path).episodes == ()
+    path.write_text(path.read_text().replace("[m]", "[cm]").replace("1,,", "1,92,3"))
+    assert read_outcomes(path).episodes == ("throw_1",)
+    np.testing.assert_allclose(read_outcomes(path).values, [(0.92, 3.0)])
+    assert missing_outcomes(["throw_1", "a,b"], read_outcomes(path)) == ["a,b"]
+
+
+@pytest.mark.parametrize(
+    ("head", "unit", "noise"),
+    [
+        ("episode,x,y,sd", None, 0.02),
+        ("episode,x [m],y [m],sd_cm", None, 0.0002),
+        ("episode,x,y,sd [m]", "cm", 0.02),
+        ("episode,x,y,SD", "cm", 0.0002),
+    ],
+)
+def test_a_table_may_say_how_uncertain_outcomes_are(recording, tmp_path, head, unit, noise):
+    scale = 100 if unit else 1
+    rows = [f"{name},{scale * x},{scale * y},0.02" for name, (x, y) in OUTCOMES.items()]
+    rows[1:3] = [rows[1].removesuffix("0.02"), rows[2].removesuffix("0.02") + "0"]
+    path = table(tmp_path, "\n".join([head, *rows]))
+    result = import_demonstrations(recording, outcomes=path, outcome_unit=unit)
+    expected = np.full((len(OUTCOMES), 2), noise)
+    expected[1:3] = 0.0
+    np.testing.assert_allclose(result.demonstrations.outcome_noise, expected)
+    np.testing.assert_allclose(result.demonstrations.outcomes_seen, list(OUTCOMES.values()))
+    assert f"uncertain by up to {1000 * noise:.2g} mm" in result.preview.text
+
+
+def test_the_uncertainty_may_be_the_first_column(tmp_path):
+    found = read_outcomes(table(tmp_path, "sd,episode,x,y\n0.02,a,1,2\n,b,3,4\n"))
+    assert found.episodes == ("a", "b")
+    np.testing.assert_allclose(found.values, [(1, 2), (3, 4)])
+    np.testing.assert_allclose(found.sd, (0.02, 0))
+
+
+def test_one_uncertainty_is_of_one_unit(recording, tmp_path):
+    path = table(
+        tmp_path, "episode,x,turn,sd\n" + "".join(f"{i},{i},{int(i) % 2},1\n" for i in OUTCOMES)
+    )
+    with pytest.raises(
+        ConfigurationError, match=r"sd in .* is one number for components in m, rad"
+    ):
+        import_demonstrations(recording, outcomes=path, outcome_units=("m", "rad"))
+
+
+@pytest.mark.parametrize(("head", "unit"), [("episode,x [m],y [m]", None), ("episode,x,y", "m")])
+def test_centimetres_that_are_said_to_be_metres_are_refused(recording, tmp_path, head, unit):
+    rows = [f"{name},{100 * x},{100 * y}" for name, (x, y) in OUTCOMES.items()]
+    path = table(tmp_path, "\n".join([head, *rows]))
+    said = r"x is said to be in m and would reach 105 m.*call its column x \[cm\]"
+    with pytest.raises(InvalidDemonstrationsError, match=said):
+        import_demonstrations(recording, outcomes=path, outcome_unit=unit, take_guesses=True)
+
+
+@pytest.mark.parametrize(
+    ("head", "scale", "names", "units"),
+    [
+        ("angle [rad],apex [m]", (1, 1), ("angle", "apex"), ("rad", "m")),
+        ("angle [deg],apex [cm]", (180 / np.pi, 100), ("angle", "apex"), ("rad", "m")),
+        ("volume [ml],arrival [ms]", (1, 1000), ("volume", "arrival"), ("ml", "s")),
+        ("arrival_ms,wait (s)", (1000, 1), ("arrival", "wait"), ("s", "s")),
+        ("force [N],x (ahead)", (1, 1), ("force", "x (ahead)"), ("N", "m")),
+    ],
+)
+def test_a_unit_in_the_tables_head_is_the_outcomes(recording, tmp_path, head, scale, names, units):
+    rows = [f"{name},{scale[0] * x:.12g},{scale[1] * y:.12g}" for name, (x, y) in OUTCOMES.items()]
+    path = table(tmp_path, "\n".join([f"episode,{head}", *rows]))
+    result = import_demonstrations(recording, outcomes=path)
+    assert result.demonstrations.outcome_format.names == names
+    assert result.demonstrations.outcome_format.units == units
+    np.testing.assert_allclose(result.demonstrations.outcomes_seen, list(OUTCOMES.values()))
+    assert f"{names[0]} 0.8 to 1.05 {units[0]}" in result.preview.text
+
+
+def test_metres_that_are_said_may_be_as_far_as_a_bat_strikes(recording, tmp_path):
+    rows = [f"{name},{9 + x},{y}" for name, (x, y) in OUTCOMES.items()]
+    path = table(tmp_path, "\n".join(["episode,x [m],y [m]", *rows]))
+    said = import_demonstrations(recording, outcomes=path, outcome_unit="m")
+    assert said.demonstrations.outcomes_seen.max() > 9
+    with pytest.raises(UnclearUnitsError, match=r"10.05 m \(if that is in cm, .*--outcome-unit m"):
+        import_demonstrations(recording, outcomes=path)  # a table that we wrote is headed so
+    bare = table(tmp_path, "\n".join(["episode,x,y", *rows]))
+    assert import_demonstrations(recording, outcomes=bare, outcome_unit="m").demonstrations.n == 6
+    with pytest.raises(UnclearUnitsError, match="it looks like cm"):
+        import_demonstrations(recording, outcomes=bare)
+
+
+def test_a_unit_that_the_task_does_not_have_says_where_it_stands(recording, tmp_path):
+    rows = [f"{name},{x},{y}" for name, (x, y) in OUTCOMES.items()]
+    path = table(tmp_path, "\n".join(["episode,x [ml],y [m]", *rows]))
+    with pytest.raises(
+        ConfigurationError, match=r"x in .* is in ml, but its unit is to be m; .*workspace.toml"
+    ):
+        import_demonstrations(recording, outcomes=path, outcome_units=("m", "m"))
+
+
+@pytest.mark.parametrize(
+    "unit", ["m", "meters", "degrees", "deg", "°", "s", "seconds", "counts", ""]
+)
+def test_a_table_that_is_written_to_be_filled_in_is_read_in_the_units_of_the_task(
+    recording, tmp_path, unit
+):
+    path = tmp_path / "outcomes.csv"
+    write_outcome_table(path, dict.fromkeys(OUTCOMES, ()), ["x", "y"], [unit, unit])
+    head, *_ = path.read_text().splitlines()
+    rows = [f"{name},{x},{y}," for name, (x, y) in OUTCOMES.items()]
+    path.write_text("\n".join([head, *rows]))
+    result = import_demonstrations(recording, outcomes=path, outcome_units=(unit, unit))
+    assert result.demonstrations.outcome_format.units == (unit, unit)
+    np.testing.assert_allclose(result.demonstrations.outcomes_seen, list(OUTCOMES.values()))
+
+
+@pytest.mark.parametrize(("head", "noise"), [("x [cm],y [cm]", 0.02), ("x [ms],y [ms]", 0.002)])
+def test_how_uncertain_outcomes_are_is_in_the_unit_of_the_first(recording, tmp_path, head, noise):
+    rows = [f"{name},{100 * x},{100 * y},2" for name, (x, y) in OUTCOMES.items()]
+    path = table(tmp_path, "\n".join([f"episode,{head},sd", *rows]))
+    demonstrations = import_demonstrations(recording, outcomes=path).demonstrations
+    np.testing.assert_allclose(demonstrations.outcome_noise, noise)
+
+
+def test_an_episode_called_like_a_formula_is_no_formula_in_the_table(tmp_path):
+    path = tmp_path / "outcomes.csv"
+    name = "=cmd|' -C calc'!A0"
+    write_outcome_table(path, {name: (0.9, 0.1)}, ["x", "y"], ["m", "m"])
+    assert path.read_text().splitlines()[1].startswith("'=cmd")
+    assert read_outcomes(path).episodes == (name,)
+
+
+def test_inches_in_the_head_or_said(recording, tmp_path):
+    rows = [f"{name},{x / 0.0254},{y / 0.0254}" for name, (x, y) in OUTCOMES.items()]
+    path = table(tmp_path, "\n".join(["episode,x [in],y (inches)", *rows]))
+    kept = import_demonstrations(recording, outcomes=path).demonstrations
+    np.testing.assert_allclose(kept.outcomes_seen, list(OUTCOMES.values()))
+    bare = table(tmp_path, "\n".join(["episode,x,y", *rows]))
+    with pytest.raises(UnclearUnitsError, match=r"looks like cm \(or inches: --outcome-unit in\)"):
+        import_demonstrations(recording, outcomes=bare)
+    said = import_demonstrations(recording, outcomes=bare, outcome_unit="in").demonstrations
+    np.testing.assert_allclose(said.outcomes_seen, list(OUTCOMES.values()))
+
+
+@pytest.mark.parametrize(
+    ("rows", "doubted"),
+    [
+        ("1,1.488,-302\n2,902,150\n", True),
+        ("1,1.488,-302\n2,902.5,150\n", False),  # so the sign is a decimal one
+        ("1,1.4880,-302\n2,902,150\n", False),
+        ("1,1.488,-0.302\n2,1.402,0.150\n", False),
+        ("1,1.488,2\n2,1.402,1\n", False),
+    ],
+)
+def test_a_thousand_that_may_be_one_and_a_half_is_doubted(tmp_path, rows, doubted):
+    path = tmp_path / "outcomes.csv"
+    path.write_text(f"episode,x [mm],y [mm]\n{rows}")
+    if not doubted:
+        assert read_outcomes(path).values.shape == (2, 2)
+        return
+    with pytest.raises(FileFormatError, match=r"line 2: x \[mm\] is '1.488' beside '902'.*1.4880"):
+        read_outcomes(path)
+
+
+def test_a_column_may_end_in_inches_where_the_task_has_that_name(tmp_path):
+    (tmp_path / "outcomes.csv").write_text("episode,distance_in,plug_in\n0,10,1\n1,12,2\n")
+    found = read_outcomes(tmp_path / "outcomes.csv", ["distance"])
+    np.testing.assert_allclose(found.values, [[0.254], [0.3048]])
+    assert found.units == ("m",)
+    assert read_outcomes(tmp_path / "outcomes.csv").names == ("distance_in", "plug_in")

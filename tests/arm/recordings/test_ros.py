@@ -1,0 +1,184 @@
+"""Bags of ROS 1 and ROS 2, and MCAP files, written by rosbags."""
+
+import contextlib
+import sqlite3
+
+import numpy as np
+import pytest
+from rosbags.rosbag1 import Writer as Writer1
+from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import Writer as Writer2
+from rosbags.typesys import Stores, get_typestore
+
+from prior_reinforce.arm.recordings import import_demonstrations, read_recordings
+from prior_reinforce.errors import FileFormatError
+from tests.arm.recordings.recorded import (
+    AS_IS,
+    JOINTS,
+    check_motions,
+    sampled,
+    write_bag,
+    write_bags,
+    write_outcomes,
+)
+
+KINDS = ["ros1", "sqlite", "mcap"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
+def test_ros_joint_states_in_any_order_with_fingers(tmp_path, kind):
+    write_bags(tmp_path, kind=kind, shuffled=True, fingers=True)
+    write_outcomes(tmp_path)
+    result = import_demonstrations(tmp_path, joints=JOINTS, preprocessing=AS_IS)
+    check_motions(result, 100, tolerance=1e-6)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
+def test_ros_trajectories(tmp_path, kind):
+    write_bags(tmp_path, kind=kind, trajectory=True, names=[f"panda_{j}" for j in JOINTS])
+    write_outcomes(tmp_path)
+    result = import_demonstrations(
+        tmp_path, joints=[f"panda_{j}" for j in JOINTS], names=JOINTS, preprocessing=AS_IS
+    )
+    check_motions(result, 100, tolerance=1e-9)
+    assert result.demonstrations.format.names == JOINTS
+
+
+@pytest.mark.slow
+def test_a_bare_mcap_file(tmp_path):
+    bag = write_bag(tmp_path / "throw0", 0, kind="mcap")
+    (file,) = bag.glob("*.mcap")
+    (recording,) = read_recordings(file)
+    np.testing.assert_allclose(recording.positions, sampled(0, 100)[1])
+
+
+@pytest.mark.slow
+def test_a_gripper_that_publishes_on_the_same_topic(tmp_path):
+    bag = write_bag(tmp_path / "throw0", 0, kind="sqlite", gripper_apart=True)
+    (recording,) = read_recordings(bag, joints=JOINTS)
+    np.testing.assert_allclose(recording.positions[:, :7], sampled(0, 100)[1])
+    assert recording.names[:7] == JOINTS
+    assert len(recording.names) > 7  # the gripper's, by name
+    assert "171 messages without all joints skipped" in recording.remarks[0]
+
+
+def test_bags_without_stamps_use_the_recorders_times(tmp_path):
+    bag = write_bag(tmp_path / "throw0", 0, kind="mcap", stamped=False)
+    (recording,) = read_recordings(bag)
+    np.testing.assert_allclose(recording.times, sampled(0, 100)[0], atol=1e-6)
+    assert "those of the recorder" in recording.remarks[0]
+
+
+def test_a_bag_without_the_joint_names_those_it_has(tmp_path):
+    bag = write_bag(tmp_path / "throw0", 0, kind="mcap", fingers=True)
+    with pytest.raises(
+        FileFormatError, match=r"joints in it are finger_left, joint1 to joint7, fin"
+    ):
+        read_recordings(bag, joints=["shoulder"])
+
+
+@pytest.mark.slow
+def test_joints_of_a_bag_are_found_by_the_same_rule_as_the_gates(tmp_path):
+    names = [f"panda_joint{i}" for i in range(1, 8)]
+    bag = write_bag(tmp_path / "throw0", 0, kind="mcap", names=names, fingers=True)
+    (recording,) = read_recordings(bag, joints=JOINTS)
+    assert set(names) < set(recording.names)
+
+
+def test_an_unknown_topic_lists_the_usable_ones(tmp_path):
+    bag = write_bag(tmp_path / "throw0", 0, kind="sqlite")
+    with pytest.raises(FileFormatError, match=r"/joint_states \(sensor_msgs/msg/JointState\)"):
+        read_recordings(bag, key="/joints")
+
+
+@pytest.mark.slow
+def test_a_damaged_bag_that_was_not_asked_for_does_not_matter(tmp_path):
+    write_bags(tmp_path, kind="ros1", count=3)
+    (tmp_path / "throw1.bag").write_bytes(b"#ROSBAG V2.0\n")
+    with pytest.raises(FileFormatError, match=r"throw1\.bag as a ROS bag"):
+        read_recordings(tmp_path)
+    found = read_recordings(tmp_path, episodes=["throw2", "throw0"])
+    assert [recording.episode for recording in found] == ["throw2", "throw0"]
+
+
+def test_a_link_out_of_a_bag_is_not_read(tmp_path):
+    bag = write_bag(tmp_path / "throw0", 0, kind="mcap", rate=20)
+    (file,) = bag.glob("*.mcap")
+    file.rename(tmp_path / "secret.mcap")
+    file.symlink_to(tmp_path / "secret.mcap")
+    with pytest.raises(FileFormatError, match="is a link out of"):
+        read_recordings(bag)
+
+
+def test_a_bag_that_claims_more_messages_than_a_day_has_is_not_read(tmp_path):
+    bag = write_bag(tmp_path / "throw0", 0, kind="sqlite", rate=20)
+    claims = (
+        (bag / "metadata.yaml").read_text().replace("message_count: 35", f"message_count: {10**12}")
+    )
+    (bag / "metadata.yaml").write_text(claims)
+    with pytest.raises(FileFormatError, match="1e\\+12 numbers; that is no recording"):
+        read_recordings(bag)
+
+
+def test_a_topic_without_messages_is_named_with_a_remedy(tmp_path):
+    bag = write_bag(tmp_path / "throw0", 0, kind="sqlite", rate=20)
+    (file,) = bag.glob("*.db3")
+    with contextlib.closing(sqlite3.connect(file)) as data, data:
+        data.execute("DELETE FROM messages")
+    with pytest.raises(FileFormatError, match=r"topic /\w+ has no messages; drop .*--leave-out"):
+        read_recordings(bag)
+
+
+def publishing(path, kind, more):
+    """A bag of a throw, each message followed by one of what `more(positions)` says."""
+    t, q = sampled(0, 20)
+    store = get_typestore(Stores.ROS1_NOETIC if kind == "ros1" else Stores.ROS2_HUMBLE)
+    name = "sensor_msgs/msg/JointState"
+    header, time = store.types["std_msgs/msg/Header"], store.types["builtin_interfaces/msg/Time"]
+
+    def write(writer, serialize, **second):
+        own = other = writer.add_connection("/joint_states", name, typestore=store)
+        if second:
+            other = writer.add_connection("/joint_states", name, typestore=store, **second)
+        for seconds, row in zip(t, q, strict=True):
+            stamp = time(sec=7 + int(seconds), nanosec=round(seconds % 1 * 1e9))
+            seq = {"seq": 0} if kind == "ros1" else {}
+            for connection, late, (joints, values) in (
+                (own, 0, (JOINTS, row)),
+                (other, 1000, more(row)),
+            ):
+                message = store.types[name](
+                    header=header(stamp=stamp, frame_id="", **seq), name=list(joints),
+                    position=np.array(values, float), velocity=np.zeros(0), effort=np.zeros(0),
+                )  # fmt: skip
+                at = 7 * 10**9 + round(seconds * 1e9) + late
+                writer.write(connection, at, serialize(message, name))
+
+    if kind == "ros1":  # a connection for each publisher, where ROS 2 has one for the topic
+        with Writer1(path) as writer:
+            write(writer, store.serialize_ros1, callerid="/other")
+    else:
+        with Writer2(path, version=8, storage_plugin=StoragePlugin.MCAP) as writer:
+            write(writer, store.serialize_cdr)
+    return path
+
+
+@pytest.mark.parametrize("kind", ["ros1", "mcap"])
+@pytest.mark.parametrize("case", ["still", "moves", "without positions", "more joints"])
+def test_a_topic_with_two_publishers(tmp_path, kind, case):
+    more = {
+        "still": lambda q: (JOINTS, np.zeros(7)),
+        "moves": lambda q: (JOINTS, q + 1.0),
+        "without positions": lambda q: (JOINTS, []),
+        "more joints": lambda q: ((*JOINTS, "finger"), [*np.zeros(7), 0.0]),
+    }[case]
+    bag = publishing(tmp_path / ("throw.bag" if kind == "ros1" else "throw"), kind, more)
+    if case == "moves" or (kind == "mcap" and case == "still"):
+        with pytest.raises(FileFormatError, match=r"several publishers .*; record one of them al"):
+            read_recordings(bag)
+        return
+    (recording,) = read_recordings(bag, joints=JOINTS)
+    np.testing.assert_allclose(recording.positions[:, :7], sampled(0, 20)[1])
+    assert any("messages" in remark for remark in recording.remarks)

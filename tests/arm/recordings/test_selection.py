@@ -1,0 +1,58 @@
+"""Channels are picked and lost frames left out; `test_preprocessing.py` has units and names."""
+
+import numpy as np
+import pytest
+
+from prior_reinforce.arm.recordings.recording import Recording
+from prior_reinforce.arm.recordings.selection import select
+from prior_reinforce.errors import InvalidDemonstrationsError
+
+T = np.arange(100) * 0.01
+
+
+def recording(*lost, columns=("actual_q_0", "actual_q_1")):
+    q = np.column_stack([np.sin(T), np.cos(T)])
+    for frame in lost:
+        q[frame, 1] = np.nan
+    return Recording("throw", T, q, columns=columns)
+
+
+def test_frames_that_are_not_finite_are_left_out_as_lost_packets_are():
+    selection = select([recording(10, 11, 12)])
+    (kept,) = selection.recordings
+    np.testing.assert_array_equal(kept.times, np.delete(T, [10, 11, 12]))
+    assert kept.remarks == (
+        "actual_q_1 is nan at frame 10; 3 frames are left out, as lost packets are",
+    )
+
+
+def test_an_episode_that_lost_more_is_refused_by_its_recorded_channel():
+    select([recording(*range(10))])
+    said = "episode throw: actual_q_1 is nan at frame 0, expected a finite number, and 11 of 100"
+    with pytest.raises(InvalidDemonstrationsError, match=said):
+        select([recording(*range(11))])
+
+
+def test_what_is_lost_in_a_channel_that_is_not_taken_does_not_count():
+    q = np.column_stack([np.sin(T), np.full(100, np.nan)])
+    selection = select([Recording("throw", T, q, ("a", "b"))], joints=["a"])
+    assert len(selection.recordings[0].times) == 100
+    assert selection.left_out == ""
+
+
+def test_episodes_are_dropped_by_name():
+    two = [Recording(name, T, np.sin(T)[:, None]) for name in "ab"]
+    assert select(two).without(["a"]).episodes == ("b",)
+
+
+def test_joints_of_a_plan_in_radians_are_not_taken_as_they_are_by_saying_percent():
+    names = ("pan", "lift", "gripper")
+    q = np.column_stack([60 * np.sin(T), 40 * np.cos(T), 50 + 20 * np.sin(T)])
+    selection = select(
+        [Recording("throw", T, q, names)],
+        units=["percent"],
+        plan_units=("rad", "rad", "percent"),
+    )
+    (asked,) = selection.ambiguities
+    assert "pan, lift in rad" in asked.what
+    assert asked.option == "--units deg deg percent"

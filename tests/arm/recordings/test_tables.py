@@ -1,0 +1,155 @@
+"""Tables come out of every dialect with the same numbers under the same names."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from prior_reinforce.arm.recordings.tables import read_table
+from prior_reinforce.errors import FileFormatError
+
+FRAME = pd.DataFrame({"t": [0.0, 0.25, 0.5], "q 1": [0.5, -1.25, 3e-5], "q 2": [1.0, 2.0, 3.0]})
+
+
+def numbers(table):
+    return np.column_stack([table.numbers(i) for i in range(len(table.names))])
+
+
+def one(path, **said):
+    table = read_table(path, **said)
+    return table
+
+
+@pytest.mark.parametrize("sep", [",", ";", "\t", " "])
+@pytest.mark.parametrize("decimal", [".", ","])
+@pytest.mark.parametrize("index", [False, True])
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
+def test_whatever_pandas_writes(tmp_path, sep, decimal, index, encoding):
+    if sep == decimal:
+        return
+    path = tmp_path / "a.csv"
+    FRAME.to_csv(path, sep=sep, decimal=decimal, index=index, encoding=encoding)
+    if sep == " " and index:  # an empty first name is lost between blanks
+        return
+    table = one(path)
+    assert table.names == tuple(FRAME.columns)
+    np.testing.assert_array_equal(numbers(table), FRAME)
+
+
+def test_what_numpy_writes_has_its_names_in_a_comment(tmp_path):
+    path = tmp_path / "a.csv"
+    np.savetxt(path, FRAME, header="t q1 q2", fmt="%.6g")
+    table = one(path)
+    assert (table.names, table.named) == (("t", "q1", "q2"), True)
+    np.testing.assert_array_equal(numbers(table), FRAME)
+    np.savetxt(path, FRAME, header="recorded on Monday, twice", fmt="%.6g")
+    assert one(path).names == ("column 1", "column 2", "column 3")
+
+
+def test_a_table_without_names(tmp_path):
+    path = tmp_path / "a.csv"
+    FRAME.to_csv(path, header=False, index=False)
+    table = one(path)
+    assert (table.names, table.named) == (("column 1", "column 2", "column 3"), False)
+    np.testing.assert_array_equal(numbers(table), FRAME)
+
+
+def test_comments_blank_lines_spaces_and_trailing_delimiters(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("# log\n\nt, q1 , q2,\n% noted\n0, 1, 2,\n\n0.1,  3, x,\n")
+    table = one(path)
+    assert table.names == ("t", "q1", "q2")
+    assert table.lines == (5, 7)
+    np.testing.assert_array_equal(table.numbers(1), [1, 3])
+    assert not table.is_number(2)
+    with pytest.raises(FileFormatError, match=r"a\.csv, line 7: q2 is 'x', expected a number"):
+        table.numbers(2)
+
+
+@pytest.mark.parametrize("row", ["s;rad;deg", "[s];[rad];[°]", "s;;deg"])
+def test_a_row_of_units(tmp_path, row):
+    path = tmp_path / "a.csv"
+    path.write_text(f"t;q1;q2\n{row}\n0,5;1;2\n0,75;2;3\n", encoding="utf-8")
+    table = one(path)
+    assert table.units == ("s", None if ";;" in row else "rad", "deg")
+    np.testing.assert_array_equal(table.numbers(0), [0.5, 0.75])
+
+
+def test_excels_own_first_line_and_code_page(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_bytes("sep=;\nt;q1 [°]\n0,5;1,5\n1;2\n".encode("cp1252"))
+    table = one(path)
+    assert table.names == ("t", "q1 [°]")
+    np.testing.assert_array_equal(numbers(table), [[0.5, 1.5], [1, 2]])
+
+
+def test_a_dialect_may_be_said(tmp_path):
+    path = tmp_path / "a.csv"
+    for delimiter, said in (("|", "|"), (";", "semicolon")):
+        path.write_text("a|b\n1,5|2\n3|4\n".replace("|", delimiter))
+        table = one(path, delimiter=said, decimal=",")
+        np.testing.assert_array_equal(numbers(table), [[1.5, 2], [3, 4]])
+
+
+def test_points_between_thousands_are_no_numbers(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("a;b\n1,5;1.234,5\n2,5;3,5\n")
+    with pytest.raises(FileFormatError, match=r"line 2: b is '1\.234,5', expected a number"):
+        one(path, decimal=",").numbers(1)
+
+
+def test_dates_and_times_of_day(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text(
+        "d,e,q\n2026-11-21T10:00:00.5,10:00:00.5,1\n2026-11-21T10:00:00.52,10:00:00.52,2"
+    )
+    table = one(path)
+    for column in (0, 1):
+        np.testing.assert_array_equal(table.nanoseconds(column), [0, 20_000_000])
+    assert table.nanoseconds(2) is None
+    path.write_text("q,a\nhigh,1\nlow,2\n")
+    assert one(path).nanoseconds(0) is None
+
+
+@pytest.mark.parametrize("content", [b"a,b\n\xff\xfe,1\n", b"PK\x03\x04\0\0\0"])
+def test_bytes_that_are_no_text(tmp_path, content):
+    path = tmp_path / "a.csv"
+    path.write_bytes(content)
+    with pytest.raises(FileFormatError, match=r"is no text"):
+        read_table(path)
+
+
+def test_an_empty_file_has_no_columns(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("# nothing\n\n")
+    table = one(path)
+    assert (table.names, len(table)) == ((), 0)
+
+
+@pytest.mark.parametrize(
+    "cells",
+    [
+        ("2026-11-21T10:00", "2026-11-21T10:00:00.000000001", "2026-11-21 10:00:01.5"),
+        ("2026-11-21T10:00:00+01:00", "2026-11-21T09:00:00Z", "2026-11-21T04:30:01-0530"),
+        ("2026-11-21", "2026-11-22"),
+        ("20261121T100000", "20261121T100001.25"),
+        ("1969-12-31T23:59:59.75", "2061-01-01T00:00"),
+        ("10:00:00", "10:00:00.004", "110:00:01"),
+        ("0 days 00:00:01.5", "1 days 00:00:02", "2 days 00:00:00.25"),
+    ],
+)
+def test_dates_and_spans_are_read_as_pandas_reads_them(tmp_path, cells):
+    path = tmp_path / "a.csv"
+    path.write_text("t,a\n" + "".join(f"{cell},{i}\n" for i, cell in enumerate(cells)))
+    try:
+        times = pd.to_datetime(pd.Series(cells), format="ISO8601", utc=True)
+    except ValueError:
+        times = pd.to_timedelta(pd.Series(cells))
+    expected = (times - times.iloc[0]).dt.as_unit("ns").astype("int64")
+    np.testing.assert_array_equal(one(path).nanoseconds(0), expected)
+
+
+@pytest.mark.parametrize("second", ["2026-02-31T10:00", "10:61:00", "monday", "", "2026"])
+def test_what_is_no_date_is_no_time(tmp_path, second):
+    path = tmp_path / "a.csv"
+    path.write_text(f"t,a\n2026-11-21T10:00,0\n{second},1\n")
+    assert one(path).nanoseconds(0) is None

@@ -1,0 +1,241 @@
+"""A URDF gives the limits and kinematics that MuJoCo finds in it, and says what it lacks."""
+
+import re
+from xml.etree import ElementTree
+
+import mujoco
+import numpy as np
+import pytest
+
+from prior_reinforce.arm.robots import robot_limits
+from prior_reinforce.arm.robots.urdf import read_urdf
+from prior_reinforce.errors import ConfigurationError, FileFormatError
+from prior_reinforce.plans.kinematics import tool_tip
+from tests.arm.robots.arms import UR, limit, ur5e, write_urdf
+
+TIP = (0.03, -0.02, 0.15)
+
+
+def test_an_arms_limits_and_names(tmp_path):
+    arm = read_urdf(write_urdf(tmp_path / "ur5e.urdf", ur5e()))
+    assert arm.joint_names == UR
+    np.testing.assert_allclose(arm.upper, np.pi * np.array([2, 2, 1, 2, 2, 2]))
+    np.testing.assert_allclose(arm.lower, -arm.upper)
+    np.testing.assert_allclose(arm.velocity, np.pi)
+    assert arm.acceleration is None
+    assert arm.jerk is None
+    assert arm.source == "ur5e.urdf, from link0 to tool0"
+
+
+def with_mujoco(path, tip, q):
+    """Where the tip is by MuJoCo, which keeps no frames of links behind fixed joints."""
+    text = re.sub("<visual>.*?</visual>", "", path.read_text())
+    text = text.replace(
+        '<robot name="arm">',
+        '<robot name="arm"><mujoco><compiler fusestatic="false" discardvisual="false"/></mujoco>',
+    )
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    data.qpos[:] = q
+    mujoco.mj_kinematics(model, data)
+    body = model.body(tip).id
+    return data.xpos[body] + data.xmat[body].reshape(3, 3) @ TIP
+
+
+@pytest.mark.parametrize("axis", ["0 0 1", "0 -1 0", "0.6 0 0.8"])
+def test_kinematics_are_those_that_mujoco_finds(tmp_path, axis):
+    path = write_urdf(tmp_path / "a.urdf", ur5e(), axis=axis)
+    arm = read_urdf(path)
+    rng = np.random.default_rng(0)
+    for q in rng.uniform(-3, 3, size=(10, 6)):
+        np.testing.assert_allclose(
+            tool_tip(arm.chain, q, TIP), with_mujoco(path, "tool0", q), atol=1e-9
+        )
+
+
+def test_the_presets_kinematics_are_those_of_the_makers_urdf(tmp_path):
+    arm = read_urdf(write_urdf(tmp_path / "ur5e.urdf", ur5e()))
+    q = np.random.default_rng(1).uniform(-3, 3, size=(20, 6))
+    preset = robot_limits("ur5e")
+    np.testing.assert_allclose(
+        tool_tip(preset.chain, q, TIP), tool_tip(arm.chain, q, TIP), atol=1e-9
+    )
+    np.testing.assert_allclose(preset.upper, arm.upper)
+    np.testing.assert_allclose(preset.velocity, arm.velocity)
+
+
+def test_the_flange_may_be_named_and_else_is_behind_the_last_turning_joint(tmp_path):
+    joints = [
+        ("a", "revolute", (0, 0, 1), (0, 0, 0), limit(-1, 1, 2)),
+        ("b", "continuous", (0, 0, 1), (0, 0, 0), limit(0, 0, 2)),
+        ("c", "fixed", (0, 0, 1), (0, 0, 0), ""),
+        ("finger", "prismatic", (0, 0, 1), (0, 0, 0), limit(0, 0.04, 1)),
+    ]
+    path = write_urdf(tmp_path / "a.urdf", joints, last="tip")
+    arm = read_urdf(path)
+    np.testing.assert_allclose(tool_tip(arm.chain, np.zeros(2)), [0, 0, 2])
+    np.testing.assert_allclose(arm.upper, [1, 4 * np.pi])
+    np.testing.assert_allclose(tool_tip(read_urdf(path, "link3").chain, np.zeros(2)), [0, 0, 3])
+    with pytest.raises(FileFormatError, match="finger is prismatic"):
+        read_urdf(path, "tip")
+    with pytest.raises(FileFormatError, match="no joint turns between the base and link0"):
+        read_urdf(path, "link0")
+    with pytest.raises(ConfigurationError, match="no link 'hand'; it has link0, link1"):
+        read_urdf(path, "hand")
+
+
+def test_two_arms_need_the_flange_to_be_named(tmp_path):
+    one = [("a", "revolute", (0, 0, 1), (0, 0, 0), limit(-1, 1, 2))]
+    other = (
+        '<link name="other"/><joint name="b" type="revolute"><parent link="link0"/>'
+        '<origin xyz="0 0 0"/><axis xyz="0 0 1"/>'
+        f'<child link="other"/><limit {limit(-2, 2, 2)}/></joint>'
+    )
+    path = write_urdf(tmp_path / "a.urdf", one, last="left", more=other)
+    with pytest.raises(ConfigurationError, match="ends in left, other; say which link"):
+        read_urdf(path)
+    assert read_urdf(path, "other").upper.tolist() == [2]
+
+
+@pytest.mark.parametrize(
+    ("attributes", "says"),
+    [
+        ('lower="-1" upper="1" effort="1" velocity="0"', "joint a has no velocity limit"),
+        ("", "joint a has no velocity limit"),
+        ('lower="0" upper="0" effort="1" velocity="1"', "joint a has no range"),
+    ],
+)
+def test_what_a_joint_lacks_is_named(tmp_path, attributes, says):
+    joints = [("a", "revolute", (0, 0, 1), (0, 0, 0), attributes)]
+    with pytest.raises(ConfigurationError, match=says):
+        read_urdf(write_urdf(tmp_path / "a.urdf", joints))
+
+
+@pytest.mark.parametrize("content", ["", "<robot", "<robot name='a'/>", "<a/>", "x\0y"])
+def test_what_is_no_urdf_is_named(tmp_path, content):
+    path = tmp_path / "a.urdf"
+    path.write_text(content)
+    with pytest.raises(FileFormatError, match=r"a\.urdf"):
+        read_urdf(path)
+    with pytest.raises(FileFormatError, match="no URDF at"):
+        read_urdf(tmp_path / "b.urdf")
+    (tmp_path / "c.urdf.xacro").write_text("<robot/>")
+    with pytest.raises(FileFormatError, match="make a URDF of it: xacro"):
+        read_urdf(tmp_path / "c.urdf.xacro")
+
+
+SMALL = [
+    ("base", "fixed", (0, 0.5, 0), (0, 0, 1.57), ""),
+    ("a", "revolute", (0, 0, 0.333), (0, 0, 0), limit(-1.5, 2.25, 2)),
+    ("b", "continuous", (0.1, -0.4, 0), (-1.57, 0, 0), limit(0, 0, 3.1)),
+]
+FINGER = (
+    '<link name="f"/><joint name="finger" type="revolute"><parent link="tool0"/><child link="f"/>'
+    '<origin xyz="0 0 0.1"/><axis xyz="0 1 0"/><limit lower="-1" upper="1" velocity="1"/>'
+    '<mimic joint="a"/></joint>'
+)
+NUMBERS = {"xyz", "rpy", "lower", "upper", "velocity"}
+
+
+def said(text):
+    """Every attribute of the arm's joints and of their elements, by a lenient look at XML.
+
+    The arm's are all but the last, FINGER, which hangs behind the flange and cannot move it.
+    """
+    joints = [*ElementTree.fromstring(text).iter("joint")][:3]
+    parts = [(joint.tag, joint.attrib) for joint in joints]
+    parts += [(part.tag, part.attrib) for joint in joints for part in joint]
+    return [(tag, key, value) for tag, pairs in parts for key, value in pairs.items()]
+
+
+def same(arm, other):
+    """Joints' kinds, limits and kinematics; not their names."""
+    q = np.random.default_rng(0).uniform(-3, 3, (5, 2))
+    return (
+        len(other.joint_names) == 2
+        and np.array_equal([arm.lower, arm.upper], [other.lower, other.upper])
+        and np.array_equal(arm.velocity, other.velocity)
+        and np.array_equal(tool_tip(arm.chain, q, TIP), tool_tip(other.chain, q, TIP))
+    )
+
+
+@pytest.mark.slow
+def test_a_urdf_that_lacks_a_character_is_refused_or_is_the_same_arm(tmp_path):
+    """A copy that passes is well-formed XML with all elements and attributes.
+
+    It is another arm only where the character was of a number, which leaves another number.
+    """
+    path = write_urdf(tmp_path / "a.urdf", SMALL, more=FINGER)
+    text = re.sub("<(visual|inertial)>.*?</(visual|inertial)>", "", path.read_text())
+    path.write_text(text)
+    arm, intact = read_urdf(path), said(text)
+    refused = passed = 0
+    for i in range(text.index("<link"), text.index("</robot>")):
+        copy = text[:i] + text[i + 1 :]
+        path.write_text(copy)
+        try:
+            other = read_urdf(path)
+        except (FileFormatError, ConfigurationError):
+            refused += 1
+            continue
+        now = said(copy)
+        changed = [key for (_, key, a), (_, _, b) in zip(intact, now, strict=True) if a != b]
+        assert [x[:2] for x in now] == [x[:2] for x in intact], copy[i - 20 : i + 20]
+        assert len(changed) <= 1
+        assert same(arm, other) or changed[0] in NUMBERS, copy[i - 20 : i + 20]
+        passed += 1
+    assert refused > 500  # most of what is no number
+    assert passed > 50  # digits, blanks and letters of joints' names
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ('<axis xyz="0 0 1"/>', "", "joint a needs an axis of length 1"),
+        ('<axis xyz="0 0 1"/>', '<axis xyz="0 1"/>', "joint a has <axis xyz=.*give 3 finite"),
+        (
+            '<axis xyz="0 0 1"/>',
+            '<axis xyz="0 0 nan"/>',
+            "joint a has <axis.*3 finite",
+        ),
+        ('<axis xyz="0 0 1"/>', '<axis xyz="0 0 10"/>', "joint a needs an axis of length 1"),
+        ('<origin xyz="0 0 0.333" rpy="0 0 0"/>', "", "joint a has no <origin>"),
+        ("0 0 0.333", "0 0 1e999", "give 3 finite numbers"),
+        ("0 0 0.333", "0 0 ${height}", "give 3 finite numbers"),
+        ("0 0 0.333", "0 0 333", "joint a has an <origin> beyond 10 m or a turn"),
+        ('velocity="2"', 'velocity="200"', "joint a has a velocity limit of 200"),
+        ('upper="2.25"', 'upper="225"', "joint a has no range within 12.57 rad"),
+        ('velocity="2"', 'velocty="2"', "joint a has an unknown velocty in <limit>"),
+        ("<axis", "axis", "text in joint base"),
+        ('<axis xyz="0 0 1"/>', '<axs xyz="0 0 1"/>', "joint base has an unknown <axs>"),
+        ('<link name="link2"/>', "", "names 'link2', which is no link"),
+        ('<child link="tool0"/>', '<child link="link2"/>', "two joints move one link"),
+        ('<link name="link2"/>', '<link name="link2"/><link name="x"/>', "2 links hang from no"),
+        ('<parent link="link1"/>', '<parent link="tool0"/>', "its joints form a loop"),
+        ('name="b" type', 'name="a" type', "two joints are called a"),
+        ('type="continuous"', 'type="continous"', "joint b has no type, or none of"),
+        ("</joint></robot>", '<mimic joint="a"/></joint></robot>', "joint b follows another"),
+        ("</joint></robot>", '<axis xyz="0 0 1"/></joint></robot>', "joint b has two <axis>"),
+        ("<robot", "<!DOCTYPE robot><robot", "it has a DOCTYPE"),
+    ],
+)
+def test_what_is_wrong_in_a_urdf_is_named(tmp_path, old, new, says):
+    path = write_urdf(tmp_path / "a.urdf", SMALL)
+    text = re.sub("<(visual|inertial)>.*?</(visual|inertial)>", "", path.read_text())
+    text = text.replace("></link>", "/>")
+    assert old in text
+    at = text.index(old, text.index('name="a"') if says.startswith("joint a ") else 0)
+    path.write_text(text[:at] + new + text[at + len(old) :])
+    with pytest.raises((FileFormatError, ConfigurationError), match=says):
+        read_urdf(path, "tool0")
+
+
+def test_soft_limits_narrow_a_joints_range(tmp_path):
+    path = write_urdf(tmp_path / "a.urdf", SMALL)
+    soft = '<safety_controller soft_lower_limit="-1" soft_upper_limit="9" k_velocity="1"/></joint>'
+    text = path.read_text()
+    at = text.index("</joint>", text.index('name="a"'))
+    path.write_text(text[:at] + soft + text[at + len("</joint>") :])
+    arm = read_urdf(path)
+    assert (arm.lower[0], arm.upper[0]) == (-1, 2.25)
+    assert arm.source.endswith("soft limits too")

@@ -1,0 +1,56 @@
+"""Where a workspace stands, in words."""
+
+import pytest
+
+from tests.arm.workspace.planar import amend, ask, describe, tell
+
+
+@pytest.mark.slow
+def test_status_is_short_and_says_what_is_next(workspace):
+    assert "prior-reinforce ask" in describe(workspace)
+    tell(workspace, ask(workspace).number, [0.05, 0.0])
+    tell(workspace, ask(workspace).number, [0.0, 0.0])
+    text = describe(workspace)
+    assert "5 cm long" in text
+    assert "reached in 2 trials (N = 4 demonstrations + 2 = 6)" in text
+    assert len(text.splitlines()) <= 12
+
+
+def test_a_first_trial_that_hits_is_one_trial(workspace):
+    tell(workspace, ask(workspace).number, [0.0, 0.0])
+    assert "reached in 1 trial (N = 4 demonstrations + 1 = 5)" in describe(workspace)
+
+
+@pytest.mark.slow
+def test_trials_that_are_not_shown_are_counted(workspace):
+    for error in (0.05, 0.04, 0.03):
+        tell(workspace, ask(workspace).number, [error, 0.0])
+    assert "more" not in describe(workspace)
+    for error in (0.02, 0.02):
+        tell(workspace, ask(workspace).number, [error, 0.0])
+    text = describe(workspace)
+    assert "2 more" in text
+    assert "trial 3" in text
+    assert "trial 2" not in text
+
+
+@pytest.mark.slow
+def test_a_plan_of_before_a_correction_is_named(workspace):
+    tell(workspace, ask(workspace).number, [0.30, 0.0])
+    ask(workspace)
+    assert "before a correction" not in describe(workspace)
+    amend(workspace, 1, [0.03, 0.0])
+    assert "planned before your correction; if it was not thrown yet, void it" in describe(
+        workspace
+    )
+
+
+@pytest.mark.slow
+def test_a_goal_far_outside_may_be_refused_and_a_nearer_one_is_named(workspace):
+    assert "nearer" not in describe(workspace)
+    with pytest.warns(UserWarning, match="outside"):
+        workspace.set_goal([0.9, 0.9])
+    assert "ask" in describe(workspace).splitlines()[-1]
+    assert "if it refuses, a goal nearer" in describe(workspace).splitlines()[-1]
+    ask(workspace)  # nothing refused it
+    assert "nearer" not in describe(workspace)
