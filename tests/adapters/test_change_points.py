@@ -17,16 +17,17 @@ def test_a_change_concerns_trials_from_it_on_of_all_goals_or_of_one():
     assert of_one.concerns(places).tolist() == [False, True, False, True]
 
 
+@pytest.mark.slow
 def test_a_shift_is_the_same_everywhere_and_changed_hardware_is_not():
     adapter = after_two_hits()
     at = np.array([[0.0, 0.0], [2.0, 0.0]])
     places = Places(at, np.array([2, 2]), at)
-    shift = Change(1, 0.8).covariance(adapter._prior, places, places)
+    shift = Change(1, 0.8).covariance(adapter._trials._prior, places, places)
     np.testing.assert_allclose(shift, 0.64)
-    stretch = Change(1, 0.0).covariance(adapter._prior, places, places)
+    stretch = Change(1, 0.0).covariance(adapter._trials._prior, places, places)
     np.testing.assert_allclose(np.diag(stretch), 0.09)
     assert stretch[0, 1] == pytest.approx(0.09 * np.exp(-0.5 * (2.0 / 2.5) ** 2))
-    before = Change(3, 0.8).covariance(adapter._prior, places, places)
+    before = Change(3, 0.8).covariance(adapter._trials._prior, places, places)
     assert not before.any()
 
 
@@ -35,11 +36,15 @@ def happened(adapter, error):
     told = after_two_hits()
     told.observe(GOAL, GOAL, Reading.measured(error, 0.002))
     may_be = split(
-        adapter._histories, adapter._prior, adapter._memory, told._memory.only(slice(-1, None))
+        adapter._trials._histories,
+        adapter._trials._prior,
+        adapter._trials._memory,
+        told._trials._memory.only(slice(-1, None)),
     )
     return [(history.changes, history.mistaken) for history in may_be]
 
 
+@pytest.mark.slow
 def test_what_was_expected_splits_nothing():
     assert happened(after_two_hits(), [0.002, 0.0]) == [((), frozenset())]
 
@@ -51,6 +56,7 @@ def test_what_was_not_expected_may_have_every_cause():
     assert kinds == {(0.8, True), (0.0, True), (0.8, False)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("moved", [[0.1, 0.1], [-0.12, 0.05]])
 def test_later_trials_tell_a_moved_table_from_a_moved_goal(moved):
     """Two throws at a goal are off alike; a throw at another goal is, or is not."""
@@ -59,16 +65,17 @@ def test_later_trials_tell_a_moved_table_from_a_moved_goal(moved):
         for _ in range(2):
             adapter.observe(GOAL, GOAL, seen)
         adapter.observe(OTHER, OTHER, seen if all_moved else Reading.measured([0.0, 0.0], 0.002))
-        (change,) = adapter._histories[0].changes
+        (change,) = adapter._trials._histories[0].changes
         assert change.since == 2
         assert (change.goal is None) == all_moved
 
 
+@pytest.mark.slow
 def test_weights_of_histories_are_prior_times_evidence():
     adapter = after_two_hits()
     adapter.observe(GOAL, GOAL, Reading.measured([0.16, -0.12], 0.002))
-    logs = [history.log_weight for history in adapter._histories]
+    logs = [history.log_weight for history in adapter._trials._histories]
     assert logs == sorted(logs, reverse=True)
-    for history in adapter._histories:
+    for history in adapter._trials._histories:
         evidence = np.log(np.exp(history.posterior.log_evidence).sum(axis=0)).sum()
         assert history.log_weight == pytest.approx(history.log_prior + evidence)

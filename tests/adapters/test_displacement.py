@@ -3,7 +3,8 @@ import pytest
 
 from prior_reinforce.adapters.displacement import BayesianConfig, DisplacementPrior
 from prior_reinforce.errors import ConfigurationError
-from prior_reinforce.plans.motions import Demonstrations, PlanFormat
+from prior_reinforce.plans.motions import Demonstrations
+from prior_reinforce.plans.plan_format import PlanFormat
 
 OUTCOMES = np.array([[0.8, -0.2], [0.8, 0.2], [1.0, -0.2], [1.0, 0.2], [0.9, 0.0]])
 
@@ -66,6 +67,7 @@ def test_demonstrations_are_readings_of_what_the_generator_gets_wrong():
     assert sd[2] < 0.3 < sd[3]
 
 
+@pytest.mark.slow
 def test_what_the_generator_gets_wrong_is_what_weights_make_of_a_random_landing():
     """Landings F are drawn at demonstrations and beside them; the weights carry over a part."""
     believed, rng = of_generator(), np.random.default_rng(1)

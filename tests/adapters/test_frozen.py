@@ -1,7 +1,8 @@
 import numpy as np
 
 from prior_reinforce.adapters.frozen import FrozenAdapter
-from prior_reinforce.plans.motions import Demonstrations, PlanFormat
+from prior_reinforce.plans.motions import Demonstrations
+from prior_reinforce.plans.plan_format import PlanFormat
 
 
 def observe(adapter, condition, outcome):

@@ -10,8 +10,11 @@ from sklearn.gaussian_process.kernels import RBF, ConstantKernel
 
 from prior_reinforce.adapters.gaussian_process import GaussianProcessAdapter, GaussianProcessConfig
 from prior_reinforce.errors import ConfigurationError
-from prior_reinforce.lab.tasks import make_task
-from prior_reinforce.plans.motions import Demonstrations, PlanFormat
+from prior_reinforce.formats import OutcomeFormat
+from prior_reinforce.plans.motions import Demonstrations
+from prior_reinforce.plans.plan_format import PlanFormat
+from prior_reinforce.readings import Reading
+from prior_reinforce.simulation.tasks import make_task
 
 
 def observe(adapter, condition, outcome):
@@ -19,13 +22,18 @@ def observe(adapter, condition, outcome):
     adapter.observe(condition, np.zeros(len(outcome)), outcome)
 
 
-DATA_SETS = int(os.environ.get("DATA_SETS", "20"))  # docs/decisions-adapter.md: 200
+DATA_SETS = int(os.environ.get("DATA_SETS", "20"))  # reproduction/docs/decisions-adapter.md: 200
 REGION = np.array([[0.80, -0.25], [1.05, 0.25]])
 
 
 def demonstrations(outcomes: np.ndarray, units: tuple[str, ...] = ()) -> Demonstrations:
     plans = np.random.default_rng(0).normal(size=(len(outcomes), 4, 1))
-    return Demonstrations(plans, outcomes, PlanFormat(("j1",), ("rad",), 0.02), (), units)
+    return Demonstrations(
+        plans,
+        outcomes,
+        PlanFormat(("j1",), ("rad",), 0.02),
+        OutcomeFormat(tuple("xyz"[: len(units)]), units),
+    )
 
 
 def spread_over_region(seed: int, n: int = 6) -> np.ndarray:
@@ -88,6 +96,7 @@ def assert_no_worse_than_scikit_learn(seeds: range, restarts: int) -> int:
     return same
 
 
+@pytest.mark.slow
 def test_never_less_likely_than_scikit_learn_with_its_restarts():
     assert assert_no_worse_than_scikit_learn(range(6), restarts=50) >= 4
 
@@ -99,6 +108,7 @@ def test_never_less_likely_than_scikit_learn_on_many_data_sets():
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(10))
 def test_predictions_are_scikit_learns_given_the_same_kernel(seed):
     adapter = random_adapter(seed)
@@ -115,6 +125,7 @@ def test_predictions_are_scikit_learns_given_the_same_kernel(seed):
     np.testing.assert_allclose(proposed, expected, atol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(10))
 def test_first_condition_is_the_goal(seed):
     outcomes = spread_over_region(seed)
@@ -137,6 +148,8 @@ def largest_miss_between(outcomes: np.ndarray, units: tuple[str, ...] = ()) -> f
     return float(np.abs(missed / adapter._normalisation.scale).max())
 
 
+@pytest.mark.slow
+@pytest.mark.slow
 @pytest.mark.parametrize("prior_set", ["A", "B"])
 @pytest.mark.parametrize("task", ["basketball-v1", "curling", "fishing"])
 def test_the_first_condition_is_the_goal_for_every_subset_of_a_prior_set(task, prior_set):
@@ -146,6 +159,7 @@ def test_the_first_condition_is_the_goal_for_every_subset_of_a_prior_set(task, p
             assert largest_miss_between(outcomes[list(subset)]) < 0.02, subset
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("k", [1, 2, 3])
 @pytest.mark.parametrize("n", [2, 3, 4, 5, 6, 8])
 def test_the_first_condition_is_the_goal_however_few_demonstrations_there_are(n, k):
@@ -162,6 +176,17 @@ def test_few_demonstrations_are_joined_by_points_of_the_convention_by_hand():
     expected = np.vstack([outcomes, np.array([0.9, 0.1]) + around])
     np.testing.assert_allclose(adapter._normalisation.undo(adapter.memory_outcomes_), expected)
     np.testing.assert_array_equal(adapter.memory_conditions_, adapter.memory_outcomes_)
+
+
+def test_a_single_demonstration_is_joined_by_them_as_well_and_trials_are_followed():
+    shown = make_task("basketball-v1").demonstrations("A").only([0])
+    adapter, goal, off = GaussianProcessAdapter(), np.array([1.0, 0.1]), np.array([0.04, -0.02])
+    adapter.start(shown)
+    np.testing.assert_allclose(adapter.propose(goal), goal, atol=0.01)
+    for _ in range(3):
+        condition = adapter.propose(goal)
+        adapter.observe(condition, goal, Reading.measured(condition + off - goal, 0.001))
+    np.testing.assert_allclose(adapter.propose(goal) + off, goal, atol=0.01)
 
 
 def test_two_demonstrations_are_enough_to_follow_an_offset():

@@ -7,11 +7,11 @@ from prior_reinforce.errors import ConfigurationError
 @pytest.mark.parametrize(
     ("choice", "memory_size", "bounds"),
     [
-        ("gp", 2, (1e-3, 0.3)),
-        ("gp-all", None, (1e-3, 0.3)),
-        ("gp-one-term", 2, (1e-3, 1e-3)),
-        ("gp-one-term-all", None, (1e-3, 1e-3)),
-        ("gp-one-term,memory_size=4", 4, (1e-3, 1e-3)),
+        ("gp", 2, (1e-3, 1e-3)),
+        ("gp-all", None, (1e-3, 1e-3)),
+        ("gp-two-term", 2, (1e-3, 0.3)),
+        ("gp-two-term-all", None, (1e-3, 0.3)),
+        ("gp,memory_size=4", 4, (1e-3, 1e-3)),
     ],
 )
 def test_a_choice_is_what_its_name_says(choice, memory_size, bounds):

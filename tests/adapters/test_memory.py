@@ -33,7 +33,7 @@ def test_two_hundred_trials_are_made_fewer_and_hardly_missed():
         low = np.floor(100 * moved(condition)) / 100
         reading = Reading(moved(condition), low, low + 0.01, np.zeros(2))
         adapter.observe(condition, condition, reading)
-    assert len(adapter._memory.numbers) == memory._KEPT
+    assert len(adapter._trials._memory.numbers) == memory._KEPT
     goals = rng.uniform([0.83, -0.17], [0.97, 0.17], size=(20, 2))
     off = [np.linalg.norm(c + moved(c) - goal) for goal in goals for c in [adapter.propose(goal)]]
     assert np.median(off) < 0.004

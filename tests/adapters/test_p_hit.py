@@ -39,6 +39,7 @@ def test_beside_what_missed_is_what_the_integral_says(aim):
     assert said[0] == pytest.approx(np.sum(left * hit) / np.sum(left), abs=0.04)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("k", [2, 3])
 def test_balls_are_missed_and_hit_as_often_as_in_a_million_throws(k):
     """Displacements at a missed condition and at two others that go with it more and less."""
@@ -114,6 +115,7 @@ def test_the_share_within_a_ball_is_that_of_samples_whatever_its_size(k, sd):
     assert share == pytest.approx(np.mean(np.linalg.norm(samples, axis=1) < 0.1), abs=0.006)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("k", [1, 2, 3])
 def test_each_component_is_a_mixture_of_its_own(k):
     rng = np.random.default_rng(k)

@@ -3,7 +3,8 @@ import pytest
 
 from prior_reinforce.adapters.proportional import ProportionalAdapter
 from prior_reinforce.errors import ConfigurationError
-from prior_reinforce.plans.motions import Demonstrations, PlanFormat
+from prior_reinforce.plans.motions import Demonstrations
+from prior_reinforce.plans.plan_format import PlanFormat
 
 
 def observe(adapter, condition, outcome):

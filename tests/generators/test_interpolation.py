@@ -5,12 +5,11 @@ import pytest
 
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.generators.interpolation import (
-    NearestNeighbours,
-    NearestNeighboursConfig,
     SmoothInterpolation,
     SmoothInterpolationConfig,
 )
-from prior_reinforce.plans.motions import Demonstrations, PlanFormat
+from prior_reinforce.plans.motions import Demonstrations
+from prior_reinforce.plans.plan_format import PlanFormat
 
 FORMAT = PlanFormat(("joint1", "gripper"), ("rad", "1"), 0.02)
 
@@ -18,33 +17,6 @@ FORMAT = PlanFormat(("joint1", "gripper"), ("rad", "1"), 0.02)
 def demonstrations(n: int = 6) -> Demonstrations:
     rng = np.random.default_rng(0)
     return Demonstrations(rng.normal(size=(n, 11, 2)), rng.uniform(size=(n, 2)), FORMAT)
-
-
-def test_nearest_mixes_two_neighbours_by_inverse_distance():
-    """A goal at a third of the way between two outcomes: weights 2/3 and 1/3 with power 1."""
-    outcomes = np.array([[0.0], [3.0], [30.0]])
-    plans = np.random.default_rng(0).normal(size=(3, 5, 2))
-    config = NearestNeighboursConfig(neighbours=2, power=1.0)
-    generator = NearestNeighbours(config).fit(
-        Demonstrations(plans, outcomes, FORMAT, outcome_units=("cm",)), seed=0
-    )
-    generated = generator.generate(np.array([[1.0]]))
-    np.testing.assert_allclose(generated[0], (2 * plans[0] + plans[1]) / 3)
-
-
-@pytest.mark.parametrize("n", [2, 3, 6])
-def test_nearest_returns_every_demonstration_exactly_at_its_outcome(n: int):
-    demos = demonstrations(n)
-    generated = NearestNeighbours().fit(demos, seed=0).generate(demos.outcomes_seen)
-    np.testing.assert_array_equal(generated, demos.plans)
-
-
-def test_nearest_never_leaves_the_range_of_its_demonstrations():
-    demos = demonstrations()
-    far = np.random.default_rng(1).normal(scale=10, size=(50, 2))
-    generated = NearestNeighbours().fit(demos, seed=0).generate(far)
-    assert np.all(generated <= demos.plans.max(axis=0) + 1e-12)
-    assert np.all(generated >= demos.plans.min(axis=0) - 1e-12)
 
 
 @pytest.mark.parametrize("n", [2, 3, 6])
@@ -64,12 +36,6 @@ def test_interpolation_is_exact_where_plans_depend_affinely_on_outcomes():
     asked = rng.uniform(-0.5, 1.5, size=(20, 2))
     generated = SmoothInterpolation().fit(demos, seed=0).generate(asked)
     np.testing.assert_allclose(generated, base + np.tensordot(asked, slopes, 1), atol=1e-10)
-
-
-@pytest.mark.parametrize(("setting", "value"), [("neighbours", 0), ("power", 0.0)])
-def test_nearest_refuses_senseless_settings(setting: str, value: float):
-    with pytest.raises(ConfigurationError, match=setting):
-        NearestNeighboursConfig(**{setting: value})
 
 
 def test_a_kernel_that_is_not_the_usual_one_is_said():

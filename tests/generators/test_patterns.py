@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from prior_reinforce.generators.patterns import patterns
-from prior_reinforce.lab.tasks import make_task
-from prior_reinforce.plans.motions import Demonstrations, PlanFormat
+from prior_reinforce.plans.motions import Demonstrations
+from prior_reinforce.plans.plan_format import PlanFormat
+from prior_reinforce.simulation.tasks import make_task
 
 OUTCOMES = np.array([[0.8, -0.2], [0.8, 0.2], [1.0, -0.1], [1.0, 0.2], [0.9, 0.0], [0.7, 0.1]])
 
@@ -40,24 +41,6 @@ def test_pushes_to_either_side_are_one_pattern():
     plans = outcomes[:, :, None] * (10 * s**3 - 15 * s**4 + 6 * s**5)[None, :, None]
     demos = Demonstrations(plans, outcomes, PlanFormat(("x",), ("m",), 0.02))
     assert patterns(demos) == (tuple(range(6)),)
-
-
-@pytest.mark.parametrize("kind", ["styles-9-0", "outlier-8-0", "mixed-8-0"])
-def test_two_manners_of_one_throw_are_one_pattern(kind):
-    assert len(patterns(make_task("zoo-scoop").demonstrations(kind))) == 1
-
-
-@pytest.mark.parametrize("name", ["zoo-sidearm", "zoo-overarm", "zoo-bank"])
-def test_two_ways_are_told_apart_by_what_each_tells_of_its_own(name):
-    """Motions that return, whose mirror image correlates with them at a delay."""
-    demos = make_task(name).demonstrations("ways-12-101")
-    one, other = patterns(demos)
-    assert len(one) == len(other) == 6
-    turns = demos.plans[:, :, 1 if name == "zoo-overarm" else 0]
-    far = turns[np.arange(12), np.abs(turns - turns[:, :1]).argmax(axis=1)]
-    assert max(far[list(one)]) < min(far[list(other)]) or min(far[list(one)]) > max(
-        far[list(other)]
-    )
 
 
 @pytest.mark.parametrize("name", ["A", "B"])

@@ -8,7 +8,7 @@ from safetensors.numpy import save
 
 from prior_reinforce.errors import FileFormatError
 from prior_reinforce.files import sha256
-from prior_reinforce.generators import NearestNeighbours, load_generator
+from prior_reinforce.generators import SmoothInterpolation, load_generator
 from prior_reinforce.generators.saving import (
     CONFIG_FILE,
     TENSOR_FILE,
@@ -62,6 +62,7 @@ def test_every_truncation_is_noticed(folder, name):
             read_model(folder)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [CONFIG_FILE, TENSOR_FILE])
 def test_every_flipped_bit_is_noticed_or_harmless(folder, name):
     content = (folder / name).read_bytes()
@@ -100,7 +101,7 @@ def crafted(folder, layers=None, tensors=None):
     config.write_text(json.dumps({**content, "config_sha256": digest}))
 
 
-LAYER = {"name": "nearest", "outcome_dim": 2, "remarks": [], "settings": {}}
+LAYER = {"name": "interpolation", "outcome_dim": 2, "remarks": [], "settings": {}}
 
 
 @pytest.mark.parametrize(
@@ -111,7 +112,7 @@ LAYER = {"name": "nearest", "outcome_dim": 2, "remarks": [], "settings": {}}
         [1],
         [{**LAYER, "outcome_dim": 0}],
         [{**LAYER, "settings": None}],
-        [{"name": "nearest"}],
+        [{"name": "interpolation"}],
     ],
 )
 def test_a_stack_of_another_form_is_refused(folder, layers):
@@ -120,6 +121,7 @@ def test_a_stack_of_another_form_is_refused(folder, layers):
         read_model(folder)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("key", ["3.a", "-9.a", "a", "", "0x1.a", "1e0.a"])
 def test_a_tensor_of_no_layer_is_refused(folder, key):
     crafted(folder, tensors={key: np.zeros(2)})
@@ -127,7 +129,10 @@ def test_a_tensor_of_no_layer_is_refused(folder, key):
         read_model(folder)
 
 
-@pytest.mark.parametrize("names", [["nearest", "nearest"], ["timed"], ["timed"] * 5000, ["auto"]])
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "names", [["interpolation", "interpolation"], ["timed"], ["timed"] * 5000, ["auto"]]
+)
 def test_a_stack_that_nobody_wrapped_is_refused(folder, names):
     crafted(folder, [{**LAYER, "name": name} for name in names], tensors={})
     with pytest.raises(FileFormatError):
@@ -135,9 +140,9 @@ def test_a_stack_that_nobody_wrapped_is_refused(folder, names):
 
 
 def test_another_generator_is_refused(folder):
-    with pytest.raises(FileFormatError, match=r"outer generator, not nearest.*load_generator"):
-        NearestNeighbours.load(folder)
-    with pytest.raises(FileFormatError, match="known here"):
+    with pytest.raises(FileFormatError, match=r"outer generator, not interp.*load_generator"):
+        SmoothInterpolation.load(folder)
+    with pytest.raises(FileFormatError, match="no generator 'inner'; known are auto, "):
         load_generator(folder)
 
 

@@ -14,7 +14,10 @@ from prior_reinforce.errors import (
     InvalidGoalError,
     InvalidPlanError,
 )
-from prior_reinforce.plans.motions import Demonstrations, Plan, PlanFormat
+from prior_reinforce.formats import OutcomeFormat
+from prior_reinforce.plans.motions import Demonstrations, Plan
+from prior_reinforce.plans.plan_format import PlanFormat
+from prior_reinforce.plans.symmetry import TurnJoint, scale_alone, turn_and_scale
 
 FORMAT = PlanFormat(names=("joint1", "joint2"), units=("rad", "rad"), dt=0.01)
 RNG_SEED = 0
@@ -31,14 +34,13 @@ def make(n=4, horizon=5, **changes):
 
 
 def test_round_trip_keeps_every_bit_and_the_meaning(tmp_path):
-    demos = make(outcome_names=("x", "t"), outcome_units=("m", "s"))
+    demos = make(outcome_format=OutcomeFormat(("x", "t"), ("m", "s")))
     demos.save(tmp_path / "demos.npz")
     loaded = Demonstrations.load(tmp_path / "demos.npz")
     np.testing.assert_array_equal(loaded.plans, demos.plans)
     np.testing.assert_array_equal(loaded.outcomes_seen, demos.outcomes_seen)
     assert loaded.format == FORMAT
-    assert loaded.outcome_names == ("x", "t")
-    assert loaded.outcome_units == ("m", "s")
+    assert loaded.outcome_format == OutcomeFormat(("x", "t"), ("m", "s"))
 
 
 @pytest.mark.parametrize(
@@ -47,8 +49,8 @@ def test_round_trip_keeps_every_bit_and_the_meaning(tmp_path):
         {"format": PlanFormat(("a", "b"), ("rad", "rad"), 0.02)},
         {"format": PlanFormat(("a", "c"), ("rad", "rad"), 0.01)},
         {"format": PlanFormat(("a", "b"), ("rad", "m"), 0.01)},
-        {"outcome_names": ("y", "x")},
-        {"outcome_units": ("m", "rad")},
+        {"outcome_format": OutcomeFormat(("y", "x"), ("m", "m"))},
+        {"outcome_format": OutcomeFormat(("x", "y"), ("m", "rad"))},
     ],
 )
 def test_the_same_numbers_that_mean_something_else_are_other_demonstrations(change):
@@ -115,28 +117,13 @@ def test_arrays_are_own_copies_and_read_only():
         ({"outcomes_seen": [[0.1, 0.2]] * 4}, "all outcomes agree"),
         ({"outcomes_seen": [[0.1 * i, 0.2 * i] for i in range(4)]}, "one line"),
         ({"outcomes_seen": [[0.1 * i, 0.2] for i in range(4)]}, "component 1"),
-        ({"plans": np.zeros((1, 5, 2)), "outcomes_seen": [[0.1, 0.2]]}, "at least two"),
-        ({"outcome_names": ("x",)}, "2 components"),
+        ({"plans": np.zeros((0, 5, 2)), "outcomes_seen": np.zeros((0, 2))}, "at least one"),
+        ({"outcome_format": OutcomeFormat(("x",), ("m",))}, "2 components"),
     ],
 )
 def test_bad_demonstrations_are_named(changes, message):
     with pytest.raises(InvalidDemonstrationsError, match=message):
         make(**changes)
-
-
-@pytest.mark.parametrize(
-    ("names", "units", "dt", "message"),
-    [
-        ((), (), 0.1, "at least one"),
-        (("a", "a"), ("rad", "rad"), 0.1, "differ"),
-        (("a", "b"), ("rad",), 0.1, "as many units"),
-        (("a",), ("rad",), 0.0, "positive"),
-        (("a",), ("rad",), float("nan"), "positive"),
-    ],
-)
-def test_bad_formats_are_named(names, units, dt, message):
-    with pytest.raises(InvalidPlanError, match=message):
-        PlanFormat(names, units, dt)
 
 
 def test_plan_times_follow_dt():
@@ -204,6 +191,7 @@ def test_what_is_masked_is_no_data():
         replace(demos, outcomes_seen=masked)
 
 
+@pytest.mark.slow
 def test_missing_truncated_flipped_and_foreign_files_are_named(tmp_path):
     with pytest.raises(FileFormatError, match="no demonstrations at"):
         Demonstrations.load(tmp_path / "none.npz")
@@ -250,7 +238,7 @@ def test_metres_are_doubted_sooner_where_nobody_said_them():
     far = [[10.0, 0.2], [16.0, 0.1], [22.0, 0.3], [28.0, 0.5]]
     with pytest.warns(UserWarning, match="28 m looks like centimetres"):
         make(outcomes_seen=far)
-    assert make(outcomes_seen=far, outcome_units=("m", "m")).n == 4
+    assert make(outcomes_seen=far, outcome_format=OutcomeFormat.metres(2)).n == 4
 
 
 def test_outcomes_that_differ_by_rounding_are_the_same():
@@ -258,13 +246,6 @@ def test_outcomes_that_differ_by_rounding_are_the_same():
     almost[2] += 1e-12
     with pytest.warns(UserWarning, match="0 and 2 have the same outcome"):
         make(outcomes_seen=almost)
-
-
-def test_a_text_is_no_list_of_names():
-    with pytest.raises(InvalidPlanError, match=r"units must be a list such as \['rad'\], got a"):
-        PlanFormat(("pan", "arm"), "rad", 0.02)
-    with pytest.raises(InvalidPlanError, match="names must be a list"):
-        PlanFormat("pan", ("rad",), 0.02)
 
 
 def test_a_plan_is_drawn_by_unit_and_printed_in_a_line():
@@ -281,3 +262,73 @@ def test_a_plan_is_drawn_by_unit_and_printed_in_a_line():
 def test_demonstrations_are_printed_in_a_line():
     demos = Demonstrations(np.zeros((2, 5, 1)), [[0.1], [0.2]], PlanFormat(["a"], ["rad"], 0.1))
     assert repr(demos) == "Demonstrations(2 plans, 5 frames x 1, 0.4 s: a; outcomes x [m])"
+
+
+TURN = turn_and_scale(TurnJoint(1))
+
+
+def test_a_symmetry_is_kept_through_all_that_is_made_of_demonstrations(tmp_path):
+    demos = make(symmetry=TURN)
+    assert demos.symmetry == TURN.around(demos.outcomes_seen)
+    assert demos.with_plans(demos.plans + 1).symmetry == demos.symmetry
+    assert demos.only([0, 2]).symmetry == TURN.around(demos.outcomes_seen[[0, 2]])
+    demos.save(tmp_path / "demos.npz")
+    loaded = Demonstrations.load(tmp_path / "demos.npz")
+    assert loaded.symmetry == demos.symmetry
+    assert loaded.sha256 == demos.sha256
+
+
+def test_a_symmetry_is_part_of_the_fingerprint_and_can_be_taken_off():
+    demos, plain = make(symmetry=TURN), make()
+    assert plain.symmetry is None
+    assert demos.sha256 != plain.sha256
+    assert demos.without_symmetry().sha256 == plain.sha256
+    assert plain.with_symmetry(TURN).sha256 == demos.sha256
+
+
+@pytest.mark.parametrize(
+    ("symmetry", "message"),
+    [
+        (scale_alone(), "moves 1 components, but outcomes have 2"),
+        (turn_and_scale(TurnJoint(2)), "columns that plans do not have; they have 2: joint1"),
+    ],
+)
+def test_a_symmetry_that_does_not_fit_is_refused(symmetry, message):
+    with pytest.raises(InvalidDemonstrationsError, match=message):
+        make(symmetry=symmetry)
+
+
+def test_one_demonstration_has_the_spread_of_its_symmetry():
+    one = make(n=1, outcomes_seen=[[2.0, 0.0]], symmetry=TURN)
+    np.testing.assert_allclose(one.spread, [0.3, 0.3])
+    np.testing.assert_allclose(make(n=4).spread, make(n=4).outcomes_seen.std(axis=0))
+    with pytest.raises(InvalidDemonstrationsError, match="state the symmetry"):
+        make(n=1).spread  # noqa: B018
+
+
+def test_outcomes_on_a_line_are_enough_with_a_symmetry():
+    line = [[0.1 * i, 0.2] for i in range(1, 5)]
+    demos = make(outcomes_seen=line, symmetry=TURN)
+    assert demos.spread[1] > 0.01
+    assert demos.repeated_outcomes() == []
+    with pytest.raises(InvalidDemonstrationsError, match="all outcomes agree"):
+        demos.without_symmetry()
+
+
+def test_a_goal_is_far_outside_where_the_symmetry_is_believed_no_more():
+    one = make(n=1, outcomes_seen=[[1.0, 0.0]], symmetry=TURN)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        one.check_goal([-0.9, 0.9])
+        one.check_goal([2.0, 0.0])
+    np.testing.assert_allclose(one.far_outside(np.array([4.0, 0.0])), [4.0 - np.exp(0.9), 0.0])
+    with pytest.warns(UserWarning, match=r"goal \[4, 0\] lies 1.54 m outside"):
+        one.check_goal([4.0, 0.0])
+
+
+def test_demonstrations_made_of_others_mute_no_warnings_but_their_own(monkeypatch):
+    """`catch_warnings` is of all threads, and two of them leave it muted for good."""
+    with pytest.warns(UserWarning, match="looks like centimetres"):
+        demos = make(outcomes_seen=[[90.0, 0.1], [80.0, 0.2], [85.0, 0.1], [95.0, 0.3]])
+    monkeypatch.setattr(warnings, "catch_warnings", None)
+    assert demos.only((0, 1, 2)).n == 3

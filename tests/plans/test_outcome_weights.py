@@ -6,33 +6,11 @@ from scipy.interpolate import RBFInterpolator
 
 from prior_reinforce.plans.outcome_weights import (
     amplification,
-    inverse_distance_weights,
     smooth_weights,
 )
 
 OUTCOMES = np.random.default_rng(0).uniform(size=(6, 2))
 CONDITIONS = np.random.default_rng(1).uniform(-0.3, 1.3, size=(20, 2))
-
-
-def test_inverse_distance_is_the_value_worked_by_hand():
-    """Distances 1, 2, 3: with power 1 the nearest two weigh 2:1; with power 2 all, 36:9:4."""
-    outcomes = np.array([[0.0], [3.0], [4.0]])
-    conditions = np.array([[1.0]])
-    weights = inverse_distance_weights(conditions, outcomes, neighbours=2, power=1.0)
-    np.testing.assert_allclose(weights, [[2 / 3, 1 / 3, 0]])
-    weights = inverse_distance_weights(conditions, outcomes, neighbours=3, power=2.0)
-    np.testing.assert_allclose(weights, np.array([[36, 9, 4]]) / 49)
-
-
-def test_inverse_distance_returns_a_demonstration_exactly_at_its_outcome():
-    weights = inverse_distance_weights(OUTCOMES, OUTCOMES, neighbours=4, power=2.0)
-    np.testing.assert_array_equal(weights, np.eye(6))
-
-
-def test_inverse_distance_survives_great_powers_and_tiny_distances():
-    conditions = OUTCOMES + 1e-14
-    weights = inverse_distance_weights(conditions, OUTCOMES, neighbours=6, power=50.0)
-    np.testing.assert_allclose(weights, np.eye(6), atol=1e-12)
 
 
 @pytest.mark.parametrize("kernel", ["linear", "thin-plate", "cubic"])
@@ -75,14 +53,11 @@ def test_two_demonstrations_of_two_components_are_joined_without_an_affine_tail(
     np.testing.assert_allclose(at_ends, np.eye(2), atol=1e-12)
 
 
-@pytest.mark.parametrize("scheme", ["nearest", "smooth"])
-def test_the_unit_of_a_component_does_not_matter(scheme: str):
+def test_the_unit_of_a_component_does_not_matter():
     """Metres and milliseconds: every component counts relative to its demonstrated range."""
     factor = np.array([1.0, 1000.0])
 
     def weights(conditions: np.ndarray, outcomes: np.ndarray) -> np.ndarray:
-        if scheme == "nearest":
-            return inverse_distance_weights(conditions, outcomes, neighbours=3, power=2.0)
         return smooth_weights(outcomes, kernel="thin-plate")(conditions)
 
     np.testing.assert_allclose(
@@ -100,15 +75,6 @@ def test_demonstrations_of_one_outcome_are_averaged(kernel, noise):
     if not noise:
         alone = smooth_weights(OUTCOMES, kernel=kernel)(CONDITIONS)
         np.testing.assert_allclose(weights[:, 2] + weights[:, 6], alone[:, 2], atol=1e-3)
-
-
-def test_the_nearest_of_one_outcome_are_averaged_there_and_beside_it():
-    repeated = np.vstack([OUTCOMES, OUTCOMES[2]])
-    at, beside = inverse_distance_weights(
-        np.array([OUTCOMES[2], OUTCOMES[2] + 1e-9]), repeated, neighbours=4, power=2.0
-    )
-    np.testing.assert_array_equal(at[[2, 6]], [0.5, 0.5])
-    np.testing.assert_allclose(beside[[2, 6]], [0.5, 0.5])
 
 
 def test_amplification_half_way_between_two_is_a_half():

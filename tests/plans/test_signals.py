@@ -10,7 +10,7 @@ from prior_reinforce.plans.signals import (
     noise,
     without_noise,
 )
-from tests.bench.importing.recorded import sampled
+from tests.arm.recordings.recorded import sampled
 
 FRAMES = np.arange(90)
 RAMP = (0.0, 0.05, 0.24, 0.54, 0.83, 0.98, 1.0)

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from prior_reinforce.plans.motions import Demonstrations, PlanFormat
+from prior_reinforce.plans.motions import Demonstrations
+from prior_reinforce.plans.plan_format import PlanFormat
 from prior_reinforce.plans.speeds import (
     frames_at_rest,
     middle,

@@ -4,17 +4,16 @@ import msgspec
 import pytest
 
 from prior_reinforce.readings import Reading
-from prior_reinforce.session.events import Amended, Asked, KeptPlan, SessionEvent, Told
+from prior_reinforce.session.events import Amended, Asked, SessionEvent, Told
 
 
 def test_an_event_is_an_object_that_names_its_kind():
-    event = Asked(trial=1, goal=1, condition=[0.9, 0.1], plan=KeptPlan("trial-001.npz", "12ab"))
+    event = Asked(trial=1, goal=1, condition=[0.9, 0.1])
     assert msgspec.json.decode(msgspec.json.encode(event)) == {
         "kind": "asked",
         "trial": 1,
         "goal": 1,
         "condition": [0.9, 0.1],
-        "plan": {"file": "trial-001.npz", "sha256": "12ab"},
     }
 
 

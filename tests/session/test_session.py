@@ -4,6 +4,7 @@ import copy
 import pickle
 import threading
 import warnings
+from functools import partial
 
 import numpy as np
 import pytest
@@ -19,9 +20,11 @@ from prior_reinforce.errors import (
     TrialStateError,
     WorkspaceError,
 )
+from prior_reinforce.formats import OutcomeFormat
 from prior_reinforce.generators.base import Generator
 from prior_reinforce.generators.interpolation import SmoothInterpolation
-from prior_reinforce.plans.motions import Demonstrations, PlanFormat
+from prior_reinforce.plans.motions import Demonstrations
+from prior_reinforce.plans.plan_format import PlanFormat
 from prior_reinforce.readings import Reading
 from prior_reinforce.session.session import Session, ask_all
 from prior_reinforce.session.trials import Log, Stage, State
@@ -164,6 +167,7 @@ def test_a_miss_alone_teaches_nobody_who_wants_numbers(session):
     np.testing.assert_array_equal(session.ask().condition, GOAL)
 
 
+@pytest.mark.slow
 def test_misses_alone_make_the_default_adapter_try_beside_them():
     seen = Demonstrations(
         DEMOS.plans, DEMOS.outcomes_seen, DEMOS.format, outcome_noise=[[0.02] * 2] * 2
@@ -200,8 +204,7 @@ MIXED = Demonstrations(
     np.random.default_rng(0).normal(size=(4, 3, 2)),
     [[0.8, 1.0], [1.0, 3.0], [0.8, 3.0], [1.0, 1.0]],  # spreads 0.1 m and 1 s
     PlanFormat(("x", "y"), ("rad", "rad"), 0.02),
-    ("x", "t"),
-    ("m", "s"),
+    OutcomeFormat(("x", "t"), ("m", "s")),
 )
 
 
@@ -303,7 +306,7 @@ class Carrying(FullStepAdapter):
         super()._start(demonstrations)
         self.events = []
 
-    def change_hardware(self):
+    def _change_hardware(self):
         self.events.append("changed")
 
     def _observe(self, condition, outcome_seen):
@@ -337,14 +340,15 @@ def test_a_surprise_is_said_at_once_with_what_to_do_about_it():
     session.ask()
     told = session.tell(1, Reading.measured([0.21, 0.0], 0.0))
     assert told.surprise == (
-        "20 sd from what was expected of it; mistyped: amend 1; changed: goal --new-hardware"
+        "20 standard deviations from the prediction (a typo? amend 1; other hardware? goal "
+        "--new-hardware)"
     )
     assert session.amend(1, Reading.measured([0.04, 0.0], 0.0)).surprise == ""
     assert session.amend(1, Reading.measured([0.21, 0.0], 0.2)).surprise == ""  # a coarse look
     session.amend(1, hit=False)
     assert session.trials[0].surprise == ""
     session.ask()
-    assert session.tell(2, "20 cm long").surprise.startswith("14 sd")  # of 15 cm
+    assert session.tell(2, "20 cm long").surprise.startswith("14 standard")  # of 15 cm
 
 
 def test_the_adapter_hears_of_new_hardware_between_the_trials_before_and_after():
@@ -391,7 +395,7 @@ class Gate:
 
     calls = 0
 
-    def __call__(self, plan):
+    def __call__(self, plan, condition):
         self.calls += 1
         self.largest = float(np.abs(plan).max())
         return self
@@ -534,13 +538,16 @@ def test_asking_many_sessions_calls_the_generator_once_and_agrees_with_asking_ea
     np.testing.assert_allclose([trial.condition for trial in trials], goals)
 
 
-def test_sessions_with_different_generators_cannot_be_asked_together():
+def test_each_generator_is_called_once_for_its_own_sessions():
+    first, second = (RepeatingGenerator().fit(DEMOS, seed=0) for _ in "ab")
+    goals = [[0.85, 0.0], [0.9, 0.1], [0.95, -0.1]]
     sessions = [
-        Session(RepeatingGenerator().fit(DEMOS, seed=0), FullStepAdapter(), DEMOS, GOAL, 0.1)
-        for _ in "ab"
+        Session(generator, FullStepAdapter(), DEMOS, goal, 0.015)
+        for generator, goal in zip((first, second, first), goals, strict=True)
     ]
-    with pytest.raises(ConfigurationError, match="share one generator"):
-        ask_all(sessions)
+    trials = ask_all(sessions)
+    assert (first.calls, second.calls) == (1, 1)
+    np.testing.assert_allclose([trial.plan[0] for trial in trials], goals)
 
 
 def test_trials_cannot_be_changed_from_outside(session):
@@ -568,6 +575,13 @@ def test_a_member_that_can_be_called_is_not_called():
     np.testing.assert_array_equal(session.ask().condition, GOAL)
 
 
+def test_any_callable_may_load_what_is_used():
+    generator = RepeatingGenerator().fit(DEMOS, seed=0)
+    loaders = [partial(lambda given: given, each) for each in (generator, FullStepAdapter(), DEMOS)]
+    session = Session(*loaders, GOAL, 0.015)
+    np.testing.assert_array_equal(session.ask().condition, GOAL)
+
+
 @pytest.mark.parametrize("which", [0, 1, 2])
 def test_a_class_is_no_object(which):
     given = [RepeatingGenerator().fit(DEMOS, seed=0), FullStepAdapter(), DEMOS]
@@ -579,7 +593,7 @@ def test_a_class_is_no_object(which):
 def test_nothing_is_written_into_an_adapter(session):
     session.tell(session.ask().number, [0.05, 0.0])
     session.ask()
-    assert set(vars(session.adapter)) == {"n_starts", "_outcome_dim", "seen"}
+    assert set(vars(session.adapter)) == {"_outcome_dim", "_key", "seen"}
 
 
 class Interrupted(FullStepAdapter):
@@ -650,6 +664,7 @@ def test_a_plan_that_holds_no_numbers_is_never_given_out():
     assert not session.trials
 
 
+@pytest.mark.slow
 def test_threads_may_share_a_session(session):
     """Each tells what it asked for; of each trial one telling counts, and none is lost."""
     told, problems = [], []
@@ -690,6 +705,7 @@ def test_what_another_session_did_is_known(session):
     assert session.trials[0].number == 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("copied", [copy.deepcopy, lambda it: pickle.loads(pickle.dumps(it))])
 def test_a_session_in_memory_can_be_copied(copied):
     session = Session(
@@ -714,3 +730,43 @@ def test_printed_it_is_short(session):
 
 def test_a_void_needs_no_reason(session):
     assert session.void(session.ask().number).note == ""
+
+
+@pytest.mark.parametrize("outcome", [[0.9, 0.1], [0.91, 0.12], [0.8, 0.0], [1.10, 0.12]])
+def test_an_outcome_is_not_taken_for_an_error(session, outcome):
+    session.ask()
+    with pytest.raises(InvalidFeedbackError, match="looks like where the object ended; give an er"):
+        session.tell(1, outcome)
+    assert session.n_trials == 0
+    session.tell(1, "91 cm long, 12 cm left")  # who says so means it
+    with pytest.raises(InvalidFeedbackError, match="looks like where the object ended"):
+        session.amend(1, outcome)
+    session.amend(1, [0.5, 0.1])
+
+
+@pytest.mark.parametrize("error", [[5, 2], [0.0, -1.0]])
+def test_numbers_of_another_unit_are_no_error(session, error):
+    session.ask()
+    with pytest.raises(InvalidFeedbackError, match="looks like centimetres; give metres"):
+        session.tell(1, error)
+    assert session.n_trials == 0
+    session.tell(1, "120 cm long")
+    with pytest.raises(InvalidFeedbackError, match="looks like centimetres; give metres"):
+        session.amend(1, error)
+
+
+def test_a_goal_is_a_place_in_the_outcomes_units_or_says_its_own(session):
+    with pytest.raises(InvalidGoalError, match="x of 105 m looks like centimetres; give metres"):
+        session.set_goal([105, 10])
+    with pytest.raises(InvalidGoalError, match=r"goal: 105 m is .*say the unit"):
+        session.set_goal("105 10")
+    assert len(session.goals) == 1
+    place = (100 * (GOAL + 0.01)).tolist()
+    session.set_goal("{}cm {}cm".format(*place))
+    np.testing.assert_allclose(session.goal, GOAL + 0.01)
+
+
+def test_a_tolerance_of_another_unit_is_refused(session):
+    with pytest.raises(ConfigurationError, match=r"tolerance: x of 1\.5 m looks like centimetres"):
+        session.set_goal(GOAL, 1.5)
+    assert len(session.goals) == 1

@@ -5,6 +5,7 @@ import pytest
 from msgspec.structs import replace
 
 from prior_reinforce.errors import WorkspaceError
+from prior_reinforce.formats import OutcomeFormat
 from prior_reinforce.readings import Reading
 from prior_reinforce.session.events import Amended, Asked, GoalSet, Told, Voided
 from prior_reinforce.session.trials import Log, Stage
@@ -14,9 +15,7 @@ def reading(*error_seen):
     return Reading.measured(error_seen).record()
 
 
-GOAL = GoalSet(
-    goal=[0.9, 0.1], tolerance=[0.015, 0.015], names=["x", "y"], units=["m", "m"], carry_over=False
-)
+GOAL = GoalSet(goal=[0.9, 0.1], format=OutcomeFormat.metres(2).within(0.015), carry_over=False)
 ASKED = Asked(trial=1, goal=1, condition=[0.88, 0.1], model="m")
 TOLD = Told(trial=1, reading=reading(0.02, 0.0), hit=False)
 VOIDED = Voided(trial=1, reason="slipped")
@@ -81,10 +80,10 @@ def test_a_log_keeps_what_was_said():
 
 
 def test_an_error_of_one_tolerance_in_all_is_a_hit():
-    goal = state(replace(GOAL, tolerance=[0.015, 0.02], units=["m", "s"])).goal
+    goal = state(replace(GOAL, format=OutcomeFormat(("x", "t"), ("m", "s"), (0.015, 0.02)))).goal
     assert goal.is_hit(np.array([0.009, 0.016]))
     assert not goal.is_hit(np.array([0.0092, 0.016]))
-    np.testing.assert_allclose(goal.least_sd, [0.005, 0.02 / 3])
+    np.testing.assert_allclose(goal.format.least_sd, [0.005, 0.02 / 3])
 
 
 def test_numbers_run_over_all_goals():
@@ -101,8 +100,8 @@ def test_numbers_run_over_all_goals():
         [replace(ASKED, trial=2)],
         [replace(ASKED, goal=2)],
         [replace(ASKED, condition=[0.88])],
-        [replace(GOAL, tolerance=[0.015])],
-        [replace(GOAL, tolerance=[0.015, 0.0])],
+        [replace(GOAL, format=OutcomeFormat.metres(1).within(0.015))],
+        [replace(GOAL, format=OutcomeFormat.metres(2))],
         [ASKED, replace(ASKED, trial=2)],
         [ASKED, replace(TOLD, trial=0)],
         [ASKED, replace(TOLD, reading=reading(0.1))],

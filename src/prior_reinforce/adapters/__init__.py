@@ -20,22 +20,15 @@ ADAPTERS: Registry[Adapter] = Registry(
             "prior_reinforce.adapters.bayesian:BayesianAdapter",
             "readings as intervals, up to 64 trials remembered, P(hit) known",
         ),
-        "gp": Member(_GP, "Gaussian process, m = 2 trials remembered"),
-        "gp-all": Member(_GP, "every trial remembered", {"memory_size": None}),
-        "gp-one-term": Member(_GP, "one fixed diagonal term, as in the paper", _ONE_TERM),
-        "gp-one-term-all": Member(
+        "gp": Member(_GP, "the paper's Gaussian process, m = 2 trials remembered", _ONE_TERM),
+        "gp-all": Member(
             _GP, "the same, every trial remembered", {**_ONE_TERM, "memory_size": None}
         ),
+        "gp-two-term": Member(_GP, "ours: demonstrations less certain than trials, m = 2"),
+        "gp-two-term-all": Member(_GP, "the same, every trial remembered", {"memory_size": None}),
         "proportional": Member(
             "prior_reinforce.adapters.proportional:ProportionalAdapter",
             "a fixed share of the last error",
-        ),
-        "offset": Member(
-            "prior_reinforce.adapters.offset:MeanOffsetAdapter",
-            "the mean of what all trials were off by",
-        ),
-        "broyden": Member(
-            "prior_reinforce.adapters.broyden:BroydenAdapter", "secants along the steps made"
         ),
         "frozen": Member(
             "prior_reinforce.adapters.frozen:FrozenAdapter", "no adaptation: the goal itself"
@@ -45,6 +38,6 @@ ADAPTERS: Registry[Adapter] = Registry(
 
 DEFAULT_ADAPTER = "bayes"
 """Of a workspace's goals, and of `adapt`: as good on one goal, and better on the next ones
-(docs/decisions-adapter.md)."""
+(reproduction/docs/decisions-adapter.md)."""
 
 make_adapter = ADAPTERS.make

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
+import os
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import ClassVar
+from pathlib import Path
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from prior_reinforce.arrays import Point, as_vector
 from prior_reinforce.errors import InvalidFeedbackError, InvalidGoalError, NotFittedError
+from prior_reinforce.files import open_npz
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.readings import Reading
 
@@ -27,6 +32,61 @@ class Expectation:
     """Expected error, outcome minus goal, shape (k,), in the outcomes' units; None if unknown."""
     sd: Point | None = None
     """Its standard deviation, likewise."""
+    remark: str = ""
+    """What a person should know beforehand, in one line, such as that a symmetry does not hold."""
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """What an adapter knows, as data that can be kept in a file: no code in it."""
+
+    facts: dict[str, Any]
+    """Of JSON types."""
+    arrays: dict[str, np.ndarray]
+    """Of numbers."""
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write an `.npz`: the arrays and a JSON text."""
+        with open(path, "wb") as file:
+            np.savez(file, **self.arrays, facts=np.array(json.dumps(self.facts)))  # type: ignore[arg-type]
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> State:
+        """Read what `save` wrote.
+
+        Raises:
+            FileFormatError: The file is no such `.npz`.
+        """
+        with open_npz(Path(path), "delete it: trials are then told again") as archive:
+            arrays = {name: archive[name] for name in archive.files if name != "facts"}
+            return cls(json.loads(str(archive["facts"])), arrays)
+
+
+def next_key(
+    key: str,
+    what: str,
+    condition: Point | None = None,
+    goal: Point | None = None,
+    reading: Reading | None = None,
+) -> str:
+    """Return `Adapter.key` after one thing more was told.
+
+    Args:
+        key: Before.
+        what: `observe` or `change_hardware`.
+        condition: c, where it is about a trial.
+        goal: g, likewise.
+        reading: As it was observed.
+    """
+    digest = hashlib.sha256(f"{key} {what}".encode())
+    told = [condition, goal]
+    if reading is not None:
+        told += [reading.error_seen, reading.low, reading.high, reading.sd]
+        told += [reading.missed_by_at_least]
+        digest.update(repr((reading.hit, reading.lost)).encode())
+    for values in told:
+        digest.update(b"-" if values is None else np.asarray(values, np.float64).tobytes())
+    return digest.hexdigest()
 
 
 class Adapter(ABC):
@@ -43,15 +103,54 @@ class Adapter(ABC):
     carries_over: ClassVar[bool] = False
     """Whether trials of earlier goals serve it, so that a session gives it those unless told
     otherwise."""
-    n_starts: int = 0
-    """How often it was started: two sessions that share it tell by this that it is the other's."""
     _outcome_dim: int | None = None
+    _key: str = ""
 
     def start(self, demonstrations: Demonstrations) -> None:
         """Begin anew with D_M = {(c_i, r_i) | c_i = r_i} (Algorithm 1), forgetting all trials."""
-        self.n_starts += 1
+        self._key = ""
         self._start(demonstrations)
         self._outcome_dim = demonstrations.outcome_dim
+        self._key = self.first_key(demonstrations)
+
+    def first_key(self, demonstrations: Demonstrations) -> str:
+        """Return `key` as it is after `start`, without starting."""
+        import prior_reinforce
+
+        what = type(self).__qualname__, prior_reinforce.__version__, getattr(self, "config", None)
+        return next_key("", f"{what} {demonstrations.sha256}")
+
+    @property
+    def key(self) -> str:
+        """Digest of version, settings, demonstrations, and all that it was told since its start.
+
+        Adapters with one key propose the same; empty before `start`, and where telling was cut off,
+        so that nobody knows what it knows. `first_key` and `next_key` say what it would be.
+        """
+        return self._key
+
+    def state(self) -> State | None:
+        """Return what `resume` needs, so that no trial need be told again; None where few do.
+
+        Raises:
+            NotFittedError: Before `start`.
+        """
+        if self._outcome_dim is None:
+            raise NotFittedError(f"{type(self).__name__} knows nothing yet; call start first")
+        return self._state()
+
+    def resume(self, demonstrations: Demonstrations, key: str, state: State) -> None:
+        """Begin with what `state` returned of an adapter with the same settings.
+
+        Args:
+            demonstrations: Those that it was started with.
+            key: Its `key`.
+            state: Its `state`.
+        """
+        self.start(demonstrations)
+        self._key = ""
+        self._resume(state)
+        self._key = key
 
     def propose(self, goal_seen: ArrayLike) -> Point:
         """Return the condition to try next for a goal: c = M(g).
@@ -86,7 +185,14 @@ class Adapter(ABC):
         error = self._checked(seen, "perceived error", InvalidFeedbackError)
         if not isinstance(reading, Reading):
             reading = Reading.estimated(error)
+        key, self._key = next_key(self._key, "observe", checked, about, reading), ""
         self._observe_reading(checked, about, reading)
+        self._key = key
+
+    @property
+    def symmetry_doubted(self) -> bool:
+        """Whether trials have left the symmetry that the demonstrations state, if they do."""
+        return False
 
     def expect(
         self, condition: ArrayLike, goal: ArrayLike, tolerance: ArrayLike
@@ -108,11 +214,14 @@ class Adapter(ABC):
             np.broadcast_to(np.asarray(tolerance, np.float64), self._outcome_dim or 0),
         )
 
-    def change_hardware(self) -> None:  # noqa: B027  # most know no difference
+    def change_hardware(self) -> None:
         """Take note that the hardware changes between the trials before and those to come.
 
-        Nothing, for most: they tell no difference between what was learned and what has changed.
+        Most tell no difference between what was learned and what has changed.
         """
+        key, self._key = next_key(self._key, "change_hardware"), ""
+        self._change_hardware()
+        self._key = key
 
     @abstractmethod
     def _start(self, demonstrations: Demonstrations) -> None:
@@ -135,6 +244,17 @@ class Adapter(ABC):
         """
         if reading.has_number:
             self._observe(condition, goal + reading.error_seen)
+
+    def _change_hardware(self) -> None:  # noqa: B027  # most know no difference
+        """See `change_hardware`."""
+
+    def _state(self) -> State | None:
+        """See `state`; for adapters to which it takes long to be told."""
+        return None
+
+    def _resume(self, state: State) -> None:
+        """See `resume`; the adapter was started."""
+        raise NotImplementedError(f"{type(self).__name__} keeps no state: tell it the trials")
 
     def _expect(self, condition: Point, goal: Point, tolerance: Point) -> Expectation | None:
         """See `expect`."""

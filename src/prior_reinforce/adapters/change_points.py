@@ -14,8 +14,9 @@ changes add to a field, and concern one goal or all, is ours.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -44,6 +45,16 @@ class Change:
     shift all by the same."""
     goal: Point | None = None
     """The only goal that it concerns, which was moved; None where it concerns all."""
+
+    def data(self) -> list[Any]:
+        """It as plain data: what `Change` takes."""
+        return [self.since, self.shift_sd, None if self.goal is None else self.goal.tolist()]
+
+    @classmethod
+    def of(cls, data: Sequence[Any]) -> Change:
+        """Make it of what `data` gave."""
+        since, shift_sd, goal = data
+        return cls(since, shift_sd, None if goal is None else np.array(goal))
 
     def concerns(self, places: Places) -> Bool[np.ndarray, " p"]:
         """Which of them it concerns."""
@@ -88,39 +99,66 @@ class History:
         self, prior: DisplacementPrior, at: Places, memory: Memory
     ) -> tuple[Float[np.ndarray, "m k p"], Float[np.ndarray, "m k p"]]:
         """Mean and variance of displacements under each model."""
-        posterior = self.posterior
         cross = self.covariance(prior, at, memory)[:, None]
-        mean = prior.mean(at.conditions) + (cross @ posterior.weights[..., None])[..., 0]
-        explained = np.sum((cross @ posterior.precision) * cross, axis=-1)
+        explained = np.sum((cross @ self.posterior.precision) * cross, axis=-1)
         variance = prior.variance(at.conditions, hardware=bool(np.all(at.numbers >= 0)))
         for change in self.changes:
             variance = variance + np.diag(change.covariance(prior, at, at))
-        return mean, np.maximum(variance[:, None] - explained, 1e-10)
+        return self._mean(prior, at, cross), np.maximum(variance[:, None] - explained, 1e-10)
+
+    def expected(
+        self, prior: DisplacementPrior, at: Places, memory: Memory
+    ) -> Float[np.ndarray, "m k p"]:
+        """Mean of displacements under each model, which takes a fraction of `predict`."""
+        return self._mean(prior, at, self.covariance(prior, at, memory)[:, None])
+
+    def _mean(
+        self, prior: DisplacementPrior, at: Places, cross: Float[np.ndarray, "m 1 p n"]
+    ) -> Float[np.ndarray, "m k p"]:
+        weighed = (cross @ self.posterior.weights[..., None])[..., 0]
+        return np.asarray(prior.mean(at.conditions) + weighed)
 
     def _changed(self, prior: DisplacementPrior, a: Places, b: Places) -> Float[np.ndarray, "p n"]:
         nothing = np.zeros((len(a.numbers), len(b.numbers)))
         return sum((change.covariance(prior, a, b) for change in self.changes), nothing)
 
-    def told(
-        self,
-        prior: DisplacementPrior,
-        memory: Memory,
-        base: Float[np.ndarray, "m n n"],
-        known: Bool[np.ndarray, " N"],
-    ) -> History:
-        """The same after the readings in memory.
 
-        Args:
-            prior: Of displacements.
-            memory: What was read.
-            base: Its covariance, had nothing changed.
-            known: Which of the readings so far are still in it; its first ones.
-        """
-        readings = _readings(prior, memory, self.mistaken)
-        noise = prior.noise[:, None, None] * np.eye(len(memory.numbers))
-        covariance = base + noise + self._changed(prior, memory, memory)
-        posterior = infer(covariance, readings, prior.log_share, self.posterior.sites(known))
-        return replace(self, posterior=posterior)
+def told(
+    histories: Sequence[History],
+    prior: DisplacementPrior,
+    memory: Memory,
+    base: Float[np.ndarray, "m n n"],
+    known: Bool[np.ndarray, " N"],
+) -> list[History]:
+    """The same histories after the readings in memory, inferred as one batch.
+
+    Args:
+        histories: At least one.
+        prior: Of displacements.
+        memory: What was read.
+        base: Its covariance, had nothing changed.
+        known: Which of the readings so far are still in it, all or all but one; its first ones.
+    """
+    m, many = len(base), len(histories)
+    own = base + prior.noise[:, None, None] * np.eye(len(memory.numbers))
+    covariance = np.concatenate([own + h._changed(prior, memory, memory) for h in histories])
+    each = [_readings(prior, memory, h.mistaken) for h in histories]
+    low, high = (
+        np.repeat([getattr(readings, name) for readings in each], m, axis=0)
+        for name in ("low", "high")
+    )
+    variance = np.broadcast_to(each[0].variance, low.shape)
+    readings = replace(each[0], low=low, high=high, variance=variance)
+    before = Posterior.joined([history.posterior for history in histories])
+    log_prior = np.tile(prior.log_share, many)
+    for i in np.flatnonzero(~known):
+        left = covariance[:, None, :-1, :-1], readings.of(np.s_[..., :-1])
+        before = before.without(int(i), *left, log_prior)
+    after = infer(covariance, readings, log_prior, before, groups=many)
+    return [
+        replace(history, posterior=after.under(slice(h * m, h * m + m)))
+        for h, history in enumerate(histories)
+    ]
 
 
 def _readings(prior: DisplacementPrior, memory: Memory, mistaken: Iterable[int] = ()) -> Readings:
@@ -142,26 +180,28 @@ def split(
     config, number, goal = prior.config, int(new.numbers[0]), new.goals[0]
     size = new.high - new.low
     flat = np.log(np.where(size > 0, np.minimum(size, _WIDTH), 1.0) / _WIDTH).sum()
-    happened: list[tuple[float, Change | None]] = [
+    happened = [
         (config.p_change / 2, Change(number, 0.0)),
         (config.p_change / 2, Change(number, config.shift_sd)),
         (config.p_misplaced, Change(number, config.shift_sd, goal)),
     ]
     nothing = 1.0 - config.p_mistaken - sum(p for p, _ in happened)
+    histories, before = list(histories), prior.mean(new.conditions)
+    each = [history.predict(prior, new, memory) for history in histories]
+    mean, variance = (np.stack(of)[:, None] for of in zip(*each, strict=True))
+    more = [0.0, *(change.covariance(prior, new, new)[0, 0] for _, change in happened if change)]
+    blurred = variance + np.reshape(more, (-1, 1, 1, 1))
+    log_z, _, _ = tilted(mean - before, blurred, _readings(prior, new))
+    with np.errstate(divide="ignore"):
+        share = np.log([history.posterior.model_weights for history in histories])
+    told = np.logaddexp.reduce(log_z[..., 0] + share[:, None], axis=2).sum(axis=-1)
+    wrong = float(np.log(config.p_mistaken) + flat)
     scored = []
-    for history in histories:
-        mean, variance = history.predict(prior, new, memory)
-        before = prior.mean(new.conditions)
-        for p, change in [(nothing, None), *happened]:
-            more = 0.0 if change is None else change.covariance(prior, new, new)[0, 0]
-            log_z, _, _ = tilted(mean - before, variance + more, _readings(prior, new))
-            with np.errstate(divide="ignore"):
-                share = np.log(history.posterior.model_weights)
-            told = float(np.logaddexp.reduce(log_z[..., 0] + share, axis=0).sum())
+    for history, under in zip(histories, told.tolist(), strict=True):
+        for (p, change), log_p in zip([(nothing, None), *happened], under, strict=True):
             changes = history.changes if change is None else (*history.changes, change)
             after = replace(history, changes=changes, log_prior=history.log_prior + np.log(p))
-            scored.append((history.log_weight + np.log(p) + told, after))
-        wrong = float(np.log(config.p_mistaken) + flat)
+            scored.append((history.log_weight + np.log(p) + log_p, after))
         after = replace(
             history, mistaken=history.mistaken | {number}, log_prior=history.log_prior + wrong
         )

@@ -15,7 +15,7 @@ Of no arm are the size a, the size of h and that of the noise known beforehand. 
 models, for each component by itself: range may be far off where direction is not.
 
 Source: ours; K is Matern's kernel of order 5/2 (Rasmussen and Williams, Gaussian Processes for
-Machine Learning, 2006, eq. 4.17). The figures are in docs/decisions-adapter.md.
+Machine Learning, 2006, eq. 4.17). The figures are in reproduction/docs/decisions-adapter.md.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ import msgspec
 import numpy as np
 from jaxtyping import Float
 
+from prior_reinforce.adapters.normalisation import Normalisation
 from prior_reinforce.arrays import Points
 from prior_reinforce.plans.motions import Demonstrations
-from prior_reinforce.plans.normalisation import Normalisation
 from prior_reinforce.plans.outcome_weights import smooth_weights
 from prior_reinforce.settings import Checked, Positive
 

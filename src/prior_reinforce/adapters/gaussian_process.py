@@ -12,10 +12,10 @@ from jaxtyping import Float
 
 from prior_reinforce.adapters.base import Adapter
 from prior_reinforce.adapters.marginal_likelihood import maximise
+from prior_reinforce.adapters.normalisation import Normalisation
 from prior_reinforce.arrays import Point, Points
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.plans.motions import Demonstrations
-from prior_reinforce.plans.normalisation import Normalisation
 from prior_reinforce.settings import Checked, Positive
 
 Jitter = Annotated[float, msgspec.Meta(ge=1e-6)]
@@ -23,7 +23,7 @@ Jitter = Annotated[float, msgspec.Meta(ge=1e-6)]
 and the likelihood loses its fifth decimal."""
 _CONVENTION_DISTANCE = 2.0
 """How far from the demonstrations' mean c = r is added where they are too few, in their spreads
-(ours): of 1, 1.5 and 2 the one that took fewest trials (docs/decisions-adapter.md)."""
+(ours): of 1, 1.5 and 2 the one that took fewest trials (reproduction/docs/decisions-adapter.md)."""
 _CONVENTION_ERROR = 0.02
 """By how much the first condition may miss a goal between demonstrations before that is done, in
 their spreads (ours): 3 mm where 0.25 m x 0.5 m can be reached."""
@@ -38,7 +38,7 @@ class GaussianProcessConfig(Checked):
     perception adds, and tells what is true where it landed. That a demonstration's condition equals
     its outcome is a convention; between the demonstrations the generator strays from it, and by how
     much is what trials show: the mean square of c - r over those remembered. One size for both
-    either chases noise or hardly moves (docs/decisions-adapter.md has the figures).
+    either chases noise or hardly moves (reproduction/docs/decisions-adapter.md has the figures).
     """
 
     memory_size: int | None = 2
@@ -142,8 +142,13 @@ class GaussianProcessAdapter(Adapter):
         return self._normalisation.undo(mean[0])
 
     def _strays_between_demonstrations(self) -> bool:
-        """Whether the first condition is off on the way from one of them to another."""
+        """Whether the first condition is off on the way from one of them to another.
+
+        Of a single one it is: there is no other.
+        """
         own = self.memory_outcomes_
+        if len(own) == 1:
+            return True
         i, j = np.nonzero(~np.eye(len(own), dtype=bool))
         # Half-way alone says nothing of two points: there symmetry makes it right.
         goals = np.vstack([(1 - share) * own[i] + share * own[j] for share in (0.25, 0.5)])

@@ -1,6 +1,7 @@
 """The trials that were read, in normalised units.
 
-Source: ours, so that a proposal stays below tens of milliseconds (docs/decisions-adapter.md).
+Source: ours, so that a proposal stays below tens of milliseconds
+(reproduction/docs/decisions-adapter.md).
 """
 
 from __future__ import annotations
@@ -8,10 +9,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Int
+from jaxtyping import Bool, Float, Int
 
 from prior_reinforce.arrays import Points
 
+_AGAIN = 0.5
+"""A condition closer than this share of the tolerance to one that missed the same goal would be
+tried again (ours)."""
 LATEST = 8
 """The latest trials, which are never forgotten, and whose misses count for themselves (ours)."""
 _KEPT = 64
@@ -68,3 +72,11 @@ class Memory(Places):
             square[np.tril_indices(len(old))] = np.inf
             keep[np.unravel_index(np.argmin(square), square.shape)[0]] = False
         return keep
+
+
+def tried_again(
+    conditions: Points, tried: Float[np.ndarray, "m k"], missed_by: Float[np.ndarray, "m k"]
+) -> Bool[np.ndarray, " n"]:
+    """Which conditions are next to one that missed by so much at least."""
+    apart = (conditions[:, None] - tried) / missed_by
+    return np.asarray(np.any(np.linalg.norm(apart, axis=2) < _AGAIN, axis=1))

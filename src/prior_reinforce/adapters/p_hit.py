@@ -28,6 +28,13 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
+from prior_reinforce.adapters.memory import Memory
+
+_TRIALS_AFTER_A_MISS = 1.24
+"""Fitted to 1623 trials of tuning material (ours; reproduction/docs/decisions-adapter.md)."""
+_LEAST_P_HIT = 0.01
+"""Where "a miss" was all that was told, 1 / P(hit) trials are expected, a hundred at most (ours):
+such a trial teaches little. That is still too few: 8 to 13 where 14 were needed (tuning fields)."""
 _CELLS = 64
 """Into which a ball is cut along all components but the last, at most (ours)."""
 _ALL_CELLS = 32768
@@ -44,6 +51,10 @@ _EDGE = 0.1
 """Blur of a ball's edge, in radii (ours): so that few draws tell small differences."""
 _SINGULAR = 1e-9
 """Eigenvalues of a covariance are this share of the greatest at least."""
+
+
+_NO_SHARE = 1e-9
+"""Probability of a model below which it is left out of P(hit) (ours)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,9 +152,9 @@ def share_within(
     middles = np.sin(0.5 * np.pi * (np.arange(cells) + 0.5) / cells * 2.0 - 0.5 * np.pi)
 
     def below(values: Float[np.ndarray, "..."], j: int) -> Float[np.ndarray, "..."]:
-        column = (-1, len(values), *(1,) * (values.ndim - 1))
-        middle, spread = mean[:, j].reshape(column), sd[:, j].reshape(column)
-        return np.asarray(np.tensordot(share[:, j], ndtr((values - middle) / spread), axes=1))
+        column, used = (-1, len(values), *(1,) * (values.ndim - 1)), share[:, j] > _NO_SHARE
+        middle, spread = mean[used, j].reshape(column), sd[used, j].reshape(column)
+        return np.asarray(np.tensordot(share[used, j], ndtr((values - middle) / spread), axes=1))
 
     def inside(left: Float[np.ndarray, "..."], j: int) -> Float[np.ndarray, "..."]:
         if j == k - 1:
@@ -177,3 +188,11 @@ def _shared_out(share: Float[np.ndarray, " m"], draws: int, seed: int) -> Int[np
     """A model for each draw, in proportion, and in an order of its own for each component."""
     evenly = (np.random.default_rng(seed).permutation(draws) + 0.5) / draws
     return np.minimum(np.searchsorted(np.cumsum(share), evenly), len(share) - 1)
+
+
+def trials_to_go(p_hit: float, told: Memory) -> float:
+    """Trials that are expected to the next hit, that one included, after those that were told."""
+    last = told.only(slice(-1, None))
+    if np.any(last.missed_by > 0.0) and np.all(np.isinf(last.high - last.low)):
+        return 1.0 / max(p_hit, _LEAST_P_HIT)
+    return 1.0 + _TRIALS_AFTER_A_MISS * (1.0 - p_hit)

@@ -6,13 +6,14 @@ affine functions, whatever else differs between demonstrations (posture, tempo, 
 outlier) cancels to first order, as long as outcomes were measured. Where demonstrations show
 patterns that do not mix (`patterns`), each that is large enough is learned so, a plan is of the one
 with the nearest outcome, and others are left out and named; where none is, a network learns all of
-them. Ours; on which evidence, docs/decisions-generator.md tells.
+them. Ours; on which evidence, reproduction/docs/decisions-generator.md tells.
 """
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any, ClassVar
+
+from typing_extensions import Self
 
 from prior_reinforce.arrays import Plans, Points
 from prior_reinforce.errors import InvalidDemonstrationsError
@@ -20,13 +21,17 @@ from prior_reinforce.generators.base import Generator, OnProgress, Wrapper
 from prior_reinforce.generators.interpolation import SmoothInterpolation, SmoothInterpolationConfig
 from prior_reinforce.generators.members import GENERATORS
 from prior_reinforce.generators.patterns import patterns
-from prior_reinforce.generators.timed import Timed
+from prior_reinforce.generators.timing.timed import Timed, Timing
 from prior_reinforce.plans.motions import Demonstrations
 
 _MORE_THAN_AFFINE = 1
 """A pattern is learned alone if it has k + 1 demonstrations and this many more. Ours: an affine
 function of the outcome, and something to tell its bending by; 4 a way hit 0.81 to 0.86 of first
 throws on `zoo.SEVERAL_WAYS` (tuning goals)."""
+
+_TIMING_TOLD_BY = 4
+"""So many demonstrations tell their timing by leaving one out (ours); of fewer the rest is too
+little to learn from."""
 
 
 class Auto(Wrapper):
@@ -40,15 +45,13 @@ class Auto(Wrapper):
         *,
         device: str = "cpu",
         threads: int = 1,
-        states: Path | None = None,
     ) -> None:
         """Choose where a network would be trained, if one is needed (see `NetworkGenerator`).
 
         `generator` is what was chosen, of a saved model; `fit` chooses anew.
         """
-        if generator is not None:
-            super().__init__(generator)
-        self._network: dict[str, Any] = {"device": device, "threads": threads, "states": states}
+        super().__init__(generator or Timed(SmoothInterpolation()))
+        self._network: dict[str, Any] = {"device": device, "threads": threads}
 
     def _fit(self, demonstrations: Demonstrations, seed: int, progress: OnProgress) -> None:
         groups = patterns(demonstrations)
@@ -56,10 +59,12 @@ class Auto(Wrapper):
         left_out = sorted(set(range(demonstrations.n)) - {i for way in ways for i in way})
         learned = demonstrations
         if len(groups) == 1:
-            self.generator = Timed(SmoothInterpolation())
+            # Fewer cannot tell which timing predicts the others' outcomes best.
+            timing: Timing = "auto" if demonstrations.n >= _TIMING_TOLD_BY else "align"
+            self.generator = Timed(SmoothInterpolation(), timing)
             remark = "generator: closed form, since the demonstrations show one pattern"
         elif not ways:
-            self.generator = GENERATORS.make("diffusion-ways", **self._network)
+            self.generator = GENERATORS.make("diffusion,symmetry=none", **self._network)
             remark = (
                 f"generator: diffusion, since the demonstrations show {len(groups)} patterns that "
                 f"do not mix: {'; '.join(map(_listed, groups))}"
@@ -78,8 +83,7 @@ class Auto(Wrapper):
             if left_out:
                 remark += (
                     f"; demonstrations {_listed(tuple(left_out))} move in another way, which does "
-                    "not mix with it, and are left out: demonstrate those outcomes again, or "
-                    "learn all with diffusion-ways"
+                    "not mix with it, and are left out: demonstrate those outcomes again"
                 )
         self.generator.fit(learned, seed=seed, progress=progress)
         self.remarks = (remark,)
@@ -96,6 +100,11 @@ class Auto(Wrapper):
 
     def _generate(self, conditions: Points) -> Plans:
         return self.generator.generate(conditions)
+
+    def to(self, device: str) -> Self:
+        """Compute on another device from now on, and train a network there; see `Generator.to`."""
+        self._network["device"] = device
+        return self if self._outcome_dim is None else super().to(device)
 
     def check_savable(self) -> None:
         """Do nothing: whatever is chosen can be saved; see `Generator.check_savable`."""

@@ -19,8 +19,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 from typing_extensions import Self
 
-from prior_reinforce.arrays import Plans, Points, as_conditions
-from prior_reinforce.errors import ConfigurationError, FileFormatError, NotFittedError
+from prior_reinforce.arrays import Plans, Points, as_conditions, check_spread
+from prior_reinforce.errors import (
+    ConfigurationError,
+    FileFormatError,
+    InvalidDemonstrationsError,
+    NotFittedError,
+)
 from prior_reinforce.generators.members import unpack
 from prior_reinforce.generators.saving import SavedLayer, Tensors, read_model, write_model
 from prior_reinforce.plans.motions import Demonstrations
@@ -49,7 +54,7 @@ class Generator(ABC):
     """A conditional motion generator: an outcome that is wished for, a plan that may reach it.
 
     After `fit` it is a function: the same conditions give the same plans, whatever was generated
-    before (docs/decisions.md says why the diffusion model samples with noise drawn once).
+    before (reproduction/docs/decisions.md says why diffusion samples with noise drawn once).
     """
 
     name: ClassVar[str]
@@ -71,7 +76,11 @@ class Generator(ABC):
 
         Returns:
             This generator, fitted; `remarks` says what could not be done.
+
+        Raises:
+            InvalidDemonstrationsError: See `check_demonstrations`.
         """
+        self.check_demonstrations(demonstrations)
         self.remarks = ()
         self._fit(demonstrations, seed, progress or (lambda _: None))
         self._outcome_dim = demonstrations.outcome_dim
@@ -91,13 +100,28 @@ class Generator(ABC):
             conditions: c, shape (n, k), in the units of the outcomes. Any n, also 0.
 
         Returns:
-            Plans, float64, in the demonstrations' units.
+            Plans, float64, in the demonstrations' units. Where a symmetry makes some longer than
+            others, shorter ones rest at their last frame; a plan that is asked for alone is not
+            padded.
 
         Raises:
             NotFittedError: Before `fit`.
             InvalidGoalError: Wrong shape, or not finite.
         """
         return self._generate(as_conditions(conditions, self._fitted_to()))
+
+    def check_demonstrations(self, demonstrations: Demonstrations) -> None:
+        """Do nothing if it can learn from these.
+
+        Raises:
+            InvalidDemonstrationsError: They are too few, or their outcomes lie in a subspace.
+        """
+        if demonstrations.n == 1:
+            raise InvalidDemonstrationsError(
+                f"generator {self.name} learns from at least two demonstrations, got one; "
+                "demonstrate more, or state a symmetry and learn with auto"
+            )
+        check_spread(demonstrations.outcomes_seen)
 
     def check_savable(self) -> None:
         """Do nothing if this generator can be saved once it is fitted.
@@ -169,12 +193,15 @@ class Generator(ABC):
             inner: What it wraps, if it is a wrapper.
 
         Raises:
-            FileFormatError: Something is missing, or does not fit.
+            FileFormatError: Something is missing, or does not fit; a class of one's own raises its
+                own error, which may be a bug in its `from_state`.
         """
+        around = () if inner is None else (inner,)
         try:
-            around = () if inner is None else (inner,)
             generator = cls.from_state(layer.settings, layer.tensors, *around)
         except Exception as error:  # whatever numbers and settings of another kind lead to
+            if not cls.__module__.startswith("prior_reinforce."):
+                raise
             raise FileFormatError(
                 f"this is no complete {cls.name} generator ({error!r}); learn it again"
             ) from error
@@ -198,11 +225,7 @@ class Generator(ABC):
 
     @classmethod
     def from_state(cls, settings: Mapping[str, Any], tensors: Tensors) -> Self:
-        """Rebuild it from what `state` gave.
-
-        Raises:
-            KeyError, TypeError, ValueError, RuntimeError: Something is missing, or does not fit.
-        """
+        """Rebuild it from what `state` gave; checksums say that a file holds just that."""
         raise NotImplementedError
 
     def _fitted_to(self) -> int:
@@ -264,17 +287,15 @@ class Wrapper(Generator):
     ) -> Self:
         """Rebuild it around a generator that was rebuilt already; see `Generator.from_state`."""
         if generator is None:
-            raise ValueError(f"a {cls.name} generator is rebuilt around another")
+            raise FileFormatError(
+                f"a {cls.name} generator is rebuilt around another; learn it again"
+            )
         wrapper = cls(generator)
         wrapper.restore(settings, tensors)
         return wrapper
 
     def restore(self, settings: Mapping[str, Any], tensors: Tensors) -> None:
-        """Take up what `state` gave, if it is more than nothing.
-
-        Raises:
-            KeyError, TypeError, ValueError: Something is missing, or does not fit.
-        """
+        """Take up what `state` gave, if it is more than nothing."""
 
 
 def at_once(progress: OnProgress, loss: float) -> None:

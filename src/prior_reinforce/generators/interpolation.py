@@ -9,7 +9,7 @@
   generator's work is done by the assumption that plans depend smoothly on outcomes.
 
 Demonstrations that begin their motion at different times give a blur of two motions rather than one
-in between; on aligned ones the second is hard to beat (`alignment`, docs/baselines.md).
+in between; on aligned ones the second is hard to beat (reproduction/docs/baselines.md).
 
 Notation:
     A_i  plans       in their units
@@ -32,24 +32,14 @@ from prior_reinforce.arrays import Plans, Points
 from prior_reinforce.generators.base import Generator, OnProgress, at_once
 from prior_reinforce.generators.saving import Tensors
 from prior_reinforce.plans.motions import Demonstrations
-from prior_reinforce.plans.outcome_weights import Kernel, inverse_distance_weights, smooth_weights
+from prior_reinforce.plans.outcome_weights import Kernel, smooth_weights
 from prior_reinforce.registry import build
-from prior_reinforce.settings import Checked, Count, Positive
-
-
-@dataclass(frozen=True)
-class NearestNeighboursConfig(Checked):
-    """How neighbours are weighted; docs/baselines.md tells what was tried."""
-
-    neighbours: Count = 3
-    """m, how many of the nearest demonstrations take part; all where there are fewer."""
-    power: Positive = 2.0
-    """p, how fast a demonstration's weight falls with the distance of its outcome."""
+from prior_reinforce.settings import Checked
 
 
 @dataclass(frozen=True)
 class SmoothInterpolationConfig(Checked):
-    """How plans are interpolated; docs/baselines.md tells what was tried."""
+    """How plans are interpolated; reproduction/docs/baselines.md tells what was tried."""
 
     kernel: Kernel = "auto"
     """Radial function: the cube of distance, of least bending (`thin-plate`), or distance itself
@@ -59,7 +49,7 @@ class SmoothInterpolationConfig(Checked):
     that has the nearest outcome. Empty: all are of one way."""
 
 
-class _Mixture(Generator):
+class Mixture(Generator):
     """Weighted sums of the demonstrated plans; a member says what the weights are."""
 
     config_type: ClassVar[type[Any]]
@@ -112,21 +102,7 @@ class _Mixture(Generator):
         self._plans, self._outcomes, self._noise = plans, outcomes, noise
 
 
-class NearestNeighbours(_Mixture):
-    """Inverse-distance interpolation of the nearest plans (paper, "I.N.N.")."""
-
-    name: ClassVar[str] = "nearest"
-    config_type: ClassVar[type[NearestNeighboursConfig]] = NearestNeighboursConfig
-    config: NearestNeighboursConfig
-
-    def _weights(self, conditions: Points) -> Float[np.ndarray, "n N"]:
-        """Weigh the nearest plans; at a demonstration's outcome, its own alone."""
-        return inverse_distance_weights(
-            conditions, self._outcomes, neighbours=self.config.neighbours, power=self.config.power
-        )
-
-
-class SmoothInterpolation(_Mixture):
+class SmoothInterpolation(Mixture):
     """Polyharmonic-spline interpolation of plans over outcomes (ours)."""
 
     name: ClassVar[str] = "interpolation"

@@ -16,10 +16,10 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from prior_reinforce.errors import InvalidDemonstrationsError
+from prior_reinforce.generators.timing.registration import best_correlations
+from prior_reinforce.generators.timing.timeline import decompose
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.plans.outcome_weights import smooth_weights
-from prior_reinforce.plans.registration import best_correlations
-from prior_reinforce.plans.timeline import decompose
 
 _AGREE = 0.1
 """Least correlation of two motions of one pattern. Ours: on the zoo's development tasks every
@@ -40,11 +40,11 @@ _TOLD_APART = 0.35
 """Demonstrations are of two ways if, left out one by one, they are missed in their own half by less
 than this part of the squared error that all leave. Ours: 0.01 to 0.26 on 13 of 14 sets of
 `zoo.SEVERAL_WAYS`, seeds from 100 on; of the zoo's development tasks, sets of eight or more below
-it gain by being parted (docs/decisions-generator.md)."""
+it gain by being parted (reproduction/docs/decisions-generator.md)."""
 _FEWEST_BY_PLACE, _FEWEST_BY_DIRECTION = 3, 4
 """Demonstrations of a half, halved by where they move or by the direction they move in: with fewer,
 what they tell of a left-out one is nothing. Ours: three that moved in another direction were mostly
-a manner, of which the rest learned no better alone (docs/decisions-generator.md)."""
+a manner, of which the rest learned no better alone (reproduction/docs/decisions-generator.md)."""
 
 _Motions = Float[np.ndarray, "N F"]
 """Channels over a common phase, in a row each; every unit counts alike."""

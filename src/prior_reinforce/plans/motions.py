@@ -18,6 +18,7 @@ import os
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -29,9 +30,6 @@ from numpy.typing import ArrayLike
 from typing_extensions import Self
 
 from prior_reinforce.arrays import (
-    BEYOND_DOUBT,
-    FARTHEST,
-    LARGEST_TURN,
     SAME_OUTCOME,
     Frames,
     Plans,
@@ -40,63 +38,29 @@ from prior_reinforce.arrays import (
     as_goal,
     as_outcomes,
     as_plans,
-    is_positive,
+    check_spread,
 )
 from prior_reinforce.errors import FileFormatError, InvalidDemonstrationsError, InvalidPlanError
 from prior_reinforce.files import open_npz
+from prior_reinforce.formats import OutcomeFormat
+from prior_reinforce.plans.plan_format import PlanFormat
 from prior_reinforce.plans.signals import Signals, analyse
+from prior_reinforce.plans.symmetry import Symmetry
+from prior_reinforce.units import looks_like
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _FILE_FORMAT = "prior-reinforce demonstrations"
 _FILE_VERSION = 1
+_SAYS_NOTHING: ContextVar[bool] = ContextVar("_SAYS_NOTHING", default=False)
+"""Whether demonstrations are made of others that were warned of; of this thread alone."""
 _ARRAYS = ("plans", "outcomes_seen", "outcome_noise", "outcome_correction")
 """Of demonstrations, N rows each."""
-
-
-@dataclass(frozen=True)
-class PlanFormat:
-    """What the numbers of a frame mean (paper, Table I: "Frame Action Format")."""
-
-    names: tuple[str, ...]
-    """Name of each of the D action dimensions, for instance `joint1`."""
-    units: tuple[str, ...]
-    """Unit of each dimension: `rad`, `m`, `1` for pure numbers, or any other word."""
-    dt: float
-    """Time between two frames, in [s]."""
-    per_plan: tuple[str, ...] = ()
-    """Names of the dimensions that are one number a plan, the same at every frame: when a motion
-    starts, for instance."""
-
-    def __post_init__(self) -> None:
-        """Check the format.
-
-        Raises:
-            InvalidPlanError: No names, repeated names, or another number of units than of names.
-        """
-        for name in ("names", "units", "per_plan"):
-            if isinstance(given := getattr(self, name), str):
-                raise InvalidPlanError(f"{name} must be a list such as [{given!r}], got a text")
-            object.__setattr__(self, name, tuple(getattr(self, name)))
-        if not self.names:
-            raise InvalidPlanError("a plan format needs at least one action name, got none")
-        if len(set(self.names)) != len(self.names):
-            raise InvalidPlanError(f"action names must differ from each other, got {self.names}")
-        if len(self.units) != len(self.names):
-            raise InvalidPlanError(
-                f"{len(self.names)} action names need as many units, got {len(self.units)}: "
-                f"{self.units}"
-            )
-        if not is_positive(self.dt):
-            raise InvalidPlanError(f"dt must be a positive number of seconds, got {self.dt!r}")
-        if unknown := set(self.per_plan) - set(self.names):
-            raise InvalidPlanError(f"per_plan names {sorted(unknown)}, but actions {self.names}")
-
-    @property
-    def action_dim(self) -> int:
-        """D, the number of action dimensions."""
-        return len(self.names)
+_TYPICAL = 0.15
+"""Standard deviation of goals about a single demonstration, in units of its chart (ours): 15 % of a
+distance, 9 degrees, 15 cm; six demonstrations of our tasks spread as much."""
+_UNSTATED = OutcomeFormat()
 
 
 def _say_size(shape: tuple[int, ...], form: PlanFormat) -> str:
@@ -167,10 +131,8 @@ class Demonstrations:
     outcomes_seen: Points
     """r tilde_i, mostly [m] in the table frame, float64, read-only."""
     format: PlanFormat
-    outcome_names: tuple[str, ...] = ()
-    """Names of the k components; `x`, `y`, `z` where none are given."""
-    outcome_units: tuple[str, ...] = ()
-    """Unit of each component; metres where none are given."""
+    outcome_format: OutcomeFormat = _UNSTATED
+    """What the k numbers of an outcome mean; x, y and z in metres where it is not given."""
     outcome_noise: Points = field(default_factory=lambda: np.empty((0, 0)))
     """How uncertain each outcome is, as a standard deviation, shape (N, k); zero where none is
     given: measured. What is learned is exact at the demonstrations only where they are."""
@@ -178,20 +140,20 @@ class Demonstrations:
     """What each outcome is expected to be, minus the one seen, shape (N, k), in the outcomes'
     units; zero where none is given. "10 cm" by eye is anything from 7.5 to 15, 11.25 on average.
     Generators learn what was seen, as in the paper; `BayesianAdapter` corrects it."""
+    symmetry: Symmetry | None = None
+    """How a demonstrated motion may be moved, if it may; one demonstration is then enough."""
 
     def __repr__(self) -> str:
         """Number, size, and what the outcomes are."""
         size = _say_size(self.plans.shape[1:], self.format)
-        pairs = zip(self.outcome_names, self.outcome_units, strict=True)
-        outcomes = ", ".join(f"{name} [{unit}]" for name, unit in pairs)
-        return f"Demonstrations({self.n} plans, {size}; outcomes {outcomes})"
+        return f"Demonstrations({self.n} plans, {size}; outcomes {self.outcome_format})"
 
     def __post_init__(self) -> None:
         """Copy and check everything; warn of units that look wrong, and of repeated outcomes.
 
         Raises:
-            InvalidDemonstrationsError: Fewer than two, outcomes in a subspace (on one line when
-                k = 2), shapes that do not fit, values that are not finite.
+            InvalidDemonstrationsError: None, several whose outcomes lie in a subspace (on one line
+                when k = 2) without a symmetry, shapes that do not fit, values that are not finite.
         """
         if isinstance(self.plans, (list, tuple)):
             horizons = sorted({np.asarray(plan).shape[0] for plan in self.plans if np.ndim(plan)})
@@ -211,12 +173,11 @@ class Demonstrations:
                 )
         outcomes = as_outcomes(self.outcomes_seen, plans.shape[0])
         k = outcomes.shape[1]
-        names = tuple(self.outcome_names) or tuple("xyz"[:k] if k <= 3 else map(str, range(k)))
-        stated = bool(self.outcome_units)
-        units = tuple(self.outcome_units) or ("m",) * k
-        if len(names) != k or len(units) != k:
+        stated = self.outcome_format.outcome_dim > 0
+        form = self.outcome_format if stated else OutcomeFormat.metres(k)
+        if form.outcome_dim != k:
             raise InvalidDemonstrationsError(
-                f"outcomes have {k} components; got names {names} and units {units}"
+                f"outcomes have {k} components, but their format names {form}"
             )
         for name, signed in (("outcome_noise", False), ("outcome_correction", True)):
             values = np.array(getattr(self, name), dtype=np.float64)
@@ -237,9 +198,12 @@ class Demonstrations:
             object.__setattr__(self, name, values)
         object.__setattr__(self, "plans", plans)
         object.__setattr__(self, "outcomes_seen", outcomes)
-        object.__setattr__(self, "outcome_names", names)
-        object.__setattr__(self, "outcome_units", units)
-        for oddity in self._oddities(unit_stated=stated):
+        object.__setattr__(self, "outcome_format", form)
+        if self.symmetry is not None:
+            object.__setattr__(self, "symmetry", self._fitting(self.symmetry))
+        elif len(outcomes) > 1:
+            check_spread(outcomes)
+        for oddity in () if _SAYS_NOTHING.get() else self._oddities(unit_stated=stated):
             warnings.warn(oddity, stacklevel=3)
 
     @property
@@ -267,10 +231,51 @@ class Demonstrations:
         """Noise, kind and rest of each dimension, analysed once."""
         return analyse(self.plans, self.format.units, self.format.dt)
 
+    @cached_property
+    def spread(self) -> Point:
+        """Standard deviation of each component of the outcomes, in its unit; never zero.
+
+        Where all outcomes agree in a component, or there is one only, it is that of goals about
+        it (`_TYPICAL`).
+
+        Raises:
+            InvalidDemonstrationsError: That, and there is no symmetry to say it.
+        """
+        deviation = self.outcomes_seen.std(axis=0)
+        alike = deviation <= SAME_OUTCOME * np.maximum(np.abs(self.outcomes_seen).max(axis=0), 1.0)
+        if not alike.any():
+            return np.asarray(deviation)
+        if self.symmetry is None:
+            raise InvalidDemonstrationsError(
+                "one demonstration without a symmetry says nothing of other goals; state the "
+                "symmetry, or demonstrate more"
+            )
+        chart = self.symmetry.chart
+        jacobian = chart.jacobian(chart.to(self.outcomes_seen)).mean(axis=0)
+        return np.where(alike, _TYPICAL * np.linalg.norm(jacobian, axis=1), deviation)
+
+    def without_symmetry(self) -> Self:
+        """Return the same demonstrations for learning from them alone, as in the paper.
+
+        Raises:
+            InvalidDemonstrationsError: There are several, and their outcomes lie in a subspace.
+        """
+        with _warned_before():
+            return replace(self, symmetry=None)
+
+    def with_symmetry(self, symmetry: Symmetry) -> Self:
+        """Return the same demonstrations, which may be moved so."""
+        with _warned_before():
+            return replace(self, symmetry=symmetry)
+
     @property
     def sha256(self) -> str:
         """Fingerprint of plans, outcomes, their noise and correction, and what they mean."""
-        about = [asdict(self.format), self.outcome_names, self.outcome_units]
+        form, own = self.outcome_format, asdict(self.format)
+        plan = {key: value for key, value in own.items() if value or key == "per_plan"}
+        about: list[Any] = [plan, form.names, form.units]
+        if self.symmetry is not None:
+            about.append(self.symmetry.data())
         digest = hashlib.sha256(json.dumps(about, sort_keys=True).encode())
         noise = (self.outcome_noise,) if np.any(self.outcome_noise) else ()
         for array in (self.plans, self.outcomes_seen, *noise):
@@ -294,7 +299,7 @@ class Demonstrations:
     def repeated_outcomes(self) -> list[tuple[int, int]]:
         """Return pairs whose outcomes were measured and are the same; by eye they often look it."""
         measured = np.all(self.outcome_noise == 0.0, axis=1)
-        scaled = self.outcomes_seen / np.ptp(self.outcomes_seen, axis=0)
+        scaled = self.outcomes_seen / np.maximum(np.ptp(self.outcomes_seen, axis=0), 1e-12)
         same = np.all(np.abs(scaled[:, None] - scaled[None]) <= SAME_OUTCOME, axis=2)
         pairs = np.argwhere(np.triu(same & measured & measured[:, None], k=1))
         return [(int(i), int(j)) for i, j in pairs]
@@ -308,15 +313,15 @@ class Demonstrations:
         Raises:
             InvalidGoalError: Wrong shape, or not finite.
         """
-        goal = as_goal(goal, self.outcome_names)
+        goal = as_goal(goal, self.outcome_format.names)
         beyond = self.far_outside(goal)
         if np.any(beyond):
             low, high = self.outcomes_seen.min(axis=0), self.outcomes_seen.max(axis=0)
             asked = ", ".join(f"{value:.4g}" for value in goal)
             where = ", ".join(
-                f"{beyond[j]:.4g} {self.outcome_units[j]} outside the demonstrated {name} "
+                f"{beyond[j]:.4g} {self.outcome_format.units[j]} outside the demonstrated {name} "
                 f"({low[j]:.4g} to {high[j]:.4g})"
-                for j, name in enumerate(self.outcome_names)
+                for j, name in enumerate(self.outcome_format.names)
                 if beyond[j] > 0
             )
             warnings.warn(
@@ -328,9 +333,17 @@ class Demonstrations:
     def far_outside(self, goal: Point) -> Point:
         """How far a goal lies outside the outcomes, in their units; zeros where it is near enough.
 
+        With a symmetry, near enough is what it is believed to move (`Symmetry.farthest`).
+
         Ours: half the demonstrated extent beyond it is extrapolation that no figure of the paper
         supports (its displacement field degrades towards the boundary already).
         """
+        if self.symmetry is not None:
+            chart, farthest = self.symmetry.chart, self.symmetry.farthest
+            z, aim = chart.to(self.outcomes_seen), chart.to(goal)
+            beyond = aim - np.clip(aim, z.min(axis=0), z.max(axis=0))
+            too_far = beyond - np.clip(beyond, -farthest, farthest)
+            return np.asarray(np.abs(goal - chart.back(aim - too_far))) * np.any(too_far)
         low, high = self.outcomes_seen.min(axis=0), self.outcomes_seen.max(axis=0)
         spread = np.maximum(high - low, 1e-12)
         beyond = np.maximum(np.maximum(low - goal, goal - high), 0.0)
@@ -338,13 +351,15 @@ class Demonstrations:
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write an `.npz`: two arrays and a JSON text; nothing in it can run code."""
-        metadata = {
+        metadata: dict[str, Any] = {
             "file_format": _FILE_FORMAT,
             "version": _FILE_VERSION,
             "format": asdict(self.format),
-            "outcome_names": self.outcome_names,
-            "outcome_units": self.outcome_units,
+            "outcome_names": self.outcome_format.names,
+            "outcome_units": self.outcome_format.units,
         }
+        if self.symmetry is not None:
+            metadata["symmetry"] = self.symmetry.data()
         arrays: dict[str, Any] = {name: getattr(self, name) for name in _ARRAYS}
         with open(path, "wb") as file:
             np.savez_compressed(file, **arrays, metadata=np.array(json.dumps(metadata)))
@@ -368,22 +383,40 @@ class Demonstrations:
             return cls(
                 **{name: archive[name] for name in _ARRAYS if name in archive},
                 format=PlanFormat(**metadata["format"]),
-                outcome_names=tuple(metadata["outcome_names"]),
-                outcome_units=tuple(metadata["outcome_units"]),
+                outcome_format=OutcomeFormat(
+                    tuple(metadata["outcome_names"]), tuple(metadata["outcome_units"])
+                ),
+                symmetry=(data := metadata.get("symmetry")) and Symmetry.from_data(data),
             )
+
+    def _fitting(self, symmetry: Symmetry) -> Symmetry:
+        """The symmetry, held against these demonstrations, its chart around their outcomes."""
+        if symmetry.k != self.outcome_dim:
+            raise InvalidDemonstrationsError(
+                f"the symmetry {symmetry.name!r} moves {symmetry.k} components, but outcomes have "
+                f"{self.outcome_dim}: {self.outcome_format}"
+            )
+        if any(
+            column >= self.action_dim for move in symmetry.moves for column in move.columns_of()
+        ):
+            raise InvalidDemonstrationsError(
+                f"the symmetry {symmetry.name!r} moves columns that plans do not have; they have "
+                f"{self.action_dim}: {', '.join(self.format.names)}"
+            )
+        return symmetry.around(self.outcomes_seen)
 
     def _oddities(self, *, unit_stated: bool) -> Iterator[str]:
         """What looks like a slip: other units, and an outcome that comes twice."""
-        metres = np.array([unit == "m" for unit in self.outcome_units])
+        metres = np.array([unit == "m" for unit in self.outcome_format.units])
         farthest = np.abs(self.outcomes_seen[:, metres]).max(initial=0.0)
-        if farthest > FARTHEST * (BEYOND_DOUBT if unit_stated else 1.0):
+        if looks_like("m", farthest, stated=unit_stated):
             yield (
                 f"an outcome of {farthest:g} m looks like centimetres; outcomes are in metres: "
                 "divide by 100"
             )
         radians = np.array([unit == "rad" for unit in self.format.units])
         largest = np.abs(self.plans[:, :, radians]).max(initial=0.0)
-        if largest > LARGEST_TURN:
+        if looks_like("rad", largest):
             yield (
                 f"an angle of {largest:g} rad looks like degrees; plans are in radians: convert "
                 "with numpy.deg2rad"
@@ -399,6 +432,8 @@ class Demonstrations:
 @contextmanager
 def _warned_before() -> Iterator[None]:
     """Demonstrations made of others say nothing of their units again."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
+    token = _SAYS_NOTHING.set(True)
+    try:
         yield
+    finally:
+        _SAYS_NOTHING.reset(token)

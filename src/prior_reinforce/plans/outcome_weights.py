@@ -25,7 +25,7 @@ the last where the first amplifies what differs between demonstrations by chance
 (`amplification`)."""
 _LARGEST_AMPLIFICATION = 1.0
 """Ours: what is mixed varies by chance no more than one demonstration does. Outcomes on a grid stay
-below it, most that nobody spread do not; docs/decisions-generator.md."""
+below it, most that nobody spread do not; reproduction/docs/decisions-generator.md."""
 _REPEATED = 1e-6
 """Least smoothing of outcomes that come more than once, so that their plans are averaged. Ours: far
 below what smooths anything else."""
@@ -34,51 +34,7 @@ _MEASURED = 0.01
 30 cm, several times what a camera or a tape is off by."""
 _SMOOTHING = 100.0
 """Smoothing of an outcome whose noise is the demonstrated range. Ours, see
-docs/decisions-generator.md."""
-
-
-def inverse_distance_weights(
-    conditions: Float[np.ndarray, "n k"],
-    outcomes: Float[np.ndarray, "N k"],
-    *,
-    neighbours: int,
-    power: float,
-) -> Float[np.ndarray, "n N"]:
-    r"""Return Shepard's weights over the nearest demonstrations.
-
-    .. math:: w_i \propto \|c - r_i\|^{-p}, \quad i \in \text{the nearest } m, \quad w_i = 0
-        \text{ else}
-
-    All weights are in [0, 1]: a convex combination, which never extrapolates. They are continuous
-    in c where m = N; where m < N they jump when the m-th neighbour changes.
-
-    Args:
-        conditions: c.
-        outcomes: r.
-        neighbours: m; all demonstrations where there are fewer.
-        power: p > 0.
-
-    Returns:
-        w; at an outcome of a demonstration, exactly that demonstration, or the mean of those that
-        have it.
-
-    Source: Shepard, "A two-dimensional interpolation function for irregularly-spaced data",
-    ACM National Conference 1968; the paper says only "computed based on distances".
-    """
-    from scipy.spatial.distance import cdist
-
-    scale = np.ptp(outcomes, axis=0)
-    distances = cdist(conditions / scale, outcomes / scale)
-    nearest = np.argsort(distances, axis=1, kind="stable")[:, :neighbours]
-    near = np.take_along_axis(distances, nearest, axis=1)
-    # Relative to the nearest, so that no power over- or underflows; 0/0 is an exact hit.
-    with np.errstate(invalid="ignore", divide="ignore"):
-        kept = (near[:, :1] / near) ** power
-    hit = near[:, 0] == 0
-    kept[hit] = near[hit] <= SAME_OUTCOME
-    weights = np.zeros_like(distances)
-    np.put_along_axis(weights, nearest, kept / kept.sum(axis=1, keepdims=True), axis=1)
-    return weights
+reproduction/docs/decisions-generator.md."""
 
 
 def smooth_weights(

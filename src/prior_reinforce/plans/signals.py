@@ -25,7 +25,7 @@ Notation:
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -40,6 +40,7 @@ from prior_reinforce.plans.speeds import (
     motion_span,
     velocity_profiles,
 )
+from prior_reinforce.units import Kind, in_unit
 
 ChannelKind = Literal["held", "switch", "step", "smooth"]
 
@@ -47,9 +48,9 @@ HELD = 1e-4
 """A channel is held if it leaves its mean by at most this, rms, in rad or m (in other units: this
 part of the largest range of that unit). Ours: what a plan may be off by and still count as
 reproduced. It is so small because a plan may consist of increments."""
-COUNTS = {"rad": 1e-3, "m": 5e-4}
-"""Range of a few counts of an encoder, and distance from a pose that is none. Ours: below what
-moves a throw by a millimetre."""
+COUNTS: Mapping[Kind, float] = {"angle": 1e-3, "length": 5e-4}
+"""Range of a few counts of an encoder, and distance from a pose that is none, in [rad] and [m].
+Ours: below what moves a throw by a millimetre."""
 NOISE_RMS = 3.0
 """What is nothing but noise stays within so many sigma, rms. Ours: sigma is estimated from few
 frames, and of a signal that is rounded to counts."""
@@ -78,11 +79,11 @@ variable, in absolute value, lie below its 30 % quantile."""
 END_STEP = 0.01
 """A channel rests at an end of a plan if its step there is at most this part of its largest step.
 Ours: a plan is then generated at rest there too."""
-REST_SPEED = {"rad": 0.05, "m": 0.02}
-"""A slower channel rests, in units/s, in recordings and for the gate. Ours: the makers ask for
-exactly 0; a smooth start recorded at 30 frames/s shows 0.02 rad/s."""
+REST_SPEED: Mapping[Kind, float] = {"angle": 0.05, "length": 0.02}
+"""A slower channel rests, in recordings and for the gate, in [rad/s] and [m/s]. Ours: the makers
+ask for exactly 0; a smooth start recorded at 30 frames/s shows 0.02 rad/s."""
 _REST_SHARE = 0.05
-"""Part of a channel's largest speed that is rest in units without a `REST_SPEED`. Ours."""
+"""Part of a channel's largest speed that is rest in units of no `REST_SPEED`. Ours."""
 _END_TIME = 0.04
 """Time over which the speed at an end is measured, in [s]: a slope through several frames."""
 _TRIM_SHARE = 0.005
@@ -131,7 +132,7 @@ def analyse(motions: Sequence[Motion] | np.ndarray, units: Sequence[str], dt: fl
     sigma = noise(motions)
     ranges = np.ptp(np.concatenate(list(motions)), axis=0)
     largest = np.max([np.ptp(motion, axis=0) for motion in motions], axis=0)
-    counts = np.array([COUNTS.get(unit, 0.0) for unit in units])
+    counts = np.array([in_unit(COUNTS, unit) or 0.0 for unit in units])
     steps = [np.abs(np.diff(motion, axis=0)) for motion in motions]
     slow = END_STEP * np.max([step.max(axis=0) for step in steps], axis=0)
     profiles = velocity_profiles(motions, units, SMOOTHING / dt)
@@ -203,9 +204,9 @@ def held_channels(
     angles and lengths are measured by encoders; noise in other units may be meant.
     """
     ranges = np.ptp(np.concatenate(list(motions)), axis=0)
-    known = np.array([unit in COUNTS for unit in units])
+    known = np.array([in_unit(COUNTS, unit) is not None for unit in units])
     floor = HELD * np.where(known, 1.0, largest_of_unit(ranges, units))
-    counts = np.array([COUNTS.get(unit, 0.0) for unit in units])
+    counts = np.array([in_unit(COUNTS, unit) or 0.0 for unit in units])
     live = [_without_repeats(motion) for motion in motions]
     sigma = np.max([noise([motion]) for motion in live], axis=0)
     held = np.ones(len(units), dtype=bool)
@@ -266,7 +267,7 @@ def moving_ends(
     """
     count = max(2, int(np.searchsorted(times, times[0] + _END_TIME, side="right")))
     fastest = np.abs(np.gradient(motion, times, axis=0)).max(axis=0)
-    rest = [REST_SPEED.get(u, _REST_SHARE * f) for u, f in zip(units, fastest, strict=True)]
+    rest = [in_unit(REST_SPEED, u) or _REST_SHARE * f for u, f in zip(units, fastest, strict=True)]
     moving = []
     for at in (slice(count), slice(-count, None)):
         t = times[at] - times[at].mean()

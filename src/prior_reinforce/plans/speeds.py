@@ -92,7 +92,7 @@ def middle(speed: Speed) -> float:
     return float(np.average(np.arange(len(speed)), weights=speed**2))
 
 
-def motion_span(speed: Speed) -> Float[np.ndarray, 2]:
+def motion_span(speed: Speed) -> Float[np.ndarray, "2"]:
     """Return where a motion begins and ends, in frames and parts of them.
 
     Crossings of `MOVING` are interpolated between frames and widened by a tenth of the duration; an

@@ -11,6 +11,7 @@ from typing import Any
 
 import msgspec
 
+from prior_reinforce.formats import OutcomeFormat
 from prior_reinforce.readings import ReadingRecord
 
 
@@ -27,7 +28,7 @@ class Event(
     forbid_unknown_fields=True,
     omit_defaults=True,
 ):
-    """Something that happened, and will always have happened."""
+    """Something that happened; never changed."""
 
     @property
     def kind(self) -> str:
@@ -39,19 +40,10 @@ class GoalSet(Event, frozen=True):
     """A goal was set; its fields are those of `trials.Goal`."""
 
     goal: list[float]
-    tolerance: list[float]
-    names: list[str]
-    units: list[str]
+    format: OutcomeFormat
     carry_over: bool
     adapter: str = ""
     new_hardware: str | None = None
-
-
-class KeptPlan(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A plan's file."""
-
-    file: str
-    sha256: str
 
 
 class Asked(Event, frozen=True):
@@ -70,8 +62,7 @@ class Asked(Event, frozen=True):
     expected_trials: float | None = None
     expected_error: list[float] | None = None
     expected_sd: list[float] | None = None
-    plan: KeptPlan | None = None
-    """None where the log keeps plans in memory."""
+    remark: str = ""
 
 
 class Told(Event, frozen=True):

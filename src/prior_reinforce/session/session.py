@@ -16,27 +16,25 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
-from functools import cached_property
+from dataclasses import replace
 from threading import RLock
-from types import FunctionType, MethodType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from prior_reinforce.adapters import ADAPTERS
 from prior_reinforce.arrays import Frames, Point
 from prior_reinforce.errors import (
     ConfigurationError,
     InvalidPlanError,
     RobotLimitError,
     TrialStateError,
-    WorkspaceError,
 )
-from prior_reinforce.readings import Reading, as_tolerance
-from prior_reinforce.session.events import Amended, Asked, GoalSet, Told, Voided
-from prior_reinforce.session.trials import AskedTrial, Goal, Log, Stage, State, Trial, Verdict
-from prior_reinforce.wording import as_reading
+from prior_reinforce.parsing import as_place, as_reading
+from prior_reinforce.readings import Reading
+from prior_reinforce.session.events import Amended, GoalSet, Told, Voided
+from prior_reinforce.session.in_use import InUse, latest_goal
+from prior_reinforce.session.trials import Goal, Log, Stage, State, Trial, Verdict
 
 if TYPE_CHECKING:
     from prior_reinforce.adapters.base import Adapter
@@ -60,7 +58,8 @@ class Session:
         *,
         carry_over: bool | None = None,
         log: Log | None = None,
-        gate: Callable[[Frames], Verdict | None] | None = None,
+        gate: Callable[[Frames, Point], Verdict | None] | None = None,
+        check_open: Callable[[Trial, Literal["ask", "tell"]], None] | None = None,
     ) -> None:
         """Begin, or go on where a log ends.
 
@@ -80,8 +79,10 @@ class Session:
             carry_over: Let the adapter learn from the trials of earlier goals too; by default it
                 does where they serve it (`Adapter.carries_over`).
             log: What happened so far, and where to write what happens; in memory if not given.
-            gate: Holds a plan against a robot's limits whenever it is to leave, such as
-                `check_plan`; by default nothing is checked.
+            gate: Holds a plan and the condition that it is for against a robot's limits whenever it
+                is to leave, such as `check_plan`; by default nothing is checked.
+            check_open: Raises TrialStateError where the open trial may not be given out again, or
+                not be told; by default it always may.
 
         Raises:
             InvalidGoalError: The goal has a wrong shape, or is not finite.
@@ -96,46 +97,33 @@ class Session:
                 )
         self.log = Log() if log is None else log
         self._given: Any = (generator, adapter, demonstrations)
-        self._gate = gate
-        self._loaded_for: tuple[str, ...] = ()
+        self._gate, self._check_open = gate, check_open
+        self._in_use = InUse(self._given, ())
         self._carry_over = carry_over
         self._tolerance = tolerance
         self._lock = RLock()
-        self._observed: list[Trial] | None = None
-        """Readings that the adapter has observed since its start `_start`."""
-        self._start = 0
-        self._on_hardware_of = 0
-        """The latest goal whose change of hardware the adapter knows of."""
-        self.state  # noqa: B018  (whether the log can be read)
         if goal is not None:
             self.set_goal(goal)
 
-    @cached_property
+    @property
     def generator(self) -> Generator:
         """The generator pi; loaded now, if a function was given."""
-        return _loaded(self._given[0])
+        return self._parts(self.state).generator
 
-    @cached_property
+    @property
     def adapter(self) -> Adapter:
         """The adapter M; loaded now, if a function was given."""
-        return _loaded(self._given[1])
+        return self._parts(self.state).adapter
 
-    @cached_property
+    @property
     def demonstrations(self) -> Demonstrations:
         """The demonstrations D_prior; loaded now, if a function was given."""
-        return _loaded(self._given[2])
+        return self._parts(self.state).demonstrations
 
     @property
     def state(self) -> State:
         """What happened so far, whoever wrote it down."""
-        with self._lock:
-            state = self.log.state()
-            now = (*state.in_use, "" if state.goal is None else state.goal.adapter)
-            if now != self._loaded_for:  # forget what was loaded: other things are in use
-                self._loaded_for, self._observed = now, None
-                for name in ("generator", "adapter", "demonstrations"):
-                    self.__dict__.pop(name, None)
-            return state
+        return self.log.state()
 
     @property
     def goals(self) -> tuple[Goal, ...]:
@@ -145,12 +133,12 @@ class Session:
     @property
     def goal(self) -> Point:
         """The goal g tilde that is worked on: the latest."""
-        return self._latest_goal().goal
+        return latest_goal(self.state).goal
 
     @property
     def tolerance(self) -> Point:
         """The tolerance epsilon of each component, of the goal that is worked on."""
-        return self._latest_goal().tolerance
+        return latest_goal(self.state).tolerance
 
     @property
     def trials(self) -> tuple[Trial, ...]:
@@ -182,7 +170,7 @@ class Session:
 
     def set_goal(
         self,
-        goal: ArrayLike,
+        goal: ArrayLike | str,
         tolerance: ArrayLike | None = None,
         *,
         carry_over: bool | None = None,
@@ -192,33 +180,34 @@ class Session:
         """Set the goal that the next trials are for.
 
         Args:
-            goal: g tilde, shape (k,), in the outcomes' units.
+            goal: g tilde, shape (k,), in the outcomes' units; or said, with its units: `92cm 10cm`.
             tolerance: epsilon; the session's own if not given.
             carry_over: As in the constructor; the session's own if not given.
-            adapter: Name of the adapter, for a log that is gone on with later.
+            adapter: Name of the adapter that `adapter` loads for this goal, for a log that is gone
+                on with later; `carry_over` goes with it.
             new_hardware: What was changed on the hardware, a note; None where nothing was. An
                 adapter that knows the difference (`Adapter.change_hardware`) then believes less of
                 what it knew, and the next reading more.
 
         Raises:
-            InvalidGoalError: Wrong shape, or not finite.
-            ConfigurationError: As in the constructor.
+            InvalidGoalError: Wrong shape, not finite, or of another unit by its size.
+            ConfigurationError: As in the constructor; or an adapter without `carry_over`.
             TrialStateError: A trial for the goal before waits to be told.
         """
-        self.state.refuse_open_trial("setting a goal")  # before anything is said of the goal
-        checked = self.demonstrations.check_goal(goal)
-        names, units = self.demonstrations.outcome_names, self.demonstrations.outcome_units
+        state = self.state
+        state.refuse_open_trial("setting a goal")  # before anything is said of the goal
+        demonstrations = self._parts(state).demonstrations
+        checked = demonstrations.check_goal(as_place(goal, demonstrations.outcome_format))
         given = self._tolerance if tolerance is None else tolerance
-        tolerances = as_tolerance(() if given is None else given, names, units)
+        form = demonstrations.outcome_format.within(() if given is None else given)
         carried = self._carry_over if carry_over is None else carry_over
         if carried is None:
-            kind = ADAPTERS.resolve(adapter) if adapter else type(self.adapter)
-            carried = kind.carries_over
+            if adapter:
+                raise ConfigurationError(f"say carry_over for the adapter {adapter}: True or False")
+            carried = self._parts(state).adapter.carries_over
         event = GoalSet(
             goal=checked.tolist(),
-            tolerance=tolerances.tolist(),
-            names=list(names),
-            units=list(units),
+            format=form,
             carry_over=carried,
             adapter=adapter,
             new_hardware=new_hardware,
@@ -226,29 +215,24 @@ class Session:
         with self._exclusive() as state:
             state.refuse_open_trial("setting a goal")
             self.log.append(event)
-        return self.state.goals[-1]
+        return state.goals[-1]
 
-    def ask(self, *, arm_did_not_move: bool = False) -> AskedTrial:
+    def ask(self) -> Trial:
         """Return the trial to execute next: the open one, or a new one.
 
         Asking again changes nothing until that trial is told or voided. Asking goes on after the
         goal is reached, for whoever wants to repeat or to measure. A plan that the gate refuses now
         is not returned, whatever the gate said before.
 
-        Args:
-            arm_did_not_move: What a person saw of a trial whose command failed, or that was
-                executing when the program died: nothing moved, it may be executed after all.
-
         Returns:
             The trial, with its plan and the gate's verdict on it.
 
         Raises:
             RobotLimitError: The plan breaks a limit of the robot.
-            TrialStateError: The open trial is executing, or was when the program died and nobody
-                said yet whether the arm moved.
+            TrialStateError: The open trial may not be given out again (`check_open`).
             WorkspaceError: No goal is set, or the log cannot be written.
         """
-        return ask_all([self], arm_did_not_move=arm_did_not_move)[0]
+        return ask_all([self])[0]
 
     def tell(
         self, number: int, seen: Reading | ArrayLike | None = None, *, hit: bool | None = None
@@ -269,8 +253,10 @@ class Session:
             The trial as it stands now.
 
         Raises:
-            TrialStateError: There is no such trial, or it is not open.
-            InvalidFeedbackError: Wrong shape, or not finite.
+            TrialStateError: There is no such trial, or it is not open; or it was not executed,
+                where that is known.
+            InvalidFeedbackError: Wrong shape, not finite, numbers of another unit by their size, or
+                an outcome in place of an error.
         """
         with self._exclusive() as state:
             trial = state.trial(number)
@@ -279,8 +265,9 @@ class Session:
                     f"trial {number} is already {trial.stage.value}; "
                     + ("amend it to correct it" if trial.stage is Stage.TOLD else "ask for another")
                 )
-            self._append_reading(Told, trial, seen, hit)
-        return self.trial(number)
+            self._check(trial, "tell")
+            self._append_reading(Told, trial, state.goal_of(trial), seen, hit)
+        return state.trial(number)
 
     def amend(
         self, number: int, seen: Reading | ArrayLike | None = None, *, hit: bool | None = None
@@ -293,7 +280,7 @@ class Session:
 
         Raises:
             TrialStateError: There is no such trial, or it has not been told.
-            InvalidFeedbackError: Wrong shape, or not finite.
+            InvalidFeedbackError: As in `tell`.
         """
         with self._exclusive() as state:
             trial = state.trial(number)
@@ -302,8 +289,8 @@ class Session:
                     f"trial {number} is {trial.stage.value}, only a told trial can be amended; "
                     + ("tell it" if trial.open else "ask for another")
                 )
-            self._append_reading(Amended, trial, seen, hit)
-        return self.trial(number)
+            self._append_reading(Amended, trial, state.goal_of(trial), seen, hit)
+        return state.trial(number)
 
     def void(self, number: int, reason: str = "") -> Trial:
         """Declare that a trial, open or told, is not data; the adapter forgets it.
@@ -322,7 +309,7 @@ class Session:
             # What a terminal could not decode cannot be printed again.
             text = str(reason).encode(errors="replace").decode()
             self.log.append(Voided(trial=trial.number, reason=text))
-        return self.trial(number)
+        return state.trial(number)
 
     def __repr__(self) -> str:
         state = self.state
@@ -342,29 +329,29 @@ class Session:
         """As it was, with a lock of its own."""
         self.__dict__.update(state, _lock=RLock())
 
-    def _latest_goal(self) -> Goal:
-        goal = self.state.goal
-        if goal is None:
-            raise WorkspaceError(
-                "no goal is set; set one (Session.set_goal, or: prior-reinforce goal)"
-            )
-        return goal
-
     @contextmanager
     def _exclusive(self) -> Iterator[State]:
         """Hold the log, and know all that it says."""
         with self._lock, self.log.exclusive():
-            yield self.state
+            yield self.log.state()
+
+    def _parts(self, state: State) -> InUse:
+        """What is in use as the log says; what was loaded before is forgotten where it is not."""
+        with self._lock:
+            names = (*state.in_use, "" if state.goal is None else state.goal.adapter)
+            if names != self._in_use.names:
+                self._in_use = InUse(self._given, names)
+            return self._in_use
 
     def _append_reading(
         self,
         event: type[Told],
         trial: Trial,
+        goal: Goal,
         seen: Reading | ArrayLike | None,
         hit: bool | None,
     ) -> None:
-        goal = self.state.goal_of(trial)
-        reading = as_reading(seen, hit, goal.names, goal.units, goal.least_sd)
+        reading = as_reading(seen, hit, goal.goal, goal.format)
         reached = goal.is_hit(reading.error_seen) if reading.hit is None else reading.hit
         self.log.append(event(trial=trial.number, reading=reading.record(), hit=bool(reached)))
 
@@ -376,83 +363,42 @@ class Session:
         Raises:
             WorkspaceError: No goal is set.
         """
-        with self._exclusive():
-            return self._informed()
+        with self._exclusive() as state:
+            return self._parts(state).believed(state, self.log).adapter
 
-    def _informed(self) -> Adapter:
-        goal, adapter = self._latest_goal(), self.adapter
-        readings = self.state.readings_for(goal, self._loaded_for[0])
-        seen, self._observed = self._observed, None  # until it has seen them all
-        # Start again if one was voided or amended, or if another session has used the adapter.
-        again = adapter.n_starts != self._start
-        if again or seen is None or seen != readings[: len(seen)]:
-            adapter.start(self.demonstrations)
-            seen, self._start, self._on_hardware_of = [], adapter.n_starts, 0
-        for trial in readings[len(seen) :]:
-            about = self.state.goal_of(trial)
-            assert trial.reading is not None
-            self._change_hardware_until(about.number)
-            adapter.observe(trial.condition, about.goal, trial.reading.within(about.tolerance))
-        self._observed = readings
-        self._change_hardware_until(goal.number)
-        return adapter
+    def _check(self, trial: Trial, verb: Literal["ask", "tell"]) -> None:
+        """Raise TrialStateError where an open trial may not be given out again, or not be told."""
+        if self._check_open is not None:
+            self._check_open(trial, verb)
 
-    def _change_hardware_until(self, goal_number: int) -> None:
-        """Tell the adapter of every change of hardware up to a goal, once."""
-        for goal in self.state.goals[self._on_hardware_of : goal_number]:
-            if goal.new_hardware is not None:
-                self.adapter.change_hardware()
-        self._on_hardware_of = max(self._on_hardware_of, goal_number)
-
-    def _open(self, condition: Point, plan: Frames) -> Verdict | None:
+    def _open(self, state: State, parts: InUse, condition: Point, plan: Frames) -> Verdict | None:
         """Write a new trial down, if its plan may be executed."""
-        goal = self._latest_goal()
-        verdict = self._check(plan, self._say_no_plan(goal.goal, condition))
-        number = len(self.state.trials) + 1
-        expected = self.adapter.expect(condition, goal.goal, goal.tolerance)
-        event = Asked(
-            trial=number,
-            goal=goal.number,
-            condition=condition.tolist(),
-            model=self._loaded_for[0],
-            gate=None if verdict is None else verdict.as_json(),
-            p_hit=None if expected is None else expected.p_hit,
-            expected_trials=None if expected is None else expected.trials,
-            expected_error=None if expected is None else _as_list(expected.error),
-            expected_sd=None if expected is None else _as_list(expected.sd),
-            plan=self.log.keep_plan(number, plan, self.demonstrations.format),
-        )
-        self.log.append(event)
+        verdict = self._verdict(plan, condition, parts.say_no_plan(state, condition))
+        event = parts.asked(state, condition, verdict)
+        self.log.keep_adapter(parts.adapter)
+        self.log.append_asked(event, plan, parts.demonstrations.format)
         return verdict
 
-    def _say_no_plan(self, goal: Point, condition: Point) -> str:
-        """For which goal there is no plan, and why that is, where it is simply too far."""
-        place, at = ((np.round(point, 4) + 0.0).tolist() for point in (goal, condition))
-        said = f"no plan for the goal {place}"
-        if at != place:
-            said += f", asked of the generator as {at}"
-        if np.any(self.demonstrations.far_outside(goal)):
-            said += ", which lies far outside the demonstrations (choose one nearer to them)"
-        return said
-
-    def _with_plan(self, number: int, fresh: Mapping[Session, Verdict | None]) -> AskedTrial:
+    def _with_plan(
+        self, state: State, number: int, fresh: Mapping[Session, Verdict | None]
+    ) -> Trial:
         """A trial with its plan and the gate's verdict, unless the gate refuses it now.
 
         `fresh` has the verdicts on trials that were opened just now.
         """
-        trial = self.trial(number)
+        trial = state.trial(number)
         if not trial.open:
             raise TrialStateError(f"trial {number} was {trial.stage.value} meanwhile; ask again")
         plan = self.log.plan(trial)
         refusal = f"trial {number} may not be executed now, void it and ask again"
-        verdict = fresh[self] if self in fresh else self._check(plan, refusal)
-        if isinstance(trial, AskedTrial) and verdict is None:
+        verdict = fresh[self] if self in fresh else self._verdict(plan, trial.condition, refusal)
+        if len(trial.plan) and verdict is None:
             return trial
-        return AskedTrial(**{**vars(trial), "plan": plan, "verdict": verdict})
+        return replace(trial, plan=plan, verdict=verdict)
 
-    def _check(self, plan: Frames, refusal: str) -> Verdict | None:
+    def _verdict(self, plan: Frames, condition: Point, refusal: str) -> Verdict | None:
         """What the gate says of a plan; an error that begins with `refusal` if it refuses."""
-        verdict = None if self._gate is None else self._gate(plan)
+        verdict = None if self._gate is None else self._gate(plan, condition)
         try:
             if verdict is not None:
                 verdict.require()
@@ -461,59 +407,60 @@ class Session:
         return verdict
 
 
-def ask_all(sessions: Sequence[Session], *, arm_did_not_move: bool = False) -> list[AskedTrial]:
-    """Ask many sessions at once: one call of the generator for all that have no open trial.
+def ask_all(sessions: Sequence[Session]) -> list[Trial]:
+    """Ask many sessions at once: one call of each generator for all that have no open trial.
 
     Args:
-        sessions: Different sessions that share one fitted generator.
-        arm_did_not_move: See `Session.ask`.
+        sessions: Different sessions; those that share a generator share its call.
 
     Returns:
         The open trial of each, in order.
 
     Raises:
-        ConfigurationError: The sessions have different generators, or one stands there twice.
+        ConfigurationError: A session stands there twice.
     """
     if len({id(session) for session in sessions}) < len(sessions):
         raise ConfigurationError("sessions asked together must be different ones")
     for session in sessions:
-        if session.open_trial is None:  # load before the log is held: others need not wait for it
-            session.generator, session.goal, session.adapter  # noqa: B018
+        state = session.state
+        if state.open_trial is None:  # load before the log is held: others need not wait for it
+            session._parts(state).load()
+            latest_goal(state)  # or refuse
     with ExitStack() as logs:
-        numbers, new = [], []
+        asked, new = list[tuple[State, int]](), dict[Session, State]()
         for session in sessions:
             state = logs.enter_context(session._exclusive())
             trial = state.open_trial
             if trial is None:
-                new.append(session)
-            elif trial.stage is Stage.EXECUTING or (
-                trial.stage is Stage.EXECUTED and arm_did_not_move
-            ):
-                session.log.settle(trial, arm_did_not_move=arm_did_not_move)
-            numbers.append(len(state.trials) + 1 if trial is None else trial.number)
+                new[session] = state
+            else:
+                session._check(trial, "ask")
+            asked.append((state, len(state.trials) + (trial is None)))
         verdicts: dict[Session, Verdict | None] = {}
         if new:
-            generator = new[0].generator
-            if any(session.generator is not generator for session in new):
-                raise ConfigurationError("sessions asked together must share one generator object")
-            conditions = np.stack([each._informed().propose(each.goal) for each in new])
-            plans = generator.generate(conditions)
-            if not np.all(np.isfinite(plans)):
-                raise InvalidPlanError(
-                    "the generator gives plans that hold no numbers (nan or inf); learn again"
-                )
-            for session, condition, plan in zip(new, conditions, plans, strict=True):
-                verdicts[session] = session._open(condition, plan)
+            parts = [s._parts(state).believed(state, s.log) for s, state in new.items()]
+            goals = [latest_goal(state).goal for state in new.values()]
+            conditions = [each.adapter.propose(g) for each, g in zip(parts, goals, strict=True)]
+            plans = _generated([each.generator for each in parts], conditions)
+            for (session, state), each, condition, plan in zip(
+                new.items(), parts, conditions, plans, strict=True
+            ):
+                verdicts[session] = session._open(state, each, condition, plan)
     return [
-        session._with_plan(number, verdicts)
-        for session, number in zip(sessions, numbers, strict=True)
+        session._with_plan(state, number, verdicts)
+        for session, (state, number) in zip(sessions, asked, strict=True)
     ]
 
 
-def _as_list(numbers: Point | None) -> list[float] | None:
-    return None if numbers is None else numbers.tolist()
-
-
-def _loaded(given: Any) -> Any:
-    """What was given, or what the function that was given loads; a network is callable too."""
-    return given() if isinstance(given, (FunctionType, MethodType)) else given
+def _generated(generators: Sequence[Generator], conditions: Sequence[Point]) -> list[Frames]:
+    """A plan for each condition, with one call of each generator."""
+    plans: dict[int, Frames] = {}
+    for generator in {id(each): each for each in generators}.values():
+        own = [i for i, each in enumerate(generators) if each is generator]
+        made = generator.generate(np.stack([conditions[i] for i in own]))
+        if not np.all(np.isfinite(made)):
+            raise InvalidPlanError(
+                "the generator gives plans that hold no numbers (nan or inf); learn again"
+            )
+        plans.update(zip(own, made, strict=True))
+    return [plans[i] for i in range(len(generators))]

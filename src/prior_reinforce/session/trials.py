@@ -8,13 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from numbers import Integral
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
-from msgspec import structs
 
 from prior_reinforce.arrays import Frames, Point
 from prior_reinforce.errors import (
@@ -23,22 +22,25 @@ from prior_reinforce.errors import (
     TrialStateError,
     WorkspaceError,
 )
-from prior_reinforce.plans.motions import PlanFormat
-from prior_reinforce.readings import Reading, in_tolerances
+from prior_reinforce.formats import OutcomeFormat, in_tolerances
+from prior_reinforce.plans.plan_format import PlanFormat
+from prior_reinforce.readings import Reading
 from prior_reinforce.session.events import (
     Amended,
     Asked,
     Entry,
     Event,
     GoalSet,
-    KeptPlan,
     Told,
     Voided,
 )
 
+if TYPE_CHECKING:
+    from prior_reinforce.adapters import base
+
 
 class Verdict(Protocol):
-    """What a gate says of a plan; see `bench.robots.report.LimitReport`."""
+    """What a gate says of a plan; see `arm.robots.report.LimitReport`."""
 
     def require(self) -> None:
         """Raise RobotLimitError unless the plan may be executed."""
@@ -54,21 +56,12 @@ class Stage(Enum):
     """Where a trial stands."""
 
     ASKED = "asked"
-    """Its plan was generated; as far as is known nothing moved yet."""
-    EXECUTING = "executing"
-    """A command was given the plan. If the program died then, only a person knows what moved."""
-    EXECUTED = "executed"
-    """The command ended; the error has not been told."""
+    """Its plan was generated; its outcome has not been told."""
     TOLD = "told"
     """What was seen of it was told."""
     VOIDED = "voided"
     """Not data: the ball slipped, the arm stopped, nothing was seen."""
 
-
-_LEAST_SD = 1 / 3
-"""Least sd of a number of unknown origin, in tolerances (ours): half a centimetre of 1.5 cm. Who
-gives numbers for words means to; with twice as much, P(hit) is said too low and adapters lag
-(docs/decisions-adapter.md)."""
 
 _NEWS = 4.0
 """A reading is a surprise from so many standard deviations on (ours): of 398 trials in which
@@ -83,28 +76,23 @@ class Goal:
     """From 1."""
     goal: Point
     """g, in the outcomes' units."""
-    tolerance: Point
-    """epsilon of each component, in its unit: an error of one tolerance's length still counts as
-    reached (see `in_tolerances`)."""
+    format: OutcomeFormat
+    """What its numbers mean, with the tolerance."""
     carry_over: bool = False
     """Whether the adapter also learns from the trials of earlier goals."""
     adapter: str = ""
     """The adapter's name; empty where the session was given one by hand."""
     new_hardware: str | None = None
     """What was changed on the hardware before its first trial; None where nothing was."""
-    names: tuple[str, ...] = ()
-    """Names of the components."""
-    units: tuple[str, ...] = ()
-    """Their units."""
 
     def is_hit(self, error: Point) -> bool:
         """Whether an error, outcome minus goal, counts as reached."""
         return in_tolerances(error, self.tolerance) <= 1.0
 
     @property
-    def least_sd(self) -> Point:
-        """Least standard deviation of an error of unknown origin, in each component's unit."""
-        return _LEAST_SD * self.tolerance
+    def tolerance(self) -> Point:
+        """Epsilon of each component, in its unit."""
+        return self.format.half_axes
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,8 +105,8 @@ class Trial:
     """The goal that it was asked for."""
     condition: Point
     """c = M(g); read-only."""
-    plan: Frames | None = None
-    """A = pi(c); read-only. None for a trial read back from a journal, until it is asked for."""
+    plan: Frames = field(default_factory=lambda: np.empty((0, 0)))
+    """A = pi(c), shape (H, D), read-only; no rows in a trial that was read back from a log."""
     stage: Stage = Stage.ASKED
     reading: Reading | None = None
     """What was said of it; None unless told."""
@@ -136,14 +124,18 @@ class Trial:
     """Error that was expected of it, outcome minus goal, likewise."""
     expected_sd: Point | None = None
     """Its standard deviation, likewise."""
+    remark: str = ""
+    """What its adapter had to say beforehand (`Expectation.remark`)."""
     model: str = ""
     """Which model planned it: the name of its folder in a workspace, else empty."""
-    kept: KeptPlan | None = None
-    """The plan's file; None where the log keeps plans in memory."""
     gate: dict[str, Any] | None = None
     """The gate's verdict when the trial was asked for, as plain data."""
     verdict: Verdict | None = None
     """The gate's verdict of now, on a trial that `Session.ask` returned; None without a gate."""
+    asked_at: str = ""
+    """When it was asked for, ISO 8601, UTC; empty where the log is in memory."""
+    told_at: str = ""
+    """When its reading was told or amended last, likewise; empty unless told."""
 
     def __repr__(self) -> str:
         said = [f"{self.number} for goal {self.goal_number}", self.stage.value]
@@ -151,7 +143,7 @@ class Trial:
         if self.error_seen is not None:
             hit = "hit" if self.hit else "miss"
             said.append(f"error {np.round(self.error_seen, 4).tolist()}, {hit}")
-        if self.plan is not None:
+        if len(self.plan):
             said.append(f"plan {' x '.join(map(str, self.plan.shape))}")
         return f"Trial({', '.join(said)})"
 
@@ -171,31 +163,28 @@ class Trial:
         if sds < _NEWS:
             return ""
         return (
-            f"{sds:.0f} sd from what was expected of it; mistyped: amend {n}; "
-            "changed: goal --new-hardware"
+            f"{sds:.0f} standard deviations from the prediction (a typo? amend {n}; other "
+            "hardware? goal --new-hardware)"
         )
 
     @property
     def open(self) -> bool:
         """Whether the trial still waits to be told or voided."""
-        return self.stage in {Stage.ASKED, Stage.EXECUTING, Stage.EXECUTED}
-
-
-class AskedTrial(Trial):
-    """A trial with its plan, as `Session.ask` returns it."""
-
-    plan: Frames
-    """A = pi(c); read-only."""
+        return self.stage is Stage.ASKED
 
 
 class State:
-    """What the events of a log add up to."""
+    """What the events of a log add up to, folded forward one event at a time.
+
+    Trials of one goal follow each other, and only the last trial can be open, so that taking in an
+    event and asking what stands cost the same however many came before.
+    """
 
     def __init__(self) -> None:
         self.goals: list[Goal] = []
         self.trials: list[Trial] = []
-        self.plans: dict[int, Frames] = {}
-        """Plans that are kept in memory, by the trial's number."""
+        self._n_before: list[int] = []
+        """Number of trials before each goal."""
 
     @property
     def in_use(self) -> tuple[str, ...]:
@@ -209,8 +198,8 @@ class State:
 
     @property
     def open_trial(self) -> Trial | None:
-        """The trial that waits to be told, if any."""
-        return next((trial for trial in self.trials if trial.open), None)
+        """The trial that waits to be told, if any: it is the last one."""
+        return self.trials[-1] if self.trials and self.trials[-1].open else None
 
     @property
     def solved(self) -> bool:
@@ -220,7 +209,7 @@ class State:
     @property
     def current(self) -> tuple[Trial, ...]:
         """Trials for the goal that is worked on, in order."""
-        return self.trials_of(len(self.goals))
+        return self.trials_of(len(self.goals)) if self.goals else ()
 
     def trial(self, number: int) -> Trial:
         """Return a trial of any goal as it stands.
@@ -244,7 +233,9 @@ class State:
 
     def trials_of(self, goal_number: int) -> tuple[Trial, ...]:
         """Trials of one goal, in order."""
-        return tuple(trial for trial in self.trials if trial.goal_number == goal_number)
+        latest = goal_number == len(self.goals)
+        end = len(self.trials) if latest else self._n_before[goal_number]
+        return tuple(self.trials[self._n_before[goal_number - 1] : end])
 
     def readings_for(self, goal: Goal, model: str) -> list[Trial]:
         """Told trials that an adapter learns from for a goal, oldest first.
@@ -252,14 +243,7 @@ class State:
         Those of the goal, and of earlier ones where they are carried over, as far as this model
         planned them.
         """
-        return [
-            trial
-            for trial in self.trials
-            if trial.stage is Stage.TOLD
-            and trial.model == model
-            and (goal.carry_over or trial.goal_number == goal.number)
-            and trial.goal_number <= goal.number
-        ]
+        return [trial for trial in self.trials if _teaches(trial, goal, model)]
 
     def refuse_open_trial(self, doing: str) -> None:
         """Do nothing unless a trial waits to be told.
@@ -280,55 +264,56 @@ class State:
             WorkspaceError: It cannot follow the others.
         """
         try:
-            self._apply(entry.event)
+            self._apply(entry.event, entry.time)
         except (IndexError, ValueError, PriorReinforceError) as error:
             raise WorkspaceError(
                 f"event {entry.id} ({entry.kind}) does not fit the ones before it: {error}; "
                 "restore the journal from a copy"
             ) from error
 
-    def _apply(self, event: Event) -> None:
+    def _apply(self, event: Event, time: str) -> None:
         match event:
             case GoalSet():
-                each = (event.goal, event.tolerance, event.names, event.units)
-                if len({len(of) for of in each}) > 1:
+                place = _read_only(event.goal)
+                if not place.size == event.format.outcome_dim == len(event.format.tolerance):
                     raise ValueError("goal, tolerance, names and units have different lengths")
-                place, tolerance = _read_only(event.goal), _read_only(event.tolerance)
-                if not np.all(tolerance > 0):
-                    raise ValueError("a tolerance is not positive")
+                if self.goals and place.size != self.goals[0].goal.size:
+                    raise ValueError("it has another number of components than the goals before")
                 rest = (event.carry_over, event.adapter, event.new_hardware)
-                outcome = (tuple(event.names), tuple(event.units))
-                self.goals.append(Goal(len(self.goals) + 1, place, tolerance, *rest, *outcome))
+                self.goals.append(Goal(len(self.goals) + 1, place, event.format, *rest))
+                self._n_before.append(len(self.trials))
             case Asked():
                 if event.trial != len(self.trials) + 1 or self.open_trial is not None:
                     raise ValueError(f"trial {event.trial} after {len(self.trials)}")
-                if not 1 <= event.goal <= len(self.goals):
-                    raise ValueError(f"there is no goal {event.goal}")
+                if event.goal != len(self.goals) or not self.goals:
+                    raise ValueError(f"goal {event.goal} is not the latest of {len(self.goals)}")
                 if len(event.condition) != self.goals[event.goal - 1].goal.size:
                     raise ValueError("the condition has another length than the goal")
-                known = structs.asdict(event)
+                known = {name: getattr(event, name) for name in Asked.__struct_fields__}
                 for name in ("condition", "expected_error", "expected_sd"):
                     known[name] = None if known[name] is None else _read_only(known[name])
-                number, goal, kept = (known.pop(name) for name in ("trial", "goal", "plan"))
-                plan = self.plans.get(number)
-                kind = Trial if plan is None else AskedTrial
-                self.trials.append(kind(number, goal, plan=plan, kept=kept, **known))
+                number, goal = known.pop("trial"), known.pop("goal")
+                self.trials.append(Trial(number, goal, asked_at=time, **known))
             case Amended():
-                self._correct(self._told(event))
+                if self.trial(event.trial).stage is not Stage.TOLD:
+                    raise ValueError(f"trial {event.trial} has not been told")
+                self._correct(self._told(event, time))
             case Told():
-                self.trials[event.trial - 1] = self._told(event)
+                if not self.trial(event.trial).open:
+                    raise ValueError(f"trial {event.trial} is not open")
+                self.trials[event.trial - 1] = self._told(event, time)
             case Voided():
                 void = replace(self.trial(event.trial), stage=Stage.VOIDED, note=event.reason)
-                self._correct(replace(void, reading=None, hit=False))
+                self._correct(replace(void, reading=None, hit=False, told_at=""))
             case _:
                 raise ValueError("no event of a session")
 
-    def _told(self, event: Told) -> Trial:
+    def _told(self, event: Told, time: str) -> Trial:
         trial = self.trial(event.trial)
         reading = Reading.from_record(event.reading)
         if reading.error_seen.size != self.goal_of(trial).goal.size:
             raise InvalidFeedbackError("the reading has another number of components than the goal")
-        return replace(trial, stage=Stage.TOLD, reading=reading, hit=event.hit)
+        return replace(trial, stage=Stage.TOLD, reading=reading, hit=event.hit, told_at=time)
 
     def _correct(self, corrected: Trial) -> None:
         """Replace a trial, and mark the open one if it was planned from what is corrected now."""
@@ -337,7 +322,7 @@ class State:
             waiting is not None
             and not before.open
             and _meaning(before) != _meaning(corrected)
-            and before in self.readings_for(self.goal_of(waiting), waiting.model)
+            and _teaches(before, self.goal_of(waiting), waiting.model)
         ):
             self.trials[waiting.number - 1] = replace(waiting, outdated=True)
         self.trials[corrected.number - 1] = corrected
@@ -349,7 +334,6 @@ class Log:
     def __init__(self) -> None:
         self._entries: list[Entry] = []
         self._state = State()
-        self._n_added = 0
 
     def entries(self) -> Sequence[Entry]:
         """All events so far, in order, whoever wrote them."""
@@ -361,9 +345,6 @@ class Log:
         Raises:
             WorkspaceError: The events do not fit together, or cannot be read.
         """
-        for entry in self.entries()[self._n_added :]:
-            self._state.add(entry)
-            self._n_added += 1
         return self._state
 
     def exclusive(self) -> AbstractContextManager[object]:
@@ -372,28 +353,38 @@ class Log:
 
     def append(self, event: Event) -> None:
         """Add an event; called within `exclusive`."""
-        entry = Entry(len(self._entries) + 1, event)
-        self._state.add(entry)  # which refuses what does not fit
-        self._entries.append(entry)
-        self._n_added += 1
+        self._add(Entry(len(self._entries) + 1, event))
 
-    def keep_plan(self, number: int, plan: Frames, form: PlanFormat) -> KeptPlan | None:
-        """Keep a trial's plan, and return its file if it has one."""
-        self._state.plans[number] = _read_only(plan)
+    def _add(self, entry: Entry) -> None:
+        """Fold the next event into the state; one that does not fit changes nothing."""
+        self._state.add(entry)
+        self._entries.append(entry)
+
+    def append_asked(self, event: Asked, plan: Frames, form: PlanFormat) -> None:
+        """Add a new trial and keep its plan; called within `exclusive`.
+
+        In memory a plan may have numbers that no arm has: a simulation loses its object for it.
+        """
+        self.append(event)
+        self._state.trials[-1] = replace(self._state.trials[-1], plan=_read_only(plan))
+
+    def keep_adapter(self, adapter: base.Adapter) -> None:
+        """Keep what an adapter knows, for programs to come; called within `exclusive`."""
+
+    def kept_adapter(self) -> tuple[str, base.State] | None:
+        """Key and state of the adapter that was kept last."""
         return None
 
     def plan(self, trial: Trial) -> Frames:
-        """Return a plan that was kept."""
-        return self._state.plans[trial.number]
+        """Return the plan that was kept of a trial."""
+        return trial.plan
 
-    def settle(self, trial: Trial, *, arm_did_not_move: bool) -> None:
-        """Note that a trial may be executed after all; called within `exclusive`.
 
-        Raises:
-            TrialStateError: It is executing now, was executed to its end, or nobody has said
-                whether the arm moved.
-        """
-        raise NotImplementedError("only a workspace executes trials")
+def _teaches(trial: Trial, goal: Goal, model: str) -> bool:
+    """Whether an adapter learns from a trial for a goal; see `State.readings_for`."""
+    of_goal = trial.goal_number == goal.number
+    earlier = goal.carry_over and trial.goal_number < goal.number
+    return trial.stage is Stage.TOLD and trial.model == model and (of_goal or earlier)
 
 
 def _meaning(trial: Trial) -> object:

@@ -1,0 +1,136 @@
+"""What is believed, before any trial, of where plans that a symmetry moves come down.
+
+The terms stand in `moved`. Three kinds of models: the symmetry holds as stated (0.85); what is not
+exact works the other way (0.05); there is none (0.10), and every entry of G may be anything.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from prior_reinforce.arrays import Point, Points
+from prior_reinforce.plans.motions import Demonstrations
+from prior_reinforce.plans.symmetry import Anchors
+
+_REACH = 0.3
+"""How far f and F reach, in the chart (ours)."""
+AS_STATED, OTHER_WAY, NONE = "as stated", "the other way", "none"
+"""What may hold: the symmetry, what is not exact of it with another sign, or nothing."""
+_P_OTHER_WAY, _P_NONE = 0.05, 0.10
+"""Probabilities of models beside the stated ones (ours)."""
+_CLOSELY, _P_CLOSELY = 0.2, 0.45
+"""All that is off may be so much smaller than stated, with this probability where a symmetry holds
+(ours): a simulated arm, or one that was measured today."""
+_ANY_GAIN, _ANY_BEND = 0.8, 3.0
+"""Where there is no symmetry: least sd of every entry of G, and how much more the law bends."""
+_REMEMBERED = 4
+"""Sets of aims whose anchors are remembered (ours): those of trials are asked for all the time."""
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """What is believed of G, and of how the law bends."""
+
+    name: str
+    """`AS_STATED`, `OTHER_WAY` or `NONE`."""
+    mean: Float[np.ndarray, "k k"]
+    sd: Float[np.ndarray, "k k"]
+    off: float
+    """Factor of the sds of b, b_i and F."""
+    bend: float
+    """Factor of the sd of f."""
+    probability: float
+
+    @property
+    def signs(self) -> Float[np.ndarray, " k"]:
+        """Of the diagonal of G."""
+        return np.asarray(np.sign(np.diag(self.mean)))
+
+
+class MovedPrior:
+    """Means and covariances, in the chart, of where moved plans come down."""
+
+    def __init__(self, demonstrations: Demonstrations) -> None:
+        """Take the demonstrations, which carry a symmetry."""
+        assert demonstrations.symmetry is not None
+        self.symmetry = symmetry = demonstrations.symmetry
+        self.anchors = Anchors(symmetry, demonstrations.outcomes_seen, demonstrations.outcome_noise)
+        seen = demonstrations.outcomes_seen + demonstrations.outcome_correction
+        self._off = symmetry.chart.to(seen) - self.anchors.z
+        jacobian = symmetry.chart.jacobian(self.anchors.z).mean(axis=0)
+        self.size: Point = np.linalg.norm(jacobian, axis=1)
+        """Outcomes per unit of the chart, (k,)."""
+        self.left: Int[np.ndarray, " s"] = self.anchors.left
+        self.models = self._models()
+        self._bases: dict[bytes, tuple[Points, Float[np.ndarray, "n N"]]] = {}
+
+    def _models(self) -> tuple[Model, ...]:
+        of = self.symmetry
+        every = itertools.product(*([1.0] if exact else [1.0, -1.0] for exact in of.exact))
+        signs = [np.array(each) for each in every][1:]
+        stated = 1.0 - _P_NONE - (_P_OTHER_WAY if signs else 0.0)
+        closely = _CLOSELY * of.gain_sd, _CLOSELY, _CLOSELY, _P_CLOSELY * stated
+        anything = np.maximum(of.gain_sd, _ANY_GAIN)
+        return (
+            Model(AS_STATED, of.gain_mean, of.gain_sd, 1.0, 1.0, (1.0 - _P_CLOSELY) * stated),
+            Model(AS_STATED, of.gain_mean, *closely),
+            *(
+                Model(OTHER_WAY, of.gain_mean * s, of.gain_sd, 1.0, 1.0, _P_OTHER_WAY / len(signs))
+                for s in signs
+            ),
+            Model(NONE, of.gain_mean, anything, 1.0, _ANY_BEND, _P_NONE),
+        )
+
+    def base(self, aims: Points) -> tuple[Points, Float[np.ndarray, "n N"]]:
+        """See `Anchors.base`."""
+        key = aims.tobytes()
+        if key not in self._bases:
+            if len(self._bases) >= _REMEMBERED:
+                self._bases.pop(next(iter(self._bases)))
+            self._bases[key] = self.anchors.base(aims)
+        return self._bases[key]
+
+    def moved(self, aims: Points) -> Points:
+        """By how much plans for these aims are moved: w, (n, k)."""
+        return np.asarray(aims - self.base(aims)[0])
+
+    def mean(self, model: Model, aims: Points) -> Points:
+        """Where they come down, (n, k)."""
+        base, weights = self.base(aims)
+        return np.asarray(base + weights @ self._off + (aims - base) @ model.mean.T)
+
+    def covariance(
+        self, model: Model, a: Float[np.ndarray, "p k"], b: Points
+    ) -> Float[np.ndarray, "k p n"]:
+        """Of each component of z between aims; different components are independent."""
+        of = self.symmetry
+        (base_a, v_a), (base_b, v_b) = self.base(a), self.base(b)
+        w_a, w_b = a - base_a, b - base_b
+        counts = ~of.exact if len(self.left) else np.ones(of.k, dtype=bool)
+        lengths = np.outer(*(np.linalg.norm(w * counts, axis=1) for w in (w_a, w_b)))
+        bent = lengths * _kernel(w_a * counts, w_b * counts)
+        between = np.zeros_like(bent)
+        if self.anchors.mixed:
+            at_a, at_b, known = (z[:, self.left] for z in (base_a, base_b, self.anchors.z))
+            between = _kernel(at_a, at_b) + v_a @ _kernel(known, known) @ v_b.T
+            between -= _kernel(at_a, known) @ v_b.T + v_a @ _kernel(known, at_b)
+        common = v_a @ v_b.T
+        return np.stack(
+            [
+                (w_a * model.sd[j] ** 2) @ w_b.T
+                + (model.off * of.offset_sd[j]) ** 2 * (0.5 + 0.5 * common)
+                + (v_a * self.anchors.sd[:, j] ** 2) @ v_b.T
+                + (model.bend * of.bend_sd[j]) ** 2 * bent
+                + (model.off * of.between_sd[j]) ** 2 * between
+                for j in range(of.k)
+            ]
+        )
+
+
+def _kernel(a: Float[np.ndarray, "p k"], b: Points) -> Float[np.ndarray, "p n"]:
+    square = np.square(a[:, None] - b[None]).sum(axis=-1)
+    return np.asarray(np.exp(-0.5 * square / _REACH**2))

@@ -1,0 +1,226 @@
+"""Trials of plans that a symmetry moves: what to try next, and what is expected of it.
+
+The part of `BayesianAdapter` for demonstrations that carry a symmetry; see `moved` for the model.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Float
+
+from prior_reinforce.adapters.base import Expectation, State
+from prior_reinforce.adapters.displacement import BayesianConfig
+from prior_reinforce.adapters.memory import LATEST, Memory, Places, tried_again
+from prior_reinforce.adapters.moved import EXECUTION, OF_TOLERANCE, UNIT, MovedBelief
+from prior_reinforce.adapters.moved_prior import AS_STATED, OTHER_WAY
+from prior_reinforce.adapters.p_hit import evenly_spread, trials_to_go
+from prior_reinforce.arrays import Point, Points
+from prior_reinforce.plans.motions import Demonstrations
+from prior_reinforce.readings import Reading
+
+_NOTHING = 0.1
+"""Probability that nothing has changed although it was said (ours)."""
+_BLUR = 2.0
+"""Standard deviations of a reading within which it leaves a hit possible (ours)."""
+_NOMINAL = 0.1
+"""Tolerance where no trial told one, in `UNIT` (ours)."""
+_BACK = 0.5
+"""What is left of the way from the demonstration where an object was lost (ours)."""
+
+
+class MovedTrials:
+    """The trials so far, in the outcomes' units."""
+
+    def __init__(self, config: BayesianConfig, demonstrations: Demonstrations) -> None:
+        """Know nothing but the demonstrations."""
+        self.belief = MovedBelief(demonstrations, config.p_change)
+        self.chart = self.belief.symmetry.chart
+        self.now = 0
+        self._lost: list[tuple[Point, Point]] = []
+
+    def state(self) -> State:
+        """What `resume` needs."""
+        state = self.belief.state()
+        lost = [[goal.tolist(), aim.tolist()] for goal, aim in self._lost]
+        return State({**state.facts, "now": self.now, "lost": lost}, state.arrays)
+
+    def resume(self, state: State) -> None:
+        """Go on from what `state` gave."""
+        self.belief.resume(state)
+        self.now = state.facts["now"]
+        self._lost = [(np.array(goal), np.array(aim)) for goal, aim in state.facts["lost"]]
+
+    def observe(self, condition: Point, goal: Point, reading: Reading) -> None:
+        """Take in one trial; see `Adapter.observe`.
+
+        Where the object was lost, the next plan for that goal is moved half as far: nearer to what
+        was demonstrated it stays.
+        """
+        if reading.lost:
+            self._lost.append((goal, self.chart.to(condition)))
+            return
+        radius = reading.missed_by_at_least
+        none = np.zeros_like(goal)
+        noise = self._noise if radius is None else OF_TOLERANCE * radius
+        self.belief.observe(
+            Memory(
+                self.chart.to(condition)[None],
+                np.array([self.now]),
+                goal[None],
+                reading.low[None],
+                reading.high[None],
+                (reading.sd**2 + noise**2)[None],
+                (none if radius is None else radius)[None],
+            )
+        )
+        self.now += 1
+
+    def change_hardware(self) -> None:
+        """Something may be different from now on."""
+        self.belief.change(self.now, _NOTHING)
+        self._lost.clear()
+
+    def propose(self, goal: Point) -> Point:
+        """Return the condition to try next; see `Adapter.propose`."""
+        aim = self.belief.aim(goal, self.now, self._farthest(goal))
+        condition = self.chart.back(aim)
+        missed = self._told_as_now(goal)
+        if tried_again(condition[None], self.chart.back(missed.conditions), missed.missed_by)[0]:
+            return self._likeliest_beside(condition, goal, missed)
+        return condition
+
+    def expect(self, condition: Point, goal: Point, tolerance: Point) -> Expectation:
+        """Return what is expected of a trial; see `Adapter.expect`."""
+        p_hit = float(self.p_hit(condition[None], goal[None], tolerance)[0])
+        trials = trials_to_go(p_hit, self.belief.memory)
+        at = self._places(condition[None], goal[None])
+        means, variances = [], []
+        for h in range(len(self.belief.hypotheses)):
+            there = self.belief.outcomes(h, at)
+            means.append(there.mean[0] - goal)
+            variances.append(np.diag(self.belief.spread(h, there)[0]))
+        share = self.belief.probabilities
+        error = share @ np.array(means)
+        variance = share @ (np.array(variances) + np.square(means)) - error**2
+        sd = np.sqrt(variance + np.square(OF_TOLERANCE * tolerance))
+        return Expectation(p_hit, trials, error, sd, self.remark(goal))
+
+    def p_hit(
+        self, conditions: Points, goals: Points, tolerance: Point, seed: int = 1
+    ) -> Float[np.ndarray, " n"]:
+        """Return each condition's probability of a hit; see `BayesianAdapter.p_hit`."""
+        at, radius = self._places(conditions, goals), np.broadcast_to(tolerance, goals.shape[1])
+        return self.belief.p_hit(at, radius, self._bare_misses(), seed)
+
+    def displacement(self, conditions: Points, *, hardware: bool = True) -> Points:
+        """Where outcomes are expected to lie, seen from conditions, most probably; (n, k).
+
+        Whatever `hardware` says: what differs from the demonstrations' day is not told apart.
+        """
+        return self.belief.outcomes(0, self._places(conditions, conditions)).mean - conditions
+
+    def gain(
+        self, candidates: Points, over: Float[np.ndarray, "m k"], *, demonstrations: bool = False
+    ) -> Float[np.ndarray, " n"]:
+        """Share of the variance over places that a reading would take; see `BayesianAdapter.gain`.
+
+        Of demonstrations too: they would be moved as those are that are there, so that each
+        tells what a trial does.
+        """
+        belief, noise = self.belief, np.square(self._noise)
+        at = belief.outcomes(0, self._places(candidates, candidates))
+        there = belief.outcomes(0, self._places(over, over))
+        unknown = np.trace(belief.spread(0, there), axis1=1, axis2=2).sum()
+        between = belief.covariance(0, at, there)
+        read = belief.spread(0, at) + np.diag(noise)
+        gone = np.einsum("pcnd,pce,pend->p", between, np.linalg.inv(read), between)
+        return np.asarray(gone / unknown)
+
+    @property
+    def odds(self) -> dict[str, float]:
+        """Probability of each kind of model of the symmetry."""
+        shares = dict.fromkeys((model.name for model in self.belief.prior.models), 0.0)
+        for h, share in enumerate(self.belief.probabilities):
+            shares[self.belief.model(h).name] += float(share)
+        return shares
+
+    @property
+    def doubted(self) -> bool:
+        """Whether evidence has left the symmetry; see `BayesianAdapter.symmetry_doubted`."""
+        memory, best = self.belief.memory, self.belief.hypotheses[0]
+        at_once = bool(best.changes) and len(np.unique(memory.goals, axis=0)) == 1
+        return self.belief.model(0).name != AS_STATED or at_once or len(self._lost) > 1
+
+    def remark(self, goal: Point) -> str:
+        """What a person should know before the next trial for a goal, in one line, or nothing."""
+        belief, model, symmetry = self.belief, self.belief.model(0), self.belief.symmetry
+        aim, farthest = belief.aim(goal, self.now, self._farthest(goal)), symmetry.farthest
+        w = belief.prior.moved(aim[None])[0]
+        error = (
+            belief.outcomes(0, self._places(self.chart.back(aim)[None], goal[None])).mean[0] - goal
+        )
+        if np.any(np.abs(w) >= (1.0 - 1e-6) * farthest) and np.linalg.norm(error) > np.linalg.norm(
+            self._noise
+        ):
+            return (
+                f"the goal is farther than the demonstration can be moved ({symmetry.name}); "
+                f"demonstrate nearer to {np.round(goal, 3).tolist()}"
+            )
+        if model.name == OTHER_WAY:
+            return f"outcomes follow the symmetry ({symmetry.name}) the other way round"
+        if self.doubted:
+            return f"outcomes do not follow the symmetry ({symmetry.name}): is it the right one?"
+        if belief.hypotheses[0].changes:
+            since = belief.hypotheses[0].changes[-1].since
+            return f"since trial {since + 1} outcomes lie elsewhere: was something moved?"
+        return ""
+
+    @property
+    def _noise(self) -> Point:
+        """Standard deviation of an execution, in the outcomes' units."""
+        told = self.belief.memory.missed_by[np.any(self.belief.memory.missed_by > 0.0, axis=1)]
+        if len(told):
+            return np.asarray(OF_TOLERANCE * told[-1])
+        return np.asarray(EXECUTION * UNIT * self.belief.prior.size)
+
+    def _farthest(self, goal: Point) -> Point:
+        """By how much plans for a goal may be moved: nearer than where an object was lost."""
+        farthest, left = self.belief.symmetry.farthest.copy(), self.belief.prior.left
+        which = left if len(left) else np.arange(len(goal))
+        for about, aim in self._lost:
+            if np.array_equal(about, goal):
+                w = np.abs(self.belief.prior.moved(aim[None])[0])
+                farthest[which] = np.minimum(farthest, _BACK * w)[which]
+        return farthest
+
+    def _places(self, conditions: Points, goals: Points) -> Places:
+        """Of trials of now."""
+        return Places(self.chart.to(conditions), np.full(len(conditions), self.now), goals)
+
+    def _told_as_now(self, goal: Point) -> Memory:
+        """Trials for a goal that missed, with all as it is now, most probably."""
+        memory, changes = self.belief.memory, self.belief.hypotheses[0].changes
+        since = changes[-1].since if changes else 0
+        missed = np.all(memory.goals == goal, axis=1) & np.any(memory.missed_by > 0.0, axis=1)
+        return memory.only(missed & (memory.numbers >= since))
+
+    def _bare_misses(self) -> Memory:
+        """The latest trials that missed and of which their readings do not say so."""
+        missed = self.belief.memory.only(slice(-LATEST, None))
+        missed = missed.only(np.any(missed.missed_by > 0.0, axis=1))
+        beyond = np.maximum(missed.low, -missed.high) - _BLUR * np.sqrt(missed.variance)
+        least = np.linalg.norm(np.maximum(beyond, 0.0) / missed.missed_by, axis=1)
+        return missed.only(least < 1.0)
+
+    def _likeliest_beside(self, condition: Point, goal: Point, missed: Memory) -> Point:
+        """Return the condition around another that most probably hits and was not tried."""
+        at, radius = self._places(condition[None], goal[None]), missed.missed_by[-1]
+        there = self.belief.outcomes(0, at)
+        sd = np.sqrt(np.diag(self.belief.spread(0, there)[0]))
+        cube = 2.0 * evenly_spread(len(goal)) - 1.0
+        ball = cube[np.linalg.norm(cube, axis=1) <= 1.0]
+        candidates = condition + (radius + 2.0 * sd) * ball
+        tried = self.chart.back(missed.conditions)
+        candidates = candidates[~tried_again(candidates, tried, missed.missed_by)]
+        goals = np.broadcast_to(goal, candidates.shape)
+        return np.asarray(candidates[np.argmax(self.p_hit(candidates, goals, radius, seed=0))])

@@ -1,0 +1,11 @@
+from .auto import Auto as Auto
+from .base import FitProgress as FitProgress
+from .base import Generator as Generator
+from .interpolation import SmoothInterpolation as SmoothInterpolation
+from .members import GENERATORS as GENERATORS
+from .members import load_generator as load_generator
+from .members import make_generator as make_generator
+from .network.config import DiffusionConfig as DiffusionConfig
+from .network.config import UNetSize as UNetSize
+from .network.diffusion import DiffusionGenerator as DiffusionGenerator
+from .timing.timed import Timed as Timed

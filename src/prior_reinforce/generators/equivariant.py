@@ -1,0 +1,156 @@
+"""Wrapper that takes out of plans what a symmetry does, and puts it back after learning.
+
+    learn     demonstrations --move to one place--> canonical plans over what is left of z
+    generate  aim --chart--> z --base--> canonical plan --move by w = z - z_base--> plan
+
+What a generator has to learn is one dimension less for each exact component (*canonicalisation*;
+`plans.symmetry`), and nothing at all where no component is left or one demonstration is all there
+is: that demonstration is moved. Beyond the demonstrated hull of what is left, plans are moved from
+its edge; nothing extrapolates. Without a symmetry the wrapped generator learns as it is.
+
+Ours; the idea is that of canonical and frame-averaging policies.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+from jaxtyping import Float
+from typing_extensions import Self
+
+from prior_reinforce.arrays import Plans, Point, Points
+from prior_reinforce.formats import OutcomeFormat
+from prior_reinforce.generators.base import Generator, OnProgress, Wrapper, at_once
+from prior_reinforce.generators.saving import SavedLayer, Tensors
+from prior_reinforce.plans.motions import Demonstrations
+from prior_reinforce.plans.symmetry import Anchors, Symmetry
+
+
+class Equivariant(Wrapper):
+    """A generator of canonical plans, which the demonstrations' symmetry moves to the aim.
+
+    Plans may differ in length, since slower ones are longer: one that is asked for alone is not
+    padded; in a batch, shorter ones rest at their last frame.
+    """
+
+    name: ClassVar[str] = "equivariant"
+    _anchors: Anchors | None = None
+    """None before `fit`, and without a symmetry."""
+    _plans: Plans
+    _outcomes: Points
+    _noise: Points
+    _home: Point
+    """Exact components to which plans are brought, the others 0, shape (k,)."""
+
+    def check_demonstrations(self, demonstrations: Demonstrations) -> None:
+        """Do nothing with a symmetry; see `Generator.check_demonstrations`."""
+        if demonstrations.symmetry is None:
+            self.generator.check_demonstrations(demonstrations)
+
+    def _fit(self, demonstrations: Demonstrations, seed: int, progress: OnProgress) -> None:
+        symmetry = demonstrations.symmetry
+        if symmetry is None:
+            self._anchors = None
+            self.generator.fit(demonstrations, seed=seed, progress=progress)
+            return
+        outcomes, noise = demonstrations.outcomes_seen, demonstrations.outcome_noise
+        anchors = self._keep(symmetry, demonstrations.plans, outcomes, noise)
+        if anchors.mixed:
+            learned = self._canonical(demonstrations, anchors)
+            self.generator.fit(learned, seed=seed, progress=progress)
+            how = "demonstrations are brought to one place, mixed there, and moved to the goal"
+        else:
+            at_once(progress, loss=0.0)
+            how = "the nearest demonstration is moved to the goal"
+            how = how if demonstrations.n > 1 else "the demonstration is moved to the goal"
+        self.remarks = (f"symmetry: {symmetry.name}; {how}",)
+
+    def _keep(self, symmetry: Symmetry, plans: Plans, outcomes: Points, noise: Points) -> Anchors:
+        anchors = Anchors(symmetry, outcomes, noise)
+        self._anchors, self._plans, self._outcomes, self._noise = anchors, plans, outcomes, noise
+        self._home = np.where(symmetry.exact, anchors.z.mean(axis=0), 0.0)
+        return anchors
+
+    def _canonical(self, demonstrations: Demonstrations, anchors: Anchors) -> Demonstrations:
+        """Plans at home, with what is left of their outcomes."""
+        symmetry, left, z = anchors.symmetry, anchors.left, anchors.z
+        to_home = np.where(symmetry.exact, self._home - z, 0.0)
+        plans = [symmetry.move(*each) for each in zip(demonstrations.plans, to_home, strict=True)]
+        into = np.linalg.inv(symmetry.chart.jacobian(z))
+        correction = np.einsum("nij,nj->ni", into, demonstrations.outcome_correction)
+        names = demonstrations.outcome_format.names
+        units = symmetry.chart.units(demonstrations.outcome_format.units)
+        return Demonstrations(
+            np.stack(plans),
+            z[:, left],
+            demonstrations.format,
+            OutcomeFormat(tuple(names[j] for j in left), tuple(units[j] for j in left)),
+            anchors.sd[:, left],
+            correction[:, left],
+        )
+
+    def _generate(self, conditions: Points) -> Plans:
+        if self._anchors is None:
+            return self.generator.generate(conditions)
+        symmetry, exact = self._anchors.symmetry, self._anchors.symmetry.exact
+        aims = symmetry.chart.to(conditions)
+        base, weights = self._anchors.base(aims)
+        if self._anchors.mixed:
+            plans = self.generator.generate(base[:, self._anchors.left])
+            base = np.where(exact, self._home, base)
+        else:
+            plans = self._plans[weights.argmax(axis=1)]
+        # What is farther than believed stays there: a tempo of 0.01 would be no plan.
+        farthest = np.where(exact, np.inf, symmetry.farthest)
+        w = np.clip(aims - base, -farthest, farthest)
+        moved = [symmetry.move(plan, by) for plan, by in zip(plans, w, strict=True)]
+        return rested(moved, symmetry.increments) if moved else plans
+
+    def pack(self) -> list[SavedLayer]:
+        """Return what was learned; see `Generator.pack`. A demonstration that is moved is all."""
+        alone = self._anchors is not None and not self._anchors.mixed
+        return Generator.pack(self) if alone else super().pack()
+
+    def state(self) -> tuple[dict[str, Any], Tensors]:
+        """The symmetry and the demonstrations; see `Generator.state`."""
+        if self._anchors is None:
+            return {"symmetry": None}, {}
+        return {"symmetry": self._anchors.symmetry.data()}, {
+            "plans": self._plans,
+            "outcomes": self._outcomes,
+            "noise": self._noise,
+        }
+
+    @classmethod
+    def from_state(
+        cls, settings: Mapping[str, Any], tensors: Tensors, generator: Generator | None = None
+    ) -> Self:
+        """Rebuild it; where demonstrations are moved as they are, nothing else was learned."""
+        from prior_reinforce.generators.auto import Auto
+
+        made = cls(generator or Auto())
+        if settings["symmetry"] is None:
+            return made
+        symmetry = Symmetry.from_data(settings["symmetry"])
+        anchors = made._keep(symmetry, *(tensors[each] for each in ("plans", "outcomes", "noise")))
+        if anchors.mixed == (generator is None):
+            raise ValueError("the canonical plans' generator does not fit the demonstrations")
+        return made
+
+
+def rested(plans: Sequence[Float[np.ndarray, "_ D"]], increments: Sequence[int] = ()) -> Plans:
+    """Stack plans of different lengths: shorter ones rest at their last frame.
+
+    Args:
+        plans: At least one, shapes (H_i, D).
+        increments: Columns that are differences from frame to frame, 0 at rest.
+    """
+    longest = max(map(len, plans))
+    padded = []
+    for plan in plans:
+        rest = np.repeat(plan[-1:], longest - len(plan), axis=0)
+        rest[:, list(increments)] = 0.0
+        padded.append(np.vstack([plan, rest]))
+    return np.stack(padded)

@@ -1,0 +1,1 @@
+"""Generators that are neural networks: conditional diffusion (paper, Stage 1) and its parts."""

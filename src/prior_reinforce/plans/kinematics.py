@@ -1,0 +1,205 @@
+"""Kinematics of a serial arm: where the tool tip is, and paths of the flange turned and solved.
+
+Ours rather than MuJoCo's, which gives the same numbers: this is shorter, takes a whole motion at
+once, and spares `ask` the loading of a physics engine.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from prior_reinforce.errors import OutOfReachError
+
+JointPositions = Float[np.ndarray, "*n D"]
+"""Positions of an arm's D joints, [rad]."""
+Places = Float[np.ndarray, "*n 3"]
+"""As many points in the base frame, [m]."""
+Pose = tuple[float, float, float, float, float, float]
+"""x, y, z in [m] and roll, pitch, yaw in [rad], as in URDF: R = Rz(yaw) Ry(pitch) Rx(roll)."""
+_Z = (0.0, 0.0, 1.0)
+_HELD = 1e-3
+"""A joint that moves less than this in a path is held, [rad] (ours)."""
+_TURN_AT_A_TIME, _NEWTON_STEPS, _LARGEST_STEP, _DAMPING = 0.1, 12, 0.2, 1e-4
+"""Of `turned_path` (ours): [rad], steps for each, [rad] a step, [m^2]."""
+_SOLVED, _REACHED = 1e-7, 1e-4
+"""Error of a pose, [m] and [rad] alike, at which it is solved; at most, to be in reach (ours)."""
+
+
+@dataclass(frozen=True)
+class Chain:
+    """Revolute joints from the base to the flange, each a pose in the frame before and an axis.
+
+    That is URDF's way to say it, and holds any arm; `craig` and `standard` take the tables of
+    Denavit and Hartenberg.
+    """
+
+    origins: tuple[Pose, ...]
+    """Pose of each joint's frame in the frame before it."""
+    axes: tuple[tuple[float, float, float], ...]
+    """About which each joint turns, in its own frame; of length 1."""
+    flange: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    """Pose of the flange in the last joint's frame."""
+
+    @classmethod
+    def craig(cls, rows: Sequence[tuple[float, float, float]], flange: float) -> Chain:
+        """Make one from rows (a, d, alpha): Rot_x(alpha) Trans_x(a) Rot_z(theta) Trans_z(d).
+
+        Args:
+            rows: a and d in [m], alpha in [rad].
+            flange: Distance from the last joint's frame to the flange along its z axis, in [m].
+        """
+        origins = tuple(
+            (a, -math.sin(alpha) * d, math.cos(alpha) * d, alpha, 0.0, 0.0) for a, d, alpha in rows
+        )
+        return cls(origins, (_Z,) * len(rows), flange=(0.0, 0.0, flange, 0.0, 0.0, 0.0))
+
+    @classmethod
+    def standard(cls, rows: Sequence[tuple[float, float, float]], yaw: float = 0.0) -> Chain:
+        """Make one from rows (a, d, alpha): Rot_z(theta) Trans_z(d) Trans_x(a) Rot_x(alpha).
+
+        Args:
+            rows: a and d in [m], alpha in [rad].
+            yaw: By which the maker's base frame is turned in the one that is wanted, in [rad].
+        """
+        poses = tuple((a, 0.0, d, alpha, 0.0, 0.0) for a, d, alpha in rows)
+        base = (0.0, 0.0, 0.0, 0.0, 0.0, yaw)
+        return cls((base, *poses[:-1]), (_Z,) * len(rows), poses[-1])
+
+
+def tool_tip(chain: Chain, joints: JointPositions, tip: Sequence[float] = (0.0,) * 3) -> Places:
+    """Return where a point of the flange's frame, `tip` in [m], is in the base frame."""
+    place = _moved(chain.flange, np.broadcast_to(tip, (*joints.shape[:-1], 3)))
+    # From the flange back to the base, each joint turns the point and its origin moves it.
+    for index in reversed(range(len(chain.origins))):
+        axis = np.array(chain.axes[index])
+        cos, sin = np.cos(joints[..., index, None]), np.sin(joints[..., index, None])
+        along = (place @ axis)[..., None] * axis
+        turned = along + cos * (place - along) + sin * np.cross(axis, place)
+        place = _moved(chain.origins[index], turned)
+    return place
+
+
+def link_places(chain: Chain, joints: JointPositions) -> Float[np.ndarray, "*n links 3"]:
+    """Return where the base, every joint's frame and the flange are, in the base frame: the arm."""
+    # A joint's frame stands behind those before it as the flange behind all.
+    ends = (*chain.origins, chain.flange)
+    before = [Chain(ends[:n], chain.axes[:n], flange=end) for n, end in enumerate(ends)]
+    base = np.zeros((*joints.shape[:-1], 3))
+    return np.stack([base, *(tool_tip(each, joints) for each in before)], axis=-2)
+
+
+def rotation(roll: float, pitch: float, yaw: float) -> Float[np.ndarray, "3 3"]:
+    """Return Rz(yaw) Ry(pitch) Rx(roll), angles in [rad]."""
+    cr, sr = math.cos(roll), math.sin(roll)
+    cp, sp = math.cos(pitch), math.sin(pitch)
+    cy, sy = math.cos(yaw), math.sin(yaw)
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )
+
+
+def _moved(pose: Pose, points: Places) -> Places:
+    """Points of a frame, in the frame that its pose is given in."""
+    return np.asarray(points @ rotation(*pose[3:]).T + pose[:3])
+
+
+@dataclass(frozen=True, eq=False)
+class FlangePath:
+    """Poses of the flange along joint paths, and how joints move them."""
+
+    places: Places
+    """(n, 3), base frame, [m]."""
+    attitudes: Float[np.ndarray, "*n 3 3"]
+    """Columns are the flange's axes in the base frame."""
+    jacobians: Float[np.ndarray, "*n 6 D"]
+    """Velocity [m/s] over angular velocity [rad/s] for joint speeds [rad/s], base frame."""
+
+
+def flange_path(chain: Chain, joints: JointPositions) -> FlangePath:
+    """Return the flange's poses and geometric Jacobians at joint positions (n, D)."""
+    place, attitude = np.zeros((len(joints), 3)), np.broadcast_to(np.eye(3), (len(joints), 3, 3))
+    axes, points = [], []
+    for (*xyz, roll, pitch, yaw), axis, angle in zip(
+        chain.origins, chain.axes, joints.T, strict=True
+    ):
+        place = place + attitude @ np.array(xyz)
+        attitude = attitude @ rotation(roll, pitch, yaw)
+        axes.append(attitude @ np.array(axis))
+        points.append(place)
+        attitude = attitude @ rotations_about(axis, angle)
+    place = place + attitude @ np.array(chain.flange[:3])
+    attitude = attitude @ rotation(*chain.flange[3:])
+    turning = np.stack(axes, axis=2)
+    moving = np.cross(turning, place[:, :, None] - np.stack(points, axis=2), axis=1)
+    return FlangePath(place, attitude, np.concatenate([moving, turning], axis=1))
+
+
+def turned_path(
+    chain: Chain, joints: JointPositions, angle: float, centre: tuple[float, float]
+) -> JointPositions:
+    """Turn the flange's path about a vertical axis and solve for the joints, all frames at once.
+
+    Damped Newton steps of least norm from the path that was given, turned a little at a time: so a
+    smooth path stays smooth, and elbows stay where they were. Joints that the path holds stay held
+    as long as six others move.
+
+    Args:
+        chain: The arm.
+        joints: Shape (H, D), [rad].
+        angle: [rad].
+        centre: (x, y) of the axis in the base frame, [m].
+
+    Raises:
+        OutOfReachError: A pose of the turned path cannot be reached.
+    """
+    given, about, q = flange_path(chain, joints), np.array([*centre, 0.0]), np.array(joints)
+    free = np.ptp(joints, axis=0) > _HELD
+    weight = (free if free.sum() >= 6 else np.ones(len(free), dtype=bool)).astype(float)[:, None]
+    off = np.zeros((len(joints), 6))
+    for part in np.linspace(0, angle, math.ceil(abs(angle) / _TURN_AT_A_TIME) + 1)[1:]:
+        turn = rotation(0.0, 0.0, part)
+        for _ in range(_NEWTON_STEPS):
+            now = flange_path(chain, q)
+            left = turn @ given.attitudes @ np.swapaxes(now.attitudes, 1, 2)
+            off[:, :3] = (given.places - about) @ turn.T + about - now.places
+            off[:, 3:] = _rotation_vectors(left)
+            if np.abs(off).max() < _SOLVED:
+                break
+            back = np.swapaxes(now.jacobians, 1, 2) * weight
+            normal = now.jacobians @ back + _DAMPING * np.eye(6)
+            step = (back @ np.linalg.solve(normal, off[:, :, None]))[:, :, 0]
+            q = q + np.clip(step, -_LARGEST_STEP, _LARGEST_STEP)
+    worst = int(np.argmax(np.abs(off).max(axis=1)))
+    if np.abs(off[worst]).max() > _REACHED:
+        raise OutOfReachError(
+            f"out of reach: turned by {angle:.3g} rad about ({centre[0]:g}, {centre[1]:g}) m, "
+            f"frame {worst} is {np.abs(off[worst, :3]).max():.2g} m and "
+            f"{np.abs(off[worst, 3:]).max():.2g} rad away from where the arm comes; "
+            "demonstrate nearer to the goal"
+        )
+    return q
+
+
+def rotations_about(
+    axis: Sequence[float], angles: Float[np.ndarray, " n"]
+) -> Float[np.ndarray, "n 3 3"]:
+    """Return the rotations about an axis of length 1 (Rodrigues), angles in [rad]."""
+    x, y, z = axis
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    sin, cos = np.sin(angles)[:, None, None], np.cos(angles)[:, None, None]
+    return np.asarray(np.eye(3) + sin * cross + (1.0 - cos) * (cross @ cross))
+
+
+def _rotation_vectors(matrices: Float[np.ndarray, "n 3 3"]) -> Float[np.ndarray, "n 3"]:
+    from scipy.spatial.transform import Rotation
+
+    return np.asarray(Rotation.from_matrix(matrices).as_rotvec())

@@ -1,0 +1,90 @@
+"""What the numbers of a plan's frames mean: names, units, time step, turns and attitudes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import chain
+
+import numpy as np
+
+from prior_reinforce.arrays import Frames, Point, is_positive
+from prior_reinforce.errors import InvalidPlanError
+from prior_reinforce.plans.whole_turns import TURN, other_form
+
+
+@dataclass(frozen=True)
+class PlanFormat:
+    """What the numbers of a frame mean (paper, Table I: "Frame Action Format")."""
+
+    names: tuple[str, ...]
+    """Name of each of the D action dimensions, for instance `joint1`."""
+    units: tuple[str, ...]
+    """Unit of each dimension: `rad`, `m`, `1` for pure numbers, or any other word."""
+    dt: float
+    """Time between two frames, in [s]."""
+    per_plan: tuple[str, ...] = ()
+    """Names of the dimensions that are one number a plan, the same at every frame: when a motion
+    starts, for instance."""
+    periodic: tuple[str, ...] = ()
+    """Names of the angles of which a whole turn more is the same pose: of a joint that turns
+    endlessly, of a yaw."""
+    attitudes: tuple[tuple[str, ...], ...] = ()
+    """Names of four dimensions that are a unit quaternion, or of three that are a rotation vector;
+    each has two forms (`plans.whole_turns`)."""
+
+    def __post_init__(self) -> None:
+        """Check the format.
+
+        Raises:
+            InvalidPlanError: No names, repeated names, or another number of units than of names.
+        """
+        for name in ("names", "units", "per_plan", "periodic"):
+            if isinstance(given := getattr(self, name), str):
+                raise InvalidPlanError(f"{name} must be a list such as [{given!r}], got a text")
+            object.__setattr__(self, name, tuple(getattr(self, name)))
+        if not self.names:
+            raise InvalidPlanError("a plan format needs at least one action name, got none")
+        if len(set(self.names)) != len(self.names):
+            raise InvalidPlanError(f"action names must differ from each other, got {self.names}")
+        if len(self.units) != len(self.names):
+            raise InvalidPlanError(
+                f"{len(self.names)} action names need as many units, got {len(self.units)}: "
+                f"{self.units}"
+            )
+        if not is_positive(self.dt):
+            raise InvalidPlanError(f"dt must be a positive number of seconds, got {self.dt!r}")
+        object.__setattr__(self, "attitudes", tuple(map(tuple, self.attitudes)))
+        said = {
+            "per_plan": self.per_plan,
+            "periodic": self.periodic,
+            "attitudes": tuple(chain.from_iterable(self.attitudes)),
+        }
+        for key, given in said.items():
+            if unknown := set(given) - set(self.names):
+                raise InvalidPlanError(f"{key} names {sorted(unknown)}, but actions {self.names}")
+
+    @property
+    def action_dim(self) -> int:
+        """D, the number of action dimensions."""
+        return len(self.names)
+
+    def toward(self, frames: Frames, pose: Point) -> Frames:
+        """Return a motion in the turns and signs in which its first frame is nearest to a pose.
+
+        It is the same motion: only periodic dimensions and attitudes have other numbers.
+
+        Args:
+            frames: Shape (T, D).
+            pose: Shape (D,), in the same units.
+        """
+        frames = np.array(frames, dtype=np.float64)
+        for name in self.periodic:
+            i = self.names.index(name)
+            turn = TURN[self.units[i]]
+            frames[:, i] += turn * np.round((pose[i] - frames[0, i]) / turn)
+        for group in self.attitudes:
+            columns = [self.names.index(name) for name in group]
+            own, other = frames[:, columns], other_form(frames[:, columns])
+            if np.linalg.norm(other[0] - pose[columns]) < np.linalg.norm(own[0] - pose[columns]):
+                frames[:, columns] = other
+        return frames

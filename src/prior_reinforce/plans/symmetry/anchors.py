@@ -1,0 +1,113 @@
+"""From where a plan for an aim is moved: one demonstration, or a mixture of several.
+
+Generators move plans by w = z - z_base, adapters learn what such moves do: both ask here, so that
+they mean the same.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Float
+
+from prior_reinforce.arrays import Point, Points
+from prior_reinforce.plans.outcome_weights import smooth_weights
+from prior_reinforce.plans.symmetry.symmetry import Symmetry
+
+_NEIGHBOURS_APART = 1.0
+"""Labels that are off by more than the gaps between demonstrated values, in these, tell which of
+two comes first no more: mixing them makes plans steep (ours)."""
+
+
+class Anchors:
+    """Demonstrations in the chart of their symmetry.
+
+    Two ways to be a base. *Mixed*: demonstrations differ enough in what is not exact, so that a
+    plan for any value within their hull can be mixed of all, and is moved from the hull's nearest
+    point beyond it. *Picked*: the nearest demonstration is moved; so with one demonstration, where
+    all components are exact, and where labels are coarser than the gaps.
+    """
+
+    def __init__(self, symmetry: Symmetry, outcomes: Points, noise: Points) -> None:
+        """Place demonstrations in the chart.
+
+        Args:
+            symmetry: Of the demonstrations.
+            outcomes: Shape (N, k).
+            noise: Standard deviation of each, shape (N, k).
+        """
+        self.symmetry = symmetry
+        self.z: Points = symmetry.chart.to(outcomes)
+        """Demonstrated outcomes in the chart, (N, k)."""
+        into = np.linalg.inv(symmetry.chart.jacobian(self.z))
+        self.sd: Points = np.sqrt(np.einsum("nij,nj->ni", into**2, noise**2))
+        """How uncertain they are, in the chart, (N, k)."""
+        self.left = np.flatnonzero(~symmetry.exact)
+        """Components that no symmetry carries along exactly."""
+        self.mixed = self._can_be_mixed()
+        """Whether plans within the hull are mixed; else the nearest demonstration is moved."""
+        if self.mixed:
+            left = self.left
+            self._weights = smooth_weights(self.z[:, left], noise=self.sd[:, left])
+
+    def base(self, aims: Points) -> tuple[Points, Float[np.ndarray, "n N"]]:
+        """Return where plans for aims are moved from, and how much each demonstration counts there.
+
+        Args:
+            aims: z, shape (n, k).
+
+        Returns:
+            z_base (n, k), and weights (n, N) that sum to one.
+        """
+        if not self.mixed:
+            apart = (aims[:, None] - self.z[None]) / self.symmetry.farthest
+            nearest = np.argmin(np.sum(apart**2, axis=2), axis=1)
+            return self.z[nearest], np.eye(len(self.z))[nearest]
+        within = into_hull(aims[:, self.left], self.z[:, self.left])
+        weights = self._weights(within)
+        base = weights @ self.z
+        base[:, self.left] = within
+        return base, weights
+
+    def moves(self, aim: Point) -> tuple[Points, Point]:
+        """Return by how much each demonstration is moved where a plan for an aim is made of it.
+
+        Exact components are brought to the aim, the others moved as far as the plan is. A
+        demonstration that such a plan is not made of is at infinity.
+
+        Args:
+            aim: z, shape (k,).
+
+        Returns:
+            w of each demonstration (N, k), and w of the plan (k,).
+        """
+        (base,), (weights,) = self.base(aim[None])
+        exact, farthest = self.symmetry.exact, self.symmetry.farthest
+        w = np.where(exact, aim - base, np.clip(aim - base, -farthest, farthest))
+        if self.mixed:
+            return np.where(exact, aim - self.z, w), w
+        return np.where(weights[:, None] > 0, w, np.inf), w
+
+    def _can_be_mixed(self) -> bool:
+        n, left = len(self.z), self.left
+        if not len(left) or n <= len(left):
+            return False
+        values = self.z[:, left] - self.z[:, left].mean(axis=0)
+        extent = np.ptp(values, axis=0)
+        if np.any(extent < 1e-6) or np.linalg.svd(values / extent)[1][-1] < 1e-3:
+            return False
+        gaps = extent / (n ** (1 / len(left)) - 1)  # as if they lay on a grid
+        return bool(np.all(np.median(self.sd[:, left], axis=0) <= _NEIGHBOURS_APART * gaps))
+
+
+def into_hull(points: Points, corners: Float[np.ndarray, "N k"]) -> Points:
+    """Return the nearest points of the convex hull of `corners`, in any dimension."""
+    if points.shape[1] == 1:
+        return np.asarray(np.clip(points, corners.min(axis=0), corners.max(axis=0)))
+    from scipy.optimize import nnls
+
+    # min |C' s - p| over s >= 0 with sum s = 1, which a heavy row holds.
+    extent = np.ptp(corners, axis=0)
+    heavy = 1e4 * np.ones((1, len(corners)))
+    system = np.vstack([(corners / extent).T, heavy])
+    shares = np.array([nnls(system, np.append(p / extent, 1e4))[0] for p in points])
+    return np.asarray(shares.reshape(len(points), len(corners)) @ corners)

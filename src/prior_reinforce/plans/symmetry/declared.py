@@ -1,0 +1,146 @@
+"""A symmetry from words: what a person knows of a task, and what its plans are.
+
+- *The arm carries the object until it leaves*: turns about the base (`about="base"`).
+- *It pushes or strikes an object that lies at (x, y)*: turns about that place (`about=(x, y)`).
+- *The motion may happen anywhere on the table*: shifts (`distance="shift"`), of poses alone.
+- *Neither*: `about=None`; one outcome is then reached by tempo or amplitude.
+
+What a plan is, its names and units say: joints of a known arm, poses (x and y in m, with rx, ry and
+rz, or qw, qx, qy and qz, or yaw), or increments of them (dx, dy, dyaw).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from prior_reinforce.errors import ConfigurationError
+from prior_reinforce.plans.kinematics import Chain, flange_path
+from prior_reinforce.plans.symmetry.moves import (
+    NOMINAL_EXPONENT,
+    Amplitude,
+    AnyMove,
+    Columns,
+    Tempo,
+    TurnIncrements,
+    TurnJoint,
+    TurnPath,
+    TurnPoses,
+)
+from prior_reinforce.plans.symmetry.symmetry import Symmetry, scale_alone, shift, turn_and_scale
+
+if TYPE_CHECKING:
+    from prior_reinforce.plans.plan_format import PlanFormat
+
+About = Literal["base"] | tuple[float, float] | None
+Distance = Literal["tempo", "amplitude", "shift"]
+_VECTOR, _QUATERNION = ("rx", "ry", "rz"), ("qw", "qx", "qy", "qz")
+_UPRIGHT = 1e-3
+"""How far, [rad] and [m], an axis may be off the vertical through the base (ours)."""
+_LEAD = 8
+"""Frames within which a hand that is told increments is brought to its moved start (ours)."""
+
+
+def declare_symmetry(
+    form: PlanFormat,
+    k: int,
+    *,
+    about: About = None,
+    distance: Distance = "tempo",
+    chain: Chain | None = None,
+    joints: Sequence[int] = (),
+    start: tuple[float, float] = (0.0, 0.0),
+    release_frame: float | None = None,
+    steps: Sequence[str] = (),
+    exponent: float = NOMINAL_EXPONENT,
+) -> Symmetry:
+    """Make the symmetry of a task from what is said of it.
+
+    Args:
+        form: Of its plans.
+        k: Components of its outcomes; x and y first where there are several.
+        about: About what the motion may be turned.
+        distance: How it is made to reach farther.
+        chain: The arm, where plans are of its joints; its base frame is the outcomes'.
+        joints: Columns of the chain's joints, in its order.
+        start: (x, y) of the hand before increments, [m].
+        release_frame: Where a clock lets go, and not the motion.
+        steps: Names of grippers and triggers.
+        exponent: p of distance ~ speed^p: 1 for a level throw from a height, whose fall takes the
+            same time at any speed; 2 for a throw upwards and a slide; less by the share of the
+            distance that the object is carried.
+
+    Raises:
+        ConfigurationError: Plans or outcomes are not such that this can be done.
+    """
+    column = {name: index for index, name in enumerate(form.names)}
+    if unknown := sorted(set(steps) - set(column)):
+        raise ConfigurationError(f"steps names {unknown}, but plans have {', '.join(form.names)}")
+    increments = _columns(column, ("dx", "dy", "dz", "dyaw"))
+    if distance == "shift":
+        place = _columns(column, ("x", "y")) or _columns(column, ("dx", "dy"))
+        if len(place) != 2 or k != 2:
+            raise ConfigurationError(
+                "distance 'shift' needs plans with x and y (or dx and dy) and outcomes x and y; "
+                f"plans have {', '.join(form.names)}, outcomes {k} components"
+            )
+        return shift((place[0], place[1]), _LEAD if increments else 0)
+    stepped = tuple(column[name] for name in steps)
+    scale: AnyMove = Amplitude(exponent, stepped, increments)
+    if distance == "tempo":
+        clocked = release_frame is not None
+        scale = Tempo(exponent, release_frame, clocked, stepped, increments)
+    if about is None:
+        if k != 1:
+            raise ConfigurationError(
+                f"an outcome of {k} components needs an axis to turn about, or shifts; say about "
+                "what the motion may be turned, or leave the symmetry out"
+            )
+        return scale_alone(scale)
+    if k != 2:
+        raise ConfigurationError(
+            f"a turn moves outcomes x and y, but outcomes have {k} components; leave the symmetry "
+            "out, or make one of moves for each (plans.symmetry)"
+        )
+    centre = (0.0, 0.0) if about == "base" else (float(about[0]), float(about[1]))
+    if chain is not None and joints:
+        if about != "base":
+            return turn_and_scale(TurnPath(chain, centre, tuple(joints)), centre, scale)
+        gain, centre = _first_joint(chain)
+        return turn_and_scale(TurnJoint(joints[0], gain), centre, scale)
+    if place := _columns(column, ("x", "y")):
+        vector, quaternion = _columns(column, _VECTOR), _columns(column, _QUATERNION)
+        turn: AnyMove = TurnPoses(
+            centre, (place[0], place[1]), vector or None, quaternion or None, column.get("yaw")
+        )
+        return turn_and_scale(turn, centre, scale)
+    if place := _columns(column, ("dx", "dy")):
+        turn = TurnIncrements(start, centre, (place[0], place[1]), column.get("dyaw"), _LEAD)
+        return turn_and_scale(turn, centre, scale)
+    raise ConfigurationError(
+        f"plans of {', '.join(form.names)} cannot be turned: name the arm, or give poses x and y"
+    )
+
+
+def _columns(column: dict[str, int], names: Sequence[str]) -> Columns:
+    """Those of these names; none of x and y, or of an attitude, unless all are there."""
+    found = tuple(column[name] for name in names if name in column)
+    return found if len(found) == len(names) or names[0] == "dx" else ()
+
+
+def _first_joint(chain: Chain) -> tuple[float, tuple[float, float]]:
+    """Which way the first joint counts, 1 or -1, and where its axis stands.
+
+    Raises:
+        ConfigurationError: It is not vertical.
+    """
+    along = flange_path(chain, np.zeros((1, len(chain.axes)))).jacobians[0, 3:, 0]
+    if np.hypot(along[0], along[1]) > _UPRIGHT:
+        raise ConfigurationError(
+            f"the first joint's axis is not vertical but along {np.round(along, 3).tolist()}; name "
+            "a place (x, y) to turn about instead of the base"
+        )
+    x, y, *_ = chain.origins[0]
+    return float(np.sign(along[2])), (float(x), float(y))

@@ -1,0 +1,313 @@
+"""Transforms of whole plans: by how much a plan is moved so that its outcome moves by w.
+
+Each member moves the outcome along one component of a chart. It is data (a kind and parameters), is
+called with a plan and an amount in the chart's units, and returns a new plan; at an amount of 0 it
+returns the plan bit for bit. Plans that start and end at rest still do.
+
+    plan    (H, D)  in the units of its format; a frame is one row
+    amount  w_j     in the chart's units, [rad] for turns, [m] for shifts, [1] for ln distance
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated
+
+import msgspec
+import numpy as np
+from jaxtyping import Float
+
+from prior_reinforce.arrays import Frames
+from prior_reinforce.plans.kinematics import Chain, turned_path
+
+Columns = tuple[int, ...]
+Moved = Float[np.ndarray, "H_moved D"]
+"""A plan that may be longer than the one it was."""
+NOMINAL_EXPONENT = 1.3
+"""p of distance ~ speed^p before any trial (ours): 2 for a range (v^2 / g) and for a slide
+(v^2 / 2 mu g), 1 where half of the way is carried, less behind soft servos and in air."""
+_COLUMN_FIELDS = (
+    "column",
+    "columns",
+    "joint",
+    "place",
+    "vector",
+    "quaternion",
+    "yaw",
+    "steps",
+    "increments",
+)
+_MOVING = 0.05
+"""A plan ends in mid-swing where its last step is more than this part of its largest (ours)."""
+
+
+class Move(msgspec.Struct, frozen=True):
+    """The interface."""
+
+    def __call__(self, plan: Frames, amount: float) -> Moved:
+        """Return the plan, moved by an amount."""
+        return plan.copy() if amount == 0.0 else self._moved(np.asarray(plan), float(amount))
+
+    def columns_of(self) -> Columns:
+        """Return the columns of a plan that it names."""
+        named = (getattr(self, name, None) for name in _COLUMN_FIELDS)
+        return _columns(*named)
+
+    def increments_of(self) -> Columns:
+        """Return the columns that it takes for differences from frame to frame."""
+        return _columns(getattr(self, "increments", None))
+
+    def _moved(self, plan: Frames, amount: float) -> Moved:
+        raise NotImplementedError
+
+
+class Tempo(Move, frozen=True, tag="tempo"):
+    """Played faster or slower; ln speed = amount / exponent.
+
+    A scaling of time with an unknown law on the outcome, no symmetry: how far a faster motion
+    throws has to be learned. Time is scaled around one frame, so that nothing happens earlier or
+    later to first order. Slower plans are longer: nothing is cut off.
+    """
+
+    exponent: float = NOMINAL_EXPONENT
+    """Nominal p of outcome ~ speed^p; negative where faster is less."""
+    about: float | None = None
+    """Frame that keeps its time: the release of a clock. None: the middle of the motion."""
+    keep_horizon: bool = False
+    """As many frames as before, since a clock counts from the first one."""
+    steps: Columns = ()
+    """Columns of grippers and triggers, on lines between frames instead of a spline."""
+    increments: Columns = ()
+    """Columns that are differences from frame to frame; the path that they add up to is played."""
+
+    def _moved(self, plan: Frames, amount: float) -> Moved:
+        added = list(self.increments)
+        path, about = plan, self.about
+        if added:  # a frame before the first, from which its difference leads
+            path = np.vstack([plan[:1], plan])
+            path[0, added] = 0.0
+            path[:, added] = np.cumsum(path[:, added], axis=0)
+            about = None if about is None else about + 1
+        out = self._played(path, math.exp(amount / self.exponent), about)
+        if added:
+            changes = np.diff(out[:, added], axis=0)
+            out = out[1:]
+            out[:, added] = changes
+        return out
+
+    def _played(self, path: Frames, speed: float, about: float | None) -> Moved:
+        from scipy.interpolate import CubicSpline
+
+        last, centre = len(path) - 1, middle(path) if about is None else about
+        first, end = 0, last
+        if speed < 1.0 and not self.keep_horizon:
+            first = math.floor(centre - centre / speed)
+            end = math.ceil(centre + (last - centre) / speed)
+        at = centre + (np.arange(first, end + 1) - centre) * speed
+        inside = np.clip(at, 0, last)
+        out = np.asarray(CubicSpline(np.arange(last + 1), path, axis=0)(inside))
+        steps = np.diff(path, axis=0)
+        moving = _MOVING * np.abs(steps).max(axis=0)
+        for slope, beyond in ((steps[0], np.minimum(at, 0)), (steps[-1], np.maximum(at - last, 0))):
+            out += beyond[:, None] * np.where(np.abs(slope) > moving, slope, 0.0)
+        for column in self.steps:
+            out[:, column] = np.interp(inside, np.arange(last + 1), path[:, column])
+        return out
+
+
+class Amplitude(Move, frozen=True, tag="amplitude"):
+    """All of the motion made larger about its first frame; ln factor = amount / exponent.
+
+    A scaling with an unknown law, as `Tempo` is.
+    """
+
+    exponent: float = NOMINAL_EXPONENT
+    """Nominal p of outcome ~ amplitude^p."""
+    steps: Columns = ()
+    """Columns that stay as they are."""
+    increments: Columns = ()
+    """Columns that are differences from frame to frame."""
+
+    def _moved(self, plan: Frames, amount: float) -> Moved:
+        origin = plan[0].copy()
+        origin[list(self.increments)] = 0.0
+        out = origin + (plan - origin) * math.exp(amount / self.exponent)
+        out[:, list(self.steps)] = plan[:, list(self.steps)]
+        return out
+
+
+class Delay(Move, frozen=True, tag="delay"):
+    """Columns later in time, their ends held; a symmetry of an outcome that is a time, if all."""
+
+    frames: float
+    """Frames later for each unit of the amount."""
+    columns: Columns = ()
+    """Which; empty: all of them."""
+
+    def _moved(self, plan: Frames, amount: float) -> Moved:
+        out, index = plan.copy(), np.arange(len(plan))
+        for column in self.columns or range(plan.shape[1]):
+            out[:, column] = np.interp(index - amount * self.frames, index, plan[:, column])
+        return out
+
+
+class Shift(Move, frozen=True, tag="shift"):
+    """One column shifted: poses moved along the table."""
+
+    column: int
+    lead: int = 0
+    """Where the column is increments: frames within which the hand is brought to its new start."""
+
+    def increments_of(self) -> Columns:
+        """See `Move.increments_of`."""
+        return (self.column,) if self.lead else ()
+
+    def _moved(self, plan: Frames, amount: float) -> Moved:
+        out = plan.copy()
+        if self.lead:
+            out[: self.lead, self.column] += amount / self.lead
+        else:
+            out[:, self.column] += amount
+        return out
+
+
+class TurnJoint(Move, frozen=True, tag="turn-joint"):
+    """One joint turned all along: an arm that stands upright, about its base, by its first."""
+
+    joint: int = 0
+    """Column."""
+    gain: float = 1.0
+    """Joint angle for each unit of the amount: -1 where the joint counts clockwise."""
+    ramp: int = 0
+    """Where the start pose is given: frames within which it turns, by minimum jerk."""
+
+    def _moved(self, plan: Frames, amount: float) -> Moved:
+        out = plan.copy()
+        x = np.clip(np.arange(len(plan)) / self.ramp, 0, 1) if self.ramp else np.ones(len(plan))
+        out[:, self.joint] += self.gain * amount * x**3 * (10 - 15 * x + 6 * x**2)
+        return out
+
+
+class TurnPoses(Move, frozen=True, tag="turn-poses"):
+    """Poses turned about a vertical axis through a point: places and attitudes."""
+
+    centre: tuple[float, float] = (0.0, 0.0)
+    """(x, y) of the axis, [m]."""
+    place: tuple[int, int] = (0, 1)
+    """Columns of x and y."""
+    vector: Annotated[Columns, msgspec.Meta(min_length=3, max_length=3)] | None = None
+    """Columns of a rotation vector, whose axes are those of the table: R -> Rz R."""
+    quaternion: Annotated[Columns, msgspec.Meta(min_length=4, max_length=4)] | None = None
+    """Columns of a quaternion, in the order w, x, y, z."""
+    yaw: int | None = None
+    """Column of a heading about the vertical."""
+
+    def _moved(self, plan: Frames, amount: float) -> Moved:
+        from scipy.spatial.transform import Rotation
+
+        out, centre = plan.copy(), np.array(self.centre)
+        out[:, self.place] = (plan[:, self.place] - centre) @ about_vertical(amount).T + centre
+        turn = Rotation.from_rotvec([0.0, 0.0, amount])
+        if self.vector is not None:
+            vector = list(self.vector)
+            turned = (turn * Rotation.from_rotvec(plan[:, vector])).as_rotvec()
+            out[:, vector] = _continuous(turned, plan[0, vector])
+        if self.quaternion is not None:
+            scalar_last = [*self.quaternion[1:], self.quaternion[0]]
+            before = plan[:, scalar_last]
+            after = (turn * Rotation.from_quat(before)).as_quat()
+            out[:, scalar_last] = after * np.where((after * before).sum(1) < 0, -1, 1)[:, None]
+        if self.yaw is not None:
+            out[:, self.yaw] += amount
+        return out
+
+
+class TurnIncrements(Move, frozen=True, tag="turn-increments"):
+    """Differences dx, dy from frame to frame turned about a point.
+
+    The hand is brought to its turned start within the first frames.
+    """
+
+    start: tuple[float, float] = (0.0, 0.0)
+    """(x, y) of the hand before the first frame, [m]."""
+    centre: tuple[float, float] = (0.0, 0.0)
+    """(x, y) of the axis, [m]."""
+    place: tuple[int, int] = (0, 1)
+    """Columns of dx and dy."""
+    yaw: int | None = None
+    """Column of the heading's differences."""
+    lead: int = 8
+    """Frames until the turned start is reached."""
+
+    def increments_of(self) -> Columns:
+        """See `Move.increments_of`."""
+        return _columns(self.place, self.yaw)
+
+    def _moved(self, plan: Frames, amount: float) -> Moved:
+        out, turn = plan.copy(), about_vertical(amount)
+        out[:, self.place] = plan[:, self.place] @ turn.T
+        arm = np.array(self.start) - self.centre
+        out[: self.lead, self.place] += (turn @ arm - arm) / self.lead
+        if self.yaw is not None:
+            out[: self.lead, self.yaw] += amount / self.lead
+        return out
+
+
+class TurnPath(Move, frozen=True, tag="turn-path"):
+    """Joint plans turned about a vertical axis through a point, by inverse kinematics.
+
+    See `kinematics.turned_path`, which refuses what is out of reach.
+    """
+
+    chain: Chain
+    centre: tuple[float, float]
+    """(x, y) of the axis in the base frame, [m]."""
+    columns: Columns
+    """Those of the chain's joints, in its order."""
+
+    def _moved(self, plan: Frames, amount: float) -> Moved:
+        out, columns = plan.copy(), list(self.columns)
+        out[:, columns] = turned_path(self.chain, plan[:, columns], amount, self.centre)
+        return out
+
+
+AnyMove = Tempo | Amplitude | Delay | Shift | TurnJoint | TurnPoses | TurnIncrements | TurnPath
+
+
+def _columns(*named: Columns | int | None) -> Columns:
+    """Columns named one by one, in groups, or not at all."""
+    groups = [(each,) if isinstance(each, int) else each or () for each in named]
+    return tuple(column for group in groups for column in group)
+
+
+def middle(plan: Frames) -> float:
+    """Return the frame around which a motion happens: the mean frame, by squared speed.
+
+    Columns count by their range, so that units do not matter; those that hardly move do not.
+    """
+    ranges = np.ptp(plan, axis=0)
+    steps = np.diff(plan, axis=0) / np.maximum(ranges, 1e-3 * ranges.max() + 1e-12)
+    energy = np.square(steps).sum(axis=1)
+    if not energy.any():
+        return (len(plan) - 1) / 2
+    return float(((np.arange(len(steps)) + 0.5) * energy).sum() / energy.sum())
+
+
+def about_vertical(angle: float) -> Float[np.ndarray, "2 2"]:
+    """Return the rotation by an angle in the plane."""
+    cos, sin = math.cos(angle), math.sin(angle)
+    return np.array([[cos, -sin], [sin, cos]])
+
+
+def _continuous(
+    vectors: Float[np.ndarray, "H 3"], first: Float[np.ndarray, "3"]
+) -> Float[np.ndarray, "H 3"]:
+    """The same attitudes as rotation vectors without jumps, beginning near `first`."""
+    out, near = vectors.copy(), first
+    for frame, vector in enumerate(vectors):
+        angle = np.linalg.norm(vector)
+        if angle > 1e-9:
+            turns = np.round((near @ vector / angle - angle) / (2 * np.pi))
+            out[frame] = vector * (1 + 2 * np.pi * turns / angle)
+        near = out[frame]
+    return out

@@ -1,0 +1,227 @@
+"""What may be done to a whole motion, and what that does to its outcome.
+
+    w = z_aim - z_base                 by how much a plan is moved, in a chart of outcomes
+    z = z_base + G w + ...             where it comes down; G (k, k) is the identity where exact
+
+`Symmetry` is stated by a task or a workspace, and kept with demonstrations as data. Evidence may
+take it back: every belief about G is a prior.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import msgspec
+import numpy as np
+from jaxtyping import Bool, Float
+
+from prior_reinforce.arrays import Frames, Point, Points
+from prior_reinforce.errors import ConfigurationError
+from prior_reinforce.plans.symmetry.charts import AnyChart, Cartesian, LogDistance, Polar
+from prior_reinforce.plans.symmetry.moves import AnyMove, Moved, Shift, Tempo
+
+Matrix = Float[np.ndarray, "k k"]
+
+
+class _Data(msgspec.Struct, forbid_unknown_fields=True):
+    """A symmetry as plain data."""
+
+    name: str
+    chart: AnyChart
+    moves: tuple[AnyMove, ...]
+    exact: tuple[bool, ...]
+    gain_mean: tuple[tuple[float, ...], ...]
+    gain_sd: tuple[tuple[float, ...], ...]
+    offset_sd: tuple[float, ...]
+    bend_sd: tuple[float, ...]
+    between_sd: tuple[float, ...]
+    farthest: tuple[float, ...]
+    rival: _Data | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Symmetry:
+    """How plans are moved, and what is believed of where they then come down, beforehand.
+
+    Standard deviations are in units of the chart. Sources of the priors: module `moves` for p, else
+    ours, from reasoning before any figure (5 % of a distance, 0.03 rad from day to day).
+    """
+
+    name: str
+    """In plain words, for messages: `turn and tempo`."""
+    chart: AnyChart
+    """Coordinates z of outcomes."""
+    moves: tuple[AnyMove, ...]
+    """How a plan is moved along each component of z; in this order."""
+    exact: Bool[np.ndarray, " k"]
+    """Components along which the physics stays the same; others are scalings of unknown law."""
+    gain_mean: Matrix
+    """Of G."""
+    gain_sd: Matrix
+    """Of G; relative to a nominal exponent where a move has one."""
+    offset_sd: Point
+    """What is off by the same everywhere: another day, another demonstration."""
+    bend_sd: Point
+    """What the law is off by for each unit of w, since it is no power law."""
+    between_sd: Point
+    """What is off between demonstrations that are mixed."""
+    farthest: Point
+    """Largest |w| that is believed."""
+    rival: Symmetry | None = None
+    """Another one, which a session takes up where outcomes do not follow this one."""
+
+    def __post_init__(self) -> None:
+        """Copy and check.
+
+        Raises:
+            ConfigurationError: Sizes that do not fit k, the number of moves.
+        """
+        k = len(self.moves)
+        object.__setattr__(self, "moves", tuple(self.moves))
+        for name, shape in _SHAPES.items():
+            values = np.array(getattr(self, name), dtype=bool if name == "exact" else np.float64)
+            if values.shape != (k,) * shape or not np.all(np.isfinite(values)):
+                raise ConfigurationError(
+                    f"{name} of the symmetry {self.name!r} must be {' x '.join([str(k)] * shape)} "
+                    f"finite numbers, one for each of its moves, got {values.tolist()}"
+                )
+            values.flags.writeable = False
+            object.__setattr__(self, name, values)
+
+    @property
+    def k(self) -> int:
+        """Number of components of the outcome."""
+        return len(self.moves)
+
+    @property
+    def increments(self) -> tuple[int, ...]:
+        """Columns of a plan that are differences from frame to frame, as its moves say."""
+        return tuple(sorted({column for move in self.moves for column in move.increments_of()}))
+
+    def speed(self, w: Point) -> float:
+        """Return how much faster a plan that is moved by w (k,) is played."""
+        at = [w[j] / m.exponent for j, m in enumerate(self.moves) if isinstance(m, Tempo)]
+        return float(np.exp(np.sum(at)))
+
+    def move(self, plan: Frames, w: Point) -> Moved:
+        """Return a plan (H, D) moved by w (k,); at w = 0 bit for bit the same.
+
+        Raises:
+            OutOfReachError: The arm cannot make the moved motion.
+        """
+        for each, amount in zip(self.moves, w, strict=True):
+            plan = each(plan, float(amount))
+        return plan
+
+    def around(self, outcomes: Points) -> Symmetry:
+        """Return it with a chart that does not jump amid these outcomes; see `Chart.around`."""
+        return replace(self, chart=self.chart.around(outcomes))
+
+    def data(self) -> dict[str, Any]:
+        """Return it as plain data, of JSON types."""
+        numbers = {name: getattr(self, name).tolist() for name in _SHAPES}
+        data = {"name": self.name, "chart": self.chart, "moves": self.moves, **numbers}
+        if self.rival is not None:
+            data["rival"] = self.rival.data()
+        made: dict[str, Any] = msgspec.json.decode(msgspec.json.encode(data, enc_hook=float))
+        return made
+
+    @classmethod
+    def from_data(cls, data: Mapping[str, Any]) -> Symmetry:
+        """Make it from what `data` gave; runs no code from it.
+
+        Raises:
+            ConfigurationError: Something is missing, unknown, or of another type.
+        """
+        try:
+            read = msgspec.convert(data, _Data)
+        except msgspec.ValidationError as error:
+            raise ConfigurationError(f"this is no symmetry: {error}") from error
+        return cls._of(read)
+
+    @classmethod
+    def _of(cls, read: _Data) -> Symmetry:
+        known = {name: getattr(read, name) for name in read.__struct_fields__}
+        return cls(**known | {"rival": read.rival and cls._of(read.rival)})
+
+    def __eq__(self, other: object) -> bool:
+        """Whether both are the same data."""
+        return isinstance(other, Symmetry) and self.data() == other.data()
+
+    def __hash__(self) -> int:
+        return hash((self.name, self.moves, self.chart))
+
+    def __repr__(self) -> str:
+        """Name and chart."""
+        return f"Symmetry({self.name}, {self.chart})"
+
+
+_SHAPES = {
+    "exact": 1,
+    "gain_mean": 2,
+    "gain_sd": 2,
+    "offset_sd": 1,
+    "bend_sd": 1,
+    "between_sd": 1,
+    "farthest": 1,
+}
+"""Axes of each array, all of length k."""
+_SCALING_SD = 0.5
+_DISTANCE = {"offset_sd": 0.05, "bend_sd": 0.1, "between_sd": 0.1, "farthest": 0.9}
+_BEARING = {"offset_sd": 0.03, "bend_sd": 0.03, "between_sd": 0.05, "farthest": np.pi}
+_OTHER = {"offset_sd": 0.05, "bend_sd": 0.1, "between_sd": 0.1, "farthest": 0.5}
+_PLACE = {"offset_sd": 0.05, "bend_sd": 0.1, "between_sd": 0.1, "farthest": 2.0}
+
+
+def turn_and_scale(
+    turn: AnyMove,
+    centre: tuple[float, float] = (0.0, 0.0),
+    scale: AnyMove | None = None,
+    others: tuple[AnyMove, ...] = (),
+) -> Symmetry:
+    """Bearing by a turn about a vertical axis, distance by a scaling: tempo, if not said.
+
+    Args:
+        turn: Which is exact: `TurnJoint`, `TurnPoses`, `TurnIncrements` or `TurnPath`.
+        centre: (x, y) of the axis in the outcomes' frame, [m].
+        scale: `Tempo` or `Amplitude`.
+        others: What moves each further component of the outcome, by a law as unknown as tempo's.
+    """
+    scale, n = scale or Tempo(), len(others)
+    name = " and ".join(["turn", *(type(move).__name__.lower() for move in (scale, *others))])
+    chart = Polar((float(centre[0]), float(centre[1])))
+    exact, sd = (False, True, *[False] * n), (_SCALING_SD, 0.1, *[_SCALING_SD] * n)
+    return _made(name, chart, (scale, turn, *others), exact, sd, _DISTANCE, _BEARING, *[_OTHER] * n)
+
+
+def shift(columns: tuple[int, int] = (0, 1), lead: int = 0) -> Symmetry:
+    """Motions that may happen anywhere on the table: x and y of poses, or of increments.
+
+    Args:
+        columns: Of x and y.
+        lead: Frames until the shifted start is reached, where columns are increments.
+    """
+    moves = tuple(Shift(column, lead) for column in columns)
+    return _made("shift", Cartesian(), moves, (True, True), (0.15, 0.15), _PLACE, _PLACE)
+
+
+def scale_alone(scale: AnyMove | None = None) -> Symmetry:
+    """One positive outcome, reached by a scaling alone: tempo, if not said."""
+    scale = scale or Tempo()
+    name = type(scale).__name__.lower()
+    return _made(name, LogDistance(), (scale,), (False,), (_SCALING_SD,), _DISTANCE)
+
+
+def _made(
+    name: str,
+    chart: AnyChart,
+    moves: tuple[AnyMove, ...],
+    exact: tuple[bool, ...],
+    gain_sd: tuple[float, ...],
+    *believed: Mapping[str, float],
+) -> Symmetry:
+    arrays: dict[str, Any] = {k: np.array([each[k] for each in believed]) for k in _DISTANCE}
+    mean, sd = np.eye(len(moves)), np.diag(gain_sd)
+    return Symmetry(name, chart, moves, np.array(exact), mean, sd, **arrays)

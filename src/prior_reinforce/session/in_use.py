@@ -1,0 +1,171 @@
+"""The generator, adapter and demonstrations that a session uses, loaded when first needed."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Iterator
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from prior_reinforce.adapters.base import next_key
+from prior_reinforce.arrays import Point
+from prior_reinforce.errors import WorkspaceError
+from prior_reinforce.plans.symmetry import Polar
+from prior_reinforce.session.events import Asked
+from prior_reinforce.session.trials import Goal, Log, State, Verdict
+
+if TYPE_CHECKING:
+    from prior_reinforce.adapters.base import Adapter
+    from prior_reinforce.generators.base import Generator
+    from prior_reinforce.plans.motions import Demonstrations
+
+
+_RIVAL = "rival"
+"""Name of the model that is learned about the rival of the declared axis."""
+
+
+class InUse:
+    """Generator, adapter and demonstrations while the log names the same; loaded when needed."""
+
+    def __init__(self, given: Any, names: tuple[str, ...]) -> None:
+        self._given = given
+        self.names = names
+        """Of the model, of whatever else is loaded, and of the adapter."""
+
+    @cached_property
+    def generator(self) -> Generator:
+        """The generator pi."""
+        return _loaded(self._given[0])
+
+    @cached_property
+    def adapter(self) -> Adapter:
+        """The adapter M."""
+        return _loaded(self._given[1])
+
+    @cached_property
+    def demonstrations(self) -> Demonstrations:
+        """The demonstrations D_prior."""
+        return _loaded(self._given[2])
+
+    @cached_property
+    def rival(self) -> InUse | None:
+        """The same by the rival that the symmetry states, learned now; None where there is none."""
+        declared = self.demonstrations.symmetry
+        if declared is None or declared.rival is None:
+            return None
+        shown = self.demonstrations.with_symmetry(declared.rival)
+        learned = copy.deepcopy(self.generator).fit(shown, seed=0)
+        return InUse((learned, copy.deepcopy(self.adapter), shown), (_RIVAL, *self.names[1:]))
+
+    def believed(self, state: State, log: Log) -> InUse:
+        """This, or its rival where trials speak against the symmetry; the adapter is informed."""
+        doubted = self.informed(state, log).symmetry_doubted
+        if not doubted or self.rival is None:
+            return self
+        self.rival.informed(state, log)
+        return self.rival
+
+    def load(self) -> tuple[Generator, Adapter]:
+        """What a new trial needs."""
+        return self.generator, self.adapter
+
+    def informed(self, state: State, log: Log) -> Adapter:
+        """The adapter, after it was told all that counts for the goal of now.
+
+        It goes on from what it knows, or from what the log kept of it, if that is the beginning of
+        what it is to be told, and starts again if not: a trial may have been voided or amended, or
+        another session have used the adapter.
+        """
+        adapter, told = self.adapter, list(_told(state, self.names[0]))
+        keys = [adapter.first_key(self.demonstrations)]
+        for what, arguments in told:
+            keys.append(next_key(keys[-1], what, *arguments))
+        if adapter.key not in keys:
+            kept = log.kept_adapter()
+            if kept is not None and kept[0] in keys:
+                adapter.resume(self.demonstrations, *kept)
+            else:
+                adapter.start(self.demonstrations)
+        for what, arguments in told[keys.index(adapter.key) :]:
+            getattr(adapter, what)(*arguments)
+        return adapter
+
+    def asked(self, state: State, condition: Point, verdict: Verdict | None) -> Asked:
+        """The event of the next trial, with what the adapter expects of it."""
+        goal = latest_goal(state)
+        expected = self.adapter.expect(condition, goal.goal, goal.tolerance)
+        return Asked(
+            trial=len(state.trials) + 1,
+            goal=goal.number,
+            condition=condition.tolist(),
+            model=self.names[0],
+            gate=None if verdict is None else verdict.as_json(),
+            p_hit=None if expected is None else expected.p_hit,
+            expected_trials=None if expected is None else expected.trials,
+            expected_error=None if expected is None else _as_list(expected.error),
+            expected_sd=None if expected is None else _as_list(expected.sd),
+            remark=("" if expected is None else expected.remark) or self._taken_back(),
+        )
+
+    def _taken_back(self) -> str:
+        """What is said where the declared axis was left; nothing where it was not."""
+        if self.names[0] != _RIVAL:
+            return ""
+        symmetry = self.demonstrations.symmetry
+        assert symmetry is not None
+        about = f" about {symmetry.chart.centre}" if isinstance(symmetry.chart, Polar) else ""
+        return (
+            "outcomes did not follow the symmetry that was declared: from now on its rival is used "
+            f"({symmetry.name}{about}); declare that one"
+        )
+
+    def say_no_plan(self, state: State, condition: Point) -> str:
+        """Say for which goal there is no plan, and whether it is simply too far."""
+        goal = latest_goal(state).goal
+        place, at = ((np.round(point, 4) + 0.0).tolist() for point in (goal, condition))
+        said = f"no plan for the goal {place}"
+        if at != place:
+            said += f", asked of the generator as {at}"
+        if np.any(self.demonstrations.far_outside(goal)):
+            said += ", which lies far outside the demonstrations (choose one nearer to them)"
+        return said
+
+
+def _told(state: State, model: str) -> Iterator[tuple[str, tuple[Any, ...]]]:
+    """What an adapter is to be told for the goal of now: its methods, and their arguments."""
+    goal, hardware = latest_goal(state), 0
+    for trial in [*state.readings_for(goal, model), None]:
+        about = goal if trial is None else state.goal_of(trial)
+        for each in state.goals[hardware : about.number]:
+            if each.new_hardware is not None:
+                yield "change_hardware", ()
+        hardware = max(hardware, about.number)
+        if trial is not None:
+            assert trial.reading is not None
+            reading = trial.reading.within(about.tolerance)
+            yield "observe", (trial.condition, about.goal, reading)
+
+
+def latest_goal(state: State) -> Goal:
+    """The goal that is worked on.
+
+    Raises:
+        WorkspaceError: None is set.
+    """
+    if state.goal is None:
+        raise WorkspaceError("no goal is set; set one (Session.set_goal, or: prior-reinforce goal)")
+    return state.goal
+
+
+def _loaded(given: Any) -> Any:
+    """What was given, or what the loader that was given returns; a network is callable too."""
+    from prior_reinforce.adapters.base import Adapter
+    from prior_reinforce.generators.base import Generator
+
+    return given() if callable(given) and not isinstance(given, (Generator, Adapter)) else given
+
+
+def _as_list(numbers: Point | None) -> list[float] | None:
+    return None if numbers is None else numbers.tolist()

@@ -1,0 +1,300 @@
+"""An arm whose law is known stands in for the physics: z = z_base + G w + b, in the chart."""
+
+import numpy as np
+import pytest
+
+from prior_reinforce.adapters.base import State
+from prior_reinforce.adapters.bayesian import BayesianAdapter
+from prior_reinforce.adapters.memory import Memory, Places
+from prior_reinforce.adapters.moved import MovedBelief
+from prior_reinforce.adapters.moved_prior import MovedPrior
+from prior_reinforce.plans.motions import Demonstrations
+from prior_reinforce.plans.plan_format import PlanFormat
+from prior_reinforce.plans.symmetry import Symmetry, TurnJoint, shift, turn_and_scale
+from prior_reinforce.readings import Reading
+
+SHOWN = np.array([[0.95, 0.05]])
+FOUR = np.array([[0.8, -0.1], [0.9, 0.15], [1.05, 0.0], [1.15, -0.15]])
+GOALS = np.array([[1.05, 0.1], [1.1, -0.1], [0.85, 0.2], [1.0, -0.2], [0.9, 0.0], [1.15, 0.15]])
+TOLERANCE = np.full(2, 0.015)
+
+
+def demonstrations(outcomes=SHOWN, symmetry: Symmetry | None = None, **more) -> Demonstrations:
+    plans = np.random.default_rng(0).normal(size=(len(outcomes), 20, 2))
+    format_ = PlanFormat(("j1", "j2"), ("rad", "rad"), 0.02)
+    symmetry = symmetry or turn_and_scale(TurnJoint())
+    return Demonstrations(plans, outcomes, format_, symmetry=symmetry, **more)
+
+
+class Arm:
+    """Throws, and tells what came of it, measured to 2 mm if not by eye."""
+
+    def __init__(self, gain=((0.8, 0.0), (0.0, 1.0)), off=(0.0, 0.0), shown=None) -> None:
+        self.shown = demonstrations() if shown is None else shown
+        self.adapter = BayesianAdapter()
+        self.adapter.start(self.shown)
+        self.gain, self.off, self.moved = np.array(gain), np.array(off), np.zeros(2)
+        self.prior = MovedPrior(self.shown)
+
+    def lands(self, condition):
+        chart = self.shown.symmetry.chart
+        aim = chart.to(condition)[None]
+        base = self.prior.base(aim)[0]
+        return chart.back(base + (aim - base) @ self.gain.T + self.off)[0] + self.moved
+
+    def throw(self, goal, seen=None):
+        """One trial; returns its condition and error."""
+        condition = self.adapter.propose(goal)
+        error = self.lands(condition) - goal
+        hit = bool(np.linalg.norm(error / TOLERANCE) <= 1.0)
+        reading = Reading.measured(error, 0.002, hit) if seen is None else seen(error, hit)
+        self.adapter.observe(condition, goal, reading.within(TOLERANCE))
+        return condition, error
+
+    def trials(self, goal, most=10, seen=None):
+        for n in range(1, most + 1):
+            _, error = self.throw(goal, seen)
+            if np.linalg.norm(error / TOLERANCE) <= 1.0:
+                return n
+        return most + 1
+
+
+def by_eye(error, hit):
+    steps = np.array([0.0, 0.02, 0.05, 0.1, 0.2, 0.3, 0.4])
+    nearest = np.abs(np.abs(error)[:, None] - steps).argmin(axis=1)
+    return Reading.by_eye(np.sign(error) * steps[nearest] + 0.0, hit)
+
+
+def only_whether(_, hit):
+    return Reading.only(hit, 2)
+
+
+@pytest.mark.parametrize("outcomes", [SHOWN, FOUR])
+def test_the_first_condition_is_the_goal_less_what_labels_say_to_be_off(outcomes):
+    arm = Arm(shown=demonstrations(outcomes))
+    for goal in GOALS:
+        np.testing.assert_allclose(arm.adapter.propose(goal), goal, atol=0.02)  # a gain of 1.08
+    off = np.tile([0.01, -0.005], (len(outcomes), 1))
+    arm = Arm(shown=demonstrations(outcomes, outcome_correction=off))
+    seen = outcomes[0] + off[0]  # of the demonstration itself
+    np.testing.assert_allclose(arm.adapter.propose(seen), outcomes[0], atol=3e-3)
+
+
+@pytest.mark.parametrize("exponent", [0.5, 0.8, 1.2, 1.6])
+@pytest.mark.parametrize("seen", [None, by_eye])
+def test_how_far_a_scaling_carries_is_learned_from_a_goal_or_two(exponent, seen):
+    arm = Arm(gain=[[exponent, 0.0], [0.0, 1.0]])
+    counts = [arm.trials(goal, seen=seen) for goal in GOALS]
+    assert counts[0] <= (3 if seen is None else 4)
+    assert max(counts[3:]) <= (1 if seen is None else 2)
+    (gain, _), _ = arm.adapter._trials.belief.gain(0)
+    assert gain == pytest.approx(exponent, abs=0.1)
+    assert arm.adapter.symmetry_odds["as stated"] > 0.95
+
+
+def test_what_works_the_other_way_is_found_and_said():
+    arm = Arm(gain=[[-0.9, 0.0], [0.0, 1.0]])
+    assert arm.trials(GOALS[2]) <= 5
+    assert arm.adapter.symmetry_odds["the other way"] > 0.9
+    assert arm.adapter.symmetry_doubted
+    assert "other way round" in arm.adapter.expect(GOALS[0], GOALS[0], 0.015).remark
+
+
+def test_two_words_on_either_side_of_the_goal_speak_for_no_other_model():
+    """Sites of "the other way" are not updated, and contradict each other: no evidence for it."""
+    arm, goal = Arm(shown=demonstrations(np.array([[0.92425745, 0.26830789]]))), [0.9862, -0.0291]
+    for word in (-0.02, 0.02):
+        condition = arm.adapter.propose(np.array(goal))
+        reading = Reading.by_eye([word, word], hit=False).within(TOLERANCE)
+        arm.adapter.observe(condition, np.array(goal), reading)
+    assert arm.adapter.symmetry_odds["as stated"] > 0.99
+    assert np.linalg.norm(arm.adapter.propose(np.array(goal)) - goal) < 0.03
+
+
+def test_a_symmetry_that_does_not_hold_is_noticed_within_two_trials_and_no_other():
+    wrong, right = Arm(gain=[[0.8, 0.0], [0.0, -1.0]]), Arm()
+    goal = np.array([0.9, -0.25])
+    for arm in (wrong, right):
+        for _ in range(2):
+            arm.throw(goal)
+    assert wrong.adapter.symmetry_doubted
+    assert wrong.adapter.symmetry_odds["as stated"] < 0.5
+    assert "turn and tempo" in wrong.adapter.expect(goal, goal, 0.015).remark
+    assert not right.adapter.symmetry_doubted
+
+
+def test_where_nothing_is_wrong_nothing_is_said():
+    rng = np.random.default_rng(4)
+    arm = Arm(off=(0.02, 0.01))
+    for goal in np.tile(GOALS, (4, 1)):
+        arm.moved = rng.normal(0.0, 0.004, size=2)
+        arm.throw(goal, by_eye)
+        assert not arm.adapter.symmetry_doubted
+        assert arm.adapter.expect(goal, goal, 0.015).remark == ""
+
+
+@pytest.mark.parametrize("size", [0.1, 0.2, 0.3, -0.2])
+def test_a_table_that_was_bumped_is_hit_again_in_three_throws(size):
+    arm = Arm()
+    for goal in GOALS[:2]:
+        arm.trials(goal)
+    arm.moved = np.array([size, 0.0])
+    assert arm.trials(np.array([1.0, 0.05])) <= 3
+    assert arm.trials(GOALS[4]) <= 2
+    (change,) = arm.adapter._trials.belief.hypotheses[0].changes
+    assert change.shift_sd > 0
+    assert "moved" in arm.adapter.expect(GOALS[0], GOALS[0], 0.015).remark
+
+
+def test_after_a_change_that_is_said_less_is_sure():
+    arm = Arm()
+    for goal in GOALS:
+        arm.trials(goal)
+    condition = arm.adapter.propose(GOALS[0])
+    sure = arm.adapter.expect(condition, GOALS[0], TOLERANCE).p_hit
+    arm.adapter.change_hardware()
+    assert sure > 0.7
+    assert arm.adapter.expect(condition, GOALS[0], TOLERANCE).p_hit < 0.4
+    arm.off = np.array([-0.12, 0.02])
+    assert arm.trials(GOALS[0]) <= 3
+
+
+def test_where_an_object_was_lost_the_next_plan_is_moved_half_as_far():
+    arm, goal = Arm(), np.array([1.4, 0.1])
+    chart = arm.shown.symmetry.chart
+    tried = []
+    for _ in range(3):
+        tried.append(chart.to(arm.adapter.propose(goal)))
+        arm.adapter.observe(chart.back(tried[-1]), goal, Reading.only(False, 2, lost=True))
+    away = np.abs(np.array(tried)[:, 0] - chart.to(SHOWN[0])[0])
+    np.testing.assert_allclose(away[1:] / away[:-1], 0.5, atol=1e-6)
+    assert "farther than" not in arm.adapter.expect(GOALS[0], GOALS[0], 0.015).remark
+
+
+def test_of_hit_or_miss_alone_no_throw_is_made_twice_and_the_same_is_less_probable():
+    arm, goal = Arm(off=(0.03, 0.01)), GOALS[4]
+    tried, said = [], []
+    for _ in range(8):
+        said.append(arm.adapter.p_hit(goal[None], goal[None], TOLERANCE)[0])
+        condition, error = arm.throw(goal, only_whether)
+        tried.append(condition)
+        if np.linalg.norm(error / TOLERANCE) <= 1.0:
+            break
+    apart = np.linalg.norm(np.array(tried)[:, None] - tried, axis=2)[np.triu_indices(len(tried), 1)]
+    assert apart.min() > 0.4 * TOLERANCE[0]
+    assert said[2] < 0.5 * said[0]
+
+
+def test_no_condition_that_missed_by_so_much_is_asked_again():
+    """What lands does not depend on the condition: the same miss whatever is tried."""
+    arm, goal, tried = Arm(), GOALS[0], []
+    for _ in range(8):
+        tried.append(arm.adapter.propose(goal))
+        reading = Reading.measured([-0.05, 0.02], 0.002, hit=False)
+        arm.adapter.observe(tried[-1], goal, reading.within(TOLERANCE))
+    apart = np.linalg.norm(np.array(tried)[:, None] - tried, axis=2)
+    assert apart[np.triu_indices(8, 1)].min() > 0.4 * TOLERANCE[0]
+
+
+def test_a_goal_farther_than_motions_can_be_moved_is_named():
+    adapter, far = Arm().adapter, np.array([4.0, 0.0])
+    condition = adapter.propose(far)
+    assert np.linalg.norm(condition) < 0.96 * np.exp(0.9)
+    expected = adapter.expect(condition, far, TOLERANCE)
+    assert "demonstrate nearer to [4.0, 0.0]" in expected.remark
+    assert expected.p_hit < 0.05
+
+
+def test_numbers_give_gaussian_regression_in_a_chart_that_is_the_outcomes_own():
+    """All is linear: G and b regressed upon the trials, with the offsets' covariance."""
+    given = demonstrations(symmetry=shift())
+    of, rng = given.symmetry, np.random.default_rng(1)
+    aims = SHOWN + rng.uniform(-0.3, 0.3, size=(5, 2))
+    noise, errors = 0.004, rng.normal(0.0, 0.02, size=(5, 2))
+    belief = MovedBelief(given, p_change=1e-12)
+    for i, (aim, error) in enumerate(zip(aims, errors, strict=True)):
+        one = np.array([i]), aim[None], error[None], error[None]
+        belief.observe(Memory(aim[None], *one, np.full((1, 2), noise**2), np.zeros((1, 2))))
+    h = next(
+        i for i, h in enumerate(belief.hypotheses) if belief.model(i).off == 1 and not h.changes
+    )
+    at = np.array([[1.0, 0.0]])
+    there = belief.outcomes(h, Places(at, np.array([5]), at))
+    spread = belief.spread(h, there)[0]
+    w, w_at = aims - SHOWN, at - SHOWN
+    for j in range(2):
+
+        def covariance(a, b, j=j):
+            size = np.outer(np.linalg.norm(a, axis=1), np.linalg.norm(b, axis=1))
+            near = np.exp(-0.5 * np.square(a[:, None] - b).sum(axis=2) / 0.3**2)
+            total = of.gain_sd[j, j] ** 2 * np.outer(a[:, j], b[:, j]) + of.offset_sd[j] ** 2
+            return total + of.bend_sd[j] ** 2 * size * near
+
+        K = covariance(w, w) + noise**2 * np.eye(5)
+        to = covariance(w_at, w)
+        assert there.mean[0, j] == pytest.approx(
+            at[0, j] + (to @ np.linalg.solve(K, errors[:, j]))[0], abs=2e-4
+        )
+        left = covariance(w_at, w_at) - to @ np.linalg.solve(K, to.T)
+        assert spread[j, j] == pytest.approx(left[0, 0], rel=0.03)
+
+
+def test_p_hit_is_the_share_of_sampled_outcomes_within_the_tolerance():
+    arm = Arm()
+    arm.throw(GOALS[0], by_eye)
+    moved, goal, rng = arm.adapter._trials, GOALS[1], np.random.default_rng(0)
+    condition = arm.adapter.propose(goal)
+    radius, total = np.array([0.02, 0.05]), 0.0
+    for h, share in enumerate(moved.belief.probabilities):
+        there = moved.belief.outcomes(h, moved._places(condition[None], goal[None]))
+        covariance = moved.belief.spread(h, there)[0] + np.diag((radius / 3) ** 2)
+        drawn = rng.multivariate_normal(there.mean[0] - goal, covariance, size=50_000)
+        total += share * np.mean(np.linalg.norm(drawn / radius, axis=1) <= 1.0)
+    said = arm.adapter.p_hit(condition[None], goal[None], radius)[0]
+    assert said == pytest.approx(total, abs=0.03)
+
+
+def test_what_is_kept_in_a_file_goes_on_as_if_never_put_away(tmp_path):
+    arm = Arm(off=(0.05, 0.0))
+    for goal in GOALS[:3]:
+        arm.throw(goal, by_eye)
+    arm.adapter.change_hardware()
+    arm.adapter.observe(np.array([1.3, 0.0]), GOALS[3], Reading.only(False, 2, lost=True))
+    arm.adapter.state().save(tmp_path / "state.npz")
+    resumed = BayesianAdapter()
+    resumed.resume(arm.shown, arm.adapter.key, State.load(tmp_path / "state.npz"))
+    for goal in GOALS[3:]:
+        condition, error = arm.throw(goal, by_eye)
+        np.testing.assert_array_equal(resumed.propose(goal), condition)
+        hit = bool(np.linalg.norm(error / TOLERANCE) <= 1.0)
+        resumed.observe(condition, goal, by_eye(error, hit).within(TOLERANCE))
+    assert resumed.key == arm.adapter.key
+    assert BayesianAdapter().first_key(arm.shown) != BayesianAdapter().first_key(
+        demonstrations(FOUR)
+    )
+
+
+def test_a_long_day_stays_within_memory():
+    arm, rng = Arm(), np.random.default_rng(3)
+    belief = arm.adapter._trials.belief
+    for i in range(68):
+        goal = rng.uniform([0.8, -0.3], [1.2, 0.3])
+        arm.adapter.observe(goal, goal, Reading.measured(rng.normal(0.0, 0.004, 2), 0.002))
+        if i in (0, 40, 67):
+            assert np.all(np.isfinite(arm.adapter.propose(goal)))
+    assert len(belief.memory.numbers) == 64
+    assert len(belief.hypotheses) <= 12
+
+
+def test_a_reading_takes_a_share_of_what_is_unknown_and_most_of_it_near_by():
+    """As much as observing there does, under the most probable hypothesis."""
+    arm = Arm()
+    arm.throw(GOALS[0])
+    over = GOALS[:3]
+    before = arm.adapter.gain(over, over)
+    assert np.all((before > 0.0) & (before < 1.0))
+    np.testing.assert_array_equal(arm.adapter.gain(over, over, demonstrations=True), before)
+    alone = arm.adapter.gain(over, over[1:2])
+    assert alone[1] == max(alone)
+    arm.throw(over[1])
+    assert arm.adapter.gain(over[1:2], over[1:2])[0] < alone[1]

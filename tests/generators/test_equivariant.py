@@ -1,0 +1,145 @@
+"""Generators that learn what a symmetry leaves."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from prior_reinforce.errors import InvalidDemonstrationsError
+from prior_reinforce.generators import load_generator, make_generator
+from prior_reinforce.generators.equivariant import Equivariant, rested
+from prior_reinforce.plans.symmetry import (
+    Shift,
+    Tempo,
+    TurnIncrements,
+    TurnJoint,
+    scale_alone,
+    shift,
+    turn_and_scale,
+)
+from prior_reinforce.testing import synthetic_demonstrations
+
+TURN = turn_and_scale(TurnJoint(2), scale=Tempo(exponent=1.0))
+QUICK = "diffusion,training_steps=3"
+
+
+def thrown(throws, n):
+    """Throws whose third joint is their bearing, and whose amplitude is their distance."""
+    demos = throws(n)
+    reach, side = demos.outcomes_seen.T
+    outcomes = np.column_stack([reach * np.cos(side), reach * np.sin(side)])
+    return replace(demos, outcomes_seen=outcomes, symmetry=TURN)
+
+
+@pytest.mark.parametrize("n", [2, 3, 6])
+def test_demonstrations_come_back_and_turns_are_exact_at_any_bearing(throws, n):
+    demos = thrown(throws, n)
+    generator = make_generator("auto,symmetry=use").fit(demos, seed=0)
+    at_home = generator.generate(demos.outcomes_seen)
+    if n > 3:  # three and fewer are aligned first
+        np.testing.assert_allclose(at_home, demos.plans, atol=0.02)
+    z = TURN.chart.to(demos.outcomes_seen)
+    turned = generator.generate(TURN.chart.back(z + np.array([0.0, 1.0])))
+    np.testing.assert_allclose(turned, at_home + np.eye(3)[2], atol=1e-9)
+
+
+def test_beyond_the_hull_plans_are_moved_from_its_edge(throws):
+    demos = thrown(throws, 4)
+    generator = make_generator("auto").fit(demos, seed=0)
+    far = float(np.linalg.norm(demos.outcomes_seen, axis=1).max())
+    (edge,) = generator.generate([[far, 0.0]])
+    (beyond,) = generator.generate([[1.2 * far, 0.0]])
+    np.testing.assert_allclose(beyond, TURN.move(edge, np.array([np.log(1.2), 0.0])), atol=1e-9)
+
+
+@pytest.mark.parametrize("choice", ["auto", QUICK])
+def test_one_demonstration_is_moved(throws, choice):
+    one = thrown(throws, 4).only([2])
+    generator = make_generator(choice).fit(one, seed=0)
+    np.testing.assert_array_equal(generator.generate(one.outcomes_seen), one.plans)
+    z = TURN.chart.to(one.outcomes_seen)[0]
+    w = np.array([-0.2, 0.4])
+    (moved,) = generator.generate(TURN.chart.back(z + w)[None])
+    np.testing.assert_allclose(moved, TURN.move(one.plans[0], w), atol=1e-9)
+    assert "one place" not in generator.remarks[0]
+    assert "the demonstration is moved" in generator.remarks[0]
+
+
+@pytest.mark.parametrize("name", ["interpolation", "diffusion-paper"])
+def test_one_demonstration_is_refused_by_name_without_the_layer(throws, name):
+    one = thrown(throws, 4).only([0])
+    for demos in (one, one.without_symmetry()):
+        with pytest.raises(InvalidDemonstrationsError, match=r"at least two.*learn with auto"):
+            make_generator(name).fit(demos, seed=0)
+    with pytest.raises(InvalidDemonstrationsError, match="at least two"):
+        make_generator("auto").fit(one.without_symmetry(), seed=0)
+
+
+def test_a_plan_alone_is_not_padded_and_rests_in_a_batch(throws):
+    generator = make_generator("auto").fit(thrown(throws, 4).only([1]), seed=0)
+    goals = np.array([[0.4, 0.0], [0.9, 0.0], [1.3, 0.2]])
+    batch = generator.generate(goals)
+    alone = [generator.generate(goal[None])[0] for goal in goals]
+    assert len({len(plan) for plan in alone}) > 1
+    for plan, padded in zip(alone, batch, strict=True):
+        np.testing.assert_array_equal(padded[: len(plan)], plan)
+        assert not np.diff(padded[len(plan) - 1 :], axis=0).any()
+    assert generator.generate(np.empty((0, 2))).shape == (0, 140, 3)
+
+
+def test_increments_rest_at_nothing():
+    short, long = np.ones((2, 2)), np.ones((4, 2))
+    padded = rested([short, long], increments=(1,))
+    np.testing.assert_array_equal(padded[0], [[1, 1], [1, 1], [1, 0], [1, 0]])
+
+
+@pytest.mark.parametrize("n", [1, 4])
+@pytest.mark.parametrize("choice", ["auto", QUICK])
+def test_it_is_loaded_as_it_was_learned(throws, choice, n, tmp_path):
+    demos = thrown(throws, 4).only(range(n))
+    generator = make_generator(choice).fit(demos, seed=0)
+    generator.save(tmp_path)
+    loaded = load_generator(tmp_path)
+    assert isinstance(loaded, Equivariant)
+    assert loaded.remarks == generator.remarks
+    goals = np.array([[0.8, 0.1], [1.3, -0.4]])
+    np.testing.assert_array_equal(loaded.generate(goals), generator.generate(goals))
+
+
+def test_without_a_symmetry_it_is_the_generator_that_it_wraps(throws):
+    demos = throws(6)
+    bare = make_generator("auto,symmetry=none").fit(demos, seed=0)
+    layered = make_generator("auto").fit(demos, seed=0)
+    goals = demos.outcomes_seen[:2] + 0.01
+    np.testing.assert_array_equal(layered.generate(goals), bare.generate(goals))
+    assert layered.remarks == bare.remarks
+
+
+def test_the_switch_gives_what_is_learned_from_demonstrations_alone(throws):
+    demos = thrown(throws, 6)
+    plain = make_generator("auto").fit(demos.without_symmetry(), seed=0)
+    none = make_generator("auto,symmetry=none").fit(demos, seed=0)
+    goals = demos.outcomes_seen[:2] + 0.01
+    np.testing.assert_array_equal(plain.generate(goals), none.generate(goals))
+
+
+@pytest.mark.parametrize(
+    ("symmetry", "k"),
+    [
+        (shift(), 2),
+        (scale_alone(), 1),
+        (turn_and_scale(TurnIncrements(), scale=Tempo(increments=(0, 1))), 2),
+        (turn_and_scale(TurnJoint(), others=(Shift(1),)), 3),
+    ],
+    ids=lambda each: getattr(each, "name", None),
+)
+@pytest.mark.parametrize("n", [1, 5])
+def test_every_symmetry_gives_finite_plans_for_goals_around(symmetry, k, n):
+    demos = synthetic_demonstrations(5, k=k)
+    demos = demos.only(range(n)) if n > 1 else demos.with_symmetry(symmetry).only([0])
+    demos = demos.with_symmetry(symmetry)
+    generator = make_generator("auto").fit(demos, seed=0)
+    goals = demos.outcomes_seen[[0]] * np.linspace(0.7, 1.4, 5)[:, None]
+    plans = generator.generate(goals)
+    assert plans.shape[::2] == (5, 3)
+    assert np.all(np.isfinite(plans))

@@ -1,0 +1,68 @@
+"""Which goals can be reached, by the plans that are made for them."""
+
+import numpy as np
+import pytest
+
+from prior_reinforce.arm.robots.presets import robot_limits
+from prior_reinforce.errors import OutOfReachError
+from prior_reinforce.generators import make_generator
+from prior_reinforce.generators.reach import reach, refusal
+from prior_reinforce.plans.motions import Demonstrations
+from prior_reinforce.plans.plan_format import PlanFormat
+from prior_reinforce.plans.symmetry import TurnJoint, TurnPath, turn_and_scale
+
+REGION = np.array([[0.5, -0.6], [1.5, 0.6]])
+
+
+def learned(symmetry, outcome=(1.0, 0.0)):
+    s = np.linspace(0, 1, 50)
+    s = s**3 * (10 - 15 * s + 6 * s**2)
+    ready = np.array([0.0, -0.3, 0.0, -2.2, 0.0, 1.9, np.pi / 4])
+    plan = ready + s[:, None] * np.array([0.1, 0.4, 0.0, 0.5, 0.05, 0.3, 0.1])
+    form = PlanFormat(tuple(f"joint{i}" for i in range(1, 8)), ("rad",) * 7, 0.02)
+    one = Demonstrations(plan[None], [outcome], form, symmetry=symmetry)
+    return make_generator("auto").fit(one, seed=0)
+
+
+def gentle(plan, goal):
+    """At most 0.3 rad to the left, and no faster than 1.2 times the demonstration."""
+    if plan[:, 0].max() > 0.4:
+        return "joint1 beyond 0.4 rad"
+    return "too fast" if np.abs(np.diff(plan[:, 3])).max() > 1.2 * 0.0191 else ""
+
+
+def test_goals_are_reached_where_their_plans_pass():
+    generator = learned(turn_and_scale(TurnJoint()))
+    assert refusal(generator, [1.0, 0.0], gentle) == ""
+    assert "joint1" in refusal(generator, [1.0, 0.6], gentle)
+    assert "too fast" in refusal(generator, [1.5, 0.0], gentle)
+    found = reach(generator, REGION, gentle, steps=7)
+    assert found.reached.shape == (7, 7)
+    at = {(x, y): found.reached[j, i] for i, x in enumerate(found.x) for j, y in enumerate(found.y)}
+    for goal, reached in at.items():
+        assert reached == (refusal(generator, goal, gentle) == "")
+    assert 0 < found.reached.mean() < 1
+
+
+def test_the_nearest_goal_that_passes_is_found_at_the_edge():
+    generator = learned(turn_and_scale(TurnJoint()))
+    found = reach(generator, REGION, gentle, steps=7)
+    np.testing.assert_array_equal(found.nearest(generator, [1.0, 0.1], gentle), [1.0, 0.1])
+    near = found.nearest(generator, [1.0, 0.6], gentle)
+    assert refusal(generator, near, gentle) == ""
+    assert 0.25 < np.arctan2(near[1], near[0]) <= 0.3
+    assert np.linalg.norm(near - [1.0, 0.6]) < 0.35
+
+
+def test_nothing_in_reach_is_said():
+    generator = learned(turn_and_scale(TurnJoint()))
+    found = reach(generator, REGION, lambda *_: "never", steps=3)
+    with pytest.raises(OutOfReachError, match=r"no goal can be reached .*never"):
+        found.nearest(generator, [1.0, 0.0], lambda *_: "never")
+
+
+def test_what_kinematics_cannot_do_is_out_of_reach_by_name():
+    turn = TurnPath(robot_limits("panda").chain, (1.2, 0.0), tuple(range(7)))
+    generator = learned(turn_and_scale(turn, (1.2, 0.0)), outcome=(1.5, 0.0))
+    assert refusal(generator, [1.5, 0.01], lambda *_: "") == ""
+    assert "out of reach: turned by" in refusal(generator, [0.9, 0.0], lambda *_: "")

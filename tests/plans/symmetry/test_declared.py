@@ -1,0 +1,102 @@
+"""Words of a person, and the symmetry that they mean."""
+
+import numpy as np
+import pytest
+
+from prior_reinforce.arm.robots.presets import robot_limits
+from prior_reinforce.errors import ConfigurationError
+from prior_reinforce.plans.kinematics import Chain, tool_tip
+from prior_reinforce.plans.plan_format import PlanFormat
+from prior_reinforce.plans.symmetry import (
+    Amplitude,
+    Shift,
+    Tempo,
+    TurnIncrements,
+    TurnJoint,
+    TurnPath,
+    TurnPoses,
+)
+from prior_reinforce.plans.symmetry.declared import declare_symmetry
+
+PANDA = robot_limits("panda").chain
+JOINTS = PlanFormat(("gripper", *(f"joint{i}" for i in range(1, 8))), ("1",) + ("rad",) * 7, 0.01)
+POSES = PlanFormat(("x", "y", "z", "rx", "ry", "rz"), ("m",) * 3 + ("rad",) * 3, 0.02)
+STEPS = PlanFormat(("dx", "dy", "dyaw", "grip"), ("m", "m", "rad", "1"), 0.04)
+UPSIDE_DOWN = Chain(
+    ((0.1, 0.2, 0.0, np.pi, 0.0, 0.0), (0.0, 0.0, 0.3, np.pi / 2, 0.0, 0.0)),
+    ((0.0, 0.0, 1.0),) * 2,
+    (0.4, 0.0, 0.0, 0.0, 0.0, 0.0),
+)
+"""Its first joint stands at (0.1, 0.2) m, and counts clockwise."""
+ARM = {"chain": PANDA, "joints": range(1, 8)}
+
+
+def kinds(symmetry):
+    return [type(move) for move in symmetry.moves]
+
+
+def test_an_arm_that_carries_the_object_turns_about_its_base():
+    symmetry = declare_symmetry(JOINTS, 2, about="base", steps=["gripper"], **ARM)
+    assert kinds(symmetry) == [Tempo, TurnJoint]
+    assert symmetry.moves[1] == TurnJoint(1, 1.0)
+    assert symmetry.moves[0].steps == (0,)
+
+
+@pytest.mark.parametrize("chain", [PANDA, robot_limits("ur5e").chain, UPSIDE_DOWN])
+def test_a_turn_about_the_base_turns_where_the_tip_is_whichever_way_the_joint_counts(chain):
+    n = len(chain.axes)
+    form = PlanFormat(tuple(f"j{i}" for i in range(n)), ("rad",) * n, 0.01)
+    symmetry = declare_symmetry(form, 2, about="base", chain=chain, joints=range(n))
+    plan = np.random.default_rng(0).uniform(-0.5, 0.5, (5, n))
+    moved = symmetry.move(plan, np.array([0.0, 0.3]))
+    centre = np.array(symmetry.chart.centre)
+    before, after = (tool_tip(chain, each)[:, :2] - centre for each in (plan, moved))
+    cos, sin = np.cos(0.3), np.sin(0.3)
+    np.testing.assert_allclose(after, before @ np.array([[cos, sin], [-sin, cos]]), atol=1e-6)
+
+
+def test_an_object_at_a_place_is_turned_about_by_kinematics():
+    symmetry = declare_symmetry(JOINTS, 2, about=(0.43, 0.0), **ARM)
+    assert kinds(symmetry) == [Tempo, TurnPath]
+    assert symmetry.chart.centre == (0.43, 0.0)
+
+
+def test_poses_turn_with_their_attitude_or_are_shifted():
+    assert declare_symmetry(POSES, 2, about="base").moves[1] == TurnPoses(vector=(3, 4, 5))
+    assert declare_symmetry(POSES, 2, distance="shift").moves == (Shift(0), Shift(1))
+
+
+def test_increments_are_played_turned_and_shifted_as_such():
+    symmetry = declare_symmetry(STEPS, 2, about=(0.2, 0.1), start=(0.1, 0.1), steps=["grip"])
+    turn = TurnIncrements((0.1, 0.1), (0.2, 0.1), yaw=2)
+    assert symmetry.moves == (Tempo(steps=(3,), increments=(0, 1, 2)), turn)
+    assert declare_symmetry(STEPS, 2, distance="shift").increments == (0, 1)
+
+
+def test_neither_leaves_a_scaling_of_one_outcome():
+    assert kinds(declare_symmetry(JOINTS, 1)) == [Tempo]
+    assert kinds(declare_symmetry(JOINTS, 1, distance="amplitude")) == [Amplitude]
+    clock = declare_symmetry(JOINTS, 1, release_frame=56.0).moves[0]
+    assert (clock.about, clock.keep_horizon) == (56.0, True)
+
+
+@pytest.mark.parametrize(
+    ("form", "k", "said", "message"),
+    [
+        (JOINTS, 2, {}, "needs an axis"),
+        (JOINTS, 2, {"about": "base"}, "name the arm"),
+        (JOINTS, 2, {"distance": "shift"}, "needs plans with x and y"),
+        (JOINTS, 3, {"about": "base", **ARM}, "outcomes have 3 components"),
+        (JOINTS, 1, {"steps": ["hand"]}, r"steps names \['hand'\]"),
+    ],
+)
+def test_what_cannot_be_done_is_refused_by_name(form, k, said, message):
+    with pytest.raises(ConfigurationError, match=message):
+        declare_symmetry(form, k, **said)
+
+
+def test_an_arm_on_a_wall_has_no_upright_base():
+    wall = Chain(((0, 0, 0, np.pi / 2, 0, 0),) * 2, ((0.0, 0.0, 1.0),) * 2)
+    form = PlanFormat(("a", "b"), ("rad", "rad"), 0.01)
+    with pytest.raises(ConfigurationError, match="not vertical"):
+        declare_symmetry(form, 2, about="base", chain=wall, joints=(0, 1))

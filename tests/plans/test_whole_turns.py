@@ -1,0 +1,36 @@
+"""Angles that nothing stops, attitudes found by their names, and the other numbers of a pose."""
+
+import math
+
+import numpy as np
+import pytest
+
+from prior_reinforce.plans.whole_turns import attitudes, other_form, whole_circles
+
+
+def test_angles_that_nothing_stops_are_known_by_name_and_unit():
+    names = ("yaw", "tool_roll", "scroll", "Gierwinkel", "heading", "joint1")
+    units = ("rad", "deg", "rad", "deg", "m", "rad")
+    assert whole_circles(names, units) == ("yaw", "tool_roll", "Gierwinkel")
+
+
+@pytest.mark.parametrize(
+    ("names", "found"),
+    [
+        (("x", "qx", "qy", "qz", "qw"), (("qx", "qy", "qz", "qw"),)),
+        (("quat_w", "quat_x", "quat_y", "quat_z"), (("quat_w", "quat_x", "quat_y", "quat_z"),)),
+        (("rx", "ry", "rz", "z"), (("rx", "ry", "rz"),)),
+        (("qx", "qy", "qz"), ()),
+        (("x", "y", "z"), ()),
+    ],
+)
+def test_attitudes_are_whole_groups_of_names(names, found):
+    assert attitudes(names) == found
+
+
+def test_the_other_form_is_the_same_turn():
+    quaternion = np.array([0.5, -0.5, 0.5, 0.5])
+    np.testing.assert_array_equal(other_form(quaternion), -quaternion)
+    vector = np.array([[0.0, 0.0, math.pi / 2], [0.0, 0.0, 0.0]])
+    np.testing.assert_allclose(other_form(vector), [[0, 0, -3 * math.pi / 2], [0, 0, 0]])
+    np.testing.assert_allclose(other_form(other_form(vector)), vector, atol=1e-12)
