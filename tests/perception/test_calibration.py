@@ -8,7 +8,11 @@ import numpy as np
 import pytest
 
 from prior_reinforce.errors import ConfigurationError, FileFormatError
-from prior_reinforce.perception.calibration import TableCalibration
+from prior_reinforce.perception.calibration import (
+    CAMERA_SD,
+    TableCalibration,
+    left_out_errors,
+)
 
 CORNERS = np.array([[0.4, -0.4], [1.2, -0.4], [1.2, 0.4], [0.4, 0.4]])
 GRID = np.array([(x, y) for x in (0.4, 0.8, 1.2) for y in (-0.4, 0.0, 0.4)])
@@ -46,6 +50,7 @@ def test_camera_straight_above_is_similar_triangles():
     np.testing.assert_allclose(calibration.to_table([150.0, -100.0]), [1.0, 0.5], atol=1e-9)
 
 
+@pytest.mark.slow
 def test_errors_are_in_metres_and_left_out_points_are_judged_harder():
     pixels = through_pinhole(at(GRID, 0.0))
     metre_per_pixel = 2.2 / 1500
@@ -136,3 +141,49 @@ def test_a_file_that_is_no_calibration_is_refused(tmp_path, damage):
         path.write_text(json.dumps(content))
     with pytest.raises(FileFormatError, match=r"table\.json"):
         TableCalibration.load(path)
+
+
+def test_a_calibration_is_of_a_picture_and_scaled_to_others_of_its_shape(tmp_path):
+    pixels = through_pinhole(at(GRID, 0.0))
+    calibration = TableCalibration.fit(GRID, pixels, picture=(1920, 1080))
+    calibration.save(tmp_path / "table.json")
+    again = TableCalibration.load(tmp_path / "table.json")
+    assert again.picture == (1920, 1080)
+    assert again.in_picture((1920, 1080)) is again
+    smaller = again.in_picture((1280, 720))
+    np.testing.assert_allclose(smaller.to_table(pixels * 2 / 3), GRID, atol=1e-9)
+    for size in ((1080, 1920), (1440, 1080), (1920, 1200)):
+        with pytest.raises(ConfigurationError, match="calibrate again"):
+            again.in_picture(size)
+    with pytest.raises(ConfigurationError, match="outside a picture"):
+        TableCalibration.fit(GRID, pixels, picture=(640, 480))
+    assert again.at_height(0.1, CAMERA).picture == (1920, 1080)
+
+
+def test_the_spread_is_no_smaller_than_what_is_left_out():
+    pixels = through_pinhole(at(GRID, 0.0))
+    assert TableCalibration.fit(GRID, pixels).sd == CAMERA_SD
+    typed = GRID.copy()
+    typed[1, 1] += 0.1
+    calibration = TableCalibration.fit(typed, pixels)
+    assert calibration.sd == calibration.left_out_error > 0.02
+    off, others_off = left_out_errors(typed, pixels)
+    assert np.argmin(others_off) == 1
+    assert off[1] > 0.08
+
+
+@pytest.mark.parametrize("what", ["place", "pixel"])
+def test_a_point_given_twice_is_named(what):
+    points, pixels = GRID.copy(), through_pinhole(at(GRID, 0.0))
+    (points if what == "place" else pixels)[5] = (points if what == "place" else pixels)[2]
+    with pytest.raises(ConfigurationError, match=f"points 3 and 6 have one {what}"):
+        TableCalibration.fit(points, pixels)
+
+
+def test_an_objects_size_in_the_picture_is_that_of_a_disc_or_a_ball():
+    camera = TableCalibration.fit(CORNERS, 400 - 1000 * CORNERS[:, ::-1] / 2.0)
+    disc, ball = camera.seen(np.array([400.0, 400.0]), 0.06)  # from straight above
+    np.testing.assert_allclose([*disc, ball], 30.0, rtol=1e-3)
+    slanted = TableCalibration.fit(GRID, through_pinhole(at(GRID, 0.0)))
+    disc, ball = slanted.seen(slanted.to_pixels([0.8, 0.0]), 0.06)
+    assert disc.min() < disc.max() <= ball * 1.001

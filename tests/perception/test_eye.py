@@ -32,6 +32,7 @@ def test_a_tie_counts_as_the_larger_whatever_the_rounding_of_floats(tie, seen, g
     assert seen_cm(tie, goal) == pytest.approx(seen)
 
 
+@pytest.mark.slow
 @given(st.floats(-3.0, 3.0))
 def test_nothing_is_seen_further_off_than_half_a_step(error):
     rollout = Rollout(outcome=np.array([error]), valid=True)

@@ -4,11 +4,12 @@ import sys
 import pytest
 
 from prior_reinforce.errors import ConfigurationError
-from prior_reinforce.perception import make_perception
+from prior_reinforce.perception import PERCEPTIONS, make_perception
 from prior_reinforce.perception.base import Perception
 from prior_reinforce.perception.colour_camera import ColourCamera
 from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
 from prior_reinforce.readings import Reading
+from prior_reinforce.registry import Member
 from tests.perception.slanted_table import SCENE
 
 
@@ -35,8 +36,9 @@ def test_settings_in_the_choice_come_on_top_of_the_config():
     assert make_perception("amplified,noise_sd=0.02").noise_sd == 0.02
 
 
-def test_your_own_gets_what_it_takes_and_is_closed():
-    with make_perception(f"{__name__}:Closing", scene=SCENE, seed=3) as perception:
+def test_your_own_gets_what_it_takes_and_is_closed(monkeypatch):
+    monkeypatch.setitem(PERCEPTIONS.members, "closing", Member(Closing, "a test's own"))
+    with make_perception("closing", scene=SCENE, seed=3) as perception:
         assert perception.scene is SCENE
     assert perception.closed == 1
 
@@ -56,12 +58,13 @@ def test_what_cannot_be_made_is_named(choice, message):
         make_perception(choice)
 
 
+@pytest.mark.slow
 def test_names_of_members_load_none_of_them():
     code = (
         "import sys\n"
         "from prior_reinforce.adapters import ADAPTERS\n"
         "from prior_reinforce.perception import PERCEPTIONS\n"
-        "from prior_reinforce.lab.tasks import TASKS\n"
+        "from prior_reinforce.simulation.tasks import TASKS\n"
         "print(ADAPTERS.help, PERCEPTIONS.help, TASKS.help)\n"
         "heavy = {'torch', 'mujoco', 'openai', 'scipy', 'numpy', 'joblib', 'PIL', 'msgspec'}\n"
         "assert not heavy & set(sys.modules), heavy & set(sys.modules)\n"

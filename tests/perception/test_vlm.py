@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+import json
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from PIL import Image
 
 from prior_reinforce.environment import Rollout, TableScene
 from prior_reinforce.errors import ConfigurationError, EndpointError, PerceptionFailedError
 from prior_reinforce.perception.camera import Camera, CameraConfig
-from prior_reinforce.perception.colour_camera import ColourClient
+from prior_reinforce.perception.colour_camera import ColourClient, find_by_colour
 from prior_reinforce.perception.vlm import VisionLanguageModel
 from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
+from prior_reinforce.perception.vlm_reading import Answer
 from tests.perception.slanted_table import BALL, GOAL, RIM_HEIGHT, SCENE
 from tests.perception.vision_server import VisionServer
 
-FAMILIES = ["glm-4.5v", "qwen2-vl", "qwen2.5-vl", "qwen3-vl"]
+FAMILIES = ["glm-4.5v", "qwen2-vl", "qwen2.5-vl", "qwen3-vl", "gemini"]
 RNG = np.random.default_rng(0)
 
 
@@ -155,3 +160,86 @@ def test_what_cannot_be_seen_is_refused_before_anyone_is_asked(
         VisionLanguageModel(SCENE, VisionLanguageModelConfig(api_key_variable="NO_SUCH_KEY"))
     with pytest.raises(ConfigurationError, match="TableScene with your objects' names"):
         VisionLanguageModel(None)
+
+
+@pytest.mark.parametrize("config", [CameraConfig(width=960, height=540), CameraConfig()])
+@pytest.mark.parametrize(
+    ("said", "believed"),
+    [("glm-4.5v", "qwen2.5-vl"), ("qwen2.5-vl", "qwen3-vl"), ("qwen2.5-vl", "glm-4.5v")],
+)
+def test_another_scale_than_the_familys_gives_no_number(
+    said, believed, config, table_model, frame_with_ball_at
+):
+    """Both boxes say so together: too small or large, or as flat as the picture."""
+    camera = Camera(config)
+    calibration = camera.calibrate(table_model, np.array(SCENE.marks), height=RIM_HEIGHT)
+    picture = camera.picture(frame_with_ball_at(*BALL), GOAL)
+    how = VisionLanguageModelConfig(family=believed)
+    with VisionLanguageModel(
+        SCENE, how, client=ColourClient(said), camera=camera, calibration=calibration
+    ) as perception:
+        reading = perception.read(picture)
+    if config.width == config.height:  # 896 pixels for 1000 thousandths: an error of a tenth
+        true = BALL - GOAL
+        assert reading.error_seen is None or np.abs(reading.error_seen - true).max() < 0.02
+    else:
+        assert reading.error_seen is None
+        assert "family" in reading.problem
+
+
+@pytest.mark.parametrize("shrunk", [0.5, 0.65, 0.8])
+def test_a_server_that_shrinks_the_picture_gives_no_number(shrunk, calibration, picture):
+    class Shrinks(ColourClient):
+        def ask(self, words, picture):
+            tall, wide, _ = picture.shape
+            small = Image.fromarray(picture).resize((int(wide * shrunk), int(tall * shrunk)))
+            box = find_by_colour(np.asarray(small), words)
+            return Answer(json.dumps({"bbox_2d": [round(v) for v in box]}), None, "stop")
+
+    how = VisionLanguageModelConfig(family="qwen2.5-vl")
+    reading = VisionLanguageModel(SCENE, how, client=Shrinks(), calibration=calibration).read(
+        picture
+    )
+    assert reading.error_seen is None
+    assert "max_image_side" in reading.problem
+
+
+@pytest.mark.parametrize(
+    ("answer", "says"),
+    [
+        (Answer("", "It is at [1, 2, 3, 4].", "stop"), "in the thoughts"),
+        (Answer("", None, "content_filter"), "content filter"),
+        (Answer("I cannot assist with that.", None, "stop"), "I cannot assist"),
+    ],
+)
+def test_an_answer_without_a_box_says_why(answer, says, calibration, picture):
+    class Says(ColourClient):
+        def ask(self, words, picture):
+            return answer
+
+    reading = VisionLanguageModel(SCENE, client=Says(), calibration=calibration).read(picture)
+    assert says in reading.problem
+    assert reading.reached.answers[0].thinking == answer.thinking
+
+
+def test_a_picture_of_another_size_is_read_with_the_calibration_scaled(
+    calibration, frame_with_ball_at
+):
+    larger = Camera(CameraConfig(width=960, height=720))
+    picture = larger.picture(frame_with_ball_at(*BALL), GOAL)
+    larger.close()
+    perception = VisionLanguageModel(SCENE, client=ColourClient(), calibration=calibration)
+    np.testing.assert_allclose(perception.read(picture).error_seen, BALL - GOAL, atol=0.003)
+    with pytest.raises(ConfigurationError, match="calibrate again"):
+        perception.read(np.ascontiguousarray(np.rot90(picture)))
+
+
+def test_what_a_camera_tells_is_no_surer_than_its_calibration(calibration, frame_with_ball_at):
+    rough = replace(calibration, left_out_error=0.14)
+    with VisionLanguageModel(
+        SCENE, client=ColourClient(), camera=Camera(CameraConfig(width=640, height=480)),
+        calibration=rough,
+    ) as perception:  # fmt: skip
+        frame = frame_with_ball_at(*BALL)
+        reading = perception.perceive(Rollout(BALL, True, frame), GOAL, RNG)
+    np.testing.assert_allclose(reading.sd, 0.14)

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import json
+import random
+import re
 import socketserver
 import threading
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -183,6 +186,17 @@ def test_a_key_that_is_sent_back_is_not_kept(monkeypatch, status, length):
     assert "secret" not in found
 
 
+@pytest.mark.parametrize("part", [slice(100), slice(8), slice(30, 60), slice(-8, None)])
+def test_a_part_of_a_key_is_not_kept_either(monkeypatch, part):
+    key = "".join(random.Random(0).choices("abcdefghijklmnopqrstuvwxyz0123456789", k=164))
+    monkeypatch.setenv("A_KEY", key)
+    said = f"you sent {key[part]}x, and then {key[part]}"
+    completion = {"choices": [{"message": {"content": said}, "finish_reason": said}]}
+    with endpoint(lambda file: file.write(body(completion))) as (address, _):
+        found = ask(address, api_key_variable="A_KEY")
+    assert found.text == found.finish_reason == "you sent ***x, and then ***"
+
+
 def test_a_password_in_the_address_is_in_no_message():
     with (
         endpoint(lambda file: file.write(body({}))) as (address, _),
@@ -258,3 +272,158 @@ def test_a_reply_nested_beyond_all_depth_is_a_failed_reading():
     content = body(b'{"choices":' + b"[" * 100_000 + b"]" * 100_000 + b"}")
     with endpoint(lambda file: file.write(content)) as (address, _), pytest.raises(EndpointError):
         ask(address)
+
+
+COMPLETION = {"choices": [{"message": {"content": "[[1, 2, 3, 4]]"}, "finish_reason": "stop"}]}
+
+
+def refused(address, **settings):
+    with pytest.raises(EndpointError) as caught:
+        ask(address, **settings)
+    said = str(caught.value)
+    assert "\n" not in said
+    return said
+
+
+@pytest.mark.parametrize(
+    ("status", "words", "remedy"),
+    [
+        (b"429 No", "You exceeded your current quota, please check your plan", "quota"),
+        (b"402 Pay", "Insufficient balance", "log"),
+        (b"401 No", "Incorrect API key provided", "api_key_variable"),
+        (b"404 No", "The model `x` has been deprecated", "base_url and model"),
+        (b"400 Bad", "Unsupported parameter: 'max_tokens'", "leave_out = ['max_tokens']"),
+        (b"400 Bad", "Unsupported value: 'temperature' is 1 alone", "leave_out = ['temperature']"),
+        (b"422 Bad", "chat_template_kwargs: extra fields", "leave_out = ['chat_template_kwargs']"),
+        (b"500 Oh", "CUDA out of memory", "server's log"),
+    ],
+)
+@pytest.mark.parametrize("form", ["error", "bare", "detail", "text"])
+def test_a_refusal_has_the_servers_own_words_and_a_remedy(status, words, remedy, form):
+    reply = {
+        "error": {"error": {"message": words, "code": "x"}},
+        "bare": {"message": words},
+        "detail": {"detail": words},
+        "text": words.encode(),
+    }[form]
+    content = body(reply).replace(b"200 OK", status)
+    with endpoint(lambda file: file.write(content)) as (address, _):
+        said = refused(address)
+    assert words[:60] in said
+    assert remedy in said
+
+
+def test_fields_that_a_server_refuses_are_left_out():
+    with VisionServer() as server:
+        kept = {"temperature", "max_tokens", "chat_template_kwargs", "skip_special_tokens"}
+        for out in ((), ("max_tokens",), ("temperature", "skip_special_tokens")):
+            address = server.base_url.removeprefix("http://")
+            with suppress(EndpointError):
+                ask(address, leave_out=out)
+            assert kept & server.requests[-1].keys() == kept - {*out}
+
+
+@pytest.mark.parametrize(
+    ("message", "text", "thinking"),
+    [
+        ({"content": [{"type": "text", "text": "[[1,"}, {"text": " 2]]"}]}, "[[1, 2]]", None),
+        ({"content": [{"type": "image"}]}, "", None),
+        ({"content": None, "reasoning": "so"}, "", "so"),
+        ({"content": "a", "reasoning_content": "so"}, "a", "so"),
+        ({"content": None, "refusal": "I cannot"}, "I cannot", None),
+    ],
+)
+def test_an_answer_may_come_in_parts_and_with_thoughts(message, text, thinking):
+    with endpoint(lambda file: file.write(body({"choices": [{"message": message}]}))) as (
+        address,
+        _,
+    ):
+        answer = ask(address)
+    assert (answer.text, answer.thinking) == (text, thinking)
+
+
+@contextmanager
+def encrypted(certificate):
+    """An address that is spoken to by TLS."""
+    import ssl
+
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    context.load_cert_chain(*certificate)
+
+    class Server(socketserver.ThreadingTCPServer):
+        daemon_threads = True
+
+    class Handler(socketserver.StreamRequestHandler):
+        def setup(self):
+            self.request = context.wrap_socket(self.request, server_side=True)
+            super().setup()
+
+        def handle(self):
+            while (line := self.rfile.readline()).strip():
+                if line.lower().startswith(b"content-length"):
+                    length = int(line.partition(b":")[2])
+            self.rfile.read(length)
+            self.wfile.write(body(COMPLETION))
+
+        def finish(self):
+            super().finish()
+            self.request.close()
+
+    class Quiet(Server):
+        def handle_error(self, *_):
+            """A client that hangs up is what is tried here."""
+
+    with Quiet(("127.0.0.1", 0), Handler) as server:
+        thread = threading.Thread(target=server.serve_forever, args=(0.02,))
+        thread.start()
+        try:
+            yield f"127.0.0.1:{server.server_address[1]}/v1"
+        finally:
+            server.shutdown()
+            thread.join()
+
+
+def test_why_a_server_cannot_be_reached_is_named(certificate):
+    with encrypted(certificate) as address:
+        secret = VisionLanguageModelConfig(f"https://{address}", max_retries=0)
+        with pytest.raises(EndpointError, match=r"self.signed.*as certificate"):
+            OpenAIClient(secret).ask("the ball", SQUARE)
+        known = replace(secret, certificate=str(certificate[0]))
+        assert OpenAIClient(known).ask("the ball", SQUARE).text == "[[1, 2, 3, 4]]"
+        assert "http or https" in refused(address)  # without TLS
+    for host in ("gpu-box.invalid:8000/v1", "127.0.0.1:9/v1"):
+        said = refused(host)
+        assert "cannot reach" in said
+        assert re.search(r"\((?!Connection error).*(Errno|refused|resolution)", said), said
+
+
+@pytest.mark.parametrize(("file", "says"), [("no.pem", "no.pem"), (__file__, "give a .pem")])
+def test_a_certificate_that_is_none_is_named(file, says):
+    with pytest.raises(ConfigurationError, match=says):
+        OpenAIClient(VisionLanguageModelConfig(certificate=file))
+
+
+@pytest.mark.parametrize("key", ["sk-abc\n", "sk-abc\r\n", "sk\u2013abc", "sk abc", "Bearer sk"])
+def test_a_key_with_what_no_key_has_is_refused_unseen(monkeypatch, key):
+    monkeypatch.setenv("A_KEY", key)
+    with pytest.raises(ConfigurationError, match="variable A_KEY") as caught:
+        OpenAIClient(VisionLanguageModelConfig(api_key_variable="A_KEY"))
+    assert "abc" not in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["ALL_PROXY", "https_proxy", "HTTP_PROXY"])
+@pytest.mark.parametrize("proxy", ["socks5://127.0.0.1:1080", "socks4://127.0.0.1:7890"])
+def test_a_proxy_that_is_not_understood_is_named_with_its_variable(monkeypatch, name, proxy):
+    for other in ("ALL_PROXY", "HTTP_PROXY", "HTTPS_PROXY", "NO_PROXY"):
+        monkeypatch.delenv(other, raising=False)
+        monkeypatch.delenv(other.lower(), raising=False)
+    monkeypatch.setenv(name, proxy)
+    with pytest.raises(ConfigurationError, match=rf"{name}.*unset it"):
+        OpenAIClient(VisionLanguageModelConfig("https://192.0.2.7/v1"))
+
+
+def test_a_proxy_that_refuses_is_named(monkeypatch):
+    monkeypatch.setenv("HTTP_PROXY", "http://127.0.0.1:9")
+    monkeypatch.delenv("NO_PROXY", raising=False)
+    monkeypatch.delenv("no_proxy", raising=False)
+    assert "HTTP_PROXY sets a proxy" in refused("192.0.2.7/v1")

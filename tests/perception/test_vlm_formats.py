@@ -140,6 +140,7 @@ def test_a_number_is_never_read_from_its_middle():
         read_box("[1000000000100, 200, 300, 500]", GLM, (1000, 1000))
 
 
+@pytest.mark.slow
 @settings(max_examples=200, deadline=None)
 @given(st.text(alphabet="[](){}<>,.-0123456789 |abox_nd", max_size=300))
 def test_any_text_is_a_box_in_the_picture_or_unreadable(text):
@@ -172,3 +173,19 @@ def test_the_prompt_names_the_object_once_asked():
         prompt = box_format.prompt.format(words="the orange ball")
         assert "the orange ball" in prompt
         assert "{{" not in prompt
+
+
+@pytest.mark.parametrize(
+    ("family", "answer"),
+    [
+        ("glm-4.5v", '```json\n[{"box_2d": [200, 100, 500, 300], "label": "ball"}]\n```'),
+        ("qwen2.5-vl", '[{"box_2d": [200, 100, 500, 300]}]'),
+        ("gemini", "[[200, 100, 500, 300]]"),
+        ("gemini", "[{'bbox_2d': [100, 200, 300, 500]}]"),
+        ("gemini", '{"ymin": 200, "xmin": 100, "ymax": 500, "xmax": 300, "label": "ball"}'),
+        ("glm-4.5v", '{"box": {"x1": 100, "y1": 200, "x2": 300, "y2": 500}}'),
+        ("qwen3-vl", '{"left": 100.0, "top": 200, "right": 300, "bottom": 500}'),
+    ],
+)
+def test_a_key_says_which_side_a_number_is(family, answer):
+    assert read_box(answer, FORMATS[family], (1000, 1000)) == EXPECTED

@@ -15,6 +15,7 @@ import threading
 from collections import deque
 from collections.abc import Iterable
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -155,6 +156,15 @@ class VisionServer:
             "two objects": json.dumps(two),
             "null content": None,
         }[fault]
+
+
+def vlm_file(folder: Path, base_url: str, **settings: object) -> Path:
+    """A file with the section [vlm] in it, for `--vlm`; a request is made once."""
+    said = {"base_url": base_url, "max_retries": 0, **settings}
+    path = folder / "vlm.toml"
+    lines = [f"{name} = {json.dumps(value)}" for name, value in said.items()]
+    path.write_text("\n".join(["[vlm]", *lines, ""]))
+    return path
 
 
 def _completion(model: str, choices: list[dict[str, Any]]) -> Reply:

@@ -6,7 +6,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from prior_reinforce.plans.motions import Demonstrations, PlanFormat
+from prior_reinforce.adapters.base import Adapter
+from prior_reinforce.formats import OutcomeFormat
+from prior_reinforce.plans.motions import Demonstrations
+from prior_reinforce.plans.plan_format import PlanFormat
 from prior_reinforce.readings import Reading
 from prior_reinforce.report import AdaptationRecord
 from prior_reinforce.session.session import Session
@@ -34,24 +37,17 @@ class Swing:
         return motion(conditions, self.action_dim)
 
 
-class FullStep:
+class FullStep(Adapter):
     """An adapter that subtracts the whole last error."""
 
-    carries_over = False
-    n_starts = 0
-
-    def start(self, demonstrations):
-        self.n_starts += 1
+    def _start(self, demonstrations):
         self.last = None
 
-    def propose(self, goal_seen):
-        return goal_seen.copy() if self.last is None else self.last - (self.seen - goal_seen)
+    def _propose(self, goal_seen):
+        return goal_seen if self.last is None else self.last - (self.seen - goal_seen)
 
-    def expect(self, condition, goal, tolerance):
-        return None
-
-    def observe(self, condition, goal, reading):
-        self.last, self.seen = condition.copy(), goal + reading.error_seen
+    def _observe(self, condition, outcome_seen):
+        self.last, self.seen = condition, outcome_seen
 
 
 def demonstrations(k: int = 2, action_dim: int = 7, units: tuple[str, ...] = ("m", "m")):
@@ -70,8 +66,9 @@ def demonstrations(k: int = 2, action_dim: int = 7, units: tuple[str, ...] = ("m
         format=PlanFormat(
             tuple(f"joint{i + 1}" for i in range(action_dim)), ("rad",) * action_dim, DT
         ),
-        outcome_names=tuple("xyz"[:k]) if set(units) == {"m"} else ("distance", "duration"),
-        outcome_units=units,
+        outcome_format=OutcomeFormat(
+            tuple("xyz"[:k]) if set(units) == {"m"} else ("distance", "duration"), units
+        ),
     )
 
 

@@ -3,6 +3,7 @@
 import numpy as np
 from PIL import Image
 
+from prior_reinforce.formats import OutcomeFormat
 from prior_reinforce.report import advice
 from prior_reinforce.report.advice import draw_advice
 
@@ -13,7 +14,7 @@ def test_where_a_first_throw_hits_is_dark(tmp_path):
     for p in (0.0, 1.0):
         path = draw_advice(
             tmp_path / f"{p}.png", grid, np.full(6, p), grid[:2], grid[3], grid[4],
-            (("x", "y"), ("m", "m")),
+            OutcomeFormat.metres(2),
         )  # fmt: skip
         pictures.append(np.asarray(Image.open(path).convert("RGB")).mean())
     assert pictures[0] > pictures[1] + 20
@@ -27,7 +28,7 @@ def test_what_the_shades_and_the_axes_mean_is_said(tmp_path, monkeypatch):
     grid = np.stack(np.meshgrid([0.8, 0.9, 1.0], [-0.2, 0.2], indexing="ij"), -1).reshape(-1, 2)
     draw_advice(
         tmp_path / "a.png", grid, np.full(6, 0.5), grid[:2], grid[3], grid[3],
-        (("x", "y"), ("m", "m")),
+        OutcomeFormat.metres(2),
     )  # fmt: skip
     (axes,) = figures[0].axes
     assert axes.get_xlabel() == "← left      y [cm]      right →"

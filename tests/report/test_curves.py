@@ -90,10 +90,9 @@ def test_only_plans_of_one_horizon_are_compared():
         assert drawn == ([n] * 7 if n else [])
 
 
-@pytest.mark.parametrize("plan", [None, np.empty((0, 7))])
-def test_a_plan_that_is_lost_is_left_out(plan):
+def test_a_plan_that_is_lost_is_left_out():
     record = told([0.03, 0.04])
-    lost = replace(record, trials=(replace(record.trials[0], plan=plan),))
+    lost = replace(record, trials=(replace(record.trials[0], plan=np.empty((0, 7))),))
     lines = draw_plans(lost).axes[0].lines
     assert sum(len(line.get_xdata()) > 0 for line in lines) == 6
 

@@ -13,6 +13,7 @@ from prior_reinforce.report.film import key_moments
 from tests.report.swing_world import pictures
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("height", "width"), [(48, 64), (47, 63)])
 def test_a_film_reads_back_whole(tmp_path, height, width):
     shown = list(pictures(17, height, width))
@@ -30,6 +31,7 @@ def test_a_film_reads_back_whole(tmp_path, height, width):
         assert difference.mean() < 6  # of 255, lossy; another picture of the film is 8 away
 
 
+@pytest.mark.slow
 def test_a_film_and_its_strip_are_recorded_in_one_pass(tmp_path):
     film = record_film(pictures(20, 240, 640), tmp_path / "new", "throw", moments=6)
     assert film.video.name == "throw.mp4"

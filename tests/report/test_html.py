@@ -5,7 +5,6 @@ import base64
 import jinja2
 import pytest
 
-from prior_reinforce.lab.experiments.recipes.tables import Table
 from prior_reinforce.report.html import data_uri, render
 
 
@@ -18,23 +17,6 @@ def test_what_is_filled_in_is_escaped(tmp_path):
 def test_what_is_not_given_is_an_error():
     with pytest.raises(jinja2.UndefinedError, match="title"):
         render("base.html")
-
-
-def test_another_packages_page_extends_ours():
-    page = render(
-        "evidence.html",
-        package="prior_reinforce.lab.experiments",
-        title="Evidence",
-        counts={"ours": {"open": 1}},
-        claims=Table(("the paper says", "verdict"), (("a claim", "open"),)),
-        observations=Table(("quantity",), ()),
-        sections=[],
-        missing=[],
-        unbroken=str,
-        source=str,
-    )
-    assert page.startswith("<!DOCTYPE html>")
-    assert "<h1>Evidence</h1>" in page
 
 
 def test_files_are_carried_whole(tmp_path):

@@ -232,8 +232,8 @@ def test_a_goal_not_tried_yet_has_a_report(tmp_path):
 
 def test_goals_keep_their_numbers_and_only_what_shows_something_is_drawn(tmp_path):
     records = [replace(told([0.05, 0.0]), number=3), replace(told(None), number=7)]
-    mine = ("goal-2-photo.png", "goal-of-my-thesis-plans.png")
-    for name in ("report.html", "goal-2-errors.png", "goal-2-aims.svg", *mine):
+    mine = ("goal-2-photo.png", "goal-of-my-thesis-plans.svg")
+    for name in ("report.html", "goal-2-errors.svg", "goal-2-aims.svg", *mine):
         (tmp_path / name).write_bytes(b"there before")
     drawn = []
     path = write_report(
@@ -254,9 +254,41 @@ def test_goals_keep_their_numbers_and_only_what_shows_something_is_drawn(tmp_pat
 
 
 def test_where_there_was_no_report_nothing_is_removed(tmp_path):
-    (tmp_path / "goal-12-plans.png").write_bytes(b"mine")
+    (tmp_path / "goal-12-plans.svg").write_bytes(b"mine")
     write_report(tmp_path, [told([0.05, 0.0])], title="x")
-    assert (tmp_path / "goal-12-plans.png").read_bytes() == b"mine"
+    assert (tmp_path / "goal-12-plans.svg").read_bytes() == b"mine"
+
+
+def test_only_goals_that_changed_are_drawn_again_and_all_where_other_code_draws(
+    tmp_path, monkeypatch
+):
+    def written(*records):
+        write_report(tmp_path, records, title="x")
+        return {path.name: path.stat().st_mtime_ns for path in tmp_path.glob("goal-*.svg")}
+
+    over, current = replace(told([0.05, 0.0]), number=1), replace(told([0.05, 0.0]), number=2)
+    before = written(over, current)
+    (tmp_path / "goal-1-table.svg").write_text("<svg>cut off")
+    after = written(over, replace(told([0.05, 0.0], [0.0, 0.02]), number=2))
+    again = {name for name in before if after[name] != before[name]}
+    names = ("table", "landings", "aims", "errors", "plans")
+    assert again == {"goal-1-table.svg", *(f"goal-2-{name}.svg" for name in names)}
+    before = written(over)
+    monkeypatch.setattr(page, "__file__", str(tmp_path / "of-another-version" / "page.py"))
+    after = written(over)
+    assert all(after[name] != before[name] for name in before)
+
+
+def test_a_page_stays_small_and_loads_pictures_of_early_goals_from_beside_it(tmp_path, monkeypatch):
+    records = [replace(told([0.05, 0.0]), number=number) for number in (1, 2)]
+    whole = write_report(tmp_path, records, title="x").stat().st_size
+    monkeypatch.setattr(page, "LARGEST_PAGE", whole * 2 // 3)
+    path = write_report(tmp_path, records, title="x")
+    assert path.stat().st_size < whole * 3 // 4
+    beside = [a for a in read(path).addresses if not a.startswith(("data:", "#"))]
+    assert beside
+    assert all((tmp_path / address).is_file() for address in beside)
+    assert all(address.startswith("goal-1-") for address in beside)
 
 
 def test_a_large_film_lies_beside_the_page(records, tmp_path, monkeypatch):

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from prior_reinforce.formats import OutcomeFormat
 from prior_reinforce.report.panels import View, views_of
-from prior_reinforce.report.pictures import draw_close_up, draw_table
+from prior_reinforce.report.places import draw_close_up, draw_table
 from tests.report.swing_world import adaptation, told
 
 
@@ -18,15 +19,16 @@ from tests.report.swing_world import adaptation, told
     ],
 )
 def test_views_show_every_component(units, views):
-    assert views_of(units) == views
+    assert views_of(OutcomeFormat(tuple("abcd"[: len(units)]), tuple(units))) == views
 
 
 def test_three_lengths_are_seen_from_above_and_from_the_side():
-    above, side = views_of(["m"] * 3)
+    above, side = views_of(OutcomeFormat.metres(3))
     assert {above.across, above.up, side.across, side.up} == {0, 1, 2}
     assert side.up == 2
 
 
+@pytest.mark.slow
 def test_from_above_left_is_left_and_beyond_is_up():
     (axes,) = draw_table([told([0.05, 0.0])]).axes
     x, y = axes.transData.transform([[-10.0, 92.0], [10.0, 102.0]]).T
@@ -36,6 +38,7 @@ def test_from_above_left_is_left_and_beyond_is_up():
     assert axes.get_ylabel().endswith("long →")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("draw", [lambda record: draw_table([record]), draw_close_up])
 @pytest.mark.parametrize("k", [2, 3])
 def test_a_centimetre_is_as_long_up_as_across(draw, k):

@@ -7,13 +7,15 @@ import pytest
 
 from prior_reinforce.adapters import ADAPTERS, make_adapter
 from prior_reinforce.adapters.base import Adapter
-from prior_reinforce.plans.motions import Demonstrations, PlanFormat
+from prior_reinforce.plans.motions import Demonstrations
+from prior_reinforce.plans.plan_format import PlanFormat
 from prior_reinforce.readings import Reading
 from prior_reinforce.testing import AdapterContract
+from tests.testing.members import members
 
 
 class TestAdapters(AdapterContract):
-    @pytest.fixture(autouse=True, params=ADAPTERS.members)
+    @pytest.fixture(autouse=True, params=members(ADAPTERS))
     def choose(self, request):
         self.make = partial(make_adapter, request.param)
 

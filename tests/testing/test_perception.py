@@ -11,16 +11,18 @@ from prior_reinforce.perception import PERCEPTIONS, make_perception
 from prior_reinforce.perception.exact import Exact
 from prior_reinforce.testing import PerceptionContract
 from tests.perception.slanted_table import RIM_HEIGHT, slanted_table
+from tests.testing.members import members
 
 PICTURES = ("camera", "vlm")
 """They need a table to look at; `perception/test_vlm.py` asks a model."""
+SELF_CONTAINED = [name for name in members(PERCEPTIONS) if name not in PICTURES]
 
 
 _table = cache(slanted_table)
 
 
 class TestPerceptions(PerceptionContract):
-    @pytest.fixture(autouse=True, params=[n for n in PERCEPTIONS.members if n not in PICTURES])
+    @pytest.fixture(autouse=True, params=SELF_CONTAINED)
     def choose(self, request):
         self.make = partial(make_perception, request.param)
 

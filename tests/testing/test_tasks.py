@@ -2,12 +2,13 @@
 
 import pytest
 
-from prior_reinforce.lab.tasks import TASKS, make_task
+from prior_reinforce.simulation.tasks import TASKS, make_task
 from prior_reinforce.testing import TaskContract
+from tests.testing.members import members
 
 
 class TestTasks(TaskContract):
-    @pytest.fixture(scope="class", params=TASKS.members)
+    @pytest.fixture(scope="class", params=members(TASKS))
     @classmethod
     def task(cls, request):
         return make_task(request.param)

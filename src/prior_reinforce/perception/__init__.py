@@ -39,10 +39,10 @@ def make_perception(
     config: VisionLanguageModelConfig | None = None,
     seed: int = 0,
 ) -> Perception:
-    """Make a perception by its name, or your own by `module:Class`.
+    """Make a perception by its name.
 
     Args:
-        choice: `name` or `module:Class`, each with settings if need be: `amplified,noise_sd=0.02`.
+        choice: Its name, with settings if need be: `amplified,noise_sd=0.02`.
         scene: What to look for in pictures: the task's `scene`.
         config: Endpoint, model and votes of `vlm`, votes of `camera`; settings in `choice` come
             on top.

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import json
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -32,7 +32,8 @@ _Row = tuple[float, float, float]
 class _Saved(msgspec.Struct):
     """What a file holds; its numbers are finite, as JSON's are."""
 
-    kind: Literal["prior-reinforce table calibration 1"]
+    kind: Literal["prior-reinforce table calibration 2"]
+    picture_px: tuple[int, int] | None
     homography: tuple[_Row, _Row, _Row]
     height_m: float
     fit_error_m: float
@@ -42,6 +43,13 @@ class _Saved(msgspec.Struct):
 # Singular values of the design matrix below this share of the largest count as zero: points on
 # one line leave about 1e-16, points clicked to a pixel on a real table 1e-2 (ours).
 _RANK_FLOOR = 1e-6
+_SAME_SHAPE = 0.005
+"""Share by which two pictures' sides may differ in proportion and be one picture, scaled (ours):
+a pixel of rounding."""
+CAMERA_SD = 0.003
+"""Least standard deviation of each component of a place that is read from a picture, in [m] (ours):
+twice what `reproduction/benchmarks/vlm_accuracy.py` finds where objects are found by colour; no
+model was measured."""
 _HIGHEST = 20.0
 """Largest height of a camera above a table, in [m]; ours: beyond any hall, and below any height in
 centimetres."""
@@ -66,10 +74,22 @@ class TableCalibration:
     left_out_error: float | None
     """The same for each point seen through an H fitted to all others, in [m]: what to expect of
     a point that was not clicked. None where there were only four points."""
+    picture: tuple[int, int] | None = None
+    """Width and height of the upright picture, in [px]; None where nobody said."""
+
+    @property
+    def sd(self) -> float:
+        """Standard deviation of each component of a place, in [m]: `CAMERA_SD`, or the left out."""
+        return max(CAMERA_SD, self.fit_error, self.left_out_error or 0.0)
 
     @classmethod
     def fit(
-        cls, table_points: ArrayLike, pixels: ArrayLike, *, height: float = 0.0
+        cls,
+        table_points: ArrayLike,
+        pixels: ArrayLike,
+        *,
+        height: float = 0.0,
+        picture: tuple[int, int] | None = None,
     ) -> TableCalibration:
         """Fit H to known points by the normalised direct linear transform.
 
@@ -79,9 +99,11 @@ class TableCalibration:
             table_points: Known points in the plane, table frame, shape (n, 2), n >= 4, in [m].
             pixels: Where they are in the picture, shape (n, 2), in [px].
             height: Height of the plane above the table, in [m].
+            picture: Width and height of the picture, in [px], if known.
 
         Raises:
-            ConfigurationError: Too few points, points on one line, or pixels in another order.
+            ConfigurationError: Too few points, points on one line or said twice, pixels in another
+                order or outside the picture.
         """
         points, seen = np.asarray(table_points, dtype=float), np.asarray(pixels, dtype=float)
         if points.shape != seen.shape or points.shape[1:] != (2,) or len(points) < 4:
@@ -94,9 +116,26 @@ class TableCalibration:
                 f"calibration points and pixels must be finite, and at most {LARGEST:.0e}; click "
                 "them again"
             )
+        if picture is not None and not np.all((seen >= 0) & (seen <= picture)):
+            raise ConfigurationError(
+                f"pixels up to {seen.max(axis=0).tolist()} lie outside a picture of "
+                f"{_by(picture)}; give the picture in which they were clicked"
+            )
+        for what, given in (("place", points), ("pixel", seen)):
+            _, index, often = np.unique(
+                given.round(6), axis=0, return_inverse=True, return_counts=True
+            )
+            twice = np.flatnonzero(often[index.ravel()] > 1)
+            if len(twice):
+                raise ConfigurationError(
+                    f"calibration points {' and '.join(map(str, twice[:9] + 1))} have one {what} "
+                    "twice, or are the same; give each point once"
+                )
         homography = _direct_linear_transform(points, seen)
         fit_error = _rms(_map(np.linalg.inv(homography), seen) - points)
-        return cls(homography, float(height), fit_error, _left_out_error(points, seen))
+        misses, _ = left_out_errors(points, seen)
+        left_out = None if np.isnan(misses).all() else float(np.sqrt(np.nanmean(misses**2)))
+        return cls(homography, float(height), fit_error, left_out, picture)
 
     def to_table(self, pixels: ArrayLike) -> Float[np.ndarray, "*n 2"]:
         """Map pixels, shape (..., 2), to points in the plane, in [m]."""
@@ -105,6 +144,41 @@ class TableCalibration:
     def to_pixels(self, table_points: ArrayLike) -> Float[np.ndarray, "*n 2"]:
         """Map points in the plane, shape (..., 2), in [m], to pixels."""
         return _map(self.homography, np.asarray(table_points, dtype=float))
+
+    def seen(
+        self, pixel: Float[np.ndarray, "2"], size: float
+    ) -> tuple[Float[np.ndarray, "2"], float]:
+        """Return how large what stands at a pixel looks, in [px].
+
+        Args:
+            pixel: Where it is.
+            size: Diameter, in [m].
+
+        Returns:
+            Width and height of the box around a flat disc, and the side of that around a ball.
+        """
+        place, step = self.to_table(pixel), 1e-3
+        moved = self.to_pixels(place + step * np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]))
+        per_metre = (moved[1:] - moved[0]).T / step
+        ball = np.linalg.norm(per_metre, ord=2)
+        return size * np.linalg.norm(per_metre, axis=1), float(size * ball)
+
+    def in_picture(self, size: tuple[int, int]) -> TableCalibration:
+        """Return the calibration of a picture of this width and height in [px], scaled if need be.
+
+        Raises:
+            ConfigurationError: It is turned, or of another shape, and so of another view.
+        """
+        if self.picture is None or size == self.picture:
+            return self
+        per_x, per_y = np.divide(size, self.picture)
+        if abs(per_x / per_y - 1) > _SAME_SHAPE:
+            raise ConfigurationError(
+                f"the camera was calibrated in a picture of {_by(self.picture)}, and this one has "
+                f"{_by(size)}, which is turned or cut; take it as before, or calibrate again"
+            )
+        homography = np.diag([per_x, per_y, 1.0]) @ self.homography
+        return replace(self, homography=homography / np.linalg.norm(homography), picture=size)
 
     def at_height(self, height: float, camera_position: ArrayLike) -> TableCalibration:
         """Return the calibration of a parallel plane, from where the camera hangs.
@@ -136,7 +210,8 @@ class TableCalibration:
         homography = self.homography @ from_new_plane
         homography /= np.linalg.norm(homography)
         left_out = None if self.left_out_error is None else self.left_out_error / scale
-        return TableCalibration(homography, float(height), self.fit_error / scale, left_out)
+        fit_error = self.fit_error / scale
+        return TableCalibration(homography, float(height), fit_error, left_out, self.picture)
 
     def summary(self) -> str:
         """One line for the operator, in centimetres."""
@@ -150,7 +225,8 @@ class TableCalibration:
     def save(self, path: Path) -> None:
         """Write the calibration as JSON."""
         saved = {
-            "kind": "prior-reinforce table calibration 1",
+            "kind": "prior-reinforce table calibration 2",
+            "picture_px": self.picture,
             "homography": self.homography.tolist(),
             "height_m": self.height,
             "fit_error_m": self.fit_error,
@@ -172,9 +248,9 @@ class TableCalibration:
             raise FileFormatError(
                 f"{path} is not a table calibration ({error}); write one with TableCalibration.save"
             ) from error
-        return cls(
-            np.array(saved.homography), saved.height_m, saved.fit_error_m, saved.left_out_error_m
-        )
+        homography = np.array(saved.homography)
+        errors = saved.fit_error_m, saved.left_out_error_m
+        return cls(homography, saved.height_m, *errors, saved.picture_px)
 
 
 def _direct_linear_transform(points: _Pairs, pixels: _Pairs) -> Float[np.ndarray, "3 3"]:
@@ -205,27 +281,27 @@ def _direct_linear_transform(points: _Pairs, pixels: _Pairs) -> Float[np.ndarray
     return homography
 
 
-def _left_out_error(points: _Pairs, pixels: _Pairs) -> float | None:
-    """Root mean square distance of each point from where the other points' H sees it, in [m]."""
-    if len(points) == 4:
-        return None
-    misses = []
-    for i in range(len(points)):
-        with suppress(ConfigurationError):  # the others lie on one line: they cannot judge this one
+def left_out_errors(
+    points: _Pairs, pixels: _Pairs
+) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
+    """Return what each point's H of all others says: how far it lies off, and the others, in [m].
+
+    nan where they are four, or the others lie on one line and cannot judge this one.
+    """
+    off, others_off = np.full((2, len(points)), np.nan)
+    for i in range(len(points) if len(points) > 4 else 0):
+        with suppress(ConfigurationError):
             others = np.delete(points, i, axis=0), np.delete(pixels, i, axis=0)
-            homography = _direct_linear_transform(*others)
-            misses.append(_map(np.linalg.inv(homography), pixels[i]) - points[i])
-    return _rms(np.array(misses)) if misses else None
+            to_points = np.linalg.inv(_direct_linear_transform(*others))
+            off[i] = _rms(_map(to_points, pixels[i : i + 1]) - points[i])
+            others_off[i] = _rms(_map(to_points, others[1]) - others[0])
+    return off, others_off
 
 
 def _similarity_to_unit(points: _Pairs) -> Float[np.ndarray, "3 3"]:
     """Similarity that moves points to centroid 0 and root mean square distance sqrt(2)."""
     centre = points.mean(axis=0)
     spread = np.sqrt(((points - centre) ** 2).sum(axis=1).mean() / 2)
-    if not spread > 0:
-        raise ConfigurationError(
-            f"all {len(points)} calibration points are the same; spread them over the table"
-        )
     return np.array([[1, 0, -centre[0]], [0, 1, -centre[1]], [0, 0, spread]]) / spread
 
 
@@ -235,6 +311,10 @@ def _map(
     """Apply a projective map."""
     mapped = points @ homography[:, :2].T + homography[:, 2]
     return mapped[..., :2] / mapped[..., 2:]
+
+
+def _by(size: tuple[int, int]) -> str:
+    return f"{size[0]} x {size[1]} px"
 
 
 def _rms(differences: _Pairs) -> float:

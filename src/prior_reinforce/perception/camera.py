@@ -135,7 +135,8 @@ class Camera:
         points = np.asarray(table_points, dtype=float)
         heights = np.full((len(points), 1), height)
         pixels = self.find_marks(model, np.hstack([points, heights]))
-        return TableCalibration.fit(points, pixels, height=height)
+        size = self.config.width, self.config.height
+        return TableCalibration.fit(points, pixels, height=height, picture=size)
 
     def close(self) -> None:
         """Free the graphics memory; the next picture takes it again."""

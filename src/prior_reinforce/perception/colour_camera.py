@@ -114,7 +114,8 @@ def say_box(box: Box | None, size: tuple[int, int], words: str, family: Family) 
         numbers = [[round(v * seen[i % 2] / size[i % 2]) for i, v in enumerate(box)]]
     if family == "glm-4.5v":
         return f"The bounding box is <|begin_of_box|>{json.dumps(numbers)}<|end_of_box|>."
-    labelled = [{"bbox_2d": found, "label": words} for found in numbers]
+    key, order = ("box_2d", (1, 0, 3, 2)) if FORMATS[family].y_first else ("bbox_2d", range(4))
+    labelled = [{key: [found[i] for i in order], "label": words} for found in numbers]
     return f"```json\n{json.dumps(labelled)}\n```"
 
 

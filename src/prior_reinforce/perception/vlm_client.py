@@ -5,23 +5,34 @@ from __future__ import annotations
 import base64
 import io
 import os
+import ssl
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated, Any, Literal, Protocol
 from urllib.parse import urlsplit
 
 import msgspec
+from typing_extensions import Self
 
 from prior_reinforce.environment import Picture
-from prior_reinforce.errors import ConfigurationError, EndpointError
+from prior_reinforce.errors import ConfigurationError, EndpointError, FileFormatError
 from prior_reinforce.extras import check_installed
 from prior_reinforce.perception.vlm_formats import FORMATS, Family
 from prior_reinforce.perception.vlm_reading import Answer
-from prior_reinforce.settings import Checked, Count, NonNegative, Positive
+from prior_reinforce.registry import build
+from prior_reinforce.settings import Checked, Count, NonNegative, Positive, tomllib
 
 _NO_KEY = "EMPTY"
 _MOST_SHOWN = 160
 """Characters of a server's own words in a message."""
+_MOST_BYTES, _BYTES_A_TOKEN = 65_536, 100
+"""Of an answer; ours: ten times what any tokenizer makes of a token, in JSON's escapes."""
+_HIDDEN = 8
+"""Characters of a key in a row that nobody shows; ours: no shorter piece tells a key."""
 _THIS_MACHINE = {"127.0.0.1", "localhost", "::1"}
+_FIELDS = ("max_tokens", "temperature", "chat_template_kwargs", "skip_special_tokens", "thinking")
+"""Of a request, which some servers refuse."""
+_PROXIES = ("all_proxy", "http_proxy", "https_proxy")
 
 
 @dataclass(frozen=True)
@@ -39,6 +50,10 @@ class VisionLanguageModelConfig(Checked):
     that refuse fields they do not know."""
     api_key_variable: str | None = None
     """Environment variable that holds the key; None for a server that wants none."""
+    certificate: str | None = None
+    """File (.pem) with the certificate of a server that signs its own."""
+    leave_out: tuple[str, ...] = ()
+    """Fields of the request that the server refuses: `max_tokens`, `temperature`, ..."""
     enable_thinking: bool = False
     """Let the model think first: slower, and `max_tokens` must be enough to finish."""
     votes: Count = 3
@@ -51,9 +66,9 @@ class VisionLanguageModelConfig(Checked):
     temperature: NonNegative = 0.7
     """Sampling temperature (ours). At 0 all votes are one answer, and voting means nothing."""
     max_tokens: Count = 2048
-    """Longest answer, thinking included."""
+    """Longest answer, thinking included; also bounds what is read of one, in bytes."""
     timeout: Positive = 60.0
-    """For a connection, and from one part of an answer to the next, in [s]."""
+    """For a request and the whole answer, in [s]."""
     max_retries: Annotated[int, msgspec.Meta(ge=0, le=20)] = 2
     """Repetitions of a request after a timeout, a lost connection, HTTP 429 or 5xx."""
     max_image_side: Count = 1000
@@ -72,10 +87,46 @@ class VisionLanguageModelConfig(Checked):
                 "votes <= most_requests"
             )
 
+    @classmethod
+    def load(cls, path: Path, *, needed: bool = True) -> Self:
+        """Read the section [vlm] of a TOML file: these settings by their names.
+
+        Args:
+            path: A file of its own, or a workspace's manifest.
+            needed: Whether the section must be there; else the defaults stand for it.
+
+        Raises:
+            FileFormatError: There is no such file, it is no TOML, or it lacks the section.
+            ConfigurationError: An unknown setting, or a value of a wrong type or out of range.
+        """
+        try:
+            sections = tomllib.loads(path.read_text(encoding="utf-8"))
+        except (OSError, ValueError) as error:
+            raise FileFormatError(
+                f"cannot read {path} ({error}); expected a TOML file with a section [vlm]"
+            ) from error
+        if needed and not isinstance(sections.get("vlm"), dict):
+            raise FileFormatError(f"{path} has no section [vlm]; write base_url, model, ... there")
+        settings: Self = build(cls, sections.get("vlm", {}), f"{path}: [vlm]")
+        return settings
+
+
+class _Part(msgspec.Struct):
+    text: str | None = None
+
 
 class _Message(msgspec.Struct):
-    content: str | None = None
+    content: str | list[_Part] | None = None
+    refusal: str | None = None
     reasoning_content: str | None = None
+    reasoning: str | None = None
+    """The same, as vLLM calls it since 0.16."""
+
+    @property
+    def text(self) -> str:
+        """What is said, or why nothing is."""
+        said = self.content or self.refusal or ""
+        return said if isinstance(said, str) else "".join(part.text or "" for part in said)
 
 
 class _Choice(msgspec.Struct):
@@ -127,6 +178,8 @@ class OpenAIClient:
         check_installed("openai")
         import openai
 
+        from prior_reinforce.perception.bounded_replies import BoundedClient
+
         self.config, self.model = config, config.model
         self._key = _NO_KEY  # the client insists on one; servers that want none take any
         if config.api_key_variable is not None:
@@ -136,17 +189,42 @@ class OpenAIClient:
                     f"environment variable {config.api_key_variable} is not set; export the key of "
                     f"{without_secrets(config.base_url)} in it"
                 )
+            if not (self._key.isascii() and self._key.isprintable() and " " not in self._key):
+                raise ConfigurationError(
+                    f"environment variable {config.api_key_variable} holds what no key does: a "
+                    "blank, a line end, or a letter or dash of another alphabet; copy the key again"
+                )
+        # A proxy, set for the internet at large, does not know a server on this machine.
+        self._proxied = urlsplit(config.base_url).hostname not in _THIS_MACHINE
+        own = config.certificate
+        try:
+            http = BoundedClient(
+                config.timeout,
+                _MOST_BYTES + _BYTES_A_TOKEN * config.max_tokens,
+                verify=ssl.create_default_context(cafile=own) if own else True,
+                trust_env=self._proxied,
+                # A redirection would send the picture, and maybe the key, somewhere else.
+                follow_redirects=False,
+            )
+        except ssl.SSLError as error:
+            raise ConfigurationError(
+                f"certificate {own} is none ({error}); give a .pem file"
+            ) from error
+        except OSError as error:
+            raise ConfigurationError(
+                f"cannot read the certificate {own} ({error.strerror})"
+            ) from error
+        except (ImportError, ValueError) as error:
+            raise ConfigurationError(
+                f"{' or '.join(_proxies())} in the environment names a proxy that is not "
+                f"understood ({error}); unset it, or for socks5: pip install 'httpx[socks]'"
+            ) from error
         self._client = openai.OpenAI(
             base_url=config.base_url,
             api_key=self._key,
             timeout=config.timeout,
             max_retries=config.max_retries,
-            http_client=openai.DefaultHttpxClient(
-                # A proxy, set for the internet at large, does not know a server on this machine.
-                trust_env=urlsplit(config.base_url).hostname not in _THIS_MACHINE,
-                # A redirection would send the picture, and maybe the key, somewhere else.
-                follow_redirects=False,
-            ),
+            http_client=http,
         )
         self._sent: tuple[object, str] = (None, "")
 
@@ -159,21 +237,25 @@ class OpenAIClient:
             {"type": "image_url", "image_url": {"url": self._sent[1]}},
             {"type": "text", "text": prompt},
         ]
+        more = {
+            "temperature": self.config.temperature,
+            "max_tokens": self.config.max_tokens,
+            **_extra_body(self.config),
+        }
         try:
             response = self._client.chat.completions.with_raw_response.create(
                 model=self.config.model,
                 messages=[{"role": "user", "content": content}],
-                temperature=self.config.temperature,
-                max_tokens=self.config.max_tokens,
-                extra_body=_extra_body(self.config),
+                extra_body={k: v for k, v in more.items() if k not in self.config.leave_out},
             )
             choice = msgspec.json.decode(response.content, type=_Completion).choices[0]
         # Whatever a server sends, the client's parsing included, is no reason to break off.
         except Exception as error:
             raise EndpointError(self._what_failed(error)) from None
-        thinking, reason = choice.message.reasoning_content, choice.finish_reason
+        message, reason = choice.message, choice.finish_reason
+        thinking = message.reasoning_content or message.reasoning
         return Answer(
-            self._hidden(choice.message.content or ""),
+            self._hidden(message.text),
             None if thinking is None else self._hidden(thinking),
             None if reason is None else self._hidden(reason),
         )
@@ -183,33 +265,70 @@ class OpenAIClient:
         self._client.close()
 
     def _hidden(self, text: str) -> str:
-        """A text without the key, which a server may send back."""
-        return text if self._key == _NO_KEY else text.replace(self._key, "***")
+        """A text without the key and its parts, which a server may send back."""
+        if self._key == _NO_KEY:
+            return text
+        n = min(len(self._key), _HIDDEN)
+        parts = {self._key[at : at + n] for at in range(len(self._key) - n + 1)}
+        shown, begin = "", 0
+        for at in range(len(text)):
+            if text[at : at + n] in parts:
+                shown, begin = f"{shown}{text[begin:at]}***" if at >= begin else shown, at + n
+        return shown + text[begin:]
 
     def _what_failed(self, error: Exception) -> str:
-        """One line with the remedy for each way in which a request fails."""
+        """One line with the server's own words and the remedy, whatever way a request fails."""
         import openai
 
         config = self.config
         url, tries = without_secrets(config.base_url), f"after {config.max_retries + 1} tries"
+        said = self._words_of(error)
         if isinstance(error, openai.APITimeoutError):
             return f"no answer from {url} in {config.timeout:g} s {tries}; raise timeout"
+        for each in (error, error.__cause__):  # which of them depends on the client's version
+            if isinstance(each, EndpointError):
+                return f"{url} sends {each}; raise max_tokens if it is meant to"
         if isinstance(error, openai.APIConnectionError):
-            return f"cannot reach {url} {tries}; is the server running?"
-        if isinstance(error, openai.RateLimitError):
-            return f"{url} refuses more requests for now (HTTP 429) {tries}; wait a minute"
-        if isinstance(error, openai.AuthenticationError):
-            return f"{url} refuses the key (HTTP 401); set api_key_variable"
-        if isinstance(error, openai.NotFoundError):
-            return f"{url} does not serve model '{config.model}' (HTTP 404); set base_url and model"
+            remedy = "is the server running? is the address right, http or https?"
+            if "CERTIFICATE" in said:
+                remedy = "give the server's own certificate, a .pem file, as certificate"
+            elif self._proxied and _proxies():
+                remedy += f" {' or '.join(_proxies())} sets a proxy"
+            return f"cannot reach {url} {tries} ({said}); {remedy}"
+        if not isinstance(error, openai.APIStatusError):
+            return (
+                f"{url} answers, but not with a chat completion ({said}); the address of an "
+                "OpenAI-compatible endpoint mostly ends in /v1"
+            )
+        what, remedy = f"failed with HTTP {error.status_code}", "see the server's log"
+        if error.status_code == 429:
+            what = f"refuses more requests for now (HTTP 429) {tries}"
+            remedy = "wait a minute, or see to the account's quota"
+        elif error.status_code == 401:
+            what, remedy = "refuses the key (HTTP 401)", "set api_key_variable"
+        elif error.status_code == 404:
+            what = f"does not serve model '{config.model}' (HTTP 404)"
+            remedy = "set base_url and model"
+        elif refused := [field for field in _FIELDS if field in said]:
+            remedy = f"where a field is not supported, set leave_out = {refused}"
+        return f"{url} {what}: {said}; {remedy}"
+
+    def _words_of(self, error: Exception) -> str:
+        """What the server, or the network, says of a failure."""
+        body, response = getattr(error, "body", None), getattr(error, "response", None)
+        words: object = error.__cause__ or error
+        if isinstance(body, dict):
+            words = body.get("message") or body.get("detail") or words
+        elif response is not None:
+            words = response.text or words
         # The key is hidden before anything is cut: the rest of it would be no longer found.
-        said = " ".join(self._hidden(str(error)).split())[:_MOST_SHOWN]
-        if isinstance(error, openai.APIStatusError):
-            return f"{url} failed with HTTP {error.status_code} ({said}); see the server's log"
-        return (
-            f"{url} answers, but not with a chat completion ({said}); the address of an "
-            "OpenAI-compatible endpoint mostly ends in /v1"
-        )
+        said = " ".join(self._hidden(str(words) or type(words).__name__).split())
+        return said[:_MOST_SHOWN]
+
+
+def _proxies() -> list[str]:
+    """Variables of the environment that set a proxy."""
+    return [name for name in os.environ if name.lower() in _PROXIES and os.environ[name]]
 
 
 def _png_address(picture: Picture) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +9,8 @@ from jaxtyping import Float
 from matplotlib.ticker import PercentFormatter
 
 from prior_reinforce.arrays import Point, Points
+from prior_reinforce.formats import OutcomeFormat
+from prior_reinforce.generators.reach import Reach
 from prior_reinforce.report import style
 from prior_reinforce.report.panels import axis_label
 from prior_reinforce.report.record import drawn_scale
@@ -21,9 +22,10 @@ def draw_advice(
     goals: Points,
     p_hit: Float[np.ndarray, " n"],
     demonstrated: Float[np.ndarray, "N k"],
-    throw: Point,
+    throw: Point | None,
     demonstration: Point | None,
-    outcome: tuple[Sequence[str], Sequence[str]],
+    form: OutcomeFormat,
+    reached: Reach | None = None,
 ) -> Path:
     """Draw it.
 
@@ -32,16 +34,16 @@ def draw_advice(
         goals: A grid, shape (n, 2), the second component fastest.
         p_hit: Probability that a first throw hits each.
         demonstrated: Outcomes of the demonstrations.
-        throw: Goal of the throw that teaches most.
+        throw: Goal of the throw that teaches most; None if none does.
         demonstration: Where the demonstration that teaches most ends; None if none would teach.
-        outcome: Names and units of the two components.
+        form: What the two components are.
+        reached: Which goals can be reached; what cannot is hatched.
 
     Returns:
         The path.
     """
-    names, units = outcome
-    scale = drawn_scale(units)
-    goals, demonstrated, throw = (scale * points for points in (goals, demonstrated, throw))
+    scale, units = drawn_scale(form), form.units
+    goals, demonstrated = scale * goals, scale * demonstrated
     x, y = (np.unique(goals[:, j]) for j in range(2))
     # As high as the region at this width, and what stands below it.
     height = 4.8 * np.ptp(x) / np.ptp(y) if units[0] == units[1] else 3.0
@@ -58,8 +60,19 @@ def draw_advice(
     bar.ax.tick_params(labelsize=9, colors=style.INK_SOFT)
     marks = [
         (demonstrated, "o", 42, style.DEMONSTRATION, "demonstrated"),
-        (throw[None], "*", 260, style.GOAL, "throw that teaches most"),
     ]
+    if throw is not None:
+        marks.append((scale * throw[None], "*", 260, style.GOAL, "throw that teaches most"))
+    if reached is not None and not reached.reached.all():
+        axes.contourf(
+            scale * reached.y,
+            scale * reached.x,
+            reached.reached.T.astype(float),
+            levels=(-0.5, 0.5),
+            colors="none",
+            hatches=["///"],
+        )
+        axes.plot([], [], color=style.INK_SOFT, label="hatched: out of reach")
     if demonstration is not None:  # the diamond fits into the star, for both are often at one place
         shown = scale * demonstration[None]
         marks.append((shown, "D", 26, style.HIT, "demonstration that teaches most"))
@@ -69,8 +82,8 @@ def draw_advice(
             edgecolors=style.INK, linewidths=0.8, label=label, zorder=3, clip_on=False,
         )  # fmt: skip
     axes.invert_xaxis()
-    axes.set_xlabel(axis_label(names, units, 1, mirrored=True))
-    axes.set_ylabel(axis_label(names, units, 0))
+    axes.set_xlabel(axis_label(form, 1, mirrored=True))
+    axes.set_ylabel(axis_label(form, 0))
     if units[0] == units[1]:
         axes.set_aspect("equal")
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=3, frameon=False, fontsize=8)

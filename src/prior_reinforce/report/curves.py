@@ -134,7 +134,7 @@ def draw_plans(record: AdaptationRecord) -> Figure:
     """
     form, d = record.demonstrations.format, record.demonstrations.action_dim
     shown = record.demonstrations.plans
-    plans = [np.empty((0, d)) if t.plan is None else t.plan for t in record.trials]
+    plans = [t.plan if len(t.plan) else np.empty((0, d)) for t in record.trials]
     styles = [_trial_style(record, i) for i in range(len(plans))]
     first, differences = _differences(record.trials, plans)
     columns = min(_COLUMNS, d)

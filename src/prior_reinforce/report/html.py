@@ -7,10 +7,11 @@ from importlib import resources
 from pathlib import Path
 
 _PACKAGE = "prior_reinforce.report"
-_MIME_TYPES = {
+MIME_TYPES = {
     ".png": "image/png", ".jpg": "image/jpeg", ".jpeg": "image/jpeg", ".svg": "image/svg+xml",
     ".mp4": "video/mp4",
 }  # fmt: skip
+"""What a page shows, by suffix."""
 
 
 def render(template: str, *, package: str = _PACKAGE, **context: object) -> str:
@@ -32,4 +33,4 @@ def render(template: str, *, package: str = _PACKAGE, **context: object) -> str:
 def data_uri(path: Path) -> str:
     """Return a picture or an mp4 as a `data:` address that carries the whole file."""
     encoded = base64.b64encode(path.read_bytes()).decode("ascii")
-    return f"data:{_MIME_TYPES[path.suffix.lower()]};base64,{encoded}"
+    return f"data:{MIME_TYPES[path.suffix.lower()]};base64,{encoded}"

@@ -6,14 +6,18 @@ import os
 import re
 import shutil
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import msgspec
 import numpy as np
 from numpy.typing import ArrayLike
 
+import prior_reinforce
 from prior_reinforce.errors import ConfigurationError
-from prior_reinforce.files import write
+from prior_reinforce.files import sha256, write
 from prior_reinforce.report import summary
 from prior_reinforce.report.html import data_uri, render
 from prior_reinforce.report.record import AdaptationRecord, Box
@@ -25,8 +29,14 @@ if TYPE_CHECKING:
 LARGEST_INLINE_FILE = 3_000_000
 """[bytes]; a larger film or photograph lies beside the page, so that the page opens fast."""
 
-_OF_A_GOAL = re.compile(r"goal-\d+-(?:table|landings|aims|errors|plans)\.(?:png|svg)")
-"""Pictures of a goal, `goal-3-table.svg`, PNG in earlier versions."""
+LARGEST_PAGE = 6_000_000
+"""[bytes] of pictures in the page, the latest goals' first; those of earlier goals stay beside."""
+
+_OF_A_GOAL = re.compile(r"goal-\d+-(?:table|landings|aims|errors|plans)\.svg")
+_HEAD = re.compile(
+    r'<svg [^>]*width="([\d.]+)pt".*<dc:description>(\w+)</dc:description>', re.DOTALL
+)
+"""Width of a picture in [points], and the digest of what it was drawn from."""
 
 
 def write_report(
@@ -39,9 +49,10 @@ def write_report(
     note: str = "",
     progress: Callable[[int, int], None] | None = None,
 ) -> Path:
-    """Write `report.html`, whole in one file, and its pictures as SVGs beside it.
+    """Write `report.html` and its pictures as SVGs beside it, whole in one file while it is small.
 
-    Pictures of goals that an earlier report left there and this one has not are removed.
+    A picture that an earlier report left there is drawn again only if what it shows has changed,
+    so that goals that are over cost nothing; those of goals that this one has not are removed.
 
     Args:
         folder: Where to write; made if need be. A film elsewhere is copied here when it is too
@@ -59,9 +70,6 @@ def write_report(
     Raises:
         ConfigurationError: No adaptations, two of one number, or a region of wrong shape.
     """
-    from prior_reinforce.report.curves import draw_trials_by_goal
-    from prior_reinforce.report.pictures import draw_table
-
     if not adaptations:
         raise ConfigurationError("a report needs at least one adaptation, got none")
     box = None if region is None else np.array(region, dtype=float)
@@ -75,19 +83,32 @@ def write_report(
             f"two goals go by one number in {summary.numbers(adaptations)}; number all or none"
         )
     folder, several = Path(folder), len(adaptations) > 1
+    code = b"".join(path.read_bytes() for path in sorted(Path(__file__).parent.glob("*.py")))
+    drawn_by = prior_reinforce.__version__, version("matplotlib"), sha256(code)
     first = adaptations[0].demonstrations
     overview = by_goal = None
     sections = []
     for number, called, record in zip(
         summary.numbers(adaptations), summary.titles(adaptations), adaptations, strict=True
     ):
-        sections.append(_section(folder, record, f"goal-{number}", called, box))
+        sections.append(_section(folder, record, f"goal-{number}", called, box, drawn_by))
         if progress is not None:
             progress(len(sections), len(adaptations))
     if several:
-        by_goal = _picture(draw_trials_by_goal(adaptations), folder / "trials-by-goal.svg")
+        from prior_reinforce.report.curves import draw_trials_by_goal
+
+        draw = partial(draw_trials_by_goal, adaptations)
+        by_goal = _picture(draw, folder / "trials-by-goal.svg", _digest([adaptations, drawn_by]))
     if several and all(record.demonstrations is first for record in adaptations):
-        overview = _picture(draw_table(adaptations, box), folder / "overview.svg")
+        from prior_reinforce.report.places import draw_table
+
+        draw = partial(draw_table, adaptations, box)
+        overview = _picture(draw, folder / "overview.svg", _digest([adaptations, box, drawn_by]))
+    pictures = [picture for s in reversed(sections) for picture in s["pictures"].values()]
+    room = LARGEST_PAGE
+    for picture in (*filter(None, (overview, by_goal)), *pictures):
+        room -= picture["path"].stat().st_size * 4 // 3
+        picture["source"] = data_uri(picture["path"]) if room > 0 else picture["path"].name
     page = render(
         "page.html",
         title=title,
@@ -96,7 +117,7 @@ def write_report(
         by_goal=by_goal,
         sections=sections,
         note=note,
-        from_behind=first.outcome_dim > 1 and in_words(first.outcome_units),
+        from_behind=first.outcome_dim > 1 and in_words(first.outcome_format),
         any_truth=any(_knows_truth(record) for record in adaptations),
         words=summary.explain_words(adaptations[0]),
         any_called=any(row.off.startswith(summary.CALLED) for s in sections for row in s["rows"]),
@@ -111,19 +132,26 @@ def write_report(
 
 
 def _section(
-    folder: Path, record: AdaptationRecord, stem: str, title: str, region: Box | None
+    folder: Path,
+    record: AdaptationRecord,
+    stem: str,
+    title: str,
+    region: Box | None,
+    drawn_by: tuple[str, ...],
 ) -> Mapping[str, Any]:
     """All that the page shows of one goal; see `page.html`."""
     from prior_reinforce.report.curves import draw_errors, draw_plans
-    from prior_reinforce.report.pictures import draw_close_up, draw_table
+    from prior_reinforce.report.places import draw_close_up, draw_table
     from prior_reinforce.report.style import trial_colour
 
-    n = len(record.trials)
-    figures = {"table": draw_table([record], region)}
+    n, digest = len(record.trials), _digest([record, region, drawn_by])
+    draw: dict[str, Callable[[], Figure]] = {"table": partial(draw_table, [record], region)}
     if record.told:
-        figures |= {"landings": draw_close_up(record), "errors": draw_errors(record)}
+        draw["landings"] = partial(draw_close_up, record)
+        draw["errors"] = partial(draw_errors, record)
     if record.trials:
-        figures |= {"aims": draw_close_up(record, aims=True), "plans": draw_plans(record)}
+        draw["aims"] = partial(draw_close_up, record, aims=True)
+        draw["plans"] = partial(draw_plans, record)
     return {
         "record": record,
         "anchor": stem,
@@ -139,16 +167,36 @@ def _section(
         "strip": record.film and data_uri(record.film.strip),
         "video": record.film and _file(folder, record.film.video),
         "pictures": {
-            name: _picture(figure, folder / f"{stem}-{name}.svg")
-            for name, figure in figures.items()
+            name: _picture(drawn, folder / f"{stem}-{name}.svg", digest)
+            for name, drawn in draw.items()
         },
     }
 
 
-def _picture(figure: Figure, path: Path) -> Mapping[str, Any]:
+def _picture(draw: Callable[[], Figure], path: Path, digest: str) -> dict[str, Any]:
+    """A picture's file, drawn unless an earlier one shows the same."""
     from prior_reinforce.report.style import save_figure
 
-    return {"source": data_uri(save_figure(figure, path)), "wide": figure.get_figwidth() > 6}
+    if (found := _head(path)) is None or found[2] != digest:
+        found = _head(save_figure(draw(), path, digest))
+    assert found is not None  # as it was just written
+    return {"path": path, "wide": float(found[1]) > 6 * 72}
+
+
+def _head(path: Path) -> re.Match[str] | None:
+    if not path.is_file():
+        return None
+    with path.open(encoding="utf-8", errors="replace") as file:
+        return _HEAD.search(file.read(1000))
+
+
+def _digest(shown: object) -> str:
+    """Fingerprint of what a picture shows."""
+
+    def plain(value: object) -> object:
+        return value.tobytes() if isinstance(value, np.ndarray) else str(value)
+
+    return sha256(msgspec.msgpack.encode(shown, enc_hook=plain))
 
 
 def _knows_truth(record: AdaptationRecord) -> bool:

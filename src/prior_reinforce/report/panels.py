@@ -15,6 +15,7 @@ from matplotlib.patches import Ellipse, FancyArrowPatch, Rectangle
 from matplotlib.ticker import MaxNLocator
 
 from prior_reinforce.arrays import Point
+from prior_reinforce.formats import OutcomeFormat
 from prior_reinforce.report import style
 from prior_reinforce.report.badges import draw_badges
 from prior_reinforce.report.record import AdaptationRecord, Box, drawn_scale
@@ -37,22 +38,21 @@ class View(NamedTuple):
     title: str = ""
 
 
-def views_of(units: Sequence[str]) -> list[View]:
-    """Choose the views that together show all components of outcomes of these units."""
-    if len(units) == 1:
+def views_of(form: OutcomeFormat) -> list[View]:
+    """Choose the views that together show all components of outcomes."""
+    if form.outcome_dim == 1:
         return [View(0, None)]
-    if not in_words(units):
-        return [View(i, i + 1) for i in range(len(units) - 1)]
+    if not in_words(form):
+        return [View(i, i + 1) for i in range(form.outcome_dim - 1)]
     above = View(1, 0, mirrored=True, title="from above")
-    return [above] if len(units) == 2 else [above, View(0, 2, title="from the side")]
+    return [above] if form.outcome_dim == 2 else [above, View(0, 2, title="from the side")]
 
 
-def axis_label(
-    names: Sequence[str], units: Sequence[str], component: int, *, mirrored: bool = False
-) -> str:
+def axis_label(form: OutcomeFormat, component: int, *, mirrored: bool = False) -> str:
     """Say what an axis shows, and in words what lies at its ends."""
-    label = f"{names[component]} [{'cm' if drawn_scale(units) == 100 else units[component]}]"
-    if not in_words(units):
+    unit = "cm" if drawn_scale(form) == 100 else form.units[component]
+    label = f"{form.names[component]} [{unit}]"
+    if not in_words(form):
         return label
     low, high = WORDS[component][:: 1 if mirrored else -1]
     return f"← {low}      {label}      {high} →"
@@ -199,7 +199,7 @@ class Panel:
 
     def _axis_label(self, component: int) -> str:
         mirrored = self._view.mirrored and component == self._view.across
-        return axis_label(*self._record.labels, component, mirrored=mirrored)
+        return axis_label(self._record.format, component, mirrored=mirrored)
 
     def _mark(
         self, place: _Place, marker: str, colour: str, *, edge: str = "white", zorder: int

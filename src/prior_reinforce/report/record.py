@@ -8,8 +8,9 @@ Notation (docs/notation.md):
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -18,17 +19,17 @@ from numpy.typing import ArrayLike
 
 from prior_reinforce.arrays import Point, as_goal
 from prior_reinforce.errors import ConfigurationError
+from prior_reinforce.formats import OutcomeFormat, in_tolerances
 from prior_reinforce.plans.motions import Demonstrations
-from prior_reinforce.readings import as_tolerance, in_tolerances
 from prior_reinforce.session.trials import Stage, Trial
 
 Box = Float[np.ndarray, "2 k"]
 """Lower and upper corner of a region of outcomes."""
 
 
-def drawn_scale(units: Sequence[str]) -> float:
-    """Number that turns outcomes of these units into what is drawn: metres become centimetres."""
-    return 100.0 if set(units) == {"m"} else 1.0
+def drawn_scale(form: OutcomeFormat) -> float:
+    """Number that turns outcomes into what is drawn: metres become centimetres."""
+    return 100.0 if set(form.units) == {"m"} else 1.0
 
 
 @dataclass(frozen=True)
@@ -71,6 +72,9 @@ class AdaptationRecord:
     """What to call this goal; `Goal` and its number where empty."""
     number: int | None = None
     """What number it goes by; its place in the report where None."""
+    lines: Mapping[int, str] = field(default_factory=dict)
+    """What became of the plan of trials that wait to be told, by the trial's number, where it was
+    executed: `executed, but aborted: ...`."""
     warnings: Mapping[int, str] = field(default_factory=dict)
     """Why what was seen of a trial might mislead, by the trial's number: `but aborted: ...`."""
     outcomes: tuple[Point | None, ...] | None = None
@@ -98,18 +102,17 @@ class AdaptationRecord:
             InvalidGoalError: The goal has a wrong shape, or is not finite.
             ConfigurationError: There are not as many outcomes as trials, or the tolerance is none.
         """
-        object.__setattr__(self, "goal", as_goal(self.goal, self.labels[0]))
-        as_tolerance(self.tolerance, *self.labels)
+        object.__setattr__(self, "goal", as_goal(self.goal, self.format.names))
         if self.outcomes is not None and len(self.outcomes) != len(self.trials):
             raise ConfigurationError(
                 f"{len(self.trials)} trials need as many true outcomes, got {len(self.outcomes)}; "
                 "give None where one is not known"
             )
 
-    @property
-    def labels(self) -> tuple[Sequence[str], Sequence[str]]:
-        """Names of the outcomes' components, and their units."""
-        return self.demonstrations.outcome_names, self.demonstrations.outcome_units
+    @cached_property
+    def format(self) -> OutcomeFormat:
+        """What the outcomes' numbers mean, with the tolerance."""
+        return self.demonstrations.outcome_format.within(self.tolerance)
 
     @property
     def told(self) -> tuple[Trial, ...]:
@@ -124,7 +127,7 @@ class AdaptationRecord:
     @property
     def half_axes(self) -> Point:
         """The tolerance of each component, in its unit."""
-        return as_tolerance(self.tolerance, *self.labels)
+        return self.format.half_axes
 
     @property
     def distance_unit(self) -> str:
@@ -162,11 +165,11 @@ class AdaptationRecord:
     @property
     def scale(self) -> float:
         """Number that turns the outcomes' unit into the one drawn: metres become centimetres."""
-        return drawn_scale(self.labels[1])
+        return drawn_scale(self.format)
 
     def unit(self, *components: int) -> str:
         """Unit drawn for some components, or for distances over all; empty where they differ."""
-        units = self.labels[1]
+        units = self.format.units
         drawn = {units[i] for i in components} or set(units)
         return "cm" if self.scale == 100 else drawn.pop() if len(drawn) == 1 else ""
 

@@ -123,11 +123,16 @@ def lay_out(figure: Figure) -> None:
             figure.set_layout_engine(None)  # "none" would be drawn twice as well
 
 
-def save_figure(figure: Figure, path: Path) -> Path:
-    """Write a PNG or an SVG, as its name says, whole or not at all: one figure, the same bytes."""
+def save_figure(figure: Figure, path: Path, digest: str | None = None) -> Path:
+    """Write a PNG or an SVG, as its name says, whole or not at all: one figure, the same bytes.
+
+    An SVG says the digest of what it shows, if given, as its description.
+    """
     with drawing(), in_place(path) as unfinished:
         lay_out(figure)
         kind = path.suffix.lower()[1:]
-        unsaid = {"Date": None, "Creator": None} if kind == "svg" else {"Software": None}
-        figure.savefig(unfinished, format=kind, dpi=PICTURE_DPI, metadata=unsaid)
+        said: dict[str, str | None] = {"Software": None}
+        if kind == "svg":
+            said = {"Date": None, "Creator": None, "Description": digest}
+        figure.savefig(unfinished, format=kind, dpi=PICTURE_DPI, metadata=said)
     return path

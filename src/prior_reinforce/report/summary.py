@@ -12,11 +12,6 @@ from prior_reinforce.report.record import AdaptationRecord
 from prior_reinforce.session.trials import Stage, Trial
 from prior_reinforce.wording import error_words, in_words, say_place, say_reading, to_words
 
-_OPEN = {
-    Stage.ASKED: "not executed yet",
-    Stage.EXECUTING: "executing",
-    Stage.EXECUTED: "executed, not told yet",
-}
 CALLED = "called "
 """Before the distance of a hit that was told to lie farther off than the tolerance."""
 _MEANS = {
@@ -101,7 +96,7 @@ def headline(records: Sequence[AdaptationRecord]) -> Headline:
         goals = "goal that was" if missing == 1 else "goals that were"
         left_out = f" This leaves out the {missing} {goals} not reached."
     count = f"N = {n} + {mean:.1f} trials" if several else f"N = {n} + {most} trials"
-    explanation = f"{n} demonstrations, then {spent}.{left_out} {within}"
+    explanation = f"{_count(n, 'demonstration')}, then {spent}.{left_out} {within}"
     return Headline(text, count, explanation, complete=not missing)
 
 
@@ -125,8 +120,8 @@ def outcome_line(record: AdaptationRecord) -> str:
         return f"not reached in {_count(len(record.told), 'trial')}"
     waiting = [trial for trial in record.trials if trial.open]
     if waiting:
-        asked = waiting[-1].stage is Stage.ASKED
-        return f"trial {waiting[-1].number} waits to be {'executed' if asked else 'told'}"
+        number = waiting[-1].number
+        return f"trial {number} waits to be {'told' if number in record.lines else 'executed'}"
     return "no trial that counts" if record.trials else "not tried yet"
 
 
@@ -137,12 +132,12 @@ def trial_rows(record: AdaptationRecord) -> list[TrialRow]:
 
 def say_goal(record: AdaptationRecord) -> str:
     """Say where the goal is."""
-    return say_place(record.goal, *record.labels)
+    return say_place(record.goal, record.format)
 
 
 def say_tolerance(record: AdaptationRecord) -> str:
     """Say how near counts as reached."""
-    return wording.say_tolerance(record.half_axes, *record.labels)
+    return wording.say_tolerance(record.format)
 
 
 def say_distance(record: AdaptationRecord, distance: float) -> str:
@@ -152,22 +147,21 @@ def say_distance(record: AdaptationRecord, distance: float) -> str:
 
 
 def _row(record: AdaptationRecord, i: int, trial: Trial) -> TrialRow:
-    names, units = record.labels
-    expected = ""
+    form, expected = record.format, ""
     if trial.p_hit is not None and trial.expected_trials is not None:
         expected = f"{trial.p_hit:.0%}, {trial.expected_trials:.1f}"
-    aim = say_place(trial.condition, names, units)
-    if in_words(units):
-        aim = to_words(trial.condition - record.goal, names).replace("on the goal", "at the goal")
+    aim = say_place(trial.condition, form)
+    if in_words(form):
+        aim = to_words(trial.condition - record.goal, form).replace("on the goal", "at the goal")
     warning = record.warnings.get(trial.number)
     reading = trial.reading
     if reading is None:
         if trial.stage is Stage.VOIDED:
             seen = f"voided: {trial.note}" if trial.note else "voided"
             return TrialRow(trial.number, "voided", aim, seen, "–", expected, "", "not counted")
-        seen = f"{trial.stage.value}, {warning}" if warning else _OPEN[trial.stage]
+        seen = record.lines.get(trial.number, "not executed yet")
         return TrialRow(trial.number, "open", aim, seen, "–", expected, "", "open")
-    seen, off, truly_off = say_reading(reading, names, units), "–", ""
+    seen, off, truly_off = say_reading(reading, form), "–", ""
     if np.all(np.isfinite(reading.low) & np.isfinite(reading.high)):
         distance = record.distance(reading.error_seen)
         called = CALLED if trial.hit and distance > record.edge else ""
@@ -185,7 +179,7 @@ def _row(record: AdaptationRecord, i: int, trial: Trial) -> TrialRow:
 
 def explain_words(record: AdaptationRecord) -> str:
     """Say what the words of an error mean, of those that these outcomes have."""
-    return "; ".join(_MEANS[pair[0]] for pair in error_words(*record.labels) if pair)
+    return "; ".join(_MEANS[pair[0]] for pair in error_words(record.format) if pair)
 
 
 def _count(n: int, what: str) -> str:

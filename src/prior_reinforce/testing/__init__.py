@@ -12,10 +12,14 @@ import pytest
 
 # The suites' asserts say what they compared, as those of a test file do.
 pytest.register_assert_rewrite(
-    *(f"{__name__}.{suite}" for suite in ("adapters", "generators", "perception", "tasks"))
+    *(
+        f"{__name__}.{suite}"
+        for suite in ("adapters", "executors", "generators", "perception", "tasks")
+    )
 )
 
 from prior_reinforce.testing.adapters import AdapterContract  # noqa: E402
+from prior_reinforce.testing.executors import ExecutorContract  # noqa: E402
 from prior_reinforce.testing.generators import GeneratorContract  # noqa: E402
 from prior_reinforce.testing.perception import PerceptionContract  # noqa: E402
 from prior_reinforce.testing.synthetic import synthetic_demonstrations  # noqa: E402
@@ -25,6 +29,7 @@ from prior_reinforce.testing.tiny import TINY, tiny_networks  # noqa: E402
 __all__ = [
     "TINY",
     "AdapterContract",
+    "ExecutorContract",
     "GeneratorContract",
     "PerceptionContract",
     "TaskContract",

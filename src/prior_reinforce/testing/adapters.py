@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from prior_reinforce.adapters.base import Adapter
+from prior_reinforce.adapters.base import Adapter, State, next_key
 from prior_reinforce.arrays import Point
 from prior_reinforce.errors import InvalidFeedbackError, InvalidGoalError, NotFittedError
 from prior_reinforce.readings import Reading
@@ -34,9 +35,11 @@ class AdapterContract:
             for trial in _trials(k):
                 adapter.observe(*trial)
                 proposals[-1].append(adapter.propose(goal))
-        assert np.shape(proposals[0]) == (5, k)
-        assert np.all(np.isfinite(proposals[0]))
-        np.testing.assert_array_equal(proposals[0], proposals[1])
+        assert np.shape(proposals[0]) == (5, k), f"propose returns a vector of k = {k} numbers"
+        assert np.all(np.isfinite(proposals[0])), "every proposal is finite"
+        assert np.array_equal(proposals[0], proposals[1]), (
+            "the same trials lead to the same proposals, bit for bit"
+        )
 
     @each_k
     def test_proposing_changes_nothing_and_aliases_nothing(self, k: int) -> None:
@@ -51,13 +54,14 @@ class AdapterContract:
         value = first.copy()
         first[:] = 1e3
         adapter.propose(2.0 * goal)  # another goal in between must leave no trace
-        np.testing.assert_array_equal(adapter.propose(goal), value)
-        np.testing.assert_array_equal(goal, kept)
+        again = adapter.propose(goal)
+        assert np.array_equal(again, value), "propose changes nothing, and returns a fresh array"
+        assert np.array_equal(goal, kept), "propose leaves the goal that it is given as it was"
 
         clean = self._started(k)
         for trial in _trials(k):
             clean.observe(*trial)
-        np.testing.assert_array_equal(clean.propose(goal), value)
+        assert np.array_equal(clean.propose(goal), value), "observe copies what it keeps"
 
     @each_k
     def test_starting_again_forgets_every_trial(self, k: int) -> None:
@@ -66,7 +70,33 @@ class AdapterContract:
         for trial in _trials(k):
             used.observe(*trial)
         used.start(synthetic_demonstrations(k=k))
-        np.testing.assert_array_equal(used.propose(_goal(k)), fresh.propose(_goal(k)))
+        same = np.array_equal(used.propose(_goal(k)), fresh.propose(_goal(k)))
+        assert same, "start forgets the trials and demonstrations before it"
+
+    @each_k
+    def test_what_is_kept_in_a_file_goes_on_as_if_never_put_away(
+        self, k: int, tmp_path: Path
+    ) -> None:
+        told, demonstrations = self._started(k), synthetic_demonstrations(k=k)
+        before, after = _trials(k)[:3], _trials(k)[3:]
+        key = told.first_key(demonstrations)
+        for condition, about, reading in before:
+            told.observe(condition, about, reading)
+            seen = reading if isinstance(reading, Reading) else Reading.estimated(reading)
+            key = next_key(key, "observe", condition, about, seen)
+        assert key == told.key
+        state = told.state()
+        if state is None:
+            return
+        state.save(tmp_path / "state.npz")
+        resumed = self.make()
+        resumed.resume(demonstrations, told.key, State.load(tmp_path / "state.npz"))
+        for trial in after:
+            np.testing.assert_array_equal(resumed.propose(_goal(k)), told.propose(_goal(k)))
+            for adapter in (told, resumed):
+                adapter.observe(*trial)
+        assert resumed.key == told.key
+        np.testing.assert_array_equal(resumed.propose(_goal(k)), told.propose(_goal(k)))
 
     @each_k
     @pytest.mark.parametrize("n", [2, 3, 4, 5, 6, 8])
@@ -79,7 +109,8 @@ class AdapterContract:
         outcomes = demonstrations.outcomes_seen
         for goal in (outcomes.mean(axis=0), 0.75 * outcomes[0] + 0.25 * outcomes[1]):
             off = np.abs(adapter.propose(goal) - goal)
-            assert np.all(off < 0.01 * np.ptp(outcomes, axis=0))
+            near = np.all(off < 0.01 * np.ptp(outcomes, axis=0))
+            assert near, f"before any trial it proposes the goal to within 1 %; it is off by {off}"
 
     def test_demonstrations_that_look_the_same_by_eye_are_no_trouble(self) -> None:
         demonstrations = synthetic_demonstrations(6)
@@ -89,9 +120,11 @@ class AdapterContract:
         adapter = self.make()
         adapter.start(replace(demonstrations, outcomes_seen=outcomes, outcome_noise=noise))
         goal, spread = outcomes.mean(axis=0), np.ptp(outcomes, axis=0)
-        assert np.all(np.abs(adapter.propose(goal) - goal) < 0.01 * spread)
+        first = np.abs(adapter.propose(goal) - goal)
+        assert np.all(first < 0.01 * spread), "two like outcomes leave the first proposal the goal"
         adapter.observe(goal, goal, 0.1 * spread)
-        assert np.all(np.abs(adapter.propose(goal) - goal) < spread)
+        then = np.abs(adapter.propose(goal) - goal)
+        assert np.all(then < spread), f"two like outcomes throw no proposal far off, as by {then}"
 
     def test_before_start_it_says_what_to_call(self) -> None:
         with pytest.raises(NotFittedError, match=r"start\(demonstrations\)"):
@@ -113,13 +146,14 @@ class AdapterContract:
             adapter.observe(good[0], bad, good[2])
         with pytest.raises(InvalidFeedbackError, match="error"):
             adapter.observe(*good[:2], bad)
-        np.testing.assert_array_equal(adapter.propose(goal), before)
+        same = np.array_equal(adapter.propose(goal), before)
+        assert same, "a trial that is refused leaves no trace"
 
     def test_a_trial_repeated_to_the_last_bit_is_no_trouble(self) -> None:
         adapter = self._started(2)
         for _ in range(5):
             adapter.observe(*_trials(2)[0])
-        assert np.all(np.isfinite(adapter.propose(_goal(2))))
+        assert np.all(np.isfinite(adapter.propose(_goal(2)))), "like trials keep proposals finite"
 
     @each_k
     def test_intervals_open_ends_and_mere_hits_are_no_trouble(self, k: int) -> None:
@@ -134,14 +168,17 @@ class AdapterContract:
         ):
             adapter.observe(goal, goal, reading)
             condition = adapter.propose(goal)
-            assert np.all(np.isfinite(condition))
-            assert np.all(np.abs(condition - goal) < spread)
+            said = f"after {reading}, it proposes {condition} for {goal}"
+            assert np.all(np.isfinite(condition)), f"{said}; every proposal is finite"
+            assert np.all(np.abs(condition - goal) < spread), f"{said}, farther than all outcomes"
 
     def test_a_miss_of_which_nothing_else_is_known_moves_nobody_who_wants_numbers(self) -> None:
         adapter = self._started(2)
         before = adapter.propose(_goal(2))
         adapter.observe(before, _goal(2), Reading.only(False, 2))
-        np.testing.assert_allclose(adapter.propose(_goal(2)), before, rtol=0.05)
+        after = adapter.propose(_goal(2))
+        near = np.allclose(after, before, rtol=0.05, atol=0)
+        assert near, f"a mere miss teaches no number, yet {before} became {after}"
 
     def _started(self, k: int) -> Adapter:
         adapter = self.make()

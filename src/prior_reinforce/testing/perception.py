@@ -39,11 +39,12 @@ class PerceptionContract:
             for _ in range(2):
                 with self.make() as perception:
                     seen.append(_looks(perception, trial, goal, 5))
-            assert [*seen[0]] == [*seen[1]]  # it fails at the same seeds, too
+            assert [*seen[0]] == [*seen[1]], "it fails at the same seeds each time"
             for seed, reading in seen[0].items():
-                assert _told(reading).shape == (4, k)
-                assert np.all(np.isfinite(reading.error_seen))
-                np.testing.assert_array_equal(_told(reading), _told(seen[1][seed]))
+                assert _told(reading).shape == (4, k), f"a reading has k = {k} components"
+                assert np.all(np.isfinite(reading.error_seen)), "the error that is seen is finite"
+                same = np.array_equal(_told(reading), _told(seen[1][seed]))
+                assert same, "the same seed sees the same; draw from the rng that is given"
 
     def test_it_returns_fresh_arrays_and_leaves_its_inputs(self) -> None:
         trial, goal = self.rollout(np.array([0.9, 0.1])), np.array([0.8, 0.3])
@@ -51,17 +52,18 @@ class PerceptionContract:
             looks = _looks(perception, trial, goal, 5)
         for seen in looks.values():
             for part in (seen.error_seen, seen.low, seen.high, seen.sd):
-                assert not np.shares_memory(part, trial.outcome)
-                assert not np.shares_memory(part, goal)
-        np.testing.assert_array_equal(trial.outcome, [0.9, 0.1])
-        np.testing.assert_array_equal(goal, [0.8, 0.3])
+                shared = np.shares_memory(part, trial.outcome) or np.shares_memory(part, goal)
+                assert not shared, "a reading shares no memory with the outcome or the goal"
+        kept = np.array_equal(trial.outcome, [0.9, 0.1]) and np.array_equal(goal, [0.8, 0.3])
+        assert kept, "perceive leaves the outcome and the goal as they were"
 
     def test_a_large_error_is_seen_on_its_own_side(self) -> None:
         trial, goal = self.rollout(np.array([1.1, 0.0])), np.array([0.9, 0.3])
         with self.make() as perception:
             for seen in _looks(perception, trial, goal, 20).values():
-                assert seen.error_seen[0] > 0.1
-                assert seen.error_seen[1] < -0.15
+                error = seen.error_seen
+                right = error[0] > 0.1 and error[1] < -0.15
+                assert right, f"the error is outcome minus goal: [0.2, -0.3] was seen as {error}"
 
     def test_the_true_error_lies_where_the_reading_says(self) -> None:
         for k in self.dims:
@@ -72,7 +74,10 @@ class PerceptionContract:
             for seen in looks.values():
                 slack = 2.5 * seen.sd + 1e-9
                 inside += bool(np.all((seen.low - slack <= true) & (true <= seen.high + slack)))
-            assert inside >= 0.85 * len(looks)
+            assert inside >= 0.85 * len(looks), (
+                f"the true error lies within low - 2.5 sd and high + 2.5 sd in {inside} of "
+                f"{len(looks)} looks; say a larger sd"
+            )
 
     def test_a_lost_object_is_seen_where_the_task_says_it_went_or_not_at_all(self) -> None:
         trial, goal = self.rollout(np.array([0.0, 0.0]), valid=False), np.array([0.9, 0.0])
@@ -81,7 +86,7 @@ class PerceptionContract:
                 seen = perception.perceive(trial, goal, np.random.default_rng(1)).error_seen
             except PerceptionFailedError:
                 return  # it is out of the picture, and an operator is asked
-        assert seen[0] < -0.5
+        assert seen[0] < -0.5, f"a lost object 0.9 short of the goal was seen {seen} off it"
 
 
 def _looks(perception: Perception, trial: Rollout, goal: Point, n: int) -> dict[int, Reading]:
@@ -90,7 +95,7 @@ def _looks(perception: Perception, trial: Rollout, goal: Point, n: int) -> dict[
     for seed in range(n):
         with suppress(PerceptionFailedError):
             seen[seed] = perception.perceive(trial, goal, np.random.default_rng(seed))
-    assert len(seen) >= n / 2
+    assert len(seen) >= n / 2, f"it failed in {n - len(seen)} of {n} looks, more than half"
     return seen
 
 

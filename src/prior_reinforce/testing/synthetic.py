@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from prior_reinforce.plans.motions import Demonstrations, PlanFormat
+from prior_reinforce.formats import OutcomeFormat
+from prior_reinforce.plans.motions import Demonstrations
+from prior_reinforce.plans.plan_format import PlanFormat
 
 _UNITS = ("m", "s", "N")
 _SPREAD = (0.3, 40.0, 1e-3)
@@ -29,4 +31,4 @@ def synthetic_demonstrations(
     plans = rng.normal(size=(n, 1, action_dim)) + share**2 * (3 - 2 * share)
     names = tuple(f"joint{d + 1}" for d in range(action_dim))
     plan_format = PlanFormat(names, ("rad",) * action_dim, 0.02)
-    return Demonstrations(plans, outcomes, plan_format, outcome_units=_UNITS[:k])
+    return Demonstrations(plans, outcomes, plan_format, OutcomeFormat(tuple("xyz"[:k]), _UNITS[:k]))

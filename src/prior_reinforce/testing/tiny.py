@@ -16,27 +16,28 @@ TINY: Mapping[str, Mapping[str, Any]] = {
         "perceptron": {"members": 2, "width": 16, "depth": 1, "step_width": 8}, "training_steps": 8,
         "warmup_steps": 2, "sampling_steps": 3,
     },
-    "diffusion-ways": {
-        "perceptron": {"members": 2, "width": 16, "depth": 1, "step_width": 8}, "training_steps": 8,
-        "warmup_steps": 2, "mixtures": 2,
-    },
     "diffusion-paper": {
         "network": _NETWORK, "training_steps": 8, "warmup_steps": 2, "noise_levels": 6,
         "sampling_steps": 6,
     },
-    "regression": {"network": _NETWORK, "training_steps": 8},
 }  # fmt: skip
 """By name of the generator; what is not here learns in a moment anyway."""
 
 
 @contextmanager
-def tiny_networks() -> Iterator[None]:
-    """Make every network that is chosen by name, here or by a command, tiny meanwhile."""
+def tiny_networks(
+    settings: Mapping[str, Mapping[str, Any]] = TINY,
+) -> Iterator[None]:
+    """Make every network that is chosen by name, here or by a command, tiny meanwhile.
+
+    Args:
+        settings: By name of a generator that is chosen; of one's own, too.
+    """
     before = dict(GENERATORS.members)
     try:
-        for name, settings in TINY.items():
+        for name, tiny in settings.items():
             member = before[name]
-            GENERATORS.members[name] = replace(member, settings={**member.settings, **settings})
+            GENERATORS.members[name] = replace(member, settings={**member.settings, **tiny})
         yield
     finally:
         GENERATORS.members.update(before)

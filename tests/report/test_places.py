@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from prior_reinforce.formats import OutcomeFormat
 from prior_reinforce.readings import Reading
-from prior_reinforce.report.pictures import draw_close_up, draw_table
+from prior_reinforce.report.places import draw_close_up, draw_table
 from tests.report.swing_world import adaptation, demonstrations, told
 
 REGION = np.array([[0.80, -0.32], [1.08, 0.32]])
@@ -27,8 +28,7 @@ def record(request):
         demos = replace(
             demonstrations(),
             outcomes_seen=outcomes,
-            outcome_names=tuple("abcd"),
-            outcome_units=units,
+            outcome_format=OutcomeFormat(tuple("abcd"), units),
         )
         (trial,) = record.trials
         trial = replace(trial, condition=outcomes[0], reading=Reading.measured(np.full(4, 0.1)))

@@ -23,6 +23,7 @@ _LABELS = (0.7, 0.72)  # [inch], what labels take of a panel's width and height
 _LEGEND = 0.5  # [inch], what a legend takes of a figure's height
 _LEAST_HEIGHT = 1.6  # [inch], of a panel inside its labels
 _ROW = 0.45  # [inch], of a trial where k = 1
+_NAMED = 12  # goals at most; the names of more would hide what they name
 
 
 @style.drawing()
@@ -31,7 +32,7 @@ def draw_table(records: Sequence[AdaptationRecord], region: Box | None = None) -
 
     Args:
         records: Goals of one set of demonstrations. The trials of a single one are numbered; of
-            several, the goals are named.
+            a few, the goals are named.
         region: Region of goals, or None.
     """
     first, single = records[0], len(records) == 1
@@ -53,7 +54,7 @@ def draw_table(records: Sequence[AdaptationRecord], region: Box | None = None) -
         for record in records:
             panel.draw_goal(record)
             panel.draw_trials(record, numbered=single)
-        if not single:
+        if 1 < len(records) <= _NAMED:
             panel.name_goals(records)
     return figure
 
@@ -102,7 +103,7 @@ def _panels(
         legend: Marks by what they mean.
         flat: Make the figure only as high as what is seen.
     """
-    views = views_of(record.demonstrations.outcome_units)
+    views = views_of(record.format)
     points = np.stack(seen) * record.scale
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
     half = np.ptp(points, axis=0) * (0.5 + margin)

@@ -1,0 +1,41 @@
+"""Photographs as people's cameras and telephones save them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+
+from prior_reinforce.environment import Picture
+from prior_reinforce.errors import FileFormatError
+
+_MOST_PIXELS = 50_000_000
+"""Of a photograph; ours: four times a telephone's."""
+
+
+def read_picture(source: Path | BinaryIO) -> Picture:
+    """Read a PNG or a JPEG: RGB, upright as the camera says; of several frames the first.
+
+    Pictures of more than 8 bits are brightened until the brightest pixel is white.
+
+    Raises:
+        FileFormatError: It is neither, is damaged, or has too many pixels.
+    """
+    from PIL import Image, ImageOps
+
+    try:
+        # Pillow goes by content and not by name, and starts other programs for some formats.
+        with Image.open(source, formats=("PNG", "JPEG")) as image:
+            if image.width * image.height > _MOST_PIXELS:  # before any is read
+                raise ValueError("too many pixels")
+            upright = ImageOps.exif_transpose(image)
+            if upright.mode[0] in "IF":
+                grey = np.asarray(upright, dtype=float)
+                upright = Image.fromarray((grey * (255 / max(grey.max(), 1))).astype(np.uint8))
+            return np.asarray(upright.convert("RGB"))
+    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
+        what = f"the picture {source}" if isinstance(source, Path) else "that as a picture"
+        raise FileFormatError(
+            f"cannot read {what} ({str(error).partition(chr(10))[0]}); expected a PNG or JPEG"
+        ) from error

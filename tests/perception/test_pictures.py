@@ -1,0 +1,51 @@
+"""Photographs of all kinds become RGB of 8 bits, upright."""
+
+import io
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from prior_reinforce.errors import FileFormatError
+from prior_reinforce.perception.pictures import read_picture
+
+
+def saved(image, kind="PNG", **how):
+    file = io.BytesIO()
+    image.save(file, kind, **how)
+    file.seek(0)
+    return file
+
+
+RAMP = np.linspace(0, 1, 64).reshape(8, 8)
+
+
+@pytest.mark.parametrize("bits", [10, 12, 16])
+def test_a_picture_of_more_than_eight_bits_keeps_its_shades(bits):
+    deep = Image.fromarray((RAMP * (2**bits - 1)).astype(np.uint16))
+    seen = read_picture(saved(deep))
+    assert seen.dtype == np.uint8
+    np.testing.assert_allclose(seen[..., 0], RAMP * 255, atol=1.5)
+    assert (seen == seen[..., :1]).all()
+
+
+@pytest.mark.parametrize("mode", ["1", "L", "LA", "P", "RGB", "RGBA"])
+def test_any_mode_becomes_three_colours(mode):
+    seen = read_picture(saved(Image.new("RGB", (4, 2), "white").convert(mode)))
+    assert seen.shape == (2, 4, 3)
+    assert (seen == 255).all()
+
+
+def test_a_picture_taken_upright_is_turned_upright():
+    turned = Image.Exif()
+    turned[0x0112] = 6
+    assert read_picture(saved(Image.new("RGB", (40, 20)), "JPEG", exif=turned)).shape[:2] == (
+        40,
+        20,
+    )
+
+
+def test_what_is_none_is_named(tmp_path):
+    (tmp_path / "a.png").write_text("x")
+    with pytest.raises(FileFormatError, match=r"a\.png.*expected a PNG or JPEG"):
+        read_picture(tmp_path / "a.png")
