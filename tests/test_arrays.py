@@ -3,7 +3,14 @@
 import numpy as np
 import pytest
 
-from prior_reinforce.arrays import as_error, as_goal, as_outcomes, as_plans, is_positive
+from prior_reinforce.arrays import (
+    as_error,
+    as_goal,
+    as_outcomes,
+    as_plans,
+    check_spread,
+    is_positive,
+)
 from prior_reinforce.errors import (
     InvalidDemonstrationsError,
     InvalidFeedbackError,
@@ -58,10 +65,10 @@ def test_bad_plans_are_named(plans, message):
 def test_outcomes_on_a_line_are_found_at_any_scale(scale):
     line = np.array([[0.1, 0.2], [0.2, 0.4], [0.3, 0.6]]) * scale
     with pytest.raises(InvalidDemonstrationsError, match="one line"):
-        as_outcomes(line, 3)
+        check_spread(line)
     bent = line.copy()
     bent[2, 1] *= 1.1
-    as_outcomes(bent, 3)
+    check_spread(bent)
 
 
 @pytest.mark.parametrize("value", [0, -1.0, np.nan, np.inf, None, "1", True, [1.0]])
@@ -69,3 +76,10 @@ def test_what_is_no_positive_number_is_told(value):
     assert not is_positive(value)
     assert is_positive(0.01)
     assert is_positive(np.float32(2))
+
+
+@pytest.mark.filterwarnings("ignore:__array__")  # of torch itself
+def test_a_tensor_that_has_a_gradient_is_named():
+    torch = pytest.importorskip("torch")
+    with pytest.raises(InvalidFeedbackError, match="detach"):
+        as_error(torch.tensor([0.05, 0.02], requires_grad=True), 2)

@@ -9,10 +9,12 @@ from importlib.metadata import version
 
 import pytest
 
+from prior_reinforce.adapters import ADAPTERS
 from prior_reinforce.cli import main
 from prior_reinforce.commands import COMMANDS
 from prior_reinforce.errors import WorkspaceError
-from tests.bench.workspace.planar import events_in
+from prior_reinforce.registry import PLUGINS
+from tests.arm.workspace.planar import events_in
 
 
 @pytest.mark.parametrize(
@@ -68,7 +70,7 @@ def test_output_that_is_not_buffered_leaves_as_quietly(folder):
         ("learn", "planar", "--seed", str(2**64)),
         ("learn", "planar", "--seed", "-1"),
         ("learn", "planar", "--seed", "9" * 5000),
-        ("rollout", "--repeats", "9" * 300),
+        ("demo", "--goals", "9" * 300),
         ("nope",),
         ("status", "x" * 300),
         ("status", "a/" * 2000),
@@ -102,7 +104,7 @@ def test_the_status_says_whether_something_changed(run, folder, tmp_path, monkey
     def full(*args, **how):
         raise WorkspaceError("the disk is full; free some space")
 
-    monkeypatch.setattr("prior_reinforce.commands.trials.write_plan", full)
+    monkeypatch.setattr("prior_reinforce.arm.workspace.workspace.write_plan", full)
     status, _, err = run("ask", folder, "--out", "plan.csv")
     assert status == 1
     assert "the disk is full" in err
@@ -119,7 +121,7 @@ def test_an_interruption_after_the_commit_says_so(run, folder, monkeypatch):
     def interrupted(*args):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("prior_reinforce.commands.trials.say_trial", interrupted)
+    monkeypatch.setattr("prior_reinforce.commands.telling.say_trial", interrupted)
     status, _, err = run("tell", folder, 1, "--hit")
     assert status == 130
     assert err == "prior-reinforce: interrupted; what was recorded before stays\n"
@@ -135,7 +137,7 @@ def test_every_help_has_an_example_and_says_no_none(capsys, name):
     shown = capsys.readouterr().out
     assert end.value.code in (0, None)
     assert shown.startswith(f"usage: prior-reinforce {name}")
-    assert f"    prior-reinforce {name} " in shown or name == "completion"
+    assert f"    prior-reinforce {name} " in shown
     for empty in ("{None}", "(default: None)", "(default: False)", "(default: )", "\0"):
         assert empty not in shown
     if "[WORKSPACE]" in shown:
@@ -146,8 +148,8 @@ def test_every_help_has_an_example_and_says_no_none(capsys, name):
 def test_alone_it_lists_the_commands_by_what_they_are_for(run, args):
     status, out, err = run(*args)
     assert (status, err) == (0, "")
-    at = [out.index(f"{group}:") for group in ("your arm", "simulated tasks", "the paper")]
-    assert at[0] < out.index("  tell ") < at[1] < out.index("  demo ") < at[2]
+    at = [out.index(f"{group}:") for group in ("your arm", "simulated tasks")]
+    assert at[0] < out.index("  tell ") < at[1] < out.index("  demo ")
     assert all(re.search(rf"^  {name} ", out, re.MULTILINE) for name in COMMANDS)
 
 
@@ -249,3 +251,38 @@ def test_a_message_of_any_length_can_be_read(folder, run):
     assert len(err) < 1100
     assert " ... " in err
     assert err.endswith(run("goal", folder, "x")[2][-30:])
+
+
+def test_the_package_runs_as_a_program():
+    program = [sys.executable, "-m", "prior_reinforce", "--version"]
+    told = subprocess.run(program, capture_output=True, text=True, check=True).stdout
+    assert told.startswith("prior-reinforce ")
+
+
+def test_a_traceback_is_shown_where_it_is_asked_for(run, tmp_path):
+    for flags, shown in (((), False), (("--traceback",), True)):
+        status, _, err = run("status", tmp_path, *flags)
+        assert status == 2
+        assert ("Traceback (most recent call last)" in err) == shown
+        assert err.splitlines()[-1].startswith("prior-reinforce: ")
+
+
+def test_plugins_are_imported_before_a_command_is_read(run, tmp_path, monkeypatch):
+    monkeypatch.setenv(PLUGINS, "")
+    monkeypatch.setattr(ADAPTERS, "members", dict(ADAPTERS.members))
+    monkeypatch.syspath_prepend(tmp_path)
+    (tmp_path / "offset_plugin.py").write_text(
+        "import prior_reinforce as pr\n"
+        "class Still(pr.FrozenAdapter): pass\n"
+        "pr.ADAPTERS.add('still', Still)\n"
+    )
+    refused = run("adapt", "--adapter", "still", "--perception", "no-such")
+    assert "no adapter 'still'" in refused[2]
+    assert (
+        "no perception"
+        in run(
+            "adapt", "--adapter", "still", "--perception", "no-such", "--plugins", "offset_plugin"
+        )[2]
+    )
+    assert os.environ[PLUGINS] == "offset_plugin"  # for programs that are started from here
+    assert "needs a module" in run("status", "--plugins")[2]

@@ -58,10 +58,15 @@ def test_members_of_the_guide_go_through_trials_on_the_command_line(tmp_path):
     assert len(re.findall(r"reached: N = 6 demonstrations \+ \d+ trial", told)) == 2
 
 
+@pytest.mark.slow
 def test_files_that_docs_and_docstrings_name_are_there():
-    named = re.compile(r"\b(?:benchmarks|docs|examples|results|tests)/[\w./-]+\.(?:py|md|ipynb)\b")
+    named = re.compile(
+        r"(?<![\w/])(?:benchmarks|docs|examples|reproduction|results|tests)/[\w./-]+\.(?:py|md|ipynb)\b"
+    )
     pages = [*REPOSITORY.glob("*.md"), *DOCS.rglob("*.md"), *REPOSITORY.glob("benchmarks/*.md")]
+    pages += REPOSITORY.glob("reproduction/docs/*.md")
     modules = [*REPOSITORY.glob("src/**/*.py"), *REPOSITORY.glob("examples/*.py")]
+    modules += REPOSITORY.glob("reproduction/src/**/*.py")
     missing = {
         f"{path.relative_to(REPOSITORY)}: {name}"
         for path in pages + modules
@@ -76,7 +81,9 @@ def test_every_part_of_the_package_is_on_the_page_of_the_architecture():
     page = (DOCS / "architecture.md").read_text()
     package = Path(pr.__file__).parent
     parts = {p.name + "/" if p.is_dir() else p.name for p in package.iterdir()}
-    parts |= {f"{wing}/{p.name}/" for wing in ("bench", "lab") for p in (package / wing).glob("*/")}
+    parts |= {
+        f"{wing}/{p.name}/" for wing in ("arm", "simulation") for p in (package / wing).glob("*/")
+    }
     parts = {part for part in parts if "__" not in part} - {"py.typed"}
     table = re.search(r"^\| part \| job \|\n(.*?)\n\n", page, re.DOTALL | re.MULTILINE)[1]
     rows = [line.split("|")[1] for line in table.splitlines()]

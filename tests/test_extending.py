@@ -12,17 +12,18 @@ import numpy as np
 import pytest
 
 from prior_reinforce.adapters import ADAPTERS, make_adapter
-from prior_reinforce.bench.robots import GateSettings
-from prior_reinforce.bench.robots.executors.base import ArmSettings
-from prior_reinforce.bench.robots.executors.drive import Request, drive
-from prior_reinforce.bench.robots.executors.result import measure_tracking
+from prior_reinforce.arm.executing import EXECUTORS
+from prior_reinforce.arm.executing.base import ArmSettings
+from prior_reinforce.arm.executing.drive import Request, drive
+from prior_reinforce.arm.executing.result import measure_tracking
+from prior_reinforce.arm.robots import GateSettings
 from prior_reinforce.cli import main
 from prior_reinforce.generators import GENERATORS, Timed, load_generator, make_generator
-from prior_reinforce.lab.experiments.recipes import RECIPES, Run, Scale, adapters
-from prior_reinforce.lab.tasks import TASKS, make_task
 from prior_reinforce.perception import PERCEPTIONS, make_perception
-from prior_reinforce.plans.motions import Plan, PlanFormat
+from prior_reinforce.plans.motions import Plan
+from prior_reinforce.plans.plan_format import PlanFormat
 from prior_reinforce.registry import Member
+from prior_reinforce.simulation.tasks import TASKS, make_task
 from prior_reinforce.testing import synthetic_demonstrations
 
 REPOSITORY = Path(__file__).parents[1]
@@ -37,13 +38,12 @@ REGISTRIES = {
 LINES = "\n".join(
     f"from prior_reinforce.{family} import {registry}\n{registry}.members[{name!r}] = {member!r}"
     for family, (registry, (_, name, member)) in zip(
-        ("adapters", "generators", "perception", "lab.tasks"), REGISTRIES.items(), strict=True
+        ("adapters", "generators", "perception", "simulation.tasks"),
+        REGISTRIES.items(),
+        strict=True,
     )
 )
 """One a family, for a process of its own: as if they stood in the registries."""
-
-
-FEW = Scale(goals=2, seeds=(0,), sets=("A",), rounds=1)
 
 
 @pytest.fixture(scope="module")
@@ -133,25 +133,6 @@ def test_a_saved_generator_is_found_by_its_name(added, choice, tmp_path):
     np.testing.assert_array_equal(loaded.generate(conditions), generator.generate(conditions))
 
 
-@pytest.mark.slow
-def test_an_adapter_joins_the_comparison_of_adapters(added, tmp_path):
-    choices = ("drift", "drift:Drift,gain=0.5")
-    assert RECIPES["adapters"].joining(("affine", *choices)) == choices
-    planned = adapters.units(FEW, choices, generator="nearest")
-    planned = [(unit, names) for unit, names in planned if unit.adapter in ("gp", *choices)]
-    rows = Run(tmp_path).rows(planned)
-    assert {row["adapter"] for row in rows} == {"gp", *choices}
-
-
-@pytest.mark.slow
-def test_a_generator_joins_the_comparison_of_generators(added, tmp_path):
-    choices = ("affine", "affine:Affine,timing=align")
-    assert RECIPES["generators"].joining(("drift", *choices)) == choices
-    planned = [p for p in RECIPES["generators"].units(FEW, choices) if p[1]["method"] in choices]
-    rows = Run(tmp_path).rows(planned)
-    assert list(dict.fromkeys(row["generator"] for row in rows)) == list(choices)
-
-
 def test_all_four_go_through_trials_together(added, tmp_path, capsys):
     chosen = [
         "--task",
@@ -170,12 +151,13 @@ def test_all_four_go_through_trials_together(added, tmp_path, capsys):
 def test_the_guides_executor_moves_its_arm_and_no_faster_than_it_may(tmp_path, monkeypatch):
     (tmp_path / "slider.py").write_text(FILES["slider.py"])
     monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setitem(EXECUTORS.members, "slider", Member("slider:Slider", "an axis"))
     before = signal.getsignal(signal.SIGTERM)
     s = np.linspace(0, 1, 51)[:, None]
     plan = Plan(0.1 * (10 * s**3 - 15 * s**4 + 6 * s**5), PlanFormat(("rail",), ("m",), 0.02))
     try:
         for fastest, outcome in ((0.5, "done"), (0.1, "not_moved")):
-            arm = ArmSettings("slider:Slider", {"port": "/dev/null", "fastest": fastest})
+            arm = ArmSettings("slider", {"port": "/dev/null", "fastest": fastest})
             result = drive(Request(arm, GateSettings(), "trial"), plan, tmp_path)
             assert result.outcome == outcome
     finally:

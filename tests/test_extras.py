@@ -12,7 +12,7 @@ from packaging.requirements import Requirement
 
 import prior_reinforce
 from prior_reinforce.extras import ALONE, EXTRA_OF, missing_extra
-from tests.bench.importing import recorded
+from tests.arm.recordings import recorded
 from tests.test_dependencies import PROJECT
 
 SOURCE = Path(prior_reinforce.__file__).parent
@@ -123,26 +123,20 @@ for words in json.loads(sys.argv[2]):
 def test_all_commands_are_listed_without_any_extra(tmp_path):
     status, out, _ = command("--help", cwd=tmp_path)
     assert status == 0
-    assert {"demo", "reproduce", "look", "tell"} <= set(re.findall(r"\w+", out))
+    assert {"demo", "adapt", "look", "tell"} <= set(re.findall(r"\w+", out))
 
 
 @pytest.mark.parametrize(
     ("words", "extra"),
     [
-        ("demo", "lab"),
-        ("adapt", "lab"),
-        ("rollout --demonstration 0", "lab"),
-        ("train --generator diffusion", "diffusion"),
-        ("train --generator diffusion-paper", "diffusion"),
-        ("train --generator regression", "diffusion"),
-        ("train --generator dmp", "baselines"),
-        ("reproduce trials", "lab"),
+        ("demo", "simulation"),
+        ("adapt", "simulation"),
     ],
 )
 def test_a_command_names_the_extra_that_it_lacks_and_writes_nothing(words, extra, tmp_path):
     status, _, err = command(*words.split(), cwd=tmp_path)
     assert (status, err.count("\n")) == (2, 1), err
-    assert err.endswith(f"; install it with: pip install 'prior-reinforce[{extra}]'\n")
+    assert err.endswith(f"; in your clone of the repository: pip install -e '.[{extra}]'\n")
     assert not list(tmp_path.iterdir())
 
 
@@ -151,9 +145,9 @@ def test_a_command_names_the_extra_that_it_lacks_and_writes_nothing(words, extra
     [
         ("pr.make_generator('diffusion')", "diffusion"),
         ("pr.DiffusionGenerator()", "diffusion"),
-        ("pr.make_task('basketball-v1')", "lab"),
-        ("pr.Camera", "lab"),
-        ("pr.make_perception('camera', scene=scene).perceive(rollout, [1, 0], None)", "lab"),
+        ("pr.make_task('basketball-v1')", "simulation"),
+        ("pr.Camera", "simulation"),
+        ("pr.make_perception('camera', scene=scene).perceive(rollout, [1, 0], None)", "simulation"),
     ],
 )
 def test_a_call_names_the_extra_that_it_lacks(call, extra, tmp_path):
@@ -171,7 +165,7 @@ except MissingExtraError as error:
 """
     status, out, _ = light(code, cwd=tmp_path)
     assert status == 0
-    assert out.endswith(f"'prior-reinforce[{extra}]'\n")
+    assert out.endswith(f"'.[{extra}]'\n")
 
 
 def test_what_no_extra_can_install_is_installed_by_make_and_named_in_the_docs():

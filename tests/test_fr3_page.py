@@ -6,9 +6,10 @@ import shlex
 import numpy as np
 import pytest
 
-from prior_reinforce.bench.workspace.workspace import Workspace
-from prior_reinforce.lab.tasks import make_task
-from tests.lab.arms import served
+from prior_reinforce.arm.workspace.workspace import Workspace
+from prior_reinforce.simulation.tasks import make_task
+from simulators import served
+from simulators.__main__ import main as simulate_arm
 from tests.test_documentation import blocks
 
 MOST_TRIALS = 4
@@ -20,13 +21,11 @@ def test_the_sequence_of_the_page_ends_in_a_hit(run, tmp_path, monkeypatch):
     prepare, simulate, throw = blocks("fr3.md", "sh")
     (serve,) = simulate.splitlines()
     ask, tell = (shlex.split(line, comments=True)[1:] for line in throw.splitlines())
-    with served.fr3(*shlex.split(serve)[3:]) as robot:
+    with served.fr3(*shlex.split(serve)[4:]) as robot:
         for line in prepare.replace("127.0.77.1", robot.host).splitlines():
             words = shlex.split(line, comments=True)
-            if words[0] == "printf":
-                text, _, path = words[1:]
-                with (tmp_path / path).open("a") as manifest:
-                    manifest.write(text.encode().decode("unicode_escape"))
+            if words[:3] == ["python", "-m", "simulators"]:
+                assert simulate_arm(words[3:]) == 0
             elif words[0] != "pip":
                 status, _, err = run(*words[1:])
                 assert status == 0, err
@@ -41,7 +40,7 @@ def test_the_sequence_of_the_page_ends_in_a_hit(run, tmp_path, monkeypatch):
             landed = np.array(re.findall(r"(-?[\d.]+) m\b", said), float)
             alone = task.rollout(plan[None], None)[0].outcome
             assert landed == pytest.approx(alone, abs=0.001)
-            seen = re.search(r"by eye: (.*)", said)[1]
+            seen = re.search(r"by eye, of --goal: (.*)", said)[1]
             if hit := seen.endswith(", a hit"):
                 assert run("tell", "hoop", number, "--hit")[0] == 0
                 break

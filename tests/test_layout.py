@@ -9,19 +9,30 @@ REPOSITORY = Path(__file__).parents[1]
 SOURCE, TESTS = REPOSITORY / "src" / "prior_reinforce", REPOSITORY / "tests"
 
 TESTED_ELSEWHERE = {
+    "__main__": "one call, in test_cli",
     "errors": "only names, which every test of bad input uses",
     "adapters/base": "what the base does for all is in testing/test_adapters",
-    "bench/robots/executors/base": "an interface, held to in bench/robots/executors/test_drive",
+    "adapters/displaced_trials": "half of the adapter of adapters/test_bayesian",
+    "adapters/moved_prior": "the prior of the model in adapters/test_moved",
+    "adapters/moved_trials": "the trials of the model in adapters/test_moved",
+    "arm/executing/base": "an interface, held to in arm/executing/test_drive",
+    "arm/recordings/turns": "turns and signs between throws are in arm/recordings/test_real_forms",
+    "arm/workspace/events": "what they add up to is in arm/workspace/test_state",
+    "arm/workspace/reaching": "goals out of reach are in arm/workspace/test_declared",
+    "arm/workspace/sessions": "what it loads and refuses is in arm/workspace/test_workspace",
+    "arm/workspace/template": "what it writes is read in arm/workspace/test_manifest",
+    "commands/telling": "tell, amend and void are in commands/test_trials and test_reading",
+    "session/in_use": "what a session loads is in session/test_session",
     "perception/base": "an interface, held to in testing/test_perception",
 }
 """Modules without a test file of their own, and where they are tested instead."""
 
 OF_THE_WHOLE = {
+    "arm/recordings/made_up": "ten kinds of recordings made up by seeds, and what they hold",
+    "arm/recordings/real_forms": "forms in which recorders write the same throws",
     "attacks/attacks": "generated attacks of every class: one table",
-    "bench/console/page": "the page in a browser, from recordings to a hit",
-    "demonstrations/curling_round": "round the stone, by either side",
-    "demonstrations/init": "every shipped set is made again",
-    "demonstrations/teleoperation": "how a recorded motion differs from the one meant",
+    "arm/console/page": "the page in a browser, from recordings to a hit",
+    "commands/walk": "how many files and functions an `ask` passes through",
     "dependencies": "floors of libraries, and calls that would run code from data",
     "documentation": "what the docs show, run as it stands",
     "examples": "the examples as a reader runs them",
@@ -30,6 +41,7 @@ OF_THE_WHOLE = {
     "folders": "folders as labs have them, from recordings to a plan",
     "layout": "this file",
     "notebook": "the notebook as a reader runs it",
+    "once": "one demonstration, from Python and on contact physics",
     "public": "what the package exports, and how little small commands load",
     "shapes": "the check of shapes that runs during the tests",
     "tutorial": "the tutorial from top to bottom",

@@ -91,6 +91,7 @@ def test_nothing_changes_where_it_was_not_seen_whether_it_hit():
 coordinates = st.floats(-0.3, 0.3)
 
 
+@pytest.mark.slow
 @given(coordinates, coordinates)
 def test_no_interval_is_cut_off_from_the_truth(x, y):
     from prior_reinforce.environment import Rollout
@@ -111,6 +112,16 @@ def test_a_reading_comes_back_from_plain_text_with_its_open_ends():
     for name in ("error_seen", "low", "high", "sd"):
         np.testing.assert_array_equal(getattr(again, name), getattr(reading, name))
     assert (again.hit, again.said) == (False, "long")
+
+
+def test_a_lost_object_stays_lost_in_plain_text_and_cannot_have_hit():
+    reading = Reading.only(False, 2, lost=True)
+    again = Reading.from_record(reading.within(RADIUS).record())
+    assert (again.lost, again.hit, again.has_number) == (True, False, False)
+    with pytest.raises(InvalidFeedbackError, match="say one of them"):
+        reading.with_hit(True)
+    with pytest.raises(InvalidFeedbackError, match="say one of them"):
+        Reading([0.1, 0.0], [0.1, 0.0], [0.1, 0.0], [0.0, 0.0], False, lost=True)
 
 
 def test_a_mere_miss_has_no_number():

@@ -1,6 +1,6 @@
 """Members by name: choices with settings, one's own, and what is wrong with a choice."""
 
-import hashlib
+import sys
 from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
@@ -8,8 +8,15 @@ import pytest
 
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.generators import make_generator
-from prior_reinforce.generators.config import DiffusionConfig
-from prior_reinforce.registry import Member, Registry, build, parse_choice, source_digest
+from prior_reinforce.generators.network.config import DiffusionConfig
+from prior_reinforce.registry import (
+    PLUGINS,
+    Member,
+    Registry,
+    build,
+    load_plugins,
+    parse_choice,
+)
 
 
 class Sail:
@@ -60,7 +67,7 @@ SAILS: Registry[Sail] = Registry(
     [
         ("gp", "gp", {}),
         ("gp,memory-size=none", "gp", {"memory_size": "none"}),
-        ("module:Class, gain = 0.5,x=", "module:Class", {"gain": "0.5", "x": ""}),
+        ("drift, gain = 0.5,x=", "drift", {"gain": "0.5", "x": ""}),
     ],
 )
 def test_a_choice_is_a_name_and_settings(choice, name, settings):
@@ -93,16 +100,48 @@ def test_a_member_gets_what_it_takes_of_the_context():
     assert SAILS.make("plain", wind=3.0).area == 2.0
 
 
-def test_ones_own_is_named_by_its_module():
-    own = f"{__name__}:Plain"
-    assert SAILS.make(f"{own},area=5").area == 5.0
-    assert SAILS.name_of(SAILS.make(own)) == "plain"
+@pytest.fixture
+def add(monkeypatch):
+    """Adds a class to the family for one test."""
+    monkeypatch.setattr(SAILS, "members", dict(SAILS.members))
+    return SAILS.add
+
+
+def test_ones_own_is_added_by_its_class(add):
+    add("racing", Racing)
+    assert SAILS.make("racing,battens=5").config.battens == 5
+    assert SAILS.name_of(SAILS.make("racing")) == "racing"
+    assert SAILS.name_of(SAILS.make("plain")) == "plain"
+    assert "racing (Shares a config, with defaults of its own)" in SAILS.help
+
+
+def test_a_plugin_registers_when_a_person_names_it(add, tmp_path, monkeypatch):
+    (tmp_path / "own_sail.py").write_text(
+        f"from {__name__} import SAILS, Plain\nSAILS.add('mine', type('Mine', (Plain,), {{}}))\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setitem(sys.modules, __name__, sys.modules[__name__])
+    with pytest.raises(ConfigurationError, match=r"no sail 'mine'; .*--plugins"):
+        SAILS.make("mine")
+    monkeypatch.setenv(PLUGINS, "own_sail")  # as in a process that is started by another
+    assert SAILS.make("mine,area=3").area == 3.0
+    with pytest.raises(ConfigurationError, match=r"no module nowhere_sail; .*PYTHONPATH"):
+        load_plugins("nowhere_sail")
+
+
+def test_errors_of_ones_own_constructor_pass_through(add):
+    add("broken", Broken)
+    with pytest.raises(ValueError, match="a bug") as caught:
+        SAILS.make("broken,area=1")
+    assert not isinstance(caught.value, ConfigurationError)
+    with pytest.raises(ConfigurationError, match="missing a required argument: 'area'"):
+        SAILS.make("broken")
 
 
 @pytest.mark.parametrize(
     ("choice", "message"),
     [
-        ("spinnaker", "no sail 'spinnaker'; known are plain, rigged, stiff, missing, or give"),
+        ("spinnaker", "no sail 'spinnaker'; known are plain, rigged, stiff, missing, .*--plugins"),
         ("plain,reef=1", "plain,reef=1 has no setting 'reef'; it has area, cloth, wet"),
         ("plain,area.x=1", "plain,area.x=1 has no setting 'area.x'; it has area, cloth, wet"),
         ("rigged,reef.x=1", "rigged,reef.x=1, reef, has no setting 'x'; it has"),
@@ -111,20 +150,21 @@ def test_ones_own_is_named_by_its_module():
         ("rigged,battens=many", "rigged,battens=many: .*battens"),
         ("rigged,battens=0", "battens must be at least 1"),
         ("missing", "cannot import nowhere:Sail: .*PYTHONPATH"),
-        (f"{__name__}:Sails", "cannot find .*Sails.*check its spelling"),
-        (f"{__name__}:Reef", "must derive from .*Sail"),
-        ("pathlib:Path", "pathlib:Path must derive from .*Sail"),
+        ("misspelt", "cannot find .*Sails.*check its spelling"),
+        ("other", "other must derive from .*Sail"),
     ],
 )
-def test_what_is_wrong_with_a_choice_is_said(choice, message):
+def test_what_is_wrong_with_a_choice_is_said(add, choice, message):
+    add("misspelt", Member(f"{__name__}:Sails", "no class"))
+    add("other", Reef)
     with pytest.raises(ConfigurationError, match=message):
         SAILS.make(choice)
 
 
 def test_help_names_every_member_and_imports_none():
     assert SAILS.help == (
-        "plain (a sheet), rigged (with battens), stiff (with many), missing (not installed), or "
-        "your own as module:Class; settings as NAME,setting=value"
+        "plain (a sheet), rigged (with battens), stiff (with many), missing (not installed); "
+        "settings as NAME,setting=value"
     )
 
 
@@ -134,13 +174,9 @@ def test_nested_settings_are_built_of_plain_values():
         build(RiggedConfig, {"reef": {"points": "two"}})
 
 
-def test_the_digest_follows_the_file_of_a_class_of_ones_own(tmp_path, monkeypatch):
-    monkeypatch.syspath_prepend(tmp_path)
-    (tmp_path / "own_sail.py").write_text("a = 1\n")
-    assert source_digest("own_sail:Own,x=2") == hashlib.sha256(b"a = 1\n").hexdigest()
-    assert source_digest("plain") == ""
-    with pytest.raises(ConfigurationError, match="cannot find nowhere_sail:Own"):
-        source_digest("nowhere_sail:Own")
+class Broken(Sail):
+    def __init__(self, area: float) -> None:
+        raise ValueError("a bug")
 
 
 class Racing(Rigged):
@@ -150,9 +186,10 @@ class Racing(Rigged):
         super().__init__(config or RiggedConfig(battens=12))
 
 
-def test_a_class_keeps_its_own_defaults_where_nothing_is_set():
-    assert SAILS.make(f"{__name__}:Racing").config.battens == 12
-    assert SAILS.make(f"{__name__}:Racing,battens=2").config.battens == 2
+def test_a_class_keeps_its_own_defaults_where_nothing_is_set(add):
+    add("racing", Racing)
+    assert SAILS.make("racing").config.battens == 12
+    assert SAILS.make("racing,battens=2").config.battens == 2
 
 
 class Optional(Sail):
@@ -160,12 +197,13 @@ class Optional(Sail):
         self.memory, self.gain = memory, gain
 
 
-def test_plain_settings_are_read_by_their_annotations():
-    made = SAILS.make(f"{__name__}:Optional,memory=3,gain=0.5")
+def test_plain_settings_are_read_by_their_annotations(add):
+    add("optional", Optional)
+    made = SAILS.make("optional,memory=3,gain=0.5")
     assert (made.memory, made.gain) == (3, 0.5)
-    assert SAILS.make(f"{__name__}:Optional,memory=none").memory is None
+    assert SAILS.make("optional,memory=none").memory is None
     with pytest.raises(ConfigurationError, match="gain"):
-        SAILS.make(f"{__name__}:Optional,gain=none")
+        SAILS.make("optional,gain=none")
 
 
 @dataclass(frozen=True)
@@ -185,6 +223,6 @@ def test_tuples_and_parts_can_be_written_in_a_choice():
 
 
 def test_a_part_of_a_network_leaves_the_rest_as_it_is_set():
-    made = make_generator("diffusion,network.widths=8:16,timing=none")
+    made = make_generator("diffusion,network.widths=8:16,timing=none,symmetry=none")
     laptop = DiffusionConfig().network
     assert made.config.network == replace(laptop, widths=(8, 16))

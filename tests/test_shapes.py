@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from jaxtyping import Float, TypeCheckError, jaxtyped
 
+from prior_reinforce.adapters.normalisation import Normalisation
 from prior_reinforce.arrays import Plans, Points
 from prior_reinforce.environment import Rollout
 from prior_reinforce.errors import PriorReinforceError
 from prior_reinforce.perception.exact import Exact
-from prior_reinforce.plans.normalisation import Normalisation
 from tests.shapes import SELDOM, arrays_only
 
 

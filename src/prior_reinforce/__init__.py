@@ -7,15 +7,12 @@ network does not wait for one.
 
 import lazy_loader
 
+__version__ = "0.1.0"
 _member, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
 
 
 def __getattr__(name: str) -> object:
-    """A public name, imported now; the version is looked up among all installed packages."""
-    if name == "__version__":
-        from importlib.metadata import version
-
-        return version("prior-reinforce")
+    """A public name, imported now."""
     try:
         return _member(name)
     except ImportError as error:

@@ -37,14 +37,6 @@ Point = Float[np.ndarray, " k"]
 
 SAME_OUTCOME = 1e-6
 """Outcomes this part of their range apart are the same; ours: what rounding and units leave."""
-FARTHEST = 5.0
-"""In [m]; ours: no arm on a table reaches, throws or is seen farther, so more is another unit,
-unless somebody says that it is metres."""
-LARGEST_TURN = 7.0
-"""In [rad]; ours: joints of arms turn one turn (6.28 rad) either way, so more is degrees."""
-BEYOND_DOUBT = 7.0
-"""Beyond this factor (eight turns of a joint, 35 m) the unit is wrong even if it is stated;
-ours."""
 
 
 def is_positive(value: Any) -> bool:
@@ -92,25 +84,36 @@ def as_outcomes(values: ArrayLike, n_plans: int) -> Points:
     """Return the outcomes of demonstrations as a fresh, read-only float64 array.
 
     Raises:
-        InvalidDemonstrationsError: Wrong shape, fewer than two, outcomes in a subspace (on one line
-            when k = 2), or values that are not finite.
+        InvalidDemonstrationsError: Wrong shape, none, or values that are not finite.
     """
     outcomes = _as_numbers(
         values, InvalidDemonstrationsError, "outcomes must be an array (N, k) of numbers"
     )
     if outcomes.ndim != 2 or outcomes.shape[1] < 1:
         raise InvalidDemonstrationsError(f"outcomes must have shape (N, k), got {outcomes.shape}")
-    n, k = outcomes.shape
+    n = len(outcomes)
     if n != n_plans:
         raise InvalidDemonstrationsError(f"{n_plans} plans need as many outcomes, got {n}")
-    if n < 2:
-        raise InvalidDemonstrationsError(f"at least two demonstrations are needed, got {n}")
+    if n < 1:
+        raise InvalidDemonstrationsError("at least one demonstration is needed, got none")
     if not np.all(np.isfinite(outcomes)):
         row = _first_not_finite(outcomes)
         raise InvalidDemonstrationsError(
             f"outcomes must be finite, but demonstration {row} has {outcomes[row].tolist()}; "
             "measure it again, or drop that demonstration"
         )
+    outcomes.setflags(write=False)
+    return outcomes
+
+
+def check_spread(outcomes: Points) -> None:
+    """Do nothing if outcomes span all their k dimensions: any goal among them can be asked for.
+
+    Raises:
+        InvalidDemonstrationsError: A component is the same in all, or they lie in a subspace (on
+            one line when k = 2).
+    """
+    n, k = outcomes.shape
     spread = np.ptp(outcomes, axis=0)
     if np.any(spread == 0):
         raise InvalidDemonstrationsError(
@@ -125,8 +128,6 @@ def as_outcomes(values: ArrayLike, n_plans: int) -> Points:
                 f"the {n} outcomes span fewer than {k} dimensions (they lie on one line or "
                 "plane); add a demonstration off it"
             )
-    outcomes.setflags(write=False)
-    return outcomes
 
 
 def as_conditions(values: ArrayLike, outcome_dim: int) -> Points:
@@ -197,21 +198,21 @@ def as_vector(
     vector = _as_numbers(values, problem, f"{name} must be {length} numbers")
     if vector.shape != (length,):
         raise problem(f"{name} has shape {vector.shape}, but {size}; give that many numbers")
-    if not np.all(np.isfinite(vector)):
+    if not np.isfinite(vector).all():
         raise problem(f"{name} must be finite, got {vector.tolist()}; {remedy}")
     return vector
 
 
 def _as_numbers(
     values: ArrayLike, problem: type[PriorReinforceError], expected: str
-) -> Float[np.ndarray, ...]:
+) -> Float[np.ndarray, "..."]:
     if np.ma.isMaskedArray(values) and np.any(np.ma.getmaskarray(values)):
         raise problem(f"{expected}, got a masked array; leave out what is masked")
     try:
         array = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError) as error:
+    except (TypeError, ValueError, OverflowError, RuntimeError) as error:
         raise problem(f"{expected}, got {values!r:.80}: {error}") from error
-    if np.any(np.abs(array) > LARGEST, where=np.isfinite(array)):
+    if ((np.abs(array) > LARGEST) & np.isfinite(array)).any():
         largest = float(np.abs(array[np.isfinite(array)]).max())
         raise problem(f"{expected}, got {largest:.4g}, which is implausibly large; check the unit")
     return array

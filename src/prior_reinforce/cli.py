@@ -1,32 +1,31 @@
 """The `prior-reinforce` command: parse to a dataclass, call once, print.
 
-Each command is a class in `commands/`, which lists them; only the one that is called is imported.
+Each command is a class in `commands/`, which lists them; only the one that is called is imported,
+and what reads its options: `--version` and `--help` answer at once.
 What a user did wrong is one line on standard error and exit status 2.
 """
 
 from __future__ import annotations
 
-import difflib
 import io
 import os
-import pkgutil
 import re
 import select
 import sys
+import traceback
 import warnings
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext, redirect_stderr, redirect_stdout
 from dataclasses import fields, is_dataclass
 from pathlib import Path
-from typing import Protocol
-
-import tyro
+from pkgutil import resolve_name
+from typing import Protocol, TypeVar
 
 import prior_reinforce
 from prior_reinforce.commands import COMMANDS, GROUPS, complain, warn
 from prior_reinforce.errors import ConfigurationError, PriorReinforceError
 from prior_reinforce.extras import missing_extra
-from prior_reinforce.files import check_path
+from prior_reinforce.registry import load_plugins
 
 
 class Command(Protocol):
@@ -36,7 +35,12 @@ class Command(Protocol):
         """Do it; the exit status, None for 0."""
 
 
+AnyCommand = TypeVar("AnyCommand", bound=Command)
+
 _QUIET = {"-q", "--quiet"}
+_TRACEBACK = "--traceback"
+_PLUGINS = "--plugins"
+_COMPLETION = ("--tyro-print-completion", "--tyro-write-completion")
 _LARGEST_WHOLE = 2**32 - 1
 """Of a whole number on the command line: numpy's and torch's largest common seed, and no sensible
 size reaches it."""
@@ -52,6 +56,8 @@ Hit a goal a robot arm has never hit, in about ten trials (simulated so far).
 {commands}
 WORKSPACE may be left out within its folder, and TRIAL for the one that waits.
 -q, --quiet prints warnings and errors only; -V, --version the version.
+--plugins MODULE (or the variable PRIOR_REINFORCE_PLUGINS) imports a module that registers classes
+of your own; --traceback shows where an error was raised.
 examples: prior-reinforce COMMAND --help"""
 _NOBODY_READS = 141
 """Exit status where the reader of our output left before the end: a shell's for SIGPIPE (128 + 13),
@@ -65,15 +71,30 @@ def main(args: Sequence[str] | None = None) -> int:
         args: The command line without the program's name; None takes the process's own.
 
     Returns:
+        The exit status; see `run`.
+    """
+    return run(_parse, args)
+
+
+def run(parse: Callable[[list[str]], Command | None], args: Sequence[str] | None = None) -> int:
+    """Run a program of commands: parse a line, call once, say what went wrong.
+
+    Args:
+        parse: Makes the command that was called; None where there is nothing more to do.
+        args: The command line without the program's name; None takes the process's own.
+
+    Returns:
         The exit status: 0 done, 1 not all of it, 2 wrong input and nothing changed, 130
         interrupted, 141 nobody read on.
     """
     warnings.showwarning = warn
     _open_streams()
+    shown = _TRACEBACK in (sys.argv[1:] if args is None else args)
     try:
         given = list(sys.argv[1:] if args is None else args)
+        load_plugins(*_take_plugins(given))
         quiet = bool(_QUIET & {*given})
-        command = _parse([arg for arg in given if arg not in _QUIET])
+        command = parse([arg for arg in given if arg not in {*_QUIET, _TRACEBACK}])
         # JSON is printed though everything else is not.
         nowhere = quiet and not getattr(command, "json", False)
         with redirect_stdout(io.StringIO()) if nowhere else nullcontext():
@@ -84,18 +105,20 @@ def main(args: Sequence[str] | None = None) -> int:
             raise
         return _NOBODY_READS
     except PriorReinforceError as error:
-        return _refuse(str(error), error)
+        return _refuse(str(error), error, shown)
     except ImportError as error:
         missing = missing_extra(error)
         if missing is None:
             raise
-        return _refuse(str(missing), error)
+        return _refuse(str(missing), error, shown)
     except OSError as error:
         where = f"{error.filename}: " if error.filename is not None else ""
         what = f"{where}{error.strerror or error}"
-        return _refuse(f"{what}; check the path, its permissions and the room on the disk", error)
+        what += "; check the path, its permissions and the room on the disk"
+        return _refuse(what, error, shown)
     except (MemoryError, RecursionError) as error:
-        return _refuse(f"too much for this machine ({error or 'no memory'}); give less", error)
+        what = f"too much for this machine ({error or 'no memory'}); give less"
+        return _refuse(what, error, shown)
     except KeyboardInterrupt as error:
         complain(f"interrupted{f'; {error}' if error.args else ''}")
         return 130
@@ -110,23 +133,60 @@ def _parse(args: list[str]) -> Command | None:
     if name in ("-V", "--version"):
         print(f"prior-reinforce {prior_reinforce.__version__}")
         return None
+    if name in _COMPLETION:
+        import tyro
+
+        kinds = {name: resolve_name(target) for name, target in COMMANDS.items()}
+        tyro.extras.subcommand_cli_from_dict(kinds, prog="prior-reinforce", args=args)
     if name not in COMMANDS:
         kind = "option" if name.startswith("-") else "command"
         raise ConfigurationError(
             f"there is no {kind} {name}{_suggested(name, [*COMMANDS, '--help', '--version'])}; "
             "prior-reinforce --help lists them all"
         )
+    return read(resolve_name(COMMANDS[name]), f"prior-reinforce {name}", args[1:])
+
+
+def read(kind: type[AnyCommand], program: str, args: list[str]) -> AnyCommand:
+    """Make one command of its options.
+
+    Args:
+        kind: Its class.
+        program: What it is called by, for help and messages.
+        args: What was typed after that.
+
+    Raises:
+        ConfigurationError: An option that it does not have, or a value that cannot be.
+    """
+    import tyro
+
     # Else the usage lacks the words that are there already.
-    rest = ["--help"] if {"-h", "--help"} & {*args[1:]} else args[1:]
-    with _in_one_line(name):
-        command: Command = tyro.cli(
-            pkgutil.resolve_name(COMMANDS[name]),
-            prog=f"prior-reinforce {name}",
+    rest = ["--help"] if {"-h", "--help"} & {*args} else args
+    with _in_one_line(program):
+        command = tyro.cli(
+            kind,
+            prog=program,
             args=rest,
             config=(tyro.conf.DisallowNone, tyro.conf.FlagCreatePairsOff),
         )
     _check_values(command)
     return command
+
+
+def _take_plugins(args: list[str]) -> list[str]:
+    """Take every `--plugins MODULE` out of a command line, and return the modules.
+
+    Raises:
+        ConfigurationError: The last one names none.
+    """
+    modules = []
+    while _PLUGINS in args:
+        at = args.index(_PLUGINS)
+        if at + 1 == len(args):
+            raise ConfigurationError(f"{_PLUGINS} needs a module; write {_PLUGINS} MODULE")
+        modules.append(args[at + 1])
+        del args[at : at + 2]
+    return modules
 
 
 def _help() -> str:
@@ -139,12 +199,14 @@ def _help() -> str:
 
 
 def _suggested(word: str, known: Iterable[str]) -> str:
+    import difflib
+
     closest = difflib.get_close_matches(word, known, n=1)
     return f"; did you mean {closest[0]}?" if closest else ""
 
 
 @contextmanager
-def _in_one_line(name: str) -> Iterator[None]:
+def _in_one_line(program: str) -> Iterator[None]:
     """Say in one line what is wrong with a command line; tyro draws a box. Help is shown tidied.
 
     Raises:
@@ -162,8 +224,7 @@ def _in_one_line(name: str) -> Iterator[None]:
         if found := re.search(r"Unrecognized options: ([^\s,]+)", box.getvalue()):
             known = re.findall(r"(?<![\w-])--[a-z][\w-]*", box.getvalue()[found.end() :])
             raise ConfigurationError(
-                f"{name} has no {found[1]}{_suggested(found[1], known)}; see prior-reinforce "
-                f"{name} --help"
+                f"{program} has no {found[1]}{_suggested(found[1], known)}; see {program} --help"
             ) from None
         words = re.sub(r"\u256d.*|[\u2502\u2570\u256f\s]+", " ", box.getvalue())
         parts = [" ".join(part.split()) for part in re.split("\u2500+|-{9,}", words)]
@@ -195,6 +256,8 @@ def _check_values(given: object, name: str = "") -> None:
         for each in given:
             _check_values(each, name)
     elif isinstance(given, Path):
+        from prior_reinforce.files import check_path
+
         check_path(given)
     elif isinstance(given, int):
         low = 0 if name == "seed" else -_LARGEST_WHOLE
@@ -216,8 +279,10 @@ def _open_streams() -> None:
             stream.reconfigure(errors="backslashreplace")
 
 
-def _refuse(message: str, error: BaseException) -> int:
+def _refuse(message: str, error: BaseException, traceback_too: bool) -> int:
     """Print why nothing more is done; the exit status says whether something was before."""
+    if traceback_too:
+        traceback.print_exception(error)
     changed = getattr(error, "changed", False)
     complain(f"{message}{'; what was recorded before stays' if changed else ''}")
     try:

@@ -19,7 +19,10 @@ from numpy.typing import ArrayLike
 
 from prior_reinforce.arrays import Point, Points
 from prior_reinforce.errors import ConfigurationError, RenderingUnavailableError
-from prior_reinforce.plans.motions import Demonstrations, PlanFormat
+from prior_reinforce.formats import OutcomeFormat
+from prior_reinforce.plans.motions import Demonstrations
+from prior_reinforce.plans.plan_format import PlanFormat
+from prior_reinforce.plans.symmetry import Symmetry
 
 if TYPE_CHECKING:
     import mujoco
@@ -114,19 +117,22 @@ class Task(ABC):
     """Name in results and messages, for instance `basketball-v1`."""
     format: PlanFormat
     """What a frame of a plan means, and how fast frames follow each other."""
-    outcome_names: tuple[str, ...] = ("x", "y")
-    """Names of the k components of an outcome."""
-    outcome_units: tuple[str, ...] = ()
-    """Unit of each component; metres where none are given."""
+    outcome_format: OutcomeFormat = OutcomeFormat.metres(2)
+    """What the k numbers of an outcome mean."""
     tolerance: float | tuple[float, ...]
     """epsilon of the paper: largest true error that counts as reached, in the outcomes' unit, or
-    one for each component, which mixed units need (see `readings.in_tolerances`)."""
+    one for each component, which mixed units need (see `formats.in_tolerances`)."""
     region: Float[np.ndarray, "2 k"]
     """Reachable region of goals, a box: lower and upper corner, in the outcomes' units."""
     demonstration_sets: tuple[str, ...] = ("A", "B")
     """Names of the prior sets that it is usually learned from."""
     scene: TableScene | None = None
     """What tells the error in a picture from above; None where no picture does."""
+
+    @property
+    def symmetry(self) -> Symmetry | None:
+        """What may be done to its motions so that the physics stays the same; None if unknown."""
+        return None
 
     @abstractmethod
     def rollout(self, plans: ArrayLike, rng: np.random.Generator | None) -> list[Rollout]:
@@ -146,6 +152,8 @@ class Task(ABC):
     @abstractmethod
     def demonstrations(self, name: str) -> Demonstrations:
         """Load the prior set `name`, one of `demonstration_sets` or another that the task knows.
+
+        It carries the task's symmetry, if it has one (`Demonstrations.without_symmetry`).
 
         Raises:
             ConfigurationError: There is no such set.

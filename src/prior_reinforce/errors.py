@@ -45,6 +45,14 @@ class UnclearUnitsError(ConfigurationError):
         super().__init__(f"{what}; if so, add: {options}{more}")
 
 
+class UnclearFlangeError(ConfigurationError):
+    """Which link of an arm's description is the flange is not clear; `proposed` may be it."""
+
+    def __init__(self, message: str, proposed: str = "") -> None:
+        self.proposed = proposed
+        super().__init__(message)
+
+
 class FileFormatError(PriorReinforceError, ValueError):
     """A file that is missing, truncated, or not of the format its name promises."""
 
@@ -73,13 +81,13 @@ class MissingExtraError(PriorReinforceError, ImportError):
     """An optional dependency is not installed; the message names the extra to install."""
 
 
+class OutOfReachError(PriorReinforceError, ValueError):
+    """A goal asks for a motion that the arm's kinematics cannot make, or that a limit forbids."""
+
+
 class RobotLimitError(PriorReinforceError, ValueError):
     """A plan breaks a limit of the robot; the report names the joint, the time and the margin."""
 
 
 class WorkspaceError(PriorReinforceError, RuntimeError):
     """A task folder on disk is missing, incomplete, locked, or inconsistent with its journal."""
-
-
-class UnitFailedError(PriorReinforceError, RuntimeError):
-    """A unit of an experiment failed; the message names it, and the others' results are kept."""

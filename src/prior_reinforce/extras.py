@@ -1,7 +1,8 @@
 """Optional libraries: which extra installs each, and what a user is told where one is missing.
 
-`pip install prior-reinforce` brings the method and the bench. What needs more imports it where it
-is used, and a missing library becomes one line that names the extra.
+`pip install .` brings the method and the arm. What needs more imports it where it is used, and a
+missing library becomes one line that names the extra. The package is on no index: who reads that
+line has a clone.
 """
 
 from __future__ import annotations
@@ -12,23 +13,18 @@ from prior_reinforce.errors import MissingExtraError
 
 EXTRA_OF = {
     "torch": "diffusion",
-    "mujoco": "lab",
-    "mink": "lab",
-    "joblib": "lab",
-    "threadpoolctl": "lab",
-    "imageio_ffmpeg": "lab",
+    "mujoco": "simulation",
+    "mink": "simulation",
+    "joblib": "simulation",
+    "threadpoolctl": "simulation",
+    "imageio_ffmpeg": "simulation",
     "openai": "vlm",
-    "movement_primitives": "baselines",
-    "pytransform3d": "baselines",
-    "botorch": "baselines",
-    "cma": "baselines",
-    "ray": "ray",
+    "httpx": "vlm",
     "pyarrow": "lerobot",
     "rosbags": "ros",
     "h5py": "hdf5",
     "zarr": "zarr",
     "numcodecs": "zarr",
-    "python_calamine": "excel",
     "pylibfranka": "fr3",
     "rtde_control": "ur",
     "rtde_receive": "ur",
@@ -61,9 +57,9 @@ def check_installed(library: str) -> None:
 
 
 def _missing(library: str) -> MissingExtraError:
-    what = (
-        f"--no-deps {ALONE[library]}"
+    how = (
+        f"install it with: pip install --no-deps {ALONE[library]}"
         if library in ALONE
-        else f"'prior-reinforce[{EXTRA_OF[library]}]'"
+        else f"in your clone of the repository: pip install -e '.[{EXTRA_OF[library]}]'"
     )
-    return MissingExtraError(f"{library} is not installed; install it with: pip install {what}")
+    return MissingExtraError(f"{library} is not installed; {how}")

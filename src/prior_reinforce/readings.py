@@ -15,7 +15,6 @@ independent evidence, and an adapter would stop moving.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import msgspec
@@ -25,7 +24,7 @@ from numpy.typing import ArrayLike
 from typing_extensions import Self
 
 from prior_reinforce.arrays import Point, as_error
-from prior_reinforce.errors import ConfigurationError, InvalidFeedbackError
+from prior_reinforce.errors import InvalidFeedbackError
 
 EYE_NEAR = np.array([0.0, 0.02, 0.05, 0.10])
 """Distances an observer distinguishes near the goal, in [m] (paper: 0 cm, 2 cm, 5 cm, multiples of
@@ -48,50 +47,6 @@ _MEASURED = 0.5
 """A number with an sd below this share of the tolerance is more informative than a hit (ours)."""
 
 
-def as_tolerance(tolerance: ArrayLike, names: Sequence[str], units: Sequence[str]) -> Point:
-    """Return epsilon for each component, in its unit.
-
-    Args:
-        tolerance: One number where all components have one unit, else one for each: 2 cm are
-            neither more nor less than 20 ms until somebody says so.
-        names: Names of the k components.
-        units: Units of the k components.
-
-    Raises:
-        ConfigurationError: Not positive, another number of numbers, or one number for several
-            units.
-    """
-    each = ", ".join(f"{name} [{unit}]" for name, unit in zip(names, units, strict=True))
-    try:
-        array = np.asarray(tolerance)
-    except ValueError:
-        array = np.empty(0)
-    numbers = array.dtype.kind in "iuf" and array.shape in ((), (len(names),))
-    if not (numbers and np.all((array > 0) & np.isfinite(array))):
-        raise ConfigurationError(
-            f"tolerance must be a positive number, or one for each of {each}, got {tolerance!r}"
-        )
-    if array.ndim == 0 and len(set(units)) > 1:
-        raise ConfigurationError(
-            f"tolerance is one number, {tolerance!r}, for outcomes of several units; give one for "
-            f"each of {each}"
-        )
-    return np.broadcast_to(array, len(names)).astype(np.float64)
-
-
-def in_tolerances(error: ArrayLike, tolerance: ArrayLike) -> float:
-    """Return how far an error is from the goal, in tolerances: a hit is at most 1.
-
-    The length of the error, each component divided by its tolerance (ours: the one way in which
-    metres and seconds add up, and the paper's distance where all tolerances are one number).
-
-    Args:
-        error: Outcome minus goal, shape (k,), in the outcomes' units.
-        tolerance: epsilon, shape (k,), or one number for all.
-    """
-    return float(np.linalg.norm(np.asarray(error) / np.asarray(tolerance)))
-
-
 class ReadingRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A `Reading` as plain data; an open end of an interval is None."""
 
@@ -101,6 +56,7 @@ class ReadingRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     sd: list[float]
     hit: bool | None = None
     said: str = ""
+    lost: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +79,9 @@ class Reading:
     hit: bool | None = None
     """Whether the goal was reached; None if that was not seen directly."""
     said: str = ""
-    """The words, if it was given in words."""
+    """The words, if it was given in words, with the units that were understood."""
+    lost: bool = False
+    """Whether the object went where nobody could see it, or never left: a miss."""
     missed_by_at_least: Point | None = None
     """Half-axes of an ellipsoid that the true error lies outside of, after a miss; None if unknown.
     Set by `within`."""
@@ -149,21 +107,23 @@ class Reading:
                 array = np.array(getattr(self, name), dtype=np.float64)
             except (TypeError, ValueError):
                 array = np.empty(0)
-            if array.shape != (k,) or np.any(np.isnan(array)):
+            if array.shape != (k,) or np.isnan(array).any():
                 raise InvalidFeedbackError(
                     f"{name} must be {k} numbers, one for each component of the error, got "
                     f"{getattr(self, name)!r:.80}"
                 )
             object.__setattr__(self, name, array)
-        if np.any((self.low > self.high) | (self.low == np.inf) | (self.high == -np.inf)):
+        if ((self.low > self.high) | (self.low == np.inf) | (self.high == -np.inf)).any():
             raise InvalidFeedbackError(
                 f"the error cannot lie in [{self.low.tolist()}, {self.high.tolist()}]; give the "
                 "lower end first"
             )
-        if not np.all((self.sd >= 0) & np.isfinite(self.sd)):
+        if not ((self.sd >= 0) & np.isfinite(self.sd)).all():
             raise InvalidFeedbackError(f"sd must be 0 or more, got {self.sd.tolist()}")
         if not (self.hit is None or isinstance(self.hit, (bool, np.bool_))):
             raise InvalidFeedbackError(f"hit must be True, False or None, got {self.hit!r}")
+        if self.lost and (self.hit is not False or self.has_number):
+            raise InvalidFeedbackError("a lost object missed, nobody knows where; say one of them")
         for array in (self.error_seen, self.low, self.high, self.sd):
             array.setflags(write=False)
 
@@ -227,10 +187,10 @@ class Reading:
         )
 
     @classmethod
-    def only(cls, hit: bool, outcome_dim: int) -> Self:
-        """Only that it hit or missed; `error_seen` is 0."""
-        everywhere = np.full(outcome_dim, np.inf)
-        return cls(np.zeros(outcome_dim), -everywhere, everywhere, np.zeros(outcome_dim), hit)
+    def only(cls, hit: bool, outcome_dim: int, *, lost: bool = False) -> Self:
+        """Only that it hit, missed, or was lost; `error_seen` is 0."""
+        everywhere, zero = np.full(outcome_dim, np.inf), np.zeros(outcome_dim)
+        return cls(zero, -everywhere, everywhere, zero, hit, lost=lost)
 
     @property
     def has_number(self) -> bool:
@@ -278,7 +238,9 @@ class Reading:
         """Plain data for a log."""
         hit = None if self.hit is None else bool(self.hit)
         low, high = _ends(self.low), _ends(self.high)
-        return ReadingRecord(self.error_seen.tolist(), low, high, self.sd.tolist(), hit, self.said)
+        return ReadingRecord(
+            self.error_seen.tolist(), low, high, self.sd.tolist(), hit, self.said, self.lost
+        )
 
     @classmethod
     def from_record(cls, record: ReadingRecord) -> Self:
@@ -286,7 +248,7 @@ class Reading:
         low = np.array([-math.inf if end is None else end for end in record.low])
         high = np.array([math.inf if end is None else end for end in record.high])
         seen, sd = np.array(record.error_seen), np.array(record.sd)
-        return cls(seen, low, high, sd, record.hit, record.said)
+        return cls(seen, low, high, sd, record.hit, record.said, record.lost)
 
 
 def _ends(ends: Float[np.ndarray, " k"]) -> list[float | None]:

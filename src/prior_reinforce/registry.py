@@ -1,38 +1,42 @@
 """The members of a family by name: what can be chosen, what it is set to, how it is made.
 
-A family's `__init__` holds its one `Registry`. The command line's choices and help texts,
-`reproduce`, saving and loading, and anyone's own `module:Class` follow from it. A member is named
-by its module, so that a list of names imports none of them.
+A family's `__init__` holds its one `Registry`. The command line's choices and help texts, saving
+and loading follow from it. A member of ours is named by its module, so that a list of names imports
+none of them. A class of one's own is added by the module that defines it (`Registry.add`); which
+modules are imported for that, a person says: `--plugins MODULE`, or the variable
+`PRIOR_REINFORCE_PLUGINS`. So nothing that is read from a file starts code.
 
 A class with settings takes a `config`, a frozen dataclass that its `config_type` names; one without
 may take plain arguments. A choice is written `name`, or `name,setting=value,...`: `gp`,
-`gp,memory_size=none`, `diffusion,network.widths=64:128`, `my_module:MyAdapter,gain=0.5`.
+`gp,memory_size=none`, `diffusion,network.widths=64:128`.
 """
 
 from __future__ import annotations
 
-import hashlib
-import importlib.util
+import importlib
 import inspect
+import operator
+import os
 import pkgutil
 import typing
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, is_dataclass
-from pathlib import Path
 from typing import Any, Generic, TypeVar, cast
 
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.extras import missing_extra
 
 T = TypeVar("T")
+PLUGINS = "PRIOR_REINFORCE_PLUGINS"
+"""Environment variable that names modules to import, separated by commas; a person sets it."""
 
 
 @dataclass(frozen=True)
 class Member:
     """One name of a family."""
 
-    target: str
-    """`module:Class`."""
+    target: str | type[Any]
+    """The class, or `module:Class`, imported when it is first used."""
     summary: str
     """What it is, in a few words, for help texts."""
     settings: Mapping[str, Any] = field(default_factory=dict)
@@ -54,42 +58,62 @@ class Registry(Generic[T]):
         self.members = dict(members)
         self._base = base
 
+    def add(self, name: str, member: Member | type[T]) -> None:
+        """Let a class of one's own be chosen by a name, in this process.
+
+        Args:
+            name: What it is chosen by; of a generator, its `name`, by which models are loaded.
+                Replaces a member of that name.
+            member: The class, described in help texts by its docstring's first line; or a `Member`.
+        """
+        if not isinstance(member, Member):
+            member = Member(member, (inspect.getdoc(member) or name).partition("\n")[0].rstrip("."))
+        self.members[name] = member
+
     @property
     def help(self) -> str:
         """The choices in one sentence, for help texts."""
-        ours = ", ".join(f"{name} ({m.summary})" for name, m in self.members.items())
-        return f"{ours}, or your own as module:Class; settings as NAME,setting=value"
+        known = ", ".join(f"{name} ({m.summary})" for name, m in self.members.items())
+        return f"{known}; settings as NAME,setting=value"
 
     def make(self, choice: str, **context: Any) -> T:
         """Make a member.
 
         Args:
-            choice: `name` or `module:Class`, each with settings if need be: `gp,memory_size=4`.
+            choice: Its name, with settings if need be: `gp,memory_size=4`.
             context: What a member may need beside its settings; given to those that take it.
 
         Raises:
             ConfigurationError: There is no such member, a setting that it does not have, or a value
                 that the setting cannot have.
         """
-        name, given = parse_choice(choice)
-        kind, member = self.resolve(name), self.members.get(name)
-        settings = {**(member.settings if member is not None else {}), **given}
+        name, settings = parse_choice(choice)
+        settings = {**self._member(name).settings, **settings}
+        return self._make(name, settings, context, choice)
+
+    def _make(
+        self, name: str, settings: Mapping[str, Any], context: Mapping[str, Any], choice: str
+    ) -> T:
+        """Make a member; errors of its constructor pass through. `choice` is for messages."""
+        kind = self._class(name)
         takes = inspect.signature(kind).parameters
-        context = {key: value for key, value in context.items() if key in takes}
+        arguments = {key: value for key, value in context.items() if key in takes}
         config = getattr(kind, "config_type", None)
-        given_config = context.pop("config", None)
-        try:
-            if config is None:
-                return kind(**context, **_arguments(kind, settings, choice))
-            if isinstance(given_config, config):  # settings in the choice come on top
-                settings = {**asdict(given_config), **settings}
+        if config is None:
+            arguments |= _arguments(kind, settings, choice)
+        else:
+            given = arguments.pop("config", None)
+            if isinstance(given, config):  # settings in the choice come on top
+                settings = {**asdict(given), **settings}
             if settings:  # else the class's own defaults, which may differ from its config's
-                context["config"] = build(config, settings, choice)
-            return kind(**context)
-        except (TypeError, ValueError) as error:
-            if isinstance(error, ConfigurationError):
-                raise
-            raise ConfigurationError(f"cannot make {choice}: {error}") from error
+                arguments["config"] = build(config, settings, choice)
+        try:
+            inspect.signature(kind).bind(**arguments)
+        except TypeError as error:
+            raise ConfigurationError(
+                f"cannot make {choice}: {error}; add it as a setting"
+            ) from error
+        return kind(**arguments)
 
     def check(self, choice: str) -> None:
         """Do nothing if a choice can be made; a bare name of ours is not imported for that.
@@ -107,23 +131,53 @@ class Registry(Generic[T]):
             ConfigurationError: It is unknown, cannot be imported, or is of another family.
             MissingExtraError: It needs a library of an extra that is not installed.
         """
-        name, _ = parse_choice(choice)
-        member = self.members.get(name)
-        if member is None and ":" not in name:
+        return self._class(parse_choice(choice)[0])
+
+    def name_of(self, made: T) -> str | None:
+        """Return the name of a member's class; None where it has none."""
+        kind = type(made)
+        targets = (kind, f"{kind.__module__}:{kind.__qualname__}")
+        return next((name for name, m in self.members.items() if m.target in targets), None)
+
+    def _member(self, name: str) -> Member:
+        if name not in self.members:
+            load_plugins()  # in a process that has not yet
+        if name not in self.members:
             raise ConfigurationError(
-                f"no {self.family} {name!r}; known are {', '.join(self.members)}, or give your own "
-                "as module:Class"
+                f"no {self.family} {name!r}; known are {', '.join(self.members)}; a class of your "
+                "own is registered by the module that --plugins names"
             )
-        kind = _resolve(name if member is None else member.target)
+        return self.members[name]
+
+    def _class(self, name: str) -> type[T]:
+        target = self._member(name).target
+        kind = _resolve(target) if isinstance(target, str) else target
         base = pkgutil.resolve_name(self._base)
         if not (isinstance(kind, type) and issubclass(kind, base)):
             raise ConfigurationError(f"{name} must derive from {self._base.replace(':', '.')}")
         return kind
 
-    def name_of(self, made: T) -> str:
-        """Return the name of a member's class, or `module:Class` where it is not ours."""
-        target = f"{type(made).__module__}:{type(made).__qualname__}"
-        return next((n for n, m in self.members.items() if m.target == target), target)
+
+def load_plugins(*modules: str) -> None:
+    """Import modules that register classes of one's own, and those that `PLUGINS` names.
+
+    Programs that are started from here, such as an executor's, are told of them by that variable.
+
+    Raises:
+        ConfigurationError: There is no such module.
+    """
+    named = dict.fromkeys(filter(None, (*os.environ.get(PLUGINS, "").split(","), *modules)))
+    for name in named:
+        try:
+            importlib.import_module(name)
+        except ModuleNotFoundError as error:
+            if error.name is None or f"{name}.".startswith(f"{error.name}."):
+                raise ConfigurationError(
+                    f"there is no module {name}; it must be importable from here (PYTHONPATH)"
+                ) from error
+            raise
+    if modules:
+        os.environ[PLUGINS] = ",".join(named)
 
 
 def parse_choice(choice: str) -> tuple[str, dict[str, str]]:
@@ -145,12 +199,6 @@ def parse_choice(choice: str) -> tuple[str, dict[str, str]]:
             )
         settings[key] = value.strip()
     return name.strip(), settings
-
-
-def own_class(choice: str) -> str | None:
-    """`module:Class` where a choice names a class of one's own; None where it is ours."""
-    name, _ = parse_choice(choice)
-    return name if ":" in name else None
 
 
 def build(config: type[Any], settings: Mapping[str, Any], choice: str = "") -> Any:
@@ -177,30 +225,30 @@ def _arguments(kind: type[Any], settings: Mapping[str, Any], choice: str) -> dic
     """Plain arguments of a constructor, read by its annotations as a dataclass of settings is."""
     import msgspec
 
-    hints = typing.get_type_hints(kind.__init__)
-    hints.pop("return", None)
-    for name in settings:
-        if name not in hints:
-            known = ", ".join(hints) or "none"
-            raise ConfigurationError(f"{choice} has no setting {name!r}; it has {known}")
-    fields = [(name, hints[name] if name in settings else Any, None) for name in hints]
-    made = build(msgspec.defstruct(kind.__name__, fields), settings, choice)
-    return {name: getattr(made, name) for name in settings}
+    hints, made = typing.get_type_hints(kind.__init__), dict[str, Any]()
+    for name, value in _plain(kind.__init__, settings, choice).items():
+        try:
+            made[name] = msgspec.convert(value, hints[name], strict=False)
+        except msgspec.ValidationError as error:
+            raise ConfigurationError(f"{choice}: {error} for {name}") from error
+    return made
 
 
-def _plain(config: type[Any], settings: Mapping[str, Any], choice: str) -> dict[str, Any]:
+def _plain(taker: Callable[..., Any], settings: Mapping[str, Any], choice: str) -> dict[str, Any]:
     """Settings as msgspec takes them: `none`, `64:128` for a tuple, `network.kernel` for a part."""
-    hints = typing.get_type_hints(config)
+    hints = typing.get_type_hints(taker)
+    hints.pop("return", None)
     plain: dict[str, Any] = {}
     for key, value in settings.items():
         outer, _, inner = key.partition(".")
-        if outer not in hints:
+        part = bool(inner) and is_dataclass(hints.get(outer))
+        if outer not in hints or (inner and not part):
             known = ", ".join(hints) or "none"
             raise ConfigurationError(f"{choice} has no setting {key!r}; it has {known}")
         hint = hints[outer]
         kinds: list[Any] = [typing.get_origin(each) for each in (hint, *typing.get_args(hint))]
-        if inner and is_dataclass(hint):
-            whole = plain[outer] if outer in plain else asdict(getattr(config(), outer))
+        if part:
+            whole = plain[outer] if outer in plain else asdict(getattr(taker(), outer))
             plain[outer] = {
                 **whole,
                 **_plain(cast(type[Any], hint), {inner: value}, f"{choice}, {outer},"),
@@ -210,36 +258,14 @@ def _plain(config: type[Any], settings: Mapping[str, Any], choice: str) -> dict[
         elif isinstance(value, str) and tuple in kinds:
             plain[outer] = value.split(":")
         else:
-            plain[key] = value
+            plain[outer] = value
     return plain
 
 
-def source_digest(choice: str) -> str:
-    """Return a hash of the file that a class of one's own stands in; empty for one of ours.
-
-    Raises:
-        ConfigurationError: The module cannot be found.
-    """
-    name, _ = parse_choice(choice)
-    module, colon, _ = name.partition(":")
-    if not colon:
-        return ""
-    try:
-        found = importlib.util.find_spec(module)
-    except (ImportError, ValueError):
-        found = None
-    if found is None or found.origin is None:
-        raise ConfigurationError(
-            f"cannot find {name}; it must be importable from here (PYTHONPATH)"
-        )
-    return hashlib.sha256(Path(found.origin).read_bytes()).hexdigest()
-
-
 def _resolve(target: str) -> Any:
+    module, _, name = target.partition(":")
     try:
-        return pkgutil.resolve_name(target)
-    except AttributeError as error:
-        raise ConfigurationError(f"cannot find {target}: {error}; check its spelling") from error
+        found = importlib.import_module(module)
     except (ImportError, ValueError) as error:
         missing = missing_extra(error) if isinstance(error, ImportError) else None
         if missing is not None:
@@ -247,3 +273,7 @@ def _resolve(target: str) -> Any:
         raise ConfigurationError(
             f"cannot import {target}: {error}; it must be importable from here (PYTHONPATH)"
         ) from error
+    try:
+        return operator.attrgetter(name)(found)
+    except AttributeError as error:
+        raise ConfigurationError(f"cannot find {target}: {error}; check its spelling") from error

@@ -5,6 +5,7 @@ So the command line, a saved model and a constructor all keep to them, and none 
 
 from __future__ import annotations
 
+import sys
 from dataclasses import dataclass, fields
 from typing import Annotated, Any, get_type_hints
 
@@ -12,6 +13,11 @@ import msgspec
 import numpy as np
 
 from prior_reinforce.errors import ConfigurationError
+
+if sys.version_info >= (3, 11):
+    import tomllib as tomllib
+else:
+    import tomli as tomllib  # noqa: F401  # read from here by all that reads TOML
 
 Count = Annotated[int, msgspec.Meta(ge=1)]
 NonNegative = Annotated[float, msgspec.Meta(ge=0)]

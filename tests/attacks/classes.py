@@ -7,6 +7,7 @@ import random
 import shutil
 import tempfile
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cache, partial
 from pathlib import Path
 from typing import Any, get_args
@@ -17,16 +18,17 @@ from PIL import Image
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
-from prior_reinforce.bench.workspace.workspace import Workspace
+from prior_reinforce.arm.workspace.workspace import Workspace
+from prior_reinforce.errors import WorkspaceError
 from prior_reinforce.files import sha256, sha256_of_folder
 from prior_reinforce.generators import load_generator
 from prior_reinforce.perception.calibration import TableCalibration
 from prior_reinforce.perception.vlm_formats import FORMATS, read_box
+from tests.arm.recordings import recorded
+from tests.arm.workspace.planar import manifest
 from tests.attacks import odd
 from tests.attacks.harness import HELD, NASTY, call, command, damage, tree
-from tests.bench.importing import recorded
-from tests.bench.workspace.planar import manifest
-from tests.perception.vision_server import Fault, VisionServer
+from tests.perception.vision_server import Fault, VisionServer, vlm_file
 
 Attack = Callable[[random.Random, Path, Path], str]
 """Of a source of chance, an empty folder, and a workspace with one open trial to copy from."""
@@ -45,7 +47,6 @@ def flags(rng: random.Random, here: Path, asked: Path) -> str:
             "--out",
             "--rate",
             "--check",
-            "--where",
             "--time-limit",
             "--generator",
             "--adapter",
@@ -357,7 +358,7 @@ def journals(rng: random.Random, here: Path, asked: Path) -> str:
     if rng.random() < 0.4:
         journal.write_bytes(damage(rng, journal.read_bytes()))
     else:
-        kinds = ["goal_set", "asked", "executing", "executed", "not_executed", "told", "amended"]
+        kinds = ["goal_set", "asked", "moving", "moved", "told", "amended"]
         kinds += ["voided", "demonstrations_imported", "model_trained", "unknown"]
         with Workspace(folder) as workspace:
             whole = [(entry.kind, msgspec.to_builtins(entry.event)) for entry in workspace.events]
@@ -367,7 +368,7 @@ def journals(rng: random.Random, here: Path, asked: Path) -> str:
                 data |= {"trial": rng.choice([0, 1, 2, -1, "1", None, 1.5]), "hit": True}
                 data |= {"error_seen": rng.choice([[0.1, 0.2], [], "x", [1e308, 0], None])}
             _edit(rng, data)
-            with workspace.log.exclusive():
+            with suppress(WorkspaceError), workspace.log.exclusive():  # which reads it back
                 data["kind"] = rng.choice([kind, rng.choice(kinds)])
                 workspace.log.append(msgspec.Raw(json.dumps(data).encode()))
     name = rng.choice([*_READERS, *["tell", "void", "export"] * 3])
@@ -398,8 +399,8 @@ def looks(rng: random.Random, here: Path, asked: Path) -> str:
     if rng.random() < 0.3:
         flags += ["--workspace", "planar", "--trial", rng.choice(["1", "2", "x"])]
     with VisionServer(faults=[rng.choice(FAULTS) for _ in range(6)]) as server:
-        flags += ["--vlm.base-url", server.base_url, "--vlm.max-retries", "0"]
-        return command(here, "look", str(photo), *flags, "--vlm.timeout", "1")
+        flags += ["--vlm", str(vlm_file(here, server.base_url, timeout=1.0))]
+        return command(here, "look", str(photo), *flags)
 
 
 FAULTS = (None, *(fault for fault in get_args(Fault) if fault != "timeout"))

@@ -16,8 +16,9 @@ import sys
 import time
 from pathlib import Path
 
-from prior_reinforce.bench.robots.executors.lock import is_executing
-from prior_reinforce.bench.workspace.workspace import Workspace
+from prior_reinforce.arm.executing.lock import is_executing
+from prior_reinforce.arm.workspace.execute import execute
+from prior_reinforce.arm.workspace.workspace import Workspace
 from tests.attacks.harness import HELD, wait_until
 
 DRIVER = """
@@ -72,7 +73,7 @@ KINDS = ("quick", "slow", "detaches", "double fork", "hangs", "will not stop", "
 KINDS += ("crashes", "lies", "says no", "continued", "deletes", "changes")
 WRAPPER = "import subprocess, sys; sys.exit(subprocess.run(sys.argv[1:]).returncode)"
 """What it starts has none of the descriptors that it inherited, and so no lock."""
-ENDS = {"says no": None, "lies": "aborted", "crashes": "aborted", "changes": "aborted"}
+ENDS = {"says no": "not_moved", "lies": "aborted", "crashes": "aborted", "changes": "aborted"}
 """Outcome in the journal of a driver that nobody disturbs; the others are done."""
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGKILL)
 SIGNALS += (signal.SIGTSTP, signal.SIGKILL)
@@ -172,7 +173,7 @@ class Program:
         with Workspace(folder) as workspace:
             number = workspace.session().ask().number
             shown = fail if raises == "show" else None
-            workspace.execute(number, command, time_limit=limit, show=shown)
+            execute(workspace, number, command, time_limit=limit, show=shown)
 
     def go(self) -> None:
         """Let it execute."""
@@ -195,17 +196,16 @@ class Program:
 
 
 def send_signal(rng: random.Random, program: Program) -> None:
-    """Send some signal to a program, its group, or one or both processes of its supervisor."""
-    number, to = rng.choice(SIGNALS), rng.choice(["program", "group", "guard", "runner", "both"])
+    """Send some signal to a program, its group, its supervisor, or both of them."""
+    number, to = rng.choice(SIGNALS), rng.choice(["program", "group", "supervisor", "both"])
     with contextlib.suppress(OSError, IndexError):
         if to == "group":
             os.killpg(program.pid, number)
         elif to == "program":
             os.kill(program.pid, number)
         else:
-            guard = _children(program.pid)[0]
-            runner = _children(guard)[0]
-            for pid in {"guard": [guard], "runner": [runner], "both": [guard, runner]}[to]:
+            supervisor = _children(program.pid)[0]
+            for pid in [supervisor, program.pid][: 1 + (to == "both")]:
                 os.kill(pid, number)
 
 
@@ -267,13 +267,15 @@ def _judge(
     kinds: collections.Counter[str] = collections.Counter()
     for folder in set(folders):
         with Workspace(folder) as workspace:
-            kinds.update(entry.kind for entry in workspace.log.entries())
-    if moved > kinds["executing"]:
+            for entry in workspace.log.entries():
+                none = getattr(entry.event, "outcome", "") == "not_moved"
+                kinds["none" if none else entry.kind] += 1
+    if moved > kinds["moving"]:
         return "a motion is not recorded"
     if moved > (len(programs) if again else len(set(folders))):
         return "a plan moved twice"
     # One of two programs may have been interrupted before it began, and the other not.
-    if moved > kinds["executing"] - kinds["not_executed"] and not _says_no(here):
+    if moved > kinds["moving"] - kinds["none"] and not _says_no(here):
         return "a motion is recorded as none"
     return HELD
 
@@ -287,7 +289,7 @@ def _ends_as_it_was(folder: Path, kind: str) -> str:
     """Nobody cries wolf where nobody disturbed the driver."""
     with Workspace(folder) as workspace:
         last = [entry.event for entry in workspace.log.entries()][-1]
-    outcome = getattr(last, "outcome", last.kind) if last.kind != "not_executed" else None
+    outcome = getattr(last, "outcome", last.kind)
     return HELD if outcome == ENDS.get(kind, "done") else f"a false alarm: {kind} is {outcome}"
 
 

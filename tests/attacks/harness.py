@@ -21,17 +21,17 @@ import unicodedata
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from prior_reinforce.bench.workspace.workspace import Workspace
+from prior_reinforce.arm.workspace.workspace import Workspace
 from prior_reinforce.cli import main
 from prior_reinforce.errors import PriorReinforceError
-from tests.bench.workspace.planar import demonstrations, manifest
+from tests.arm.workspace.planar import demonstrations, manifest
 
 REMEDY = re.compile(
     r"add|ask|call|check|choose|close|convert|copy|correct|demonstrate|drop|expected|export|give|"
     r"help|import (?:again|all|without)|it (?:has|holds) |known|learn (?:it|again)|"
-    r"leave [\w ]{0,14}out|load it|looks like|make|measure|mend|missing|move the|must|name|need|"
-    r"put|record|remove|rename|resample|restore|run:|save it|say|see|set one|spread|tell|unknown; |"
-    r"use|valid|void|wait|want|write",
+    r"leave [\w ]{0,14}out|load it|looks like|make|mean|measure|mend|missing|move the|must|name|"
+    r"need|put|record|remove|rename|resample|restore|run:|save it|say|see|set one|spread|tell|"
+    r"unknown; |use|valid|void|wait|want|write",
     re.IGNORECASE,
 )
 """What a refusal says must be done, in one of these words."""
@@ -65,13 +65,12 @@ def prepare(folder: Path) -> Path:
 def program(module: str, *args: object) -> str:
     """Call an attack that is a program of its own: one that has used threads cannot be forked."""
     root = Path(__file__).parents[2]
-    path = [str(root / "tests/lab/experiments"), os.environ.get("PYTHONPATH", "")]
     done = subprocess.run(
         [sys.executable, "-m", f"tests.attacks.{module}", *map(str, args)],
         cwd=root,
         capture_output=True,
         text=True,
-        env=os.environ | {"OMP_NUM_THREADS": "1", "PYTHONPATH": os.pathsep.join(path)},
+        env=os.environ | {"OMP_NUM_THREADS": "1"},
     )
     return HELD if done.returncode == 0 else (done.stderr.splitlines() or [done.stdout])[-1]
 

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 import zarr
 
-from tests.bench.workspace.planar import demonstrations
+from tests.arm.workspace.planar import demonstrations
 
 T = np.arange(24) * 0.02
 PLANS = demonstrations().plans
@@ -53,12 +53,6 @@ def degrees(folder: Path) -> Path:
     return folder
 
 
-def workbook(folder: Path) -> Path:
-    for i in range(4):
-        frames(i).to_excel(folder / f"{i}.xlsx", index=False)
-    return folder
-
-
 def npz(folder: Path) -> Path:
     for i in range(4):
         np.savez(folder / f"{i}.npz", t=T, q=PLANS[i], joint_names=["joint1", "joint2"])
@@ -78,15 +72,6 @@ def robomimic(folder: Path) -> Path:
     return folder / "demos.hdf5"
 
 
-def droid(folder: Path) -> Path:
-    for i in range(4):
-        (folder / str(i)).mkdir()
-        with h5py.File(folder / str(i) / "trajectory.h5", "w") as file:
-            file["observation/robot_state/joint_positions"] = PLANS[i]
-            file["observation/timestamp/control/step_start"] = np.round(1000 * T).astype(int)
-    return folder
-
-
 def replay_buffer(folder: Path) -> Path:
     root = zarr.open_group(str(folder / "all.zarr"), mode="w", zarr_format=2)
     root.create_group("data").create_array("joint_pos", data=np.concatenate(PLANS))
@@ -104,7 +89,7 @@ def blanks(folder: Path) -> Path:
 
 
 _ALL = (
-    *(csv, semicolons, headless, together, degrees, workbook, npz, npy, robomimic, droid),
+    *(csv, semicolons, headless, together, degrees, npz, npy, robomimic),
     *(replay_buffer, blanks),
 )
 WRITERS: dict[str, Callable[[Path], Path]] = {write.__name__: write for write in _ALL}

@@ -26,8 +26,9 @@ from PIL import Image
 
 from prior_reinforce.errors import PriorReinforceError
 from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig, without_secrets
+from tests.arm.recordings import recorded
 from tests.attacks.harness import HELD, REMEDY, call, command, prepare, tree
-from tests.bench.importing import recorded
+from tests.perception.vision_server import vlm_file
 
 KEY = "sk-" + "".join(random.Random(0).choices("abcdefghijklmnopqrstuvwxyz0123456789", k=161))
 MOST_MB, LONGEST_S = 1500.0, 60.0
@@ -114,16 +115,6 @@ def _parquet(folder: Path) -> None:
             writer.write_table(pa.table(row))
 
 
-def _stray_cell(folder: Path) -> None:
-    """A workbook whose one cell stands in the last row and column there may be."""
-    from openpyxl import Workbook
-
-    book = Workbook()
-    book.active["A1"], book.active["XFD1048576"] = "episode", 1
-    book.save(folder / "outcomes.xlsx")
-    recorded.write_csv(folder)
-
-
 def _edited_info(value: object) -> Callable[[Path], None]:
     def write(folder: Path) -> None:
         path = next(recorded.write_lerobot(folder).rglob("info.json"))
@@ -161,7 +152,6 @@ FLOODS: dict[str, Callable[[Path], object]] = {
     "B5 a CSV of 1,000,000 columns": lambda folder: (folder / "throw_1.csv").write_text(
         "\n".join([",".join("a" * 1_000_000), ",".join("0" * 1_000_000)])
     ),
-    "B5 a workbook with a cell at XFD1048576": _stray_cell,
     "B5 an NPZ that says 4 GB": _huge_array,
     "B5 an NPZ of 500 MB of zeros": _zeros,
     "B5 HDF5, gzip, 4 GB of zeros": _hdf5_zeros,
@@ -230,7 +220,7 @@ def echoes(body: str, status: int = 500) -> Case:
             Thread(target=server.serve_forever, daemon=True).start()
             url = f"http://127.0.0.1:{server.server_port}/v1"
             done = subprocess.run(
-                [sys.executable, "-m", "prior_reinforce.cli", *_looking(url)],
+                [sys.executable, "-m", "prior_reinforce.cli", *_looking(here, url)],
                 cwd=here, env=os.environ | {"THE_KEY": KEY}, capture_output=True, text=True,
             )  # fmt: skip
             server.shutdown()
@@ -244,10 +234,10 @@ def echoes(body: str, status: int = 500) -> Case:
     return case
 
 
-def _looking(url: str, *more: str) -> list[str]:
+def _looking(here: Path, url: str, *more: str) -> list[str]:
     flags = ["--reached", "a ball", "--reached-size", "0.06", "--goal", "a hoop"]
-    flags += ["--goal-size", "0.1", "--vlm.base-url", url, "--vlm.max-retries", "0"]
-    return ["look", "photo.png", *flags, "--vlm.api-key-variable", "THE_KEY", *more]
+    flags += ["--goal-size", "0.1", "--vlm", str(vlm_file(here, url, api_key_variable="THE_KEY"))]
+    return ["look", "photo.png", *flags, *more]
 
 
 def _calibration(folder: Path) -> Path:
@@ -307,7 +297,7 @@ def writes_through_no_link(here: Path, asked: Path) -> str:
     shutil.copy(_calibration(here.parent / "calibrated"), here / "table.json")
     os.environ["THE_KEY"] = KEY
     try:
-        looking = _looking("http://127.0.0.1:9/v1", "--workspace", "planar", "--trial", "1")
+        looking = _looking(here, "http://127.0.0.1:9/v1", "--workspace", "planar", "--trial", "1")
         verdict = command(here, *looking)
     finally:
         del os.environ["THE_KEY"]
@@ -348,7 +338,9 @@ def starts_no_interpreter(here: Path, asked: Path) -> str:
     (here / "photo.png").write_text(text)
     shutil.copy(_calibration(here.parent / "calibrated"), here / "table.json")
     path = f"{here / 'bin'}:{os.environ['PATH']}"
-    verdict = alone(here, *_looking("http://127.0.0.1:9/v1"), env={"PATH": path, "THE_KEY": KEY})
+    verdict = alone(
+        here, *_looking(here, "http://127.0.0.1:9/v1"), env={"PATH": path, "THE_KEY": KEY}
+    )
     return "started" if (here / "started").exists() else verdict
 
 

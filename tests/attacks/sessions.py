@@ -12,9 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
-from prior_reinforce.bench.workspace.workspace import Workspace
+from prior_reinforce.arm.workspace.workspace import Workspace
+from tests.arm.workspace.planar import demonstrations, manifest
 from tests.attacks.harness import program
-from tests.bench.workspace.planar import demonstrations, manifest
 
 TRIALS, KILLS = 12, 25
 
@@ -101,9 +101,9 @@ def said(folder):
 def main(folder, seed):
     # Loaded once: children that load torch themselves are mostly killed while they do.
     import prior_reinforce.adapters.bayesian
-    import prior_reinforce.generators.denoiser
-    import prior_reinforce.generators.diffusion
-    import prior_reinforce.generators.training  # noqa: F401
+    import prior_reinforce.generators.network.denoiser
+    import prior_reinforce.generators.network.diffusion
+    import prior_reinforce.generators.network.training  # noqa: F401
 
     learned, reference, killed = folder / "learned", folder / "reference", folder / "killed"
     learn_in_child(learned)

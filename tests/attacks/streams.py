@@ -2,14 +2,14 @@
 
     python -m tests.attacks.streams 1000
 
-Noise, bursts, spikes, saws, alternation and chirps at 0.5 to 20 ms a frame go to every arm. What
-the gate lets through is looked at as scipy's spline, as the plan files' own differences, and as a
-ROS 2 joint trajectory controller joins them, at 20 kHz. Nothing may be above 100 % of a limit.
+Noise, bursts, spikes, saws, alternation, chirps and a few frames only, at 0.5 to 20 ms a frame, go
+to every arm: as they are, at another rate, or from where an arm stands a little off them. What the
+gate lets through is looked at as scipy's spline, as the plan files' own differences, and as a ROS 2
+joint trajectory controller joins them, at 20 kHz. Nothing may be above 100 % of a limit.
 """
 
 from __future__ import annotations
 
-import contextlib
 import json
 import sys
 import tempfile
@@ -20,15 +20,17 @@ from pathlib import Path
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from prior_reinforce.bench.robots import RobotLimits, check_plan, robot_limits
-from prior_reinforce.bench.robots.plan_files import write_plan
-from prior_reinforce.bench.robots.presets import PRESETS
-from prior_reinforce.bench.robots.urdf import read_urdf
+from prior_reinforce.arm.executing.base import begin_at
+from prior_reinforce.arm.robots import RobotLimits, check_plan, robot_limits
+from prior_reinforce.arm.robots.plan_files import resample_plan, write_plan
+from prior_reinforce.arm.robots.presets import PRESETS
+from prior_reinforce.arm.robots.urdf import read_urdf
 from prior_reinforce.errors import InvalidPlanError
-from prior_reinforce.plans.motions import Plan, PlanFormat
-from tests.bench.robots.arms import ur5e, write_urdf
+from prior_reinforce.plans.motions import Plan
+from prior_reinforce.plans.plan_format import PlanFormat
+from tests.arm.robots.arms import ur5e, write_urdf
 
-KINDS = ("noise", "bursts", "spikes", "saws", "alternation", "chirps")
+KINDS = ("noise", "bursts", "spikes", "saws", "alternation", "chirps", "brief")
 FINE = 20_000.0
 FULL_SPEED_WITHIN, FULL_ACCELERATION_WITHIN = 0.05, 0.002
 """In [s], as docs/robots.md says them of arms without published accelerations and jerks."""
@@ -50,12 +52,12 @@ def allowed(limits: RobotLimits) -> RobotLimits:
 def shaken(kind: str, limits: RobotLimits, rng: np.random.Generator) -> tuple[Plan, float]:
     """A plan of a kind, and how much of a limit its spline asks for: half of them near 100 %."""
     d, dt = len(limits.joint_names), float(rng.choice([0.5, 1, 1, 2, 3.3, 5, 10, 12.5, 20])) / 1000
-    n = int(rng.integers(20, 20 + 0.4 / dt))
+    n = int(rng.integers(2, 9) if kind == "brief" else rng.integers(20, 20 + 0.4 / dt))
     t = np.arange(n) * dt
     s = np.linspace(0, 1, n)[:, None]
     swing = (10 * s**3 - 15 * s**4 + 6 * s**5) * rng.uniform(-1, 1, d)
     sign = (-1.0) ** np.arange(n)[:, None]
-    if kind == "noise":
+    if kind in ("noise", "brief"):
         shake = rng.standard_normal((n, d))
     elif kind == "bursts":
         shake = rng.standard_normal((n, d)) * (np.abs(s - rng.uniform(0.2, 0.8)) < 0.05)
@@ -80,6 +82,16 @@ def shaken(kind: str, limits: RobotLimits, rng: np.random.Generator) -> tuple[Pl
     return Plan(middle + moved, form), share
 
 
+def as_sent(plan: Plan, rng: np.random.Generator) -> Plan:
+    """The plan itself, at another rate, or from up to 5 mrad off."""
+    how = rng.integers(3)
+    if how == 0:
+        return resample_plan(plan, float(rng.choice([50, 100, 240, 250, 500, 997, 1000])))
+    if how == 1:
+        return begin_at(plan, plan.actions[0] + rng.uniform(-5e-3, 5e-3, plan.actions.shape[1]))
+    return plan
+
+
 def asked(plan: Plan, limits: RobotLimits, files: Path | None = None) -> float:
     """The largest share of a limit that a plan asks for, as its spline and as its files have it."""
     limits, dt = allowed(limits), plan.format.dt
@@ -95,18 +107,14 @@ def asked(plan: Plan, limits: RobotLimits, files: Path | None = None) -> float:
     ]
     if files is None:
         return float(max(shares))
-    for rate in (None, 1000.0):
-        with contextlib.suppress(InvalidPlanError):  # at that rate it would be another motion
-            file = write_plan(plan, files / f"{rate}.json", rate=rate)
-            step = dt if rate is None else 1 / rate
-            q, dq, ddq = points(file.path)
-            shares.append(differences(q, step, limits))
-            joined, djoined, ddjoined = quintics(q, dq, ddq, step)
-            shares += [
-                position(joined, limits),
-                velocity(joined, djoined, limits),
-                np.abs(ddjoined / limits.acceleration).max(),
-            ]
+    q, dq, ddq = points(write_plan(plan, files / "plan.json").path)
+    shares.append(differences(q, dt, limits))
+    joined, djoined, ddjoined = quintics(q, dq, ddq, dt)
+    shares += [
+        position(joined, limits),
+        velocity(joined, djoined, limits),
+        np.abs(ddjoined / limits.acceleration).max(),
+    ]
     return float(max(shares))
 
 
@@ -174,9 +182,11 @@ def attack(arm: str, limits: RobotLimits, kind: str, seed: int) -> tuple[bool, f
     rng = np.random.default_rng([seed, *f"{arm} {kind}".encode()])
     plan, share = shaken(kind, limits, rng)
     try:
+        if (sent := as_sent(plan, rng)) is not plan:
+            plan, share = sent, asked(sent, limits)
         if check_plan(plan, limits).refused:
             return True, share
-    except InvalidPlanError:  # closer frames than the arm's cycles
+    except InvalidPlanError:  # closer frames than the arm's cycles, or another motion
         return True, share
     with tempfile.TemporaryDirectory() as files:
         return False, asked(plan, limits, Path(files))

@@ -17,15 +17,17 @@ from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from pathlib import Path
 
-from tests.attacks import arms, execution, interruptions, reviewed, runs, sessions
+from tests.attacks import arms, execution, flips, interruptions, reviewed, sessions, watching
 from tests.attacks.classes import CLASSES, WRITERS, Attack, recordings
 from tests.attacks.harness import HELD, prepare, where
 
 ATTACKS: dict[str, tuple[Attack, int]] = {
-    **{name: (attack, 20) for name, attack in CLASSES.items()},
+    **{name: (attack, 10) for name, attack in CLASSES.items()},
     **{f"recordings: {kind}": (partial(recordings, kind), 2) for kind in WRITERS},
     **{f"motions: {kind}": (partial(execution.attack, kind), 2) for kind in execution.KINDS},
-    "arms": (arms.attack, 8),
+    "flips": (flips.attack, 10),
+    "arms": (arms.attack, 5),
+    "watching": (watching.attack, 30),
     **{
         f"{how}: {name}": (partial(interruptions.attack, how, name), 1)
         for how in interruptions.HOW
@@ -33,7 +35,6 @@ ATTACKS: dict[str, tuple[Attack, int]] = {
     },
     **{name: (partial(reviewed.attack, name), 1) for name in reviewed.QUICK},
     "killed sessions": (sessions.attack, 1),
-    "killed runs": (runs.attack, 1),
 }
 """Each class, and how many of it the tests try."""
 

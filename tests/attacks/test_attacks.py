@@ -8,6 +8,8 @@ import pytest
 
 from tests.attacks.classes import written
 from tests.attacks.harness import HELD, command, prepare
+from tests.attacks.requests import attack as requesting
+from tests.attacks.requests import let_in
 from tests.attacks.table import ATTACKS, attack
 
 pytestmark = pytest.mark.slow
@@ -67,3 +69,16 @@ def test_the_harness_sees_what_breaks(tmp_path, monkeypatch):
     assert run(out="\x1b[2J") == "control characters"
     monkeypatch.setattr("tests.attacks.harness.print", print, raising=False)
     assert run(status=0, write="new") == HELD
+
+
+def test_a_console_that_listens_lets_nobody_in(monkeypatch):
+    monkeypatch.setenv("PRIOR_REINFORCE_ARM", "")  # put back afterwards
+    assert requesting(60) == []
+
+
+def test_who_is_let_in_is_noticed():
+    ok, kind = b"HTTP/1.1 200 OK\r\ncontent-type: ", b"HTTP/1.1 401 Unauthorized\r\n\r\n"
+    assert let_in(ok + b"application/json\r\n\r\n{}")
+    assert let_in(kind + ok + b"text/event-stream\r\n\r\n")
+    assert let_in(ok + b"text/html\r\nx: style-src 'unsafe-inline'\r\n\r\n")  # a report
+    assert not let_in(kind + ok + b"text/javascript\r\n\r\nx")

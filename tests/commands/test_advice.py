@@ -2,10 +2,13 @@
 
 import re
 
+import pytest
+
 from prior_reinforce.commands import advice
-from tests.bench.workspace.planar import events_in
+from tests.arm.workspace.planar import events_in
 
 
+@pytest.mark.slow
 def test_advice_names_places_and_draws_the_region(run, folder, monkeypatch):
     monkeypatch.setattr(advice, "_ACROSS", 6)  # goals a side; all 15 take seconds
     run("goal", folder, "0.9", "0.05")

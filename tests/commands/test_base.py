@@ -5,9 +5,9 @@ import sys
 
 import pytest
 
-from prior_reinforce.bench.workspace.workspace import Workspace
+from prior_reinforce.arm.workspace.workspace import Workspace
 from prior_reinforce.commands.base import print_checked
-from tests.bench.workspace.planar import trials_in
+from tests.arm.workspace.planar import trials_in
 
 
 @pytest.fixture
@@ -41,17 +41,19 @@ def test_the_trial_that_waits_need_not_be_numbered(run, within, words):
     assert (status, trial.error_seen.tolist()) == (0, [0.05, 0.0])
 
 
+@pytest.mark.slow
 def test_all_commands_take_their_words_so(run, within, tmp_path):
     assert run("ask")[0] == 0
     assert run("export", tmp_path / "1.csv")[0] == run("export", "1", tmp_path / "2.csv")[0] == 0
     assert run("void", "--reason", "slipped")[1].startswith("trial 1: void: slipped")
     assert run("goal", "0.8", "-0.05")[1].startswith("goal 2: 80 cm ahead, 5 cm right")
-    assert run("learn", "--generator", "nearest")[0] == 0
+    assert run("learn", "--generator", "interpolation")[0] == 0
     assert run("import", "nowhere")[2] == (
         "prior-reinforce: no recording at nowhere; give the path of a file or a folder\n"
     )
 
 
+@pytest.mark.slow
 def test_no_word_is_dropped(run, within):
     for args, said in [
         (("status", "hoop"), "'hoop' is no workspace"),
@@ -61,13 +63,14 @@ def test_no_word_is_dropped(run, within):
         (("import",), "say which recordings"),
         (("import", "a", "b"), "say which recordings"),
         (("tell", "planar", "1", "hit"), "write a length and one of"),
-        (("goal",), "goal: "),
+        (("goal",), "trial 1 waits to be told"),
     ]:
         status, out, err = run(*args)
         assert (status, out, err.count("\n")) == (2, "", 1)
         assert said in err
     assert run("tell", "hit")[0] == 0
     assert "no trial waits" in run("tell", "hit")[2]
+    assert run("goal")[2].startswith("prior-reinforce: goal: ")
 
 
 def test_a_folder_in_a_workspace_that_is_called_like_a_trial_is_none(run, within):
@@ -91,6 +94,8 @@ def test_a_folder_of_somebody_else_is_not_searched(run, within, tmp_path, monkey
 def test_elsewhere_the_workspace_is_named_first(run, folder):
     assert "name the workspace, or change into its folder" in run("status")[2]
     assert "5cm long is not a workspace" in run("tell", "5cm long")[2]
+    assert f"did you mean {folder}?" in run("status", "planer")[2]
+    assert run("status", "..")[2].endswith("make one with: prior-reinforce new WORKSPACE\n")
     assert run("status", folder)[0] == 0
 
 

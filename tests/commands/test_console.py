@@ -26,11 +26,12 @@ def opened(monkeypatch):
 def test_it_listens_at_this_computer_alone_and_shows_the_link(folder, run, port, opened):
     status, out, err = run("console", folder, "--port", port)
     assert (status, err) == (0, "")
-    assert re.search(rf"http://127\.0\.0\.1:{port}/#[\w-]{{32,}}$", out.strip())
+    assert re.search(rf"http://127\.0\.0\.1:{port}/#[\w-]{{32,}}\nconsole closed\n$", out)
     assert opened[0][1] == ("127.0.0.1", port)
     assert "█" not in out
 
 
+@pytest.mark.slow
 def test_for_another_device_the_link_is_a_qr_code_too(folder, run, port, opened, monkeypatch):
     monkeypatch.setattr("prior_reinforce.commands.console._own_address", lambda: "192.168.1.5")
     status, out, _ = run("console", folder, "--host", "0.0.0.0", "--port", port)
@@ -44,6 +45,7 @@ def test_the_same_link_again(folder, run, port, opened):
     assert run("console", folder, "--port", port) == run("console", folder, "--port", port)
 
 
+@pytest.mark.slow
 def test_with_a_certificate_it_answers_by_https(
     folder, run, port, opened, certificate, monkeypatch
 ):

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from prior_reinforce.bench.importing import importer, inspection, npz
-from prior_reinforce.bench.workspace.workspace import Workspace
-from tests.bench.workspace.planar import demonstrations, events_in, recordings
+from prior_reinforce.arm.recordings import importer, inspection, npz
+from prior_reinforce.arm.workspace.workspace import Workspace
+from tests.arm.workspace.planar import demonstrations, events_in, recordings
 
 T = np.arange(24) * 0.02
 NEW = (
@@ -38,7 +38,9 @@ def in_milliseconds_and_degrees(folder):
     recordings(folder)
     for i, plan in enumerate(demonstrations().plans):
         t = np.arange(len(plan)) * 20
-        np.savez(folder / f"throw_{i}.npz", t=t, q=np.rad2deg(plan))
+        np.savez(
+            folder / f"throw_{i}.npz", t=t, q=np.rad2deg(plan), joint_names=["joint1", "joint2"]
+        )
 
 
 def test_what_is_unclear_is_taken_only_when_said(run, folder, tmp_path):
@@ -97,24 +99,43 @@ def test_what_breaks_every_limit_is_not_learned_from_next(run, tmp_path, monkeyp
     for i, plan in enumerate(demonstrations().plans):
         t = np.arange(len(plan)) * 0.02
         q = 10 * plan[:, [0, 1, 0, 1, 0, 1, 0]]
-        np.savez(tmp_path / "recordings" / f"throw_{i}.npz", t=t, q=q)
+        np.savez(
+            tmp_path / "recordings" / f"throw_{i}.npz",
+            t=t,
+            q=q,
+            joint_names=[f"joint{j + 1}" for j in range(q.shape[1])],
+        )
     status, out, err = run("import", "arm", "recordings", "--units", "rad", "--no-trim")
     assert (status, err) == (0, "")
     assert "panda: 4 of 4 demonstrations break a limit" in out
     assert out.endswith("next: prior-reinforce import arm recordings --no-trim --units deg\n")
 
 
-def test_or_agreed_to_at_a_terminal(run, folder, tmp_path, monkeypatch):
+def test_or_agreed_to_at_a_terminal(run, folder, tmp_path, person):
     in_milliseconds_and_degrees(tmp_path / "odd")
-    monkeypatch.setattr("sys.stdin.isatty", lambda: True)
-    answers = iter(["no", "yes"])
-    monkeypatch.setattr("builtins.input", lambda question: next(answers))
+    asked = person("no", "y", "yes").asked
     assert run("import", folder, "odd", "--no-trim")[0] == 2
     status, out, _ = run("import", folder, "odd", "--no-trim")
     assert status == 0
     assert "joint1 to joint2 [rad, recorded in deg]" in out
+    assert all(said.endswith("; is it so?") for said in asked[:2])
+    assert asked[2:] == ['got "y", which is not "yes" in full']
     with Workspace(folder) as workspace:
         np.testing.assert_allclose(workspace.demonstrations.plans, demonstrations().plans)
+
+
+def test_inspecting_looks_at_recordings_by_names_of_their_own(run, folder, tmp_path):
+    recordings(tmp_path / "own")
+    for path in (tmp_path / "own").glob("*.npz"):
+        content = dict(np.load(path)) | {"joint_names": ["shoulder", "elbow"]}
+        np.savez(path, **content)
+    status, out, _ = run("import", folder, "own", "--inspect")
+    assert status == 0
+    assert "shoulder" in out
+    assert "--joints" in out.splitlines()[-1]
+    status, _, err = run("import", folder, "own")
+    assert status == 2
+    assert "--joints" in err
 
 
 def test_inspecting_says_what_to_type_next_and_writes_a_table_to_fill_in(run, folder, tmp_path):
@@ -219,19 +240,24 @@ def on_a_panda(run, folder, scale, outcomes):
     recordings(folder / "recordings", outcomes=outcomes)
     for i, plan in enumerate(demonstrations().plans):
         q = scale * plan[:, [0, 1, 0, 1, 0, 1, 0]]
-        np.savez(folder / "recordings" / f"throw_{i}.npz", t=T * 1000, q=q)
+        np.savez(
+            folder / "recordings" / f"throw_{i}.npz",
+            t=T * 1000,
+            q=q,
+            joint_names=[f"joint{j + 1}" for j in range(q.shape[1])],
+        )
     assert run("new", "arm", "--robot", "panda", "--dt", "0.02")[0] == 0
 
 
-def test_an_import_reads_and_checks_everything_once(run, tmp_path, monkeypatch, work):
+def test_an_import_reads_and_checks_everything_once(run, tmp_path, monkeypatch, work, person):
     monkeypatch.chdir(tmp_path)
     on_a_panda(run, tmp_path, 0.05, [0, 1])
     assert run("import", "arm", "recordings", "--inspect", "--time-unit", "ms")[0] == 0
     assert work == ONCE
     work.clear()
     # At a terminal: a guess is agreed to, an outcome typed, and an episode skipped.
-    answers = iter(["yes", "100cm 20cm", "skip"])
-    monkeypatch.setattr("sys.stdin.isatty", lambda: True)
+    person("yes")
+    answers = iter(["100cm 20cm", "skip"])
     monkeypatch.setattr("builtins.input", lambda question: next(answers))
     status, out, err = run("import", "arm", "recordings", "--no-trim")
     assert (status, err) == (0, "")

@@ -1,89 +1,56 @@
-"""`learn`, `train`: the model and its record; remarks, and nothing where nothing is lost."""
+"""`learn`: the model and its record; remarks, and nothing where nothing is lost."""
 
 from dataclasses import replace
 
 import pytest
 
-from prior_reinforce.cli import main
-from prior_reinforce.lab.experiments.learned import load_learned
-from prior_reinforce.lab.tasks import make_task
-from prior_reinforce.plans.alignment import align
-from tests.bench.workspace.planar import events_in
+from prior_reinforce.commands.learning import Learn
+from prior_reinforce.generators import GENERATORS, make_generator
+from prior_reinforce.generators.timing.alignment import align
+from prior_reinforce.simulation.tasks import make_task
+from tests.arm.workspace.planar import events_in
 
 TINY = "training_steps=1"
-RECORDED = make_task("basketball-v1").demonstrations("A")
+RECORDED = make_task("basketball-v1").demonstrations("A").without_symmetry()
 
 
-@pytest.fixture
-def learn(tmp_path, capsys):
-    """Learn from set A of which only so many frames were recorded, and return what was told."""
-
-    def run(*flags, frames=140):
-        path = tmp_path / "recorded.npz"
-        cut = replace(RECORDED, plans=RECORDED.plans[:, :frames])
-        cut.save(path)
-        out = ["--demonstrations", str(path), "--out", str(tmp_path / "model")]
-        assert main(["train", *flags, *out]) == 0
-        return capsys.readouterr().out, load_learned(tmp_path / "model", cut)
-
-    return run
+def learn(choice, frames=140):
+    """Learn from set A of which only so many frames were recorded."""
+    cut = replace(RECORDED, plans=RECORDED.plans[:, :frames])
+    return make_generator(choice).fit(cut, seed=0)
 
 
 @pytest.mark.parametrize("generator", [f"diffusion,{TINY}", "interpolation"])
 @pytest.mark.parametrize("frames", [140, 80], ids=["rest to rest", "cut off in mid-swing"])
-def test_the_timing_that_was_chosen_is_told_in_a_line_and_kept(learn, generator, frames):
-    told, model = learn("--generator", generator, frames=frames)
-    assert "timing: when to start is learned apart from how to move" in " ".join(told.split())
+def test_the_timing_that_was_chosen_is_told_in_a_line_and_kept(generator, frames):
+    model = learn(generator, frames)
+    assert model.remarks[0].startswith(
+        "timing: when to start is learned separately from the motion"
+    )
     assert [remark.partition(":")[0] for remark in model.remarks] == (
         ["timing", "network"] if "diffusion" in generator else ["timing"]
     )
 
 
-@pytest.mark.parametrize("generator", [f"diffusion,{TINY},timing=none", "nearest"])
-def test_nothing_is_told_where_nothing_was_chosen(learn, generator):
-    told, model = learn("--generator", generator, frames=80)
-    assert "timing" not in told
+@pytest.mark.parametrize(
+    "generator", [f"diffusion,{TINY},timing=none", "interpolation,timing=none"]
+)
+def test_nothing_is_told_where_nothing_was_chosen(generator):
+    model = learn(generator, frames=80)
     assert all(remark.startswith("network: ") for remark in model.remarks)
 
 
-def test_by_default_the_generator_is_chosen_and_told(learn):
-    told, model = learn(frames=80)
-    assert "generator: closed form, since the demonstrations show one pattern" in told
-    assert model.name == "auto"
+def test_by_default_the_generator_is_chosen_and_told():
+    model = learn("auto", frames=80)
+    assert "generator: closed form, since the demonstrations show one pattern" in model.remarks
+    assert GENERATORS.name_of(model) == "auto"
 
 
-def test_align_alone_aligns_what_is_taken_for_one_pattern(learn):
-    _, model = learn("--align")
-    _, same = learn("--generator", "interpolation,timing=align")
-    conditions = RECORDED.outcomes_seen
-    assert (model.generate(conditions) == same.generate(conditions)).all()
-
-
-def test_align_is_short_for_a_setting(learn):
-    _, model = learn("--generator", "nearest", "--align")
-    _, same = learn("--generator", "nearest,timing=align")
-    conditions = RECORDED.outcomes_seen
+def test_align_is_short_for_a_setting():
+    assert Learn(align=True).choice == "interpolation,timing=align"
+    assert Learn(generator="diffusion", align=True).choice == "diffusion,timing=align"
     aligned = align(RECORDED).demonstrations.plans
-    assert model.generate(conditions).shape == aligned.shape
-    assert (model.generate(conditions) == same.generate(conditions)).all()
-
-
-@pytest.mark.parametrize(
-    ("flags", "said"),
-    [
-        (["--generator", "diffusion,steps=3"], "has no setting 'steps'"),
-        (["--generator", "nearest,timing=never"], "timing"),
-        (["--generator", "none"], "no generator 'none'; known are auto, diffusion"),
-        (["--generator", "nearest", "--seed", "-1"], "--seed must be a whole number from 0"),
-    ],
-)
-def test_wrong_input_is_one_line_and_leaves_nothing(flags, said, tmp_path, capsys, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    assert main(["train", *flags]) == 2
-    told = capsys.readouterr().err
-    assert said in told
-    assert told.count("\n") == 1
-    assert not list(tmp_path.iterdir())
+    assert learn(Learn(align=True).choice).generate(RECORDED.outcomes_seen).shape == aligned.shape
 
 
 def test_another_generator_can_be_learned(run, folder):
@@ -93,8 +60,11 @@ def test_another_generator_can_be_learned(run, folder):
     before = events_in(folder)
     for args, remedy in (
         (("--generator", "spline"), "known are auto, diffusion"),
-        (("--generator", "nearest,training_steps=5"), "has no setting 'training_steps'"),
-        (("--generator", "nearest,neighbours=0"), ">= 1 - at `$.neighbours`"),
+        (("--generator", "interpolation,training_steps=5"), "has no setting 'training_steps'"),
+        (("--generator", "diffusion,noise_levels=0"), ">= 1 - at `$.noise_levels`"),
+        (("--generator", "diffusion,steps=3"), "has no setting 'steps'"),
+        (("--generator", "interpolation,timing=never"), "timing"),
+        (("--generator", "interpolation", "--seed", "-1"), "--seed must be a whole number from 0"),
     ):
         status, _, err = run("learn", folder, *args)
         assert status == 2

@@ -9,11 +9,12 @@ from rich.console import Console
 from rich.progress import Progress
 
 from prior_reinforce.commands.live import LiveView, drawing_progress, fit_progress, say
+from prior_reinforce.formats import OutcomeFormat
 from prior_reinforce.generators.base import FitProgress
-from prior_reinforce.lab.experiments.protocol import GoalTrials
+from prior_reinforce.simulation.protocol import GoalTrials
 
-DEMONSTRATIONS = SimpleNamespace(n=6, outcome_names=("x", "y"), outcome_units=("m", "m"))
-TIMED = SimpleNamespace(n=5, outcome_names=("x", "arrival"), outcome_units=("m", "s"))
+DEMONSTRATIONS = SimpleNamespace(n=6, outcome_format=OutcomeFormat.metres(2))
+TIMED = SimpleNamespace(n=5, outcome_format=OutcomeFormat(("x", "arrival"), ("m", "s")))
 GOAL = np.array([1.0, 0.1])
 
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from prior_reinforce.bench.workspace.workspace import Workspace
-from tests.bench.workspace.planar import demonstrations, recordings
+from prior_reinforce.arm.workspace.workspace import Workspace
+from tests.arm.workspace.planar import demonstrations, recordings
 
 
 def test_missing_outcomes_are_named_or_asked_for(run, folder, tmp_path, monkeypatch):

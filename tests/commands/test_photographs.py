@@ -6,14 +6,14 @@ import re
 
 import numpy as np
 import pytest
-from PIL import Image
+from PIL import Image, ImageDraw
 
-from prior_reinforce.bench.workspace.workspace import Workspace
+from prior_reinforce.arm.workspace.workspace import Workspace
 from prior_reinforce.cli import main
-from prior_reinforce.lab.tasks import make_task
 from prior_reinforce.perception.camera import Camera
-from tests.bench.workspace.planar import demonstrations, manifest
-from tests.perception.vision_server import VisionServer
+from prior_reinforce.simulation.tasks import make_task
+from tests.arm.workspace.planar import demonstrations, manifest
+from tests.perception.vision_server import VisionServer, vlm_file
 
 GOAL = np.array([1.0, 0.05])
 SCENE = make_task("basketball-v1").scene
@@ -45,8 +45,7 @@ def look(folder, url: str, *more: str) -> int:
         "--reached-size": "0.06",
         "--goal-size": "0.10",
         "--calibration": str(folder / "table.json"),
-        "--vlm.base-url": url,
-        "--vlm.max-retries": "0",
+        "--vlm": str(vlm_file(folder, url)),
     }
     flags = [word for flag in given.items() for word in flag]
     return main(["look", str(folder / "photo.png"), *flags, *more])
@@ -135,7 +134,7 @@ def test_the_photograph_is_taken_first(table, tmp_path, run):
     objects = ["--reached", "the orange ball", "--reached-size", "0.06", "--goal", "the red hoop"]
     objects += ["--goal-size", "0.1", "--calibration", folder / "table.json"]
     nobody = "http://127.0.0.1:9/v1"  # the discard port: no model answers
-    given = [*objects, "--vlm.base-url", nobody, "--vlm.max-retries", "0"]
+    given = [*objects, "--vlm", vlm_file(tmp_path, nobody)]
     assert "cannot reach" in run("look", taken, "--camera", feed, *given)[2]
     assert np.abs(np.asarray(Image.open(taken), float) - photo).mean() < 3
     status, _, err = run("look", taken, "--camera", feed, *given)
@@ -205,8 +204,17 @@ def photographed(folder, tmp_path, run):
     (tmp_path / "points.csv").write_text(points)
     assert run("calibrate", "points.csv")[0] == 0
     Image.new("RGB", (200, 200)).save("photo.png")
-    what = "--reached-size 0.06 --goal-size 0.1 --vlm.max-retries 0 --vlm.base-url"
-    return ["look", "photo.png", *what.split(), "http://127.0.0.1:9/v1"]
+    vlm_file(tmp_path, "http://127.0.0.1:9/v1")
+    return [
+        "look",
+        "photo.png",
+        "--reached-size",
+        "0.06",
+        "--goal-size",
+        "0.1",
+        "--vlm",
+        "vlm.toml",
+    ]
 
 
 OBJECTS = ("--reached", "the orange ball", "--goal", "the red hoop")
@@ -266,3 +274,153 @@ def test_words_of_two_lines_are_refused(photographed, run):
     status, _, err = run(*photographed, "--reached", "the ball", "--goal", "a hoop\nand more")
     assert status == 2
     assert "one line" in err
+
+
+POINTS = [(x, y, 960 - 750 * y, 540 - 750 * (x - 0.9)) for x in (0.6, 1.2) for y in (0.4, 0, -0.4)]
+
+
+def points_file(path, points=POINTS, names=("x", "y", "u", "v"), sep=",", dec=".", end="", **how):
+    rows = [names, *points]
+    text = "\n".join(sep.join(str(cell).replace(".", dec) for cell in row) for row in rows)
+    path.write_text(f"{text}\n{end}", **how)
+    return path
+
+
+@pytest.mark.parametrize(
+    "written",
+    [
+        {},
+        {"encoding": "utf-8-sig"},
+        {"sep": ";", "dec": ","},
+        {"sep": ";", "dec": ",", "encoding": "utf-8-sig"},
+        {"encoding": "utf-16"},
+        {"sep": "\t"},
+        {"sep": "\t", "encoding": "utf-16"},
+        {"end": ",,,\n"},
+        {"sep": ";", "end": ";;;\n\n"},
+        {"names": ("X", "Y", "U", "V")},
+        {"names": ("x", " y", "u", "v ")},
+    ],
+)
+def test_points_are_read_as_a_spreadsheet_writes_them(tmp_path, run, written):
+    points = points_file(tmp_path / "points.csv", **written)
+    status, out, err = run("calibrate", points, "--out", tmp_path / "table.json")
+    assert (status, err) == (0, "")
+    assert "calibrated to 0.00 cm" in out
+
+
+@pytest.mark.parametrize(("unit", "in_m"), [("cm", 100), ("mm", 1000)])
+def test_points_may_be_measured_in_other_units(tmp_path, run, unit, in_m):
+    far = [(x * in_m, y * in_m, u, v) for x, y, u, v in POINTS]
+    names = (f"x [{unit}]", f"y_{unit}", "u [px]", "v")
+    for name, rows, heads in (("a", POINTS, ("x", "y", "u", "v")), ("b", far, names)):
+        points = points_file(tmp_path / f"{name}.csv", rows, heads)
+        assert run("calibrate", points, "--out", tmp_path / f"{name}.json")[0] == 0
+    one, other = (
+        [
+            float(n)
+            for n in re.findall(r"-?\d+\.\d+(?:e-?\d+)?", (tmp_path / f"{name}.json").read_text())
+        ]
+        for name in "ab"
+    )
+    assert len(one) > 8
+    np.testing.assert_allclose(other, one, rtol=1e-6, atol=1e-9)
+
+
+def test_points_in_other_columns_may_stand_beside(tmp_path, run):
+    named = [(f"P{i}", *row) for i, row in enumerate(POINTS)]
+    points = points_file(tmp_path / "points.csv", named, ("point", "x", "y", "u", "v"))
+    assert run("calibrate", points, "--out", tmp_path / "table.json")[0] == 0
+    points_file(tmp_path / "points.csv", [(1, 2, 3, "?")])
+    status, _, err = run("calibrate", points, "--out", tmp_path / "other.json")
+    assert status == 2
+    assert "'?'" in err
+
+
+def test_a_coarse_calibration_names_its_worst_point(tmp_path, run):
+    typed = [list(row) for row in POINTS]
+    typed[1][1] = 0.1
+    points = points_file(tmp_path / "points.csv", typed)
+    status, _, err = run("calibrate", points, "--out", tmp_path / "table.json")
+    assert status == 0
+    assert "2 (0.6, 0.1)" in err
+    thin = [(0.6, 0.4, 660.3, 765.2), (0.605, 0, 960.4, 760.1), (0.6, -0.4, 1259.6, 764.9)]
+    thin += [(0.61, 0.2, 810.2, 757.7), (0.6, 0.1, 885, 765.4)]
+    assert "coarse" in run("calibrate", points_file(points, thin), "--out", tmp_path / "t.json")[2]
+
+
+def drawn(path, size=(1920, 1080), ball=(1.05, 0.12), hoop=(1.0, 0.05)):
+    """The table of `POINTS`, seen from straight above, in a picture of some size."""
+    image, per_metre = Image.new("RGB", size, (200, 200, 200)), 750 * size[0] / 1920
+    pen = ImageDraw.Draw(image)
+    for (x, y), radius, colour in ((hoop, 0.05, (220, 0, 0)), (ball, 0.03, (255, 140, 0))):
+        at = size[0] / 2 - y * per_metre, size[1] / 2 - (x - 0.9) * per_metre
+        pen.circle(at, radius * per_metre, fill=colour)
+    image.save(path)
+
+
+@pytest.fixture
+def drawn_table(tmp_path, run):
+    drawn(tmp_path / "photo.png")
+    points = points_file(tmp_path / "points.csv")
+    of = ("--picture", tmp_path / "photo.png", "--out", tmp_path / "table.json")
+    assert run("calibrate", points, *of)[0] == 0
+    return tmp_path
+
+
+def seen(out):
+    told = re.search(r"tell \S+ \S+ ([-.\d]+)\+-(\S+) ([-.\d]+)\+-", out)
+    return [float(number) for number in told.groups()]
+
+
+def test_a_picture_of_another_size_is_scaled_or_refused(drawn_table, capsys):
+    with VisionServer() as server:
+        drawn(drawn_table / "photo.png", (1280, 720))
+        assert look(drawn_table, server.base_url) == 0
+        said = capsys.readouterr()
+        assert "another size" in said.err
+        np.testing.assert_allclose(seen(said.out)[::2], [0.05, 0.07], atol=0.004)
+        drawn(drawn_table / "photo.png", (1080, 1920))
+        assert look(drawn_table, server.base_url) == 2
+        assert "1920 x 1080 px" in capsys.readouterr().err
+
+
+def test_what_is_told_is_no_surer_than_the_calibration(drawn_table, capsys, run):
+    typed = [list(row) for row in POINTS]
+    typed[1][1] = 0.05
+    points_file(drawn_table / "points.csv", typed)
+    run("calibrate", drawn_table / "points.csv", "--out", drawn_table / "table.json")
+    with VisionServer() as server:
+        assert look(drawn_table, server.base_url) == 0
+    assert seen(capsys.readouterr().out)[1] > 0.02
+
+
+def test_a_goal_that_is_seen_far_from_the_one_that_is_set_is_no_reading(drawn_table, capsys):
+    with Workspace.create(drawn_table / "hoop", manifest()) as workspace:
+        workspace.import_demonstrations(demonstrations(), "made up")
+        workspace.learn("interpolation")
+        workspace.set_goal([0.8, 0.05])
+        workspace.session().ask()
+    of_trial = ("--workspace", str(drawn_table / "hoop"), "--trial", "1")
+    with VisionServer() as server:
+        assert look(drawn_table, server.base_url, *of_trial) == 1
+    said = capsys.readouterr()
+    assert "20.0 cm from the goal that is set" in said.err
+    assert "tell" not in said.out
+
+
+def test_which_model_looks_may_stand_in_the_workspaces_manifest(drawn_table, capsys):
+    with Workspace.create(drawn_table / "hoop", manifest()) as workspace:
+        workspace.import_demonstrations(demonstrations(), "made up")
+        workspace.learn("interpolation")
+        workspace.set_goal([1.0, 0.05])
+        workspace.session().ask()
+    objects = ["--reached", "the orange ball", "--reached-size", "0.06", "--goal", "the red hoop"]
+    objects += ["--goal-size", "0.1", "--calibration", str(drawn_table / "table.json")]
+    where = ["--workspace", str(drawn_table / "hoop"), "--trial", "1"]
+    with VisionServer("gemini") as server:
+        section = f'\n[vlm]\nbase_url = "{server.base_url}"\nfamily = "gemini"\n'
+        with (drawn_table / "hoop" / "workspace.toml").open("a") as file:
+            file.write(section)
+        assert main(["look", str(drawn_table / "photo.png"), *objects, *where]) == 0
+    np.testing.assert_allclose(seen(capsys.readouterr().out)[::2], [0.05, 0.07], atol=0.004)

@@ -1,10 +1,9 @@
 """What a person or a tracker's table can say of a trial, and what cannot be understood."""
 
 import numpy as np
-import pandas as pd
 import pytest
 
-from tests.bench.workspace.planar import events_in, trials_in
+from tests.arm.workspace.planar import events_in, trials_in
 
 
 def asked(run, folder):
@@ -54,10 +53,12 @@ def test_an_error_can_be_told_in_many_ways(run, folder, said, seen):
         (("5+-1", "0+-1"), "looks like centimetres"),
         (("--error", "5", "-2"), "looks like centimetres"),
         (("--outcome", "92", "10"), "looks like centimetres"),
+        (("--outcome", "0.05", "-0.02"), "looks like an error"),
+        (("0.91", "0.04"), "looks like where the object ended"),
         (("--error", "0.05"), "needs 2 numbers"),
         (("--error", "nan", "0"), "void the trial"),
         (("--error", "0.05 long"), "say m, cm or mm"),
-        (("--error", "5cm far"), "write a length and one of long, short"),
+        (("--error", "5cm wide"), "write a length and one of long, short"),
         (("--error", "50m long"), "say it again, in cm"),
         (("--error", "0.05", "0", "--outcome", "0.9", "0"), "--error or --outcome"),
         (("--outcome", "0.9"), "needs 2 numbers"),
@@ -121,73 +122,3 @@ def test_where_it_ended_may_be_measured(run, folder):
     asked(run, folder)
     assert run("tell", folder, 1, "--outcome", "95cm 3cm +- 2mm")[0] == 0
     np.testing.assert_allclose(trials_in(folder)[0].reading.sd, [0.002, 0.002])
-
-
-def test_a_trackers_table_tells_trial_by_trial(run, folder, tmp_path):
-    asked(run, folder)
-    tracker = tmp_path / "tracker.csv"
-    tracker.write_text("trial;x [cm];y [mm];frame\n1;95,0;30;1032\n")
-    status, out, _ = run("tell", folder, "--from", tracker)
-    assert status == 0
-    assert "trial 1: 5 cm long, 2 cm right" in out
-    run("ask", folder)
-    tracker.write_text(tracker.read_text() + "2;88,0;55;2011\n3;;;\n")
-    assert "trial 2: 2 cm short" in run("tell", folder, "--from", tracker)[1]
-    np.testing.assert_allclose(
-        [t.error_seen for t in trials_in(folder)[:2]], [[0.05, -0.02], [-0.02, 0.005]], atol=1e-9
-    )
-    before = events_in(folder)
-    assert "says nothing that was not told already" in run("tell", folder, "--from", tracker)[1]
-    assert events_in(folder) == before
-
-
-def test_words_and_hits_stand_in_a_table_too(run, folder, tmp_path):
-    asked(run, folder)
-    frame = pd.DataFrame({"Trial": [1], "said": ["5cm long, 2cm left"], "hit": ["no"]})
-    frame.to_excel(tmp_path / "notes.xlsx", index=False)
-    assert "5cm long, 2cm left" in run("tell", folder, "--from", tmp_path / "notes.xlsx")[1]
-    run("ask", folder)
-    (tmp_path / "hits.csv").write_text("trial,said,hit\n2,,yes\n")
-    assert "reached" in run("tell", folder, "--from", tmp_path / "hits.csv")[1]
-
-
-@pytest.mark.parametrize(
-    ("text", "says"),
-    [
-        ("a,b\n1,2\n", "expected column names such as trial,x,y"),
-        ("trial,x\n1,0.9\n", "it has x, and no column for each of x, y"),
-        ("trial,q\n1,0.9\n", "no column for each of x, y, nor one called said"),
-        ("trial,x,y\n1,95,3\n", "x reaches 95, too far for an arm: it looks like cm"),
-        ("trial,x,y\n1,far,0\n", "line 2: x is 'far', expected a finite number"),
-        ("trial,x,y,hit\n1,0.9,0,perhaps\n", "hit is 'perhaps', expected yes or no"),
-        ("trial,x,y\nnan,0.9,0\n", "trial is nan, expected its number"),
-        ("trial,x,y\n7,0.9,0\n", "7"),
-        ("trial,said\n1,green\n", "cannot read 'green'"),
-    ],
-)
-def test_what_a_table_cannot_say_changes_nothing(run, folder, tmp_path, text, says):
-    asked(run, folder)
-    before = events_in(folder)
-    (tmp_path / "t.csv").write_text(text)
-    status, _, err = run("tell", folder, "--from", tmp_path / "t.csv")
-    assert status == 2
-    assert says in err
-    assert events_in(folder) == before
-
-
-def test_what_was_told_otherwise_is_not_overwritten(run, folder, tmp_path):
-    asked(run, folder)
-    run("tell", folder, 1, "5cm long")
-    (tmp_path / "t.csv").write_text("trial,x,y\n1,0.90,0.05\n")
-    status, _, err = run("tell", folder, "--from", tmp_path / "t.csv")
-    assert status == 2
-    assert "trial 1 was told otherwise; correct it with: prior-reinforce amend" in err
-    run("void", folder, 1)
-    assert run("tell", folder, "--from", tmp_path / "t.csv")[0] == 0
-
-
-def test_a_table_goes_alone(run, folder, tmp_path):
-    asked(run, folder)
-    (tmp_path / "t.csv").write_text("trial,x,y\n1,0.90,0.05\n")
-    assert "drop what else was given" in run("tell", folder, 1, "--from", tmp_path / "t.csv")[2]
-    assert "no table at" in run("tell", folder, "--from", "gone.csv")[2]

@@ -1,29 +1,24 @@
 """Recording at an arm: by the clock, and by keys at a terminal."""
 
-import os
 import re
-import select
-import subprocess
-import sys
 import time
 from contextlib import suppress
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from prior_reinforce.bench.workspace.workspace import Workspace
+from prior_reinforce.arm.workspace.workspace import Workspace
 from prior_reinforce.commands.importing import Import
-from tests.bench.robots.executors.toy_arm import TOY, name_arm
-from tests.bench.workspace.planar import manifest
+from tests.arm.executing.toy_arm import name_arm
+from tests.arm.workspace.planar import manifest
+from tests.commands.at_terminal import Typed
 
-BY_CLOCK = ("--takes", "4", "--seconds", "1", "--pause", "1", "--executor", TOY)
+BY_CLOCK = ("--takes", "4", "--seconds", "1", "--pause", "1")
 
 
 @pytest.fixture
-def folder(tmp_path, monkeypatch, request):
+def folder(tmp_path, toy_plugin):
     """A workspace whose arm is thrown by a hand every two seconds."""
-    monkeypatch.setenv("PYTHONPATH", str(request.config.rootpath))
     folder = tmp_path / "planar"
     Workspace.create(folder, manifest()).close()
     name_arm(folder, tmp_path / "arm")
@@ -77,7 +72,6 @@ def test_what_a_leader_told_the_arm_is_learned_and_the_lag_is_said(run, folder, 
         ((), "without a terminal there are no keys"),
         (("--takes", "0"), "--takes and --seconds must be more than 0"),
         (("--takes", "2", "--seconds", "0"), "--takes and --seconds must be more than 0"),
-        (("--takes", "2"), "a manifest starts no code of its own; add --executor"),
     ],
 )
 def test_what_cannot_be_recorded_is_said_and_leaves_nothing(run, folder, flags, said):
@@ -102,55 +96,23 @@ def test_an_arm_that_would_fall_or_move_waits_for_a_person(run, folder, tmp_path
 def test_a_person_who_holds_the_arm_says_so_at_the_terminal(folder, tmp_path):
     name_arm(folder, tmp_path / "arm", guiding="let go", seconds=0.005)
     for answer, then in (("no", "nothing was done"), ("yes", "q imports them")):
-        typed = Typed("record", folder, "--executor", TOY)
-        typed.wait_for("do you hold it? (yes/no)")
+        typed = Typed("record", folder)
+        typed.wait_for('type "yes" if so, or press Enter if not: ')
         typed.type(f"{answer}\n")
         typed.wait_for(then)
-        typed.process.kill()
-        typed.process.wait()
+        typed.close()
 
 
 def test_an_arm_that_is_unplugged_keeps_what_was_recorded(run, folder, tmp_path):
     name_arm(folder, tmp_path / "arm", kind="unplugged")
-    _, _, refused = run("record", folder, *BY_CLOCK[:3], "0.2", "--pause", "0.1", "--executor", TOY)
+    _, _, refused = run("record", folder, *BY_CLOCK[:3], "0.2", "--pause", "0.1")
     assert "does not answer any more" in refused
     assert (folder / "recordings/1/take-1.npz").is_file()
 
 
-class Typed:
-    """A command at a terminal."""
-
-    def __init__(self, *args):
-        self.ours, theirs = os.openpty()
-        self.process = subprocess.Popen(
-            [Path(sys.executable).with_name("prior-reinforce"), *map(str, args)],
-            stdin=theirs,
-            stdout=theirs,
-            stderr=theirs,
-            start_new_session=True,
-        )
-        os.close(theirs)
-        self.seen = ""
-
-    def wait_for(self, text, limit=60.0):
-        deadline = time.monotonic() + limit
-        while text not in self.seen:
-            assert time.monotonic() < deadline, self.seen
-            if not select.select([self.ours], [], [], 1.0)[0]:
-                continue
-            try:
-                self.seen += os.read(self.ours, 4096).decode()
-            except OSError:
-                assert text in self.seen, self.seen
-        self.seen = self.seen.partition(text)[2]
-
-    def type(self, text):
-        os.write(self.ours, text.encode())
-
-
 def test_takes_are_cut_dropped_named_and_placed_by_keys(folder, tmp_path):
     name_arm(folder, tmp_path / "arm", seconds=0.005)
-    typed = Typed("record", folder, "--executor", TOY)
+    typed = Typed("record", folder)
     typed.wait_for("q imports them")
     for place, key in (("80cm 10cm", "d"), ("90cm 5cm", "n")):
         typed.type(" ")
@@ -167,8 +129,7 @@ def test_takes_are_cut_dropped_named_and_placed_by_keys(folder, tmp_path):
     typed.type("q")
     with suppress(AssertionError):
         typed.wait_for("nothing that it says", 30.0)
-    typed.process.kill()
-    typed.process.wait()
+    typed.close()
     recorded = folder / "recordings/1"
     assert sorted(path.name for path in recorded.iterdir()) == [
         "good.npz",

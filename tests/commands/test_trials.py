@@ -9,14 +9,17 @@ from pathlib import Path
 
 import pytest
 
-from prior_reinforce.bench.robots.executors.lock import executing_lock, stop_executing
-from prior_reinforce.bench.workspace import workspace as workspace_module
-from prior_reinforce.bench.workspace.log import Executing
-from prior_reinforce.bench.workspace.workspace import Workspace
+from prior_reinforce.arm.executing import EXECUTORS
+from prior_reinforce.arm.executing.lock import executing_lock, stop_executing
+from prior_reinforce.arm.workspace import workspace as workspace_module
+from prior_reinforce.arm.workspace.events import Moving
+from prior_reinforce.arm.workspace.workspace import Workspace
+from prior_reinforce.commands import trials as trials_module
+from prior_reinforce.errors import TrialStateError
+from prior_reinforce.registry import PLUGINS
 from prior_reinforce.session.session import Session
-from prior_reinforce.session.trials import Stage
-from tests.bench.robots.executors import toy_arm
-from tests.bench.workspace.planar import events_in, recordings, trials_in
+from tests.arm.executing import toy_arm
+from tests.arm.workspace.planar import events_in, recordings, stage_in, trials_in
 
 NARROW = (
     'model = "given"\njoint_names = ["joint1", "joint2"]\nlower = [-3, -3]\nupper = [3, 3]\n'
@@ -29,8 +32,8 @@ NARROW = (
     [
         (("--out", "plan.txt"), "end the name in"),
         (("--out", "nowhere/plan.csv"), "make the folder first"),
-        (("--out", "plan.csv", "--rate", "1e12"), "up to 100000"),
-        (("--out", "plan.csv", "--rate", "nan"), "up to 100000"),
+        (("--out", "plan.csv", "--rate", "1e12"), "up to 1000"),
+        (("--out", "plan.csv", "--rate", "nan"), "up to 1000"),
         (("--run", "true {plan}"), "or add --yes"),
         (("--yes", "--run", "true {plan}", "--rate", "1000"), "--run is given the plan's own"),
         (("--run", "true"), "hold {plan}"),
@@ -65,7 +68,7 @@ def work(monkeypatch):
     def connect(*args, connect=sqlite3.connect, **kwargs):
         connection = connect(*args, **kwargs)
         connection.set_trace_callback(
-            lambda sql: done.update(readings="FROM events WHERE id > 0" in sql)
+            lambda sql: done.update(readings="FROM events WHERE id >= 0 " in sql)
         )
         return connection
 
@@ -81,14 +84,14 @@ def work(monkeypatch):
     [
         (("goal", "0.9", "0.05"), 1, 0),
         (("ask",), 1, 1),
-        (("ask", "--yes", "--run", "true {plan}"), 1, 2),
+        (("ask", "--yes", "--run", "true {plan}"), 1, 3),
         (("tell", "1", "hit"), 1, 0),
         (("void", "1"), 1, 0),
         (("status",), 0, 0),
     ],
 )
 def test_a_command_reads_the_journal_once(run, folder, work, command, sessions, gated):
-    """And builds one session, and asks the gate once more right before a motion."""
+    """And builds one session; the gate is asked again for the question, and before a motion."""
     run("goal", folder, "0.9", "0.05")
     if command[0] not in ("goal", "ask"):
         run("ask", folder)
@@ -103,11 +106,13 @@ def test_ask_says_what_the_trial_may_expect(run, folder):
     run("goal", folder, "0.9", "0.05")
     out = run("ask", folder)[1]
     (trial,) = trials_in(folder)
-    assert f"hits with probability {trial.p_hit:.2f}; {trial.expected_trials:.1f} trials" in out
+    assert (
+        f"{100 * trial.p_hit:.0f} % chance to hit; about {trial.expected_trials:.1f} trials" in out
+    )
     run("tell", folder, 1, "5 cm long")
     run("void", folder, 1)
     run("goal", folder, "0.9", "0.05", "--adapter", "gp")
-    assert "probability" not in run("ask", folder)[1]
+    assert "chance" not in run("ask", folder)[1]
 
 
 def test_what_was_told_is_repeated_as_it_was_understood(run, folder):
@@ -147,7 +152,7 @@ def slide(run, folder, unit):
     table = "\n".join(["episode,x", *(f"{i},{1 + i / 2}" for i in range(4))])
     (folder / "recorded" / "outcomes.csv").write_text(table)
     assert run("import", "slide", "recorded")[0] == 0
-    assert run("learn", "slide", "--generator", "nearest")[0] == 0
+    assert run("learn", "slide", "--generator", "interpolation")[0] == 0
 
 
 def test_after_three_poor_trials_it_is_said_what_would_help(run, folder):
@@ -215,10 +220,10 @@ def test_a_trial_whose_arm_did_not_move_stays_open(run, folder, driver, tmp_path
     status, _, err = run("ask", folder, "--yes", "--run", driver)
     assert status == 1
     assert "the arm did not move: door open" in err
-    assert trials_in(folder)[0].stage is Stage.ASKED
+    assert stage_in(folder) == "asked"
     (tmp_path / "say.json").write_text('{"outcome": "done"}')
     assert run("ask", folder, "--yes", "--run", driver)[0] == 0
-    assert trials_in(folder)[0].stage is Stage.EXECUTED
+    assert stage_in(folder) == "executed"
     assert len(list((tmp_path / folder / "executions").iterdir())) == 2
 
 
@@ -261,13 +266,13 @@ def test_a_command_that_failed_before_the_arm_moved_costs_no_trial(run, folder, 
     status, out, _ = run(*again)
     assert status == 0
     assert 'next: prior-reinforce ask planar --run "COMMAND {plan}"' in out
-    assert trials_in(folder)[0].stage is Stage.ASKED
+    assert stage_in(folder) == "asked"
     (tmp_path / "say.json").write_text('{"outcome": "done"}')
     assert run("ask", folder, "--yes", "--run", driver)[0] == 0
     status, _, err = run(*again)  # whose command says that it was executed
     assert status == 2
     assert "trial 1 was executed to its end" in err
-    assert trials_in(folder)[0].stage is Stage.EXECUTED
+    assert stage_in(folder) == "executed"
 
 
 def test_an_aborted_trial_is_proposed_to_be_voided(run, folder, driver, tmp_path):
@@ -280,15 +285,14 @@ def test_an_aborted_trial_is_proposed_to_be_voided(run, folder, driver, tmp_path
     assert run("void", folder, 1)[0] == 0
 
 
-@pytest.mark.parametrize("answer", ["no", "yes"])
-def test_a_person_says_that_the_arm_may_move(run, folder, driver, tmp_path, monkeypatch, answer):
+@pytest.mark.parametrize("answer", ["no", "yes", "Throw  1"])
+def test_a_person_says_that_the_arm_may_move(run, folder, driver, tmp_path, person, answer):
     run("goal", folder, "0.9", "0.05")
     (tmp_path / "say.json").write_text('{"outcome": "done"}')
-    monkeypatch.setattr("sys.stdin.isatty", lambda: True)
-    monkeypatch.setattr("builtins.input", lambda question: answer)
+    person(answer)
     status, _, _ = run("ask", folder, "--run", driver)
-    assert status == (0 if answer == "yes" else 1)
-    assert (tmp_path / "motions").exists() == (answer == "yes")
+    assert status == (0 if answer.startswith("Throw") else 1)
+    assert (tmp_path / "motions").exists() == (answer.startswith("Throw"))
 
 
 def test_a_check_moves_nothing(run, folder, driver, tmp_path):
@@ -298,72 +302,28 @@ def test_a_check_moves_nothing(run, folder, driver, tmp_path):
     assert "it begins at joint1 0 rad, joint2 0 rad: move the arm there slowly first" in out
     assert "checked; nothing moved" in out
     assert not (tmp_path / "motions").exists()
-    assert trials_in(folder)[0].stage is Stage.ASKED
-
-
-@pytest.mark.parametrize(
-    ("pose", "status", "says"),
-    [
-        ('{"joint1": 0.001, "joint2": -0.004}', 0, "off it by up to 0.004 rad (joint2)"),
-        ("[0.0, 0.3]", 1, "off it by up to 0.3 rad (joint2), more than 0.02"),
-        ('{"joint1": 0.0}', 1, "says nothing of joint2 [rad]"),
-        ('{"joint1": 0.0, "panda_joint2": 0.0}', 1, "says nothing of joint2 [rad]"),
-        ("[0.0]", 1, "must end with a line of JSON"),
-        ("nan", 1, "must end with a line of JSON"),
-        ("[NaN, 0]", 1, "must end with a line of JSON"),
-    ],
-)
-def test_the_arm_is_held_against_the_plans_first_pose(
-    run, folder, driver, tmp_path, pose, status, says
-):
-    run("goal", folder, "0.9", "0.05")
-    (tmp_path / "say.json").write_text('{"outcome": "done"}')
-    (tmp_path / "pose.json").write_text(f"connected\n{pose}\n")
-    where = f"cat {tmp_path}/pose.json"
-    found, out, err = run("ask", folder, "--yes", "--run", driver, "--where", where)
-    assert found == status
-    assert says in out + err
-    assert (tmp_path / "motions").exists() == (status == 0)
-
-
-def test_where_the_arm_stands_is_asked_after_the_person(run, folder, driver, tmp_path, monkeypatch):
-    run("goal", folder, "0.9", "0.05")
-    (tmp_path / "say.json").write_text('{"outcome": "done"}')
-    (tmp_path / "pose.json").write_text("[0, 0]")
-
-    def pushed_meanwhile(question):
-        (tmp_path / "pose.json").write_text("[0, 0.3]")
-        return "yes"
-
-    monkeypatch.setattr("sys.stdin.isatty", lambda: True)
-    monkeypatch.setattr("builtins.input", pushed_meanwhile)
-    where = f"cat {tmp_path}/pose.json"
-    status, _, err = run("ask", folder, "--run", driver, "--where", where)
-    assert status == 1
-    assert "off it by up to 0.3 rad (joint2)" in err
-    assert not (tmp_path / "motions").exists()
+    assert stage_in(folder) == "asked"
 
 
 def cut_off(folder):
     with Workspace(folder) as workspace, workspace.log.exclusive():
         # What is written before the program dies.
-        workspace.log.append(Executing(trial=1, command="arm {plan}", folder=""))
+        workspace.log.append(Moving(1, "trial", "arm", ""))
 
 
 @pytest.mark.parametrize(("answer", "stage"), [("no", "asked"), ("yes", "executing")])
-def test_a_cut_off_execution_asks_whether_the_arm_moved(run, folder, monkeypatch, answer, stage):
+def test_a_cut_off_execution_asks_whether_the_arm_moved(run, folder, person, answer, stage):
     run("goal", folder, "0.9", "0.05")
     run("ask", folder)
     cut_off(folder)
     status, _, err = run("ask", folder)
     assert status == 2
     assert "did the arm move?" in err
-    answers = iter(["perhaps", answer])
-    monkeypatch.setattr("sys.stdin.isatty", lambda: True)
-    monkeypatch.setattr("builtins.input", lambda question: next(answers))
+    asked = person("perhaps", answer[0], answer).asked
     status, out, _ = run("ask", folder)
+    assert asked == ["did the arm move?"] * 3
     assert status == (0 if answer == "no" else 1)
-    assert trials_in(folder)[0].stage is Stage(stage)
+    assert stage_in(folder) == stage
     assert ("plan: " in out) == (answer == "no")
 
 
@@ -372,20 +332,20 @@ def test_export_writes_what_was_handed_out(run, folder):
     run("ask", folder)
     status, out, _ = run("export", folder, 1, "plan.npz")
     assert status == 0
-    assert trials_in(folder)[0].kept.sha256 in out
+    assert json.loads(run("trials", folder, "--json")[1])[0]["sha256"] in out
 
 
 def test_a_plan_of_before_a_correction_is_named_until_it_is_voided(run, folder):
     run("goal", folder, "0.9", "-0.05")
     run("ask", folder)
-    assert "before a correction" not in run("tell", folder, 1, "30 cm long")[1]
+    assert "before your correction" not in run("tell", folder, 1, "30 cm long")[1]
     run("ask", folder)
-    said = "trial 2 was planned before a correction: unless it was thrown, void it and ask again"
+    said = "trial 2 was planned before your correction; if it was not thrown yet, void it"
     assert said in run("amend", folder, 1, "3 cm long")[1]
     assert said in run("ask", folder)[1]
     assert said in run("void", folder, 1)[1]
-    assert "before a correction" not in run("void", folder, 2)[1]
-    assert "before a correction" not in run("ask", folder)[1]
+    assert "before your correction" not in run("void", folder, 2)[1]
+    assert "before your correction" not in run("ask", folder)[1]
 
 
 def test_a_plan_that_is_refused_while_it_is_shown_leaves_nothing(
@@ -411,7 +371,7 @@ def test_a_plan_that_is_refused_while_it_is_shown_leaves_nothing(
 def test_limits_that_change_after_the_verdict_give_out_no_refused_plan(
     run, folder, tmp_path, monkeypatch
 ):
-    """What is written is what the report above it speaks of."""
+    """What is written is held against the limits of the moment at which it is written."""
     run("goal", folder, "0.9", "0.05")
     path = tmp_path / folder / "workspace.toml"
     ask = Session.ask
@@ -422,10 +382,10 @@ def test_limits_that_change_after_the_verdict_give_out_no_refused_plan(
         return trial
 
     monkeypatch.setattr(Session, "ask", narrowed)
-    _, out, _ = run("ask", folder, "--out", "plan.npz")
-    assert "no limits checked" in out
-    assert "refused" not in out
-    assert (tmp_path / "plan.npz").exists()
+    status, _, err = run("ask", folder, "--out", "plan.npz")
+    assert status != 0
+    assert "refused" in err
+    assert not (tmp_path / "plan.npz").exists()
 
 
 def test_a_restored_journal_asks_whether_that_was_this_trial(run, folder, driver, tmp_path):
@@ -470,9 +430,8 @@ def test_the_journal_keeps_no_argument(run, folder, driver):
 
 
 @pytest.fixture
-def arm(run, folder, tmp_path, monkeypatch):
+def arm(run, folder, tmp_path, toy_plugin):
     """A toy arm that the manifest names; call it with what is wrong with it."""
-    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parents[2]))
     run("goal", folder, "0.9", "0.05")
 
     def named(**options):
@@ -482,18 +441,18 @@ def arm(run, folder, tmp_path, monkeypatch):
     return named
 
 
-ON_ARM = ("--execute", "--executor", toy_arm.TOY)
+STOP = "Ctrl-C stops the arm; keep the arm's own stop button in your hand."
 
 
 @pytest.mark.parametrize(
     ("flags", "remedy"),
     [
         (("--execute",), "or add --yes"),
-        (("--execute", "--yes", "--run", "true {plan}"), "drop --run and --where"),
+        (("--execute", "--yes", "--run", "true {plan}"), "drop --run"),
         (("--rehearse", "0.2"), "go with --execute"),
         (("--approach",), "go with --execute"),
-        ((*ON_ARM, "--yes", "--rehearse", "1.5"), "must be a fraction of the speed"),
-        ((*ON_ARM, "--yes", "--rehearse", "nan"), "must be a fraction of the speed"),
+        (("--execute", "--yes", "--rehearse", "1.5"), "must be a fraction of the speed"),
+        (("--execute", "--yes", "--rehearse", "nan"), "must be a fraction of the speed"),
     ],
 )
 def test_what_cannot_be_executed_is_said_before_a_trial_is_made(run, arm, folder, flags, remedy):
@@ -505,12 +464,18 @@ def test_what_cannot_be_executed_is_said_before_a_trial_is_made(run, arm, folder
     assert events_in(folder) == before
 
 
-def test_a_manifest_starts_no_code_of_its_own(run, arm, folder):
-    toy = arm()
-    status, _, err = run("ask", folder, "--yes", "--execute")
-    assert status == 1  # the trial was asked for
-    assert f"a manifest starts no code of its own; add --executor {toy_arm.TOY}" in err
-    assert toy_arm.motions(toy) == 0
+def test_a_manifest_starts_no_code_of_its_own(run, arm, folder, monkeypatch):
+    toy, before = arm(), events_in(folder)
+    monkeypatch.delenv(PLUGINS)
+    with monkeypatch.context() as unknown:
+        unknown.delitem(EXECUTORS.members, toy_arm.TOY)
+        status, _, err = run("ask", folder, "--yes", "--execute")
+        assert status == 2
+        assert "no executor 'toy'" in err
+        assert "your own is registered by the module that --plugins names" in err
+    assert (toy_arm.motions(toy), events_in(folder)) == (0, before)
+    status, _, err = run("ask", folder, "--yes", "--execute", "--plugins", toy_arm.__name__)
+    assert (status, toy_arm.motions(toy)) == (0, 1), err
 
 
 def test_without_an_arm_the_manifest_is_to_name_one(run, folder):
@@ -518,76 +483,75 @@ def test_without_an_arm_the_manifest_is_to_name_one(run, folder):
     assert "add [arm] with its executor" in run("ask", folder, "--yes", "--execute")[2]
 
 
-@pytest.mark.parametrize("answer", ["no", "yes"])
-def test_a_person_is_told_what_was_not_checked(run, arm, folder, monkeypatch, answer):
-    toy, asked = arm(), []
-    monkeypatch.setattr("sys.stdin.isatty", lambda: True)
-    monkeypatch.setattr("builtins.input", lambda question: asked.append(question) or answer)
-    status, out, _ = run("ask", folder, *ON_ARM)
+@pytest.mark.parametrize("answer", ["no", "throw 1"])
+def test_a_person_is_told_what_was_not_checked(run, arm, folder, person, answer):
+    toy, asked = arm(), person(answer).asked
+    status, out, _ = run("ask", folder, "--execute")
     assert asked == [
-        "the arm will move (trial 1 at full speed, 0.5 s); NOT checked: self-collision, the "
-        "table; is the area clear? (yes/no) "
+        "Trial 1 will run at FULL SPEED (0.5 s). NOT checked: self-collision, the table. "
+        f"Is the area clear? {STOP}"
     ]
-    assert status == (answer != "yes")
-    assert toy_arm.motions(toy) == (answer == "yes")
-    assert "toy, firmware 1.0: the arm is off it by up to 3.24e-05 rad (joint1)" in out
+    assert status == (answer == "no")
+    assert toy_arm.motions(toy) == (answer == "throw 1")
+    assert "toy, firmware 1.0: the arm is 3.24e-05 rad (joint1) from the start pose" in out
 
 
-def test_a_command_is_asked_nothing_so_less_is_checked(run, folder, driver, tmp_path, monkeypatch):
+def test_a_command_is_asked_nothing_so_less_is_checked(run, folder, driver, tmp_path, person):
     run("goal", folder, "0.9", "0.05")
     (tmp_path / "say.json").write_text('{"outcome": "done"}')
-    asked = []
-    monkeypatch.setattr("sys.stdin.isatty", lambda: True)
-    monkeypatch.setattr("builtins.input", lambda question: asked.append(question) or "no")
+    asked = person("no").asked
     run("ask", folder, "--run", driver)
     assert asked == [
-        "the arm will move (trial 1 at full speed); NOT checked: where the arm stands, the arm's "
-        "limits, self-collision, the table; is the area clear? (yes/no) "
+        "Trial 1 will run at FULL SPEED (0.5 s). NOT checked: where the arm stands, the arm's "
+        f"limits, self-collision, the table. Is the area clear? {STOP.replace('arm;', 'command;')}"
     ]
 
 
-def asked_at(run, folder, monkeypatch, *flags):
+def asked_at(run, folder, person, *flags):
     """What a person is asked, who says no."""
-    asked = []
-    monkeypatch.setattr("sys.stdin.isatty", lambda: True)
-    monkeypatch.setattr("builtins.input", lambda said: asked.append(said) or "no")
+    asked = person("no").asked
     assert run("ask", folder, *flags)[0] == 1
     return asked
 
 
-def test_an_arm_that_checks_its_range_alone_has_not_checked_its_limits(
-    run, arm, folder, monkeypatch
-):
+def test_an_arm_that_checks_its_range_alone_has_not_checked_its_limits(run, arm, folder, person):
     arm()
-    assert "NOT checked: self-coll" in asked_at(run, folder, monkeypatch, *ON_ARM)[0]
+    assert "NOT checked: self-coll" in asked_at(run, folder, person, "--execute")[0]
     arm(checks="the range of every joint")
-    asked = asked_at(run, folder, monkeypatch, *ON_ARM)[0]
-    assert "NOT checked: self-collision, the arm's limits, the table; " in asked
+    asked = asked_at(run, folder, person, "--execute")[0]
+    assert "NOT checked: self-collision, the arm's limits, the table. " in asked
 
 
-def test_each_motion_is_confirmed_and_none_is_made_unasked(run, arm, folder, monkeypatch):
-    toy, asked, answers = arm(), [], iter(["yes", "no"])
+@pytest.mark.parametrize("answers", [["yes", "no"], ["yes", "yes", "yes"], ["yes", "yes", "no"]])
+def test_each_motion_is_confirmed_and_none_is_made_unasked(run, arm, folder, person, answers):
+    """And the yes to the slow way to the start is none to the throw."""
+    toy = arm()
     (toy / "pose").write_text("0.0 0.3")
-    status, _, err = run("ask", folder, "--yes", *ON_ARM)
+    status, _, err = run("ask", folder, "--yes", "--execute")
     assert status == 1
-    assert "0.3 rad (joint2), more than 0.02; move it there, or ask again with --approach" in err
+    assert (
+        "0.3 rad (joint2) from the start pose; 0.02 is allowed; move it there, or ask again with "
+        "--approach" in err
+    )
     assert toy_arm.motions(toy) == 0
-    monkeypatch.setattr("sys.stdin.isatty", lambda: True)
-    monkeypatch.setattr("builtins.input", lambda said: asked.append(said) or next(answers))
-    assert run("ask", folder, "--approach", *ON_ARM)[0] == 1
-    assert [question.partition(";")[0] for question in asked] == [
-        "the arm will move (slowly to where trial 1 begins, 1.9 s)",
-        "the arm will move (trial 1 at full speed, 0.5 s)",
+    asked = person(*answers).asked
+    status, out, err = run("ask", folder, "--approach", "--execute")
+    assert status == 1, (out, err)
+    assert "nothing moved; run ask again when the area is clear" in out
+    assert [question.partition(".")[0] for question in asked[:2]] == [
+        "The arm will move slowly to where trial 1 begins (1",
+        "Trial 1 will run at FULL SPEED (0",
     ]
+    assert asked[2:] == ['got "yes", which is not "throw 1" in full'] * (len(answers) - 2)
     assert toy_arm.motions(toy) == 1
-    assert trials_in(folder)[0].stage is Stage.ASKED
+    assert stage_in(folder) == "asked"
 
 
 @pytest.mark.parametrize(("after", "motions"), [("look_at_arm", 0), ("execute", 1)])
 def test_a_stop_between_two_motions_lets_no_other_begin(
     run, arm, folder, monkeypatch, after, motions
 ):
-    toy, plain = arm(), getattr(Workspace, after)
+    toy, plain = arm(), getattr(trials_module, after)
     (toy / "pose").write_text("0.0 0.3")
 
     def then_stopped(workspace, *args, **kwargs):
@@ -595,39 +559,82 @@ def test_a_stop_between_two_motions_lets_no_other_begin(
         stop_executing(Path(folder))
         return result
 
-    monkeypatch.setattr(Workspace, after, then_stopped)
-    status, _, err = run("ask", folder, "--yes", "--approach", *ON_ARM)
+    monkeypatch.setattr(trials_module, after, then_stopped)
+    status, _, err = run("ask", folder, "--yes", "--approach", "--execute")
     assert status == 1
     assert "somebody pressed Stop since this was asked for" in err
     assert toy_arm.motions(toy) == motions
-    assert trials_in(folder)[0].stage is Stage.ASKED
+    assert stage_in(folder) == "asked"
+
+
+@pytest.mark.parametrize(
+    ("speed", "answer", "moves"),
+    [("0.2", "yes", 1), ("0.9", "yes", 0), ("0.9", "throw 1", 0), ("0.9", "rehearse 1", 1)],
+)
+def test_a_rehearsal_that_is_not_slow_is_no_plain_yes(
+    run, arm, folder, person, speed, answer, moves
+):
+    toy, asked = arm(), person(answer, "no").asked
+    assert run("ask", folder, "--rehearse", speed, "--execute")[0] == (not moves)
+    assert f"Trial 1 will be rehearsed at {float(speed):.0%}".replace("%", " %") in asked[0]
+    assert toy_arm.motions(toy) == moves
 
 
 def test_a_rehearsal_leaves_the_trial_as_it_was(run, arm, folder):
     toy = arm()
-    status, out, _ = run("ask", folder, "--yes", "--rehearse", "0.5", *ON_ARM)
+    status, out, _ = run("ask", folder, "--yes", "--rehearse", "0.5", "--execute")
     assert status == 0
     assert "measured: at most" in out
-    assert trials_in(folder)[0].stage is Stage.ASKED
-    assert run("ask", folder, "--yes", "--approach", *ON_ARM)[0] == 0
-    assert trials_in(folder)[0].stage is Stage.EXECUTED
+    assert stage_in(folder) == "asked"
+    assert run("ask", folder, "--yes", "--approach", "--execute")[0] == 0
+    assert stage_in(folder) == "executed"
     assert toy_arm.motions(toy) == 3
-    assert "a plan runs once" in run("ask", folder, "--yes", *ON_ARM)[2]
+    assert "a plan runs once" in run("ask", folder, "--yes", "--execute")[2]
+
+
+def test_what_was_not_executed_is_not_told_but_approached_again(run, arm, folder):
+    toy = arm(kind="faults")
+    (toy / "pose").write_text("0.0 0.3")
+    again = f"prior-reinforce ask {folder} --execute --approach"
+    status, out, err = run("ask", folder, "--yes", "--approach", "--execute")
+    assert status == 1
+    assert "the approach was aborted" in err
+    assert f"next: {again}" in out
+    said = run("status", folder)[1]
+    assert "its approach was not made to its end; it waits to be executed" in said
+    assert again in said
+    before = events_in(folder)
+    status, _, err = run("tell", folder, "1", "5cm long")
+    assert status == 2
+    assert f"trial 1 was not executed, its approach was not made to its end: run {again}" in err
+    assert events_in(folder) == before
+    arm()
+    (toy / "pose").write_text("0.0 0.3")
+    assert run("ask", folder, "--yes", "--approach", "--execute")[0] == 0
+    assert run("tell", folder, "1", "5cm long")[0] == 0
+
+
+def test_a_trial_that_the_manifests_arm_did_not_execute_is_not_told(run, arm, folder):
+    arm()
+    assert "--execute" in run("ask", folder)[1]
+    status, _, err = run("tell", folder, "1", "--hit")
+    assert status == 2
+    assert "[arm] has not moved for it: run prior-reinforce ask" in err
+    with Workspace(folder) as workspace, pytest.raises(TrialStateError, match="not executed"):
+        workspace.session().tell(1, hit=True)
+    assert run("void", folder, "1", "--reason", "no time")[0] == 0
 
 
 @pytest.mark.parametrize("answer", ["no", "yes"])
-def test_a_fault_voids_the_trial_after_a_question(run, arm, folder, monkeypatch, answer):
+def test_a_fault_voids_the_trial_after_a_question(run, arm, folder, person, answer):
     arm(kind="faults")
-    asked = []
-    monkeypatch.setattr("sys.stdin.isatty", lambda: True)
-    monkeypatch.setattr("builtins.input", lambda question: asked.append(question) or answer)
-    status, out, err = run("ask", folder, "--yes", *ON_ARM)
+    asked = person(answer).asked
+    status, out, err = run("ask", folder, "--yes", "--execute")
     assert status == 1
     assert f"aborted: {toy_arm.FAULT}" in err
-    assert asked == ["void trial 1? (yes/no) "]
-    trial = trials_in(folder)[0]
-    assert trial.stage is (Stage.VOIDED if answer == "yes" else Stage.EXECUTED)
-    assert trial.note == (toy_arm.FAULT if answer == "yes" else "")
+    assert asked == ["void trial 1?"]
+    assert stage_in(folder) == ("voided" if answer == "yes" else "executed")
+    assert trials_in(folder)[0].note == (toy_arm.FAULT if answer == "yes" else "")
     assert "next: " in out
 
 
@@ -637,16 +644,16 @@ def test_a_fault_voids_the_trial_after_a_question(run, arm, folder, monkeypatch,
 )
 def test_an_arm_that_refuses_is_not_asked_to_move(run, arm, folder, options, says):
     toy = arm(**options)
-    status, _, err = run("ask", folder, "--yes", *ON_ARM)
+    status, _, err = run("ask", folder, "--yes", "--execute")
     assert status == 1
     assert says in err
     assert toy_arm.motions(toy) == 0
-    assert trials_in(folder)[0].stage is Stage.ASKED
+    assert stage_in(folder) == "asked"
 
 
 def test_a_check_asks_the_arm_and_moves_nothing(run, arm, folder):
     toy = arm()
-    status, out, _ = run("ask", folder, "--check", *ON_ARM)
+    status, out, _ = run("ask", folder, "--check", "--execute")
     assert status == 0
     assert "checked; nothing moved" in out
     assert toy_arm.motions(toy) == 0

@@ -5,10 +5,12 @@ import json
 import numpy as np
 import pytest
 
-from prior_reinforce.bench.workspace.workspace import Workspace
-from tests.bench.robots.arms import UR, ur5e, write_urdf
+from prior_reinforce.arm.workspace.workspace import Workspace
+from tests.arm.robots.arms import UR, ur5e, write_urdf
+from tests.arm.robots.descriptions import J, Urdf, arm
 
 
+@pytest.mark.slow
 def test_an_afternoon(run, folder):
     assert run("goal", folder, "0.9", "-0.05")[1].startswith("goal 1: 90 cm ahead, 5 cm right")
     status, out, _ = run("ask", folder, "--out", "plan.csv")
@@ -37,6 +39,7 @@ def test_an_afternoon(run, folder):
     assert kinds[2:6] == ["goal_set", "asked", "told", "amended"]
 
 
+@pytest.mark.slow
 def test_a_report_replaces_only_what_it_wrote(run, folder, tmp_path):
     run("goal", folder, "0.9", "0.05")
     run("ask", folder)
@@ -46,6 +49,10 @@ def test_a_report_replaces_only_what_it_wrote(run, folder, tmp_path):
     assert status == 2
     assert "choose an empty or a new folder" in err
     assert (tmp_path / "thesis" / "overview.png").read_bytes() == b"mine"
+    status, _, err = run("report", folder, "--out", "shown.html")
+    assert status == 2
+    assert "--out shown" in err
+    assert not (tmp_path / "shown.html").exists()
     for _ in range(2):
         assert run("report", folder)[0] == 0
 
@@ -82,6 +89,21 @@ def test_a_gripper_is_one_more_dimension(run, tmp_path, monkeypatch, said, names
     assert form.units == (*("rad" for _ in robot.joint_names), *units)
 
 
+@pytest.mark.slow
+def test_what_drives_the_arm_is_written_into_the_manifest(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert run("new", "hoop", "--robot", "ur5e", "--arm", "ur,host=192.168.1.10,lag=0.05")[0] == 0
+    with Workspace("hoop") as workspace:
+        arm = workspace.manifest.driven_by
+    assert arm.executor == "ur"
+    assert arm.options == {"host": "192.168.1.10", "lag": 0.05}
+    for wrong, says in (("fr4", "fr3, lerobot, ur"), ("fr3", "host"), ("fr3,hots=x", "hots")):
+        status, _, err = run("new", "other", "--robot", "fr3", "--arm", wrong)
+        assert status == 2
+        assert says in err
+    assert not (tmp_path / "other").exists()
+
+
 def test_an_arm_that_is_not_known_names_the_ways_to_give_it(run, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     status, _, err = run("new", "hoop", "--robot", "ur3")
@@ -89,7 +111,7 @@ def test_an_arm_that_is_not_known_names_the_ways_to_give_it(run, tmp_path, monke
     assert "known are panda, fr3, ur5e, ur10e, xarm6, xarm7, so101" in err
     assert "--robot path/to/arm.urdf" in err
     assert run("new", "hoop", "--robot", "gone.urdf")[0] == 2
-    assert "--tip is a link of a URDF" in run("new", "hoop", "--tip", "tool0")[2]
+    assert "--tip, --base and --hold are of a URDF" in run("new", "hoop", "--tip", "tool0")[2]
     assert not (tmp_path / "hoop").exists()
 
 
@@ -104,3 +126,25 @@ def test_a_goal_in_centimetres_without_a_unit_is_refused(run, folder):
     assert "65 m is farther than any arm throws; say the unit, for instance 65cm" in err
     with Workspace(folder) as workspace:
         assert not workspace.session().goals
+
+
+def test_a_person_at_the_terminal_is_asked_which_link_is_the_flange(run, tmp_path, monkeypatch):
+    so101 = Urdf("so101", [*arm(["a", "b", "wrist"]), J("gripper", "jaw")])
+    (tmp_path / "arm.urdf").write_text(so101.text())
+    monkeypatch.setattr("sys.stdin.isatty", lambda: True)
+    monkeypatch.setattr(
+        "prior_reinforce.commands.workspace.answer_to",
+        lambda question: "none" if "object" in question else "",
+    )
+    status, out, err = run("new", tmp_path / "w", "--robot", tmp_path / "arm.urdf")
+    assert status == 0, err
+    assert "--tip: wrist_link" in out
+    with Workspace(tmp_path / "w") as workspace:
+        assert workspace.manifest.robot.joint_names == ("a", "b", "wrist")
+
+
+@pytest.mark.parametrize("held", ["lift", "lift=high", "=0.2", "lift=nan"])
+def test_a_joint_is_held_somewhere(run, tmp_path, held):
+    status, _, err = run("new", tmp_path / "w", "--robot", "arm.urdf", "--hold", held)
+    assert status == 2
+    assert "lift=0.2" in err

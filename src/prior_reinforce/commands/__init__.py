@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 
-from prior_reinforce.wording import RED, YELLOW, coloured, plain
+from prior_reinforce.terminal import RED, YELLOW, coloured, plain
 
 _HERE = "prior_reinforce.commands"
 GROUPS: dict[str, dict[str, tuple[str, str]]] = {
@@ -15,33 +15,22 @@ GROUPS: dict[str, dict[str, tuple[str, str]]] = {
         "learn": ("learning:Learn", "learn the motion from them"),
         "goal": ("workspace:Goal", "set the goal of the next trials"),
         "ask": ("trials:Ask", "get the plan of the next trial, and execute it"),
-        "tell": ("trials:Tell", "say where the object went"),
-        "amend": ("trials:Amend", "correct what was told"),
-        "void": ("trials:Void", "declare that a trial is no data"),
+        "tell": ("telling:Tell", "say where the object went"),
+        "amend": ("telling:Amend", "correct what was told"),
+        "void": ("telling:Void", "discard a trial; nothing is learned from it"),
         "status": ("workspace:Status", "where you are, and what comes next"),
         "advise": ("advice:Advise", "where throws would hit, and what would teach most"),
         "trials": ("workspace:Trials", "all trials as a table, CSV or JSON"),
         "log": ("workspace:Log", "all events, one JSON object a line"),
         "report": ("workspace:Report", "write a page with every goal, trial and plan"),
         "export": ("trials:Export", "write a trial's plan as NPZ, CSV or JSON"),
-        "pack": ("workspace:Pack", "write a workspace into one file"),
-        "unpack": ("workspace:Unpack", "make a workspace of such a file"),
         "console": ("console:Console", "open a page to work on beside the arm"),
         "calibrate": ("photographs:Calibrate", "fit the camera above the table"),
         "look": ("photographs:Look", "see a trial's error in a photograph"),
     },
     "simulated tasks": {
         "demo": ("simulated:Demo", "six demonstrations, five new goals, a report"),
-        "train": ("simulated:Train", "learn from a simulated task's demonstrations"),
         "adapt": ("simulated:Adapt", "reach new goals, trial by trial"),
-        "rollout": ("simulated:Rollout", "execute one plan"),
-        "simulate": ("simulate:Simulate", "serve a simulated arm to programs that drive one"),
-    },
-    "the paper": {
-        "reproduce": ("reproduce:Reproduce", "make its tables and figures again"),
-    },
-    "this program": {
-        "completion": ("completion:Completion", "let the shell complete commands and options"),
     },
 }
 """Where each command's class is, and what it is for: only the one that is called is imported."""

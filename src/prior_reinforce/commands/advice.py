@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
 
 import numpy as np
-import tyro
 from jaxtyping import Float
 
-from prior_reinforce.arrays import Points
-from prior_reinforce.bench.workspace.records import AdviceRecord
-from prior_reinforce.bench.workspace.workspace import Workspace
+from prior_reinforce.arm.workspace.view import AdviceView
+from prior_reinforce.arm.workspace.workspace import Workspace
+from prior_reinforce.arrays import Point, Points
 from prior_reinforce.commands.base import Json, OnWorkspace, print_json
 from prior_reinforce.errors import ConfigurationError
+from prior_reinforce.generators.reach import reach, region_around
 from prior_reinforce.wording import say_place
 
 _ACROSS = 15
@@ -38,8 +37,6 @@ class Advise(OnWorkspace):
         prior-reinforce advise hoop --out advice.png
     """
 
-    adapter: Annotated[str | None, tyro.conf.arg(metavar="module:Class")] = None
-    """The adapter that the goal was set with, where it is your own: module:Class."""
     out: Path | None = None
     """Picture, a .png; advice.png in the workspace if not given."""
     json: Json = False
@@ -48,7 +45,7 @@ class Advise(OnWorkspace):
         out = self.out or workspace.folder / "advice.png"
         if out.suffix != ".png":
             raise ConfigurationError(f"--out must name a .png file, got {out}")
-        session = workspace.session(own_adapter=self.adapter)
+        session = workspace.session()
         adapter = session.informed_adapter()
         p_hit, gain = getattr(adapter, "p_hit", None), getattr(adapter, "gain", None)
         if p_hit is None or gain is None:
@@ -56,30 +53,39 @@ class Advise(OnWorkspace):
                 f"the adapter {session.goals[-1].adapter} knows no probabilities; set the "
                 "goal with --adapter bayes"
             )
-        outcomes = session.demonstrations.outcomes_seen
-        goals = _region(outcomes)
+        demonstrations = session.demonstrations
+        outcomes, moved = demonstrations.outcomes_seen, demonstrations.symmetry is not None
+        low, high = region_around(demonstrations) if moved else _around(outcomes)
+        goals = _grid(low, high)
         conditions = np.array([adapter.propose(goal) for goal in goals])
         p = p_hit(conditions, goals, session.tolerance)
-        throws = gain(conditions, conditions)
-        tried = np.arange(0, len(goals), _DEMONSTRATED_EVERY)
-        shown = gain(goals[tried], conditions, demonstrations=True)
-        about = workspace.manifest.outcome_names, workspace.manifest.outcome_units
-        best, worst, throw = np.argmax(p), np.argmin(p), np.argmax(throws)
+        reached = None
+        if moved:  # what is learned of a move serves everywhere: no throw teaches most
+            reached = reach(session.generator, np.stack([low, high]), workspace.refusals)
+            throws, shown = np.zeros(len(goals)), np.zeros(1)
+        else:
+            throws = gain(conditions, conditions)
+            tried = np.arange(0, len(goals), _DEMONSTRATED_EVERY)
+            shown = gain(goals[tried], conditions, demonstrations=True)
+        form = workspace.manifest.outcome_format
+        best, worst = np.argmax(p), np.argmin(p)
+        throw = None if moved else goals[np.argmax(throws)]
         demonstration = goals[tried[np.argmax(shown)]] if shown.max() > 0 else None
         picture = None
         if goals.shape[1] == 2:
             from prior_reinforce.report.advice import draw_advice
 
-            picture = draw_advice(out, goals, p, outcomes, goals[throw], demonstration, about)
+            picture = draw_advice(out, goals, p, outcomes, throw, demonstration, form, reached)
         if self.json:
-            record = AdviceRecord(
+            record = AdviceView(
                 mean_p_hit=float(p.mean()),
                 best=goals[best].tolist(),
                 best_p_hit=float(p[best]),
                 worst=goals[worst].tolist(),
                 worst_p_hit=float(p[worst]),
-                throw=goals[throw].tolist(),
-                throw_teaches=float(throws[throw]),
+                throw=None if throw is None else throw.tolist(),
+                throw_teaches=float(throws.max()),
+                reached=None if reached is None else float(reached.reached.mean()),
                 demonstration=None if demonstration is None else demonstration.tolist(),
                 demonstration_teaches=float(shown.max()),
                 picture=None if picture is None else str(picture),
@@ -88,26 +94,38 @@ class Advise(OnWorkspace):
             return
         print(
             f"first throws hit with probability {p.mean():.2f} on average over the "
-            f"demonstrated region: {p[best]:.2f} at {say_place(goals[best], *about)}, "
-            f"{p[worst]:.2f} at {say_place(goals[worst], *about)}\n"
-            f"the throw that teaches most: {say_place(goals[throw], *about)} "
-            f"({throws[throw]:.0%} of what is unknown; half of all places teach less than "
-            f"{np.median(throws):.0%})"
+            f"{'region around what was shown' if moved else 'demonstrated region'}: "
+            f"{p[best]:.2f} at {say_place(goals[best], form)}, "
+            f"{p[worst]:.2f} at {say_place(goals[worst], form)}"
         )
-        if demonstration is None:
+        if reached is not None:
+            print(f"{reached.reached.mean():.0%} of it can be reached within the arm's limits")
+        if throw is not None:
+            print(
+                f"the throw that teaches most: {say_place(throw, form)} ({throws.max():.0%} of "
+                f"what is unknown; half of all places teach less than {np.median(throws):.0%})"
+            )
+        if moved:
+            pass
+        elif demonstration is None:
             print("one more demonstration here would teach nothing that trials do not")
         else:
-            place = f"{say_place(demonstration, *about)} ({shown.max():.0%} of what is unknown)"
+            place = f"{say_place(demonstration, form)} ({shown.max():.0%} of what is unknown)"
             print(f"the demonstration that teaches most: one that ends at {place}")
         if picture is not None:
             print(f"picture: {picture}")
 
 
-def _region(outcomes: Points) -> Float[np.ndarray, "m k"]:
-    """A grid over the demonstrated outcomes and a little beyond, the last component fastest."""
+def _around(outcomes: Points) -> tuple[Point, Point]:
+    """Corners of the demonstrated outcomes and a little beyond."""
     low, high = outcomes.min(axis=0), outcomes.max(axis=0)
     margin = _MARGIN * (high - low)
+    return low - margin, high + margin
+
+
+def _grid(low: Point, high: Point) -> Float[np.ndarray, "m k"]:
+    """Goals between two corners, the last component fastest."""
     k = len(low)
     across = min(_ACROSS, int(_MOST_GOALS ** (1 / k)))
-    axes = [np.linspace(a, b, across) for a, b in zip(low - margin, high + margin, strict=True)]
+    axes = [np.linspace(a, b, across) for a, b in zip(low, high, strict=True)]
     return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, k)

@@ -6,7 +6,6 @@ import re
 import shlex
 import sys
 from collections.abc import Collection
-from contextlib import redirect_stdout, suppress
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
@@ -14,11 +13,12 @@ from typing import Annotated, Any, ClassVar
 import msgspec
 import tyro
 
-from prior_reinforce.bench.workspace.status import next_step
-from prior_reinforce.bench.workspace.workspace import Workspace, workspace_around
+from prior_reinforce.arm.workspace.manifest import workspace_around
+from prior_reinforce.arm.workspace.text import next_step
+from prior_reinforce.arm.workspace.workspace import Workspace
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.files import check_path
-from prior_reinforce.wording import GREEN, RED, YELLOW, coloured, plain
+from prior_reinforce.terminal import GREEN, RED, YELLOW, coloured, plain
 
 Words = Annotated[tuple[str, ...], tyro.conf.Positional]
 """Positional words of a command on a workspace; see `find_workspace`."""
@@ -94,25 +94,29 @@ def trial_and_rest(workspace: Workspace, words: tuple[str, ...]) -> tuple[int, t
     return waiting.number, words
 
 
-def options_of(given: Any, prefix: str = "--", without: Collection[str] = ()) -> list[str]:
+def options_of(given: Any, without: Collection[str] = ()) -> list[str]:
     """The options of a command as they are typed, each with its values; defaults are left out."""
     said = []
     for each in fields(given):
         value = getattr(given, each.name)
         if each.name not in without and value != each.default:
-            name = f"{prefix}{'no-' if value is False else ''}{each.name.replace('_', '-')}"
+            name = f"--{'no-' if value is False else ''}{each.name.replace('_', '-')}"
             values = value if isinstance(value, tuple) else (value,)
-            said.append(shlex.join([name, *(str(v) for v in values if not isinstance(v, bool))]))
+            words = [str(v) for v in values if not isinstance(v, bool)]
+            if "UseAppendAction" in str(each.type):
+                said += [shlex.join([name, word]) for word in words]
+            else:
+                said.append(shlex.join([name, *words]))
     return said
 
 
 def print_next(workspace: Workspace) -> None:
     """Say which command comes next."""
-    print(f"next: {next_step(workspace)}")
+    print(f"next: {next_step(workspace.standing)}")
 
 
 def print_json(record: object) -> None:
-    """Print records of `bench.workspace.records`; what is not finite is null."""
+    """Print records of `arm.workspace.view`; what is not finite is null."""
     print(msgspec.json.format(msgspec.json.encode(record)).decode())
 
 
@@ -126,20 +130,3 @@ def print_checked(text: str) -> None:
             flags=re.MULTILINE,
         )
     )
-
-
-def answer_to(question: str) -> str:
-    """Ask the person at the terminal, on standard error.
-
-    Raises:
-        EOFError: No answer came.
-    """
-    with redirect_stdout(sys.stderr):
-        return input(question)
-
-
-def says_yes(question: str, *yes: str) -> bool:
-    """Whether the person at the terminal answers `yes`, or one of `yes`."""
-    with suppress(EOFError):
-        return answer_to(f"{question} (yes/no) ").strip().lower() in ("yes", *yes)
-    return False

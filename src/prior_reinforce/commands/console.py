@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import ipaddress
 import socket
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from ssl import PROTOCOL_TLS_SERVER, SSLContext
 from typing import Annotated
 
 import tyro
 
-from prior_reinforce.bench.workspace.workspace import Workspace
+from prior_reinforce.arm.workspace.workspace import Workspace
 from prior_reinforce.commands.base import OnWorkspace
-from prior_reinforce.commands.trials import arm_of
+from prior_reinforce.commands.vision import Vlm, model_of
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.extras import check_installed
-from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
 
 
 @dataclass(frozen=True)
@@ -36,31 +35,25 @@ class Console(OnWorkspace):
     run_command: Annotated[str | None, tyro.conf.arg(name="run")] = None
     """Command that executes a plan, as in `ask --run`; without one, the arm that [arm] of the
     manifest names does, and where there is none, plans are downloaded."""
-    executor: str | None = None
-    """The executor that [arm] names, where it is your own: module:Class."""
     time_limit: float = 120.0
     """Seconds that the command may take."""
-    generator: str | None = None
-    """The generator that the model was learned by, where it is your own: module:Class."""
-    adapter: str | None = None
-    """The adapter that the goal was set with, where it is your own: module:Class."""
     certificate: Path | None = None
     """Certificate by which to answer over https, so that a tablet's camera works (PEM; mkcert
     makes one)."""
     key: Path | None = None
     """Its key, where that is a file of its own."""
-    vlm: VisionLanguageModelConfig = field(default_factory=VisionLanguageModelConfig)
-    """Endpoint and model that find objects in pictures (docs/perception.md)."""
+    vlm: Vlm = None
 
     def _run_on(self, workspace: Workspace, words: tuple[str, ...]) -> None:
         check_installed("uvicorn")
-        from prior_reinforce.bench.console.guard import report_path, token_of
-        from prior_reinforce.bench.console.server import Events, application, server_of
-        from prior_reinforce.bench.console.verbs import Verbs
-        from prior_reinforce.bench.robots.executors.arguments import check_command
+        from prior_reinforce.arm.console.guard import report_path, token_of
+        from prior_reinforce.arm.console.server import Events, application, server_of
+        from prior_reinforce.arm.console.verbs import Verbs
+        from prior_reinforce.arm.executing.arguments import check_command
 
         self._check_certificate()
-        arm, by = arm_of(workspace, self.executor), self.run_command
+        model = model_of(self.vlm, workspace.folder)
+        arm, by = workspace.manifest.driven_by, self.run_command
         if by is not None:
             check_command(by, time_limit=self.time_limit)
         with self._listening() as listening:
@@ -69,17 +62,18 @@ class Console(OnWorkspace):
                 workspace.folder,
                 moved_by=by or arm,
                 time_limit=self.time_limit,
-                own=self.generator,
-                own_adapter=self.adapter,
                 report=report_path(token),
                 publish=events.publish,
             )
             try:
                 self._say(workspace.folder, token)
-                app = application(verbs, events, token, self.host, self.vlm)
-                server_of(app, self.certificate, self.key).run([listening])
+                app = application(verbs, events, token, self.host, model)
+                server_of(app, events, self.certificate, self.key).run([listening])
+            except KeyboardInterrupt:  # how it is meant to end
+                pass
             finally:
                 verbs.close()
+        print("console closed")
 
     def _check_certificate(self) -> None:
         if self.certificate is None and self.key is not None:

@@ -11,7 +11,7 @@ from typing import Annotated, Literal
 
 import tyro
 
-from prior_reinforce.bench.importing import (
+from prior_reinforce.arm.recordings import (
     Inspection,
     Preprocessing,
     ReadOptions,
@@ -19,7 +19,7 @@ from prior_reinforce.bench.importing import (
     inspect,
     read,
 )
-from prior_reinforce.bench.importing.outcomes import (
+from prior_reinforce.arm.recordings.outcomes import (
     OUTCOMES_FILE,
     Outcomes,
     in_units,
@@ -28,11 +28,11 @@ from prior_reinforce.bench.importing.outcomes import (
     table_beside,
     write_outcome_table,
 )
-from prior_reinforce.bench.importing.selection import Selection
-from prior_reinforce.bench.importing.units import Ambiguity, raise_if_ambiguous
-from prior_reinforce.bench.workspace.manifest import UNKNOWN, Manifest
-from prior_reinforce.bench.workspace.records import InspectRecord
-from prior_reinforce.bench.workspace.workspace import Workspace
+from prior_reinforce.arm.recordings.selection import Selection
+from prior_reinforce.arm.recordings.units import Ambiguity, raise_if_ambiguous
+from prior_reinforce.arm.workspace.manifest import UNKNOWN, Manifest
+from prior_reinforce.arm.workspace.view import InspectView
+from prior_reinforce.arm.workspace.workspace import Workspace
 from prior_reinforce.commands import warn
 from prior_reinforce.commands.base import (
     Json,
@@ -42,9 +42,9 @@ from prior_reinforce.commands.base import (
     print_checked,
     print_json,
     print_next,
-    says_yes,
 )
 from prior_reinforce.commands.outcome_questions import ask_for_outcomes
+from prior_reinforce.commands.questions import agrees
 from prior_reinforce.errors import (
     ConfigurationError,
     InvalidDemonstrationsError,
@@ -52,7 +52,7 @@ from prior_reinforce.errors import (
     WorkspaceError,
 )
 from prior_reinforce.files import check_path, named_disk_errors
-from prior_reinforce.wording import plain
+from prior_reinforce.terminal import plain
 
 _PICTURE = "demonstrations.png"
 Unclear = tuple[Ambiguity, ...]
@@ -70,7 +70,7 @@ class Import(OnWorkspace):
 
     words: Annotated[Words, tyro.conf.arg(metavar="[WORKSPACE] RECORDINGS")] = ()
     """The workspace (the current folder's if not given) and the recordings, a file or a folder:
-    NPZ, NPY, CSV, a workbook, LeRobot, robomimic or DROID HDF5, ROS 1, ROS 2 or MCAP, or a replay
+    NPZ, NPY, CSV, LeRobot, HDF5, ROS 1, ROS 2 or MCAP, or a replay
     buffer in zarr."""
     outcomes: Path | None = None
     """CSV `episode,x,y` with where each object landed; if not given, `outcomes.csv` beside the
@@ -82,7 +82,7 @@ class Import(OnWorkspace):
     horizon: int | None = None
     """Frames of every plan; the longest recording's if not given."""
     trim: bool = True
-    """Drop the still ends of each recording."""
+    """Drop the still ends of each recording; `--no-trim` keeps them."""
     smooth: float | None = None
     """Low-pass frequency in Hz, against encoder noise; the preview reports what it changed."""
 
@@ -110,9 +110,18 @@ class Import(OnWorkspace):
         is_known = form.names != UNKNOWN
         joints = self.options.joints or (form.names if is_known else None)
         try:
-            recordings = read(source, replace(self.options, joints=joints))
-            selection = recordings.select(*((form.names, form.units) if is_known else ()))
-            unclear = recordings.ambiguities + selection.ambiguities
+            try:
+                recordings = read(source, replace(self.options, joints=joints))
+                selection = recordings.select(*((form.names, form.units) if is_known else ()))
+                unclear = recordings.ambiguities + selection.ambiguities
+            except InvalidDemonstrationsError as error:
+                if not self.inspect or self.options.joints is not None or not is_known:
+                    raise
+                recordings = read(source, self.options)  # what is there, by its own names
+                selection = recordings.select()
+                unclear = (*recordings.ambiguities, Ambiguity(str(error), "--joints COLUMN ..."))
+            if self.options.joints is not None:  # said, though they are the plan's own
+                unclear = tuple(one for one in unclear if not one.option.startswith("--joints"))
             if self.inspect:
                 self._inspect(workspace, recordings, selection, unclear)
             else:
@@ -126,12 +135,13 @@ class Import(OnWorkspace):
         self, workspace: Workspace, recordings: Recordings, selection: Selection, unclear: Unclear
     ) -> None:
         manifest, at_terminal = workspace.manifest, sys.stdin.isatty()
+        form = manifest.outcome_format
         known, more = self._known(manifest, recordings, unclear, may_lack=at_terminal)
         _settle(unclear + more, at_terminal=at_terminal)
         partial = bool(self.options.episodes or self.options.leave_out)
         if at_terminal:
             source = recordings.source
-            answers = ask_for_outcomes(workspace.folder, source, known, selection, manifest)
+            answers = ask_for_outcomes(workspace.folder, source, known, selection, form)
             if answers is not None:
                 print(
                     f"outcomes kept in {answers.where}; to import again: --outcomes {answers.where}"
@@ -140,10 +150,11 @@ class Import(OnWorkspace):
                 selection = selection.without(missing_outcomes(selection.episodes, answers))
                 if not selection.recordings:
                     raise InvalidDemonstrationsError("no episode is left; import again")
-        names, units = manifest.outcome_names, manifest.outcome_units
         outcomes_of(selection.episodes, known, partial=partial)  # before the work of the next line
         inspection = self._inspected(manifest, selection)
-        result = recordings.demonstrations(inspection, known, names, units, partial=partial)
+        result = recordings.demonstrations(
+            inspection, known, form, partial=partial, declared=manifest.declared
+        )
         print_checked(result.preview.text)
         n_before = workspace.take_in(result, str(recordings.source), append=self.append)
         if n_before:
@@ -175,18 +186,19 @@ class Import(OnWorkspace):
         if table is not None:
             missing = missing_outcomes(episodes, known)
             said = f"{table}, {', '.join(missing) or 'none'} missing"
-        elif len(known.frame):
+        elif known.episodes:
             said = "in the recordings"
         else:
             table, missing = places[0] / OUTCOMES_FILE, [*episodes]
             rows: dict[str, tuple[object, ...]] = dict.fromkeys(episodes, ())
+            outcome = workspace.manifest.outcome_format
             with named_disk_errors(places[0]):
-                write_outcome_table(table, rows, manifest.outcome_names, manifest.outcome_units)
+                write_outcome_table(table, rows, outcome.names, outcome.units)
             said = f"none yet; fill in {table} (units are in its first line)"
         options = " ".join(dict.fromkeys(one.option for one in unclear + more))
         command = self._command(options, found.remedy)
         if self.json:
-            record = InspectRecord(
+            record = InspectView(
                 source=str(recordings.source),
                 format=recordings.format,
                 episodes=[*episodes],
@@ -222,7 +234,7 @@ class Import(OnWorkspace):
         self, manifest: Manifest, recordings: Recordings, unclear: Unclear, *, may_lack: bool
     ) -> tuple[Outcomes, Unclear]:
         """The outcomes of a table or the recordings, in the manifest's units."""
-        names = manifest.outcome_names
+        names = manifest.outcome_format.names
         try:
             found = recordings.outcomes(self.outcomes, names)
         except InvalidDemonstrationsError as missing:
@@ -230,7 +242,7 @@ class Import(OnWorkspace):
                 raise_if_ambiguous(unclear, also=str(missing))
                 raise
             found = Outcomes.none(names)
-        return in_units(found, manifest.outcome_units, self.outcome_unit)
+        return in_units(found, manifest.outcome_format.units, self.outcome_unit)
 
 
 def _settle(ambiguities: Unclear, *, at_terminal: bool) -> None:
@@ -242,8 +254,6 @@ def _settle(ambiguities: Unclear, *, at_terminal: bool) -> None:
     try:
         raise_if_ambiguous(ambiguities)
     except UnclearUnitsError as unclear:
-        if at_terminal:
-            print(plain(unclear.what))
-            if says_yes("is it so?", "y"):
-                return
+        if at_terminal and agrees(f"{plain(unclear.what)}; is it so?"):
+            return
         raise

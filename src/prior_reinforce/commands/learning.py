@@ -8,7 +8,7 @@ from typing import Annotated
 import tyro
 from rich.console import Console
 
-from prior_reinforce.bench.workspace.workspace import Workspace
+from prior_reinforce.arm.workspace.workspace import Workspace
 from prior_reinforce.commands.base import OnWorkspace, print_next
 from prior_reinforce.commands.live import fit_progress
 from prior_reinforce.generators import GENERATORS, make_generator
@@ -19,8 +19,13 @@ GeneratorChoice = Annotated[
 
 
 @dataclass(frozen=True)
-class Fitting:
-    """How a generator is fitted."""
+class Learn(OnWorkspace):
+    """Learn outcome -> plan from the demonstrations of a workspace (Stage 1).
+
+    For example:
+        prior-reinforce learn hoop
+        prior-reinforce learn hoop --generator diffusion --seed 1
+    """
 
     generator: GeneratorChoice = "auto"
     align: bool = False
@@ -36,16 +41,6 @@ class Fitting:
         if not self.align:
             return self.generator
         return f"{'interpolation' if self.generator == 'auto' else self.generator},timing=align"
-
-
-@dataclass(frozen=True)
-class Learn(Fitting, OnWorkspace):
-    """Learn outcome -> plan from the demonstrations of a workspace (Stage 1).
-
-    For example:
-        prior-reinforce learn hoop
-        prior-reinforce learn hoop --generator diffusion --seed 1
-    """
 
     def _run_on(self, workspace: Workspace, words: tuple[str, ...]) -> None:
         make_generator(self.choice, device=self.device)  # a wrong setting is reported first

@@ -14,17 +14,20 @@ from rich.progress import BarColumn, Progress, TextColumn
 from rich.text import Text
 
 from prior_reinforce.arrays import Point
-from prior_reinforce.commands.base import answer_to
+from prior_reinforce.commands.questions import answer_to
 from prior_reinforce.errors import InvalidFeedbackError, PerceptionFailedError
+from prior_reinforce.formats import OutcomeFormat
+from prior_reinforce.parsing import from_words
 from prior_reinforce.readings import Reading
-from prior_reinforce.wording import error_example, from_words, plain, say_error, say_place
+from prior_reinforce.terminal import plain
+from prior_reinforce.wording import error_example, say_place, to_words
 
 if TYPE_CHECKING:
     from prior_reinforce.environment import Rollout
     from prior_reinforce.generators.base import FitProgress
-    from prior_reinforce.lab.experiments.protocol import FailedReading, GoalTrials
     from prior_reinforce.perception.base import Perception
     from prior_reinforce.plans.motions import Demonstrations
+    from prior_reinforce.simulation.protocol import FailedReading, GoalTrials
 
 
 def say(console: Console, *parts: str | tuple[str, str]) -> None:
@@ -40,12 +43,12 @@ class LiveView:
     def __init__(self, console: Console, demonstrations: Demonstrations) -> None:
         """Remember where to print, and what an outcome is called."""
         self._say, self._n = partial(say, console), demonstrations.n
-        self._about = demonstrations.outcome_names, demonstrations.outcome_units
+        self._form = demonstrations.outcome_format
 
     def goal(self, number: int, n_goals: int, goal: Point) -> None:
         """Announce a goal."""
         of_all = f" {number} of {n_goals}" if n_goals > 1 else ""
-        self._say((f"\ngoal{of_all}", "bold"), f": {say_place(goal, *self._about)}")
+        self._say((f"\ngoal{of_all}", "bold"), f": {say_place(goal, self._form)}")
 
     def trial(self, result: GoalTrials) -> None:
         """Print the latest trial: how the condition moved, what was seen, solved or not."""
@@ -53,7 +56,7 @@ class LiveView:
         assert trial.error_seen is not None
         aimed, moved = (before[0].condition, "moved ") if before else (goal, "")
         nothing, off, seen = (
-            say_error(error, *self._about)
+            to_words(error, self._form)
             for error in (0.0 * goal, trial.condition - aimed, trial.error_seen)
         )
         aim = "aim at the goal" if off == nothing else f"aim {moved}{off}"
@@ -67,19 +70,24 @@ class LiveView:
             self._say("  ", ("not reached", "bold red"), f" in {len(result.trials)} trials")
         else:
             trials = f"{n} trial{'s' if n > 1 else ''}"
-            self._say(f"  reached: N = {self._n} demonstrations + {trials} = {self._n + n}")
+            shown = f"{self._n} demonstration{'s' if self._n > 1 else ''}"
+            self._say(f"  reached: N = {shown} + {trials} = {self._n + n}")
 
     def summary(self, results: Sequence[GoalTrials]) -> None:
         """Print the count over all goals."""
-        solved = [result.solved_at for result in results if result.solved_at is not None]
-        if len(results) < 2 or not solved:
+        if len(results) < 2 or all(result.solved_at is None for result in results):
             return
-        mean = np.mean(solved)
-        self._say(
-            (f"\n{len(solved)} of {len(results)} goals reached", "bold"),
-            f", on average N = {self._n} + {mean:.1f} = {self._n + mean:.1f} trials",
-        )
+        reached, count = goals_reached(self._n, results)
+        self._say((f"\n{reached}", "bold"), f", on average {count}")
         self._say(f"trials by goal: {trials_by_goal(results)}")
+
+
+def goals_reached(n: int, results: Sequence[GoalTrials]) -> tuple[str, str]:
+    """Say how many goals were reached, and the mean count N of these, with n demonstrations."""
+    solved = [result.solved_at for result in results if result.solved_at is not None]
+    mean = float(np.mean(solved)) if solved else np.nan
+    reached = f"{len(solved)} of {len(results)} goal{'s' if len(results) > 1 else ''} reached"
+    return reached, f"N = {n} + {mean:.1f} = {n + mean:.1f} trials"
 
 
 def trials_by_goal(results: Sequence[GoalTrials]) -> str:
@@ -87,11 +95,9 @@ def trials_by_goal(results: Sequence[GoalTrials]) -> str:
     return ", ".join(str(r.solved_at or f"{len(r.trials)}+") for r in results)
 
 
-def say_outcome(
-    outcome: Point, names: Sequence[str], units: Sequence[str], *, digits: int = 3
-) -> str:
+def say_outcome(outcome: Point, form: OutcomeFormat, *, digits: int = 3) -> str:
     """Say where an object ended, in numbers: `x 0.920 m, y 0.100 m`."""
-    components = zip(names, outcome, units, strict=True)
+    components = zip(form.names, outcome, form.units, strict=True)
     return ", ".join(f"{name} {value:.{digits}f} {unit}" for name, value, unit in components)
 
 
@@ -108,7 +114,7 @@ def asking(
     Returns:
         Asks for the error; a PerceptionFailedError where there is no terminal or no answer.
     """
-    about = demonstrations.outcome_names, demonstrations.outcome_units
+    form = demonstrations.outcome_format
 
     def ask(failure: PerceptionFailedError, _: Rollout, goal: Point, __: object) -> Reading:
         if not sys.stdin.isatty():
@@ -119,14 +125,14 @@ def asking(
         say(console, f"  not seen: {failure}")
         if (latest := getattr(perception, "latest", None)) is not None:
             say(console, f"  picture: {latest}")
-        example = f'"{said}", or ' if (said := error_example(*about)) else ""
+        example = f'"{said}", or ' if (said := error_example(form)) else ""
         while True:
             try:
                 text = answer_to(
-                    f"  what was the error, seen from {say_place(goal, *about)}? for instance "
+                    f"  what was the error, seen from {say_place(goal, form)}? for instance "
                     f"{example}hit: "
                 )
-                return from_words(text, *about)
+                return from_words(text, form)
             except EOFError as error:
                 raise PerceptionFailedError(f"{failure}; no answer came") from error
             except InvalidFeedbackError as error:

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import csv
 import shlex
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
 import numpy as np
 import tyro
-from jaxtyping import Float, UInt8
+from jaxtyping import Float
 
-from prior_reinforce.arrays import FARTHEST, Point
+from prior_reinforce.arrays import Point
 from prior_reinforce.commands import warn
+from prior_reinforce.commands.vision import Vlm, model_of
 from prior_reinforce.environment import SeenObject, TableScene
 from prior_reinforce.errors import (
     ConfigurationError,
@@ -23,14 +23,18 @@ from prior_reinforce.errors import (
 )
 from prior_reinforce.extras import check_installed
 from prior_reinforce.files import named_disk_errors, refuse_foreign, write
-from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
+from prior_reinforce.units import looks_like
 from prior_reinforce.wording import to_words
 
 _COLUMNS = ("x", "y", "u", "v")
+_COARSE = 0.02
+"""Spread of a calibration that is warned of, in [m]; ours: more than any task's tolerance."""
 _EXPOSURE = 10
 """Frames, of which the last is kept; ours: the first are dark until a webcam has set itself."""
-_SAME_GOAL = 0.02
-"""By how far what stands at the goal may be seen from it, in [m]; ours: twice a camera's error."""
+_SAME_GOAL, _OTHER_GOAL = 0.02, 0.15
+"""By how far what stands at the goal may be seen from it, in [m], without a warning; from where on
+the picture or its reading is another one than is thought. Ours: twice a camera's error, and
+farther than anybody misplaces a hoop."""
 
 
 @dataclass(frozen=True)
@@ -46,6 +50,9 @@ class Calibrate:
     down), four points at least, five to know how well it fits."""
     height: float = 0.0
     """Height of the points above the table, in [m]."""
+    picture: Path | None = None
+    """The photograph in which u and v were clicked: others are then scaled to its size, or refused
+    where they are turned or cut."""
     outcome_height: float | None = None
     """Height at which the outcome is defined, in [m], if it is another; needs --camera."""
     camera: tuple[float, float, float] | None = None
@@ -55,25 +62,44 @@ class Calibrate:
 
     def run(self) -> None:
         """Fit, save, and say how far each point lies from where the others put it."""
-        from prior_reinforce.perception.calibration import TableCalibration
+        from prior_reinforce.perception.calibration import TableCalibration, left_out_errors
+        from prior_reinforce.perception.pictures import read_picture
 
         refuse_foreign(self.out, "prior-reinforce table calibration")
         for name, height in (("height", self.height), ("outcome-height", self.outcome_height)):
-            if height is not None and not abs(height) <= FARTHEST:
+            if height is not None and looks_like("m", height):
                 raise ConfigurationError(f"--{name} must be metres above the table, got {height}")
         table_points, pixels = np.hsplit(_read_points(self.points), 2)
-        if np.abs(table_points).max(initial=0.0) > FARTHEST:
+        if looks_like("m", np.abs(table_points).max(initial=0.0)):
             raise ConfigurationError(
                 f"a point {np.abs(table_points).max():g} m away looks like centimetres; x and y "
                 "must be metres"
             )
-        calibration = TableCalibration.fit(table_points, pixels, height=self.height)
+        size = None
+        if self.picture is not None:
+            tall, wide, _ = read_picture(self.picture).shape
+            size = wide, tall
+        calibration = TableCalibration.fit(table_points, pixels, height=self.height, picture=size)
         if self.outcome_height is not None:
             if self.camera is None:
                 raise ConfigurationError("--outcome-height needs --camera X Y Z, in metres")
             calibration = calibration.at_height(self.outcome_height, np.array(self.camera))
         calibration.save(self.out)
         print(f"{calibration.summary()}: {self.out}")
+        _, others_off = left_out_errors(table_points, pixels)
+        if calibration.sd > _COARSE:
+            # Without the point that is wrong the others agree, where they are enough to disagree.
+            agree = others_off <= 2 * np.nan_to_num(others_off, nan=np.inf).min() + 0.001
+            says = " or ".join(
+                f"{i + 1} ({x:g}, {y:g})"
+                for i, (x, y) in enumerate(table_points.tolist())
+                if agree[i]
+            )
+            warn(
+                f"that is coarse; without point {says} the others agree: measure and click it again"
+                if 0 < agree.sum() <= len(agree) / 2
+                else "that is coarse; give more points, in all corners of the table"
+            )
 
 
 @dataclass(frozen=True)
@@ -106,15 +132,16 @@ class Look:
     goal that is set there, and what was seen is kept there, in pictures/."""
     trial: int | None = None
     """Number of that trial."""
-    vlm: VisionLanguageModelConfig = field(default_factory=VisionLanguageModelConfig)
-    """Endpoint and model (docs/perception.md)."""
+    vlm: Vlm = None
 
     def run(self) -> None:
         """Look, keep what was seen beside the photograph, and say what to tell."""
         from prior_reinforce.perception.calibration import TableCalibration
-        from prior_reinforce.perception.vlm import CAMERA_SD, VisionLanguageModel
+        from prior_reinforce.perception.pictures import read_picture
+        from prior_reinforce.perception.vlm import VisionLanguageModel
 
         goal, folder, stem = self._of_trial()
+        around = None if goal is None else folder.parent
         drawn = folder / f"{stem}.png"
         written = drawn.with_suffix(".json")
         for path in (folder, drawn, written):
@@ -130,8 +157,11 @@ class Look:
         )
         if self.camera is not None:
             _photograph(self.camera, self.picture)
-        picture = _read_picture(self.picture)
-        with VisionLanguageModel(scene, self.vlm, calibration=calibration) as model:
+        picture = read_picture(self.picture)
+        here = calibration.in_picture((picture.shape[1], picture.shape[0]))
+        if here is not calibration:
+            warn("the picture has another size than that of the calibration, and is scaled to it")
+        with VisionLanguageModel(scene, model_of(self.vlm, around), calibration=here) as model:
             reading = model.read(picture)
         if reading.unanswered:
             raise EndpointError(f"{reading.problem}; then call look again")
@@ -148,13 +178,18 @@ class Look:
         if goal is not None and reading.reached.place is not None:
             error = reading.reached.place - goal
             moved = float(np.linalg.norm(error - reading.error_seen))
-            if moved > _SAME_GOAL:
-                warn(
-                    f"{self.goal} is seen {100 * moved:.1f} cm from the goal that is set; "
-                    "check the calibration, or move it there"
+            says = f"{self.goal} is seen {100 * moved:.1f} cm from the goal that is set; "
+            if moved > max(_OTHER_GOAL, 3 * here.sd):
+                failed = PerceptionFailedError(
+                    f"{says}is this the picture, the calibration and the model family that you "
+                    f"think? look at {drawn}"
                 )
+                failed.changed = True
+                raise failed
+            if moved > _SAME_GOAL:
+                warn(f"{says}check the calibration, or move it there")
         print(f"seen: {to_words(error)}   boxes: {drawn}")
-        numbers = " ".join(f"{component:.4f}+-{CAMERA_SD:g}" for component in error)
+        numbers = " ".join(f"{component:.4f}+-{here.sd:.2g}" for component in error)
         told = "FOLDER TRIAL" if goal is None else f"{shlex.quote(str(folder.parent))} {self.trial}"
         print(f"if the boxes are right: prior-reinforce tell {told} {numbers}")
 
@@ -162,13 +197,14 @@ class Look:
         """The goal that the trial was for, where to keep what is seen, and its name there."""
         if self.workspace is None and self.trial is None:
             return None, self.picture.parent, f"{self.picture.stem}-seen"
-        from prior_reinforce.bench.workspace.workspace import Workspace, workspace_around
+        from prior_reinforce.arm.workspace.manifest import workspace_around
+        from prior_reinforce.arm.workspace.workspace import Workspace
 
         folder = self.workspace or workspace_around(Path())
         if folder is None or self.trial is None:
             raise ConfigurationError("--workspace and --trial say together which trial it was")
         with Workspace(folder) as workspace:
-            state, units = workspace.state, workspace.manifest.outcome_units
+            state, units = workspace.state, workspace.manifest.outcome_format.units
             if tuple(units) != ("m", "m"):
                 raise ConfigurationError(
                     f"a photograph from above shows two lengths, but outcomes are in {list(units)};"
@@ -201,28 +237,19 @@ def _photograph(camera: str, path: Path) -> None:
 
 
 def _read_points(path: Path) -> Float[np.ndarray, "n 4"]:
-    """Rows of x, y [m], u, v [px]."""
-    try:
-        with path.open(newline="", encoding="utf-8") as file:
-            rows = list(csv.DictReader(file, skipinitialspace=True))
-        return np.array([[float(row[name]) for name in _COLUMNS] for row in rows]).reshape(-1, 4)
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    """Rows of x, y [m] (a head may say `x [cm]`), u, v [px]; rows without any are skipped."""
+    from prior_reinforce.arm.recordings.tables import read_table
+    from prior_reinforce.arm.recordings.units import conversion, split_unit
+
+    table = read_table(path, head=_COLUMNS)
+    split = [split_unit(name.strip()) for name in table.names]
+    names = [name.lower() for name, _ in split]
+    if missing := {*_COLUMNS} - {*names}:
         raise FileFormatError(
-            f"cannot read points from {path} ({error}); expected a CSV with the columns "
+            f"{path} has no column {min(missing)}; expected a CSV with the columns "
             f"{', '.join(_COLUMNS)} and a number in each"
-        ) from error
-
-
-def _read_picture(path: Path) -> UInt8[np.ndarray, "height width 3"]:
-    """RGB, upright as the camera says."""
-    from PIL import Image, ImageOps
-
-    try:
-        # Pillow goes by content and not by name, and starts other programs for some formats.
-        with Image.open(path, formats=("PNG", "JPEG")) as image:
-            return np.asarray(ImageOps.exif_transpose(image).convert("RGB"))
-    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
-        first_line = str(error).partition("\n")[0]
-        raise FileFormatError(
-            f"cannot read the picture {path} ({first_line}); expected a PNG or JPEG"
-        ) from error
+        )
+    at = [names.index(name) for name in _COLUMNS]
+    scale = [conversion(table.units[c] or split[c][1] or "m", "m", names[c]) for c in at[:2]]
+    rows = table.rows([i for i in range(len(table)) if any(table.cells[c][i] for c in at)])
+    return rows.columns(at) * [*scale, 1.0, 1.0]

@@ -5,8 +5,6 @@ from __future__ import annotations
 import os
 import select
 import sys
-import termios
-import tty
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,22 +13,22 @@ from typing import Any, Literal
 import numpy as np
 from typing_extensions import Self
 
-from prior_reinforce.bench.importing.options import ReadOptions
-from prior_reinforce.bench.importing.outcomes import OUTCOMES_FILE
-from prior_reinforce.bench.robots.executors.base import Guiding
-from prior_reinforce.bench.robots.executors.drive import arms_columns, guiding_of
-from prior_reinforce.bench.robots.executors.lock import executing_lock
-from prior_reinforce.bench.robots.executors.watch import State, Take, Watch
-from prior_reinforce.bench.workspace.manifest import Manifest
-from prior_reinforce.bench.workspace.workspace import Workspace
-from prior_reinforce.commands.base import OnWorkspace, says_yes
+from prior_reinforce.arm.executing.base import Guiding
+from prior_reinforce.arm.executing.drive import arms_columns, guiding_of
+from prior_reinforce.arm.executing.lock import executing_lock
+from prior_reinforce.arm.executing.watch import State, Take, Watch
+from prior_reinforce.arm.recordings.options import ReadOptions
+from prior_reinforce.arm.recordings.outcomes import OUTCOMES_FILE
+from prior_reinforce.arm.workspace.manifest import Manifest
+from prior_reinforce.arm.workspace.workspace import Workspace
+from prior_reinforce.commands.base import OnWorkspace
 from prior_reinforce.commands.importing import Import
 from prior_reinforce.commands.outcome_questions import Place, ask_place, keep_places
-from prior_reinforce.commands.trials import arm_of
+from prior_reinforce.commands.questions import agrees
 from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
 from prior_reinforce.files import named_disk_errors
-from prior_reinforce.plans.motions import PlanFormat
-from prior_reinforce.wording import plain
+from prior_reinforce.plans.plan_format import PlanFormat
+from prior_reinforce.terminal import plain
 
 RECORDINGS = "recordings"
 Which = Literal["measured", "commanded"]
@@ -40,12 +38,24 @@ _FEWEST = 10
 """States of a take; ours: a tenth of a second, which nobody means."""
 _SILENT = 10.0
 """How long an arm may be silent, in [s]; ours."""
-_QUESTIONS: dict[Guiding, str] = {
-    "as it is": "",
-    "let go": "hold the arm: its torque goes off, and what nobody holds falls; do you hold it?",
-    "led": "the arm goes at once where its leader is, and follows it; may it?",
+_QUESTIONS: dict[Guiding, tuple[str, str]] = {
+    "as it is": ("", ""),
+    "let go": (
+        "hold the arm: its torque goes off, and an arm that nobody holds falls. Do you hold it?",
+        "yes",
+    ),
+    "led": (
+        "the arm will move at once and FAST to where its leader is, then follow it. NOT checked: "
+        "the way there, self-collision, the table. Ctrl-C ends it. Is the area clear?",
+        "follow",
+    ),
 }
-"""What a person is asked before an arm is guided."""
+"""What a person is asked before an arm is guided, and what to type for it."""
+_READING: dict[Guiding, str] = {
+    "as it is": "reading {}; move it by hand now",
+    "let go": "reading {}; move it by hand now",
+    "led": "reading {}; it follows its leader now",
+}
 _KEYS = "space or enter starts and ends a take, d drops the last, n names it, q imports them"
 
 
@@ -69,8 +79,6 @@ class Record(OnWorkspace):
     """Before each of those, to bring the arm to where it starts, in seconds."""
     append: bool = False
     """Keep the demonstrations in use and add these to them."""
-    executor: str | None = None
-    """The executor that [arm] names, where it is your own: module:Class."""
     yes: bool = False
     """The arm's torque goes off, or a leader moves it at once: do not ask whether it may."""
 
@@ -83,17 +91,19 @@ class Record(OnWorkspace):
                 f"{self.takes}, {self.seconds:g} and {self.pause:g}"
             )
         workspace.state.refuse_open_trial("recording demonstrations")
-        manifest, arm = workspace.manifest, arm_of(workspace, self.executor)
+        manifest, arm = workspace.manifest, workspace.manifest.driven_by
         if arm is None:
             raise ConfigurationError(
                 f"{workspace.folder} names no arm; add [arm] with its executor to the manifest"
             )
-        question = _QUESTIONS[guiding_of(arm)]
+        guiding = guiding_of(arm)
+        question, answer = _QUESTIONS[guiding]
         asked = sys.stdin.isatty()
-        if question and not (self.yes or (asked and says_yes(question, "y"))):
+        if question and not (self.yes or (asked and agrees(question, answer))):
             raise ConfigurationError(
-                f"nobody said yes to {question!r}; nothing was done: say --yes"
+                f'nobody said {answer} to "{question}"; nothing was done: say --yes'
             )
+        print(f"connecting to {arm.executor}; this may take half a minute", flush=True)
         with (
             executing_lock(workspace.folder, manifest.arm) as lock,
             Watch(arm, lock) as watch,
@@ -103,7 +113,7 @@ class Record(OnWorkspace):
             folder = _new_folder(workspace.folder / RECORDINGS)
             asks = self.takes is None
             session = _Session(manifest, folder, channels, self.motion, terminal, asks)
-            print(f"{watch.arm.model} is read", flush=True)
+            print(_READING[guiding].format(watch.arm.model), flush=True)
             if asks:
                 _by_keys(watch, session)
             else:
@@ -245,9 +255,11 @@ class _Session:
 
     def _ask_place(self, name: str) -> None:
         """Ask where the object of a take landed; what is skipped, `import` asks for."""
-        names, units = self.manifest.outcome_names, self.manifest.outcome_units
-        question = f"where did it land, {' '.join(names)} [{', '.join(dict.fromkeys(units))}]? "
-        place = ask_place(lambda: self.terminal.line(question), self.manifest, "", "s", "skip")
+        form = self.manifest.outcome_format
+        question = (
+            f"where did it land, {' '.join(form.names)} [{', '.join(dict.fromkeys(form.units))}]? "
+        )
+        place = ask_place(lambda: self.terminal.line(question), form, "", "s", "skip")
         if not isinstance(place, str):
             self.taken[name] = place
             self._keep()
@@ -255,7 +267,7 @@ class _Session:
     def _keep(self) -> None:
         """Write the table of outcomes beside the recordings."""
         places = {name: place for name, place in self.taken.items() if place is not None}
-        keep_places(self.folder / OUTCOMES_FILE, places, self.manifest)
+        keep_places(self.folder / OUTCOMES_FILE, places, self.manifest.outcome_format)
 
 
 class _Terminal:
@@ -266,12 +278,17 @@ class _Terminal:
 
     def __enter__(self) -> Self:
         if sys.stdin.isatty():
+            import termios  # not on Windows, where other commands go on
+            import tty
+
             self._before = termios.tcgetattr(sys.stdin)
             tty.setcbreak(sys.stdin, termios.TCSADRAIN)  # which keeps what was typed ahead
         return self
 
     def __exit__(self, *_: object) -> None:
         if self._before is not None:
+            import termios
+
             termios.tcsetattr(sys.stdin, termios.TCSADRAIN, self._before)
 
     def key(self) -> str:

@@ -1,9 +1,8 @@
-"""Stage 2 on the simulated tasks: demo, adapt, rollout."""
+"""Stage 2 on the simulated tasks: demo, adapt."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from importlib.metadata import version
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -11,40 +10,40 @@ import numpy as np
 import tyro
 from rich.console import Console
 
+import prior_reinforce
 from prior_reinforce.adapters import DEFAULT_ADAPTER, make_adapter
-from prior_reinforce.arrays import Frames, Point, Points
-from prior_reinforce.commands.learning import Fitting, GeneratorChoice
+from prior_reinforce.arrays import Points
+from prior_reinforce.commands.learning import GeneratorChoice
 from prior_reinforce.commands.live import (
     LiveView,
     asking,
     fit_progress,
+    goals_reached,
     say,
-    say_outcome,
     trials_by_goal,
 )
+from prior_reinforce.commands.vision import Vlm, model_of
 from prior_reinforce.commands.workspace import AdapterChoice
 from prior_reinforce.environment import Task
-from prior_reinforce.errors import ConfigurationError, FileFormatError, InvalidGoalError
+from prior_reinforce.errors import ConfigurationError, InvalidGoalError
 from prior_reinforce.files import claim_folder
 from prior_reinforce.generators import make_generator
 from prior_reinforce.generators.base import Generator
-from prior_reinforce.lab.experiments.adaptation import goal_record, recording
-from prior_reinforce.lab.experiments.learned import load_learned, save_learned
-from prior_reinforce.lab.experiments.protocol import (
+from prior_reinforce.perception import PERCEPTIONS, make_perception
+from prior_reinforce.perception.base import Perception
+from prior_reinforce.perception.vlm_client import without_secrets
+from prior_reinforce.plans.motions import Demonstrations
+from prior_reinforce.report import AdaptationRecord, write_report
+from prior_reinforce.session.session import Session
+from prior_reinforce.simulation.adaptation import goal_record, recording
+from prior_reinforce.simulation.learned import load_learned, save_learned
+from prior_reinforce.simulation.protocol import (
     GoalTrials,
-    is_hit,
     perceive_demonstrations,
     reach_goals,
     unseen_goals,
 )
-from prior_reinforce.lab.tasks import TASKS, make_task
-from prior_reinforce.perception import PERCEPTIONS, make_perception
-from prior_reinforce.perception.base import Perception
-from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig, without_secrets
-from prior_reinforce.plans.motions import Demonstrations
-from prior_reinforce.readings import as_tolerance
-from prior_reinforce.report import AdaptationRecord, record_film, write_report
-from prior_reinforce.session.session import Session
+from prior_reinforce.simulation.tasks import TASKS, make_task
 from prior_reinforce.wording import say_tolerance
 
 SEEN = "seen"
@@ -96,39 +95,49 @@ def learn(
 
 
 @dataclass(frozen=True)
-class Train(Fitting, OnTask):
-    """Learn outcome -> plan from a simulated task's demonstrations (Stage 1), for `--model`.
-
-    For example:
-        prior-reinforce train --task curling --generator diffusion --out runs/curling
-    """
-
-    out: Path = Path("runs/model")
-    """Folder for the model."""
-
-    def run(self) -> None:
-        """Fit and save."""
-        console = Console()
-        # Made first: a wrong setting is reported before anything is read.
-        generator = make_generator(self.choice, device=self.device)
-        _, demonstrations = self.open()
-        claim_folder(self.out)
-        learn(demonstrations, self.out, generator, self.seed, console)
-        say(console, f"model of {demonstrations.n} demonstrations saved in {self.out}")
-
-
-@dataclass(frozen=True)
 class _Reaching:
     """How goals are reached."""
 
     generator: GeneratorChoice = "diffusion"
     perception: PerceptionChoice = "eye"
-    vlm: VisionLanguageModelConfig = field(default_factory=VisionLanguageModelConfig)
-    """Endpoint and model for --perception vlm (docs/perception.md)."""
+    vlm: Vlm = None
     film: bool = True
     """Draw the last trial of each goal as a film."""
     seed: int = 0
     """Seed of training, goals, disturbances and perception."""
+
+
+@dataclass(frozen=True)
+class Reached:
+    """Goals that were worked through, and what their report says."""
+
+    out: Path
+    results: list[GoalTrials]
+    records: list[AdaptationRecord]
+    title: str
+    facts: dict[str, str]
+    region: Points
+
+    def __str__(self) -> str:
+        """The count, for a person."""
+        reached, count = goals_reached(self.records[0].demonstrations.n, self.results)
+        return f"{reached}, {count}"
+
+    def write(self, note: str = "") -> int:
+        """Write the report; exit status 1 if a goal was not reached."""
+        console = Console()
+        page = write_report(
+            self.out,
+            self.records,
+            title=self.title,
+            facts=self.facts,
+            region=self.region,
+            note=note,
+        )
+        say(console, f"report: {page}")
+        if (self.out / SEEN).is_dir():
+            say(console, f"what was seen, with boxes and all answers: {self.out / SEEN}")
+        return 0 if all(result.solved_at for result in self.results) else 1
 
 
 @dataclass(frozen=True)
@@ -143,8 +152,7 @@ class Adapt(_Reaching, OnTask):
     """The goal in metres, for instance `0.92 0.10` (forward, left), or `random`. Several are worked
     through one after another, as in one afternoon: `0.92 0.10 1.05 -0.10`, `random random`."""
     model: Path | None = None
-    """Folder of a model learned before; None learns one now. It knows its generator itself, unless
-    that is a class of your own."""
+    """Folder of a model learned before; None learns one now."""
     adapter: AdapterChoice = DEFAULT_ADAPTER
     rounds: int = 10
     """Largest number of trials per goal."""
@@ -156,27 +164,26 @@ class Adapt(_Reaching, OnTask):
         task, demonstrations = self.open()
         if self.rounds < 1:
             raise ConfigurationError(f"--rounds must be at least 1, got {self.rounds}")
-        return self.reach(task, demonstrations, self._goals(task, demonstrations))
+        reached = self.reach(task, demonstrations, self._goals(task, demonstrations))
+        return reached.write()
 
     def reach(
         self, task: Task, demonstrations: Demonstrations, goals: Points, *, perceive: bool = False
-    ) -> int:
-        """Learn, work through goals in one session, and write the report.
+    ) -> Reached:
+        """Learn, and work through goals in one session.
 
         Args:
             task: Where they are tried.
             demonstrations: D_prior.
             goals: Each is worked through in turn, [m].
             perceive: Whether the demonstrations are executed first, for their outcomes to be seen.
-
-        Returns:
-            Exit status: 1 if a goal was not reached.
         """
         console = Console()
         # Made first, so that a wrong setting is reported before anything is learned.
         adapter, unfitted = make_adapter(self.adapter), make_generator(self.generator)
+        model = model_of(self.vlm)
         with make_perception(
-            self.perception, scene=task.scene, config=self.vlm, seed=self.seed
+            self.perception, scene=task.scene, config=model, seed=self.seed
         ) as perception:
             claim_folder(self.out)
             if perceive:
@@ -185,15 +192,14 @@ class Adapt(_Reaching, OnTask):
                 folder = self.out / "model"
                 generator = learn(demonstrations, folder, unfitted, self.seed, console)
             else:
-                generator = load_learned(self.model, demonstrations, generator=self.generator)
+                generator = load_learned(self.model, demonstrations)
             session = Session(generator, adapter, demonstrations)
             results, records = self._adapt(task, session, perception, goals, console)
         seen_by = self.perception
         if seen_by.split(",")[0] == "vlm":
-            seen_by += f", {self.vlm.model} at {without_secrets(self.vlm.base_url)}"
+            seen_by += f", {model.model} at {without_secrets(model.base_url)}"
         outcomes = f"seen by {self.perception}" if perceive else "exact"
-        names, units = demonstrations.outcome_names, demonstrations.outcome_units
-        tolerance = say_tolerance(as_tolerance(task.tolerance, names, units), names, units)
+        tolerance = say_tolerance(demonstrations.outcome_format.within(task.tolerance))
         facts = {
             "Task": f"{task.name}, tolerance {tolerance}",
             "Demonstrations": f"{demonstrations.n}, {self.demonstrations}, outcomes {outcomes}",
@@ -203,20 +209,17 @@ class Adapt(_Reaching, OnTask):
             "Seed": str(self.seed),
             "Trials by goal": trials_by_goal(results),
             "Earlier goals' trials used": "yes" if session.goals[-1].carry_over else "no",
-            "Version": version("prior-reinforce"),
+            "Version": prior_reinforce.__version__,
         }
         title = f"{task.name}: {len(goals)} new goal" + "s" * (len(goals) > 1)
-        page = write_report(self.out, records, title=title, facts=facts, region=task.region)
-        say(console, f"report: {page}")
-        if hasattr(perception, "last_reading") and (self.out / SEEN).is_dir():
-            say(console, f"what was seen, with boxes and all answers: {self.out / SEEN}")
-        return 0 if all(result.solved_at for result in results) else 1
+        return Reached(self.out, results, records, title, facts, task.region)
 
     def _perceive(
         self, task: Task, recorded: Demonstrations, perception: Perception, console: Console
     ) -> Demonstrations:
         """Execute the demonstrations once, see where they go, and keep that for `adapt`."""
-        say(console, f"executing {recorded.n} demonstrations once, seen by {self.perception}")
+        shown = "1 demonstration" if recorded.n == 1 else f"{recorded.n} demonstrations"
+        say(console, f"executing {shown} once, seen by {self.perception}")
         eyes = recording(perception, self.out / SEEN, "demonstration")
         ask = asking(console, recorded, eyes)
         seen = perceive_demonstrations(task, recorded, eyes, seed=self.seed, on_failed_reading=ask)
@@ -271,92 +274,37 @@ class Adapt(_Reaching, OnTask):
 
 @dataclass(frozen=True)
 class Demo(_Reaching):
-    """The main job: six demonstrations seen by eye and learned from, then five unseen goals.
+    """The main job: shown once, seen by eye, then five unseen goals; the paper's six beside it.
 
     For example:
         prior-reinforce demo --out runs/demo
     """
 
     out: Path = Path("runs/demo")
-    """Folder for the model and the report."""
+    """Folder for the report; what six demonstrations did is in its folder `six`."""
     goals: int = 5
     """Number of unseen goals."""
+    six: bool = True
+    """Also reach the goals as in the paper: from six demonstrations, without symmetry, and by a
+    Gaussian process."""
 
     def run(self) -> int:
-        """See the demonstrations, learn, adapt, report."""
+        """See one demonstration, adapt; the same with six; report."""
         if self.goals < 1:
             raise ConfigurationError(f"--goals must be at least 1, got {self.goals}")
-        adapt = Adapt(**{name: value for name, value in vars(self).items() if name != "goals"})
-        task, recorded = adapt.open()
+        console, own = Console(), {**vars(self)}
+        own.pop("goals"), own.pop("six")
+        moved = "" if "symmetry=" in self.generator else ",symmetry=use"
+        once = Adapt(**{**own, "generator": self.generator + moved})
+        task, recorded = once.open()
         goals = unseen_goals(task, recorded, self.goals, np.random.default_rng([self.seed, 3]))
-        return adapt.reach(task, recorded, goals, perceive=True)
-
-
-@dataclass(frozen=True)
-class Rollout(OnTask):
-    """Execute one plan on a simulated task: a demonstration's, or one generated for a condition.
-
-    For example:
-        prior-reinforce rollout --task curling --demonstration 0 --repeats 5
-    """
-
-    demonstration: int | None = None
-    """Number of the demonstration to execute, from 0."""
-    condition: tuple[float, ...] | None = None
-    """Condition to generate the plan for, in metres; needs --model."""
-    model: Path | None = None
-    """Folder of a model made by `train`."""
-    repeats: int = 1
-    """How often to execute the plan."""
-    film: Path | None = None
-    """Write the first execution as a film to this .mp4 file."""
-    seed: int = 0
-    """Seed of the disturbances."""
-
-    def run(self) -> None:
-        """Execute and print where it went."""
-        console = Console()
-        task, demonstrations = self.open()
-        plan, aim = self._plan(demonstrations)
-        if self.repeats < 1:
-            raise ConfigurationError(f"--repeats must be at least 1, got {self.repeats}")
-        if self.film is not None and self.film.suffix != ".mp4":
-            raise ConfigurationError(f"--film must name an .mp4 file, got {self.film}")
-        if self.film is not None and self.film.exists():
-            raise FileFormatError(f"{self.film} is there already; choose another name")
-        plans = np.repeat(plan[None], self.repeats, axis=0)
-        rollouts = task.rollout(plans, np.random.default_rng(self.seed))
-        units = demonstrations.outcome_units
-        for number, rollout in enumerate(rollouts, start=1):
-            hit = "  within the tolerance" if is_hit(rollout, aim, task.tolerance) else ""
-            lost = "" if rollout.valid else "  (lost: it has no place on the table)"
-            place = say_outcome(rollout.outcome, task.outcome_names, units)
-            say(console, f"rollout {number}: {place}{lost}{hit}")
-        if self.repeats > 1:
-            outcomes = np.array([rollout.outcome for rollout in rollouts])
-            spread = [
-                f"{100 * value:.2f} cm" if unit == "m" else f"{value:.4f} {unit}"
-                for value, unit in zip(outcomes.std(axis=0, ddof=1), units, strict=True)
-            ]
-            say(console, "spread (sd): " + ", ".join(spread))
-        if self.film is not None:
-            frames = task.film(plan, aim, np.random.default_rng(self.seed))
-            film = record_film(frames, self.film.parent, self.film.stem)
-            say(console, f"film: {film.video}, its key moments: {film.strip}")
-
-    def _plan(self, demonstrations: Demonstrations) -> tuple[Frames, Point]:
-        """The plan to execute, and the outcome that it is for."""
-        if (self.demonstration is None) == (self.condition is None):
-            raise ConfigurationError("give either --demonstration or --condition")
-        if self.demonstration is not None:
-            number = self.demonstration
-            if not 0 <= number < demonstrations.n:
-                raise ConfigurationError(
-                    f"--demonstration must be 0 to {demonstrations.n - 1}, got {number}"
-                )
-            return demonstrations.plans[number], demonstrations.outcomes_seen[number]
-        if self.model is None:
-            raise ConfigurationError("--condition needs --model, a folder made by train")
-        condition = demonstrations.check_goal(self.condition or ())
-        generator = load_learned(self.model, demonstrations)
-        return generator.generate(condition[None])[0], condition
+        say(console, ("one demonstration", "bold"))
+        reached, note = once.reach(task, recorded.only([0]), goals, perceive=True), ""
+        if self.six:
+            say(console, ("\nsix demonstrations, as in the paper", "bold"))
+            paper = Adapt(**{**own, "adapter": "gp", "out": self.out / "six", "film": False})
+            beside = paper.reach(task, recorded.without_symmetry(), goals, perceive=True)
+            beside.write()
+            note = f"As in the paper, with the same goals: {beside} (six/report.html)."
+            say(console, f"\nshown once: {reached}\nas in the paper: {beside}")
+        return reached.write(note)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+import sys
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -11,17 +12,16 @@ import msgspec
 import tyro
 
 from prior_reinforce.adapters import ADAPTERS, DEFAULT_ADAPTER
-from prior_reinforce.arrays import Point
-from prior_reinforce.bench.robots import RobotLimits
-from prior_reinforce.bench.robots.presets import PRESETS
-from prior_reinforce.bench.workspace.manifest import NewWorkspace
-from prior_reinforce.bench.workspace.records import status_record, trial_records, trials_table
-from prior_reinforce.bench.workspace.status import describe, say_trial
-from prior_reinforce.bench.workspace.workspace import Workspace
+from prior_reinforce.arm.robots import RobotLimits
+from prior_reinforce.arm.robots.presets import PRESETS
+from prior_reinforce.arm.workspace.declared import WAYS, read_object
+from prior_reinforce.arm.workspace.template import NewWorkspace
+from prior_reinforce.arm.workspace.view import trials_table
+from prior_reinforce.arm.workspace.workspace import Workspace
 from prior_reinforce.commands.base import Json, OnWorkspace, Words, print_json, print_next
-from prior_reinforce.errors import ConfigurationError, InvalidFeedbackError, InvalidGoalError
-from prior_reinforce.files import check_path
-from prior_reinforce.wording import read_place, say_place, say_tolerance
+from prior_reinforce.commands.questions import answer_to
+from prior_reinforce.errors import ConfigurationError, UnclearFlangeError
+from prior_reinforce.wording import say_place, say_tolerance
 
 AdapterChoice = Annotated[
     str, tyro.conf.arg(help=f"How the condition is corrected: {ADAPTERS.help}.")
@@ -33,8 +33,10 @@ class New(NewWorkspace):
     """Make a workspace: a folder with a commented manifest.
 
     For example:
+        prior-reinforce new hoop --symmetry carried --box -0.8 -0.7 0.4 0.6 0.7 1.4
         prior-reinforce new hoop --robot ur5e
         prior-reinforce new hoop --robot my_arm.urdf --gripper percent
+        prior-reinforce new hoop --robot my_arm.urdf --base torso_lift_link
         prior-reinforce new hoop --robot none
     """
 
@@ -50,12 +52,50 @@ class New(NewWorkspace):
 
     def run(self) -> None:
         """Write the folder."""
-        text = self.manifest(self.folder.resolve().name)
+        asked = self._with_flange()._asked()
+        text = asked.manifest(self.folder.resolve().name)
         with Workspace.create(self.folder, text) as workspace:
             print(f"workspace made in {self.folder}; look through {self.folder / 'workspace.toml'}")
             if workspace.manifest.robot is not None:
                 print(_say_robot(workspace.manifest.robot))
+            if (moved := workspace.manifest.symmetry) is not None:
+                where = moved.object if isinstance(moved.object, str) else "X Y"
+                print(f"symmetry: {WAYS[where]}; one demonstration is enough, see docs/symmetry.md")
             print_next(workspace)
+
+    def _with_flange(self) -> New:
+        """The same with what a person at a terminal says of the flange, where it is not clear."""
+        if not sys.stdin.isatty() or not self.robot.lower().endswith((".urdf", ".xml")):
+            return self
+        try:
+            self.described(Path(self.robot))
+        except UnclearFlangeError as error:
+            print(error)
+            tip = answer_to(f"link that is the flange [{error.proposed}]: ").strip()
+            return replace(self, tip=tip or error.proposed or None)
+        return self
+
+    def _asked(self) -> New:
+        """The same with what a person at a terminal says of the object, and of the box."""
+        if self.symmetry is not None or not sys.stdin.isatty():
+            return self
+        for way, means in WAYS.items():
+            print(f"  {way:<9} {means}")
+        said = answer_to("where is the object before it leaves? one demonstration is then enough: ")
+        where, asked = read_object(said.strip() or "none"), replace(self, symmetry=said or "none")
+        if where in ("anywhere", "none") or self.robot == "none" or self.box or self.no_box:
+            return asked
+        corners = answer_to(
+            "a turned motion sweeps other parts of the room: two corners of the box that the tool "
+            'tip must stay in, x y z x y z in metres, or "no box": '
+        )
+        if corners.strip().lower() == "no box":
+            return replace(asked, no_box=True)
+        try:
+            low_x, low_y, low_z, x, y, z = map(float, corners.replace(",", " ").split())
+        except ValueError as error:
+            raise ConfigurationError(f"six numbers or no box, got {corners!r}") from error
+        return replace(asked, box=(low_x, low_y, low_z, x, y, z))
 
 
 def _say_robot(robot: RobotLimits) -> str:
@@ -69,24 +109,11 @@ def _say_robot(robot: RobotLimits) -> str:
     )
 
 
-def read_goal(workspace: Workspace, words: tuple[str, ...]) -> Point:
-    """Read a goal as a person says it, in the outcome's units.
-
-    Raises:
-        InvalidGoalError: It is none.
-    """
-    manifest = workspace.manifest
-    try:
-        return read_place(" ".join(words), manifest.outcome_names, manifest.outcome_units)
-    except InvalidFeedbackError as error:
-        raise InvalidGoalError(f"goal: {error}") from error
-
-
 def print_goal(workspace: Workspace) -> None:
     """Say which goal the next trials are for."""
-    goal, names = workspace.state.goals[-1], workspace.manifest.outcome_names
-    place = say_place(goal.goal, names, goal.units)
-    print(f"goal {goal.number}: {place}; within {say_tolerance(goal.tolerance, names, goal.units)}")
+    goal = workspace.state.goals[-1]
+    place, within = say_place(goal.goal, goal.format), say_tolerance(goal.format)
+    print(f"goal {goal.number}: {place}; within {within}")
 
 
 @dataclass(frozen=True)
@@ -113,7 +140,7 @@ class Goal(OnWorkspace):
 
     def _run_on(self, workspace: Workspace, words: tuple[str, ...]) -> None:
         workspace.set_goal(
-            read_goal(workspace, words),
+            " ".join(words),
             carry_over=None if self.memory is None else self.memory == "workspace",
             adapter=self.adapter,
             new_hardware=self.new_hardware,
@@ -134,10 +161,11 @@ class Status(OnWorkspace):
     json: Json = False
 
     def _run_on(self, workspace: Workspace, words: tuple[str, ...]) -> None:
+        view = workspace.status()
         if self.json:
-            print_json(status_record(workspace))
+            print_json(view)
         else:
-            print(describe(workspace))
+            print(view.text)
 
 
 @dataclass(frozen=True)
@@ -156,16 +184,16 @@ class Trials(OnWorkspace):
     def _run_on(self, workspace: Workspace, words: tuple[str, ...]) -> None:
         if self.csv and self.json:
             raise ConfigurationError("--csv or --json: drop one of the two")
+        view = workspace.status()
         if self.json:
-            print_json(trial_records(workspace))
+            print_json(view.trials)
         elif self.csv:
-            print(trials_table(workspace), end="")
+            print(trials_table(view), end="")
         else:
-            names, units = workspace.manifest.outcome_names, workspace.manifest.outcome_units
-            for trial in workspace.state.trials:
-                aim = say_place(trial.condition, names, units)
-                said = f"aimed at {aim}: {say_trial(workspace, trial)}"
-                print(f"goal {trial.goal_number}  trial {trial.number:<4}{said}")
+            for trial in view.trials:
+                aim = say_place(trial.condition, view.outcome_format)
+                said = f"aimed at {aim}: {trial.line}"
+                print(f"goal {trial.goal}  trial {trial.number:<4}{said}")
 
 
 @dataclass(frozen=True)
@@ -196,59 +224,13 @@ class Report(OnWorkspace):
     def _run_on(self, workspace: Workspace, words: tuple[str, ...]) -> None:
         from rich.console import Console
 
+        if self.out is not None and self.out.suffix.lower() in (".html", ".htm", ".pdf"):
+            raise ConfigurationError(
+                f"--out is a folder for the page and its pictures, got {self.out}; give --out "
+                f"{self.out.with_suffix('')}"
+            )
         from prior_reinforce.commands.live import drawing_progress
 
         with drawing_progress(Console()) as progress:
             page = workspace.report(self.out, progress=progress)
         print(f"report: {page}")
-
-
-@dataclass(frozen=True)
-class Pack(OnWorkspace):
-    """Write a workspace into one file, to be opened on another machine.
-
-    For example:
-        prior-reinforce pack hoop hoop.zip
-    """
-
-    words: Annotated[Words, tyro.conf.arg(metavar="[WORKSPACE] FILE")] = ()
-    """The workspace (the current folder's if not given), and the file to write."""
-
-    takes_words = True
-
-    def _run_on(self, workspace: Workspace, words: tuple[str, ...]) -> None:
-        if len(words) != 1:
-            raise ConfigurationError("say which file to write: one name, such as hoop.zip")
-        file = check_path(Path(words[0]))
-        print(f"packed: {file}  sha256 {workspace.pack(file)}")
-        said = sum(bool(getattr(e, "output_tail", "")) for e in workspace.state.executions.values())
-        if said:
-            print(f"it holds the last output of {said} commands, as `log` shows: read it first")
-
-
-@dataclass(frozen=True)
-class Unpack:
-    """Make a workspace of what `pack` wrote; nothing in it is run.
-
-    For example:
-        prior-reinforce unpack hoop.zip hoop
-    """
-
-    file: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
-    """What `pack` wrote."""
-    folder: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="WORKSPACE")]
-    """Folder to make."""
-
-    def run(self) -> None:
-        """Make it."""
-        from prior_reinforce.bench.workspace.packing import unpack
-
-        print(f"unpacked: {self.folder}  sha256 {unpack(self.file, self.folder)}")
-        with Workspace(self.folder) as workspace:
-            waiting = workspace.state.open_trial
-            if waiting is not None:
-                print(
-                    f"trial {waiting.number} waits: was it executed where this was packed? then "
-                    "tell or void it here"
-                )
-            print(describe(workspace))

@@ -8,22 +8,55 @@ import shutil
 import signal
 import subprocess
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 from threadpoolctl import threadpool_limits
 
+from tests import tiers
 from tests.shapes import check_shapes
 
 # Before anything imports the package, or it stays unchecked.
 check_shapes("prior_reinforce")
+check_shapes("reproduction")
+check_shapes("simulators")
 
 # Threads that wait for each other by spinning crawl on a busy machine; two test processes are one.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("MUJOCO_GL", "egl")
+# Programs that tests start find the tests' own classes, and the package where the tests do.
+here = (str(Path(__file__).parent), os.environ.get("PYTHONPATH"))
+os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, here))
 # A shell's background job ignores interruptions, and so would all that these tests interrupt.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 # Other tests that run at the same time move other arms.
 os.environ["PRIOR_REINFORCE_ARM"] = f"tests-{os.getpid()}"
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add `--most`."""
+    parser.addoption("--most", type=float, help="Most processor time [s] of a quick test.")
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_call(item: pytest.Item) -> Iterator[None]:
+    """Hold a quick test to `--most`."""
+    most = item.config.getoption("--most")
+    if most is None or item.get_closest_marker("quick") is None:
+        yield
+    else:
+        yield from tiers.within(most)
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Import the reproduction where its tests are run, and only there: it registers members.
+
+    Now: pytest names its tests `reproduction.tests...`, and would take the folder for the package.
+    """
+    import simulators  # noqa: F401  # likewise
+
+    if any("reproduction" in argument for argument in config.args):
+        import reproduction  # noqa: F401
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -44,8 +77,10 @@ def pytest_collection() -> Iterator[None]:
         gc.freeze()
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Start the longest tests first, or one process waits for them in the end."""
+@pytest.hookimpl(tryfirst=True)  # before tests are chosen by their marks
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Mark tests by tier, and start the longest first, or one process waits for them in the end."""
+    tiers.mark(items, str(config.rootpath))
 
     def place(item: pytest.Item) -> int:
         if item.path.stem in ("test_notebook", "test_tutorial", "test_cluster"):
@@ -58,8 +93,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 @pytest.fixture(scope="session")
 def learned_folder(tmp_path_factory):
     """A small workspace with a model and no goal; copy it, never change it."""
-    from prior_reinforce.bench.workspace.workspace import Workspace
-    from tests.bench.workspace.planar import demonstrations, manifest
+    from prior_reinforce.arm.workspace.workspace import Workspace
+    from tests.arm.workspace.planar import demonstrations, manifest
 
     folder = tmp_path_factory.mktemp("learned") / "planar"
     with Workspace.create(folder, manifest()) as workspace:
@@ -71,7 +106,7 @@ def learned_folder(tmp_path_factory):
 @pytest.fixture
 def workspace(learned_folder, tmp_path):
     """A copy of it, with a goal."""
-    from prior_reinforce.bench.workspace.workspace import Workspace
+    from prior_reinforce.arm.workspace.workspace import Workspace
 
     shutil.copytree(learned_folder, tmp_path / "planar")
     with Workspace(tmp_path / "planar") as workspace:
@@ -98,6 +133,24 @@ def run(capsys):
         return status, said.out, said.err
 
     return call
+
+
+@pytest.fixture(autouse=True)
+def no_plugins_of_others() -> Iterator[None]:
+    """Put back which plugins are named: a command leaves that to the programs that it starts."""
+    from prior_reinforce.registry import PLUGINS
+
+    before = os.environ.get(PLUGINS)
+    yield
+    os.environ.pop(PLUGINS, None)
+    if before is not None:
+        os.environ[PLUGINS] = before
+
+
+@pytest.fixture
+def toy_plugin(monkeypatch):
+    """Programs that a test starts know the toy arm, as by `--plugins`."""
+    monkeypatch.setenv("PRIOR_REINFORCE_PLUGINS", "tests.arm.executing.toy_arm")
 
 
 @pytest.fixture(scope="session")

@@ -1,0 +1,412 @@
+"""Read errors and places from words and numbers, for instance `5cm long, 2 cm left`.
+
+A text is split into parts at commas; a part is a number, a range or a measurement with a word of
+direction (`wording` has the words). Numbers without a unit are in centimetres where the outcome's
+unit is the metre, else in the outcome's own. Every text gives a result or an InvalidFeedbackError
+that quotes the part that cannot be read.
+
+Source: paper, Section IV, "Perception Process" (coarse human feedback); the grammar is ours.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from prior_reinforce.arrays import Point, as_error, as_goal
+from prior_reinforce.errors import InvalidFeedbackError, InvalidGoalError
+from prior_reinforce.formats import OutcomeFormat, in_tolerances
+from prior_reinforce.readings import EYE_BETWEEN, OPEN_ERROR, Reading
+from prior_reinforce.units import SPELT, factor, kind_of, looks_like, spelt, units_of
+from prior_reinforce.wording import (
+    PLACE_WORDS,
+    TIME_WORDS,
+    WORDS,
+    bare_unit,
+    error_example,
+    error_words,
+)
+
+_LEAST_BARE_CM = 0.1
+"""Ours: nobody sees a throw to a millimetre; a smaller number without a unit is in metres."""
+_OPEN_SDS = 10.0
+"""Error assumed where only the direction is known, of what is no length, in its least sds (ours):
+in tolerances as far as 5 cm, where 1.5 cm are allowed."""
+_FAR = 10.0
+"""Tolerances from which an error is looked at twice (ours): 15 cm, where 1.5 cm are allowed. It is
+taken for an outcome, or an outcome for an error, where that would be four times nearer."""
+_TOO_LARGE = {"length": "farther than any arm throws", "angle": "more than a turn"}
+_SOMEWHERE = "somewhere"
+_ON_THE_GOAL = ("on the goal", "spot on", "0")
+_LOST = "lost"
+_HITS = {"hit": True, "miss": False, _LOST: False}
+_FILLERS = re.compile(r"\b(?:about|approximately|approx\.?|around|roughly|circa|ca\.?|too)\s+|~\s*")
+"""What people say beside a length, which is an estimate anyway."""
+_DECIMAL_COMMA = re.compile(r"(?<=\d),(?=\d+\s*[a-z])")
+_RANGE = re.compile(r"(?<=[\da-z\"°.])\s*(?:–|-|\bto\b)\s*(?=\.?\d)")
+_COMMA, _NEXT = re.compile(r"\s*(?:,|;|\band\b)\s*"), re.compile(r"(?<=[a-z])\s+(?=\.?\d)")
+_PLUS_MINUS = r"(?:\+-|\+/-|±)"
+_NUMBER = r"\d{1,6}(?:\.\d*)?|\.\d+"
+_A_UNIT = "|".join(
+    re.escape(each) + "(?![a-z])" * (each in ("m", "in", "s"))
+    for each in sorted(SPELT, key=len, reverse=True)
+)
+_UNIT = f"{_A_UNIT}|"
+_TERM = re.compile(
+    rf"(?:(?:(?P<least>{_NUMBER})\s*(?P<least_unit>{_UNIT})\s*-\s*)?"
+    rf"(?P<value>{_NUMBER})\s*(?P<unit>{_UNIT})\s*"
+    rf"(?:{_PLUS_MINUS}\s*(?P<sd>{_NUMBER})\s*(?P<sd_unit>{_UNIT})\s*)?)?"
+    r"(?:to the )?(?P<word>[a-z]+)"
+)
+"""`5-7 cm long`, `5 +- 0.5 cm long`, `long`."""
+_LENGTHS = "|".join(re.escape(each) for each, unit in SPELT.items() if kind_of(unit) == "length")
+_BARE_TERM = re.compile(rf"(?P<value>{_NUMBER})\s*(?P<unit>{_LENGTHS})")
+"""`92cm`."""
+_WORD_FIRST = re.compile(rf"([a-z]+)\s+(?:by\s+)?((?:{_NUMBER})\s*(?:{_UNIT}))")
+"""`long by 5cm`."""
+_SYNONYMS = {"far": "long"}
+_FROM_BASE = re.compile(r"(?P<length>.*?)\s*(?:away )?from (?:the )?(?:base|robot|arm|foot)\b.*")
+_PLACE_TERM = re.compile(rf"(?P<number>[+-]?(?:{_NUMBER}))\s*(?P<unit>{_UNIT})(?:\s*[,;]\s*|\s+|$)")
+
+
+def from_words(text: str, form: OutcomeFormat | None = None) -> Reading:
+    """Read an error from words, for instance `5cm long, 2 cm left`, `20ms late`, `5-7 in short`.
+
+    A length without a unit is in centimetres, or in the outcome's inches; a component that is not
+    named is zero. 0, 2, 5 cm and tens are an observer's words (`Reading.by_eye`), other numbers
+    estimates (`Reading.estimated`), `5 +- 0.5 cm long` is a measurement. `long` means by 1 cm or
+    more, and leaves components that are not named unknown; so does `5 cm long, somewhere`. `hit`
+    and `miss` stand alone or beside terms; `lost` alone: nobody saw where the object went.
+
+    Args:
+        text: The words.
+        form: What the outcomes are; its tolerance gives the least sd of numbers that are no
+            lengths and were not measured. x and y in metres if not given.
+
+    Returns:
+        The reading, in the outcomes' units; `said` is the text, with the units that were understood
+        where it has none.
+
+    Raises:
+        InvalidFeedbackError: Unknown words, or one direction named twice.
+    """
+    form = form or OutcomeFormat.metres(2)
+    parts = _parts(text)
+    hits = {_HITS[part] for part in parts if part in _HITS}
+    if len(hits) > 1:
+        raise InvalidFeedbackError(f"{text!r} says hit and miss; say one of them")
+    hit = hits.pop() if hits else None
+    directed = [part for part in parts if part not in (*_HITS, _SOMEWHERE, *_ON_THE_GOAL)]
+    lost = _LOST in parts
+    if lost and directed:
+        raise InvalidFeedbackError(
+            f"{text!r} says where it went and that it was lost; say one of them"
+        )
+    if hit is not None and not directed:
+        return replace(Reading.only(hit, form.outcome_dim, lost=lost), said=text)
+    terms = _terms(directed, text, form)
+    understood = {term.part: term.said for term in terms.values()}
+    if any(part != said for part, said in understood.items()):
+        said = ", ".join(understood.get(part, part) for part in parts)
+    else:
+        said = text
+    return replace(_reading(terms, text, form, _SOMEWHERE in parts), hit=hit, said=said)
+
+
+def _reading(terms: dict[int, _Term], text: str, form: OutcomeFormat, somewhere: bool) -> Reading:
+    """The intervals of an error from its terms; components without a term are 0, or unknown."""
+    k, sds = form.outcome_dim, form.least_sd
+    metres = np.array([units_of("length").get(unit, 0.0) for unit in form.units])
+    is_length = metres > 0.0
+    number = np.zeros(k)
+    for j, term in terms.items():
+        unknown = OPEN_ERROR / metres[j] if is_length[j] else _OPEN_SDS * sds[j]
+        number[j] = term.sign * (unknown if term.size is None else term.size)
+        _refuse_too_large(number[j], form.units[j], text)
+    seen = Reading.estimated(number, sds)
+    bounds = np.array([seen.low, seen.high, seen.sd])  # of each component
+    if np.any(is_length):
+        eye = Reading.by_eye((number * metres)[is_length])
+        bounds[:, is_length] = np.array([eye.low, eye.high, eye.sd]) / metres[is_length]
+    if somewhere or any(term.size is None for term in terms.values()):
+        unnamed = [j for j in range(k) if j not in terms]
+        bounds[:, unnamed] = [[-math.inf], [math.inf], [0.0]]
+    for j, term in terms.items():
+        if term.size is None:
+            nearest = EYE_BETWEEN[0] / metres[j] if is_length[j] else 0.0
+            bounds[:, j] = *sorted((term.sign * nearest, term.sign * math.inf)), 0.0
+        elif term.least is not None:
+            low, high = sorted((term.sign * term.least, number[j]))
+            number[j], bounds[:, j] = 0.5 * (low + high), (low, high, 0.0)
+        elif term.sd is not None:
+            bounds[:, j] = number[j], number[j], term.sd
+    return Reading(number, *bounds)
+
+
+def _refuse_too_large(number: float, unit: str, text: str) -> None:
+    """Refuse an error that no arm makes."""
+    base = "m" if kind_of(unit) == "length" else unit
+    if said := looks_like(base, number * (factor(unit, base) or 1.0)):
+        raise InvalidFeedbackError(
+            f"{text!r} is {number:g} {unit}, {_TOO_LARGE[kind_of(unit)]}; say it again, in {said}, "
+            "or void the trial if that is true"
+        )
+
+
+def as_reading(
+    seen: Reading | ArrayLike | None, hit: bool | None, goal: Point, form: OutcomeFormat
+) -> Reading:
+    """Return what was seen of a trial as a reading; arguments and errors as in `Session.tell`."""
+    if not (hit is None or isinstance(hit, (bool, np.bool_))):
+        raise InvalidFeedbackError(f"hit must be True, False or None, got {hit!r}")
+    if seen is None:
+        if hit is None:
+            raise InvalidFeedbackError("say what was seen, or whether it hit")
+        return Reading.only(bool(hit), form.outcome_dim)
+    if isinstance(seen, str):
+        reading = from_words(seen, form)
+    elif isinstance(seen, Reading):
+        as_error(seen.error_seen, form.outcome_dim)
+        reading = seen
+    else:
+        reading = Reading.estimated(as_bare_error(seen, goal, form), form.least_sd)
+    return reading.with_hit(hit)
+
+
+def as_bare_error(
+    told: ArrayLike, goal: Point, form: OutcomeFormat, *, landed: bool = False
+) -> Point:
+    """Return outcome minus goal in the outcome's units, which nobody stated, as a fresh array.
+
+    Args:
+        told: The error; or, if `landed`, the outcome.
+        goal: g, shape (k,).
+        form: What the outcomes are.
+        landed: Whether the outcome was asked for, not the error.
+
+    Raises:
+        InvalidFeedbackError: Wrong shape, not finite, of another unit by its size, or an outcome in
+            place of an error, or the other way round.
+    """
+    array = as_error(told, form.outcome_dim)
+    error, other = (array - goal, array) if landed else (array, array - goal)
+    far, otherwise = (in_tolerances(e, form.tolerance or 1.0) for e in (error, other))
+    if form.tolerance and far >= max(_FAR, 4 * otherwise):
+        kinds = ("an error (outcome minus goal)", "where the object ended")
+        asked, mistaken = kinds[::-1] if landed else kinds
+        said = ", ".join(f"{number:g}" for number in array)
+        raise InvalidFeedbackError(
+            f"{said} looks like {mistaken}; give {asked}, or the unit if it is that"
+        )
+    if slip := form.slip(error, error=True):
+        raise InvalidFeedbackError(
+            f"an error in {slip} (outcome minus goal), or words with their unit"
+        )
+    return error
+
+
+def as_place(place: ArrayLike | str, form: OutcomeFormat) -> Point:
+    """Return a goal as numbers in the outcome's units: it is given as such, or said (`read_place`).
+
+    Raises:
+        InvalidGoalError: It cannot be read, has another shape, is not finite, or of another unit by
+            its size.
+    """
+    if isinstance(place, str):
+        try:
+            return read_place(place, form)
+        except InvalidFeedbackError as error:
+            raise InvalidGoalError(f"goal: {error}") from error
+    array = as_goal(place, form.names)
+    if slip := form.slip(array, error=False):
+        raise InvalidGoalError(f"goal: {slip}, or say its unit")
+    return array
+
+
+def read_numbers(text: str) -> list[tuple[float, float | None]] | None:
+    """Read numbers, each with that after its `+-` (`0.05+-0.003, -0.02 ± 0.001`); None if none."""
+    parts = re.sub(rf"\s*{_PLUS_MINUS}\s*", "±", text).replace(",", " ").split()
+    try:
+        split = [part.split("±") for part in parts]
+        return [(float(number), float(*sd) if sd else None) for number, *sd in split]
+    except (ValueError, TypeError):
+        return None
+
+
+def read_uncertain_place(text: str, form: OutcomeFormat) -> tuple[Point, float]:
+    """Read a place, and the standard deviation that may follow it: `92cm 10cm +- 2cm`.
+
+    Raises:
+        InvalidFeedbackError: As `read_place` does, or a `+-` for components of several units.
+    """
+    said, *spread = re.split(_PLUS_MINUS, text, maxsplit=1)
+    place, of_sd = read_place(said, form), OutcomeFormat(("+-",), form.units[:1])
+    sd = abs(float(read_place(spread[0], of_sd)[0])) if spread else 0.0
+    if sd and len(set(form.units)) > 1:
+        raise InvalidFeedbackError("+- is for components of one unit; leave it out")
+    return place, sd
+
+
+def read_place(text: str, form: OutcomeFormat) -> Point:
+    """Read a place from numbers in the outcome's units, numbers with a unit, or words.
+
+    For instance `0.92 0.10`, `92cm 10cm`, `92 10 cm`, or `92cm ahead, 10cm left`; beside words, a
+    length without one is the component in that position: `92cm, 10cm left`.
+
+    Raises:
+        InvalidFeedbackError: It is none of these, has a `+-`, or is farther than any arm throws.
+    """
+    if re.search(_PLUS_MINUS, text):
+        raise InvalidFeedbackError(f"cannot read {text!r} as one place; leave out the +-")
+    k = form.outcome_dim
+    expected = f"{k} finite numbers: {', '.join(form.names)}"
+    numbers = _numbers_with_units(text, form.units)
+    if numbers is None:
+        if k > len(WORDS) or {kind_of(unit) for unit in form.units} != {"length"}:
+            raise InvalidFeedbackError(f"cannot read {text!r}; give {expected}")
+        place = np.zeros(k)
+        for j, term in _terms(_parts(text), text, form, place=True).items():
+            place[j] = term.sign * (term.size or 0.0)
+        return place
+    if len(numbers) != k or not all(map(math.isfinite, numbers)):
+        raise InvalidFeedbackError(f"{text!r} is not {expected}; give those")
+    stated = read_numbers(text) is None
+    for number, unit in zip(numbers, form.units, strict=True):
+        possible = unit == "m" and not looks_like(unit, number, stated=True)
+        said = looks_like(unit, number)
+        if said and not (stated and possible):
+            raise InvalidFeedbackError(
+                f"{number:g} {unit} is {_TOO_LARGE[kind_of(unit)]}; say the unit, for instance "
+                f"{number:g}{said}" + (f", or {number:g}{unit}" if possible else "")
+            )
+    return np.array(numbers)
+
+
+def _numbers_with_units(text: str, units: Sequence[str]) -> list[float] | None:
+    """Numbers in the outcome's units, such as `0.92 0.1` or `92cm, 10 cm`; None if it is none.
+
+    A unit after the last number only is that of all.
+    """
+    bare = read_numbers(text)
+    if bare is not None:
+        return [number for number, _ in bare]
+    terms = list(_PLACE_TERM.finditer(text.strip()))
+    if "".join(term[0] for term in terms) != text.strip():
+        return None
+    stated = [term["unit"] and spelt(term["unit"]) for term in terms]
+    if not any(stated[:-1]):
+        stated = stated[-1:] * len(terms)
+    if len(stated) != len(units):
+        return [math.nan] * len(stated)
+    numbers = []
+    for term, unit, wanted in zip(terms, stated, units, strict=True):
+        scale = factor(unit, wanted) if unit else None
+        if scale is None:
+            return None
+        numbers.append(float(term["number"]) * scale)
+    return numbers
+
+
+@dataclass(frozen=True)
+class _Term:
+    """What a part of a text says of one component, in its unit."""
+
+    part: str
+    said: str
+    """The part, with its unit where it had none."""
+    sign: float
+    size: float | None
+    """None where only the direction was said."""
+    least: float | None = None
+    """Lower end of a range, whose upper one is `size`."""
+    sd: float | None = None
+    """Standard deviation, where a `+-` was said."""
+
+
+def _parts(text: str) -> list[str]:
+    """Split a text at commas, without fillers, in lower case."""
+    plainer = _DECIMAL_COMMA.sub(".", _FILLERS.sub("", text.strip().lower()))
+    said = [part.rstrip(".! ") for part in _COMMA.split(_RANGE.sub("-", plainer))]
+    turned = [_WORD_FIRST.sub(r"\2 \1", p) if _WORD_FIRST.fullmatch(p) else p for p in said]
+    return [part.rstrip(".! ") for each in turned for part in _NEXT.split(each)]
+
+
+def _terms(
+    parts: Sequence[str], text: str, form: OutcomeFormat, *, place: bool = False
+) -> dict[int, _Term]:
+    """Read parts as terms, by component; a place has a number for each, and no `+-`."""
+    words = PLACE_WORDS if place else WORDS
+    pairs = error_words(form, words)
+    known = {word: (j, pair) for j, pair in enumerate(pairs) if pair for word in pair}
+    if form.outcome_dim == 1 and kind_of(form.units[0]) != "length":  # whatever is more of it
+        known |= {word: (0, pair) for pair in (*words, TIME_WORDS) for word in pair}
+    terms: dict[int, _Term] = {}
+    for position, part in enumerate(parts):
+        match, bare = _TERM.fullmatch(part), _BARE_TERM.fullmatch(part)
+        found = {} if match is None else match.groupdict()
+        if not place and found:
+            found["word"] = _SYNONYMS.get(found["word"], found["word"])
+        if bare is not None and place and len(parts) > 1 and position < len(pairs):
+            found, j, pair = bare.groupdict(), position, pairs[position]
+        elif found.get("word") not in known or (
+            place and (not found["value"] or found["sd"] or found["least"])
+        ):
+            raise InvalidFeedbackError(_unread(part, text, [*known], form, place))
+        else:
+            j, pair = known[found["word"]]
+        if j in terms:
+            twice = " and ".join(pair or form.names[j])
+            raise InvalidFeedbackError(f"{text!r} names {twice} twice; give each direction once")
+        terms[j] = _term(part, found, pair, form.units[j], form.outcome_dim)
+    return terms
+
+
+def _term(
+    part: str, found: dict[str, str | None], pair: tuple[str, str] | None, unit: str, k: int
+) -> _Term:
+    """Convert the numbers of a part to the component's unit."""
+    word, value, least, sd = (found.get(name) for name in ("word", "value", "least", "sd"))
+    numbers: list[float | None] = []
+    for name, number in (("value", value), ("least", least), ("sd", sd)):
+        stated = found.get(f"{name}_unit") or found.get("unit") or found.get("sd_unit") or ""
+        numbers.append(_in_unit(number, stated, unit, k, part) if number else None)
+    said = part
+    if value and not found.get("unit") and not found.get("sd_unit"):
+        range_, spread = f"{least}-" if least else "", f" +- {sd}" if sd else ""
+        said = f"{range_}{value}{spread} {bare_unit(unit)} {word}"
+    sign = -1.0 if pair is not None and word == pair[1] else 1.0
+    return _Term(part, said, sign, *numbers)
+
+
+def _in_unit(number: str, stated: str, unit: str, k: int, part: str) -> float:
+    """Convert a number to the outcome's unit; `stated` is empty where it has none."""
+    value = float(number)
+    if not stated and unit == "m" and 0 < value < _LEAST_BARE_CM:
+        raise InvalidFeedbackError(
+            f"{part!r} has no unit and would be {10 * value:g} mm; say m, cm or mm"
+        )
+    given = spelt(stated) or ""
+    if not stated and (kind_of(unit) == "length" or k == 1):
+        given = bare_unit(unit)
+    scale = factor(given, unit)
+    if scale is None:
+        raise InvalidFeedbackError(f"{part!r} is to be in {unit}; say that unit")
+    return value * scale
+
+
+def _unread(part: str, text: str, known: Sequence[str], form: OutcomeFormat, place: bool) -> str:
+    """Message for a part that cannot be read."""
+    if place and (from_base := _FROM_BASE.fullmatch(part)):
+        return (
+            f"{part!r} may be straight to the place or along x only; measure along x and say "
+            f"{from_base['length']} {known[0]}"
+        )
+    example = '"92cm ahead, 10cm left"' if place else f'"{error_example(form)}", or "hit"'
+    where = "" if part == text.strip().lower() else f" in {text!r}"
+    said = f"cannot read {part!r}{where}; write a length and one of {', '.join(known)}"
+    return f"{said}, for instance {example}"

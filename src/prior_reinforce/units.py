@@ -1,0 +1,142 @@
+"""The units of plans and outcomes: what they measure, how they are spelt, how large numbers get."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+Kind = Literal["length", "angle", "time", "share"]
+"""What a unit measures, in [m], [rad], [s] or [1]; angles repeat after a turn, the others do not.
+A unit that is not listed here counts something, and is a kind of its own."""
+STATED = 7.0
+"""Numbers may be this many times larger where their unit is stated (ours): beyond, at eight turns
+of a joint or 35 m, it is stated wrongly."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Unit:
+    """A unit, and how large numbers in it get."""
+
+    kind: Kind
+    factor: float
+    """Number of the kind's base units in one: 0.01 for cm."""
+    plural: str
+    """Its name in a sentence: `centimetres`."""
+    spellings: str
+    """Other ways to write it, in lower case, apart by blanks."""
+    largest: float = math.inf
+    """Largest plausible number, of a place or a joint; more is the next unit of its kind."""
+    error_limit: float = math.inf
+    """From here on an error or a tolerance is implausible."""
+    spoken: str = ""
+    """The unit that people say instead; empty where they say this one."""
+    small: str = ""
+    """Name of its thousandth; empty where it has none."""
+
+
+# Largest numbers are ours. No arm on a table reaches, throws or is seen farther than 5 m; above
+# 300 cm, millimetres are likelier. Joints turn one turn (6.28 rad) either way, never two. Errors
+# of a metre or half a turn are another unit far more often than a miss by as much.
+UNITS: Mapping[str, Unit] = {
+    "m": Unit(
+        kind="length", factor=1.0, plural="metres", spellings="metre meter meters",
+        largest=5.0, error_limit=1.0, spoken="cm", small="mm",
+    ),
+    "cm": Unit(
+        kind="length", factor=0.01, plural="centimetres",
+        spellings="centimetre centimeter centimeters", largest=300.0,
+    ),
+    "mm": Unit(
+        kind="length", factor=0.001, plural="millimetres",
+        spellings="millimetre millimeter millimeters",
+    ),
+    "in": Unit(kind="length", factor=0.0254, plural="inches", spellings='inch "'),
+    "rad": Unit(
+        kind="angle", factor=1.0, plural="radians", spellings="radian",
+        largest=7.0, error_limit=math.pi, spoken="deg", small="mrad",
+    ),
+    "deg": Unit(
+        kind="angle", factor=math.pi / 180, plural="degrees", spellings="degree °", largest=720.0
+    ),
+    "s": Unit(
+        kind="time", factor=1.0, plural="seconds", spellings="sec secs second", spoken="ms"
+    ),
+    "ms": Unit(kind="time", factor=1e-3, plural="milliseconds", spellings="msec millisecond"),
+    "us": Unit(
+        kind="time", factor=1e-6, plural="microseconds", spellings="µs μs usec microsecond"
+    ),
+    "ns": Unit(kind="time", factor=1e-9, plural="nanoseconds", spellings="nsec nanosecond"),
+    "percent": Unit(kind="share", factor=0.01, plural="percent", spellings=""),
+}  # fmt: skip
+SPELT = {
+    spelling: name
+    for name, unit in UNITS.items()
+    for spelling in (name, unit.plural, *unit.spellings.split())
+}
+"""Unit by each of its spellings, in lower case."""
+
+
+def spelt(text: str) -> str | None:
+    """Return the name of the unit that a text spells, `deg` for `°`; None if it spells none."""
+    return SPELT.get(text.lower())
+
+
+def kind_of(unit: str) -> str:
+    """Return what a unit measures; the unit itself if it is not listed."""
+    return UNITS[unit].kind if unit in UNITS else unit
+
+
+def units_of(kind: Kind) -> dict[str, float]:
+    """Return the units of a kind with their factors, the base unit first."""
+    return {name: unit.factor for name, unit in UNITS.items() if unit.kind == kind}
+
+
+def base_of(unit: str) -> tuple[str, float]:
+    """Return the base unit and the factor to it, rad and pi/180 for deg; other units stay."""
+    known = UNITS.get(unit)
+    if known is None or known.kind == "share":
+        return unit, 1.0
+    return next(iter(units_of(known.kind))), known.factor
+
+
+def factor(unit: str, wanted: str) -> float | None:
+    """Return what to multiply a number with, for another unit; None if that cannot be."""
+    (here, of_one), (there, of_other) = base_of(unit), base_of(wanted)
+    return of_one / of_other if here == there else None
+
+
+def spoken(unit: str) -> tuple[str, float]:
+    """Return the unit that people say for another, and how many of it are one: `cm`, 100 for m."""
+    said = (UNITS[unit].spoken if unit in UNITS else "") or unit
+    return said, factor(unit, said) or 1.0
+
+
+def in_unit(quantities: Mapping[Kind, float], unit: str) -> float | None:
+    """Return the quantity of a unit's kind, in that unit; None if there is none for it.
+
+    Args:
+        quantities: In base units, by kind: `{"angle": 0.3}`.
+        unit: For instance `deg`.
+    """
+    known = UNITS.get(unit)
+    quantity = None if known is None else quantities.get(known.kind)
+    return None if known is None or quantity is None else quantity / known.factor
+
+
+def looks_like(unit: str, number: float, *, error: bool = False, stated: bool = False) -> str:
+    """Return the unit that a number in [m] or [rad] is in by its size; empty if it is plausible.
+
+    Args:
+        unit: The unit that it would be in; numbers in others than m and rad are all plausible.
+        number: The number.
+        error: Whether it is an error or a tolerance, not a place or a joint's angle.
+        stated: Whether a person said that this is its unit.
+    """
+    known = UNITS.get(unit)
+    if known is None or not known.spoken or known.kind == "time":
+        return ""
+    if error:
+        return known.spoken if known.error_limit <= abs(number) < math.inf else ""
+    return "" if abs(number) <= known.largest * (STATED if stated else 1.0) else known.spoken

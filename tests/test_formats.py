@@ -1,0 +1,56 @@
+"""What an outcome's numbers mean, and how near counts as reached."""
+
+import numpy as np
+import pytest
+
+from prior_reinforce.errors import ConfigurationError
+from prior_reinforce.formats import OutcomeFormat, in_tolerances
+
+MIXED = OutcomeFormat(("x", "t"), ("m", "s"))
+
+
+def test_lengths_are_x_y_and_z_or_numbered():
+    assert str(OutcomeFormat.metres(3)) == "x [m], y [m], z [m]"
+    assert OutcomeFormat.metres(4).names == ("0", "1", "2", "3")
+
+
+def test_one_tolerance_is_that_of_every_component():
+    form = OutcomeFormat.metres(2).within(0.015)
+    assert form.tolerance == (0.015, 0.015)
+    np.testing.assert_allclose(form.least_sd, 0.005)
+    assert np.all(OutcomeFormat.metres(2).least_sd == 0)
+    assert MIXED.within([0.015, 0.02]) == OutcomeFormat(("x", "t"), ("m", "s"), (0.015, 0.02))
+
+
+@pytest.mark.parametrize(
+    ("tolerance", "message"),
+    [
+        (0.015, "one number, 0.015, for outcomes of several units"),
+        ([0.015], r"one for each of x \[m\], t \[s\]"),
+        ([0.015, 0.0], "positive"),
+        ([0.015, np.nan], "positive"),
+        ("2cm", "positive"),
+        ([[0.015], [0.02, 0.03]], "positive"),
+        ((), "positive"),
+    ],
+)
+def test_other_tolerances_are_refused(tolerance, message):
+    with pytest.raises(ConfigurationError, match=message):
+        MIXED.within(tolerance)
+
+
+@pytest.mark.parametrize(
+    ("names", "units", "tolerance", "message"),
+    [
+        (("x", "x"), ("m", "m"), (), "differ"),
+        (("x", "y"), ("m",), (), "2 outcome names"),
+        (("x", "y"), ("m", "m"), (0.1,), "one for each"),
+    ],
+)
+def test_a_format_that_cannot_be_is_refused(names, units, tolerance, message):
+    with pytest.raises(ConfigurationError, match=message):
+        OutcomeFormat(names, units, tolerance)
+
+
+def test_a_hit_is_one_tolerance_away_at_most():
+    assert in_tolerances([0.009, 0.016], [0.015, 0.02]) == pytest.approx(1.0)

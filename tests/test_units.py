@@ -1,0 +1,81 @@
+"""One table of units: what converts to what, and which numbers look like another unit."""
+
+import math
+
+import pytest
+
+from prior_reinforce.units import (
+    UNITS,
+    base_of,
+    factor,
+    in_unit,
+    kind_of,
+    looks_like,
+    spelt,
+    spoken,
+    units_of,
+)
+
+
+def test_every_unit_is_spelt_in_its_own_way_and_converts_to_its_base():
+    for name, unit in UNITS.items():
+        spellings = (name, unit.plural, *unit.spellings.split())
+        assert {spelt(spelling) for spelling in spellings} == {name}
+        assert unit.spoken in ("", *units_of(unit.kind))
+    for kind, base in (("length", "m"), ("angle", "rad"), ("time", "s")):
+        assert next(iter(units_of(kind).items())) == (base, 1.0)
+
+
+@pytest.mark.parametrize(("text", "unit"), [("°", "deg"), ("Inches", "in"), ("counts", None)])
+def test_spellings(text, unit):
+    assert spelt(text) == unit
+
+
+def test_units_of_one_kind_convert():
+    assert factor("in", "m") == 0.0254
+    assert factor("rad", "deg") == pytest.approx(180 / math.pi)
+    assert factor("turns", "turns") == 1.0
+    assert factor("cm", "rad") is None
+    assert factor("turns", "rad") is None
+    assert (base_of("cm"), base_of("percent"), base_of("N")) == (
+        ("m", 0.01),
+        ("percent", 1),
+        ("N", 1),
+    )
+    assert (kind_of("us"), kind_of("N")) == ("time", "N")
+
+
+def test_people_say_centimetres_milliseconds_and_degrees():
+    assert (spoken("m"), spoken("s"), spoken("in")) == (("cm", 100.0), ("ms", 1000.0), ("in", 1.0))
+    assert spoken("rad") == ("deg", pytest.approx(180 / math.pi))
+    assert spoken("turns") == ("turns", 1.0)
+
+
+def test_a_threshold_holds_in_every_unit_of_its_kind():
+    slow = {"angle": 0.3, "share": 0.5}
+    assert in_unit(slow, "rad") == 0.3
+    assert in_unit(slow, "deg") == pytest.approx(math.degrees(0.3))
+    assert in_unit(slow, "percent") == 50.0
+    assert (in_unit(slow, "m"), in_unit(slow, "steps")) == (None, None)
+
+
+@pytest.mark.parametrize(
+    ("unit", "number", "said", "looks"),
+    [
+        ("m", 5.0, {}, ""),
+        ("m", -5.1, {}, "cm"),
+        ("m", 34.0, {"stated": True}, ""),
+        ("m", 36.0, {"stated": True}, "cm"),
+        ("m", math.inf, {}, "cm"),
+        ("m", 0.99, {"error": True}, ""),
+        ("m", -1.0, {"error": True}, "cm"),
+        ("rad", 6.9, {}, ""),
+        ("rad", 7.1, {}, "deg"),
+        ("rad", 3.2, {"error": True}, "deg"),
+        ("s", 1e6, {}, ""),
+        ("deg", 1e6, {}, ""),
+        ("steps", 1e6, {}, ""),
+    ],
+)
+def test_a_number_that_is_too_large_looks_like_another_unit(unit, number, said, looks):
+    assert looks_like(unit, number, **said) == looks
