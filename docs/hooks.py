@@ -22,9 +22,13 @@ PAGES = {
     "CHANGELOG.md": "changelog.md",
     "CONTRIBUTING.md": "contributing.md",
     "results/evidence.md": "results.md",
+    "results/beyond.md": "beyond.md",
 }
 """Files outside docs/ by their page on the site."""
 PICTURES = "results/pictures"
+EVIDENCE = "reproduction/docs"
+"""Folder whose pages and pictures stand on the site as if they stood in docs/."""
+PAGES |= {f"{EVIDENCE}/{path.name}": path.name for path in (REPOSITORY / EVIDENCE).glob("*.md")}
 LINK = re.compile(
     r'(?P<before>\]\(|src=")(?P<target>[^)\s"#]+)(?P<anchor>#[^)\s"]*)?(?P<after>[)"])'
 )
@@ -36,6 +40,9 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         files.append(File.generated(config, page, abs_src_path=str(REPOSITORY / source)))
     for picture in sorted((REPOSITORY / PICTURES).iterdir()):
         place = f"pictures/{picture.name}"
+        files.append(File.generated(config, place, abs_src_path=str(picture)))
+    for picture in sorted((REPOSITORY / EVIDENCE).rglob("*.png")):
+        place = picture.relative_to(REPOSITORY / EVIDENCE).as_posix()
         files.append(File.generated(config, place, abs_src_path=str(picture)))
     return files
 
@@ -81,6 +88,8 @@ def _address(place: str, page: Page, config: MkDocsConfig) -> str:
         on_site = PAGES[place]
     elif place.startswith(f"{PICTURES}/"):
         on_site = place.removeprefix("results/")
+    elif place.startswith(f"{EVIDENCE}/"):
+        on_site = place.removeprefix(f"{EVIDENCE}/")
     elif place.startswith("docs/"):
         on_site = place.removeprefix("docs/")
     else:

@@ -1,7 +1,7 @@
 """An adapter of your own: an affine correction, fitted to the trials by ridge regression.
 
     python examples/own_adapter.py
-    PYTHONPATH=examples prior-reinforce adapt --adapter own_adapter:RidgeAdapter
+    PYTHONPATH=examples prior-reinforce adapt --adapter ridge --plugins own_adapter
 
 What was asked for minus what came of it, c - r, is modelled as b + B z, where z is r in units of
 the demonstrated spread. The penalty draws b and B towards 0, that is, towards c = r, which is what
@@ -56,9 +56,11 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
 
-    task = pr.make_task("basketball-v1")
+    task = pr.make_task("basketball-v3")  # learned on other hardware
     demonstrations = task.demonstrations("A")
-    generator = pr.make_generator("nearest,timing=align").fit(demonstrations, seed=options.seed)
+    generator = pr.make_generator("interpolation,timing=align").fit(
+        demonstrations, seed=options.seed
+    )
     goals = task.sample_goals(options.goals, np.random.default_rng(options.seed))
     makers = {
         name: lambda name=name: pr.make_adapter(name) for name in ("frozen", "proportional", "gp")
@@ -77,6 +79,8 @@ def main() -> None:
         shares = " ".join(f"{share:4.0%}" for share in pr.success_by_round(results, options.rounds))
         print(f"{name:<12}  reached by trial 1, 2, ...: {shares}")
 
+
+pr.ADAPTERS.add("ridge", RidgeAdapter)
 
 if __name__ == "__main__":
     main()

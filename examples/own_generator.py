@@ -1,14 +1,15 @@
 """Your own generator: the nearest demonstrations, blended in motion and in timing.
 
     python examples/own_generator.py
-    PYTHONPATH=examples prior-reinforce reproduce zero-shot --include own_generator:SoftmaxBlend
+    PYTHONPATH=examples python -m reproduction zero-shot --plugins own_generator \
+        --include softmax-blend
 
     A(c, t) = sum_i w_i(c) A_i(t + s(c) - s_i),    s(c) = sum_i w_i(c) s_i
 
 where s_i is how far demonstration i has to be moved for its motion to coincide with the others',
 and w the softmax of minus the squared distance between c and the outcomes. So motions are blended
 phase by phase, and the blend starts when its neighbours start. Prints the error of first throws,
-next to plain interpolation between nearest neighbours.
+next to plain interpolation of all of them.
 """
 
 from __future__ import annotations
@@ -97,7 +98,7 @@ def main() -> None:
     task = pr.make_task("basketball-v1")
     demonstrations = task.demonstrations("A")
     goals = task.sample_goals(options.goals, np.random.default_rng(options.seed))
-    for generator in (SoftmaxBlend(), pr.NearestNeighbours()):
+    for generator in (SoftmaxBlend(), pr.SmoothInterpolation()):
         generator.fit(demonstrations, seed=options.seed)
         rollouts = task.rollout(generator.generate(goals), None)
         errors = np.linalg.norm([r.outcome for r in rollouts] - goals, axis=1)
@@ -105,6 +106,8 @@ def main() -> None:
             f"{generator.name:<13}  first throws miss by {100 * np.median(errors):.1f} cm (median)"
         )
 
+
+pr.GENERATORS.add("softmax-blend", SoftmaxBlend)
 
 if __name__ == "__main__":
     main()

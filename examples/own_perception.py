@@ -1,7 +1,7 @@
 """A perception of your own: a camera above the table, calibrated for the table and nothing higher.
 
     python examples/own_perception.py
-    PYTHONPATH=examples prior-reinforce adapt --perception own_perception:OverheadCamera
+    PYTHONPATH=examples prior-reinforce adapt --perception overhead --plugins own_perception
 
 The ball is seen above the table, so the camera takes it to be farther from the point below the lens
 than it is: by height / (height - ball_height). The goal lies on the table and is seen where it is.
@@ -78,7 +78,9 @@ def main() -> None:
         print(f"a hit at ({x:.2f}, {y:.2f}) m seems to be {100 * np.linalg.norm(bias):.1f} cm off")
 
     demonstrations = task.demonstrations("A")
-    generator = pr.make_generator("nearest,timing=align").fit(demonstrations, seed=options.seed)
+    generator = pr.make_generator("interpolation,timing=align").fit(
+        demonstrations, seed=options.seed
+    )
     goals = task.sample_goals(options.goals, np.random.default_rng(options.seed))
     table = OverheadCamera(ball_height=0.0)  # the same camera, calibrated at the ball's height
     for label, perception in (
@@ -97,6 +99,8 @@ def main() -> None:
         shares = " ".join(f"{share:4.0%}" for share in pr.success_by_round(results, options.rounds))
         print(f"{label:<10}  reached by trial 1, 2, ...: {shares}")
 
+
+pr.PERCEPTIONS.add("overhead", OverheadCamera)
 
 if __name__ == "__main__":
     main()

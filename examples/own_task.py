@@ -1,7 +1,7 @@
 """A task of your own, without a simulator: a catapult on a turntable, flight in closed form.
 
     python examples/own_task.py
-    PYTHONPATH=examples prior-reinforce adapt --task own_task:Toss --generator interpolation
+    PYTHONPATH=examples prior-reinforce adapt --plugins own_task --task toss
 
 A plan turns the turntable and swings the arm; where the arm passes its stop, the ball leaves it and
 flies on a parabola. The script prints how many throws new goals take; the command goes through the
@@ -155,6 +155,8 @@ def main() -> None:
     for number, share in enumerate(pr.success_by_round(results, options.rounds), start=1):
         print(f"reached in at most {number} throws: {share:4.0%}")
 
+
+pr.TASKS.add("toss", Toss)
 
 if __name__ == "__main__":
     main()

@@ -4,8 +4,9 @@
 
 It knows nothing of workspaces: it gets a plan file (NPZ with t, q, dq, ddq), lets the simulated
 Panda throw the ball with the disturbances of a real arm, and says where the ball came down as an
-operator at the table would, in words and to half a centimetre. `--call FILE` writes the same words
-to a file, so that they can be told without being typed; a lost ball leaves no such file.
+operator at the table would, in words and to half a centimetre; a ball that never comes down at the
+hoop's height is "lost". `--call FILE` writes the same words to a file, so that they can be told
+without being typed.
 """
 
 from __future__ import annotations
@@ -33,18 +34,17 @@ def main() -> int:
     options = parser.parse_args()
 
     task = pr.make_task(options.task)
-    if options.call is not None:  # the last throw's call is not this one's
-        options.call.unlink(missing_ok=True)
     rollout = throw(task, options.plan, options.seed)
-    if not rollout.valid:
-        print("the ball never came down at the hoop's height: void this trial")
-        return 1
     error = rollout.outcome - options.goal
-    hit = np.linalg.norm(error) <= task.tolerance
-    called = "hit" if hit else pr.to_words(np.round(error / CALLED_TO) * CALLED_TO)
+    if not rollout.valid:
+        called, where = "lost", "never came down at the hoop's height:"
+    elif np.linalg.norm(error) <= task.tolerance:
+        called, where = "hit", "went through the hoop:"
+    else:
+        called, where = pr.to_words(np.round(error / CALLED_TO) * CALLED_TO), "came down"
     if options.call is not None:
         options.call.write_text(called + "\n")
-    print(f"the ball came down {called}" if not hit else "the ball went through the hoop: hit")
+    print(f"the ball {where} {called}")
     return 0
 
 
