@@ -21,9 +21,8 @@ from reproduction.units import UnitFailedError, Workers, result_path, run_units
 
 MEMORY = 80 * 2**20
 
-LASTS = 2.0
-"""Seconds that a unit takes on the cluster: long enough to be killed in, on a busy machine too."""
-
+VICTIM = "victim"
+"""File that names the node to be killed."""
 
 CONFIG = {"worker_niceness": 0}
 """Ray runs its workers at 15, where tests at their side leave them no processor for minutes."""
@@ -31,13 +30,19 @@ CONFIG = {"worker_niceness": 0}
 
 @dataclass(frozen=True)
 class Watched(Roots):
-    """Tells on which node it runs."""
+    """Tells on which node it runs, and ends only after one of them began on the victim.
+
+    On the victim it never ends: it is to be killed, however long that takes.
+    """
 
     def run(self, folder):
         if ray.is_initialized():
+            marks = folder.parent
             node = ray.get_runtime_context().get_node_id()
-            (folder.parent / f"{self.seed} on {node}").touch()
-            time.sleep(LASTS)
+            victim = (marks / VICTIM).read_text()
+            (marks / f"{self.seed} on {node}").touch()
+            while node == victim or not list(marks.glob(f"* on {victim}")):
+                time.sleep(0.05)
         return super().run(folder)
 
 
@@ -61,6 +66,7 @@ def main(folder: Path) -> None:
     cluster = Cluster(initialize_head=True, head_node_args=options)
     victim = cluster.add_node(num_cpus=1, object_store_memory=MEMORY)
     shared = folder / "ray"
+    (folder / VICTIM).write_text(victim.node_id)
 
     def running_on_the_victim():
         return [

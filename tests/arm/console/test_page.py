@@ -660,15 +660,18 @@ def test_news_waits_for_the_finger_and_no_longer_than_two_seconds(at, serve):
     page = at(served)
     touch(page, [0.9, 0.05])
     expect(page.locator("#goal")).to_be_enabled()
-    drawn = (
-        "() => { window.drawn = 0; const now = draw; draw = () => { window.drawn += 1; now(); }; }"
-    )
-    page.evaluate(drawn)
+    page.wait_for_function("calmAt < performance.now()")  # what stood out has been drawn
+    early = """() => {
+        window.early = 0;
+        const now = draw;
+        draw = () => { window.early += performance.now() < heldUntil; now(); };
+    }"""
+    page.evaluate(early)
     page.locator("#goal").hover()
     page.mouse.down()
     page.evaluate("heard({ output: 'said meanwhile' })")
-    page.wait_for_timeout(500)
-    assert page.evaluate("window.drawn") == 0
+    page.wait_for_timeout(200)
+    assert page.evaluate("window.early") == 0
     page.mouse.up()  # the button that was touched is still there
     expect(page.locator("#execute")).to_be_enabled()
     page.locator("#now").hover()
