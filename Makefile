@@ -70,13 +70,14 @@ docs: $(VENV)/.docs
 # call: each call looks at all that is installed anew.
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 EXTRAS := diffusion,simulation,dev,vlm,lerobot,hdf5,ros,zarr,fr3,ur,console,camera,docs
-$(VENV)/.core: pyproject.toml constraints.txt
-	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+$(BIN)/python:
+	$(PYTHON) -m venv $(VENV)
+
+$(VENV)/.core: pyproject.toml constraints.txt | $(BIN)/python
 	$(PIP) -c constraints.txt torch==2.13.0 -e '.[diffusion,simulation]'
 	touch $@
 
-$(VENV)/.all: pyproject.toml constraints.txt reproduction/pyproject.toml simulators/pyproject.toml
-	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+$(VENV)/.all: pyproject.toml constraints.txt reproduction/pyproject.toml simulators/pyproject.toml | $(BIN)/python
 	$(PIP) -c constraints.txt torch==2.13.0 -e '.[$(EXTRAS)]' -e 'reproduction[ray]' -e simulators
 	$(PIP) --no-deps franka-sim==1.1.7
 	touch $(VENV)/.core $(VENV)/.docs $@
@@ -87,7 +88,7 @@ $(VENV)/.reproduction: $(VENV)/.core reproduction/pyproject.toml
 	touch $@
 
 # A Python with LeRobot, for the executor of that name: .venv/lerobot/python.
-$(VENV)/.lerobot: lerobot.txt $(VENV)/.core
+$(VENV)/.lerobot: lerobot.txt | $(BIN)/python
 	rm -rf $(VENV)/lerobot
 	$(PIP) --no-deps --target $(VENV)/lerobot -r lerobot.txt
 	printf '#!/bin/sh\nPYTHONPATH="$(CURDIR)/$(VENV)/lerobot" exec "$(CURDIR)/$(BIN)/python" -W ignore "$$@"\n' > $(VENV)/lerobot/python

@@ -66,7 +66,7 @@ def typed(monkeypatch):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("steps", [250, 0])
+@pytest.mark.parametrize("steps", [120, 0])
 def test_adapting_says_what_the_network_learned_and_needs_it(tmp_path, capsys, steps):
     """Nothing else reaches the goal: with an untrained network in its place it is missed."""
     choice = f"diffusion,training_steps={steps},symmetry=none"

@@ -168,10 +168,17 @@ class Results:
         """A row a training, a column a goal."""
         if self.empty:
             return pd.DataFrame()
+        values = np.append(np.asarray(measure.of(self.frame), dtype=float), np.nan)
+        places = self._places
+        return pd.DataFrame(values[places.to_numpy()], places.index, places.columns)
+
+    @cached_property
+    def _places(self) -> pd.DataFrame:
+        """Which row is of a training and a goal; -1: none. It is the same for every measure."""
         rows = [c for c in _TRAINING if c in self.frame and self.frame[c].notna().all()]
         columns = [c for c in _GOAL if c in self.frame and self.frame[c].notna().all()]
         index = pd.MultiIndex.from_frame(self.frame[rows + columns])
-        return pd.Series(measure.of(self.frame), index).unstack(columns)
+        return pd.Series(np.arange(self.n), index).unstack(columns, fill_value=-1)
 
 
 def _groups(tables: Sequence[pd.DataFrame]) -> tuple[list[Values], list[int]]:

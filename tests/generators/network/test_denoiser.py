@@ -141,10 +141,10 @@ def ramps(conditions):
 def test_the_network_itself_learns_codes_and_what_lies_between_them(prediction):
     """Nothing in closed form helps here; untrained it is off by more than the codes are large."""
     errors = {}
-    for steps in (0, 250):
+    for steps in (0, 150):
         config = DiffusionConfig(
             coordinates="time", prediction=prediction, network=TINY, training_steps=steps,
-            learning_rate=3e-3, warmup_steps=20, ema_limit=0.98,
+            learning_rate=5e-3, warmup_steps=10, ema_limit=0.95,
         )  # fmt: skip
         network = build(lambda: ConditionalUNet(2, 2, TINY), seed=0)
         of_step = loss(network, ramps(SHOWN), SHOWN, config, torch.Generator().manual_seed(0))
@@ -157,5 +157,5 @@ def test_the_network_itself_learns_codes_and_what_lies_between_them(prediction):
         ]
     size = ramps(SHOWN).square().mean().sqrt()  # 0.38
     assert min(errors[0]) > size
-    assert errors[250][0] < 0.1 * size
-    assert errors[250][1] < (0.4 if prediction == "sample" else 0.2) * size
+    assert errors[150][0] < 0.15 * size
+    assert errors[150][1] < (0.4 if prediction == "sample" else 0.2) * size

@@ -48,7 +48,7 @@ def test_demonstrations_come_back_and_between_them_the_direction_follows_the_con
 
 
 def test_mixed_dimensions_come_back_at_outcomes_of_mixed_units(swing, plan_format):
-    t = np.arange(64) / 64
+    t = np.arange(32) / 32
     starts = np.array([0.0, 0.12, 0.25])
     plans = np.stack(
         [
@@ -56,7 +56,7 @@ def test_mixed_dimensions_come_back_at_outcomes_of_mixed_units(swing, plan_forma
                 [
                     swing(t, start, 0.6),
                     (t > 0.4 + start).astype(float),  # gripper
-                    np.full(64, 0.7),  # constant
+                    np.full(32, 0.7),  # constant
                     0.01 * swing(t, 0.5 + start, 1.0),  # cut off in mid-swing, of another scale
                 ],
                 axis=1,
@@ -67,10 +67,12 @@ def test_mixed_dimensions_come_back_at_outcomes_of_mixed_units(swing, plan_forma
     outcomes = np.array([[0.9, 20.0], [1.0, 35.0], [1.1, 10.0]])
     plan = replace(plan_format(4), units=("rad", "rad", "rad", "m"))
     demos = Demonstrations(plans, outcomes, plan, OutcomeFormat(("x", "y"), ("m", "s")))
-    generator = Timed(
-        DiffusionGenerator(replace(SMALL, training_steps=2 * SMALL.training_steps))
-    ).fit(demos, seed=0)
-    assert misses(generator, demos)[:, [0, 3]].max() < 0.05
+    errors = {}
+    for steps in (0, 400):
+        generator = Timed(DiffusionGenerator(replace(SMALL, training_steps=steps)))
+        errors[steps] = misses(generator.fit(demos, seed=0), demos)[:, [0, 3]].max()
+    assert errors[400] < 0.1
+    assert errors[0] > 0.3
     back = generator.generate(outcomes)
     np.testing.assert_allclose(back[:, :, 1:3], plans[:, :, 1:3], atol=1e-12)
     between = generator.generate(np.array([[0.95, 28.0], [1.05, 20.0]]))
