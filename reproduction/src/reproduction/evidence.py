@@ -9,7 +9,7 @@ from __future__ import annotations
 import io
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -164,8 +164,11 @@ def _on_drawn(rows: Results | None, of: tuple[PaperRow, Results]) -> Any:
     return "" if tried is None else tried.mean(TRIALS)
 
 
-def headlines(results: Results) -> Mapping[str, Table]:
-    """Tables in other pages, by name: README's, and those of reproduction/docs/evidence.md."""
+def headlines(results: Results) -> Mapping[str, Callable[[], Table]]:
+    """Tables in other pages, by name: README's, and those of reproduction/docs/evidence.md.
+
+    Each is made when it is called, as a page may show one of them.
+    """
     of = {name: RECIPES[name].rows_of(results) for name in ("trials", "generators", "adapters")}
     after = later(results.where(recipe="adaptation"))
     if INCOMPLETE in results.made_by.get("adaptation", ""):
@@ -204,14 +207,14 @@ def headlines(results: Results) -> Mapping[str, Table]:
     }
     afternoon = {"trials a goal": mean_of(TRIALS)}
     return {
-        "trials": Table.of(("task, by eye",), tasks, trials),
-        "camera": Table.of(("task",), seen, camera),
-        "drawn generators": Table.of(("generator",), network, four),
-        "drawn adapters": Table.of(("adapter",), drawn, afternoon),
-        "p-hit": p_hit_table(results.where(recipe="sets")),
-        "methods": Table.of(("behind or before", "method"), methods, four),
-        "once": RECIPES["once"].table(results.where(recipe="once")),
-        "afternoon": Table.of(("adapter",), after.by("method"), afternoon),
+        "trials": lambda: Table.of(("task, by eye",), tasks, trials),
+        "camera": lambda: Table.of(("task",), seen, camera),
+        "drawn generators": lambda: Table.of(("generator",), network, four),
+        "drawn adapters": lambda: Table.of(("adapter",), drawn, afternoon),
+        "p-hit": lambda: p_hit_table(results.where(recipe="sets")),
+        "methods": lambda: Table.of(("behind or before", "method"), methods, four),
+        "once": lambda: RECIPES["once"].table(results.where(recipe="once")),
+        "afternoon": lambda: Table.of(("adapter",), after.by("method"), afternoon),
     }
 
 
@@ -220,7 +223,7 @@ def fill_tables(page: Path, results: Results) -> None:
     tables = headlines(results)
 
     def filled(found: re.Match[str]) -> str:
-        table = tables[found["name"]]
+        table = tables[found["name"]]()
         text = "\n".join(_rows(table)) if table.rows else "Not run.\n"
         return f"{found[1]}\n{text}\n{found[3]}"
 

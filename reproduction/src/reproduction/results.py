@@ -195,13 +195,25 @@ def _groups(tables: Sequence[pd.DataFrame]) -> tuple[list[Values], list[int]]:
         columns = first.columns.intersection(other.columns)
         first = first.loc[rows, columns] - other.loc[rows, columns]
     groups, weights = [], []
-    for _, of_source in first.groupby(level="learned_on", sort=False):
-        complete = of_source.dropna(axis="columns", how="all").dropna()
-        if complete.size:
-            of_sets = complete.groupby(level=[c for c in _SET if c in complete.index.names])
-            groups.append(of_sets.mean().to_numpy(dtype=float))
-            weights.append(len(set(complete.columns.get_level_values("task"))))
+    sources = first.index.get_level_values("learned_on")
+    of_set = first.index.droplevel([c for c in first.index.names if c not in _SET])
+    known = first.notna().to_numpy()
+    for source in sources.unique():
+        rows = np.asarray(sources == source)
+        columns = known[rows].any(axis=0)
+        rows &= known[:, columns].all(axis=1)
+        if rows.any() and columns.any():
+            groups.append(_of_sets(first.to_numpy(dtype=float)[rows][:, columns], of_set[rows]))
+            weights.append(len(set(first.columns[columns].get_level_values("task"))))
     return groups, weights
+
+
+def _of_sets(values: Values, sets: pd.Index) -> Values:
+    """The mean of each set's trainings."""
+    if sets.is_unique:
+        return values
+    means = pd.DataFrame(values, sets).groupby(level=list(range(sets.nlevels))).mean()
+    return means.to_numpy(dtype=float)
 
 
 def _estimate(tables: Sequence[pd.DataFrame], within: tuple[float, float]) -> Interval:

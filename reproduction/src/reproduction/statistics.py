@@ -123,19 +123,21 @@ def _resampled(
     """The mean and resampled ones: deviations widened as a variance of so few, with its tails."""
     from scipy import stats
 
-    rng, value = np.random.default_rng(seed), 0.0
-    deviation = np.zeros(_RESAMPLES)
     shares = np.ones(len(groups)) if weights is None else np.asarray(weights, dtype=float)
-    for values, share in zip(groups, shares / shares.sum(), strict=True):
-        values = np.asarray(values, dtype=float)
+    shared = [
+        (np.asarray(values, dtype=float), share)
+        for values, share in zip(groups, shares / shares.sum(), strict=True)
+    ]
+    value = sum(float(share * values.mean()) for values, share in shared)
+    freedom = sum(len(values) - 1 for values, _ in shared)
+    if freedom < _LEAST_FREEDOM:
+        return value, np.full(_RESAMPLES, np.nan)
+    rng, deviation = np.random.default_rng(seed), np.zeros(_RESAMPLES)
+    for values, share in shared:
         m, n = values.shape
         counts = rng.multinomial(m, np.full(m, 1 / m), size=_RESAMPLES) / m
         drawn = np.take_along_axis(counts @ values, rng.integers(n, size=(_RESAMPLES, n)), axis=1)
         deviation += share * np.sqrt(m / max(m - 1, 1)) * (drawn.mean(axis=1) - values.mean())
-        value += float(share * values.mean())
-    freedom = sum(len(values) - 1 for values in groups)
-    if freedom < _LEAST_FREEDOM:
-        return value, np.full(_RESAMPLES, np.nan)
     tail = (1 + _CONFIDENCE) / 2
     return value, value + deviation * stats.t.ppf(tail, freedom) / stats.norm.ppf(tail)
 
