@@ -7,11 +7,11 @@ from reproduction.recipes import RECIPES, Run
 from reproduction.recipes.base import QUICK
 from reproduction.results import write_rows
 
+FEW = replace(QUICK, goals=4, rounds=2)
+
 
 def test_rows_that_do_not_come_out_again_are_counted(tmp_path, monkeypatch, capsys):
-    planned = [p for p in RECIPES["sets"].units(QUICK) if p[1]["method"] == "nearest neighbours"][
-        :1
-    ]
+    planned = [p for p in RECIPES["sets"].units(FEW) if p[1]["method"] == "nearest neighbours"][:1]
     recipe = replace(RECIPES["sets"], units=lambda scale, include: planned)
     monkeypatch.setattr("reproduction.verify.RECIPES", {"sets": recipe})
     rows = [dict(row) for row in Run(tmp_path).rows(planned)]

@@ -85,7 +85,7 @@ def test_what_is_learned_from_is_said_as_a_symmetry_or_not(tmp_path):
 def test_a_few_rows_give_table_verdict_and_picture(tmp_path):
     planned = [
         p
-        for p in units(Scale(goals=2, rounds=4))
+        for p in units(Scale(goals=2, rounds=2))
         if p[0].task == "basketball-v1"
         and p[0].training.demonstrations in ("v00", "v01")
         and len(p[0].training.subset) in (1, 6)

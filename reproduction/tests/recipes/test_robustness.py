@@ -45,8 +45,8 @@ def by_hand(monkeypatch):
 
 def test_conditions_give_table_picture_and_remarks(by_hand, tmp_path):
     conditions = [
-        Condition("by eye", FIELDS),
-        Condition("turned away", FIELDS, TURNED, f"{OBSERVERS}:ErringEye"),
+        Condition("by eye", FIELDS, goals=4),
+        Condition("turned away", FIELDS, TURNED, f"{OBSERVERS}:ErringEye", goals=4),
     ]
     planned = [unit for c in conditions for unit in tried(c, [*RULES, FROZEN], rounds=4)]
     results = gather(tmp_path, planned, "robustness")
@@ -54,7 +54,7 @@ def test_conditions_give_table_picture_and_remarks(by_hand, tmp_path):
     assert table.header[2] == "Bayesian, earlier goals too"
     assert table.header[-1] == "frozen"  # the one that was included
     assert "CMA-ES" not in table.header  # which searches, and these conditions ask for none
-    assert [row[:2] for row in table.rows] == [("by eye", "7"), ("turned away", "7")]
+    assert [row[:2] for row in table.rows] == [("by eye", "3"), ("turned away", "3")]
     for of in later(results).by("condition").values():
         methods = of.by("method")
         ours = methods["Bayesian, earlier goals too"].mean(TRIALS).value

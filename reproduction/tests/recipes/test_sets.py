@@ -3,7 +3,7 @@
 import pytest
 from gathered import gather
 
-from reproduction.recipes import RECIPES, Scale
+from reproduction.recipes import RECIPES, Scale, adaptation, sets
 from reproduction.recipes.sets import RECIPE, SETS, units
 from reproduction.results import TRIALS
 
@@ -18,10 +18,12 @@ def test_every_set_is_tried_with_every_method_and_a_seed_of_its_own():
 
 
 @pytest.mark.slow
-def test_two_sets_give_table_and_picture(tmp_path):
+def test_two_sets_give_table_and_picture(tmp_path, monkeypatch):
+    monkeypatch.setattr(adaptation, "GOALS", 4)
+    monkeypatch.setattr(sets, "_SEQUENCES", 1)
     planned = [
         p
-        for p in units(Scale(goals=4, rounds=4))
+        for p in units(Scale(goals=2, rounds=2))
         if p[0].training.demonstrations in ("v00", "v01")
         and p[0].task in ("basketball-v1", "basketball-v3")
         and p[0].adapter in ("proportional", "gp-two-term")
