@@ -50,6 +50,10 @@ def wait_for_a_write(folder: Path, pid: int) -> None:
 def main(folder: Path, seed: int) -> None:
     # Loaded once: runs that load torch and MuJoCo themselves are mostly killed while they do.
     import joblib  # noqa: F401
+    import mujoco.rollout  # noqa: F401
+    import scipy.interpolate
+    import scipy.optimize
+    import scipy.spatial  # noqa: F401
     import torch._dynamo  # noqa: F401  # an optimizer does
 
     os.environ[PLUGINS] = "quick_units"  # for the workers

@@ -10,6 +10,7 @@ from prior_reinforce.generators import make_generator
 from prior_reinforce.perception import make_perception
 from prior_reinforce.simulation.protocol import run_goals
 from prior_reinforce.simulation.tasks import make_task
+from reproduction import fields
 from reproduction.fields import Change, Conditions, Field, FieldTask, measure
 
 REGION = np.array([[0.9, -0.2], [1.1, 0.2]])
@@ -123,7 +124,8 @@ def test_measuring_a_field_finds_the_field(field):
 
 
 @pytest.mark.slow
-def test_a_field_measured_in_physics_tells_where_other_plans_land():
+def test_a_field_measured_in_physics_tells_where_other_plans_land(monkeypatch):
+    monkeypatch.setattr(fields, "SPACING", 0.08)
     task = make_task("basketball-v1")
     own = task.demonstrations("A")
     known = np.linspace(-0.01, 0.02, own.outcomes_seen.size).reshape(own.outcomes_seen.shape)

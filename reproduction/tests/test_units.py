@@ -24,11 +24,11 @@ def silent(done, total, label):
 def test_any_number_of_workers_gives_the_same_files_bit_for_bit(tmp_path, monkeypatch):
     monkeypatch.setenv(PLUGINS, "quick_units")  # for the workers
     units = [*real_units(), *map(Roots, range(4))]
-    for count in (1, 3):
+    for count in (1, 2):
         run_units(units, tmp_path / str(count), Workers(count), silent)
     one = results(tmp_path / "1")
     assert len(one) == len(units) + 9  # three models of three files each
-    assert results(tmp_path / "3") == one
+    assert results(tmp_path / "2") == one
 
 
 def test_a_model_of_which_nobody_says_what_made_it_is_learned_anew(tmp_path):
