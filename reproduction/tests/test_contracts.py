@@ -44,6 +44,12 @@ class TestTasks(TaskContract):
     def task(cls, request):
         return make_task(request.param)
 
+    @pytest.fixture(scope="class")
+    @classmethod
+    def plans(cls, task):
+        kind = task.demonstration_sets[0].partition("-")[0]
+        return task.demonstrations(f"{kind}-3-0").plans
+
 
 @pytest.mark.parametrize("name", ["diffusion-ways", "regression", "dmp", "nearest"])
 def test_a_generator_is_chosen_by_the_name_of_its_class(name):

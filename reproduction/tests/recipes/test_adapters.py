@@ -8,7 +8,7 @@ from reproduction.recipes import Scale
 from reproduction.recipes.adapters import RECIPE, units
 from reproduction.results import FIRST, TRIALS, reached
 
-SMALL = Scale(goals=3, seeds=(0,), sets=("A",), rounds=3)
+SMALL = Scale(goals=2, seeds=(0,), sets=("A",), rounds=3)
 
 
 @pytest.mark.slow

@@ -56,7 +56,7 @@ def test_the_three_kept_span_the_largest_triangle():
 @pytest.mark.slow
 def test_the_recipe_runs_from_throws_to_table_and_picture(tmp_path):
     planned = [
-        (Displacement(unit.training, spacing=0.1), names)
+        (Displacement(unit.training, spacing=0.15), names)
         for unit, names in units(Scale(seeds=(0,), sets=("A",)), generator="dmp")
     ]
     results = gather(tmp_path, planned, "displacement")

@@ -16,7 +16,7 @@ from reproduction.recipes.generators import (
 )
 from reproduction.results import TRIALS, Results
 
-SMALL = Scale(goals=5, seeds=(0,), sets=("A",), rounds=3)
+SMALL = Scale(goals=3, seeds=(0,), sets=("A",), rounds=3)
 OWN = "twin"
 QUICK = ("segmented DMP", "nearest neighbours", "nearest neighbours, aligned")
 
