@@ -70,7 +70,8 @@ class MovedPrior:
 
     def _models(self) -> tuple[Model, ...]:
         of = self.symmetry
-        every = itertools.product(*([1.0] if exact else [1.0, -1.0] for exact in of.exact))
+        known = of.exact | of.learned
+        every = itertools.product(*([1.0] if each else [1.0, -1.0] for each in known))
         signs = [np.array(each) for each in every][1:]
         stated = 1.0 - _P_NONE - (_P_OTHER_WAY if signs else 0.0)
         closely = _CLOSELY * of.gain_sd, _CLOSELY, _CLOSELY, _P_CLOSELY * stated

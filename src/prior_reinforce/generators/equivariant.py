@@ -6,7 +6,8 @@
 What a generator has to learn is one dimension less for each exact component (*canonicalisation*;
 `plans.symmetry`), and nothing at all where no component is left or one demonstration is all there
 is: that demonstration is moved. Beyond the demonstrated hull of what is left, plans are moved from
-its edge; nothing extrapolates. Without a symmetry the wrapped generator learns as it is.
+its edge, but for components that demonstrations alone tell (`Learned`): these the generator
+extrapolates. Without a symmetry the wrapped generator learns as it is.
 
 Ours; the idea is that of canonical and frame-averaging policies.
 """
@@ -21,6 +22,7 @@ from jaxtyping import Float
 from typing_extensions import Self
 
 from prior_reinforce.arrays import Plans, Point, Points
+from prior_reinforce.errors import InvalidDemonstrationsError
 from prior_reinforce.formats import OutcomeFormat
 from prior_reinforce.generators.base import Generator, OnProgress, Wrapper, at_once
 from prior_reinforce.generators.saving import SavedLayer, Tensors
@@ -45,9 +47,17 @@ class Equivariant(Wrapper):
     """Exact components to which plans are brought, the others 0, shape (k,)."""
 
     def check_demonstrations(self, demonstrations: Demonstrations) -> None:
-        """Do nothing with a symmetry; see `Generator.check_demonstrations`."""
-        if demonstrations.symmetry is None:
+        """Refuse too few to tell what a turn leaves; see `Generator.check_demonstrations`."""
+        symmetry = demonstrations.symmetry
+        if symmetry is None:
             self.generator.check_demonstrations(demonstrations)
+        elif np.any(symmetry.learned):
+            anchors = Anchors(symmetry, demonstrations.outcomes_seen, demonstrations.outcome_noise)
+            if not anchors.mixed:
+                raise InvalidDemonstrationsError(
+                    f"{demonstrations.n} demonstrations do not tell what a turn leaves: give more "
+                    f"than {len(anchors.left)} that differ in it, or declare distance 'tempo'"
+                )
 
     def _fit(self, demonstrations: Demonstrations, seed: int, progress: OnProgress) -> None:
         symmetry = demonstrations.symmetry

@@ -339,8 +339,11 @@ class Demonstrations:
         supports (its displacement field degrades towards the boundary already).
         """
         if self.symmetry is not None:
-            chart, farthest = self.symmetry.chart, self.symmetry.farthest
+            chart = self.symmetry.chart
             z, aim = chart.to(self.outcomes_seen), chart.to(goal)
+            farthest = np.where(
+                self.symmetry.learned, 0.5 * np.ptp(z, axis=0), self.symmetry.farthest
+            )
             beyond = aim - np.clip(aim, z.min(axis=0), z.max(axis=0))
             too_far = beyond - np.clip(beyond, -farthest, farthest)
             return np.asarray(np.abs(goal - chart.back(aim - too_far))) * np.any(too_far)

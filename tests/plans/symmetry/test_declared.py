@@ -9,6 +9,7 @@ from prior_reinforce.plans.kinematics import Chain, tool_tip
 from prior_reinforce.plans.plan_format import PlanFormat
 from prior_reinforce.plans.symmetry import (
     Amplitude,
+    Learned,
     Shift,
     Tempo,
     TurnIncrements,
@@ -100,3 +101,15 @@ def test_an_arm_on_a_wall_has_no_upright_base():
     form = PlanFormat(("a", "b"), ("rad", "rad"), 0.01)
     with pytest.raises(ConfigurationError, match="not vertical"):
         declare_symmetry(form, 2, about="base", chain=wall, joints=(0, 1))
+
+
+def test_all_but_the_bearing_may_be_left_to_the_demonstrations():
+    symmetry = declare_symmetry(JOINTS, 3, about="base", distance="learned", **ARM)
+    assert kinds(symmetry) == [Learned, TurnJoint, Learned]
+    assert symmetry.name == "turn"
+    np.testing.assert_array_equal(symmetry.learned, [True, False, True])
+    with pytest.raises(ConfigurationError, match="say distance 'learned'"):
+        declare_symmetry(JOINTS, 3, about="base", **ARM)
+    for k, about in ((1, None), (2, None), (1, "base")):
+        with pytest.raises(ConfigurationError):
+            declare_symmetry(JOINTS, k, about=about, distance="learned", **ARM)

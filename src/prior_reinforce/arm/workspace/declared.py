@@ -25,8 +25,8 @@ class DeclaredSymmetry(Struct, frozen=True, forbid_unknown_fields=True):
 
     object: Literal["carried", "anywhere", "none"] | tuple[float, float]
     """Where the object is before it leaves; (x, y) in the table frame."""
-    distance: Literal["tempo", "amplitude"] = "tempo"
-    """How a motion is made to reach farther: played faster, or made larger."""
+    distance: Literal["tempo", "amplitude", "learned"] = "tempo"
+    """How a motion reaches farther: played faster, made larger, or as demonstrations tell."""
     release_frame: Annotated[float, Meta(ge=0)] | None = None
     """Where a clock lets go, and not the motion."""
     steps: tuple[str, ...] = ()

@@ -15,6 +15,7 @@ from prior_reinforce.plans.symmetry.declared import declare_symmetry
 from prior_reinforce.plans.symmetry.moves import (
     Amplitude,
     Delay,
+    Learned,
     Move,
     Shift,
     Tempo,
@@ -37,6 +38,7 @@ __all__ = [
     "Cartesian",
     "Chart",
     "Delay",
+    "Learned",
     "LogDistance",
     "Move",
     "Polar",

@@ -23,8 +23,9 @@ class Anchors:
 
     Two ways to be a base. *Mixed*: demonstrations differ enough in what is not exact, so that a
     plan for any value within their hull can be mixed of all, and is moved from the hull's nearest
-    point beyond it. *Picked*: the nearest demonstration is moved; so with one demonstration, where
-    all components are exact, and where labels are coarser than the gaps.
+    point beyond it; what demonstrations alone tell is mixed beyond it, too. *Picked*: the nearest
+    demonstration is moved; so with one demonstration, where all components are exact, and where
+    labels are coarser than the gaps.
     """
 
     def __init__(self, symmetry: Symmetry, outcomes: Points, noise: Points) -> None:
@@ -62,7 +63,9 @@ class Anchors:
             apart = (aims[:, None] - self.z[None]) / self.symmetry.farthest
             nearest = np.argmin(np.sum(apart**2, axis=2), axis=1)
             return self.z[nearest], np.eye(len(self.z))[nearest]
-        within = into_hull(aims[:, self.left], self.z[:, self.left])
+        wanted = aims[:, self.left]
+        learned = self.symmetry.learned[self.left]
+        within = np.where(learned, wanted, into_hull(wanted, self.z[:, self.left]))
         weights = self._weights(within)
         base = weights @ self.z
         base[:, self.left] = within
@@ -95,6 +98,8 @@ class Anchors:
         extent = np.ptp(values, axis=0)
         if np.any(extent < 1e-6) or np.linalg.svd(values / extent)[1][-1] < 1e-3:
             return False
+        if np.all(self.symmetry.learned[left]):
+            return True  # whatever the labels: nothing else gives plans for what is asked
         gaps = extent / (n ** (1 / len(left)) - 1)  # as if they lay on a grid
         return bool(np.all(np.median(self.sd[:, left], axis=0) <= _NEIGHBOURS_APART * gaps))
 

@@ -4,6 +4,7 @@
 - *It pushes or strikes an object that lies at (x, y)*: turns about that place (`about=(x, y)`).
 - *The motion may happen anywhere on the table*: shifts (`distance="shift"`), of poses alone.
 - *Neither*: `about=None`; one outcome is then reached by tempo or amplitude.
+- *Only the turn is known* (`distance="learned"`): several demonstrations tell all but the bearing.
 
 What a plan is, its names and units say: joints of a known arm, poses (x and y in m, with rx, ry and
 rz, or qw, qx, qy and qz, or yaw), or increments of them (dx, dy, dyaw).
@@ -23,6 +24,7 @@ from prior_reinforce.plans.symmetry.moves import (
     Amplitude,
     AnyMove,
     Columns,
+    Learned,
     Tempo,
     TurnIncrements,
     TurnJoint,
@@ -35,7 +37,7 @@ if TYPE_CHECKING:
     from prior_reinforce.plans.plan_format import PlanFormat
 
 About = Literal["base"] | tuple[float, float] | None
-Distance = Literal["tempo", "amplitude", "shift"]
+Distance = Literal["tempo", "amplitude", "learned", "shift"]
 _VECTOR, _QUATERNION = ("rx", "ry", "rz"), ("qw", "qx", "qy", "qz")
 _UPRIGHT = 1e-3
 """How far, [rad] and [m], an axis may be off the vertical through the base (ours)."""
@@ -62,7 +64,8 @@ def declare_symmetry(
         form: Of its plans.
         k: Components of its outcomes; x and y first where there are several.
         about: About what the motion may be turned.
-        distance: How it is made to reach farther.
+        distance: How it is made to reach farther; `learned`: as the demonstrations tell, with every
+            further component of the outcome.
         chain: The arm, where plans are of its joints; its base frame is the outcomes'.
         joints: Columns of the chain's joints, in its order.
         start: (x, y) of the hand before increments, [m].
@@ -89,36 +92,45 @@ def declare_symmetry(
         return shift((place[0], place[1]), _LEAD if increments else 0)
     stepped = tuple(column[name] for name in steps)
     scale: AnyMove = Amplitude(exponent, stepped, increments)
-    if distance == "tempo":
+    others: tuple[AnyMove, ...] = ()
+    if distance == "learned":
+        scale, others = Learned(), (Learned(),) * max(k - 2, 0)
+    elif distance == "tempo":
         clocked = release_frame is not None
         scale = Tempo(exponent, release_frame, clocked, stepped, increments)
     if about is None:
+        if distance == "learned":
+            raise ConfigurationError(
+                "with distance 'learned' a turn is all that is known: say about what the motion "
+                "may be turned, or leave the symmetry out"
+            )
         if k != 1:
             raise ConfigurationError(
                 f"an outcome of {k} components needs an axis to turn about, or shifts; say about "
                 "what the motion may be turned, or leave the symmetry out"
             )
         return scale_alone(scale)
-    if k != 2:
+    if k != 2 + len(others):
         raise ConfigurationError(
-            f"a turn moves outcomes x and y, but outcomes have {k} components; leave the symmetry "
-            "out, or make one of moves for each (plans.symmetry)"
+            f"a turn and a {distance} move outcomes x and y, but outcomes have {k} components; say "
+            "distance 'learned' (several demonstrations tell all but the bearing), leave the "
+            "symmetry out, or make one of moves for each (plans.symmetry)"
         )
     centre = (0.0, 0.0) if about == "base" else (float(about[0]), float(about[1]))
     if chain is not None and joints:
         if about != "base":
-            return turn_and_scale(TurnPath(chain, centre, tuple(joints)), centre, scale)
+            return turn_and_scale(TurnPath(chain, centre, tuple(joints)), centre, scale, others)
         gain, centre = _first_joint(chain)
-        return turn_and_scale(TurnJoint(joints[0], gain), centre, scale)
+        return turn_and_scale(TurnJoint(joints[0], gain), centre, scale, others)
     if place := _columns(column, ("x", "y")):
         vector, quaternion = _columns(column, _VECTOR), _columns(column, _QUATERNION)
         turn: AnyMove = TurnPoses(
             centre, (place[0], place[1]), vector or None, quaternion or None, column.get("yaw")
         )
-        return turn_and_scale(turn, centre, scale)
+        return turn_and_scale(turn, centre, scale, others)
     if place := _columns(column, ("dx", "dy")):
         turn = TurnIncrements(start, centre, (place[0], place[1]), column.get("dyaw"), _LEAD)
-        return turn_and_scale(turn, centre, scale)
+        return turn_and_scale(turn, centre, scale, others)
     raise ConfigurationError(
         f"plans of {', '.join(form.names)} cannot be turned: name the arm, or give poses x and y"
     )

@@ -151,6 +151,13 @@ class Delay(Move, frozen=True, tag="delay"):
         return out
 
 
+class Learned(Move, frozen=True, tag="learned"):
+    """None: a component that demonstrations alone tell, as they do without a symmetry."""
+
+    def _moved(self, plan: Frames, amount: float) -> Moved:
+        return plan.copy()
+
+
 class Shift(Move, frozen=True, tag="shift"):
     """One column shifted: poses moved along the table."""
 
@@ -271,7 +278,9 @@ class TurnPath(Move, frozen=True, tag="turn-path"):
         return out
 
 
-AnyMove = Tempo | Amplitude | Delay | Shift | TurnJoint | TurnPoses | TurnIncrements | TurnPath
+AnyMove = (
+    Tempo | Amplitude | Delay | Learned | Shift | TurnJoint | TurnPoses | TurnIncrements | TurnPath
+)
 
 
 def _columns(*named: Columns | int | None) -> Columns:

@@ -20,7 +20,7 @@ from jaxtyping import Bool, Float
 from prior_reinforce.arrays import Frames, Point, Points
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.plans.symmetry.charts import AnyChart, Cartesian, LogDistance, Polar
-from prior_reinforce.plans.symmetry.moves import AnyMove, Moved, Shift, Tempo
+from prior_reinforce.plans.symmetry.moves import AnyMove, Learned, Moved, Shift, Tempo
 
 Matrix = Float[np.ndarray, "k k"]
 
@@ -94,6 +94,11 @@ class Symmetry:
     def k(self) -> int:
         """Number of components of the outcome."""
         return len(self.moves)
+
+    @property
+    def learned(self) -> Bool[np.ndarray, " k"]:
+        """Components that demonstrations alone tell, within their hull and beyond it."""
+        return np.array([isinstance(move, Learned) for move in self.moves])
 
     @property
     def increments(self) -> tuple[int, ...]:
@@ -186,11 +191,12 @@ def turn_and_scale(
     Args:
         turn: Which is exact: `TurnJoint`, `TurnPoses`, `TurnIncrements` or `TurnPath`.
         centre: (x, y) of the axis in the outcomes' frame, [m].
-        scale: `Tempo` or `Amplitude`.
+        scale: `Tempo`, `Amplitude` or `Learned`.
         others: What moves each further component of the outcome, by a law as unknown as tempo's.
     """
     scale, n = scale or Tempo(), len(others)
-    name = " and ".join(["turn", *(type(move).__name__.lower() for move in (scale, *others))])
+    moved = [type(each).__name__.lower() for each in (scale, *others) if type(each) is not Learned]
+    name = " and ".join(["turn", *moved])
     chart = Polar((float(centre[0]), float(centre[1])))
     exact, sd = (False, True, *[False] * n), (_SCALING_SD, 0.1, *[_SCALING_SD] * n)
     return _made(name, chart, (scale, turn, *others), exact, sd, _DISTANCE, _BEARING, *[_OTHER] * n)
