@@ -35,7 +35,7 @@ def test_each_demonstration_of_a_and_b_is_shown_alone_and_drawn_sets_are_tried_a
     ]
     alone = [of.subset for of in ours if of.demonstrations == "A" and len(of.subset) == 1]
     assert sorted(alone) == [(i,) for i in range(6)]
-    assert len({of.demonstrations for of in ours}) == 8
+    assert len({of.demonstrations for of in ours}) == 22
     assert {len(of.subset) for of in ours} == set(COUNTS)
     assert len({(of.demonstrations, of.seed, of.subset) for of in ours}) == len(ours)
     conditions = Counter(names["condition"] for _, names in planned)
