@@ -660,7 +660,12 @@ def test_news_waits_for_the_finger_and_no_longer_than_two_seconds(at, serve):
     page = at(served)
     touch(page, [0.9, 0.05])
     expect(page.locator("#goal")).to_be_enabled()
-    page.wait_for_function("calmAt < performance.now()")  # what stood out has been drawn
+    page.evaluate(  # what stood out has been drawn
+        """() => new Promise((go) => {
+            const look = () => (calmAt < performance.now() ? go() : setTimeout(look, 20));
+            look();
+        })"""
+    )
     early = """() => {
         window.early = 0;
         const now = draw;
