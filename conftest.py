@@ -7,6 +7,7 @@ import os
 import shutil
 import signal
 import subprocess
+import zlib
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -79,13 +80,17 @@ def pytest_collection() -> Iterator[None]:
 
 @pytest.hookimpl(tryfirst=True)  # before tests are chosen by their marks
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Mark tests by tier, and start the longest first, or one process waits for them in the end."""
+    """Mark tests by tier, and start the longest first, or one process waits for them in the end.
+
+    Files in no order, or all processes would wait at once, for the arms and browsers of a folder.
+    """
     tiers.mark(items, str(config.rootpath))
 
-    def place(item: pytest.Item) -> int:
+    def place(item: pytest.Item) -> tuple[int, int]:
         if item.path.stem in ("test_notebook", "test_tutorial", "test_cluster"):
-            return 0
-        return 1 if item.get_closest_marker("slow") else 2
+            return 0, 0
+        file = zlib.crc32(str(item.path.relative_to(config.rootpath)).encode())
+        return 1 if item.get_closest_marker("slow") else 2, file
 
     items.sort(key=place)
 

@@ -99,6 +99,12 @@ def test_three_numbers_are_adapted_to_with_a_turn_alone(throws):
             condition, goal, Reading.measured(error, 0.002, False).within(np.full(3, 0.01))
         )
     np.testing.assert_allclose(adapter.propose(goal), goal - off, atol=0.01)
+    beyond, lost = np.array([1.3, 0.1, 0.72]), Reading.only(False, 3, lost=True)
+    first = adapter.propose(beyond)
+    adapter.observe(first, beyond, lost.within(np.full(3, 0.01)))
+    reach = np.hypot(*demos.outcomes_seen[:, :2].T).max()
+    then = adapter.propose(beyond)
+    assert reach < np.hypot(*then[:2]) < 0.5 * (reach + np.hypot(*first[:2])) + 0.01
 
 
 @pytest.mark.parametrize("choice", ["auto", QUICK])

@@ -83,7 +83,7 @@ class MovedTrials:
     def propose(self, goal: Point) -> Point:
         """Return the condition to try next; see `Adapter.propose`."""
         aim = self.belief.aim(goal, self.now, self._farthest(goal))
-        condition = self.chart.back(aim)
+        condition = self.chart.back(self._held_back(aim, goal))
         missed = self._told_as_now(goal)
         if tried_again(condition[None], self.chart.back(missed.conditions), missed.missed_by)[0]:
             return self._likeliest_beside(condition, goal, missed)
@@ -192,6 +192,17 @@ class MovedTrials:
                 w = np.abs(self.belief.prior.moved(aim[None])[0])
                 farthest[which] = np.minimum(farthest, _BACK * w)[which]
         return farthest
+
+    def _held_back(self, aim: Point, goal: Point) -> Point:
+        """Nearer to a demonstration than where an object was lost, in what they alone tell."""
+        learned, z = self.belief.symmetry.learned, self.belief.prior.anchors.z
+        for about, lost in self._lost:
+            if np.array_equal(about, goal):
+                apart = (z - lost)[:, learned] / np.ptp(z, axis=0)[learned]
+                nearest = z[np.argmin(np.square(apart).sum(axis=1))]
+                way = _BACK * np.abs(lost - nearest)
+                aim = np.where(learned, nearest + np.clip(aim - nearest, -way, way), aim)
+        return aim
 
     def _places(self, conditions: Points, goals: Points) -> Places:
         """Of trials of now."""
