@@ -85,7 +85,9 @@ def main(folder: Path) -> None:
             time.sleep(0.01)
 
     run_units(units, shared, Workers(ray=cluster.address), progress)
-    assert results(shared) == results(reference)
+    ours, theirs = results(reference), results(shared)
+    differ = [name for name in {*ours, *theirs} if ours.get(name) != theirs.get(name)]
+    assert not differ, [(name, ours.get(name), theirs.get(name)) for name in differ]
     assert all(len(nodes_of(shared, unit)) == 2 for unit in killed_with)
     print(f"{len(units)} units done, {len(killed_with)} of them twice")
 
