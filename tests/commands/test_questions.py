@@ -17,7 +17,7 @@ from prior_reinforce.errors import ConfigurationError
 from tests.arm.executing import toy_arm
 from tests.commands.at_terminal import PROGRAM, Typed
 
-SCRIPTS = int(os.environ.get("PRIOR_REINFORCE_RUNS", "3"))
+SCRIPTS = int(os.environ.get("PRIOR_REINFORCE_RUNS", "6"))
 QUESTION = re.compile(r"(?:The arm will move slowly|Trial \d+ will (?:run|be rehearsed)) .*\r\n")
 
 
