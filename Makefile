@@ -105,7 +105,7 @@ $(VENV)/.docs: $(VENV)/.core
 	$(PIP) -c constraints.txt -e '.[diffusion,simulation,docs]'
 	touch $@
 
-lerobot: $(VENV)/.lerobot
+lerobot: $(VENV)/.core $(VENV)/.lerobot
 
 clean:
 	rm -rf $(VENV) runs site

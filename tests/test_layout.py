@@ -44,6 +44,7 @@ OF_THE_WHOLE = {
     "once": "one demonstration, from Python and on contact physics",
     "public": "what the package exports, and how little small commands load",
     "shapes": "the check of shapes that runs during the tests",
+    "tiers": "which tests are quick, and which are run again",
     "tutorial": "the tutorial from top to bottom",
 }
 """Test files of no single module, and what they are about."""

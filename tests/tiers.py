@@ -3,12 +3,20 @@
 quick     every test takes at most 0.1 s of processor time (`--most`), all of them under a minute
 test      everything but what is nightly
 nightly   attacks, kills, floods, simulated arms, the browser, the reproduction
+
+    python -m tests.tiers
+
+exits with 0 where all tests that failed last are nightly ones: these run programs, browsers and
+arms by the clock, and may starve beside others.
 """
 
 from __future__ import annotations
 
+import json
 import os
+import sys
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 
 import pytest
 
@@ -102,3 +110,17 @@ def within(most: float) -> Iterator[None]:
     taken = sum(os.times()[:4]) - before
     if taken > most:
         pytest.fail(f"took {taken:.2f} s, more than {most} s: mark it slow", pytrace=False)
+
+
+FAILED = Path(".pytest_cache/v/cache/lastfailed")
+"""Where pytest keeps which tests failed."""
+
+
+def only_nightly_failed(kept: Path = FAILED) -> bool:
+    """Whether some tests failed, and each of them is nightly."""
+    failed = json.loads(kept.read_text()) if kept.exists() else {}
+    return bool(failed) and all(_within(test.split("::")[0], NIGHTLY) for test in failed)
+
+
+if __name__ == "__main__":
+    sys.exit(not only_nightly_failed())

@@ -8,9 +8,17 @@ from prior_reinforce.adapters.bayesian import BayesianAdapter
 from prior_reinforce.adapters.memory import Memory, Places
 from prior_reinforce.adapters.moved import MovedBelief
 from prior_reinforce.adapters.moved_prior import MovedPrior
+from prior_reinforce.formats import OutcomeFormat
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.plans.plan_format import PlanFormat
-from prior_reinforce.plans.symmetry import Symmetry, TurnJoint, shift, turn_and_scale
+from prior_reinforce.plans.symmetry import (
+    Delay,
+    Learned,
+    Symmetry,
+    TurnJoint,
+    shift,
+    turn_and_scale,
+)
 from prior_reinforce.readings import Reading
 
 SHOWN = np.array([[0.95, 0.05]])
@@ -169,6 +177,73 @@ def test_where_an_object_was_lost_the_next_plan_is_moved_half_as_far():
     away = np.abs(np.array(tried)[:, 0] - chart.to(SHOWN[0])[0])
     np.testing.assert_allclose(away[1:] / away[:-1], 0.5, atol=1e-6)
     assert "farther than" not in arm.adapter.expect(GOALS[0], GOALS[0], 0.015).remark
+
+
+SIX = np.array(
+    [
+        [0.90, -0.20, 0.50],
+        [1.00, 0.10, 0.66],
+        [1.10, 0.00, 0.58],
+        [0.95, 0.20, 0.90],
+        [1.05, -0.10, 0.82],
+        [1.15, 0.15, 0.74],
+    ]
+)
+"""Distance, bearing and a third number, as they differ in six demonstrations."""
+TURN_ALONE = turn_and_scale(TurnJoint(), scale=Learned(), others=(Learned(),))
+
+
+def three_numbers(symmetry) -> Demonstrations:
+    places = symmetry.chart.back(np.column_stack([np.log(SIX[:, 0]), SIX[:, 1:]]))
+    form = OutcomeFormat(("x", "y", "t"), ("m", "m", "s"))
+    return demonstrations(places, symmetry, outcome_format=form)
+
+
+@pytest.mark.parametrize(
+    ("symmetry", "most", "least"),
+    [(TURN_ALONE, 3, 1), (turn_and_scale(TurnJoint(), others=(Delay(10.0),)), 11, 4)],
+)
+def test_what_is_learned_needs_no_law_and_a_law_with_another_sign_costs_trials(
+    symmetry, most, least
+):
+    """Goals beyond the demonstrations, where moves would have the opposite effect."""
+    arm = Arm(np.diag([-0.5, 1.0, -0.5]), (0.03, -0.02, 0.02), three_numbers(symmetry))
+    arm.moved = np.zeros(3)
+    goals = symmetry.chart.back(np.array([[np.log(1.2), 0.1, 0.55], [np.log(0.87), 0.0, 0.95]]))
+    tolerance = np.full(3, 0.015)
+    trials = [0, 0]
+    for i, goal in enumerate(goals):
+        hit = False
+        while not hit and trials[i] < 11:
+            condition = arm.adapter.propose(goal)
+            error = arm.lands(condition) - goal
+            hit = bool(np.linalg.norm(error / tolerance) <= 1.0)
+            reading = Reading.measured(error, 0.002, hit).within(tolerance)
+            arm.adapter.observe(condition, goal, reading)
+            trials[i] += 1
+    assert least <= trials[0]
+    assert max(trials) <= most
+
+
+def test_what_is_learned_is_aimed_at_no_farther_than_it_is_believed_and_nearer_once_lost():
+    arm = Arm(np.eye(3), np.zeros(3), three_numbers(TURN_ALONE))
+    chart, z = TURN_ALONE.chart, arm.prior.anchors.z
+    beyond = 0.5 * np.ptp(z, axis=0)
+    beside = 0.03  # of a condition that missed, another is tried as far away as the tolerance
+    low, high = z.min(axis=0) - beyond - beside, z.max(axis=0) + beyond + beside
+    goal, learned = chart.back(np.array([np.log(1.25), 0.0, 1.0])), [0, 2]
+    for _ in range(8):  # what lands never comes nearer
+        condition = arm.adapter.propose(goal)
+        aim = chart.to(condition)
+        assert np.all(((low <= aim) & (aim <= high))[learned])
+        reading = Reading.measured([-0.2, 0.0, -0.1], 0.002, hit=False)
+        arm.adapter.observe(condition, goal, reading.within(np.full(3, 0.015)))
+    lost, other = Reading.only(False, 3, lost=True), chart.back(np.array([np.log(1.25), 0.2, 0.9]))
+    first = chart.to(arm.adapter.propose(other))
+    arm.adapter.observe(chart.back(first), other, lost.within(np.full(3, 0.015)))
+    then = chart.to(arm.adapter.propose(other))
+    away = [np.abs(aim - z)[:, learned].sum(axis=1).min() for aim in (first, then)]
+    assert away[1] < 0.7 * away[0]
 
 
 def test_of_hit_or_miss_alone_no_throw_is_made_twice_and_the_same_is_less_probable():

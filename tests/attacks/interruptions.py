@@ -61,9 +61,8 @@ _PR_CAPBSET_DROP, _CAP_DAC_OVERRIDE = 24, 1
 """Root's right to write where permissions forbid it; it stays root, and reads what is its own."""
 
 
-def attack(name: str, rng: random.Random, here: Path, asked: Path) -> str:
+def attack(how: str, name: str, rng: random.Random, here: Path, asked: Path) -> str:
     """Call a command, interrupt it, and check what is left; then finish it."""
-    how = rng.choice(HOW)
     folder = here / "planar"
     shutil.copytree(asked, folder)
     recordings(here / "recorded")

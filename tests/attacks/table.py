@@ -27,9 +27,10 @@ ATTACKS: dict[str, tuple[Attack, int]] = {
     **{f"motions: {kind}": (partial(execution.attack, kind), 2) for kind in execution.KINDS},
     "flips": (flips.attack, 10),
     "arms": (arms.attack, 5),
-    "watching": (watching.attack, 15),
+    "watching": (watching.attack, 30),
     **{
-        f"interrupted: {name}": (partial(interruptions.attack, name), 1)
+        f"{how}: {name}": (partial(interruptions.attack, how, name), 1)
+        for how in interruptions.HOW
         for name in interruptions.COMMANDS
     },
     **{name: (partial(reviewed.attack, name), 1) for name in reviewed.QUICK},

@@ -5,12 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from prior_reinforce.adapters.bayesian import BayesianAdapter
 from prior_reinforce.errors import InvalidDemonstrationsError
-from prior_reinforce.formats import OutcomeFormat
 from prior_reinforce.generators import load_generator, make_generator
 from prior_reinforce.generators.equivariant import Equivariant, rested
-from prior_reinforce.plans.plan_format import PlanFormat
 from prior_reinforce.plans.symmetry import (
     Learned,
     Shift,
@@ -21,7 +18,6 @@ from prior_reinforce.plans.symmetry import (
     shift,
     turn_and_scale,
 )
-from prior_reinforce.readings import Reading
 from prior_reinforce.testing import synthetic_demonstrations
 
 TURN = turn_and_scale(TurnJoint(2), scale=Tempo(exponent=1.0))
@@ -69,42 +65,8 @@ def test_with_a_turn_alone_the_rest_is_extrapolated_by_what_was_learned(throws):
     assert np.abs(beyond - edge).max() > 0.01
     (turned,) = generator.generate(1.1 * far * np.array([[np.cos(1.0), np.sin(1.0)]]))
     np.testing.assert_allclose(turned, beyond + np.eye(3)[2], atol=1e-9)
-    with pytest.raises(InvalidDemonstrationsError, match="more than 1 that differ"):
+    with pytest.raises(InvalidDemonstrationsError, match="more than 1 that differ in it, or leave"):
         make_generator("auto").fit(demos.only([0]), seed=0)
-
-
-def test_three_numbers_are_adapted_to_with_a_turn_alone(throws):
-    """A third one that no scaling moves; trials that miss by a displacement converge."""
-    flat = thrown(throws, 6)
-    third = np.linspace(0.5, 0.9, 6)[[3, 0, 5, 1, 4, 2]]
-    demos = replace(
-        flat,
-        plans=np.concatenate(
-            [flat.plans, np.full((*flat.plans.shape[:2], 1), third[:, None, None])], 2
-        ),
-        format=PlanFormat((*flat.format.names, "opens"), (*flat.format.units, "1"), flat.format.dt),
-        outcomes_seen=np.column_stack([flat.outcomes_seen, third]),
-        outcome_noise=np.zeros((6, 3)),
-        outcome_correction=np.zeros((6, 3)),
-        outcome_format=OutcomeFormat(("x", "y", "t"), ("m", "m", "s")),
-        symmetry=turn_and_scale(TurnJoint(2), scale=Learned(), others=(Learned(),)),
-    )
-    adapter = BayesianAdapter()
-    adapter.start(demos)
-    goal, off = np.array([1.0, 0.1, 0.72]), np.array([0.05, -0.06, 0.03])
-    for _ in range(4):
-        condition = adapter.propose(goal)
-        error = condition + off - goal
-        adapter.observe(
-            condition, goal, Reading.measured(error, 0.002, False).within(np.full(3, 0.01))
-        )
-    np.testing.assert_allclose(adapter.propose(goal), goal - off, atol=0.01)
-    beyond, lost = np.array([1.3, 0.1, 0.72]), Reading.only(False, 3, lost=True)
-    first = adapter.propose(beyond)
-    adapter.observe(first, beyond, lost.within(np.full(3, 0.01)))
-    reach = np.hypot(*demos.outcomes_seen[:, :2].T).max()
-    then = adapter.propose(beyond)
-    assert reach < np.hypot(*then[:2]) < 0.5 * (reach + np.hypot(*first[:2])) + 0.01
 
 
 @pytest.mark.parametrize("choice", ["auto", QUICK])

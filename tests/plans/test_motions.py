@@ -17,7 +17,7 @@ from prior_reinforce.errors import (
 from prior_reinforce.formats import OutcomeFormat
 from prior_reinforce.plans.motions import Demonstrations, Plan
 from prior_reinforce.plans.plan_format import PlanFormat
-from prior_reinforce.plans.symmetry import TurnJoint, scale_alone, turn_and_scale
+from prior_reinforce.plans.symmetry import Learned, TurnJoint, scale_alone, turn_and_scale
 
 FORMAT = PlanFormat(names=("joint1", "joint2"), units=("rad", "rad"), dt=0.01)
 RNG_SEED = 0
@@ -324,6 +324,14 @@ def test_a_goal_is_far_outside_where_the_symmetry_is_believed_no_more():
     np.testing.assert_allclose(one.far_outside(np.array([4.0, 0.0])), [4.0 - np.exp(0.9), 0.0])
     with pytest.warns(UserWarning, match=r"goal \[4, 0\] lies 1.54 m outside"):
         one.check_goal([4.0, 0.0])
+
+
+def test_a_goal_is_far_outside_at_half_the_range_of_what_is_learned():
+    several = make(symmetry=turn_and_scale(TurnJoint(), scale=Learned()))
+    reach = np.linalg.norm(several.outcomes_seen, axis=1)
+    edge = reach.max() * np.sqrt(reach.max() / reach.min())
+    assert not np.any(several.far_outside(np.array([0.99 * edge, 0.0])))
+    np.testing.assert_allclose(several.far_outside(np.array([1.1 * edge, 0.0])), [0.1 * edge, 0.0])
 
 
 def test_demonstrations_made_of_others_mute_no_warnings_but_their_own(monkeypatch):

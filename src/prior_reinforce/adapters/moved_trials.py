@@ -185,7 +185,8 @@ class MovedTrials:
 
     def _farthest(self, goal: Point) -> Point:
         """By how much plans for a goal may be moved: nearer than where an object was lost."""
-        farthest, left = self.belief.symmetry.farthest.copy(), self.belief.prior.left
+        symmetry, left = self.belief.symmetry, self.belief.prior.left
+        farthest = np.where(symmetry.learned, 0.0, symmetry.farthest)
         which = left if len(left) else np.arange(len(goal))
         for about, aim in self._lost:
             if np.array_equal(about, goal):
@@ -194,7 +195,7 @@ class MovedTrials:
         return farthest
 
     def _held_back(self, aim: Point, goal: Point) -> Point:
-        """Nearer to a demonstration than where an object was lost, in what they alone tell."""
+        """Nearer to a demonstration than where an object was lost, in what is learned."""
         learned, z = self.belief.symmetry.learned, self.belief.prior.anchors.z
         for about, lost in self._lost:
             if np.array_equal(about, goal):

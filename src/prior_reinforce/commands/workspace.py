@@ -60,7 +60,10 @@ class New(NewWorkspace):
                 print(_say_robot(workspace.manifest.robot))
             if (moved := workspace.manifest.symmetry) is not None:
                 where = moved.object if isinstance(moved.object, str) else "X Y"
-                print(f"symmetry: {WAYS[where]}; one demonstration is enough, see docs/symmetry.md")
+                enough = "several demonstrations tell the rest"
+                if moved.distance != "learned":
+                    enough = "one demonstration is enough"
+                print(f"symmetry: {WAYS[where]}; {enough}, see docs/symmetry.md")
             print_next(workspace)
 
     def _with_flange(self) -> New:

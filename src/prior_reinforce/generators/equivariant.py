@@ -6,8 +6,8 @@
 What a generator has to learn is one dimension less for each exact component (*canonicalisation*;
 `plans.symmetry`), and nothing at all where no component is left or one demonstration is all there
 is: that demonstration is moved. Beyond the demonstrated hull of what is left, plans are moved from
-its edge, but for components that demonstrations alone tell (`Learned`): these the generator
-extrapolates. Without a symmetry the wrapped generator learns as it is.
+its edge; components that are `Learned` the generator extrapolates instead. Without a symmetry the
+wrapped generator learns as it is.
 
 Ours; the idea is that of canonical and frame-averaging policies.
 """
@@ -56,7 +56,7 @@ class Equivariant(Wrapper):
             if not anchors.mixed:
                 raise InvalidDemonstrationsError(
                     f"{demonstrations.n} demonstrations do not tell what a turn leaves: give more "
-                    f"than {len(anchors.left)} that differ in it, or declare distance 'tempo'"
+                    f"than {len(anchors.left)} that differ in it, or leave the symmetry out"
                 )
 
     def _fit(self, demonstrations: Demonstrations, seed: int, progress: OnProgress) -> None:

@@ -45,7 +45,7 @@ from prior_reinforce.files import open_npz
 from prior_reinforce.formats import OutcomeFormat
 from prior_reinforce.plans.plan_format import PlanFormat
 from prior_reinforce.plans.signals import Signals, analyse
-from prior_reinforce.plans.symmetry import Symmetry
+from prior_reinforce.plans.symmetry import EXTRAPOLATED, Symmetry
 from prior_reinforce.units import looks_like
 
 if TYPE_CHECKING:
@@ -333,7 +333,7 @@ class Demonstrations:
     def far_outside(self, goal: Point) -> Point:
         """How far a goal lies outside the outcomes, in their units; zeros where it is near enough.
 
-        With a symmetry, near enough is what it is believed to move (`Symmetry.farthest`).
+        With a symmetry, near enough is what it is believed for (`Symmetry.farthest_from`).
 
         Ours: half the demonstrated extent beyond it is extrapolation that no figure of the paper
         supports (its displacement field degrades towards the boundary already).
@@ -341,16 +341,14 @@ class Demonstrations:
         if self.symmetry is not None:
             chart = self.symmetry.chart
             z, aim = chart.to(self.outcomes_seen), chart.to(goal)
-            farthest = np.where(
-                self.symmetry.learned, 0.5 * np.ptp(z, axis=0), self.symmetry.farthest
-            )
+            farthest = self.symmetry.farthest_from(z)
             beyond = aim - np.clip(aim, z.min(axis=0), z.max(axis=0))
             too_far = beyond - np.clip(beyond, -farthest, farthest)
             return np.asarray(np.abs(goal - chart.back(aim - too_far))) * np.any(too_far)
         low, high = self.outcomes_seen.min(axis=0), self.outcomes_seen.max(axis=0)
         spread = np.maximum(high - low, 1e-12)
         beyond = np.maximum(np.maximum(low - goal, goal - high), 0.0)
-        return beyond if np.any(beyond > 0.5 * spread) else np.zeros_like(beyond)
+        return beyond if np.any(beyond > EXTRAPOLATED * spread) else np.zeros_like(beyond)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write an `.npz`: two arrays and a JSON text; nothing in it can run code."""

@@ -108,6 +108,14 @@ def test_a_turn_asks_for_a_box(tmp_path):
         assert workspace.manifest.symmetry.no_box
 
 
+def test_of_three_numbers_the_turn_alone_is_declared(tmp_path):
+    how = {"outcome_names": ("x", "y", "t"), "outcome_units": ("m", "m", "s")}
+    with Workspace.create(
+        tmp_path / "hoop", symmetry="carried", box=BOX, tolerance=(0.02, 0.02, 0.05), **how
+    ) as workspace:
+        assert workspace.manifest.symmetry.distance == "learned"
+
+
 def test_poses_without_a_robot_are_shifted(tmp_path):
     form = PlanFormat(("x", "y", "z"), ("m",) * 3, 0.02)
     path = np.linspace([0.3, 0.0, 0.2], [0.5, 0.1, 0.2], 30)

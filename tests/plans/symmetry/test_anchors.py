@@ -89,11 +89,13 @@ def test_two_components_that_are_left_are_mixed_over_both():
     np.testing.assert_allclose(base[:, [0, 2]], anchors.z[:2][:, [0, 2]], atol=1e-6)
 
 
-def test_what_demonstrations_alone_tell_is_mixed_beyond_them_too_however_coarse_labels_are():
+def test_what_is_learned_is_mixed_to_half_the_range_beyond_however_coarse_labels_are():
     turn_alone = turn_and_scale(TurnJoint(), scale=Learned())
     anchors = Anchors(turn_alone, OUTCOMES, np.full((4, 2), 0.3))
-    aims = np.column_stack([np.log([1.05, 0.5, 2.0]), [0.0, 3.0, -3.0]])
+    aims = np.column_stack([np.log([1.05, 0.85, 1.3, 0.5, 2.0]), [0.0, 3.0, -3.0, 0.0, 0.0]])
     base, weights = anchors.base(aims)
-    np.testing.assert_allclose(base[:, 0], aims[:, 0])
+    low, high = anchors.z[:, 0].min(), anchors.z[:, 0].max()
+    beyond = 0.5 * (high - low)
+    np.testing.assert_allclose(base[:, 0], [*aims[:3, 0], low - beyond, high + beyond])
     np.testing.assert_allclose(base[:, 1], weights @ anchors.z[:, 1])
     assert not Anchors(turn_alone, OUTCOMES[:1], np.zeros((1, 2))).mixed

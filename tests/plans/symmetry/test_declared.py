@@ -108,8 +108,14 @@ def test_all_but_the_bearing_may_be_left_to_the_demonstrations():
     assert kinds(symmetry) == [Learned, TurnJoint, Learned]
     assert symmetry.name == "turn"
     np.testing.assert_array_equal(symmetry.learned, [True, False, True])
-    with pytest.raises(ConfigurationError, match="say distance 'learned'"):
+    with pytest.raises(ConfigurationError, match="say distance = 'learned'"):
         declare_symmetry(JOINTS, 3, about="base", **ARM)
-    for k, about in ((1, None), (2, None), (1, "base")):
-        with pytest.raises(ConfigurationError):
+    for k, about, why in ((2, None, "a turn is all that is known"), (1, "base", "one component")):
+        with pytest.raises(ConfigurationError, match=why):
             declare_symmetry(JOINTS, k, about=about, distance="learned", **ARM)
+
+
+@pytest.mark.parametrize("distance", ["amplitude", "learned", "shift"])
+def test_a_release_frame_is_refused_where_no_tempo_uses_it(distance):
+    with pytest.raises(ConfigurationError, match="release_frame says"):
+        declare_symmetry(JOINTS, 2, about="base", distance=distance, release_frame=56.0, **ARM)

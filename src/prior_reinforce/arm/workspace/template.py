@@ -148,6 +148,8 @@ class NewWorkspace:
         if where is not None and (where != "none" or len(self.outcome_names) == 1):
             text = text.replace("# [symmetry]", "[symmetry]")
             said["object"] = json.dumps(where)
+            if len(self.outcome_names) > 2:  # tempo and amplitude move x and y alone
+                said["distance"] = '"learned"'
         if self.no_box:
             said["no_box"] = "true"
         for key, value in said.items():

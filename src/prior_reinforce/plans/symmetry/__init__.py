@@ -25,6 +25,7 @@ from prior_reinforce.plans.symmetry.moves import (
     TurnPoses,
 )
 from prior_reinforce.plans.symmetry.symmetry import (
+    EXTRAPOLATED,
     Symmetry,
     scale_alone,
     shift,
@@ -32,6 +33,7 @@ from prior_reinforce.plans.symmetry.symmetry import (
 )
 
 __all__ = [
+    "EXTRAPOLATED",
     "Amplitude",
     "Anchors",
     "Axis",

@@ -23,7 +23,7 @@ class Anchors:
 
     Two ways to be a base. *Mixed*: demonstrations differ enough in what is not exact, so that a
     plan for any value within their hull can be mixed of all, and is moved from the hull's nearest
-    point beyond it; what demonstrations alone tell is mixed beyond it, too. *Picked*: the nearest
+    point beyond it; what is learned is extrapolated instead. *Picked*: the nearest
     demonstration is moved; so with one demonstration, where all components are exact, and where
     labels are coarser than the gaps.
     """
@@ -63,9 +63,11 @@ class Anchors:
             apart = (aims[:, None] - self.z[None]) / self.symmetry.farthest
             nearest = np.argmin(np.sum(apart**2, axis=2), axis=1)
             return self.z[nearest], np.eye(len(self.z))[nearest]
-        wanted = aims[:, self.left]
+        wanted, z = aims[:, self.left], self.z[:, self.left]
+        beyond = self.symmetry.farthest_from(self.z)[self.left]
+        extrapolated = np.clip(wanted, z.min(axis=0) - beyond, z.max(axis=0) + beyond)
         learned = self.symmetry.learned[self.left]
-        within = np.where(learned, wanted, into_hull(wanted, self.z[:, self.left]))
+        within = np.where(learned, extrapolated, into_hull(wanted, z))
         weights = self._weights(within)
         base = weights @ self.z
         base[:, self.left] = within

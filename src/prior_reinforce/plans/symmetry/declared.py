@@ -4,7 +4,7 @@
 - *It pushes or strikes an object that lies at (x, y)*: turns about that place (`about=(x, y)`).
 - *The motion may happen anywhere on the table*: shifts (`distance="shift"`), of poses alone.
 - *Neither*: `about=None`; one outcome is then reached by tempo or amplitude.
-- *Only the turn is known* (`distance="learned"`): several demonstrations tell all but the bearing.
+- *Only a turn is known* (`distance="learned"`): several demonstrations tell all but the bearing.
 
 What a plan is, its names and units say: joints of a known arm, poses (x and y in m, with rx, ry and
 rz, or qw, qx, qy and qz, or yaw), or increments of them (dx, dy, dyaw).
@@ -64,8 +64,8 @@ def declare_symmetry(
         form: Of its plans.
         k: Components of its outcomes; x and y first where there are several.
         about: About what the motion may be turned.
-        distance: How it is made to reach farther; `learned`: as the demonstrations tell, with every
-            further component of the outcome.
+        distance: How it is made to reach farther; `learned`: several demonstrations tell, and so
+            with every further component of the outcome.
         chain: The arm, where plans are of its joints; its base frame is the outcomes'.
         joints: Columns of the chain's joints, in its order.
         start: (x, y) of the hand before increments, [m].
@@ -81,6 +81,10 @@ def declare_symmetry(
     column = {name: index for index, name in enumerate(form.names)}
     if unknown := sorted(set(steps) - set(column)):
         raise ConfigurationError(f"steps names {unknown}, but plans have {', '.join(form.names)}")
+    if release_frame is not None and distance != "tempo":
+        raise ConfigurationError(
+            f"release_frame says about which frame tempo plays a motion; distance is {distance!r}"
+        )
     increments = _columns(column, ("dx", "dy", "dz", "dyaw"))
     if distance == "shift":
         place = _columns(column, ("x", "y")) or _columns(column, ("dx", "dy"))
@@ -110,10 +114,14 @@ def declare_symmetry(
                 "what the motion may be turned, or leave the symmetry out"
             )
         return scale_alone(scale)
+    if k < 2:
+        raise ConfigurationError(
+            "a turn moves outcomes x and y, but outcomes have one component; leave the turn out"
+        )
     if k != 2 + len(others):
         raise ConfigurationError(
-            f"a turn and a {distance} move outcomes x and y, but outcomes have {k} components; say "
-            "distance 'learned' (several demonstrations tell all but the bearing), leave the "
+            f"a turn and {distance} move outcomes x and y, but outcomes have {k} components; say "
+            "distance = 'learned' (several demonstrations tell all but the bearing), leave the "
             "symmetry out, or make one of moves for each (plans.symmetry)"
         )
     centre = (0.0, 0.0) if about == "base" else (float(about[0]), float(about[1]))

@@ -152,7 +152,7 @@ class Delay(Move, frozen=True, tag="delay"):
 
 
 class Learned(Move, frozen=True, tag="learned"):
-    """None: a component that demonstrations alone tell, as they do without a symmetry."""
+    """No transform: several demonstrations tell this component, as they do without a symmetry."""
 
     def _moved(self, plan: Frames, amount: float) -> Moved:
         return plan.copy()

@@ -23,6 +23,9 @@ from prior_reinforce.plans.symmetry.charts import AnyChart, Cartesian, LogDistan
 from prior_reinforce.plans.symmetry.moves import AnyMove, Learned, Moved, Shift, Tempo
 
 Matrix = Float[np.ndarray, "k k"]
+EXTRAPOLATED = 0.5
+"""How far beyond the demonstrated range what was learned is believed, as a part of it (ours: see
+`Demonstrations.far_outside`)."""
 
 
 class _Data(msgspec.Struct, forbid_unknown_fields=True):
@@ -97,8 +100,18 @@ class Symmetry:
 
     @property
     def learned(self) -> Bool[np.ndarray, " k"]:
-        """Components that demonstrations alone tell, within their hull and beyond it."""
+        """Components that several demonstrations tell, and that no move changes."""
         return np.array([isinstance(move, Learned) for move in self.moves])
+
+    def farthest_from(self, z: Points) -> Point:
+        """How far aims beyond the demonstrated range are believed, in each component.
+
+        By `farthest` plans are moved; what is learned is extrapolated by half the range.
+
+        Args:
+            z: Demonstrated outcomes in the chart, shape (N, k).
+        """
+        return np.where(self.learned, EXTRAPOLATED * np.ptp(z, axis=0), self.farthest)
 
     @property
     def increments(self) -> tuple[int, ...]:
