@@ -27,8 +27,8 @@ from prior_reinforce.errors import PriorReinforceError
 from tests.arm.workspace.planar import demonstrations, manifest
 
 REMEDY = re.compile(
-    r"add|ask|call|check|choose|close|convert|copy|correct|demonstrate|drop|expected|export|give|"
-    r"help|import (?:again|all|without)|it (?:has|holds) |known|learn (?:it|again)|"
+    r"add|ask|calibrate again|call|check|choose|close|convert|copy|correct|demonstrate|drop|"
+    r"expected|export|give|help|import (?:again|all|without)|it (?:has|holds) |known|learn (?:it|again)|"
     r"leave [\w ]{0,14}out|load it|looks like|make|mean|measure|mend|missing|move the|must|name|"
     r"need|put|record|remove|rename|resample|restore|run:|save it|say|see|set one|spread|tell|"
     r"unknown; |use|valid|void|wait|want|write",

@@ -125,7 +125,9 @@ def test_a_saved_calibration_comes_back(tmp_path):
     assert (loaded.height, loaded.fit_error) == (made.height, made.fit_error)
 
 
-@pytest.mark.parametrize("damage", ["missing", "cut", "another kind", "no homography", "nan"])
+@pytest.mark.parametrize(
+    "damage", ["missing", "cut", "another kind", "no homography", "nan", "no text"]
+)
 def test_a_file_that_is_no_calibration_is_refused(tmp_path, damage):
     path = tmp_path / "table.json"
     TableCalibration.fit(CORNERS, through_pinhole(at(CORNERS, 0.0))).save(path)
@@ -134,6 +136,8 @@ def test_a_file_that_is_no_calibration_is_refused(tmp_path, damage):
         path.unlink()
     elif damage == "cut":
         path.write_text(path.read_text()[:40])
+    elif damage == "no text":
+        path.write_bytes(path.read_bytes().replace(b"kind", b"k\xffnd"))
     else:
         content.pop("homography") if damage == "no homography" else None
         content.update({"kind": "x"} if damage == "another kind" else {})

@@ -244,7 +244,7 @@ class TableCalibration:
         try:
             saved = msgspec.json.decode(path.read_bytes(), type=_Saved)
             np.linalg.inv(saved.homography)
-        except (OSError, msgspec.DecodeError, np.linalg.LinAlgError) as error:
+        except (OSError, ValueError, np.linalg.LinAlgError) as error:
             raise FileFormatError(
                 f"{path} is not a table calibration ({error}); write one with TableCalibration.save"
             ) from error

@@ -46,7 +46,7 @@ def load_learned(folder: Path, demonstrations: Demonstrations) -> Generator:
     path = folder / _RECORD
     try:
         record = msgspec.json.decode(path.read_bytes(), type=TrainingRecord)
-    except (OSError, msgspec.DecodeError) as error:
+    except (OSError, ValueError) as error:
         raise FileFormatError(
             f"no learned model in {folder} ({error}); let adapt learn one: prior-reinforce "
             "adapt --out FOLDER writes FOLDER/model"

@@ -28,6 +28,13 @@ def test_the_secret_is_kept_for_pages_that_are_open_and_read_by_nobody_else(tmp_
     assert (tmp_path / TOKEN_FILE).stat().st_mode & 0o077 == 0
 
 
+@pytest.mark.parametrize("damaged", [b"", b"a", b"\xff" * 32, b"x" * 31 + b"\n"])
+def test_a_secret_that_is_damaged_is_made_anew(tmp_path, damaged):
+    """One that is cut to a few characters could be guessed."""
+    (tmp_path / TOKEN_FILE).write_bytes(damaged)
+    assert len(token_of(tmp_path)) == 32
+
+
 def test_the_secret_is_never_there_for_others_to_read(tmp_path, monkeypatch):
     modes = []
 

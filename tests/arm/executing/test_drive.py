@@ -14,6 +14,7 @@ from prior_reinforce.arm.executing.arguments import split_command
 from prior_reinforce.arm.executing.base import ArmDescription, ArmSettings, begin_at
 from prior_reinforce.arm.executing.command import run_command
 from prior_reinforce.arm.executing.drive import (
+    LOOK_FILE,
     Request,
     approach,
     arms_columns,
@@ -224,6 +225,12 @@ def test_a_look_moves_nothing_and_says_how_the_arm_stands(arm):
     assert arm.motions() == 0
     with pytest.raises(FileFormatError, match="ask again"):
         read_look(arm.folder)
+
+
+def test_what_an_executor_wrote_that_is_no_text_is_as_if_it_said_nothing(tmp_path):
+    (tmp_path / LOOK_FILE).write_bytes(b'{"refused": "\xff"}')
+    with pytest.raises(FileFormatError, match="ask again"):
+        read_look(tmp_path)
 
 
 @pytest.mark.slow

@@ -1,6 +1,7 @@
 """What happens here while a command runs: nothing that is raised leaves the arm moving."""
 
 import errno
+import io
 import signal
 import sys
 from pathlib import Path
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 
 from prior_reinforce.arm.executing.command import run_command
+from prior_reinforce.arm.executing.supervision import read_ended
 from prior_reinforce.arm.robots.plan_files import write_plan
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.plans.motions import Plan
@@ -32,6 +34,11 @@ def has_begun(here):
 def has_ended(here):
     assert has_begun(here)
     return not Path("/proc", (here / "pid").read_text().strip()).exists()
+
+
+@pytest.mark.parametrize("said", [b"", b"{", b'{"fault": "\xff"}', b'{"fault": "why"}'])
+def test_a_supervisor_that_wrote_nothing_whole_said_nothing(said):
+    assert read_ended(io.BytesIO(said)) is None
 
 
 @pytest.mark.parametrize("error", [ZeroDivisionError, KeyboardInterrupt, SystemExit])

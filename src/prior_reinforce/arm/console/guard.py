@@ -23,6 +23,9 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from prior_reinforce.files import in_place, require_inside
 
 TOKEN_FILE = ".console-token"
+_RANDOM = 24
+"""Bytes of the secret, which are written as 32 characters."""
+_TOKEN = re.compile(rb"[\w-]{32}")
 PUBLIC = {
     "/": "text/html",
     "/console.js": "text/javascript",
@@ -57,18 +60,18 @@ def problem(status: int, error: str) -> JSONResponse:
 
 
 def token_of(folder: Path) -> str:
-    """Return a workspace's secret; made if there is none, and kept, so that open pages stay valid.
+    """Return a workspace's secret; made if there is none whole, and kept, so that pages stay valid.
 
     Raises:
         FileFormatError: It is a link out of the workspace.
     """
     path = require_inside(folder / TOKEN_FILE, folder)
-    if not path.is_file() or not path.read_text(encoding="ascii").strip():
+    if not path.is_file() or not _TOKEN.fullmatch(path.read_bytes()):
         with in_place(path) as unfinished:
             unfinished.touch(0o600)  # before it holds the secret, and has its name
-            unfinished.write_text(secrets.token_urlsafe(24), encoding="ascii")
+            unfinished.write_text(secrets.token_urlsafe(_RANDOM), encoding="ascii")
     path.chmod(0o600)
-    return path.read_text(encoding="ascii").strip()
+    return path.read_text(encoding="ascii")
 
 
 def report_path(token: str, name: str = "report.html") -> str:

@@ -118,7 +118,7 @@ def read_look(folder: Path) -> Look:
     """
     try:
         return msgspec.json.decode((folder / LOOK_FILE).read_bytes(), type=Look)
-    except (OSError, msgspec.MsgspecError) as error:
+    except (OSError, ValueError) as error:
         raise FileFormatError(f"the arm's executor said nothing ({error}); ask again") from error
 
 

@@ -85,7 +85,7 @@ def read_ended(file: IO[bytes]) -> Ended | None:
     try:
         file.seek(0)
         ended = msgspec.json.decode(file.read(), type=Ended)
-    except (OSError, msgspec.MsgspecError):
+    except (OSError, ValueError):
         return None
     return ended if ended.not_started or ended.exit_status is not None else None
 
