@@ -137,7 +137,7 @@ def test_a_file_that_is_no_calibration_is_refused(tmp_path, damage):
     elif damage == "cut":
         path.write_text(path.read_text()[:40])
     elif damage == "no text":
-        path.write_bytes(path.read_bytes().replace(b"kind", b"k\xffnd"))
+        path.write_bytes(path.read_bytes().replace(b"prior-", b"\xff"))
     else:
         content.pop("homography") if damage == "no homography" else None
         content.update({"kind": "x"} if damage == "another kind" else {})

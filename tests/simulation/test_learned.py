@@ -36,7 +36,9 @@ def test_a_model_of_other_demonstrations_is_refused(saved):
         load_learned(saved[0], TASK.demonstrations("B"))
 
 
-@pytest.mark.parametrize("text", [None, b"{", b"[]", b'{"seed": 0}', b'{"seed\xff": 0}'])
+@pytest.mark.parametrize(
+    "text", [None, b"{", b"[]", b'{"seed": 0}', b'{"demonstrations_sha256": "\xff"}']
+)
 def test_a_folder_without_a_readable_record_is_told_with_the_remedy(saved, text):
     record = saved[0] / "training.json"
     record.unlink() if text is None else record.write_bytes(text)
