@@ -30,8 +30,8 @@ REMEDY = re.compile(
     r"add|ask|calibrate again|call|check|choose|close|convert|copy|correct|demonstrate|drop|"
     r"expected|export|give|help|import (?:again|all|without)|it (?:has|holds) |known|"
     r"learn (?:it|again)|leave [\w ]{0,14}out|load it|looks like|make|mean|measure|mend|"
-    r"missing|move the|must|name|need|put|record|remove|rename|resample|restore|run:|save it|say|see|set one|spread|tell|"
-    r"unknown; |use|valid|void|wait|want|write",
+    r"missing|move the|must|name|need|put|record|remove|rename|resample|restore|run:|save it|say|"
+    r"see|set one|spread|tell|unknown; |use|valid|void|wait|want|write",
     re.IGNORECASE,
 )
 """What a refusal says must be done, in one of these words."""
