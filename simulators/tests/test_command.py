@@ -12,7 +12,7 @@ import pytest
 from prior_reinforce.arm.workspace.workspace import Workspace
 from prior_reinforce.simulation.tasks import make_task
 from simulators.__main__ import main
-from tests.arm.executing.test_lerobot import LEROBOT
+from tests.arm.executing.test_lerobot import LEROBOT, NO_LEROBOT
 
 
 @pytest.fixture
@@ -83,7 +83,7 @@ def lines_of(served, wanted):
 @pytest.mark.slow
 def test_an_so101_goes_from_six_recorded_throws_to_a_hit(run, tmp_path, monkeypatch):
     """The sequence of docs/lerobot.md, through LeRobot's own class."""
-    if not LEROBOT.exists():
+    if NO_LEROBOT:
         pytest.skip("no LeRobot; install it with: make lerobot")
     monkeypatch.chdir(tmp_path)
     command = [sys.executable, "-m", "simulators", "so101"]

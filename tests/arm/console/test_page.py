@@ -30,7 +30,7 @@ from tests.arm.workspace.planar import FORMAT, demonstrations, events_in, manife
 
 # Where tests of the page must run, as in CI, a browser that is missing is a failure.
 pytestmark = pytest.mark.skipif(
-    not Path(CHROMIUM).exists() and "PRIOR_REINFORCE_BROWSER" not in os.environ,
+    not Path(CHROMIUM).exists() and "PRIOR_REINFORCE_REQUIRED" not in os.environ,
     reason=f"no {CHROMIUM}: apt-get install chromium",
 )
 expect.set_options(timeout=60_000)  # a busy machine; what never comes still fails
