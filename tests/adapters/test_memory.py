@@ -1,7 +1,8 @@
 import numpy as np
+import pytest
 
 from prior_reinforce.adapters import memory
-from prior_reinforce.adapters.memory import Memory
+from prior_reinforce.adapters.memory import Memory, tried_again, untried_around
 from prior_reinforce.readings import Reading
 from tests.adapters.test_bayesian import CORNERS, started
 
@@ -37,3 +38,15 @@ def test_two_hundred_trials_are_made_fewer_and_hardly_missed():
     goals = rng.uniform([0.83, -0.17], [0.97, 0.17], size=(20, 2))
     off = [np.linalg.norm(c + moved(c) - goal) for goal in goals for c in [adapter.propose(goal)]]
     assert np.median(off) < 0.004
+
+
+@pytest.mark.parametrize("k", [1, 2, 3])
+def test_where_all_around_was_tried_it_is_looked_farther_off(k):
+    """An hour of misses of which nothing was told but that: somewhere is always left."""
+    at, reach = np.ones(k), np.full(k, 0.1)
+    tried = np.empty((0, k))
+    for _ in range(40):
+        left = untried_around(at, reach, tried, np.full_like(tried, 0.1))
+        assert not tried_again(left, tried, np.full_like(tried, 0.1)).any()
+        tried = np.vstack([tried, left[np.argmin(np.linalg.norm(left - at, axis=1))]])
+    assert np.linalg.norm(tried - at, axis=1).max() > 0.1

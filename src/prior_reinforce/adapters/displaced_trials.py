@@ -16,11 +16,10 @@ from prior_reinforce.adapters.base import Expectation, State
 from prior_reinforce.adapters.change_points import Change, History, split, told
 from prior_reinforce.adapters.displacement import BayesianConfig, DisplacementPrior
 from prior_reinforce.adapters.expectation_propagation import Posterior, Readings, infer
-from prior_reinforce.adapters.memory import LATEST, Memory, Places, tried_again
+from prior_reinforce.adapters.memory import LATEST, Memory, Places, tried_again, untried_around
 from prior_reinforce.adapters.p_hit import (
     Belief,
     Targets,
-    evenly_spread,
     p_hit_after,
     share_within,
     trials_to_go,
@@ -247,10 +246,7 @@ class DisplacedTrials:
         sd = math.sqrt(float(np.einsum("mk,mkp->k", share, variance).max()))
         radius = missed.missed_by[-1]
         reach = radius + 2.0 * min(sd, self.config.hardware_sd[1])
-        cube = 2.0 * evenly_spread(len(goal)) - 1.0
-        ball = cube[np.linalg.norm(cube, axis=1) <= 1.0]
-        candidates = condition + reach * ball
-        candidates = candidates[~tried_again(candidates, same.conditions, same.missed_by)]
+        candidates = untried_around(condition, reach, same.conditions, same.missed_by)
         p_hit = self._p_hit_after(missed, self._places(candidates, goal), radius)
         return np.asarray(candidates[np.argmax(p_hit)])
 

@@ -6,12 +6,13 @@ Source: ours, so that a proposal stays below tens of milliseconds
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from prior_reinforce.arrays import Points
+from prior_reinforce.arrays import Point, Points
 
 _AGAIN = 0.5
 """A condition closer than this share of the tolerance to one that missed the same goal would be
@@ -74,9 +75,45 @@ class Memory(Places):
         return keep
 
 
+def untried_around(
+    condition: Point,
+    reach: Point | float,
+    tried: Float[np.ndarray, "m k"],
+    missed_by: Float[np.ndarray, "m k"],
+) -> Points:
+    """Conditions around one that no trial which missed was next to, as far off as it takes.
+
+    Args:
+        condition: Shape (k,).
+        reach: How far around it is looked first; doubled until something is left.
+        tried: Conditions of trials that missed, shape (m, k).
+        missed_by: By how much at least, shape (m, k).
+    """
+    while True:
+        around = condition + reach * _ball(len(condition))
+        left = around[~tried_again(around, tried, missed_by)]
+        if len(left):
+            return left
+        reach = 2.0 * reach
+
+
 def tried_again(
     conditions: Points, tried: Float[np.ndarray, "m k"], missed_by: Float[np.ndarray, "m k"]
 ) -> Bool[np.ndarray, " n"]:
     """Which conditions are next to one that missed by so much at least."""
     apart = (conditions[:, None] - tried) / missed_by
     return np.asarray(np.any(np.linalg.norm(apart, axis=2) < _AGAIN, axis=1))
+
+
+@functools.lru_cache
+def _ball(k: int) -> Float[np.ndarray, "q k"]:
+    """Points that fill the unit ball evenly: additive recurrence by the root of x^(k+1) = x + 1.
+
+    Source: Roberts, The unreasonable effectiveness of quasirandom sequences, 2018.
+    """
+    root = 2.0
+    for _ in range(50):
+        root = (1.0 + root) ** (1.0 / (k + 1))
+    cube = (0.5 + np.arange(1, 193)[:, None] * root ** -np.arange(1.0, k + 1)) % 1
+    ball = 2.0 * cube - 1.0
+    return np.asarray(ball[np.linalg.norm(ball, axis=1) <= 1.0])

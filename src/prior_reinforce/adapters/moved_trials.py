@@ -10,10 +10,10 @@ from jaxtyping import Float
 
 from prior_reinforce.adapters.base import Expectation, State
 from prior_reinforce.adapters.displacement import BayesianConfig
-from prior_reinforce.adapters.memory import LATEST, Memory, Places, tried_again
+from prior_reinforce.adapters.memory import LATEST, Memory, Places, tried_again, untried_around
 from prior_reinforce.adapters.moved import EXECUTION, OF_TOLERANCE, UNIT, MovedBelief
 from prior_reinforce.adapters.moved_prior import AS_STATED, OTHER_WAY
-from prior_reinforce.adapters.p_hit import evenly_spread, trials_to_go
+from prior_reinforce.adapters.p_hit import trials_to_go
 from prior_reinforce.arrays import Point, Points
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.readings import Reading
@@ -229,10 +229,7 @@ class MovedTrials:
         at, radius = self._places(condition[None], goal[None]), missed.missed_by[-1]
         there = self.belief.outcomes(0, at)
         sd = np.sqrt(np.diag(self.belief.spread(0, there)[0]))
-        cube = 2.0 * evenly_spread(len(goal)) - 1.0
-        ball = cube[np.linalg.norm(cube, axis=1) <= 1.0]
-        candidates = condition + (radius + 2.0 * sd) * ball
         tried = self.chart.back(missed.conditions)
-        candidates = candidates[~tried_again(candidates, tried, missed.missed_by)]
+        candidates = untried_around(condition, radius + 2.0 * sd, tried, missed.missed_by)
         goals = np.broadcast_to(goal, candidates.shape)
         return np.asarray(candidates[np.argmax(self.p_hit(candidates, goals, radius, seed=0))])

@@ -167,18 +167,6 @@ def share_within(
 
 
 @functools.lru_cache
-def evenly_spread(k: int) -> Float[np.ndarray, "q k"]:
-    """Points that fill the unit cube evenly: additive recurrence by the root of x^(k+1) = x + 1.
-
-    Source: Roberts, The unreasonable effectiveness of quasirandom sequences, 2018.
-    """
-    root = 2.0
-    for _ in range(50):
-        root = (1.0 + root) ** (1.0 / (k + 1))
-    return np.asarray((0.5 + np.arange(1, 193)[:, None] * root ** -np.arange(1.0, k + 1)) % 1)
-
-
-@functools.lru_cache
 def _normal(k: int, size: int, seed: int) -> Float[np.ndarray, "k q s"]:
     """The same draws for every call, so that a proposal depends on what was observed alone."""
     return np.random.default_rng(seed).standard_normal((k, _DRAWS[1] + 1, size))
