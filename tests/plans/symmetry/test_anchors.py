@@ -9,6 +9,7 @@ from prior_reinforce.plans.symmetry import (
     Anchors,
     Delay,
     Learned,
+    Tempo,
     TurnJoint,
     scale_alone,
     shift,
@@ -51,6 +52,14 @@ def test_the_nearest_is_moved_where_labels_are_coarser_than_the_gaps():
     assert Anchors(TURN, OUTCOMES, np.full((4, 2), 0.03)).mixed
     assert not Anchors(TURN, OUTCOMES, np.full((4, 2), 0.3)).mixed
     assert not Anchors(TURN, OUTCOMES[[0, 0]], np.zeros((2, 2))).mixed
+
+
+def test_the_nearest_is_moved_where_a_clock_releases():
+    """People are at different points of their motion then."""
+    for keep_horizon in (False, True):
+        clocked = turn_and_scale(TurnJoint(), scale=Tempo(about=30.0, keep_horizon=keep_horizon))
+        assert clocked.clocked is keep_horizon
+        assert Anchors(clocked, OUTCOMES, np.zeros((4, 2))).mixed is not keep_horizon
 
 
 def test_noise_is_carried_into_the_chart():

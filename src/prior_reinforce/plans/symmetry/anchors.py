@@ -24,8 +24,9 @@ class Anchors:
     Two ways to be a base. *Mixed*: demonstrations differ enough in what is not exact, so that a
     plan for any value within their hull can be mixed of all, and is moved from the hull's nearest
     point beyond it; what is learned is extrapolated instead. *Picked*: the nearest
-    demonstration is moved; so with one demonstration, where all components are exact, and where
-    labels are coarser than the gaps.
+    demonstration is moved; so with one demonstration, where all components are exact, where labels
+    are coarser than the gaps, and where a clock releases: people are at different points of their
+    motion then, and what is mixed of them is nobody's throw.
     """
 
     def __init__(self, symmetry: Symmetry, outcomes: Points, noise: Points) -> None:
@@ -102,6 +103,8 @@ class Anchors:
             return False
         if np.all(self.symmetry.learned[left]):
             return True  # whatever the labels: nothing else gives plans for what is asked
+        if self.symmetry.clocked:
+            return False
         gaps = extent / (n ** (1 / len(left)) - 1)  # as if they lay on a grid
         return bool(np.all(np.median(self.sd[:, left], axis=0) <= _NEIGHBOURS_APART * gaps))
 

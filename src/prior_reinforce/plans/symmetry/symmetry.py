@@ -103,6 +103,11 @@ class Symmetry:
         """Components that several demonstrations tell, and that no move changes."""
         return np.array([isinstance(move, Learned) for move in self.moves])
 
+    @property
+    def clocked(self) -> bool:
+        """Whether a clock releases, as its tempo says."""
+        return any(isinstance(move, Tempo) and move.keep_horizon for move in self.moves)
+
     def farthest_from(self, z: Points) -> Point:
         """How far aims beyond the demonstrated range are believed, in each component.
 
