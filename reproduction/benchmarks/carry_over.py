@@ -35,7 +35,7 @@ def main() -> None:
 
     task = pr.make_task(options.task)
     if options.demonstrations in task.demonstration_sets:
-        demonstrations = task.demonstrations(options.demonstrations)
+        demonstrations = task.demonstrations(options.demonstrations).without_symmetry()
     else:
         demonstrations = pr.Demonstrations.load(options.demonstrations)
     goals = task.sample_goals(options.sequences * GOALS, np.random.default_rng([options.seed, 6]))

@@ -37,7 +37,7 @@ def thrown(
 ) -> tuple[list[np.ndarray], np.ndarray]:
     """P(hit) said under each probability of changed hardware, and which throws hit."""
     task, key = make_task(name), arguments.sets[number]
-    seed, prior = arguments.seed + number, task.demonstrations(key)
+    seed, prior = arguments.seed + number, task.demonstrations(key).without_symmetry()
     if arguments.perception != "exact":
         perception = make_perception(arguments.perception)
         prior = perceive_demonstrations(task, prior, perception, seed=seed)

@@ -73,7 +73,7 @@ class World:
 def of_the_zoo(name: str, key: str) -> World:
     """A set of a simulated task, read exactly."""
     task = make_task(name)
-    prior = task.demonstrations(key)
+    prior = task.demonstrations(key).without_symmetry()
 
     def throw(plan: np.ndarray, rng: np.random.Generator) -> tuple[np.ndarray, bool]:
         rollout = task.rollout(plan[None], rng)[0]

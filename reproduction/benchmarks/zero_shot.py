@@ -42,7 +42,7 @@ def main() -> None:
     print("|---|---|---|---|---|")
     for method in options.methods:
         for prior_set in options.sets:
-            demonstrations = task.demonstrations(prior_set)
+            demonstrations = task.demonstrations(prior_set).without_symmetry()
             generator = pr.make_generator(method).fit(demonstrations, seed=options.seed)
             rollouts = task.rollout(generator.generate(goals), None)
             outcomes = np.array([rollout.outcome for rollout in rollouts])

@@ -35,7 +35,7 @@ def first_throws(task: Task, kind: str, sets: int, goals: int, seed: int) -> flo
     rng, hits = np.random.default_rng(seed), []
     timing = "start" if task.name == "zoo-arrival" else "none"
     for number in range(sets):
-        prior = task.demonstrations(f"{kind}-6-{number}")
+        prior = task.demonstrations(f"{kind}-6-{number}").without_symmetry()
         generator = make_generator(f"interpolation,kernel=thin-plate,timing={timing}").fit(
             prior, seed=0
         )

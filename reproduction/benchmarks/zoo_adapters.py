@@ -65,7 +65,11 @@ def main() -> None:
     warnings.simplefilter("ignore")
     named = {"developed": DEVELOPED_ON, "reported": REPORTED}
     tasks = [make_task(n) for given in arguments.tasks for n in named.get(given, (given,))]
-    priors = [(task, task.demonstrations(name)) for task in tasks for name in arguments.sets]
+    priors = [
+        (task, task.demonstrations(name).without_symmetry())
+        for task in tasks
+        for name in arguments.sets
+    ]
     fitted = [
         (task, prior, make_generator("auto").fit(prior, seed=arguments.seed))
         for task, prior in priors

@@ -135,7 +135,7 @@ def main() -> None:
         found: dict[str, list[tuple[float, float]]] = {method: [] for method in arguments.methods}
         for kind in arguments.kinds:
             for number in range(arguments.sets):
-                prior = task.demonstrations(f"{kind}-{number}")
+                prior = task.demonstrations(f"{kind}-{number}").without_symmetry()
                 rng = np.random.default_rng([arguments.seed, number])
                 goals = task.sample_goals(arguments.goals, rng)
                 for method, rows in found.items():

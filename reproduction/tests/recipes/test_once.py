@@ -1,5 +1,6 @@
 """Shown once: what is run, augmented demonstrations, and what is made of the rows."""
 
+import re
 from collections import Counter
 
 import numpy as np
@@ -19,6 +20,7 @@ from reproduction.recipes.once import (
     NONE,
     OURS,
     RECIPE,
+    ZOO,
     Shown,
     augmented,
     units,
@@ -79,6 +81,27 @@ def test_what_is_learned_from_is_said_as_a_symmetry_or_not(tmp_path):
     assert learned("none").symmetry is None
     assert learned("none").n == 1
     assert learned("copies").n == 9
+
+
+def test_the_zoo_is_tried_from_one_demonstration_where_one_tells_all_that_is_left():
+    planned = [(unit, names) for unit, names in units(Scale()) if unit.task in ZOO]
+    assert {unit.task for unit, _ in planned} == set(ZOO)
+    assert {unit.training.task == unit.task for unit, _ in planned} == {True}
+    once = {unit.task for unit, _ in planned if len(unit.training.subset) == 1}
+    assert set(ZOO) - once == {"zoo-gripper"}
+    sets = {unit.training.demonstrations for unit, _ in planned}
+    assert sets == {f"mixed-8-{i}" for i in range(22)}
+
+
+@pytest.mark.slow
+def test_a_task_of_the_zoo_says_what_its_symmetry_is_worth(tmp_path):
+    planned = [
+        p
+        for p in units(Scale(goals=2, rounds=2))
+        if p[0].task == "zoo-pour" and p[0].training.demonstrations in ("mixed-8-0", "mixed-8-1")
+    ]
+    (verdict, _) = RECIPE.remarks(gather(tmp_path, planned, "once"))
+    assert re.match(r"zoo-pour: shown once, N = 2\.00.*; six shown [+-]\d", verdict)
 
 
 @pytest.mark.slow

@@ -45,3 +45,20 @@ def test_tasks_can_be_demonstrated_in_every_kind(name, kind):
 def test_pairs_hold_every_task_and_kind():
     assert {name for name, _ in PAIRS} == set(TASKS)
     assert {kind for _, kind in PAIRS} == set(KINDS)
+
+
+@pytest.mark.parametrize("name", [name for name in TASKS if make_task(name).symmetry is not None])
+def test_what_a_symmetry_calls_exact_moves_outcomes_by_just_that(name):
+    task = make_task(name)
+    shown = task.demonstrations("mixed-8-0")
+    chart = shown.symmetry.chart
+    for j in np.flatnonzero(task.symmetry.exact):
+        w = 0.2 * np.eye(task.symmetry.k)[j]
+        moved = np.stack([task.symmetry.move(plan, w) for plan in shown.plans])
+        after = chart.to(np.array([rollout.outcome for rollout in task.rollout(moved, None)]))
+        np.testing.assert_allclose(after - chart.to(shown.outcomes_seen), w + 0 * after, atol=1e-9)
+
+
+def test_most_tasks_state_a_symmetry_in_both_halves():
+    for half in (DEVELOPED_ON, REPORTED):
+        assert sum(make_task(name).symmetry is not None for name in half) >= 5

@@ -5,6 +5,9 @@ reached counts as one trial more than there were rounds. What a symmetry is wort
 same without it, about a wrong axis, with one demonstration augmented by moved copies, and with the
 paper's Gaussian process in the adapter's place.
 
+The zoo's tasks that state a symmetry are tried as well, with trials that are measured, for words by
+eye are coarser than their tolerances; theirs are no part of the verdicts that were stated before.
+
 Outcomes of demonstrations are exact, but in one row a task. Of ours by eye and of moved copies,
 each demonstration of A and B is tried alone, and of 22 sets a drawn subset of each size, on four
 goals; whatever stands beside them on one subset and two of the goals: a unit takes a second, all of
@@ -33,13 +36,18 @@ from reproduction.recipes.adaptation import TASKS, said_and_came
 from reproduction.recipes.base import Picture, Planned, Recipe, Scale
 from reproduction.recipes.tables import Columns, Table
 from reproduction.results import FIRST, ROUNDS, TRIALS, Measure, Results, reached
+from reproduction.zoo import DEVELOPED_ON, REPORTED
 
 COUNTS = (1, 2, 3, 4, 6)
 """Numbers of demonstrations."""
 _GOALS, _GOALS_BESIDE = 4, 2
 """Goals a training: of ours by eye and of copies, and of all else."""
 _SHOWN = {"basketball-v1": 6, "curling": 6, "fishing": 8}
-"""Demonstrations in a set."""
+"""Demonstrations in a set; of the zoo's, eight."""
+ZOO = tuple(name for name in (*DEVELOPED_ON, *REPORTED) if make_task(name).symmetry is not None)
+"""Tasks of the zoo that state a symmetry."""
+_OF_ZOO = "mixed-8-{}"
+"""Sets of the zoo, people of every kind: the number is that of the set that it stands beside."""
 EXECUTIONS = Measure(
     lambda rows: rows["count"].to_numpy(dtype=float) + TRIALS.of(rows),
     (1 + min(COUNTS), max(COUNTS) + ROUNDS + 1),
@@ -130,6 +138,8 @@ METHODS = (
     Method(NONE, "none", counts=(3, 6)),  # fewer than three are refused
     Method(OURS, seen=EYE_LABELS, counts=(1,)),
     Method(OURS, seen=MEASURED, counts=(1, 6)),
+    Method(OURS, seen=MEASURED, counts=(1, 6), tasks=ZOO),
+    Method(NONE, "none", seen=MEASURED, counts=(6,), tasks=ZOO),
 )
 
 
@@ -154,16 +164,24 @@ def units(scale: Scale, include: Sequence[str] = ()) -> list[Planned]:
 
 def _subsets(method: Method, task: str, name: str, count: int) -> int:
     """How many subsets of a set are tried: of the shipped ones perhaps each demonstration alone."""
+    symmetry = make_task(task).symmetry
+    if count == 1 and symmetry is not None and np.any(symmetry.learned):
+        return 0  # which one demonstration does not tell
     alone = method.thorough and count == 1 and name not in DRAWN
-    return _SHOWN[TASKS[task]] if alone else 1
+    return _shown(task) if alone else 1
+
+
+def _shown(task: str) -> int:
+    return _SHOWN.get(TASKS.get(task, task), 8)
 
 
 def _trials(scale: Scale, method: Method, task: str, name: str, count: int, number: int) -> Trials:
     of_set = ("A", "B", *DRAWN).index(name)
-    order = np.random.default_rng([of_set, count]).permutation(_SHOWN[TASKS[task]])
+    order = np.random.default_rng([of_set, count]).permutation(_shown(task))
     subset = tuple(sorted(int(i) for i in np.roll(order, -number)[:count]))
+    name = _OF_ZOO.format(of_set) if task in ZOO else name
     training = Shown(
-        TASKS[task], name, "auto", 10 * of_set + number, subset,
+        TASKS.get(task, task), name, "auto", 10 * of_set + number, subset,
         perception="eye" if method.seen == EYE_LABELS else None, symmetry=method.symmetry,
     )  # fmt: skip
     few = replace(scale, goals=min(scale.goals, _GOALS if method.thorough else _GOALS_BESIDE))
@@ -214,7 +232,10 @@ LEAST_FIRST: Mapping[int, float] = {2: 0.75, 3: 0.93, 4: 0.95, 6: 0.98}
 
 def remarks(results: Results) -> list[str]:
     """A verdict a task, in a sentence, and how far P(hit) of first trials can be trusted."""
-    verdicts = [_verdict(task, of) for task, of in results.by("task").items()]
+    verdicts = [
+        _of_zoo(task, of) if task in ZOO else _verdict(task, of)
+        for task, of in results.by("task").items()
+    ]
     first = said_and_came(results.where(method=OURS, condition=EYE))
     first = first[first["number"] == 0]
     said = "; ".join(
@@ -250,6 +271,15 @@ def _verdict(task: str, results: Results) -> str:
             )
         )
     return "; ".join(said) + "."
+
+
+def _of_zoo(task: str, results: Results) -> str:
+    ours, none = results.where(method=OURS), results.where(method=NONE)
+    one = ours.where(count=1)
+    said = [] if one.empty else [f"shown once, N = {one.mean(EXECUTIONS)}, measured"]
+    more = ours.where(count=6).minus(none.where(count=6), TRIALS)
+    said.append(f"six shown {more:+.2f} trials (with the symmetry minus without)")
+    return f"{task}: {'; '.join(said)}."
 
 
 def _n(results: Results, count: int) -> float:

@@ -124,4 +124,5 @@ class ZooTask(Task):
         Raises:
             ConfigurationError: There is no such set.
         """
-        return demonstrate(self, name)
+        made, symmetry = demonstrate(self, name), self.symmetry
+        return made if symmetry is None else made.with_symmetry(symmetry)

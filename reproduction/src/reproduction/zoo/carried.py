@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from prior_reinforce.arrays import Frames, Point
 from prior_reinforce.plans.plan_format import PlanFormat
+from prior_reinforce.plans.symmetry import Symmetry, shift
 from reproduction.zoo.base import ZooTask
 from reproduction.zoo.human import Strategy, Submovement, reach_and_strike
 from reproduction.zoo.physics import first_passage, hung, landing, moving
@@ -40,6 +41,11 @@ class Pour(ZooTask):
     """Tilt of the lip below the horizontal at which the marble goes, in [rad]."""
     roll = 0.3
     """Speed at which it rolls off the lip, in [m/s]."""
+
+    @property
+    def symmetry(self) -> Symmetry:
+        """Done elsewhere on the table."""
+        return shift()
 
     def strategy(self, aims: Point, style: int) -> Strategy:
         """Raise, then sweep and tip at once; in style 1 tip from the side, by turning first."""
@@ -81,6 +87,11 @@ class Swing(ZooTask):
     """Length of the string, in [m]."""
     clock = 78
     """Frame at which the weight is let go."""
+
+    @property
+    def symmetry(self) -> Symmetry:
+        """Done elsewhere on the table."""
+        return shift()
 
     def strategy(self, aims: Point, style: int) -> Strategy:
         """Draw the weight back, then pull it forward; in style 1 by turning the rod as well."""

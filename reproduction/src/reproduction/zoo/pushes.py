@@ -11,6 +11,14 @@ from scipy.optimize import brentq
 from prior_reinforce.arrays import Frames, Point
 from prior_reinforce.formats import OutcomeFormat
 from prior_reinforce.plans.plan_format import PlanFormat
+from prior_reinforce.plans.symmetry import (
+    Symmetry,
+    Tempo,
+    TurnIncrements,
+    TurnJoint,
+    scale_alone,
+    turn_and_scale,
+)
 from reproduction.zoo.base import ZooTask, joints
 from reproduction.zoo.human import Strategy, Submovement, reach_and_strike
 from reproduction.zoo.physics import GRAVITY, Arm, finely, first_passage, moving
@@ -54,6 +62,13 @@ class Push(ByIncrements):
     """Friction of the puck on the bar's face [-]."""
     per_frame = 6
     """Steps of the contact a frame."""
+
+    @property
+    def symmetry(self) -> Symmetry:
+        """Turned about the puck, and played faster."""
+        return turn_and_scale(
+            TurnIncrements(self.bar, self.puck, yaw=2), self.puck, Tempo(increments=(0, 1, 2))
+        )
 
     def strategy(self, aims: Point, style: int) -> Strategy:
         """Turn the bar behind the puck, then push along its face; style 1: turn while pushing."""
@@ -128,6 +143,11 @@ class Slide(ZooTask):
     wave = 0.35
     """Length of these waves, in [m]."""
 
+    @property
+    def symmetry(self) -> Symmetry:
+        """Played faster."""
+        return scale_alone()
+
     def work(self, x: Float[np.ndarray, " t"]) -> Float[np.ndarray, " t"]:
         """What friction takes from the disc from 0 to a place of the table, for its mass [J/kg]."""
         phase = 2.0 * math.pi * x / self.wave
@@ -186,6 +206,11 @@ class Curl(ByIncrements):
     curl = 0.25
     """Sideways deceleration over spin, in [m/s]."""
 
+    @property
+    def symmetry(self) -> Symmetry:
+        """Turned about the start, and played faster."""
+        return turn_and_scale(TurnIncrements(yaw=2), scale=Tempo(increments=(0, 1, 2)))
+
     def strategy(self, aims: Point, style: int) -> Strategy:
         """Draw back, then push and turn the hand to the left; style 1: turn it to the right."""
         length, heading = aims
@@ -237,6 +262,11 @@ class Strike(ZooTask):
     """Restitution of the ball on the putter, which is much heavier [-]."""
     friction = 0.15
     """Friction of the ball on the lawn [-]."""
+
+    @property
+    def symmetry(self) -> Symmetry:
+        """Turned about the ball, and played faster."""
+        return turn_and_scale(TurnJoint())
 
     def strategy(self, aims: Point, style: int) -> Strategy:
         """Turn and reach back, wait 0.7 s, strike; style 1 bends the elbow more."""

@@ -14,6 +14,15 @@ from scipy.interpolate import CubicSpline
 from prior_reinforce.arrays import Frames, Point
 from prior_reinforce.formats import OutcomeFormat
 from prior_reinforce.plans.plan_format import PlanFormat
+from prior_reinforce.plans.symmetry import (
+    Amplitude,
+    Learned,
+    Symmetry,
+    Tempo,
+    TurnJoint,
+    scale_alone,
+    turn_and_scale,
+)
 from reproduction.zoo import physics
 from reproduction.zoo.base import ZooTask, joints
 from reproduction.zoo.human import Strategy, Submovement, reach_and_strike
@@ -63,6 +72,11 @@ class Lob(Throw):
     clock = 56
     """Frame at which the ball is let go."""
 
+    @property
+    def symmetry(self) -> Symmetry:
+        """Turned about the base, and played faster around the release."""
+        return turn_and_scale(TurnJoint(), scale=Tempo(about=float(self.clock), keep_horizon=True))
+
     def strategy(self, aims: Point, style: int) -> Strategy:
         """Lean back, then swing: shoulder first, or (style 1) more with elbow and wrist."""
         heading, swing = aims
@@ -90,6 +104,11 @@ class Scoop(Throw):
     aim_range = ((-0.8, 0.8), (0.35, 1.5))
     arm = Arm.straight("zyxyzyx", 0.30, 0.16, 0.16, 0.20, 0.10, 0.08, 0.15)
 
+    @property
+    def symmetry(self) -> Symmetry:
+        """Turned about the base, and played faster."""
+        return turn_and_scale(TurnJoint())
+
     def strategy(self, aims: Point, style: int) -> Strategy:
         """Lay the scoop back, then swing it over; in style 1 the wrist does more."""
         heading, swing = aims
@@ -116,6 +135,11 @@ class GripperThrow(Throw):
     posture = (0.02, 0.04, 0.04, 0.0)
     aim_range = ((-0.4, 0.4), (1.2, 3.0), (-0.1, 0.45))
     arm = Arm.straight("zyy", 0.40, 0.30, 0.35)
+
+    @property
+    def symmetry(self) -> Symmetry:
+        """Turned about the base; how far and how high it flies is learned."""
+        return turn_and_scale(TurnJoint(), scale=Learned(), others=(Learned(),))
 
     def strategy(self, aims: Point, style: int) -> Strategy:
         """Lean back, swing, and open the gripper in the swing: early for a high throw."""
@@ -165,6 +189,11 @@ class Bounce(Latched):
     restitution, slip = 0.65, 0.8
     """What a bounce leaves of the vertical speed, and of the horizontal [-]."""
 
+    @property
+    def symmetry(self) -> Symmetry:
+        """Turned about the base, and played faster."""
+        return turn_and_scale(TurnJoint())
+
     def strategy(self, aims: Point, style: int) -> Strategy:
         """Lean back and swing over; in style 1 the wrist does more."""
         heading, swing = aims
@@ -197,6 +226,11 @@ class Drag(Latched):
     latch = -0.5
     drag = 0.25
     """Deceleration over speed squared, in [1/m]; of a ball of paper."""
+
+    @property
+    def symmetry(self) -> Symmetry:
+        """Played faster."""
+        return scale_alone()
 
     def strategy(self, aims: Point, style: int) -> Strategy:
         """Swing both joints; in style 1 the elbow follows with a whip."""
@@ -310,6 +344,11 @@ class Catapult(ZooTask):
     """Speed over draw, the root of the spring's stiffness over the ball's mass, in [1/s]."""
     height = 0.2
     """Height of the muzzle, in [m]."""
+
+    @property
+    def symmetry(self) -> Symmetry:
+        """Drawn farther, the trigger and the elevation as they are."""
+        return scale_alone(Amplitude(steps=(1, 2)))
 
     def strategy(self, aims: Point, style: int) -> Strategy:
         """Draw and raise it, pull the trigger, let it sink; style 1: raise it first, steeply."""
