@@ -6,6 +6,7 @@ import pytest
 from prior_reinforce.generators.interpolation import SmoothInterpolation
 from prior_reinforce.generators.timing import evidence
 from prior_reinforce.generators.timing.evidence import choose_timing, outcome_error
+from prior_reinforce.generators.timing.registration import telling
 from prior_reinforce.generators.timing.timed import Timed
 from prior_reinforce.generators.timing.timeline import decompose
 from prior_reinforce.plans.motions import Demonstrations
@@ -44,6 +45,19 @@ def test_a_clocked_release_asks_for_plans_as_recorded():
         "timing: plans start when the demonstrations did (none), as these demonstrations ask for"
     )
     assert choice.errors == errors | {"tempo": choice.errors["tempo"]}
+
+
+def test_of_many_some_tell_the_timing_by_which_all_are_learned():
+    rng = np.random.default_rng(1)
+    swing = np.sin(np.clip((np.arange(60) - rng.uniform(5, 20, (40, 1))) / 30, 0, 1) * np.pi / 2)
+    plans = swing[..., None] * rng.uniform(0.5, 1.5, (40, 1, 2))
+    form = PlanFormat(("a", "b"), ("rad",) * 2, 0.02)
+    many = Demonstrations(plans, plans[:, -1], form)
+    some = many.only(telling(40).tolist())
+    choice, of_some = choose_timing(many), choose_timing(some)
+    assert len(choice.decomposition.numbers) == 40
+    assert choice.errors == of_some.errors
+    assert choice.reason == of_some.reason
 
 
 def test_a_hand_that_opens_in_the_plan_needs_no_clock():

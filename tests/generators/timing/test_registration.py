@@ -7,7 +7,11 @@ import pytest
 
 from prior_reinforce.errors import InvalidDemonstrationsError
 from prior_reinforce.generators.timing import registration
-from prior_reinforce.generators.timing.registration import best_correlations, correlation_lags
+from prior_reinforce.generators.timing.registration import (
+    best_correlations,
+    correlation_lags,
+    telling,
+)
 from prior_reinforce.generators.timing.timeline import decompose
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.plans.plan_format import PlanFormat
@@ -178,3 +182,10 @@ def test_what_demonstrations_agree_in_is_found_once_for_all_warps(monkeypatch):
     for kind in ("none", "start", "tempo"):
         decompose(demos, kind)
     assert len(asked) == 1
+
+
+def test_of_many_demonstrations_some_tell_how_to_learn_from_all():
+    assert telling(24).tolist() == list(range(24))
+    some = telling(200)
+    assert len(some) == len(set(some.tolist())) == 24
+    assert (some[0], some[-1]) == (0, 199)

@@ -23,7 +23,7 @@ import numpy as np
 from jaxtyping import Float
 
 from prior_reinforce.errors import InvalidDemonstrationsError
-from prior_reinforce.generators.timing.registration import WarpKind
+from prior_reinforce.generators.timing.registration import WarpKind, telling
 from prior_reinforce.generators.timing.timeline import Decomposition, decompose
 from prior_reinforce.plans.motions import Demonstrations
 
@@ -96,12 +96,15 @@ def choose_timing(demonstrations: Demonstrations) -> TimingChoice:
             f"timing: {_WORDS[usual.timeline.kind]}, as a rule; {n} demonstrations cannot tell "
             "what is better",
         )
+    some = telling(n)
+    told = demonstrations if len(some) == n else demonstrations.only(some.tolist())
     decompositions: dict[WarpKind, Decomposition] = {
-        kind: decompose(demonstrations, kind) for kind in _MAX_RELATIVE_ERROR
+        kind: decompose(told, kind) for kind in _MAX_RELATIVE_ERROR
     }
-    errors = {kind: outcome_error(demonstrations, each) for kind, each in decompositions.items()}
+    errors = {kind: outcome_error(told, each) for kind, each in decompositions.items()}
     able = [kind for kind in errors if kind == "start" or errors[kind] < _MAX_USEFUL_ERROR]
-    length = float(np.median(np.ptp(demonstrations.signals.spans, axis=1)))
+    usual = decompositions["start"]
+    length = float(np.median(np.ptp(told.signals.spans, axis=1)))
     no_clock = float(np.std(usual.numbers[:, 0])) > _CLOCK_SPREAD * length
     # A hand that opens within the plan needs no clock.
     if no_clock or errors["start"] <= _CLOCK_ERROR or usual.by_step:
@@ -114,9 +117,10 @@ def choose_timing(demonstrations: Demonstrations) -> TimingChoice:
         why = ", as a rule" if better else "; other timings would do equally well here"
     else:
         why = ", as these demonstrations ask for"
+    taken = decompositions[best] if told is demonstrations else decompose(demonstrations, best)
     return TimingChoice(
-        decompositions[best],
-        f"timing: {_WORDS[decompositions[best].timeline.kind]} ({best}){why}",
+        taken,
+        f"timing: {_WORDS[taken.timeline.kind]} ({best}){why}",
         errors,
     )
 
