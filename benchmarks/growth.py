@@ -46,13 +46,12 @@ def plans_of(outcomes: np.ndarray, frames: int, joints: int, seed: int = 0) -> n
 
 
 def demonstrations(n: int = 6, frames: int = 140, joints: int = 7) -> Any:
-    from prior_reinforce.plans.motions import Demonstrations
-    from prior_reinforce.plans.plan_format import PlanFormat
+    import prior_reinforce as pr  # public names, which other commits have as well
 
     outcomes = np.random.default_rng(1).uniform([0.7, -0.3], [1.1, 0.3], (n, 2))
     names = tuple(f"joint{i + 1}" for i in range(joints))
-    form = PlanFormat(names, ("rad",) * joints, 2.8 / frames)
-    return Demonstrations(plans_of(outcomes, frames, joints), outcomes, form)
+    form = pr.PlanFormat(names, ("rad",) * joints, 2.8 / frames)
+    return pr.Demonstrations(plans_of(outcomes, frames, joints), outcomes, form)
 
 
 def command(*words: object) -> float:
@@ -104,10 +103,9 @@ def asks(n: int, folder: Path) -> float:
 
 def readings(n: int, _: Path) -> float:
     """One reading, a proposal and P(hit), the median of three, with n trials before."""
-    from prior_reinforce.adapters import make_adapter
-    from prior_reinforce.readings import Reading
+    import prior_reinforce as pr
 
-    rng, adapter = np.random.default_rng(3), make_adapter("bayes")
+    rng, adapter = np.random.default_rng(3), pr.make_adapter("bayes")
     adapter.start(demonstrations())
     taken = []
     for number in range(n + 3):
@@ -115,7 +113,7 @@ def readings(n: int, _: Path) -> float:
             goal = rng.uniform([0.75, -0.25], [1.05, 0.25])
         condition = goal + rng.normal(0, 0.02, 2)
         off = condition + np.array([0.03, -0.02]) + rng.normal(0, 0.01, 2) - goal
-        reading = Reading.by_eye(np.round(off, 2), hit=False)
+        reading = pr.Reading.by_eye(np.round(off, 2), hit=False)
 
         def one(condition: Any = condition, goal: Any = goal, reading: Any = reading) -> None:
             adapter.observe(condition, goal, reading)
@@ -141,16 +139,18 @@ def fits(n: int, _: Path) -> float:
     import scipy.interpolate
     import scipy.optimize  # noqa: F401
 
-    from prior_reinforce.generators import make_generator
+    import prior_reinforce as pr
 
-    shown, generator = demonstrations(n), make_generator("auto")
+    shown, generator = demonstrations(n), pr.make_generator("auto")
     return processor(lambda: generator.fit(shown, seed=0))
 
 
 def frames(n: int, _: Path) -> float:
-    from prior_reinforce.generators import make_generator
+    import prior_reinforce as pr
 
-    generator = make_generator("diffusion,training_steps=1").fit(demonstrations(frames=n), seed=0)
+    generator = pr.make_generator("diffusion,training_steps=1").fit(
+        demonstrations(frames=n), seed=0
+    )
     place = np.array([[0.9, 0.05]])
     generator.generate(place)
     return statistics.median(processor(lambda: generator.generate(place)) for _ in range(5))
