@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from prior_reinforce.adapters.base import next_key
-from prior_reinforce.arrays import Point
-from prior_reinforce.errors import WorkspaceError
+from prior_reinforce.arrays import Frames, Point
+from prior_reinforce.errors import InvalidPlanError, WorkspaceError
 from prior_reinforce.plans.symmetry import Polar
 from prior_reinforce.session.events import Asked
 from prior_reinforce.session.trials import Goal, Log, State, Verdict
@@ -169,3 +169,21 @@ def _loaded(given: Any) -> Any:
 
 def _as_list(numbers: Point | None) -> list[float] | None:
     return None if numbers is None else numbers.tolist()
+
+
+def generated(generators: Sequence[Generator], conditions: Sequence[Point]) -> list[Frames]:
+    """Return a plan for each condition, with one call of each generator.
+
+    Raises:
+        InvalidPlanError: A generator gives what is no number.
+    """
+    plans: dict[int, Frames] = {}
+    for generator in {id(each): each for each in generators}.values():
+        own = [i for i, each in enumerate(generators) if each is generator]
+        made = generator.generate(np.stack([conditions[i] for i in own]))
+        if not np.all(np.isfinite(made)):
+            raise InvalidPlanError(
+                "the generator gives plans that hold no numbers (nan or inf); learn again"
+            )
+        plans.update(zip(own, made, strict=True))
+    return [plans[i] for i in range(len(generators))]

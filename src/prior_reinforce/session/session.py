@@ -24,16 +24,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from prior_reinforce.arrays import Frames, Point
-from prior_reinforce.errors import (
-    ConfigurationError,
-    InvalidPlanError,
-    RobotLimitError,
-    TrialStateError,
-)
+from prior_reinforce.errors import ConfigurationError, RobotLimitError, TrialStateError
 from prior_reinforce.parsing import as_place, as_reading
 from prior_reinforce.readings import Reading
 from prior_reinforce.session.events import Amended, GoalSet, Told, Voided
-from prior_reinforce.session.in_use import InUse, latest_goal
+from prior_reinforce.session.in_use import InUse, generated, latest_goal
 from prior_reinforce.session.trials import Goal, Log, Stage, State, Trial, Verdict
 
 if TYPE_CHECKING:
@@ -441,7 +436,7 @@ def ask_all(sessions: Sequence[Session]) -> list[Trial]:
             parts = [s._parts(state).believed(state, s.log) for s, state in new.items()]
             goals = [latest_goal(state).goal for state in new.values()]
             conditions = [each.adapter.propose(g) for each, g in zip(parts, goals, strict=True)]
-            plans = _generated([each.generator for each in parts], conditions)
+            plans = generated([each.generator for each in parts], conditions)
             for (session, state), each, condition, plan in zip(
                 new.items(), parts, conditions, plans, strict=True
             ):
@@ -450,17 +445,3 @@ def ask_all(sessions: Sequence[Session]) -> list[Trial]:
         session._with_plan(state, number, verdicts)
         for session, (state, number) in zip(sessions, asked, strict=True)
     ]
-
-
-def _generated(generators: Sequence[Generator], conditions: Sequence[Point]) -> list[Frames]:
-    """A plan for each condition, with one call of each generator."""
-    plans: dict[int, Frames] = {}
-    for generator in {id(each): each for each in generators}.values():
-        own = [i for i, each in enumerate(generators) if each is generator]
-        made = generator.generate(np.stack([conditions[i] for i in own]))
-        if not np.all(np.isfinite(made)):
-            raise InvalidPlanError(
-                "the generator gives plans that hold no numbers (nan or inf); learn again"
-            )
-        plans.update(zip(own, made, strict=True))
-    return [plans[i] for i in range(len(generators))]

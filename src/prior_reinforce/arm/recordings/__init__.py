@@ -1,9 +1,9 @@
 """Demonstrations from the format they were recorded in: read, trim, resample, look at, use."""
 
+from prior_reinforce.arm.recordings.appending import appended as appended
 from prior_reinforce.arm.recordings.importer import FORMATS as FORMATS
 from prior_reinforce.arm.recordings.importer import ImportResult as ImportResult
 from prior_reinforce.arm.recordings.importer import Recordings as Recordings
-from prior_reinforce.arm.recordings.importer import appended as appended
 from prior_reinforce.arm.recordings.importer import import_demonstrations as import_demonstrations
 from prior_reinforce.arm.recordings.importer import inspect_recordings as inspect_recordings
 from prior_reinforce.arm.recordings.importer import read as read

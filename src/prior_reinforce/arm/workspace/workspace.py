@@ -15,7 +15,6 @@ a session's: demonstrations imported, a model trained.
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import os
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -28,7 +27,8 @@ from prior_reinforce.adapters import ADAPTERS, DEFAULT_ADAPTER
 from prior_reinforce.arm.robots.gate import check_plan
 from prior_reinforce.arm.robots.plan_files import PlanFile, resample_plan, write_plan
 from prior_reinforce.arm.workspace.events import DemonstrationsImported, ModelTrained
-from prior_reinforce.arm.workspace.journal import JOURNAL_FILE, Journal
+from prior_reinforce.arm.workspace.folder import check_folder, make_folder
+from prior_reinforce.arm.workspace.journal import Journal
 from prior_reinforce.arm.workspace.manifest import (
     MANIFEST_FILE,
     UNKNOWN,
@@ -48,9 +48,8 @@ from prior_reinforce.errors import (
     InvalidDemonstrationsError,
     OutOfReachError,
     PriorReinforceError,
-    WorkspaceError,
 )
-from prior_reinforce.files import named_disk_errors, require_inside, sweep, write
+from prior_reinforce.files import named_disk_errors, write
 from prior_reinforce.plans.motions import Demonstrations, Plan
 from prior_reinforce.session.events import Entry
 from prior_reinforce.session.session import Session
@@ -61,13 +60,6 @@ if TYPE_CHECKING:
     from prior_reinforce.arm.recordings import ImportResult, Preprocessing
     from prior_reinforce.arm.robots.report import LimitReport
     from prior_reinforce.generators.base import FitProgress
-
-
-_OWN = (
-    *(MANIFEST_FILE, JOURNAL_FILE, "demonstrations", "models", "plans", "executions", "report"),
-    *("demonstrations.png", "outcomes.csv"),
-)
-"""What is read and written in the folder."""
 
 
 class Workspace:
@@ -88,12 +80,7 @@ class Workspace:
     def __init__(self, folder: str | os.PathLike[str]) -> None:
         """Open a workspace that `create` made."""
         self.folder = folder = Path(folder)
-        for name in _OWN:
-            require_inside(folder / name, folder)
-        if not (folder / MANIFEST_FILE).is_file():
-            raise WorkspaceError(
-                f"{folder} is not a workspace (it has no {MANIFEST_FILE}){_meant(folder)}"
-            )
+        check_folder(folder)
         self._manifest_text: str | None = None
         self.read_manifest()
         self.store = Store(folder)
@@ -117,13 +104,7 @@ class Workspace:
         """
         folder = Path(folder)
         text = manifest or NewWorkspace(**settings).manifest(folder.resolve().name)
-        parse_manifest(text, folder / MANIFEST_FILE)
-        with named_disk_errors(folder):
-            sweep(folder)
-            if folder.is_file() or (folder.is_dir() and any(folder.iterdir())):
-                raise WorkspaceError(f"{folder} exists and is not empty; choose a new folder")
-            folder.mkdir(parents=True, exist_ok=True)
-            write(folder / MANIFEST_FILE, text)
+        make_folder(folder, text)
         return cls(folder)
 
     def read_manifest(self) -> None:
@@ -464,12 +445,3 @@ class Workspace:
         path = self.folder / MANIFEST_FILE
         self.manifest.check_fit(self._read[sha256], "what was imported", path)
         return self._read[sha256]
-
-
-def _meant(folder: Path) -> str:
-    """What to do where a folder is no workspace: another name beside it, or a new one."""
-    there = [path.parent.name for path in folder.parent.glob(f"*/{MANIFEST_FILE}")]
-    closest = difflib.get_close_matches(folder.name, there, n=1)
-    if closest:
-        return f"; did you mean {folder.with_name(closest[0])}?"
-    return "; give a workspace's folder, or make one with: prior-reinforce new WORKSPACE"

@@ -1,0 +1,57 @@
+"""The folder of a workspace: recognised, and made."""
+
+from __future__ import annotations
+
+import difflib
+from pathlib import Path
+
+from prior_reinforce.arm.workspace.journal import JOURNAL_FILE
+from prior_reinforce.arm.workspace.manifest import MANIFEST_FILE, parse_manifest
+from prior_reinforce.errors import WorkspaceError
+from prior_reinforce.files import named_disk_errors, require_inside, sweep, write
+
+_OWN = (
+    *(MANIFEST_FILE, JOURNAL_FILE, "demonstrations", "models", "plans", "executions", "report"),
+    *("demonstrations.png", "outcomes.csv"),
+)
+"""What is read and written in the folder."""
+
+
+def make_folder(folder: Path, manifest: str) -> None:
+    """Make a folder with a manifest; nothing is made if a value in it is wrong.
+
+    Raises:
+        WorkspaceError: The folder holds something already, or cannot be written.
+        FileFormatError, ConfigurationError: See `parse_manifest`.
+    """
+    parse_manifest(manifest, folder / MANIFEST_FILE)
+    with named_disk_errors(folder):
+        sweep(folder)
+        if folder.is_file() or (folder.is_dir() and any(folder.iterdir())):
+            raise WorkspaceError(f"{folder} exists and is not empty; choose a new folder")
+        folder.mkdir(parents=True, exist_ok=True)
+        write(folder / MANIFEST_FILE, manifest)
+
+
+def check_folder(folder: Path) -> None:
+    """Do nothing if a folder is a workspace, and no part of it a link out of it.
+
+    Raises:
+        WorkspaceError: It has no manifest.
+        FileFormatError: A part leads out of it.
+    """
+    for name in _OWN:
+        require_inside(folder / name, folder)
+    if not (folder / MANIFEST_FILE).is_file():
+        raise WorkspaceError(
+            f"{folder} is not a workspace (it has no {MANIFEST_FILE}){_meant(folder)}"
+        )
+
+
+def _meant(folder: Path) -> str:
+    """What to do where a folder is no workspace: another name beside it, or a new one."""
+    there = [path.parent.name for path in folder.parent.glob(f"*/{MANIFEST_FILE}")]
+    closest = difflib.get_close_matches(folder.name, there, n=1)
+    if closest:
+        return f"; did you mean {folder.with_name(closest[0])}?"
+    return "; give a workspace's folder, or make one with: prior-reinforce new WORKSPACE"
