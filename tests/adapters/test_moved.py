@@ -15,6 +15,7 @@ from prior_reinforce.plans.symmetry import (
     Delay,
     Learned,
     Symmetry,
+    Tempo,
     TurnJoint,
     shift,
     turn_and_scale,
@@ -258,6 +259,16 @@ def test_of_hit_or_miss_alone_no_throw_is_made_twice_and_the_same_is_less_probab
     apart = np.linalg.norm(np.array(tried)[:, None] - tried, axis=2)[np.triu_indices(len(tried), 1)]
     assert apart.min() > 0.4 * TOLERANCE[0]
     assert said[2] < 0.5 * said[0]
+
+
+def test_where_a_clock_releases_goals_between_two_demonstrations_are_reached():
+    """Moves that carry too little leave a gap between two, if either is moved and never both."""
+    clocked = turn_and_scale(TurnJoint(), scale=Tempo(about=9.0, keep_horizon=True))
+    for distance in np.linspace(0.7, 1.1, 9):
+        shown = demonstrations(np.array([[0.6, 0.0], [1.2, 0.1]]), clocked)
+        arm = Arm(gain=((0.6, 0.0), (0.0, 1.0)), shown=shown)
+        errors = [arm.throw(np.array([distance, 0.05]))[1] for _ in range(6)]
+        assert min(np.linalg.norm(error) for error in errors) <= TOLERANCE[0]
 
 
 def test_what_is_off_may_be_little_but_a_law_is_as_unknown_as_stated():

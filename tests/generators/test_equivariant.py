@@ -104,6 +104,17 @@ def test_a_plan_alone_is_not_padded_and_rests_in_a_batch(throws):
     assert generator.generate(np.empty((0, 2))).shape == (0, 140, 3)
 
 
+def test_where_a_clock_releases_one_is_moved_and_between_two_both_are_and_are_mixed(throws):
+    clocked = turn_and_scale(TurnJoint(2), scale=Tempo(1.0, about=70.0, keep_horizon=True))
+    demos = replace(thrown(throws, 4), symmetry=clocked)
+    two = demos.only(np.argsort(np.linalg.norm(demos.outcomes_seen, axis=1))[[0, 3]].tolist())
+    generator, z = make_generator("auto").fit(two, seed=0), clocked.chart.to(two.outcomes_seen)
+    np.testing.assert_array_equal(generator.generate(two.outcomes_seen), two.plans)
+    (plan,) = generator.generate(clocked.chart.back(z.mean(axis=0)[None]))
+    both = [clocked.move(p, z.mean(axis=0) - of) for p, of in zip(two.plans, z, strict=True)]
+    np.testing.assert_allclose(plan, np.mean(both, axis=0), atol=1e-9)
+
+
 def test_increments_rest_at_nothing():
     short, long = np.ones((2, 2)), np.ones((4, 2))
     padded = rested([short, long], increments=(1,))

@@ -355,6 +355,8 @@ class MovedBelief:
             if self.prior.anchors.mixed:
                 within = left[np.abs(w[left]) < 1e-9]
                 slope[:, within] = np.eye(self.k)[:, within]
+            elif np.count_nonzero(self.prior.base(z[None])[1]) > 1:
+                slope += (np.eye(self.k) - slope) @ self.prior.anchors.slope(z)
             off = np.linalg.solve(at.jacobian[0], at.mean[0] - goal)
             step = slope.T @ np.linalg.solve(slope @ slope.T + _DAMPING * np.eye(self.k), off)
             new = z - np.clip(step, -_LONGEST, _LONGEST)

@@ -21,7 +21,7 @@ import numpy as np
 from jaxtyping import Float
 from typing_extensions import Self
 
-from prior_reinforce.arrays import Plans, Point, Points
+from prior_reinforce.arrays import Frames, Plans, Point, Points
 from prior_reinforce.errors import InvalidDemonstrationsError
 from prior_reinforce.formats import OutcomeFormat
 from prior_reinforce.generators.base import Generator, OnProgress, Wrapper, at_once
@@ -104,19 +104,41 @@ class Equivariant(Wrapper):
     def _generate(self, conditions: Points) -> Plans:
         if self._anchors is None:
             return self.generator.generate(conditions)
-        symmetry, exact = self._anchors.symmetry, self._anchors.symmetry.exact
+        symmetry, anchors = self._anchors.symmetry, self._anchors
         aims = symmetry.chart.to(conditions)
-        base, weights = self._anchors.base(aims)
-        if self._anchors.mixed:
-            plans = self.generator.generate(base[:, self._anchors.left])
-            base = np.where(exact, self._home, base)
-        else:
-            plans = self._plans[weights.argmax(axis=1)]
-        # What is farther than believed stays there: a tempo of 0.01 would be no plan.
-        farthest = np.where(exact, np.inf, symmetry.farthest)
-        w = np.clip(aims - base, -farthest, farthest)
-        moved = [symmetry.move(plan, by) for plan, by in zip(plans, w, strict=True)]
-        return rested(moved, symmetry.increments) if moved else plans
+        base, weights = anchors.base(aims)
+        if not len(aims):
+            return self._plans[:0]
+        if anchors.mixed:
+            plans = self.generator.generate(base[:, anchors.left])
+            at = np.where(symmetry.exact, self._home, base)
+            return self._rested([self._to(*each) for each in zip(plans, aims, at, strict=True)])
+        return self._rested([self._picked(*each) for each in zip(aims, weights, strict=True)])
+
+    def _picked(self, aim: Point, weights: Float[np.ndarray, " N"]) -> Float[np.ndarray, "_ D"]:
+        """The demonstrations that count, each moved to the aim, and mixed."""
+        assert self._anchors is not None
+        count = np.flatnonzero(weights)
+        moved = [self._to(self._plans[i], aim, self._anchors.z[i]) for i in count]
+        return (
+            moved[0]
+            if len(count) == 1
+            else np.tensordot(weights[count], self._rested(moved), axes=1)
+        )
+
+    def _to(self, plan: Frames, aim: Point, at: Point) -> Float[np.ndarray, "_ D"]:
+        """A plan that belongs to `at`, moved to the aim.
+
+        What is farther than believed stays there: a tempo of 0.01 would be no plan.
+        """
+        assert self._anchors is not None
+        symmetry = self._anchors.symmetry
+        farthest = np.where(symmetry.exact, np.inf, symmetry.farthest)
+        return symmetry.move(plan, np.clip(aim - at, -farthest, farthest))
+
+    def _rested(self, plans: Sequence[Float[np.ndarray, "_ D"]]) -> Plans:
+        assert self._anchors is not None
+        return rested(plans, self._anchors.symmetry.increments)
 
     def pack(self) -> list[SavedLayer]:
         """Return what was learned; see `Generator.pack`. A demonstration that is moved is all."""

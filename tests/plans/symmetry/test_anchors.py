@@ -62,6 +62,25 @@ def test_the_nearest_is_moved_where_a_clock_releases():
         assert Anchors(clocked, OUTCOMES, np.zeros((4, 2))).mixed is not keep_horizon
 
 
+def test_where_a_clock_releases_outcomes_do_not_jump_from_one_demonstration_to_the_next():
+    anchors = Anchors(
+        scale_alone(Tempo(about=30.0, keep_horizon=True)),
+        np.array([[0.5], [1.0]]),
+        np.zeros((2, 1)),
+    )
+    middle = anchors.z.mean()
+    aims = middle + np.linspace(-0.3, 0.3, 601)[:, None]
+    base, weights = anchors.base(aims)
+    assert np.abs(np.diff(base[:, 0])).max() < 0.02 * np.ptp(anchors.z)
+    np.testing.assert_allclose(weights.sum(axis=1), 1.0)
+    np.testing.assert_allclose(weights[300], 0.5)
+    np.testing.assert_array_equal(weights[0], [1.0, 0.0])
+    each, _ = anchors.moves(aims[300])
+    np.testing.assert_allclose(each, aims[300] - anchors.z)
+    each, _ = anchors.moves(aims[0])
+    assert np.isinf(each[1]).all()
+
+
 def test_noise_is_carried_into_the_chart():
     anchors = Anchors(TURN, np.array([[2.0, 0.0]]), np.array([[0.1, 0.4]]))
     np.testing.assert_allclose(anchors.sd, [[0.05, 0.2]])

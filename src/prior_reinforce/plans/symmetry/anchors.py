@@ -18,6 +18,14 @@ _NEIGHBOURS_APART = 1.0
 two comes first no more: mixing them makes plans steep (ours)."""
 
 
+_EVENLY = 0.2
+"""Where a clock releases and two demonstrations are equally near an aim to this part, both are
+moved to it, and mixed (ours): else outcomes would jump from one to the other, and what lies between
+not be reached. Only there are motions as recorded at the same time."""
+_NUDGE = 1e-4
+"""By how much an aim is changed for a difference quotient, in the chart (ours)."""
+
+
 class Anchors:
     """Demonstrations in the chart of their symmetry.
 
@@ -61,9 +69,8 @@ class Anchors:
             z_base (n, k), and weights (n, N) that sum to one.
         """
         if not self.mixed:
-            apart = (aims[:, None] - self.z[None]) / self.symmetry.farthest
-            nearest = np.argmin(np.sum(apart**2, axis=2), axis=1)
-            return self.z[nearest], np.eye(len(self.z))[nearest]
+            weights = self._picked(aims)
+            return weights @ self.z, weights
         wanted, z = aims[:, self.left], self.z[:, self.left]
         beyond = self.symmetry.farthest_from(self.z)[self.left]
         extrapolated = np.clip(wanted, z.min(axis=0) - beyond, z.max(axis=0) + beyond)
@@ -73,6 +80,12 @@ class Anchors:
         base = weights @ self.z
         base[:, self.left] = within
         return base, weights
+
+    def slope(self, aim: Point) -> Float[np.ndarray, "k k"]:
+        """Return how z_base changes with the aim: d z_base / d z, by a difference quotient."""
+        nudged = aim + _NUDGE * np.concatenate([np.eye(len(aim)), -np.eye(len(aim))])
+        above, below = np.split(self.base(nudged)[0], 2)
+        return np.asarray((above - below).T / (2.0 * _NUDGE))
 
     def moves(self, aim: Point) -> tuple[Points, Point]:
         """Return by how much each demonstration is moved where a plan for an aim is made of it.
@@ -91,7 +104,19 @@ class Anchors:
         w = np.where(exact, aim - base, np.clip(aim - base, -farthest, farthest))
         if self.mixed:
             return np.where(exact, aim - self.z, w), w
-        return np.where(weights[:, None] > 0, w, np.inf), w
+        each = np.where(exact, aim - self.z, np.clip(aim - self.z, -farthest, farthest))
+        return np.where(weights[:, None] > 0, each, np.inf), w
+
+    def _picked(self, aims: Points) -> Float[np.ndarray, "n N"]:
+        """The nearest counts all; where a clock releases, others that are as near count as well."""
+        apart = (aims[:, None] - self.z[None]) / self.symmetry.farthest
+        far = np.linalg.norm(apart, axis=2)
+        if not self.symmetry.clocked:
+            return np.eye(len(self.z))[far.argmin(axis=1)]
+        least = far.min(axis=1, keepdims=True)
+        evenly = (far - least) / np.maximum(_EVENLY * (far + least), np.finfo(float).tiny)
+        weights = np.maximum(1.0 - evenly, 0.0)
+        return np.asarray(weights / weights.sum(axis=1, keepdims=True))
 
     def _can_be_mixed(self) -> bool:
         n, left = len(self.z), self.left
