@@ -271,14 +271,6 @@ def test_where_a_clock_releases_goals_between_two_demonstrations_are_reached():
         assert min(np.linalg.norm(error) for error in errors) <= TOLERANCE[0]
 
 
-def test_what_is_off_may_be_little_but_a_law_is_as_unknown_as_stated():
-    stated, closely = MovedPrior(demonstrations()).models[:2]
-    assert closely.name == stated.name
-    assert closely.sd[0, 0] == stated.sd[0, 0]  # how far a faster motion throws
-    assert closely.sd[1, 1] < 0.1 * stated.sd[1, 1]  # a turn
-    assert closely.off < 0.1 * stated.off
-
-
 def test_however_often_a_goal_is_missed_another_condition_is_tried():
     adapter, goal, wide = BayesianAdapter(), GOALS[0], np.full(2, 0.2)
     adapter.start(demonstrations(FOUR))
