@@ -90,7 +90,7 @@ class Case:
         """The set of a kind, with the change that the kind names."""
         change, _, rest = kind.partition("-")
         name = f"{rest if change in ('few', 'noisy') else kind}-{number}"
-        demonstrations = task.demonstrations(name)
+        demonstrations = task.demonstrations(name).without_symmetry()
         plans, rng = demonstrations.plans, np.random.default_rng([8, number])
         form = demonstrations.format
         if change == "few":

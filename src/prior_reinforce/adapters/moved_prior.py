@@ -25,8 +25,8 @@ _P_OTHER_WAY, _P_NONE = 0.05, 0.10
 _CLOSELY, _P_CLOSELY = 0.05, 0.45
 """All that is off may be so much smaller than stated, with this probability where a symmetry holds:
 a simulated arm, or one that was measured today. Ours, by P(hit) of first trials on the zoo's
-development tasks, which was said too low. A law, too: where it alone were unknown, the first miss
-of another arm would be put down to it, and V3 takes 0.3 trials more."""
+development tasks, which was said too low. The law's exponent is included: left unknown, it would
+take the blame for a first miss that comes of changed hardware (V3: 0.3 trials more)."""
 _ANY_GAIN, _ANY_BEND = 0.8, 3.0
 """Where there is no symmetry: least sd of every entry of G, and how much more the law bends."""
 _REMEMBERED = 4

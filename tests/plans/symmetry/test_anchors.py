@@ -60,6 +60,9 @@ def test_the_nearest_is_moved_where_a_clock_releases():
         clocked = turn_and_scale(TurnJoint(), scale=Tempo(about=30.0, keep_horizon=keep_horizon))
         assert clocked.clocked is keep_horizon
         assert Anchors(clocked, OUTCOMES, np.zeros((4, 2))).mixed is not keep_horizon
+    of_three = turn_and_scale(TurnJoint(), scale=clocked.moves[0], others=(Learned(),))
+    third = np.array([[0.5], [0.8], [0.6], [0.9]])
+    assert Anchors(of_three, np.hstack([OUTCOMES, third]), np.zeros((4, 3))).mixed
 
 
 def test_where_a_clock_releases_outcomes_do_not_jump_from_one_demonstration_to_the_next():

@@ -119,3 +119,8 @@ def test_all_but_the_bearing_may_be_left_to_the_demonstrations():
 def test_a_release_frame_is_refused_where_no_tempo_uses_it(distance):
     with pytest.raises(ConfigurationError, match="release_frame says"):
         declare_symmetry(JOINTS, 2, about="base", distance=distance, release_frame=56.0, **ARM)
+
+
+def test_a_release_frame_says_that_a_clock_releases():
+    assert declare_symmetry(JOINTS, 2, about="base", release_frame=56.0, **ARM).clocked
+    assert not declare_symmetry(JOINTS, 2, about="base", **ARM).clocked

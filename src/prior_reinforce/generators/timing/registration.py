@@ -91,8 +91,8 @@ _REWEIGHTED = 3
 """Rounds of "lags, then scales by what is left". Ours: two more raise the log likelihood by 0.01 at
 most, on three sets of pushes."""
 _TELL = 24
-"""So many demonstrations tell how to learn from all of them: scales, and which timing. Ours: a few
-numbers, for which all of 200 took half a minute."""
+"""Most demonstrations from which the scales of channels and the timing are chosen; all are then
+learned with these. Ours: `auto` took half a minute with 200, most of it for these few numbers."""
 _ALONE = 0.01
 """What other channels count where the search begins with one. Ours."""
 _STILL = 1e-6
@@ -180,7 +180,7 @@ def _scaled_by_agreement(profiles: Profiles) -> Profiles:
 
 
 def telling(n: int) -> Int[np.ndarray, " m"]:
-    """Which of n demonstrations tell how to learn from all: all, or of many some, evenly chosen."""
+    """Return which of n demonstrations scales and timing are chosen from, evenly spread."""
     return np.linspace(0, n - 1, min(n, _TELL)).round().astype(int)
 
 

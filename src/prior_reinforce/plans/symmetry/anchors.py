@@ -128,8 +128,8 @@ class Anchors:
             return False
         if np.all(self.symmetry.learned[left]):
             return True  # whatever the labels: nothing else gives plans for what is asked
-        if self.symmetry.clocked:
-            return False
+        if self.symmetry.clocked and not np.any(self.symmetry.learned):
+            return False  # what is learned is learned from several, whatever releases
         gaps = extent / (n ** (1 / len(left)) - 1)  # as if they lay on a grid
         return bool(np.all(np.median(self.sd[:, left], axis=0) <= _NEIGHBOURS_APART * gaps))
 
