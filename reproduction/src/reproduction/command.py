@@ -75,6 +75,8 @@ class Reproduce:
     """Processes on this machine."""
     ray: str | None = None
     """Address of a Ray cluster to run on, or `local` to start one on this machine."""
+    device: Literal["cpu", "cuda"] = "cpu"
+    """Where `papers-loop` trains and runs its networks."""
     include: tuple[str, ...] = ()
     """Generators or adapters beside ours: your own (--plugins MODULE), or ours with other settings,
     each as NAME,setting=value."""
@@ -161,6 +163,8 @@ class Reproduce:
             raise ConfigurationError("--sets must be A, B, or both")
         if self.quick and replace(self, quick=False, reader="camera")._scale != Scale():
             raise ConfigurationError("--quick has its own goals, seeds and sets; leave out either")
+        if self.device != "cpu" and not any(recipe.on_device for recipe in self._recipes()):
+            raise ConfigurationError(f"{self.recipe} runs on the CPU; leave out --device")
         asked = self.reader == "vlm"
         if asked and (self.quick or self.recipe not in ("trials", "all")):
             raise ConfigurationError("--reader vlm reads the pictures of `trials`, without --quick")
@@ -178,7 +182,7 @@ class Reproduce:
         model = model_of(self.vlm) if self.reader == "vlm" else None
         if self.quick:
             return QUICK
-        return Scale(goals=self.goals, seeds=self.seeds, sets=self.sets, model=model)
+        return Scale(self.goals, self.seeds, self.sets, model=model, device=self.device)
 
     def _command(self, recipe: Recipe, include: Sequence[str]) -> str:
         """What makes the rows of one recipe again."""
@@ -188,6 +192,8 @@ class Reproduce:
         else:
             words += ["--goals", str(self.goals), "--seeds", *map(str, self.seeds)]
             words += ["--sets", *self.sets] if self.sets != Scale().sets else []
+        if recipe.on_device:
+            words += ["--device", self.device]
         for own in include:
             words += ["--include", own]
         said = [shlex.join(words)]

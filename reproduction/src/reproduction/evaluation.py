@@ -121,6 +121,8 @@ class Training(Unit):
     """How the outcomes of the demonstrations are seen, by its choice; None for the exact ones."""
     model: VisionLanguageModelConfig | None = None
     """Endpoint to ask where `perception` is vlm."""
+    device: str = "cpu"
+    """Where a network is trained and run: `cpu`, or `cuda`, whose last digits are other ones."""
 
     def __str__(self) -> str:
         how = "" if self.perception is None else f" by {self.perception}"
@@ -150,6 +152,7 @@ class Training(Unit):
             "count": None if self.subset is None else len(self.subset),
             "generator": self.generator,
             "labels": self.perception or "exact",
+            **({} if self.device == "cpu" else {"device": self.device}),
         }
 
     def run(self, folder: Path) -> Mapping[str, Any]:
@@ -171,13 +174,15 @@ class Training(Unit):
         home = self._home(folder)
         if not home.is_dir():
             prior = self._prior(folder)
-            generator = make_generator(self.generator, states=folder / "training")
+            # Two minutes of a GPU are begun anew; hours of a core go on where they were.
+            states = folder / "training" if self.device == "cpu" else None
+            generator = make_generator(self.generator, device=self.device, states=states)
             generator.fit(prior, seed=self.seed)
             with in_place(home) as unfinished:
                 unfinished.mkdir()
                 generator.save(unfinished / "generator")
                 prior.save(unfinished / "demonstrations.npz")
-        generator = load_generator(home / "generator")
+        generator = load_generator(home / "generator", device=self.device)
         return LearnedGenerator(generator, Demonstrations.load(home / "demonstrations.npz"))
 
     def _home(self, folder: Path) -> Path:
@@ -268,6 +273,10 @@ class Trials(OfTraining):
         """What is tried: from the folder's models, or learned now."""
         return self.training.learned(folder)
 
+    def seen(self, goals: Points) -> Points | None:
+        """Where goals are perceived; None: exactly where they are."""
+        return None
+
     def trials(self, folder: Path) -> list[GoalTrials]:
         """Run the protocol."""
         task, learned = make_task(self.task), self.learned(folder)
@@ -291,6 +300,7 @@ class Trials(OfTraining):
                 goals,
                 rounds=self.rounds,
                 seed=seed,
+                goals_seen=self.seen(goals),
             )
 
 

@@ -42,7 +42,7 @@ class GoalTrials:
     """All trials of one goal, as executed in simulation."""
 
     goal: Point
-    """g, [m]."""
+    """g, where it truly is, [m]."""
     trials: tuple[Trial, ...]
     """As the session kept them; the last one hit, unless the rounds were spent."""
     rollouts: tuple[Rollout, ...]
@@ -174,6 +174,7 @@ def run_goals(
     *,
     rounds: int,
     seed: int,
+    goals_seen: Points | None = None,
     on_round: OnRound | None = None,
     on_failed_reading: FailedReading = estimate_by_eye,
 ) -> list[GoalTrials]:
@@ -188,6 +189,8 @@ def run_goals(
         goals: Each with a session of its own, [m].
         rounds: Largest number of trials a goal.
         seed: Of the disturbances (a stream a round) and of perception (a stream a goal).
+        goals_seen: Where each goal is perceived, which is all that a session knows of it (the
+            paper's g~); exactly where it is when None. Trials are seen, and hit, by where it is.
         on_round: Called after every round.
         on_failed_reading: Called for the error of a trial in which perception gave up.
 
@@ -195,12 +198,14 @@ def run_goals(
         One result a goal, in order.
     """
     sessions = [
-        Session(generator, make_adapter(), demonstrations, goal, task.tolerance) for goal in goals
+        Session(generator, make_adapter(), demonstrations, goal, task.tolerance)
+        for goal in (goals if goals_seen is None else goals_seen)
     ]
     return reach_goals(
         task,
         sessions,
         perception,
+        goals=goals,
         rounds=rounds,
         seed=seed,
         on_round=on_round,
@@ -256,6 +261,7 @@ def reach_goals(
     sessions: Sequence[Session],
     perception: Perception,
     *,
+    goals: Points | None = None,
     rounds: int,
     seed: int,
     on_round: OnRound | None = None,
@@ -263,15 +269,18 @@ def reach_goals(
 ) -> list[GoalTrials]:
     """Try the goal that each session works on, in lock step; else as `run_goals`.
 
-    All sessions have one fitted generator, and a goal each.
+    All sessions have one fitted generator, and a goal each; `goals` says where these truly are,
+    where sessions only know where they were seen.
     """
+    if goals is None:
+        goals = np.array([session.goal for session in sessions])
     seers = [np.random.default_rng([seed, 1, i]) for i in range(len(sessions))]
     rollouts: list[list[Rollout]] = [[] for _ in sessions]
     failed = [0] * len(sessions)
 
     def results() -> list[GoalTrials]:
         return [
-            GoalTrials(session.goal, session.trials, tuple(rollouts[i]), failed[i])
+            GoalTrials(goals[i], session.trials, tuple(rollouts[i]), failed[i])
             for i, session in enumerate(sessions)
         ]
 
@@ -283,7 +292,7 @@ def reach_goals(
         plans = rested([trial.plan for trial in trials])
         executed = _executed(task, plans, np.random.default_rng([seed, 0, number]))
         for i, trial, rollout in zip(active, trials, executed, strict=True):
-            goal = sessions[i].goal
+            goal = goals[i]
             try:
                 reading = perception.perceive(rollout, goal, seers[i])
             except PerceptionFailedError as failure:

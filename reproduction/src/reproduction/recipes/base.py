@@ -54,6 +54,8 @@ class Scale:
     """Whether rows are run whose trials are read from pictures: they take long."""
     model: VisionLanguageModelConfig | None = None
     """Endpoint that reads the pictures; None for the camera that finds objects by colour."""
+    device: str = "cpu"
+    """Where networks of the paper's own size are trained and run, `cpu` or `cuda`."""
 
     def trainings(
         self, generator: str, task: str = TASK, *, perception: str | None = None
@@ -150,6 +152,8 @@ class Recipe:
     """Takes rows of all recipes for what is shown of those that belong here; None: its own rows."""
     apart: bool = False
     """Whether it is run by its name, or with `more`, and not with `all`: it takes hours."""
+    on_device: bool = False
+    """Whether its networks can be trained and run on a GPU."""
 
     @property
     def in_the_paper(self) -> bool:

@@ -1,0 +1,200 @@
+"""The paper's loop at the paper's own size: widths 256, 512 and 1024, Mish, 20,000 steps (a GPU).
+
+For every trial the network is sampled anew, and the paper's Gaussian process corrects the condition
+from what is seen by eye. Outcomes of the demonstrations, and the goal, are exact, or perceived as
+in the paper. Controls: one noise for all trials, and no adapter. On A, B and drawn sets.
+
+The paper does not say how its plans reach the arm, whose controllers are low-pass filters. Plans of
+the network's raw frames, smoothed ones, and ones of a network that learns spline control points are
+held against the Panda's limits, and thrown once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from copy import copy
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+
+from prior_reinforce.arm.robots.gate import check_plan
+from prior_reinforce.arm.robots.presets import robot_limits
+from prior_reinforce.arrays import Points
+from prior_reinforce.generators import Generator
+from prior_reinforce.generators.network.diffusion import DiffusionGenerator
+from prior_reinforce.plans.motions import Plan
+from prior_reinforce.simulation.protocol import is_hit
+from prior_reinforce.simulation.tasks import make_task
+from reproduction.evaluation import GOAL_SEED, OfTraining, Training, ZeroShot
+from reproduction.recipes.base import TASK, Planned, Recipe, Scale
+from reproduction.recipes.generators import FreshNoise, FreshNoiseTrials
+from reproduction.recipes.sets import SETS
+from reproduction.recipes.tables import Columns, Table
+from reproduction.results import FIRST, TRIALS, Results, column, reached, rows_of
+from reproduction.statistics import SHARE
+
+_STEPS = "training_steps=20000"
+OWN_SIZE = f"diffusion-paper,{_STEPS}"
+"""Raw frames, as in the paper."""
+SPLINES = f"{OWN_SIZE},representation=splines"
+"""The same network on spline control points."""
+_DRAWN = SETS[:4]
+"""Drawn sets: what a GPU does in minutes, and a core in four hours each."""
+_VARIANTS = {"V1": "basketball-v1", "V2": "basketball-v2", "V3": "basketball-v3"}
+LOOP, PERCEIVED = "the paper's loop", "the paper's loop, demonstrations and goals perceived"
+ONE_NOISE, ALONE = "one noise for all trials", "fresh noise, no adapter"
+ON_SPLINES = "the paper's loop, spline control points"
+GATE, KNOWN = "one throw, before the Panda's gate", "its own demonstrations"
+_GOAL_SPREAD = 0.01
+"""Standard deviation of a perceived goal in each direction, in [m]: the camera's own."""
+_SMOOTHINGS = (0.0, 0.025, 0.04, 0.06)
+"""Standard deviations of the Gaussian over time, in [s]."""
+
+
+@dataclass(frozen=True)
+class PerceivedGoalTrials(FreshNoiseTrials):
+    """Trials of goals that are only known as they were perceived once."""
+
+    def seen(self, goals: Points) -> Points:
+        """Each goal beside where it is."""
+        rng = np.random.default_rng([GOAL_SEED, self.training.seed, 6])
+        return goals + rng.normal(scale=_GOAL_SPREAD, size=goals.shape)
+
+
+@dataclass(frozen=True)
+class Executable(OfTraining):
+    """Which plans for goals pass the Panda's gate, and where they throw, at one smoothing."""
+
+    goals: int
+    """Number of goals."""
+    smoothing_s: float
+    """Standard deviation of the Gaussian over time, in [s]."""
+    what: ClassVar[str] = "plans before the gate"
+
+    def run(self, folder: Path) -> Mapping[str, Any]:
+        """Generate, check and throw, with execution's disturbances."""
+        task, learned = make_task(self.training.task), self.training.learned(folder)
+        generator = FreshNoise(
+            smoothed(learned.generator, self.smoothing_s / learned.prior.format.dt)
+        )
+        goals = task.sample_goals(self.goals, np.random.default_rng(GOAL_SEED))
+        plans = generator.generate(goals)
+        limits = robot_limits("panda")
+        reports = [check_plan(Plan(p, learned.prior.format), limits, learned.prior) for p in plans]
+        thrown = task.rollout(plans, np.random.default_rng([GOAL_SEED, self.training.seed]))
+        return {
+            "passed": [not report.refusals for report in reports],
+            "hit": [
+                is_hit(of, goal, task.tolerance) for of, goal in zip(thrown, goals, strict=True)
+            ],
+            "error": [
+                float(np.linalg.norm(of.outcome - goal))
+                for of, goal in zip(thrown, goals, strict=True)
+            ],
+        }
+
+    def rows(self, result: Mapping[str, Any]) -> list[dict[str, Any]]:
+        """A row a goal: one throw."""
+        told = {**self.columns, "adapter": "frozen", "noise": "fresh", "rounds": 1}
+        return rows_of(
+            {**told, "smoothing_s": self.smoothing_s},
+            goal=range(len(result["hit"])),
+            solved_at=[int(hit) for hit in result["hit"]],
+            first_error=[round(error, 5) for error in result["error"]],
+            passed=[int(passed) for passed in result["passed"]],
+        )
+
+
+def smoothed(generator: Generator, frames: float) -> Generator:
+    """A fitted network whose plans are smoothed by so many frames."""
+    assert isinstance(generator, DiffusionGenerator)
+    assert generator._learned is not None
+    other, learned = copy(generator), generator._learned
+    other._learned = replace(learned, codec=replace(learned.codec, smoothing=frames))
+    return other
+
+
+def units(scale: Scale, include: Sequence[str] = ()) -> list[Planned]:
+    """Every training's trials on V1, A's and B's on V2 and V3 too; its plans before the gate."""
+    seed = scale.seeds[0]
+    own = [(name, seed) for name in scale.sets]
+    planned: list[Planned] = []
+    for name, s in (*own, *(_DRAWN if scale.variants else ())):
+        training = Training(TASK, name, OWN_SIZE, s, device=scale.device)
+        planned += _loop(training, scale, tuple(_VARIANTS) if (name, s) in own else ("V1",))
+    for name, s in own:
+        perceived = Training(TASK, name, OWN_SIZE, s, perception="camera", device=scale.device)
+        for label, task in _VARIANTS.items():
+            base = scale.trials(perceived, "gp", "eye", task=task)
+            told = {"condition": f"{label}, by eye", "method": PERCEIVED}
+            planned.append((PerceivedGoalTrials(**vars(base)), told))
+        splines = Training(TASK, name, SPLINES, s, device=scale.device)
+        fresh = FreshNoiseTrials(**vars(scale.trials(splines, "gp", "eye")))
+        planned += [(fresh, {"condition": "V1, by eye", "method": ON_SPLINES})]
+        planned += _plans(splines, scale, "spline control points", _SMOOTHINGS[:1])
+    return planned
+
+
+def _loop(training: Training, scale: Scale, variants: Sequence[str]) -> list[Planned]:
+    """The loop on variants of the hardware, its controls on the demonstrations' own."""
+    planned: list[Planned] = []
+    for label in variants:
+        base = scale.trials(training, "gp", "eye", task=_VARIANTS[label])
+        told = {"condition": f"{label}, by eye"}
+        planned.append((FreshNoiseTrials(**vars(base)), {**told, "method": LOOP}))
+        if label == "V1":
+            alone = scale.trials(training, "frozen", "eye")
+            planned += [
+                (base, {**told, "method": ONE_NOISE}),
+                (FreshNoiseTrials(**vars(alone)), {**told, "method": ALONE}),
+            ]
+    return planned + _plans(training, scale, "raw frames", _SMOOTHINGS)
+
+
+def _plans(
+    training: Training, scale: Scale, coded: str, smoothings: Sequence[float]
+) -> list[Planned]:
+    """How well it knows its demonstrations, and its plans before the gate."""
+    planned: list[Planned] = [(ZeroShot(training), {"condition": KNOWN, "method": coded})]
+    for by in smoothings:
+        method = f"{coded}, smoothed by {1000 * by:.0f} ms" if by else coded
+        told = {"condition": GATE, "method": method}
+        planned.append((Executable(training, scale.goals, by), told))
+    return planned
+
+
+def table(results: Results) -> Table:
+    """One row a condition and method."""
+    columns: Columns = {
+        "first trials": _where_it_is("solved_at", lambda of: of.mean(FIRST)),
+        "within 4": _where_it_is("failed_readings", lambda of: of.mean(reached(4))),
+        "within 10": _where_it_is("failed_readings", lambda of: of.mean(reached(10))),
+        "trials": _where_it_is("failed_readings", lambda of: of.mean(TRIALS)),
+        "plans that pass": _where_it_is("passed", lambda of: of.mean(column("passed", SHARE))),
+        "off its demonstrations [mrad]": _where_it_is("quantity", _own_mrad),
+        "sets": lambda of: of.sets,
+    }
+    rows = {
+        (condition, method): of
+        for condition, in_it in results.by("condition").items()
+        for method, of in in_it.by("method").items()
+    }
+    return Table.of(("tried", "method"), rows, columns)
+
+
+def _where_it_is(name: str, show: Callable[[Results], object]) -> Callable[[Results], object]:
+    """What a column of the table shows of rows that have something in one of theirs."""
+    return lambda of: "" if of.having(name).empty else show(of)
+
+
+def _own_mrad(of: Results) -> str:
+    """Root mean square difference of its plans from the demonstrations that it learned."""
+    return f"{1000 * of.where(quantity='own_rms_rad').frame['value'].mean():.1f}"
+
+
+RECIPE = Recipe(
+    "papers-loop", "The paper's loop at its own size", "Figure 7b, Table II", units, table,
+    apart=True, on_device=True,
+)  # fmt: skip

@@ -1,0 +1,88 @@
+"""The paper's loop at its own size: what is run, what each unit gives, and its table from rows."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import prior_reinforce as pr
+from prior_reinforce.generators import make_generator
+from reproduction.evaluation import LearnedGenerator, Training
+from reproduction.recipes import Scale
+from reproduction.recipes.papers_loop import (
+    OWN_SIZE,
+    RECIPE,
+    SPLINES,
+    Executable,
+    PerceivedGoalTrials,
+    units,
+)
+from reproduction.results import Results
+
+SMALL = "diffusion-paper,network.widths=8:16,network.groups=4,training_steps=3"
+
+
+def test_one_training_a_set_and_form_at_the_papers_own_size():
+    planned = units(Scale())
+    trainings = {unit.training for unit, _ in planned}
+    assert {t.generator for t in trainings} == {OWN_SIZE, SPLINES}
+    own = [t for t in trainings if t.generator == OWN_SIZE and t.perception is None]
+    assert sorted(t.demonstrations for t in own) == ["A", "B", "v00", "v01", "v02", "v03"]
+    assert {t.device for unit, _ in units(Scale(device="cuda")) for t in (unit.training,)} == {
+        "cuda"
+    }
+
+
+@pytest.fixture(scope="module")
+def learned():
+    prior = pr.make_task("basketball-v1").demonstrations("A").without_symmetry()
+    return LearnedGenerator(make_generator(SMALL).fit(prior, seed=0), prior)
+
+
+def test_smoothing_changes_plans_as_said(learned, tmp_path, monkeypatch):
+    training = Training("basketball-v1", "A", SMALL, 0)
+    monkeypatch.setattr(Training, "learned", lambda self, folder: learned)
+    raw, smooth = (Executable(training, 3, by).rows(Executable(training, 3, by).run(tmp_path))
+                   for by in (0.0, 0.06))  # fmt: skip
+    assert [row["goal"] for row in raw] == [0, 1, 2]
+    assert {row["smoothing_s"] for row in smooth} == {0.06}
+    assert [row["first_error"] for row in raw] != [row["first_error"] for row in smooth]
+    assert {row["passed"] for row in raw} == {0}  # three steps: noise, which no arm can follow
+
+
+def test_a_perceived_goal_is_beside_the_goal_and_hits_count_at_the_goal(
+    learned, tmp_path, monkeypatch
+):
+    training = Training("basketball-v1", "A", SMALL, 0)
+    monkeypatch.setattr(Training, "learned", lambda self, folder: learned)
+    unit = PerceivedGoalTrials(training, "basketball-v1", "gp", "exact", 4, rounds=1)
+    asked: list[np.ndarray] = []
+    propose = pr.make_adapter("gp").__class__.propose
+    monkeypatch.setattr(
+        "prior_reinforce.adapters.gaussian_process.GaussianProcessAdapter.propose",
+        lambda self, goal: (asked.append(np.array(goal)), propose(self, goal))[1],
+    )
+    tried = unit.trials(tmp_path)
+    goals = np.array([of.goal for of in tried])
+    np.testing.assert_allclose(np.array(asked), unit.seen(goals))
+    off = np.array(asked) - goals
+    assert 0.002 < np.sqrt(np.mean(off**2)) < 0.02
+    for of in tried:  # what was seen is the error from where the goal truly is
+        np.testing.assert_allclose(of.trials[0].reading.error_seen, of.errors[0])
+
+
+def test_a_row_a_condition_and_method():
+    told = {"learned_on": "t", "task": "t", "set": "A", "seed": 0, "rounds": 10}
+    rows = [
+        *({**told, "condition": "V1, by eye", "method": "loop", "goal": j, "solved_at": 2,
+           "failed_readings": 0} for j in range(3)),
+        *({**told, "condition": "gate", "method": "raw", "goal": j, "solved_at": 1, "rounds": 1,
+           "passed": j % 2} for j in range(4)),
+        *({**told, "condition": "own", "method": "raw", "quantity": "own_rms_rad", "value": v}
+          for v in (0.001, 0.003)),
+    ]  # fmt: skip
+    table = RECIPE.table(Results(pd.DataFrame(rows), {}))
+    cells = {row[:2]: dict(zip(table.header, row, strict=True)) for row in table.rows}
+    assert cells["V1, by eye", "loop"]["trials"].startswith("2.00")
+    assert cells["gate", "raw"]["plans that pass"].startswith("0.50")
+    assert cells["gate", "raw"]["trials"] == ""
+    assert cells["own", "raw"]["off its demonstrations [mrad]"] == "2.0"
