@@ -9,37 +9,40 @@ from prior_reinforce.generators import make_generator
 from reproduction.evaluation import LearnedGenerator, Training
 from reproduction.recipes import Scale
 from reproduction.recipes.papers_loop import (
+    FORMS,
     OWN_SIZE,
     RECIPE,
-    SPLINES,
+    SMALL,
     Executable,
     PerceivedGoalTrials,
     units,
 )
 from reproduction.results import Results
 
-SMALL = "diffusion-paper,network.widths=8:16,network.groups=4,training_steps=3"
+TINY = "diffusion-paper,network.widths=8:16,network.groups=4,training_steps=3"
 
 
-def test_one_training_a_set_and_form_at_the_papers_own_size():
-    planned = units(Scale())
+def test_one_training_a_set_and_form_with_the_own_size_alone_on_the_gpu():
+    planned = units(Scale(device="cuda"))
     trainings = {unit.training for unit, _ in planned}
-    assert {t.generator for t in trainings} == {OWN_SIZE, SPLINES}
-    own = [t for t in trainings if t.generator == OWN_SIZE and t.perception is None]
-    assert sorted(t.demonstrations for t in own) == ["A", "B", "v00", "v01", "v02", "v03"]
-    assert {t.device for unit, _ in units(Scale(device="cuda")) for t in (unit.training,)} == {
-        "cuda"
-    }
+    assert {t.generator for t in trainings} == {form.generator for form in FORMS}
+    assert {t.perception for t in trainings} == {"camera"}
+    by = {f.generator: sorted(t.demonstrations for t in trainings if t.generator == f.generator)
+          for f in FORMS}  # fmt: skip
+    assert by[OWN_SIZE] == ["A", "B"]
+    assert by[SMALL] == ["A", "B", "v00", "v01", "v02", "v03"]
+    on_gpu = {t.generator for t in trainings if t.device == "cuda"}
+    assert on_gpu == {form.generator for form in FORMS if form.own_size}
 
 
 @pytest.fixture(scope="module")
 def learned():
     prior = pr.make_task("basketball-v1").demonstrations("A").without_symmetry()
-    return LearnedGenerator(make_generator(SMALL).fit(prior, seed=0), prior)
+    return LearnedGenerator(make_generator(TINY).fit(prior, seed=0), prior)
 
 
 def test_smoothing_changes_plans_as_said(learned, tmp_path, monkeypatch):
-    training = Training("basketball-v1", "A", SMALL, 0)
+    training = Training("basketball-v1", "A", TINY, 0)
     monkeypatch.setattr(Training, "learned", lambda self, folder: learned)
     raw, smooth = (Executable(training, 3, by).rows(Executable(training, 3, by).run(tmp_path))
                    for by in (0.0, 0.06))  # fmt: skip
@@ -52,7 +55,7 @@ def test_smoothing_changes_plans_as_said(learned, tmp_path, monkeypatch):
 def test_a_perceived_goal_is_beside_the_goal_and_hits_count_at_the_goal(
     learned, tmp_path, monkeypatch
 ):
-    training = Training("basketball-v1", "A", SMALL, 0)
+    training = Training("basketball-v1", "A", TINY, 0)
     monkeypatch.setattr(Training, "learned", lambda self, folder: learned)
     unit = PerceivedGoalTrials(training, "basketball-v1", "gp", "exact", 4, rounds=1)
     asked: list[np.ndarray] = []

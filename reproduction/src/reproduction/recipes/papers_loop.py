@@ -1,8 +1,9 @@
-"""The paper's loop at the paper's own size: widths 256, 512 and 1024, Mish, 20,000 steps (a GPU).
+"""The paper's loop as the paper has it, at the paper's own size and at one that a core learns.
 
-For every trial the network is sampled anew, and the paper's Gaussian process corrects the condition
-from what is seen by eye. Outcomes of the demonstrations, and the goal, are exact, or perceived as
-in the paper. Controls: one noise for all trials, and no adapter. On A, B and drawn sets.
+Outcomes of the demonstrations are read by a camera, so is each goal, once; for every trial the
+network is sampled anew, and the paper's Gaussian process corrects the condition from what is seen
+by eye. Controls: goals known exactly; then one noise for all trials, or no adapter. The own size
+(256, 512 and 1024, Mish) wants a GPU: three minutes a training there, four hours of two cores.
 
 The paper does not say how its plans reach the arm, whose controllers are low-pass filters. Plans of
 the network's raw frames, smoothed ones, and ones of a network that learns spline control points are
@@ -27,25 +28,22 @@ from prior_reinforce.generators.network.diffusion import DiffusionGenerator
 from prior_reinforce.plans.motions import Plan
 from prior_reinforce.simulation.protocol import is_hit
 from prior_reinforce.simulation.tasks import make_task
-from reproduction.evaluation import GOAL_SEED, OfTraining, Training, ZeroShot
+from reproduction.evaluation import GOAL_SEED, OfTraining, Training, Trials, ZeroShot
 from reproduction.recipes.base import TASK, Planned, Recipe, Scale
-from reproduction.recipes.generators import FreshNoise, FreshNoiseTrials
+from reproduction.recipes.generators import PAPERS_FORM, FreshNoise, FreshNoiseTrials
 from reproduction.recipes.sets import SETS
 from reproduction.recipes.tables import Columns, Table
 from reproduction.results import FIRST, TRIALS, Results, column, reached, rows_of
 from reproduction.statistics import SHARE
 
-_STEPS = "training_steps=20000"
-OWN_SIZE = f"diffusion-paper,{_STEPS}"
-"""Raw frames, as in the paper."""
-SPLINES = f"{OWN_SIZE},representation=splines"
-"""The same network on spline control points."""
+OWN_SIZE = "diffusion-paper,training_steps=20000"
+OWN_SIZE_SPLINES = "diffusion-paper,training_steps=6000,representation=splines"
+"""On spline control points; as many steps as there was time for on the GPU."""
+SMALL, SMALL_SPLINES = PAPERS_FORM, f"{PAPERS_FORM},representation=splines"
 _DRAWN = SETS[:4]
-"""Drawn sets: what a GPU does in minutes, and a core in four hours each."""
 _VARIANTS = {"V1": "basketball-v1", "V2": "basketball-v2", "V3": "basketball-v3"}
-LOOP, PERCEIVED = "the paper's loop", "the paper's loop, demonstrations and goals perceived"
-ONE_NOISE, ALONE = "one noise for all trials", "fresh noise, no adapter"
-ON_SPLINES = "the paper's loop, spline control points"
+LOOP, EXACT = "the paper's loop", "goals known exactly"
+ONE_NOISE, ALONE = f"{EXACT}, one noise for all trials", f"{EXACT}, no adapter"
 GATE, KNOWN = "one throw, before the Panda's gate", "its own demonstrations"
 _GOAL_SPREAD = 0.01
 """Standard deviation of a perceived goal in each direction, in [m]: the camera's own."""
@@ -116,50 +114,67 @@ def smoothed(generator: Generator, frames: float) -> Generator:
     return other
 
 
+@dataclass(frozen=True)
+class Form:
+    """What the paper's generator is learned as."""
+
+    label: str
+    """For tables."""
+    generator: str
+    """Its choice."""
+    own_size: bool
+    """Of the paper's size: on A and B alone, and on a GPU where one is asked for."""
+    splines: bool = False
+    """On spline control points: tried on V1, unsmoothed."""
+
+
+FORMS = (
+    Form("own size", OWN_SIZE, own_size=True),
+    Form("small", SMALL, own_size=False),
+    Form("own size, splines", OWN_SIZE_SPLINES, own_size=True, splines=True),
+    Form("small, splines", SMALL_SPLINES, own_size=False, splines=True),
+)
+
+
 def units(scale: Scale, include: Sequence[str] = ()) -> list[Planned]:
-    """Every training's trials on V1, A's and B's on V2 and V3 too; its plans before the gate."""
-    seed = scale.seeds[0]
-    own = [(name, seed) for name in scale.sets]
-    planned: list[Planned] = []
-    for name, s in (*own, *(_DRAWN if scale.variants else ())):
-        training = Training(TASK, name, OWN_SIZE, s, device=scale.device)
-        planned += _loop(training, scale, tuple(_VARIANTS) if (name, s) in own else ("V1",))
-    for name, s in own:
-        perceived = Training(TASK, name, OWN_SIZE, s, perception="camera", device=scale.device)
-        for label, task in _VARIANTS.items():
-            base = scale.trials(perceived, "gp", "eye", task=task)
-            told = {"condition": f"{label}, by eye", "method": PERCEIVED}
-            planned.append((PerceivedGoalTrials(**vars(base)), told))
-        splines = Training(TASK, name, SPLINES, s, device=scale.device)
-        fresh = FreshNoiseTrials(**vars(scale.trials(splines, "gp", "eye")))
-        planned += [(fresh, {"condition": "V1, by eye", "method": ON_SPLINES})]
-        planned += _plans(splines, scale, "spline control points", _SMOOTHINGS[:1])
-    return planned
+    """Every form's trials and plans: on A and B, and on drawn sets where it is small."""
+    own = tuple((name, scale.seeds[0]) for name in scale.sets)
+    return [
+        planned
+        for form in FORMS
+        for name, seed in (own if form.own_size else (*own, *_DRAWN))
+        for planned in _of_training(
+            form,
+            Training(
+                TASK, name, form.generator, seed, perception="camera",
+                device=scale.device if form.own_size else "cpu",
+            ),
+            scale,
+        )
+    ]  # fmt: skip
 
 
-def _loop(training: Training, scale: Scale, variants: Sequence[str]) -> list[Planned]:
-    """The loop on variants of the hardware, its controls on the demonstrations' own."""
-    planned: list[Planned] = []
-    for label in variants:
-        base = scale.trials(training, "gp", "eye", task=_VARIANTS[label])
-        told = {"condition": f"{label}, by eye"}
-        planned.append((FreshNoiseTrials(**vars(base)), {**told, "method": LOOP}))
-        if label == "V1":
-            alone = scale.trials(training, "frozen", "eye")
-            planned += [
-                (base, {**told, "method": ONE_NOISE}),
-                (FreshNoiseTrials(**vars(alone)), {**told, "method": ALONE}),
-            ]
-    return planned + _plans(training, scale, "raw frames", _SMOOTHINGS)
+def _of_training(form: Form, training: Training, scale: Scale) -> list[Planned]:
+    """The loop on variants of the hardware, its controls on V1; plans before the gate."""
 
+    def tried(kind: type[Trials], adapter: str, variant: str, method: str) -> Planned:
+        unit = scale.trials(training, adapter, "eye", task=_VARIANTS[variant])
+        told = {"condition": f"{variant}, by eye", "method": f"{form.label}: {method}"}
+        return kind(**vars(unit)), told
 
-def _plans(
-    training: Training, scale: Scale, coded: str, smoothings: Sequence[float]
-) -> list[Planned]:
-    """How well it knows its demonstrations, and its plans before the gate."""
-    planned: list[Planned] = [(ZeroShot(training), {"condition": KNOWN, "method": coded})]
-    for by in smoothings:
-        method = f"{coded}, smoothed by {1000 * by:.0f} ms" if by else coded
+    planned = [
+        tried(PerceivedGoalTrials, "gp", variant, LOOP)
+        for variant in (("V1",) if form.splines else _VARIANTS)
+    ]
+    if not form.splines:
+        planned += [
+            tried(FreshNoiseTrials, "gp", "V1", EXACT),
+            tried(Trials, "gp", "V1", ONE_NOISE),
+            tried(FreshNoiseTrials, "frozen", "V1", ALONE),
+        ]
+    planned.append((ZeroShot(training), {"condition": KNOWN, "method": form.label}))
+    for by in _SMOOTHINGS[:1] if form.splines else _SMOOTHINGS:
+        method = f"{form.label}, smoothed by {1000 * by:.0f} ms" if by else form.label
         told = {"condition": GATE, "method": method}
         planned.append((Executable(training, scale.goals, by), told))
     return planned
