@@ -97,8 +97,8 @@ def test_all_leaves_out_what_takes_hours_and_more_is_that():
     named = {name: {r.name for r in Reproduce(name)._recipes()} for name in choices}
     assert named["all"] - named["paper"] == {"zero-shot", "adaptation", "ways"}
     assert named["more"] == {
-        "sets", "sets-network", "adaptation-network", "papers-form", "robustness", "variation",
-        "once",
+        "sets", "sets-network", "adaptation-network", "papers-form", "papers-loop", "robustness",
+        "variation", "once",
     }  # fmt: skip
     assert named["all"] == set(RECIPES) - named["more"]
     assert {r.name for r in Reproduce("all", taken_from=Path("x"))._recipes()} == set(RECIPES)
