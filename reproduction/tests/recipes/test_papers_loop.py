@@ -30,7 +30,7 @@ def test_one_training_a_set_and_form_with_the_own_size_alone_on_the_gpu():
     by = {f.generator: sorted(t.demonstrations for t in trainings if t.generator == f.generator)
           for f in FORMS}  # fmt: skip
     assert by[OWN_SIZE] == ["A", "B"]
-    assert by[SMALL] == ["A", "B", "v00", "v01"]
+    assert by[SMALL] == ["A", "B"]
     on_gpu = {t.generator for t in trainings if t.device == "cuda"}
     assert on_gpu == {form.generator for form in FORMS if form.own_size}
 

@@ -31,7 +31,6 @@ from prior_reinforce.simulation.tasks import make_task
 from reproduction.evaluation import GOAL_SEED, OfTraining, Training, Trials, ZeroShot
 from reproduction.recipes.base import TASK, Planned, Recipe, Scale
 from reproduction.recipes.generators import PAPERS_FORM, FreshNoise, FreshNoiseTrials
-from reproduction.recipes.sets import SETS
 from reproduction.recipes.tables import Columns, Table
 from reproduction.results import FIRST, TRIALS, Results, column, reached, rows_of
 from reproduction.statistics import SHARE
@@ -40,8 +39,6 @@ OWN_SIZE = "diffusion-paper,training_steps=20000"
 OWN_SIZE_SPLINES = "diffusion-paper,training_steps=6000,representation=splines"
 """On spline control points; as many steps as there was time for on the GPU."""
 SMALL, SMALL_SPLINES = PAPERS_FORM, f"{PAPERS_FORM},representation=splines"
-_DRAWN = SETS[:2]
-"""Few: a small network too takes a core a quarter of an hour."""
 _VARIANTS = {"V1": "basketball-v1", "V2": "basketball-v2", "V3": "basketball-v3"}
 LOOP, EXACT = "the paper's loop", "goals known exactly"
 ONE_NOISE, ALONE = f"{EXACT}, one noise for all trials", f"{EXACT}, no adapter"
@@ -124,7 +121,7 @@ class Form:
     generator: str
     """Its choice."""
     own_size: bool
-    """Of the paper's size: on A and B alone, V2 and V3 too, and on a GPU where one is asked for."""
+    """Of the paper's size: on V2 and V3 too, and on a GPU where one is asked for."""
     splines: bool = False
     """On spline control points: tried on V1, unsmoothed."""
 
@@ -138,16 +135,15 @@ FORMS = (
 
 
 def units(scale: Scale, include: Sequence[str] = ()) -> list[Planned]:
-    """Every form's trials and plans: on A and B, and on drawn sets where it is small."""
-    own = tuple((name, scale.seeds[0]) for name in scale.sets)
+    """Every form's trials and plans, of one training a set."""
     return [
         planned
         for form in FORMS
-        for name, seed in (own if form.own_size else (*own, *_DRAWN))
+        for name in scale.sets
         for planned in _of_training(
             form,
             Training(
-                TASK, name, form.generator, seed, perception="camera",
+                TASK, name, form.generator, scale.seeds[0], perception="camera",
                 device=scale.device if form.own_size else "cpu",
             ),
             scale,
