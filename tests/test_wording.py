@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from prior_reinforce.formats import OutcomeFormat
-from prior_reinforce.wording import in_words, say_length, say_place, to_words
+from prior_reinforce.wording import in_words, say_chance, say_length, say_place, to_words
 
 METRES = OutcomeFormat.metres(2)
 MIXED = OutcomeFormat(("x", "t"), ("m", "s"))
@@ -78,3 +78,8 @@ def test_places_are_said_as_seen_from_the_base(place, said):
 )
 def test_lengths(length, form, said):
     assert say_length(length, form) == said
+
+
+def test_a_chance_is_one_of_three_words():
+    said = [say_chance(p) for p in (0.0, 0.0999, 0.1, 0.43, 0.6499, 0.65, 1.0)]
+    assert said == ["unlikely"] * 2 + ["possible"] * 3 + ["likely"] * 2

@@ -69,7 +69,7 @@ _BARE_TERM = re.compile(rf"(?P<value>{_NUMBER})\s*(?P<unit>{_LENGTHS})")
 """`92cm`."""
 _WORD_FIRST = re.compile(rf"([a-z]+)\s+(?:by\s+)?((?:{_NUMBER})\s*(?:{_UNIT}))")
 """`long by 5cm`."""
-_SYNONYMS = {"far": "long"}
+_SYNONYMS = {"far": "long", "beyond": "long", "above": "high", "below": "low"}
 _FROM_BASE = re.compile(r"(?P<length>.*?)\s*(?:away )?from (?:the )?(?:base|robot|arm|foot)\b.*")
 _PLACE_TERM = re.compile(rf"(?P<number>[+-]?(?:{_NUMBER}))\s*(?P<unit>{_UNIT})(?:\s*[,;]\s*|\s+|$)")
 

@@ -25,7 +25,7 @@ def test_within_its_folder_a_workspace_need_not_be_named(run, within, monkeypatc
         monkeypatch.chdir(place)
         status, out, err = run("status")
         assert (status, err) == (0, "")
-        assert 'next            prior-reinforce tell 1 --error "5cm long, 2cm left"' in out
+        assert 'next            prior-reinforce tell 1 --error "_cm long, _cm left"' in out
 
 
 @pytest.mark.parametrize(

@@ -59,7 +59,7 @@ def test_a_trial_of_a_later_goal_is_counted_for_its_goal_and_tells_its_chance(vi
     shown, told = view
     first = trial(7, [1.0, 0.1], [0.05, 0.0], p_hit=0.523)
     shown.trial(GoalTrials(GOAL, (first,), ()))
-    line = "trial 1  aim at the goal                      chance  52%  seen: 5 cm long"
+    line = "trial 1  aim at the goal                      hit possible  seen: 5 cm long"
     assert told.getvalue().strip() == line
 
 

@@ -16,7 +16,7 @@ def test_an_afternoon(run, folder):
     status, out, _ = run("ask", folder, "--out", "plan.csv")
     assert status == 0
     assert "no limits checked" in out
-    assert 'next: prior-reinforce tell planar 1 --error "5cm long, 2cm left"' in out
+    assert 'next: prior-reinforce tell planar 1 --error "_cm long, _cm left"' in out
     assert run("tell", folder, 1, "--error", "5cm", "long,", "2cm", "left")[0] == 0
     _, out, _ = run("amend", folder, 1, "--error", "-0.05", "0.02")
     assert "trial 1, corrected: 5 cm short, 2 cm left" in out

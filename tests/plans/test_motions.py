@@ -322,7 +322,7 @@ def test_a_goal_is_far_outside_where_the_symmetry_is_believed_no_more():
         one.check_goal([-0.9, 0.9])
         one.check_goal([2.0, 0.0])
     np.testing.assert_allclose(one.far_outside(np.array([4.0, 0.0])), [4.0 - np.exp(0.9), 0.0])
-    with pytest.warns(UserWarning, match=r"goal \[4, 0\] lies 1.54 m outside"):
+    with pytest.warns(UserWarning, match=r"goal \[4, 0\] lies 1.54 m in x from where"):
         one.check_goal([4.0, 0.0])
 
 

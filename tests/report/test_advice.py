@@ -13,7 +13,7 @@ def test_where_a_first_throw_hits_is_dark(tmp_path):
     pictures = []
     for p in (0.0, 1.0):
         path = draw_advice(
-            tmp_path / f"{p}.png", grid, np.full(6, p), grid[:2], grid[3], grid[4],
+            tmp_path / f"{p}.png", grid, np.full(6, p), grid[:2], grid[2], grid[3], grid[4],
             OutcomeFormat.metres(2),
         )  # fmt: skip
         pictures.append(np.asarray(Image.open(path).convert("RGB")).mean())
@@ -27,15 +27,15 @@ def test_what_the_shades_and_the_axes_mean_is_said(tmp_path, monkeypatch):
     )
     grid = np.stack(np.meshgrid([0.8, 0.9, 1.0], [-0.2, 0.2], indexing="ij"), -1).reshape(-1, 2)
     draw_advice(
-        tmp_path / "a.png", grid, np.full(6, 0.5), grid[:2], grid[3], grid[3],
+        tmp_path / "a.png", grid, np.full(6, 0.5), grid[:2], grid[2], grid[3], grid[3],
         OutcomeFormat.metres(2),
     )  # fmt: skip
     (axes,) = figures[0].axes
     assert axes.get_xlabel() == "← left      y [cm]      right →"
     assert axes.get_xbound() == (-20.0, 20.0)
     (bar,) = axes.child_axes
-    assert bar.get_ylabel() == "probability that\na first throw hits"
-    assert bar.get_yticklabels()[-1].get_text() == "100%"
+    assert bar.get_ylabel() == "a first throw's hit is"
+    assert [t.get_text() for t in bar.get_yticklabels()] == ["unlikely", "possible", "likely"]
     sizes = {scatter.get_label(): scatter.get_sizes()[0] for scatter in axes.collections[1:]}
     # Both are seen where they are at one place.
     assert sizes["throw that teaches most"] > 4 * sizes["demonstration that teaches most"]

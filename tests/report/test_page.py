@@ -154,8 +154,8 @@ def test_what_is_known_beside_the_trials_is_on_the_page(tmp_path):
     )
     reader = read(write_report(tmp_path / "report", [record], title="x"))
     for text in (
-        "P(hit), to go",
-        "34%, 1.9",
+        "A hit, to go",
+        "possible, 1.9",
         "new on the hardware: <smaller> ball",
         "called 2 cm ✓",
         "that it hit was seen directly",
@@ -165,7 +165,7 @@ def test_what_is_known_beside_the_trials_is_on_the_page(tmp_path):
         assert text in reader.words
     assert sum(address.startswith("data:image/png") for address in reader.addresses) == 1
     unsaid = read(write_report(tmp_path / "other", [told([0.05, 0.0])], title="x")).words
-    for text in ("P(hit)", "Dotted", "seen directly"):
+    for text in ("A hit", "Dotted", "seen directly"):
         assert text not in unsaid
 
 

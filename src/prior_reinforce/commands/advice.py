@@ -8,13 +8,14 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
+from prior_reinforce.arm.workspace.reaching import reach_check
 from prior_reinforce.arm.workspace.view import AdviceView
 from prior_reinforce.arm.workspace.workspace import Workspace
 from prior_reinforce.arrays import Point, Points
 from prior_reinforce.commands.base import Json, OnWorkspace, print_json
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.generators.reach import reach, region_around
-from prior_reinforce.wording import say_place
+from prior_reinforce.wording import say_chance, say_place
 
 _ACROSS = 15
 """Goals along each side of the region (ours): 25 took four to five times as long, to tell places
@@ -61,7 +62,7 @@ class Advise(OnWorkspace):
         p = p_hit(conditions, goals, session.tolerance)
         reached = None
         if moved:  # what is learned of a move serves everywhere: no throw teaches most
-            reached = reach(session.generator, np.stack([low, high]), workspace.refusals)
+            reached = reach(session.generator, np.stack([low, high]), reach_check(workspace))
             throws, shown = np.zeros(len(goals)), np.zeros(1)
         else:
             throws = gain(conditions, conditions)
@@ -75,7 +76,9 @@ class Advise(OnWorkspace):
         if goals.shape[1] == 2:
             from prior_reinforce.report.advice import draw_advice
 
-            picture = draw_advice(out, goals, p, outcomes, throw, demonstration, form, reached)
+            picture = draw_advice(
+                out, goals, p, outcomes, session.goal, throw, demonstration, form, reached
+            )
         if self.json:
             record = AdviceView(
                 mean_p_hit=float(p.mean()),
@@ -93,10 +96,9 @@ class Advise(OnWorkspace):
             print_json(record)
             return
         print(
-            f"first throws hit with probability {p.mean():.2f} on average over the "
-            f"{'region around what was shown' if moved else 'demonstrated region'}: "
-            f"{p[best]:.2f} at {say_place(goals[best], form)}, "
-            f"{p[worst]:.2f} at {say_place(goals[worst], form)}"
+            f"in the {'region around what was shown' if moved else 'demonstrated region'} a first "
+            f"throw's hit is likeliest at {say_place(goals[best], form)} ({say_chance(p[best])}), "
+            f"least likely at {say_place(goals[worst], form)} ({say_chance(p[worst])})"
         )
         if reached is not None:
             print(f"{reached.reached.mean():.0%} of it can be reached within the arm's limits")

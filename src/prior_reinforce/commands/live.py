@@ -20,7 +20,7 @@ from prior_reinforce.formats import OutcomeFormat
 from prior_reinforce.parsing import from_words
 from prior_reinforce.readings import Reading
 from prior_reinforce.terminal import plain
-from prior_reinforce.wording import error_example, say_place, to_words
+from prior_reinforce.wording import error_example, say_chance, say_place, to_words
 
 if TYPE_CHECKING:
     from prior_reinforce.environment import Rollout
@@ -61,7 +61,7 @@ class LiveView:
         )
         aim = "aim at the goal" if off == nothing else f"aim {moved}{off}"
         shown = ("HIT", "bold green") if trial.hit else "a near miss" if seen == nothing else seen
-        chance = "" if trial.p_hit is None else f"chance {trial.p_hit:4.0%}  "
+        chance = "" if trial.p_hit is None else f"hit {say_chance(trial.p_hit):<8}  "
         self._say(f"  trial {len(result.trials)}  {aim:<36} {chance}seen: ", shown)
 
     def end(self, result: GoalTrials) -> None:

@@ -53,7 +53,7 @@ from prior_reinforce.files import check_path
 from prior_reinforce.parsing import as_place
 from prior_reinforce.session.trials import State, Trial
 from prior_reinforce.terminal import RED, coloured
-from prior_reinforce.wording import say_place
+from prior_reinforce.wording import in_words, say_place, to_words
 
 if TYPE_CHECKING:
     from prior_reinforce.arm.executing.drive import Look
@@ -248,8 +248,12 @@ class Ask(OnWorkspace):
     def _show(self, workspace: Workspace, state: State, trial: Trial, reached_before: bool) -> None:
         """Print where the trial aims and what the gate says, and write --out."""
         manifest = workspace.manifest
-        place = say_place(trial.condition, manifest.outcome_format)
-        print(f"trial {trial.number}: aimed at {place}")
+        outcome, goal = manifest.outcome_format, state.goals[trial.goal_number - 1].goal
+        aims = f"trial {trial.number}: aims at {say_place(trial.condition, outcome)}"
+        beside = to_words(trial.condition - goal, outcome) if in_words(outcome) else ""
+        if beside and beside != to_words(0.0 * goal, outcome):
+            aims += f", {beside} of the goal, so that it lands there"
+        print(aims)
         for line in (*say_expectation(workspace.standing, trial), *say_outdated(state)):
             print(line)
         if reached_before:

@@ -15,12 +15,14 @@ from prior_reinforce.adapters import ADAPTERS, DEFAULT_ADAPTER
 from prior_reinforce.arm.robots import RobotLimits
 from prior_reinforce.arm.robots.presets import PRESETS
 from prior_reinforce.arm.workspace.declared import WAYS, read_object
+from prior_reinforce.arm.workspace.folder import require_new
 from prior_reinforce.arm.workspace.template import NewWorkspace
 from prior_reinforce.arm.workspace.view import trials_table
 from prior_reinforce.arm.workspace.workspace import Workspace
 from prior_reinforce.commands.base import Json, OnWorkspace, Words, print_json, print_next
 from prior_reinforce.commands.questions import answer_to
 from prior_reinforce.errors import ConfigurationError, UnclearFlangeError
+from prior_reinforce.files import named_disk_errors
 from prior_reinforce.wording import say_place, say_tolerance
 
 AdapterChoice = Annotated[
@@ -52,6 +54,8 @@ class New(NewWorkspace):
 
     def run(self) -> None:
         """Write the folder."""
+        with named_disk_errors(self.folder):
+            require_new(self.folder)  # before anything is asked
         asked = self._with_flange()._asked()
         text = asked.manifest(self.folder.resolve().name)
         with Workspace.create(self.folder, text) as workspace:
@@ -84,8 +88,16 @@ class New(NewWorkspace):
             return self
         for way, means in WAYS.items():
             print(f"  {way:<9} {means}")
-        said = answer_to("where is the object before it leaves? one demonstration is then enough: ")
-        where, asked = read_object(said.strip() or "none"), replace(self, symmetry=said or "none")
+        while True:
+            said = answer_to(
+                "where is the object before it leaves? one demonstration is then enough [none]: "
+            )
+            try:
+                where = read_object(said.strip() or "none")
+                break
+            except ConfigurationError as error:
+                print(error)
+        asked = replace(self, symmetry=said.strip() or "none")
         if where in ("anywhere", "none") or self.robot == "none" or self.box or self.no_box:
             return asked
         corners = answer_to(
@@ -195,7 +207,7 @@ class Trials(OnWorkspace):
         else:
             for trial in view.trials:
                 aim = say_place(trial.condition, view.outcome_format)
-                said = f"aimed at {aim}: {trial.line}"
+                said = f"aims at {aim}: {trial.line}"
                 print(f"goal {trial.goal}  trial {trial.number:<4}{said}")
 
 

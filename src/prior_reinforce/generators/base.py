@@ -119,7 +119,7 @@ class Generator(ABC):
         if demonstrations.n == 1:
             raise InvalidDemonstrationsError(
                 f"generator {self.name} learns from at least two demonstrations, got one; "
-                "demonstrate more, or state a symmetry and learn with auto"
+                "demonstrate more, or state how this one may be moved (docs/symmetry.md)"
             )
         check_spread(demonstrations.outcomes_seen)
 

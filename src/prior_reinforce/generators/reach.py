@@ -70,14 +70,19 @@ class Reach:
         if not len(possible):
             raise OutOfReachError(f"no goal can be reached from these demonstrations: {why}")
         within = possible[np.argmin(np.linalg.norm(possible - wanted, axis=1))]
-        low, high = 0.0, 1.0
-        for _ in range(_HALVINGS):
-            share = (low + high) / 2
-            if refusal(generator, within + share * (wanted - within), check):
-                high = share
-            else:
-                low = share
-        return np.asarray(within + low * (wanted - within))
+        return farthest_between(generator, within, wanted, check)
+
+
+def farthest_between(generator: Generator, within: Point, wanted: Point, check: Check) -> Point:
+    """Return the last goal that can be reached on the way from one that can to one that cannot."""
+    low, high = 0.0, 1.0
+    for _ in range(_HALVINGS):
+        share = (low + high) / 2
+        if refusal(generator, within + share * (wanted - within), check):
+            high = share
+        else:
+            low = share
+    return np.asarray(within + low * (wanted - within))
 
 
 def region_around(demonstrations: Demonstrations) -> Float[np.ndarray, "2 k"]:

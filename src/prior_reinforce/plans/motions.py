@@ -318,10 +318,14 @@ class Demonstrations:
         if np.any(beyond):
             low, high = self.outcomes_seen.min(axis=0), self.outcomes_seen.max(axis=0)
             asked = ", ".join(f"{value:.4g}" for value in goal)
+            form, symmetry = self.outcome_format, self.symmetry
             where = ", ".join(
-                f"{beyond[j]:.4g} {self.outcome_format.units[j]} outside the demonstrated {name} "
+                f"{beyond[j]:.4g} {form.units[j]} outside the demonstrated {name} "
                 f"({low[j]:.4g} to {high[j]:.4g})"
-                for j, name in enumerate(self.outcome_format.names)
+                if symmetry is None
+                else f"{beyond[j]:.4g} {form.units[j]} in {name} from where motions can be moved "
+                f"({symmetry.name})"
+                for j, name in enumerate(form.names)
                 if beyond[j] > 0
             )
             warnings.warn(

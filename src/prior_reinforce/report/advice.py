@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
-from matplotlib.ticker import PercentFormatter
 
 from prior_reinforce.arrays import Point, Points
 from prior_reinforce.formats import OutcomeFormat
@@ -14,6 +13,7 @@ from prior_reinforce.generators.reach import Reach
 from prior_reinforce.report import style
 from prior_reinforce.report.panels import axis_label
 from prior_reinforce.report.record import drawn_scale
+from prior_reinforce.wording import CHANCES, say_chance
 
 
 @style.drawing()
@@ -22,6 +22,7 @@ def draw_advice(
     goals: Points,
     p_hit: Float[np.ndarray, " n"],
     demonstrated: Float[np.ndarray, "N k"],
+    goal: Point,
     throw: Point | None,
     demonstration: Point | None,
     form: OutcomeFormat,
@@ -34,6 +35,7 @@ def draw_advice(
         goals: A grid, shape (n, 2), the second component fastest.
         p_hit: Probability that a first throw hits each.
         demonstrated: Outcomes of the demonstrations.
+        goal: That is set.
         throw: Goal of the throw that teaches most; None if none does.
         demonstration: Where the demonstration that teaches most ends; None if none would teach.
         form: What the two components are.
@@ -47,7 +49,8 @@ def draw_advice(
     x, y = (np.unique(goals[:, j]) for j in range(2))
     # As high as the region at this width, and what stands below it.
     height = 4.8 * np.ptp(x) / np.ptp(y) if units[0] == units[1] else 3.0
-    figure = style.new_figure(6.4, 1.1 + float(np.clip(height, 1.5, 6.0)))
+    height = float(np.clip(height, 1.5, 6.0))
+    figure = style.new_figure(6.4, 1.1 + height)
     axes = figure.add_subplot()
     style.calm_axes(axes, grid=False)
     # As seen from the robot: ahead is up, left is left.
@@ -55,8 +58,9 @@ def draw_advice(
         y, x, p_hit.reshape(len(x), len(y)), cmap="Greys", vmin=0.0, vmax=1.0, shading="gouraud"
     )
     bar = figure.colorbar(shade, cax=axes.inset_axes((1.04, 0, 0.035, 1)))  # as high as the panel
-    bar.set_label("probability that\na first throw hits", color=style.INK_SOFT)
-    bar.ax.yaxis.set_major_formatter(PercentFormatter(1.0))
+    bar.set_label("a first throw's hit is", color=style.INK_SOFT)
+    bar.set_ticks(np.mean(CHANCES, axis=1), labels=[say_chance(low) for low, _ in CHANCES])
+    bar.ax.hlines([high for _, high in CHANCES[:-1]], 0, 1, colors=style.INK_SOFT, linewidths=1)
     bar.ax.tick_params(labelsize=9, colors=style.INK_SOFT)
     marks = [
         (demonstrated, "o", 42, style.DEMONSTRATION, "demonstrated"),
@@ -81,10 +85,14 @@ def draw_advice(
             points[:, 1], points[:, 0], marker=mark, s=size, color=colour,
             edgecolors=style.INK, linewidths=0.8, label=label, zorder=3, clip_on=False,
         )  # fmt: skip
+    y, x = scale * goal[1], scale * goal[0]
+    axes.plot(y, x, "+", color=style.GOAL, ms=11, mew=2.2, label="goal", zorder=4, clip_on=False)
     axes.invert_xaxis()
     axes.set_xlabel(axis_label(form, 1, mirrored=True))
     axes.set_ylabel(axis_label(form, 0))
     if units[0] == units[1]:
         axes.set_aspect("equal")
-    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=3, frameon=False, fontsize=8)
+    axes.legend(
+        loc="upper center", bbox_to_anchor=(0.5, -0.6 / height), ncols=3, frameon=False, fontsize=8
+    )
     return style.save_figure(figure, path)

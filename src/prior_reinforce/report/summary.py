@@ -34,8 +34,8 @@ class TrialRow:
     off: str
     """How far off it was seen to be; a dash where nothing was told of that."""
     expected: str
-    """Its P(hit) and the trials to go, as the adapter saw it: `38%, 1.9`; empty from one that
-    expects nothing."""
+    """How likely a hit was and the trials to go, as the adapter saw it: `possible, 1.9`; empty from
+    one that expects nothing."""
     truly_off: str
     """How far off it truly was; empty where that is not known."""
     result: str
@@ -149,7 +149,7 @@ def say_distance(record: AdaptationRecord, distance: float) -> str:
 def _row(record: AdaptationRecord, i: int, trial: Trial) -> TrialRow:
     form, expected = record.format, ""
     if trial.p_hit is not None and trial.expected_trials is not None:
-        expected = f"{trial.p_hit:.0%}, {trial.expected_trials:.1f}"
+        expected = f"{wording.say_chance(trial.p_hit)}, {trial.expected_trials:.1f}"
     aim = say_place(trial.condition, form)
     if in_words(form):
         aim = to_words(trial.condition - record.goal, form).replace("on the goal", "at the goal")

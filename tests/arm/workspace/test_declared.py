@@ -69,8 +69,11 @@ def test_demonstrations_that_state_a_rival_are_refused(tmp_path):
 def test_a_goal_out_of_reach_is_refused_with_the_nearest_that_is_not(hoop):
     hoop.import_demonstrations(shown([0]), "a throw")
     hoop.learn()
-    with pytest.raises(OutOfReachError, match=r"tempo: .* nearest that can be reached is \d+"):
-        hoop.set_goal([2.2, 0.3])
+    # Farther and nearer, and the nearest lies where the goal does as seen from the base.
+    for goal, nearest in (([2.2, 0.3], r"\d+"), ([2.5, 0.0], "163 cm ahead, 0 cm left"),
+                          ([0.3, 0.1], "37.2 cm ahead, 12.4 cm left")):  # fmt: skip
+        with pytest.raises(OutOfReachError, match=f"nearest that can be reached is {nearest}"):
+            hoop.set_goal(goal)
     assert not hoop.state.goals
 
 

@@ -103,7 +103,7 @@ def test_amendments_hardware_seed_paths_and_photographs_are_reported(run, folder
         "Trial 1, as it was looked at.",
         "seed 0",
         "Trials made",
-        "P(hit), to go",
+        "A hit, to go",
     ):
         assert text in page
     assert "Trial 2, as it was looked at." not in page

@@ -625,7 +625,7 @@ async function download(trial) {
 function chance(trial) {
   if (trial.p_hit === null) return null;
   const togo = trial.expected_trials === null ? "" : `${trial.expected_trials.toFixed(1)} trials to go`;
-  return h("p", { class: "chance", id: "chance" }, `${Math.round(100 * trial.p_hit)} % chance to hit `, h("small", {}, togo));
+  return h("p", { class: "chance", id: "chance" }, `A hit is ${trial.chance} `, h("small", {}, togo));
 }
 function surprise(trial) {
   const before = S.trials.slice(0, trial.number - 1).reverse().find((each) => each.stage === "told");
@@ -883,7 +883,7 @@ function drawHistory() {
   if (!S.trials.length) { fill("history"); return; }
   const trials = [...S.trials].reverse();
   const row = (trial) => h("li", {}, h("div", { class: "entry" }, h("b", {}, `${trial.number}`),
-    h("span", { class: trial.hit ? "hit" : "" }, `${trial.hit ? "✓ hit, " : ""}${trial.seen || trial.line}${trial.p_hit !== null && trial.stage === "told" ? ` (predicted ${Math.round(100 * trial.p_hit)} %)` : ""}`),
+    h("span", { class: trial.hit ? "hit" : "" }, `${trial.hit ? "✓ hit, " : ""}${trial.seen || trial.line}${trial.p_hit !== null && trial.stage === "told" ? ` (a hit was ${trial.chance})` : ""}`),
     trial.stage === "told" && button(`amend-${trial.number}`, "Correct", () => { L.amending = trial.number; L.mark = trial.outcome; draw(); (mapped() ? $("map") : rulers[0].svg).focus(); }, "plain", { "aria-label": `Correct trial ${trial.number}` }),
     trial.stage === "told" && L.voiding !== trial.number && button(`undo-${trial.number}`, "Void", () => { L.voiding = trial.number; draw(); }, "plain", { "aria-label": `Void trial ${trial.number}` })),
     trial.stage === "told" && !L.amending && confirmVoid(trial.number));

@@ -177,8 +177,10 @@ class Inspection:
         unchecked = {c for r in self.reports for c in r.unchecked} - of_themselves
         open_ = f"; not checked: {', '.join(sorted(unchecked))}" if unchecked else ""
         n = len(self.reports)
-        verdict = f"{refused} of {n} demonstrations break a limit"
-        return f"{self.robot}: {verdict if refused else f'all {n} demonstrations pass'}{open_}"
+        verdict = "the demonstration passes" if n == 1 else f"all {n} demonstrations pass"
+        if refused:
+            verdict = f"{refused} of {n} demonstrations break a limit"
+        return f"{self.robot}: {verdict}{open_}"
 
     def _broken(self) -> list[str]:
         """Limits that demonstrations break; plans like them will be refused."""

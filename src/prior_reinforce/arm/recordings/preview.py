@@ -69,7 +69,10 @@ class Preview:
         demos = self.demonstrations
         form = demos.outcome_format
         outcomes = zip(form.names, form.units, demos.outcomes_seen.T, strict=True)
-        ranges = ", ".join(f"{n} {v.min():.3g} to {v.max():.3g} {u}" for n, u, v in outcomes)
+        ranges = ", ".join(
+            f"{n} {v.min():.3g}" + f" to {v.max():.3g}" * (len(v) > 1) + f" {u}"
+            for n, u, v in outcomes
+        )
         if np.any(demos.outcome_noise):
             most = say_small(float(demos.outcome_noise.max()), form.units[0])
             ranges += f", uncertain by up to {most}"
@@ -128,8 +131,9 @@ class Preview:
     def _coverage(self) -> str:
         demos, points = self.demonstrations, self.demonstrations.outcomes_seen
         if demos.n == 1:
-            moved = demos.symmetry.name if demos.symmetry is not None else "none is declared"
-            return f"one outcome; other goals are reached by the symmetry: {moved}"
+            if demos.symmetry is None:
+                return "one outcome, and no symmetry is declared: no other goal can be reached"
+            return f"one outcome; other goals are reached by the symmetry: {demos.symmetry.name}"
         gaps = np.linalg.norm(points[:, None] - points[None], axis=-1)
         gaps[np.diag_indices(demos.n)] = np.inf
         i, j = np.unravel_index(int(np.argmin(gaps)), gaps.shape)

@@ -27,10 +27,19 @@ def make_folder(folder: Path, manifest: str) -> None:
     parse_manifest(manifest, folder / MANIFEST_FILE)
     with named_disk_errors(folder):
         sweep(folder)
-        if folder.is_file() or (folder.is_dir() and any(folder.iterdir())):
-            raise WorkspaceError(f"{folder} exists and is not empty; choose a new folder")
+        require_new(folder)
         folder.mkdir(parents=True, exist_ok=True)
         write(folder / MANIFEST_FILE, manifest)
+
+
+def require_new(folder: Path) -> None:
+    """Do nothing if a workspace can be made there: the folder is empty, or there is none.
+
+    Raises:
+        WorkspaceError: The folder holds something already.
+    """
+    if folder.is_file() or (folder.is_dir() and any(folder.iterdir())):
+        raise WorkspaceError(f"{folder} exists and is not empty; choose a new folder")
 
 
 def check_folder(folder: Path) -> None:

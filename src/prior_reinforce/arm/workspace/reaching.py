@@ -9,11 +9,18 @@ from numpy.typing import ArrayLike
 
 from prior_reinforce.arm.robots import RobotLimits, match_joints
 from prior_reinforce.arm.workspace.sessions import model_in_use
+from prior_reinforce.arrays import Frames, Point
 from prior_reinforce.errors import OutOfReachError
-from prior_reinforce.generators.reach import reach, refusal, region_around
+from prior_reinforce.generators.reach import (
+    Check,
+    farthest_between,
+    reach,
+    refusal,
+    region_around,
+)
 from prior_reinforce.parsing import as_place
 from prior_reinforce.plans.motions import Demonstrations
-from prior_reinforce.plans.symmetry import Polar, find_axis, hand_paths
+from prior_reinforce.plans.symmetry import Polar, Symmetry, find_axis, hand_paths
 from prior_reinforce.wording import say_place
 
 if TYPE_CHECKING:
@@ -34,16 +41,40 @@ def require_reach(workspace: Workspace, goal: ArrayLike) -> None:
     shown, place = workspace.demonstrations, as_place(goal, form)
     if shown.symmetry is None:
         return
-    generator = model_in_use(workspace.standing, workspace.store)
-    if why := refusal(generator, place, workspace.refusals):
-        region = region_around(shown)
-        region = np.stack([np.minimum(region[0], place), np.maximum(region[1], place)])
-        possible = reach(generator, region, workspace.refusals)
-        nearest = possible.nearest(generator, place, workspace.refusals)
+    generator, check = model_in_use(workspace.standing, workspace.store), reach_check(workspace)
+    if why := refusal(generator, place, check):
+        straight = _same_direction(shown, shown.symmetry, place)
+        if refusal(generator, straight, check):
+            region = region_around(shown)
+            region = np.stack([np.minimum(region[0], place), np.maximum(region[1], place)])
+            nearest = reach(generator, region, check).nearest(generator, place, check)
+        else:
+            nearest = farthest_between(generator, straight, place, check)
         raise OutOfReachError(
             f"goal {say_place(place, form)} is out of reach: {why}; the nearest that can be "
-            f"reached is {say_place(nearest, form)}; demonstrate nearer to reach farther"
+            f"reached is {say_place(nearest, form)}; demonstrate closer to the goal"
         )
+
+
+def reach_check(workspace: Workspace) -> Check:
+    """What decides whether a goal can be reached: how far motions may be moved, and the gate."""
+    shown = workspace.demonstrations
+    # What several demonstrations tell of a distance is warned about only: more of them tell more.
+    moved = shown.symmetry if shown.symmetry and not shown.symmetry.learned.any() else None
+
+    def check(plan: Frames, goal: Point) -> str:
+        if moved is not None and np.any(shown.far_outside(goal)):
+            return f"it is nearer or farther than motions are moved ({moved.name})"
+        return workspace.refusals(plan, goal)
+
+    return check
+
+
+def _same_direction(shown: Demonstrations, symmetry: Symmetry, goal: Point) -> Point:
+    """As far off as the nearest demonstration, where the goal is in all that is exact."""
+    z, aim = symmetry.chart.to(shown.outcomes_seen), symmetry.chart.to(goal)
+    apart = np.linalg.norm(np.where(symmetry.exact, 0.0, z - aim), axis=1)
+    return np.asarray(symmetry.chart.back(np.where(symmetry.exact, aim, z[np.argmin(apart)])))
 
 
 def axis_of(demonstrations: Demonstrations, robot: RobotLimits | None) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 from pathlib import Path
 
@@ -10,7 +11,7 @@ from prior_reinforce.arm.workspace.manifest import Manifest, workspace_around
 from prior_reinforce.arm.workspace.state import Standing
 from prior_reinforce.session.trials import Stage, State, Trial
 from prior_reinforce.terminal import plain
-from prior_reinforce.wording import error_example, say_reading
+from prior_reinforce.wording import error_example, say_chance, say_reading
 
 _POOR_TRIALS = 3
 _POOR_CHANCE = 0.35
@@ -61,9 +62,8 @@ def say_expectation(now: Standing, trial: Trial) -> list[str]:
     state = now.state
     if trial.p_hit is None or trial.expected_trials is None:
         return []
-    lines = [
-        f"{100 * trial.p_hit:.0f} % chance to hit; about {trial.expected_trials:.1f} trials to go"
-    ]
+    chance = say_chance(trial.p_hit)
+    lines = [f"a hit is {chance}; about {trial.expected_trials:.1f} trials to go"]
     if trial.remark:
         lines.append(trial.remark)
     told = [known for known in state.trials if known.stage is Stage.TOLD]
@@ -74,7 +74,7 @@ def say_expectation(now: Standing, trial: Trial) -> list[str]:
             f"{name} +- {100 * value:.0f} cm" if unit == "m" else f"{name} +- {value:.2g} {unit}"
             for name, value, unit in zip(form.names, trial.expected_sd, form.units, strict=True)
         )
-        lines.append(f"this trial tells how {moved.distance} carries: expect {sd}")
+        lines.append(f"it teaches how {moved.distance} changes the distance; expect {sd}")
     if told and told[-1].surprise:
         lines.append(f"trial {told[-1].number} was {told[-1].surprise}")
     missed = sum(known.goal_number == trial.goal_number for known in told)
@@ -140,7 +140,13 @@ def next_step(now: Standing) -> str:
             case "import":
                 return call(folder, "import", "RECORDINGS")
             case "learn":
-                return call(folder, "learn")
+                learn, shown = call(folder, "learn"), state.demonstrations
+                if now.manifest.symmetry is None and shown is not None and shown.n == 1:
+                    return (
+                        f"import more, or say in {folder / 'workspace.toml'} under [symmetry] how "
+                        f"this one may be moved (docs/symmetry.md); then: {learn}"
+                    )
+                return learn
             case "goal":
                 return goal_step(now)
             case "reached":
@@ -179,6 +185,6 @@ def execute_step(now: Standing, trial: Trial) -> str:
 def tell_example(manifest: Manifest) -> str:
     """How an error of this task can be told."""
     form = manifest.outcome_format
-    if example := error_example(form):
-        return f'--error "{example}"'
+    if example := error_example(form):  # without numbers, which somebody in a hurry would take
+        return f'--error "{re.sub("[0-9]+", "_", example)}"'
     return "--error " + " ".join(f"D{name.upper()}" for name in form.names)

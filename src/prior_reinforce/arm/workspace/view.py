@@ -22,7 +22,7 @@ from prior_reinforce.files import as_cell
 from prior_reinforce.formats import OutcomeFormat
 from prior_reinforce.session.trials import Goal, Stage, State, Trial
 from prior_reinforce.terminal import plain
-from prior_reinforce.wording import as_html, say_place, say_reading, say_tolerance
+from prior_reinforce.wording import as_html, say_chance, say_place, say_reading, say_tolerance
 
 _TRIALS_SHOWN = 3
 
@@ -79,6 +79,8 @@ class TrialView(View, frozen=True):
     """Why it was voided."""
     p_hit: float | None
     """Probability that it hits, as expected when it was asked for."""
+    chance: str | None
+    """The same in a word, which is what it can be trusted to."""
     expected_trials: float | None
     """Trials until the goal is reached, this one included, likewise."""
     surprise: str | None
@@ -225,6 +227,7 @@ def trial_view(now: Standing, store: Store, trial: Trial) -> TrialView:
         hit=trial.hit if reading is not None else None,
         reason=trial.note or None,
         p_hit=trial.p_hit,
+        chance=None if trial.p_hit is None else say_chance(trial.p_hit),
         expected_trials=trial.expected_trials,
         surprise=trial.surprise or None,
         outdated=trial.outdated,
@@ -322,9 +325,11 @@ def _say_goal(view: StatusView, goal: GoalView) -> str:
     place = say_place(goal.goal, view.outcome_format)
     n, hits = view.demonstrations, goal.reached_after
     if hits is not None:
-        total = f"N = {n} demonstrations + {hits} = {n + hits}"
+        total = f"N = {n} demonstration{'s' * (n > 1)} + {hits} = {n + hits}"
         return f"{place}: reached in {_say_count(hits)} ({total})"
     if goal.number < len(view.goals):
+        if not goal.told:
+            return f"{place}: not tried"
         return f"{place}: not reached in {_say_count(goal.told)}"
     changed = f", new hardware: {goal.new_hardware}" if goal.new_hardware is not None else ""
     carried = ", with earlier goals' trials" if goal.earlier_trials else ""
