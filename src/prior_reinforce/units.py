@@ -68,7 +68,13 @@ UNITS: Mapping[str, Unit] = {
         kind="time", factor=1e-6, plural="microseconds", spellings="µs μs usec microsecond"
     ),
     "ns": Unit(kind="time", factor=1e-9, plural="nanoseconds", spellings="nsec nanosecond"),
-    "percent": Unit(kind="share", factor=0.01, plural="percent", spellings=""),
+    "percent": Unit(
+        kind="share", factor=0.01, plural="percent", spellings="%", largest=100.0
+    ),
+    "share": Unit(kind="share", factor=1.0, plural="shares", spellings="fraction"),
+    "rev": Unit(
+        kind="angle", factor=2 * math.pi, plural="revolutions", spellings="revs turn turns"
+    ),
 }  # fmt: skip
 SPELT = {
     spelling: name
@@ -103,6 +109,8 @@ def base_of(unit: str) -> tuple[str, float]:
 
 def factor(unit: str, wanted: str) -> float | None:
     """Return what to multiply a number with, for another unit; None if that cannot be."""
+    if kind_of(unit) == kind_of(wanted) == "share":
+        return UNITS[unit].factor / UNITS[wanted].factor
     (here, of_one), (there, of_other) = base_of(unit), base_of(wanted)
     return of_one / of_other if here == there else None
 

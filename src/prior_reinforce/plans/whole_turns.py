@@ -27,6 +27,8 @@ _VECTOR = re.compile(r"(?P<stem>.*?)(?P<part>(?<![a-z])r[._]?[xyz]|[._ /]?[xyz])
 _OF_VECTOR = re.compile(r"rot_?vec|axis_?angle", re.IGNORECASE)
 _PATTERNS = ((_QUATERNION, _OF_ATTITUDE, "wxyz"), (_VECTOR, _OF_VECTOR, "xyz"))
 
+_LAST_WORD = re.compile(r"(?P<stem>|.*[^a-z])(?P<word>[a-z]+)")
+
 Frames = TypeVar("Frames", bound=np.ndarray)
 
 
@@ -63,3 +65,28 @@ def other_form(attitude: np.ndarray) -> np.ndarray:
         return -attitude
     angle = np.linalg.norm(attitude, axis=-1, keepdims=True)
     return attitude * (1 - 2 * math.pi / np.maximum(angle, 1e-9)) * (angle > 1e-9)
+
+
+def euler_angles(names: Sequence[str], units: Sequence[str]) -> tuple[tuple[str, str, str], ...]:
+    """Return the groups of angles that are an attitude: roll, pitch and yaw; a robot's A, B, C.
+
+    The second of each is the middle turn, whatever the order in which they are recorded.
+    """
+    found = []
+    for letters in (("roll", "pitch", "yaw"), ("a", "b", "c"), ("rx", "ry", "rz")):
+        groups: dict[str, dict[str, str]] = {}
+        for name, unit in zip(names, units, strict=True):
+            match = _LAST_WORD.fullmatch(name.strip().lower())
+            if unit in TURN and match is not None and match["word"] in letters:
+                groups.setdefault(match["stem"], {})[match["word"]] = name
+        for group in groups.values():
+            if len(group) == 3:
+                first, middle, last = (group[letter] for letter in letters)
+                found.append((first, middle, last))
+    return tuple(found)
+
+
+def other_euler_angles(angles: np.ndarray, turn: float) -> np.ndarray:
+    """Return the other Euler angles (..., 3) of the same attitudes, the middle turn second."""
+    half = turn / 2
+    return np.stack([angles[..., 0] + half, half - angles[..., 1], angles[..., 2] + half], axis=-1)

@@ -174,6 +174,97 @@ def test_rotation_vectors_at_the_cut(tmp_path):
     assert np.ptp(first[:, 3:5], axis=0).max() < 0.01
 
 
+@pytest.mark.parametrize("names", [POSE + tuple(f"pose_{k}" for k in range(4)),
+                                   tuple(f"ee_state_{k}" for k in range(7))])  # fmt: skip
+def test_a_quaternion_is_known_by_its_length_where_names_do_not_say(tmp_path, names):
+    def motion(i, s):
+        return np.column_stack([0.4 + 0.2 * s, 0.3 * s, 0.1 * s, quaternion(i, s) * (-1) ** i])
+
+    result = import_demonstrations(write(tmp_path, names, motion))
+    assert np.ptp(result.demonstrations.plans[:, 0, 3:], axis=0).max() < 0.01
+    assert result.demonstrations.format.attitudes == (tuple(names[3:]),)
+
+
+def test_a_rotation_vector_is_known_by_its_other_form_where_names_do_not_say(tmp_path):
+    def motion(i, s):
+        v = np.column_stack([2.2 + 0.05 * s, 2.2 - 0.05 * s, 0.1 + 0.2 * s])
+        if i in (1, 4):
+            v = v * (1 - TURN / np.linalg.norm(v, axis=1, keepdims=True))
+        return np.column_stack([0.4 + 0.2 * s, 0.1 + 0.03 * i * s, 0.3 + 0 * s, v])
+
+    first, said = starts(write(tmp_path, tuple(f"actual_TCP_pose_{k}" for k in range(6)), motion))
+    np.testing.assert_allclose(first[:, 3:], np.tile([2.2, 2.2, 0.1], (N, 1)), atol=1e-3)
+    assert "the other numbers of the same turn" in said
+
+
+@pytest.mark.parametrize("names", [("yaw [deg]", "pitch [deg]", "roll [deg]"),
+                                   ("A [deg]", "B [deg]", "C [deg]")])  # fmt: skip
+@pytest.mark.parametrize("where", ["between", "within"])
+def test_euler_angles_of_either_form(tmp_path, names, where):
+    def motion(i, s):
+        first, middle, last = 10 + 5 * s, 70 + 35 * s * (1 + 0.02 * i), 20 + 10 * s
+        other = i % 2 if where == "between" else middle > 90
+        first, last = (np.mod(a + 180 * other + 180, 360) - 180 for a in (first, last))
+        return np.column_stack([s, s, s, first, np.where(other, 180 - middle, middle), last])
+
+    result = import_demonstrations(write(tmp_path, (*POSE, *names), motion))
+    plans = np.rad2deg(result.demonstrations.plans[:, :, 3:])
+    np.testing.assert_allclose(plans[:, 0], np.tile([10, 70, 20], (N, 1)), atol=0.1)
+    assert np.abs(np.diff(plans, axis=1)).max() < 5
+
+
+def test_a_frame_that_is_averaged_across_the_cut_is_refused(tmp_path):
+    def motion(i, s):
+        wrapped = np.mod(150 + 60 * s + 180, 360) - 180
+        at = int(np.argmin(np.diff(wrapped)))
+        wrapped[at] = wrapped[at : at + 2].mean() + 20
+        return np.column_stack([s, s, wrapped])
+
+    with pytest.raises(InvalidDemonstrationsError, match=r"yaw steps by .* in one frame"):
+        starts(write(tmp_path, ("a", "b", "yaw [deg]"), motion))
+
+
+@pytest.mark.parametrize(
+    ("names", "units", "scale"),
+    [
+        (("shoulder [rev]", "elbow [rev]"), ("rad", "rad"), TURN),
+        (("q_deg_0", "q_deg_1"), ("rad", "rad"), TURN / 360),
+        (("shoulder [rad]", "pressure [bar]"), ("rad", "bar"), 1),
+        (("x", "y"), ("m", "m"), 1),
+    ],
+)
+def test_units_are_what_names_say(tmp_path, names, units, scale):
+    def motion(i, s):
+        return np.column_stack([0.1 + 0.3 * s, 0.2 + 2.3 * s * (1 + 0.01 * i)])
+
+    made = import_demonstrations(write(tmp_path, names, motion)).demonstrations
+    assert made.format.units == units
+    np.testing.assert_allclose(made.plans[0, [0, -1]] / scale, [[0.1, 0.2], [0.4, 2.5]], atol=0.01)
+
+
+def test_places_and_angles_are_asked_about_each_in_their_unit(tmp_path):
+    def motion(i, s):
+        places = 600 + 200 * s, 100 + 20 * i * s, 400 + 30 * s
+        return np.column_stack([*places, -90 + 30 * s, 10 + 40 * s, 175 + 3 * s])
+
+    with pytest.raises(UnclearUnitsError) as caught:
+        import_demonstrations(write(tmp_path, tuple("XYZABC"), motion))
+    assert caught.value.options == "--units mm mm mm deg deg deg"
+
+
+@pytest.mark.parametrize(("unit", "span", "looks"), [("m", 80, "mm"), ("percent", 0.9, "share")])
+def test_a_grippers_unit_is_asked_about_where_it_is_another(tmp_path, unit, span, looks):
+    folder = write(tmp_path, (*UR, "gripper"), lambda i, s: np.column_stack([ur(i, s), span * s]))
+    plan_units = (*["rad"] * 6, unit)
+    with pytest.raises(UnclearUnitsError) as caught:
+        import_demonstrations(folder, plan_units=plan_units)
+    assert caught.value.options == f"--units {'rad ' * 6}{looks}"
+    units = caught.value.options.removeprefix("--units ").split()
+    made = import_demonstrations(folder, plan_units=plan_units, units=units).demonstrations
+    factor = {"mm": 0.001, "share": 100}[looks]
+    assert made.plans[:, -1, -1] == pytest.approx(span * factor, rel=0.01)
+
+
 def test_a_switch_of_five_is_no_turn(tmp_path):
     def motion(i, s):
         return np.column_stack([s, s, 5.0 * (s > 0.5)])

@@ -9,7 +9,7 @@ import pytest
 
 from prior_reinforce.arm.robots import robot_limits
 from prior_reinforce.arm.robots.urdf import read_urdf
-from prior_reinforce.errors import ConfigurationError, FileFormatError
+from prior_reinforce.errors import ConfigurationError, FileFormatError, UnclearFlangeError
 from prior_reinforce.plans.kinematics import tool_tip
 from tests.arm.robots.arms import UR, limit, ur5e, write_urdf
 
@@ -239,3 +239,35 @@ def test_soft_limits_narrow_a_joints_range(tmp_path):
     arm = read_urdf(path)
     assert (arm.lower[0], arm.upper[0]) == (-1, 2.25)
     assert arm.source.endswith("soft limits too")
+
+
+def named_arm(tmp_path, names, mesh, behind=""):
+    """A chain of joints of these names; the last link's mesh has a name."""
+    links = ["base", *(f"part_{k}" for k in range(1, len(names) + 1))]
+    joint = (
+        '<joint name="{}" type="revolute"><origin xyz="0 0 0.1"/><parent link="{}"/>'
+        '<child link="{}"/><axis xyz="0 0 1"/><limit lower="-1" upper="1" velocity="6"/>{}</joint>'
+    )
+    parts = [joint.format(name, *links[k : k + 2], "") for k, name in enumerate(names)]
+    links += ["jaw_l", "jaw_r"] * bool(behind)
+    if behind:
+        parts.append(joint.format("left_jaw", behind, "jaw_l", ""))
+        parts.append(joint.format("right_jaw", behind, "jaw_r", '<mimic joint="left_jaw"/>'))
+    visual = f'<visual><geometry><mesh filename="package://arm/{mesh}"/></geometry></visual>'
+    shown = [f'<link name="{n}">{visual * (n == f"part_{len(names)}")}</link>' for n in links]
+    path = tmp_path / "arm.urdf"
+    path.write_text(f'<robot name="arm">{"".join(shown)}{"".join(parts)}</robot>')
+    return path
+
+
+def test_a_jaw_is_known_by_its_mesh_where_no_name_tells(tmp_path):
+    names = [f"Revolute {k}" for k in range(1, 7)]
+    with pytest.raises(UnclearFlangeError, match=r"Revolute 6 looks like .* --tip: part_5"):
+        read_urdf(named_arm(tmp_path, names, "moving_jaw_v1.stl"))
+    assert len(read_urdf(named_arm(tmp_path, names, "part.stl")).joint_names) == 6
+
+
+def test_a_joint_that_turns_the_gripper_is_the_arms(tmp_path):
+    names = ["base_rotation", "shoulder", "elbow", "wrist_pitch", "gripper_rotation"]
+    with pytest.raises(UnclearFlangeError, match=r"--tip: part_5, which .* gripper_rotation moves"):
+        read_urdf(named_arm(tmp_path, names, "part.stl", behind="part_5"))

@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,13 @@ from jaxtyping import Float
 
 from prior_reinforce.arm.recordings.bounds import check_names
 from prior_reinforce.arm.recordings.clock import Clock, Times, says_time
-from prior_reinforce.arm.recordings.units import CHANNEL_UNITS, Ambiguity, say_names, split_unit
+from prior_reinforce.arm.recordings.units import (
+    CHANNEL_UNITS,
+    Ambiguity,
+    say_names,
+    split_unit,
+    stated_unit,
+)
 from prior_reinforce.arm.robots.limits import says_no_position
 from prior_reinforce.arrays import Point
 from prior_reinforce.errors import FileFormatError, InvalidDemonstrationsError, PriorReinforceError
@@ -204,11 +211,19 @@ def unread() -> Recording:
 
 
 def without_units(names: Sequence[str]) -> tuple[tuple[str, ...], tuple[str | None, ...]]:
-    """Return names without units, and the units; names that would then coincide all stay."""
-    split = [split_unit(name, CHANNEL_UNITS) for name in names]
-    bare = tuple(name for name, _ in split)
-    units = tuple(unit for _, unit in split)
-    return (bare if len(set(bare)) == len(set(names)) else tuple(names)), units
+    """Return names without units, and the units; names that would then coincide all stay.
+
+    A word in square brackets is a unit though it is not known, `pressure [bar]`, unless it is what
+    tells names apart, as in `q[elbow]`.
+    """
+    for split_one in (stated_unit, partial(split_unit, among=CHANNEL_UNITS)):
+        split = [split_one(name) for name in names]
+        bare = tuple(name for name, _ in split)
+        if len(set(bare)) == len(set(names)):
+            break
+    else:
+        bare = tuple(names)
+    return bare, tuple(unit for _, unit in split)
 
 
 @contextmanager

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import shlex
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -27,6 +27,7 @@ from prior_reinforce.arm.recordings.units import (
     judge_unit,
     known_unit,
     listed,
+    place_names,
     say_names,
 )
 from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
@@ -133,11 +134,12 @@ def select(
         max(np.abs(r.positions[:, c[i]]).max() for r, c in zip(recordings, columns, strict=True))
         for i in range(len(names))
     ]
+    lengths = place_names(names)
     no_angles |= {n for n, m in zip(names, most, strict=True) if is_no_angle(n) and m <= 1}
     wanted = [
         plan_units[i]
         if plan_units is not None
-        else base_of(unit or ("1" if names[i] in no_angles else "rad"))[0]
+        else base_of(unit or _usual_unit(names[i], no_angles, lengths))[0]
         for i, unit in enumerate(said)
     ]
     picked = [_picked(*each, joints) for each in zip(recordings, columns, strict=True)]
@@ -166,13 +168,18 @@ def select(
     )
 
 
+def _usual_unit(name: str, no_angles: Collection[str], lengths: Collection[str]) -> str:
+    """The unit of a channel that states none."""
+    return "1" if name in no_angles else "m" if name in lengths else "rad"
+
+
 def _spread(unit: str, plan_units: Sequence[str] | None, names: Sequence[str]) -> list[str | None]:
-    """One unit for all channels that can be in it, which no gripper is in degrees."""
+    """One unit for all channels that can be in it, which no gripper or place is in degrees."""
     base = base_of(unit)[0]
     fits = [base_of(own)[0] == base for own in plan_units or (base,) * len(names)]
-    fits = fits if any(fits) else [True] * len(fits)
+    fits, lengths = fits if any(fits) else [True] * len(fits), place_names(names)
     return [
-        unit if fit and not (base in TURN and is_no_angle(name)) else None
+        unit if fit and not (base in TURN and (is_no_angle(name) or name in lengths)) else None
         for fit, name in zip(fits, names, strict=True)
     ]
 
@@ -314,11 +321,16 @@ def _judge_units(
     near = max((most[i] for i in angles if i not in far), default=math.inf)
     if far and (2 * len(far) > len(angles) or near > TURN["rad"] or given != "no"):
         far = angles
+    lengths = place_names(names)  # of one recorder, in one unit
+    places = [i for i, unit in enumerate(recorded) if unit == "m" and names[i] in lengths]
     groups: dict[tuple[str, str | None, str], list[int]] = {}
     doubtful, other = dict[tuple[str, str], int](), ""
     single = len(set(recorded)) == 1
     for i, unit in enumerate(recorded):
-        looks, why = judge_unit(unit, most[i]), "which no arm does"
+        number = max(most[j] for j in places) if i in places else most[i]
+        looks, why = judge_unit(unit, number, opening=is_no_angle(names[i])), "which no arm does"
+        if unit == "percent":
+            why = "which is hardly a motion" if looks else "which no share of a range does"
         alone = i in far and len(far) < len(angles) and not fixed
         if (alone or is_no_angle(names[i])) and said[i] is None and unit in TURN and looks != unit:
             why = "by its name" if not alone else f"beside joints in {unit}"

@@ -18,7 +18,13 @@ from prior_reinforce.arm.recordings.units import is_no_angle, listed
 from prior_reinforce.arm.robots.limits import RobotLimits, is_joint, with_turns
 from prior_reinforce.errors import InvalidDemonstrationsError
 from prior_reinforce.plans.plan_format import PlanFormat
-from prior_reinforce.plans.whole_turns import TURN, other_form
+from prior_reinforce.plans.whole_turns import (
+    TURN,
+    euler_angles,
+    other_euler_angles,
+    other_form,
+    whole_circles,
+)
 
 Channel = Float[np.ndarray, " T"]
 """An angle at T frames."""
@@ -29,6 +35,8 @@ _NEXT = 0.3
 frames around it step. Ours: an encoder's noise, and one lost frame at 10 rad/s and 30 Hz."""
 _NORM = 0.05
 """By which the four numbers of a quaternion may miss length 1."""
+_SAME = 1e-3
+"""The same where only that tells that they are one. Ours: recorders write four digits or more."""
 _MOST_TURNS = 3
 
 
@@ -40,10 +48,15 @@ def aligned(selection: Selection, limits: RobotLimits | None) -> tuple[Selection
     """
     form = with_turns(PlanFormat(selection.names, selection.units, 1.0), limits)
     motions = [np.array(recording.positions) for recording in selection.recordings]
-    form = replace(form, attitudes=tuple(_unit_length(form, motions)))
+    named = tuple(_unit_length(form, motions))
+    form = replace(form, attitudes=(*named, *_unnamed_attitudes(form, named, motions)))
     said: list[str] = []
     for group in form.attitudes:
         said += _align_attitude(selection, motions, group)
+    vectors = {name for group in form.attitudes for name in group}
+    for angles in euler_angles(form.names, form.units):
+        if vectors.isdisjoint(angles):
+            said += _align_euler(selection, motions, angles)
     of_attitudes = {name for group in form.attitudes for name in group}
     for i, (name, unit) in enumerate(zip(form.names, form.units, strict=True)):
         if unit in TURN and name not in of_attitudes and not is_no_angle(name):
@@ -63,6 +76,78 @@ def _unit_length(form: PlanFormat, motions: Sequence[np.ndarray]) -> Iterator[tu
         lengths = np.concatenate([np.linalg.norm(m[:, columns], axis=1) for m in motions])
         if len(group) == 3 or np.all(np.abs(lengths - 1) < _NORM):
             yield group
+
+
+def _unnamed_attitudes(
+    form: PlanFormat, named: Sequence[tuple[str, ...]], motions: Sequence[np.ndarray]
+) -> Iterator[tuple[str, ...]]:
+    """Attitudes whose names do not say so, such as `pose_3` to `pose_6`: their numbers do.
+
+    Four numbers whose length is 1 throughout are a quaternion. Three are a rotation vector where
+    some episodes start at one, and others at the same attitude's other form.
+    """
+    taken = {name for group in named for name in group} | set(form.periodic)
+    for size in (4, 3):
+        for first in range(len(form.names) - size + 1):
+            group, columns = form.names[first : first + size], slice(first, first + size)
+            if not taken.isdisjoint(group) or {*form.units[columns]} - {"rad", "1"}:
+                continue
+            own = [motion[:, columns] for motion in motions]
+            starts = np.array([motion[0] for motion in own])
+            if size == 4:
+                every = np.concatenate(own)
+                found = np.ptp(every, axis=0).max() > _NEXT / 10 and np.all(
+                    np.abs(np.linalg.norm(every, axis=1) - 1) < _SAME
+                )
+            else:
+                off = starts - starts[0]
+                near, far, turned = (
+                    np.linalg.norm(each, axis=1)
+                    for each in (
+                        off,
+                        other_form(starts) - starts[0],
+                        off - TURN["rad"] * np.round(off / TURN["rad"]),
+                    )
+                )  # as angles of their own, they would lie apart though turned
+                found = bool(np.any((near > 1) & (far < np.minimum(_NEXT, turned / 2))))
+                found = found and bool(np.all(np.minimum(near, far) < 1))
+            if found:
+                taken |= set(group)
+                yield group
+
+
+def _align_euler(
+    selection: Selection, motions: Sequence[np.ndarray], group: tuple[str, str, str]
+) -> Iterator[str]:
+    """Take the form of Euler angles that is nearest to the frame, and the episode, before."""
+    columns = [selection.names.index(name) for name in group]
+    turn, what = TURN[selection.units[columns[0]]], ", ".join(group)
+    passed, turned = list[str](), list[str]()
+    first: np.ndarray | None = None
+
+    def off(angles: np.ndarray, other: np.ndarray) -> float:
+        step = angles - other
+        return float(np.linalg.norm(step - turn * np.round(step / turn)))
+
+    for episode, motion in zip(selection.episodes, motions, strict=True):
+        kept = motion[:, columns].copy()
+        other = other_euler_angles(kept, turn)
+        for t in range(1, len(kept)):
+            if off(other[t], kept[t - 1]) < off(kept[t], kept[t - 1]) - _NEXT * turn / TURN["rad"]:
+                kept[t:], other[t:] = other[t:].copy(), kept[t:].copy()
+                passed.append(episode)
+        first = kept[0] if first is None else first
+        if off(other[0], first) < off(kept[0], first) - _NEXT * turn / TURN["rad"]:
+            kept, other = other, kept
+            turned.append(episode)
+        motion[:, columns] = kept
+    if passed:
+        yield (
+            f"{listed(list(dict.fromkeys(passed)))}: {what} change to the other angles of the same "
+            "attitude within the motion, and are continued"
+        )
+    if turned:
+        yield f"{listed(turned)}: {what} are taken as the same attitude's other angles"
 
 
 def _align_attitude(
@@ -93,7 +178,8 @@ def _align_attitude(
     if passed:
         yield f"{listed(passed)}: {what} change their sign within the motion, which is one attitude"
     if turned:
-        yield f"{listed(turned)}: {what} have the other sign, and are taken as the same attitude"
+        other = "sign" if len(group) == 4 else "numbers of the same turn"
+        yield f"{listed(turned)}: {what} have the other {other}, and are taken as the same attitude"
 
 
 def _align_angle(
@@ -101,6 +187,7 @@ def _align_angle(
 ) -> Iterator[str]:
     name, turn = selection.names[channel], TURN[selection.units[channel]]
     low, high = _range(name, limits)
+    whole = whole_circles(selection.names, selection.units)
     passed = list[str]()
     for episode, motion in zip(selection.episodes, motions, strict=True):
         unwrapped = _continued(motion[:, channel], turn)
@@ -108,7 +195,7 @@ def _align_angle(
             passed.append(episode)
         motion[:, channel] = unwrapped
         step = np.abs(np.diff(unwrapped))
-        if np.isfinite(low) and step.max() > turn / 2:
+        if (np.isfinite(low) or name in whole) and step.max() > turn / 2:
             raise InvalidDemonstrationsError(
                 f"episode {episode}: {name} steps by {step.max():.3g} {selection.units[channel]} "
                 f"at frame {int(np.argmax(step)) + 1}, which no joint does in one frame; mend that "
@@ -144,8 +231,11 @@ def _continued(values: Channel, turn: float) -> Channel:
     """An angle without whole turns within one frame; a switch that steps further stays."""
     steps = np.diff(values)
     left = steps - turn * np.round(steps / turn)
-    around = np.abs(left[np.maximum(np.arange(len(left)) - 1, 0)])
-    around = np.maximum(around, np.abs(left[np.minimum(np.arange(len(left)) + 1, len(left) - 1)]))
+    at = np.arange(len(left))
+    before, after = at - 1, at + 1
+    before[0], after[-1] = min(1, len(left) - 1), max(len(left) - 2, 0)
+    # The smaller: one bad frame at the cut makes two large steps, which must not excuse each other.
+    around = np.minimum(np.abs(left[before]), np.abs(left[after]))
     wraps = (np.abs(steps) > turn / 2) & (np.abs(left) <= 2 * around + _NEXT * turn / TURN["rad"])
     if not np.any(wraps):
         return values

@@ -11,12 +11,13 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from prior_reinforce.errors import ConfigurationError, UnclearUnitsError
+from prior_reinforce.plans.whole_turns import attitudes
 from prior_reinforce.units import STATED, UNITS, factor, spelt, units_of
 
 SECONDS = units_of("time")
 """Units of time, in [s]."""
-CHANNEL_UNITS = (*units_of("angle"), *units_of("length"))
-"""Units that a channel's name may carry: angles and lengths."""
+CHANNEL_UNITS = (*units_of("angle"), *units_of("length"), "percent")
+"""Units that a channel's name may carry."""
 _UNITS = (*CHANNEL_UNITS, *SECONDS)
 _SLOWEST, _FASTEST = 5.0, 5000.0
 """Frames a second at which arms are recorded. Ours: teleoperation at 10 Hz is the slowest in use,
@@ -24,16 +25,31 @@ libfranka's and RTDE's logs have 1000 and 500."""
 _PLAUSIBLE: Mapping[str, Mapping[str, tuple[float, float]]] = {
     "rad": {unit: (0.0, UNITS[unit].largest) for unit in ("rad", "deg")},
     "m": {unit: (0.0, UNITS[unit].largest) for unit in ("m", "cm", "mm")},
+    "percent": {"percent": (1.0, UNITS["percent"].largest), "share": (0.0, 1.0)},
+    "opening": {"m": (0.0, 0.3), "cm": (0.0, 30.0), "mm": (0.0, UNITS["mm"].largest)},
     "period": {u: (1 / (_FASTEST * scale), 1 / (_SLOWEST * scale)) for u, scale in SECONDS.items()},
 }
 """Units that angles, lengths and periods may be in, the likeliest first, with the least and the
 greatest number: of angles and lengths the largest one, of periods the time between two frames.
-Ours: no joint turns two turns; above 300, millimetres are likelier than an arm of three metres."""
+Ours: no joint turns two turns; above 300, millimetres are likelier than an arm of three metres; no
+gripper opens by 30 cm; one that moves by less than a percent is recorded as a share."""
 _NO_ANGLE = re.compile(
-    r"grip|jaw|finger|width|claw|opening|suction|robotiq|wsg|greifer|pince|夹爪|夹具", re.I
+    r"grip|jaw|finger|width|claw|opening|suction|robotiq|wsg|greifer|pince|夹爪|夹具|vacuum|valve"
+    r"|pressure|force|torque|current|voltage|temperature",
+    re.I,
 )
+_PLACE = re.compile(r"(?P<stem>|.*[^a-z0-9])(?P<axis>[xyz])", re.IGNORECASE)
+_NO_PLACE = re.compile(
+    r"rot|quat|orient|euler|rpy|vel|speed|acc|gyro|ang|force|torque|moment|(^|[^a-z])[rwqv][^a-z]*$",
+    re.IGNORECASE,
+)
+"""What x, y and z are of where they are no place."""
 _BRACKETS = re.compile(r"(?P<name>.+?)\s*[\[(]\s*(?P<unit>[^\[\]()]+?)\s*[\])]")
 _ENDING = re.compile(r"(?P<name>.+?)[_ ](?P<unit>[a-zµμ°]+)")
+_BEFORE_NUMBER = re.compile(r"(?P<name>.+?)_(?P<unit>deg|rad|mm|cm)(?P<number>_?\d+)", re.I)
+"""`q_deg_0`."""
+_UNKNOWN = re.compile(r"(?P<name>.+?)\s*\[\s*(?P<unit>[^\W\d_][^\[\]\s]*|%)\s*\]")
+"""`pressure [bar]`, in a unit that this program does not know."""
 
 
 @dataclass(frozen=True)
@@ -69,22 +85,44 @@ def is_no_angle(name: str) -> bool:
     return _NO_ANGLE.search(name) is not None
 
 
+def place_names(names: Sequence[str]) -> set[str]:
+    """Return the channels that are lengths by their names: x, y and z, or `tool_x` and `tool_y`."""
+    of_attitudes = {name for group in attitudes(names) for name in group}
+    groups: dict[str, dict[str, str]] = {}
+    for name in names:
+        match = _PLACE.fullmatch(name.strip())
+        if match is not None and name not in of_attitudes and not _NO_PLACE.search(match["stem"]):
+            groups.setdefault(match["stem"], {})[match["axis"].lower()] = name
+    return {name for group in groups.values() if len(group) > 1 for name in group.values()}
+
+
 def split_unit(column: str, among: Collection[str] | None = None) -> tuple[str, str | None]:
     """Split a column's name `x_cm`, `q0 [deg]` or `time (ms)` into the name and the unit in it.
 
     `among` are units that may stand there; None takes all, and in square brackets any word at all:
     `volume [ml]`. Without such a unit, the whole name and None.
     """
-    for pattern in (_BRACKETS, _ENDING):
+    for pattern in (_BRACKETS, _ENDING, _BEFORE_NUMBER):
         match = pattern.fullmatch(column.strip())
         unit = match and known_unit(match["unit"])
         if match is None or (pattern is _ENDING and match["unit"] == "in"):
             continue  # `plug_in` is no length
+        if pattern is _BEFORE_NUMBER:
+            return match["name"] + match["number"], unit
         if unit in (among or _UNITS):
             return match["name"].strip(), unit
         if among is None and column.strip().endswith("]"):
             return match["name"].strip(), match["unit"]
     return column, None
+
+
+def stated_unit(channel: str) -> tuple[str, str | None]:
+    """Split a channel's name like `split_unit`; any word in square brackets counts as a unit."""
+    name, unit = split_unit(channel, CHANNEL_UNITS)
+    match = _UNKNOWN.fullmatch(channel.strip())
+    if unit is not None or match is None:
+        return name, unit
+    return match["name"], spelt(match["unit"]) or match["unit"]
 
 
 def conversion(recorded: str, wanted: str, name: str) -> float:
@@ -102,13 +140,19 @@ def conversion(recorded: str, wanted: str, name: str) -> float:
     return scale
 
 
-def judge_unit(unit: str, number: float, *, period: bool = False) -> str | None:
+def judge_unit(
+    unit: str, number: float, *, period: bool = False, opening: bool = False
+) -> str | None:
     """Return the unit that a number looks like: the same if that is plausible, None if none fits.
 
-    The number is the largest absolute angle or length in `rad` or `m` (other units are plausible
-    all), or a `period` between two frames in a unit of time.
+    The number is the largest absolute angle or length in `rad`, `m` or percent (other units are
+    plausible all, and so is 0), a gripper's `opening`, or a `period` between two frames in a unit
+    of time.
     """
-    ranges = _PLAUSIBLE.get("period" if period else unit, {unit: (0.0, float("inf"))})
+    if number == 0 and not period:
+        return unit
+    kind = "period" if period else "opening" if opening and unit == "m" else unit
+    ranges = _PLAUSIBLE.get(kind, {unit: (0.0, float("inf"))})
     fitting = [u for u, (low, high) in ranges.items() if low <= number <= high]
     return unit if unit in fitting else next(iter(fitting), None)
 

@@ -19,6 +19,8 @@ _MOST_NAMED, _MOST_JOINTS = 40, 100
 _TIPS = ("tool0", "flange", "link_eef")
 """Links that are the flange by ROS's conventions (REP 199) and UFACTORY's; the first there is."""
 _JAW = re.compile("grip|jaw|finger|claw|knuckle|thumb|pinch|tong", re.IGNORECASE)
+_JAW_MESH = re.compile("jaw|finger|claw|thumb|pinch", re.IGNORECASE)
+"""Of a mesh's file name, which may be the only one that a CAD program's export leaves telling."""
 _OF_AN_ARM = re.compile("wrist|elbow|shoulder|arm|roll|pitch|yaw|rotat", re.IGNORECASE)
 
 
@@ -47,7 +49,7 @@ def read_urdf(
         ConfigurationError: No such link, or a joint without limits.
         UnclearFlangeError: A gripper's joint may be one of the arm's, or there are several arms.
     """
-    name, joints, links = read_joints(path)
+    name, joints, links, meshes = read_joints(path)
     moving, hold = {joint.child: joint for joint in joints}, dict(hold or {})
     try:
         if unknown := hold.keys() - {joint.name for joint in joints}:
@@ -55,7 +57,7 @@ def read_urdf(
         for link in {tip, base} - {None, *links}:
             few = ", ".join(links[:_MOST_NAMED])
             raise ConfigurationError(f"it has no link {link!r}; it has {few}")
-        tip = _flange(links, moving, base, hold) if tip is None else tip
+        tip = _flange(links, moving, base, hold, meshes) if tip is None else tip
         chain = _path(tip, moving, base)
         if base is not None and (not chain or chain[0].parent != base):
             raise ConfigurationError(f"link {base} is not on the way to {tip}; say another --base")
@@ -98,7 +100,11 @@ def _path(link: str, moving: Mapping[str, Joint], base: str | None = None) -> li
 
 
 def _flange(
-    links: Sequence[str], moving: Mapping[str, Joint], base: str | None, hold: Mapping[str, float]
+    links: Sequence[str],
+    moving: Mapping[str, Joint],
+    base: str | None,
+    hold: Mapping[str, float],
+    meshes: Mapping[str, str],
 ) -> str:
     """The link that `read_urdf` takes for the flange.
 
@@ -117,7 +123,9 @@ def _flange(
         if joint is None or joint.parent not in turns or link == start:
             continue
         free = joint.free and joint.name not in hold
-        jaws += [link] if free and _JAW.search(joint.name) else []
+        called = _JAW.search(joint.name) and not _OF_AN_ARM.search(joint.name)
+        looks = _JAW_MESH.search(meshes.get(link, ""))
+        jaws += [link] if free and (called or looks) else []
         of_jaw[link] = of_jaw[joint.parent] or link in jaws[-1:]
         turns[link] = turns[joint.parent] + (free and not of_jaw[link])
         ends += [link] if free and not of_jaw[link] else []

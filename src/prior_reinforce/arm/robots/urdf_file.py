@@ -56,8 +56,8 @@ the market; a lost decimal point is mostly more."""
 _XACRO = "make a URDF of its xacro: xacro arm.urdf.xacro > arm.urdf"
 
 
-def read_joints(path: Path) -> tuple[str, list[Joint], list[str]]:
-    """Read the robot's name, every joint, and every link from the root outwards.
+def read_joints(path: Path) -> tuple[str, list[Joint], list[str], dict[str, str]]:
+    """Read the robot's name, joints, links from the root outwards, and names of links' meshes.
 
     Raises:
         FileFormatError: It is no URDF, or its links do not all hang from one root.
@@ -71,7 +71,8 @@ def read_joints(path: Path) -> tuple[str, list[Joint], list[str]]:
             raise ValueError(f"it has more than {_LARGEST_FILE / 1e6:g} MB, as no URDF has")
         root = ElementTree.parse(path, ElementTree.XMLParser(target=_Builder())).getroot()
         joints = _joints_of(root)
-        return root.get("name") or path.stem, joints, _links_of(root, joints)
+        links = _links_of(root, joints)
+        return root.get("name") or path.stem, joints, links, _meshes_of(root, joints)
     except (ElementTree.ParseError, OSError, ValueError, LookupError) as error:
         problem = str(error)[:_LONGEST_PROBLEM]
         raise FileFormatError(
@@ -251,6 +252,17 @@ def _joints_of(robot: ElementTree.Element) -> list[Joint]:
     if not found:
         raise ValueError("it has no joint, and so is no arm")
     return list(found.values())
+
+
+def _meshes_of(robot: ElementTree.Element, joints: list[Joint]) -> dict[str, str]:
+    """File names of the meshes of each link; the files are not read."""
+    space = joints[0].namespace
+    return {
+        _name(link): " ".join(
+            mesh.get("filename", "").rpartition("/")[2] for mesh in link.iter(f"{space}mesh")
+        )
+        for link in robot.findall(f"{space}link")
+    }
 
 
 def _links_of(robot: ElementTree.Element, joints: list[Joint]) -> list[str]:
