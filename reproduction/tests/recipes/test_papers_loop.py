@@ -10,6 +10,8 @@ from reproduction.evaluation import LearnedGenerator, Training
 from reproduction.recipes import Scale
 from reproduction.recipes.papers_loop import (
     FORMS,
+    GATE,
+    KNOWN,
     OWN_SIZE,
     RECIPE,
     SMALL,
@@ -73,19 +75,19 @@ def test_a_perceived_goal_is_beside_the_goal_and_hits_count_at_the_goal(
         np.testing.assert_allclose(of.trials[0].reading.error_seen, of.errors[0])
 
 
-def test_a_row_a_condition_and_method():
-    told = {"learned_on": "t", "task": "t", "set": "A", "seed": 0, "rounds": 10}
+def test_a_row_a_form_and_what_is_known_before_the_gate_in_words():
+    told = {"learned_on": "t", "set": "A", "seed": 0, "rounds": 10}
     rows = [
-        *({**told, "condition": "V1, by eye", "method": "loop", "goal": j, "solved_at": 2,
-           "failed_readings": 0} for j in range(3)),
-        *({**told, "condition": "gate", "method": "raw", "goal": j, "solved_at": 1, "rounds": 1,
-           "passed": j % 2} for j in range(4)),
-        *({**told, "condition": "own", "method": "raw", "quantity": "own_rms_rad", "value": v}
-          for v in (0.001, 0.003)),
+        *({**told, "task": task, "method": "loop", "goal": j, "solved_at": at, "failed_readings": 0}
+          for task, at in (("basketball-v1", 2), ("basketball-v2", 4)) for j in range(3)),
+        *({**told, "task": "basketball-v1", "condition": GATE, "method": "raw", "goal": j,
+           "solved_at": 1, "rounds": 1, "passed": j % 2} for j in range(4)),
+        *({**told, "task": "basketball-v1", "condition": KNOWN, "method": "raw",
+           "quantity": "own_rms_rad", "value": v} for v in (0.001, 0.003)),
     ]  # fmt: skip
-    table = RECIPE.table(Results(pd.DataFrame(rows), {}))
-    cells = {row[:2]: dict(zip(table.header, row, strict=True)) for row in table.rows}
-    assert cells["V1, by eye", "loop"]["trials"].startswith("2.00")
-    assert cells["gate", "raw"]["plans that pass"].startswith("0.50")
-    assert cells["gate", "raw"]["trials"] == ""
-    assert cells["own", "raw"]["off its demonstrations [mrad]"] == "2.0"
+    results = Results(pd.DataFrame(rows), {})
+    (row,) = RECIPE.table(results).rows
+    assert [cell.split()[0] for cell in row[:3]] == ["loop", "2.00", "4.00"]
+    known, gate = RECIPE.remarks(results)
+    assert known.endswith("raw 2.0 mrad.")
+    assert gate.endswith("raw 0.50 and 1.00.")
