@@ -252,7 +252,7 @@ class Ask(OnWorkspace):
         aims = f"trial {trial.number}: aims at {say_place(trial.condition, outcome)}"
         beside = to_words(trial.condition - goal, outcome) if in_words(outcome) else ""
         if beside and beside != to_words(0.0 * goal, outcome):
-            aims += f", {beside} of the goal, so that it lands there"
+            aims += f" ({beside} of the goal, so that it lands there)"
         print(aims)
         for line in (*say_expectation(workspace.standing, trial), *say_outdated(state)):
             print(line)
