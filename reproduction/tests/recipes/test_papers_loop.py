@@ -21,7 +21,10 @@ from reproduction.recipes.papers_loop import (
 )
 from reproduction.results import Results
 
-TINY = "diffusion-paper,network.widths=8:16,network.groups=4,training_steps=3"
+TINY = (
+    "diffusion-paper,network.widths=8:16,network.groups=4,training_steps=3,noise_levels=4,"
+    "sampling_steps=4"
+)
 
 
 def test_one_training_a_set_and_form_with_the_own_size_alone_on_the_gpu():
