@@ -125,25 +125,28 @@ def _align_euler(
     passed, turned = list[str](), list[str]()
     first: np.ndarray | None = None
 
-    def off(angles: np.ndarray, other: np.ndarray) -> float:
+    margin = _NEXT * turn / TURN["rad"]
+
+    def off(angles: np.ndarray, other: np.ndarray) -> np.ndarray:
         step = angles - other
-        return float(np.linalg.norm(step - turn * np.round(step / turn)))
+        return np.linalg.norm(step - turn * np.round(step / turn), axis=-1)
 
     for episode, motion in zip(selection.episodes, motions, strict=True):
-        kept = motion[:, columns].copy()
-        other = other_euler_angles(kept, turn)
-        for t in range(1, len(kept)):
-            if off(other[t], kept[t - 1]) < off(kept[t], kept[t - 1]) - _NEXT * turn / TURN["rad"]:
-                kept[t:], other[t:] = other[t:].copy(), kept[t:].copy()
-                passed.append(episode)
-        first = kept[0] if first is None else first
-        if off(other[0], first) < off(kept[0], first) - _NEXT * turn / TURN["rad"]:
-            kept, other = other, kept
+        own = motion[:, columns]
+        other = other_euler_angles(own, turn)
+        # Steps between others are those between own, so what counts is where the form changes.
+        changes = off(other[1:], own[:-1]) < off(own[1:], own[:-1]) - margin
+        if np.any(changes):
+            passed.append(episode)
+        is_other = np.cumsum(np.concatenate([[False], changes])) % 2 == 1
+        first = own[0] if first is None else first
+        if off(other[0], first) < off(own[0], first) - margin:
+            is_other = ~is_other
             turned.append(episode)
-        motion[:, columns] = kept
+        motion[:, columns] = np.where(is_other[:, None], other, own)
     if passed:
         yield (
-            f"{listed(list(dict.fromkeys(passed)))}: {what} change to the other angles of the same "
+            f"{listed(passed)}: {what} change to the other angles of the same "
             "attitude within the motion, and are continued"
         )
     if turned:
