@@ -115,6 +115,11 @@ class Table:
             return None
         return np.array([time - found[0] for time in found], dtype=np.int64)  # type: ignore[operator]
 
+    def stamps(self, column: int) -> Column:
+        """Return a column as times: dates in [ns] from the first on, else its numbers."""
+        dates = self.nanoseconds(column)
+        return self.values[:, column] if dates is None else dates.astype(float)
+
 
 def read_table(
     path: Path, delimiter: str | None = None, decimal: str | None = None, head: Collection[str] = ()
