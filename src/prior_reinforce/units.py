@@ -63,11 +63,19 @@ UNITS: Mapping[str, Unit] = {
     "s": Unit(
         kind="time", factor=1.0, plural="seconds", spellings="sec secs second", spoken="ms"
     ),
-    "ms": Unit(kind="time", factor=1e-3, plural="milliseconds", spellings="msec millisecond"),
-    "us": Unit(
-        kind="time", factor=1e-6, plural="microseconds", spellings="µs μs usec microsecond"
+    "ms": Unit(
+        kind="time", factor=1e-3, plural="milliseconds",
+        spellings="msec msecs millisec millisecs millisecond",
     ),
-    "ns": Unit(kind="time", factor=1e-9, plural="nanoseconds", spellings="nsec nanosecond"),
+    "us": Unit(
+        kind="time", factor=1e-6, plural="microseconds",
+        spellings="µs μs usec usecs microsec microsecs microsecond",
+    ),
+    "ns": Unit(
+        kind="time", factor=1e-9, plural="nanoseconds",
+        spellings="nsec nsecs nanosec nanosecs nanosecond",
+    ),
+    "day": Unit(kind="time", factor=86400.0, plural="days", spellings=""),
     "percent": Unit(
         kind="share", factor=0.01, plural="percent", spellings="%", largest=100.0
     ),

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from prior_reinforce.arm.recordings.clock import clock_of
+from prior_reinforce.arm.recordings.clock import clock_of, declared_rate, skips_frames
 from prior_reinforce.errors import (
     ConfigurationError,
     FileFormatError,
@@ -59,7 +59,7 @@ def test_plausible_seconds_are_taken_as_they_are(rate):
 
 
 def test_times_that_fit_no_unit_say_so():
-    (doubt,) = clock_of("a", 9, stamps=np.arange(9) * 1e-7, name="t").ambiguities
+    (doubt,) = clock_of("a", 9, stamps=np.arange(9) * 1e-10, name="t").ambiguities
     assert "no other unit fits better" in doubt.what
 
 
@@ -96,6 +96,68 @@ def test_a_rate_that_disagrees_with_the_times_is_refused_and_one_that_agrees_is_
     assert clock_of("a", 5, stamps=stamps, name="t", rate=101.0).period == pytest.approx(0.01)
     with pytest.raises(ConfigurationError, match=r"--rate 1000, but t in s says 100 Hz; drop"):
         clock_of("a", 5, stamps=stamps, name="t", rate=1000.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "number", "likely"),
+    [("dt", 20, "50 or 20"), ("dt", 50, "20 or 50"), ("rate", 0.02, "50 or 20"),
+     ("dt", 2e-5, "5e+04")],
+)  # fmt: skip
+def test_a_declared_rate_at_which_no_arm_is_recorded_is_a_doubt(name, number, likely):
+    (doubt,) = clock_of("a", 100, **declared_rate("a", {name: number})).ambiguities
+    assert doubt.what.endswith(f"it looks like {likely}")
+    assert doubt.option == f"--rate {float(likely.split()[0]):g}"
+    assert clock_of("a", 100, **declared_rate("a", {name: number}), rate=50).ambiguities == ()
+
+
+@pytest.mark.parametrize(
+    ("said", "rate"),
+    [({"fps": 50}, 50), ({"dt_ms": 20, "Frame Rate": 50}, 50), ({"control_freq": 20}, 20),
+     ({"sampling_frequency": 125, "mass": 3}, 125), ({"time_step": 0.02}, 50), ({"hz": 30}, 30)],
+)  # fmt: skip
+def test_rates_that_files_declare(said, rate):
+    found = declared_rate("a", said)
+    assert found == {"own_rate": pytest.approx(rate), "rate_name": next(iter(said))}
+
+
+def test_declared_rates_that_contradict_each_other_or_are_none():
+    with pytest.raises(FileFormatError, match="dt says 50 frames a second, but fps 30; take one"):
+        declared_rate("a", {"dt": 0.02, "fps": 30})
+    assert declared_rate("a", {"mass": 3.0, "generate": 1, "update": 2}) == {}
+
+
+@pytest.mark.parametrize(("name", "unit"), [("t_ms", None), ("t", "ms")])
+def test_a_unit_of_the_file_that_makes_no_recording_is_a_doubt(name, unit):
+    stamps = np.arange(200) / 100
+    (doubt,) = clock_of("a", 200, stamps=stamps, name=name, unit=unit).ambiguities
+    by = "format" if unit else "name"
+    assert f"{name} in ms, as its {by} says, would be 1e+05 Hz and 0.00199 s long" in doubt.what
+    assert doubt.option == "--time-unit s"
+    for said, period in (("s", 0.01), ("ms", 1e-5)):
+        clock = clock_of("a", 200, stamps=stamps, name=name, unit=unit, time_unit=said)
+        assert (clock.ambiguities, clock.period) == ((), pytest.approx(period))
+
+
+def test_serial_dates_are_in_days():
+    stamps = 45987.5 + np.arange(200) / 100 / 86400
+    for said in (None, "s"):
+        (doubt,) = clock_of("a", 200, stamps=stamps, name="time", time_unit=said).ambiguities
+        assert doubt.option == "--time-unit day"
+    clock = clock_of("a", 200, stamps=stamps, name="time", time_unit="day")
+    np.testing.assert_allclose(clock.times, np.arange(200) / 100, atol=1e-6)
+
+
+def test_a_rate_settles_the_unit_of_times():
+    stamps = np.arange(200) * 10.0
+    clock = clock_of("a", 200, stamps=stamps, name="t", rate=100)
+    assert (clock.ambiguities, clock.source) == ((), "t in ms")
+
+
+def test_counters_that_skip():
+    assert skips_frames(np.array([7.0, 8, 9, 21, 22]))
+    assert skips_frames(np.array([2.0, 4, 6, 12, 14]))
+    for other in ([1.0, 2, 3, 4], [1, 1, 2, 9], [0.5, 1.5, 2.5, 9.5], [1, 5, 7, 8, 20]):
+        assert not skips_frames(np.array(other))
 
 
 def test_what_has_no_use_is_refused():

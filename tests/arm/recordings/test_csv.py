@@ -258,6 +258,54 @@ def test_the_column_of_times_may_be_named_or_left_unread(tmp_path):
     np.testing.assert_allclose(recording.times, [0, 0.02, 0.04])
 
 
+def recorded_at_50(path, head, first, rows=100):
+    """A table of two joints, and a first column that is made of the times in [s]."""
+    t = np.arange(rows) / 50
+    joints = np.column_stack([np.sin(t), np.cos(t)])
+    np.savetxt(
+        path / "a.csv", np.column_stack([first(t), joints]), "%.9f", ",",
+        header=f"{head},a,b", comments="",
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("head", ["tid [s]", "tid", "chrono_s"])
+@pytest.mark.parametrize("late", [0.0, 0.004])
+def test_whatever_tells_the_time_is_held_against_the_rate(tmp_path, head, late):
+    recorded_at_50(tmp_path, head, lambda t: t + late * np.sin(40 * t))
+    with pytest.raises(ConfigurationError, match=r"--rate 100, but tid|chrono.* says .* Hz; drop"):
+        read_recordings(tmp_path, rate=100)
+    (recording,) = read_recordings(tmp_path, rate=50)
+    assert recording.names == ("a", "b")
+    np.testing.assert_allclose(recording.times, np.arange(100) / 50, atol=0.005)
+
+
+@pytest.mark.parametrize("head", ["frame", "nr", ""])
+def test_a_counter_that_skips_says_where_frames_are_missing(tmp_path, head):
+    recorded_at_50(tmp_path, head, lambda t: np.round(t * 50) + 12 * (t > 0.99))
+    (recording,) = read_recordings(tmp_path, rate=50)
+    assert recording.names == ("a", "b")
+    assert np.diff(recording.times).max() == pytest.approx(13 / 50)
+
+
+def test_times_that_go_on_where_a_counter_skips_are_refused(tmp_path):
+    recorded_at_50(
+        tmp_path, "t,frame", lambda t: np.column_stack([t, np.round(t * 50) + 12 * (t > 0.99)])
+    )
+    with pytest.raises(FileFormatError, match=r"t and frame part by 0.24 s, most at frame 50"):
+        read_recordings(tmp_path)
+    assert read_recordings(tmp_path, time_column="t")[0].period == pytest.approx(0.02)
+
+
+@pytest.mark.parametrize(("names", "part"), [("tv_sec,tv_usec", 1e6), ("secs,msecs", 1e3)])
+def test_seconds_and_their_parts_are_one_time(tmp_path, names, part):
+    recorded_at_50(
+        tmp_path, names,
+        lambda t: np.column_stack([np.floor(t + 7.31), np.round((t + 7.31) % 1 * part)]),
+    )  # fmt: skip
+    (recording,) = read_recordings(tmp_path)
+    np.testing.assert_allclose(recording.times, np.arange(100) / 50, atol=1e-9)
+
+
 def test_joints_by_the_gates_names_and_a_refusal_that_is_short(tmp_path):
     names = [f"panda_joint{i}" for i in range(1, 8)]
     t, q = sampled(0, 100)

@@ -2,12 +2,16 @@
 
 from dataclasses import replace
 from itertools import combinations
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from prior_reinforce.arm.recordings.fit import slips
+from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.simulation.tasks import make_task
+
+DRAWN = Path(__file__).parents[3] / "reproduction/src/reproduction/demonstrations/drawn"
 
 
 def named(n):
@@ -34,6 +38,58 @@ def test_two_rows_that_were_exchanged_are_doubted_and_no_others():
 def test_sets_that_are_right_are_not_doubted(task, which):
     shown = make_task(task).demonstrations(which)
     assert slips(shown, named(shown.n)) == []
+
+
+@pytest.mark.parametrize("game", ["basketball", "curling", "fishing"])
+def test_sets_that_were_drawn_are_not_doubted(game):
+    paths = sorted(DRAWN.glob(f"{game}_v*.npz"))
+    assert len(paths) >= 20
+    sets = [Demonstrations.load(path) for path in paths]
+    assert [slip for shown in sets for slip in slips(shown, named(shown.n))] == []
+
+
+def plain(parts):
+    """Motions of two parts, each of which moves one component of the outcome."""
+    shown = make_task("curling").demonstrations("A")
+    ways = np.arange(1.0, 15.0).reshape(2, 7) / 10
+    plans = np.linspace(0, 1, shown.plans.shape[1])[:, None] * (parts @ ways)[:, None, :]
+    nothing = np.zeros(parts.shape)
+    return replace(
+        shown, plans=plans, outcomes_seen=(0.9, 0.0) + parts * (0.1, 0.2),
+        outcome_noise=nothing, outcome_correction=nothing,
+    )  # fmt: skip
+
+
+def text_order(n):
+    return sorted(range(n), key=lambda i: named(n)[i])
+
+
+@pytest.mark.filterwarnings("ignore:an outcome of")
+@pytest.mark.parametrize(
+    ("wrong", "says"),
+    [
+        (lambda seen: seen[np.argsort(text_order(len(seen)))], "names in the order 1, 10, 11, 2"),
+        (lambda seen: seen[text_order(len(seen))], "may stand in the order 1, 10, 11, 2"),
+        (lambda seen: seen[::-1], "all outcomes may stand in reverse"),
+        (lambda seen: np.abs(seen), "all of y may have lost their signs"),
+        (lambda seen: seen * (1, -1) * np.sign(seen), "all of y may have lost their signs"),
+    ],
+)
+def test_slips_of_all_rows_are_named(wrong, says):
+    shown = plain(np.random.default_rng(0).uniform(-1, 1, (12, 2)))
+    assert slips(shown, named(12)) == []
+    outcomes = wrong(shown.outcomes_seen)
+    (slip,) = slips(replace(shown, outcomes_seen=outcomes), named(shown.n))
+    assert says in slip.what
+    assert slip.rows == tuple(range(shown.n))
+
+
+def test_an_exchange_among_six_is_doubted_where_it_is_plain():
+    shown = plain(np.array([(-1, -1), (-1, 1), (0, -0.5), (0.2, 0.6), (1, -1), (0.9, 0.9)]))
+    assert slips(shown, named(6)) == []
+    wrong = shown.outcomes_seen[[0, 1, 2, 4, 3, 5]]
+    (slip,) = slips(replace(shown, outcomes_seen=wrong), named(6))
+    assert slip.what == "throw_3 and throw_4 may have each other's outcome"
 
 
 @pytest.mark.filterwarnings("ignore:an outcome of")

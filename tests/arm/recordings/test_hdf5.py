@@ -125,6 +125,16 @@ def test_a_link_within_the_file_is_followed(tmp_path):
     np.testing.assert_array_equal(read_recordings(path)[0].positions, expected)
 
 
+@pytest.mark.parametrize("place", ["/", "data/demo_0", KEY])
+def test_a_rate_in_the_attributes_is_read(tmp_path, place):
+    path = write_robomimic(tmp_path, rate=None)
+    with h5py.File(path, "a") as file:
+        file[place].attrs["fps"] = 25
+        file[place].attrs["note"] = "slow"
+        assert KEY.startswith("data/demo_0")
+    assert read_recordings(path, episodes=["demo_0"])[0].period == pytest.approx(0.04)
+
+
 def test_a_header_that_claims_too_much_is_not_read(tmp_path):
     path = write_robomimic(tmp_path)
     with h5py.File(path, "a") as file:

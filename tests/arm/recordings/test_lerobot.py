@@ -1,9 +1,13 @@
 """LeRobot data sets in the layouts of both versions."""
 
+import json
+
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as parquet
 import pytest
 
-from prior_reinforce.arm.recordings import import_demonstrations
+from prior_reinforce.arm.recordings import import_demonstrations, read_recordings
 from prior_reinforce.errors import FileFormatError
 from tests.arm.recordings.recorded import (
     AS_IS,
@@ -56,6 +60,28 @@ def test_lerobot_whose_recorder_was_not_finalized(tmp_path):
     path.write_bytes(path.read_bytes()[:-5000])  # its footer was never written
     with pytest.raises(FileFormatError, match=r"file-000\.parquet .* called finalize\(\)"):
         import_demonstrations(folder, joints=JOINTS)
+
+
+def test_other_times_of_lerobot_are_held_against_the_rate(tmp_path):
+    folder = write_lerobot(tmp_path / "set", version="v2.1")
+    info = folder / "meta" / "info.json"
+    said = json.loads(info.read_text())
+    said["features"]["observation.timestamp"] = {"dtype": "float64", "shape": [1], "names": None}
+    info.write_text(json.dumps(said))
+    for path in folder.glob("data/**/*.parquet"):
+        table = parquet.read_table(path)
+        taken = pa.array(1.7e9 + table["frame_index"].to_numpy() / 50)  # written at 100 a second
+        parquet.write_table(table.append_column("observation.timestamp", taken), path)
+    with pytest.raises(
+        FileFormatError, match=r"timestamp says 100 frames .* observation.timestamp"
+    ):
+        read_recordings(folder)
+    recording = read_recordings(folder, time_column="observation.timestamp")[0]
+    assert recording.period == pytest.approx(0.02)
+    assert read_recordings(folder, time_column="timestamp")[0].period == pytest.approx(0.01)
+    assert read_recordings(folder, rate=50)[0].period == pytest.approx(0.02)
+    with pytest.raises(FileFormatError, match=r"observation\.timestamp steps by 0\.02"):
+        read_recordings(folder, rate=20)
 
 
 @pytest.mark.parametrize("table", [True, False])

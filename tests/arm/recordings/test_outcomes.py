@@ -330,6 +330,52 @@ def test_a_thousand_that_may_be_one_and_a_half_is_doubted(tmp_path, rows, doubte
         read_outcomes(path)
 
 
+@pytest.mark.parametrize(
+    ("head", "rows", "doubted"),
+    [
+        ("x [mm];y [mm]", "1;1.012;90\n2;1.234;-83\n", True),
+        ("x [ml];y", "1;1.012;9\n2;1.234;8\n", True),
+        ("x [mm];y [mm]", "1;1.012;90.5\n2;1.234;-83\n", False),
+        ("x [mm];y [mm]", "1;1,012;90\n2;1,234;-83\n", False),
+        ("x [m];y [m]", "1;1.012;1.090\n2;1.234;1.083\n", False),
+        ("x;y", "1;1.012;2\n2;1.234;1\n", False),
+    ],
+)
+def test_a_point_before_three_digits_between_semicolons_is_doubted(tmp_path, head, rows, doubted):
+    path = table(tmp_path, f"episode;{head}\n{rows}")
+    if not doubted:
+        assert abs(read_outcomes(path).values).max() < 100
+        return
+    with pytest.raises(FileFormatError, match=r"line 2: x \[m[ml]\] is '1.012' beside '; between"):
+        read_outcomes(path)
+
+
+@pytest.mark.parametrize("head", ["x,y", "x [m],y [m]"])
+@pytest.mark.parametrize("unit", [None, "cm"])
+def test_a_row_in_another_unit_is_named(recording, tmp_path, head, unit):
+    rows = [f"{name},{x},{y}" for name, (x, y) in OUTCOMES.items()]
+    rows[3] = "3," + ",".join(f"{100 * number:g}" for number in OUTCOMES["3"])
+    path = table(tmp_path, "\n".join([f"episode,{head}", *rows]))
+    if unit and "[" in head:
+        return
+    with pytest.raises(InvalidDemonstrationsError, match="3 is in another unit than the others"):
+        import_demonstrations(recording, outcomes=path, outcome_unit=unit, take_guesses=True)
+
+
+def test_a_spread_as_large_as_the_outcomes_lie_apart_is_doubted(recording, tmp_path):
+    rows = [f"{name},{x},{y},0.5" for name, (x, y) in OUTCOMES.items()]
+    path = table(tmp_path, "\n".join(["episode,x,y,sd", *rows]))
+    said = r"sd in .* is up to 0.5 m, and all outcomes are within 0.25 m .*: sd \[cm\], or sd \[m\]"
+    with pytest.raises(InvalidDemonstrationsError, match=said):
+        import_demonstrations(recording, outcomes=path)
+    for unit, noise in (("cm", 0.005), ("m", 0.5)):
+        head = f"episode,x,y,sd [{unit}]"
+        found = import_demonstrations(
+            recording, outcomes=table(tmp_path, "\n".join([head, *rows]))
+        ).demonstrations
+        np.testing.assert_allclose(found.outcome_noise, noise)
+
+
 def test_a_column_may_end_in_inches_where_the_task_has_that_name(tmp_path):
     (tmp_path / "outcomes.csv").write_text("episode,distance_in,plug_in\n0,10,1\n1,12,2\n")
     found = read_outcomes(tmp_path / "outcomes.csv", ["distance"])

@@ -90,6 +90,31 @@ def test_a_dialect_may_be_said(tmp_path):
         np.testing.assert_array_equal(numbers(table), [[1.5, 2], [3, 4]])
 
 
+@pytest.mark.parametrize("said", [{}, {"decimal": ","}, {"decimal": ",", "delimiter": "comma"}])
+def test_decimal_commas_in_quotes_between_commas(tmp_path, said):
+    path = tmp_path / "a.csv"
+    path.write_text('name,a,b\nx,"0,5","-1,25"\n"y, z","3",2\n')
+    table = one(path, **said)
+    assert (table.names, table.decimal) == (("name", "a", "b"), ",")
+    assert table.cells[0] == ["x", "y, z"]
+    np.testing.assert_array_equal(table.values[:, 1:], [[0.5, -1.25], [3, 2]])
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("e,x,y\n0,0,84,0,05\n", "line 2: 5 cells under 3 names.*semicolons between cells"),
+        ('"t","a"\n"1",0,2\n"2",1,3\n', r"line 2: 3 cells under 2 names.*of R, .*col\.names = NA"),
+        ("t,a\n0,2\n1,3,,4\n", "line 3: 4 cells under 2 names"),
+    ],
+)
+def test_cells_under_no_name_are_refused(tmp_path, text, says):
+    path = tmp_path / "a.csv"
+    path.write_text(text)
+    with pytest.raises(FileFormatError, match=says):
+        one(path)
+
+
 def test_points_between_thousands_are_no_numbers(tmp_path):
     path = tmp_path / "a.csv"
     path.write_text("a;b\n1,5;1.234,5\n2,5;3,5\n")

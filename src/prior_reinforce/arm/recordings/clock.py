@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Shaped
@@ -35,6 +36,13 @@ _APART = 3.0
 """Frames by which two clocks of one recording may differ. Ours: jitter is a frame or two."""
 _LOWEST_RATE, _HIGHEST_RATE = 1e-3, 1e6
 """Declared frames a second beyond which a file is damaged. Ours."""
+_SLOWEST, _FASTEST = 1.0, 1e4
+"""And beyond which a rate or a unit is doubted although the file or a person says it. Ours."""
+_RATE = re.compile(
+    r"((control|sampl[a-z]*|frame|record[a-z]*)[ _]?)?(fps|fs|hz|rate|freq(uency)?)([ _]?hz)?"
+)
+_PERIOD = re.compile(r"((control|sampl[a-z]*|frame)[ _]?)?(dt|period|time[ _]?step|delta[ _]?t)")
+"""What files call their frames a second, and the time from one to the next."""
 
 
 def says_time(name: str) -> bool:
@@ -43,10 +51,54 @@ def says_time(name: str) -> bool:
     return _SAYS_TIME.search(spaced) is not None
 
 
-def rises(values: Times) -> bool:
+def rises(values: Stamps) -> bool:
     """Whether a column rises steadily, as times and counters do and no joint does."""
-    steps = np.diff(values)
+    steps = np.diff(values.astype(float))
     return bool(len(steps) > 1 and np.all(steps > 0) and steps.max() < 10 * np.median(steps))
+
+
+def tells_time(name: str, values: Stamps) -> bool:
+    """Whether a column rises steadily, and its name or the unit in it says that it is a time."""
+    return (says_time(name) or split_unit(name, SECONDS)[1] is not None) and rises(values)
+
+
+def skips_frames(values: Stamps) -> bool:
+    """Whether a column counts frames, of which some are missing: 7, 8, 9, 21, 22."""
+    steps = np.diff(values.astype(float))
+    if len(steps) < 2 or steps.min() <= 0 or np.any(values % 1):
+        return False
+    return bool(np.median(steps) == steps.min() < steps.max())
+
+
+def declared_rate(
+    where: object, said: Mapping[str, Any], given: float | None = None
+) -> dict[str, Any]:
+    """Return the rate that a file declares, if any, as `clock_of` takes it.
+
+    `said` are its numbers by name, for instance `fps` 50 or `dt_ms` 20. FileFormatError if two
+    contradict each other, and no rate is given.
+    """
+    found: dict[str, float] = {}
+    for name, value in said.items():
+        bare, unit = split_unit(name, SECONDS)
+        is_period = _PERIOD.fullmatch(bare.lower()) is not None
+        if not (is_period or _RATE.fullmatch(name.lower())):
+            continue
+        if np.size(value) != 1 or np.asarray(value).dtype.kind not in "fiu":
+            raise FileFormatError(
+                f"{where}: {name} is no number; expected times t, or dt, or rate: mend it, or "
+                "leave it unread with --time-column none"
+            )
+        number = float(value) * SECONDS[unit or "s"]
+        found[name] = 1 / number if is_period and number else number
+    for name, rate in found.items():
+        first, of_first = next(iter(found.items()))
+        if given is None and not _same(rate, of_first):
+            raise FileFormatError(
+                f"{where}: {first} says {of_first:.4g} frames a second, but {name} {rate:.4g}; "
+                "take one: --rate"
+            )
+    return dict(zip(("rate_name", "own_rate"), next(iter(found.items()), ()), strict=False))
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,13 +173,14 @@ def clock_of(
             "one time a frame"
         )
     known = unit or split_unit(name, SECONDS)[1]
-    if known is not None and time_unit not in (None, known):
-        raise ConfigurationError(f"{name} is in {known}, but --time-unit says {time_unit}; drop it")
-    chosen, ambiguities = time_unit or known, tuple[Ambiguity, ...]()
-    if chosen == FRAME:
-        if rate is None:
-            raise ConfigurationError(f"{name} counts frames, so the rate is wanted: add --rate")
-        return Clock(numbers / rate, f"{name}, frames at {rate:g} Hz")
+    if FRAME in (time_unit, known):
+        frames = rate or own_rate
+        if frames is None or time_unit not in (None, FRAME):
+            raise ConfigurationError(
+                f"{name} counts frames, so the rate is wanted: add --rate, and no other --time-unit"
+            )
+        step = np.diff(numbers).min(initial=np.inf) if unit == FRAME else 1.0
+        return Clock(numbers / step / frames, f"{name}, frames at {frames:g} Hz")
     if not np.all(np.isfinite(numbers)):
         return Clock(numbers, name)  # the recording names the frame
     # From the first on, since nanoseconds since 1970 are 0.2 us coarse as floats.
@@ -138,8 +191,21 @@ def clock_of(
             f"episode {episode}: {name} steps by {period:g} a frame, which is no time in any unit; "
             "mend it, or leave the times unread with --time-column none"
         )
-    if chosen is None or time_unit is not None:
-        chosen, ambiguities = _judge(name, period, float(elapsed[-1]) if count else 0.0, chosen)
+    length = float(elapsed[-1]) if count else 0.0
+    by = "its name says" if unit is None else "its format says"
+    chosen, ambiguities = _judge(name, period, length, known, by)
+    if time_unit is not None and time_unit == known:
+        chosen, ambiguities = known, ()  # said twice
+    elif time_unit is not None:
+        if known is not None and not ambiguities:
+            raise ConfigurationError(
+                f"{name} is in {known}, but --time-unit says {time_unit}; drop it"
+            )
+        chosen, ambiguities = _judge(name, period, length, time_unit, "--time-unit says")
+    elif known is None and period > 0 and (at := rate or own_rate):
+        # A rate that agrees in one unit settles it.
+        agrees = [u for u, scale in SECONDS.items() if _same(at, 1 / (period * scale))]
+        chosen, ambiguities = (agrees[0], ()) if agrees else (chosen, ambiguities)
     seconds = period * SECONDS[chosen]
     if rate is not None and not (period > 0 and _same(rate, 1 / seconds)):
         found = f"{1 / seconds:.4g} Hz" if period > 0 else "no rate"
@@ -167,6 +233,8 @@ def hold_together(where: str, clocks: Mapping[str, Times]) -> None:
         steps = np.diff(stamps)
         own = float(np.median(steps))
         scales = [scale for scale in SECONDS.values() if period > 0 and _same(own * scale, period)]
+        if not scales and skips_frames(stamps):
+            scales = [period / own]
         if own <= 0 or (not scales and np.all(steps == 1)):
             continue  # it counts frames, or is no clock
         if not scales:
@@ -191,19 +259,33 @@ def _even(episode: str, count: int, name: str, own_rate: float | None, rate: flo
             f"episode {episode} holds neither times nor a rate; give the rate in frames a second: "
             "--rate"
         )
+    ambiguities = tuple[Ambiguity, ...]()
     if rate is None:
-        source = f"{name} in the file"
+        source, ambiguities = f"{name} in the file", _doubt_rate(name, chosen, count)
     elif own_rate is not None and not _same(rate, own_rate):
         source = f"the given rate ({name} in the file says {own_rate:g} Hz)"
-    return Clock(np.arange(count) / chosen, source)
+    return Clock(np.arange(count) / chosen, source, ambiguities)
+
+
+def _doubt_rate(name: str, rate: float, count: int) -> tuple[Ambiguity, ...]:
+    """Doubt a declared rate at which no arm is recorded: `dt` 20 is in milliseconds, or a rate."""
+    if _SLOWEST <= rate <= _FASTEST:
+        return ()
+    in_units = [rate / SECONDS[unit] for unit in SECONDS]
+    others = [1 / rate, *in_units] if _RATE.fullmatch(name.lower()) else [*in_units, 1 / rate]
+    likely = [other for other in others if _SLOWEST <= other <= _FASTEST] or [rate]
+    what = f"{name} in the file says {rate:.4g} frames a second, {count / rate:.4g} s in all"
+    what += ": it looks like " + " or ".join(f"{other:.4g}" for other in likely)
+    return (Ambiguity(what, f"--rate {likely[0]:.6g}"),)
 
 
 def _judge(
-    name: str, period: float, length: float, said: str | None
+    name: str, period: float, length: float, said: str | None, by: str
 ) -> tuple[str, tuple[Ambiguity, ...]]:
     """Infer the unit of a column of times, and say if it is ambiguous.
 
-    `period` (between two frames) and `length` are in that unit; `said` is what the user gave.
+    `period` (between two frames) and `length` are in that unit; `said` is what a person, the name
+    or the format gives, and `by` which of them: `its name says`.
     """
 
     def rate_in(unit: str) -> str:
@@ -215,10 +297,11 @@ def _judge(
     if looks == unit or period <= 0:
         return unit, ()
     is_throw = looks is not None and _SHORTEST <= length * SECONDS[looks] <= LONGEST
-    if said is not None and not is_throw:
+    plausible = _SLOWEST <= 1 / (period * SECONDS[unit]) <= _FASTEST
+    if said is not None and (plausible or not is_throw):
         return said, ()  # believed, unless another unit makes it the length of a throw
-    by = ", as --time-unit says," if said is not None else ""
-    what = f"{name} in {unit}{by} would be {rate_in(unit)}, "
+    as_said = f", as {by}," if said is not None else ""
+    what = f"{name} in {unit}{as_said} would be {rate_in(unit)}, "
     if looks is None:
         return "s", (Ambiguity(f"{what}and no other unit fits better", "--time-unit s"),)
     what += f"in {looks} {rate_in(looks)}: it looks like {looks}"

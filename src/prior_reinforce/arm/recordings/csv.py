@@ -15,7 +15,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from prior_reinforce.arm.recordings.clock import Clock, hold_together, rises, says_time
+from prior_reinforce.arm.recordings.clock import (
+    FRAME,
+    Clock,
+    hold_together,
+    rises,
+    says_time,
+    skips_frames,
+    tells_time,
+)
 from prior_reinforce.arm.recordings.naming import could_be_forgotten, find_channels, vectors
 from prior_reinforce.arm.recordings.options import ReadOptions
 from prior_reinforce.arm.recordings.recording import (
@@ -32,7 +40,13 @@ from prior_reinforce.arm.recordings.recording import (
     without_units,
 )
 from prior_reinforce.arm.recordings.tables import Table, counts, read_table
-from prior_reinforce.arm.recordings.units import SECONDS, Ambiguity, say_names, split_unit
+from prior_reinforce.arm.recordings.units import (
+    SECONDS,
+    Ambiguity,
+    known_unit,
+    say_names,
+    split_unit,
+)
 from prior_reinforce.errors import ConfigurationError, FileFormatError
 
 SUFFIXES = (".csv", ".tsv")
@@ -217,10 +231,12 @@ class _Times(NamedTuple):
     """Which columns are the time."""
 
     columns: tuple[int, ...] = ()
-    """None, one, or seconds and nanoseconds."""
+    """None, one, or whole seconds and a part of a second."""
     guessed: tuple[Ambiguity, ...] = ()
     held: tuple[int, ...] = ()
     """Columns that must agree with it."""
+    unit: str | None = None
+    """Unit of the last column, where it is known by other columns or by its numbers."""
 
 
 def _time_columns(table: Table, options: ReadOptions, others: Sequence[int | None]) -> _Times:
@@ -229,21 +245,27 @@ def _time_columns(table: Table, options: ReadOptions, others: Sequence[int | Non
         return _Times()
     if options.time_column is not None:
         return _Times((_named_column(table, options.time_column, "--time-column"),))
-    if (pair := _seconds_and_nanoseconds(table)) is not None:
-        return _Times(pair)
+    if (pair := _seconds_and_parts(table)) is not None:
+        return pair
     names = [split_unit(name, SECONDS)[0] if table.named else "" for name in table.names]
-    rising = [i for i in range(len(names)) if i not in others and _rises(table, i)]
-    known = [i for i, name in enumerate(names) if name.lower() in _TIMES and i not in others]
-    called = [i for i in rising if says_time(table.names[i])] if table.named else []
+    free = [i for i in range(len(names)) if i not in others]
+    rising = [i for i in free if rises(table.stamps(i))]
+    skipping = [i for i in free if skips_frames(table.values[:, i])]
+    known = [i for i in free if names[i].lower() in _TIMES]
+    called = [i for i in free if table.named and tells_time(table.names[i], table.stamps(i))]
     if known or called:
         time = [*known, *called][0]
-        held = [i for i in range(len(names)) if i not in (time, *others) and table.is_number(i)]
-        held = [i for i in held if says_time(table.names[i]) and counts(table.values[:, i])]
-        return _Times((time,), (), tuple(held))
+        held = [i for i in free if says_time(table.names[i]) and counts(table.values[:, i])]
+        return _Times((time,), (), tuple({*held, *skipping} - {time}))
     nameless = [i for i in rising if table.named and _has_no_name(table, i)]
     if nameless and table.nanoseconds(nameless[0]) is not None:
         return _Times((nameless[0],))
-    if rising and len(names) > 1 and options.rate is None:
+    if options.rate is not None:
+        # Whatever else rises is held against the rate; what counts rows says nothing of it.
+        long = len(table) >= _FEWEST_COUNTS
+        rising = [i for i in rising if long and np.any(np.diff(table.stamps(i)) != 1)]
+        return _Times((*skipping, *rising)[:1], unit=FRAME if skipping else None)
+    if rising and len(names) > 1:
         first = rising[0]
         shown = table.names[first] if table.named and table.names[first] else f"{first + 1}"
         column = f"column {first + 1}" if shown.isdigit() else shown
@@ -252,18 +274,18 @@ def _time_columns(table: Table, options: ReadOptions, others: Sequence[int | Non
     return _Times()
 
 
-def _seconds_and_nanoseconds(table: Table) -> tuple[int, int] | None:
-    """Two columns that are one time, as ROS writes it: `stamp.sec` and `stamp.nanosec`."""
+def _seconds_and_parts(table: Table) -> _Times | None:
+    """Two columns that are one time: `stamp.sec` and `stamp.nanosec`, or `tv_sec` and `tv_usec`."""
     ends = {name.lower(): i for i, name in enumerate(table.names) if table.named}
     for name, i in ends.items():
         if (match := _SECONDS.fullmatch(name)) is None:
             continue
-        for ending in ("nanosec", "nanosecs", "nsec", "nsecs", "nanoseconds", "ns"):
-            j = ends.get(match["stem"] + ending)
-            if j is not None and table.is_number(i) and table.is_number(j):
-                whole, part = table.values[:, i], table.values[:, j]
-                if np.all(whole % 1 == 0) and np.all((part >= 0) & (part < 1e9)):
-                    return i, j
+        for ending, j in ends.items():
+            unit = known_unit(ending.removeprefix(match["stem"])) or ""
+            if ending.startswith(match["stem"]) and SECONDS.get(unit, 1.0) < 1:
+                whole, part = table.values[:, i], table.values[:, j] * SECONDS[unit]
+                if np.all(whole % 1 == 0) and np.all((part >= 0) & (part < 1)):
+                    return _Times((i, j), unit=unit)
     return None
 
 
@@ -276,17 +298,10 @@ def _counts(table: Table, column: int) -> bool:
     """Whether a column rises by one step all along, which no joint does."""
     values = table.values[:, column]
     if _has_no_name(table, column):
-        return _rises(table, column)
+        return rises(table.stamps(column))
     steps = np.diff(values)
     long = len(values) >= _FEWEST_COUNTS and table.is_number(column)
     return long and bool(np.all(steps > 0) and steps.max() < 1.5 * np.median(steps))
-
-
-def _rises(table: Table, column: int) -> bool:
-    stamps = table.nanoseconds(column)
-    if stamps is None and not table.is_number(column):
-        return False
-    return rises(table.values[:, column] if stamps is None else stamps.astype(float))
 
 
 def _clock(
@@ -296,10 +311,11 @@ def _clock(
         return options.clock(episode, len(table))
     time = times.columns[0]
     dates, name = table.nanoseconds(time), table.names[time] or f"column {time + 1}"
+    unit = times.unit or unit
     stamps, unit = (dates, "ns") if dates is not None else (table.numbers(time), unit)
-    if len(times.columns) == 2:
+    if unit and len(times.columns) == 2:
         whole, part = (table.values[:, i] for i in times.columns)
-        stamps, unit = (whole - whole[0]) * 1e9 + part, "ns"
+        stamps = (whole - whole[0]) / SECONDS[unit] + part
         name = f"{name} and {table.names[times.columns[1]]}"
     unit = unit or table.units[time]
     clock = options.clock(episode, len(table), stamps=stamps, name=name, unit=unit)

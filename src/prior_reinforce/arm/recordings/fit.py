@@ -1,8 +1,9 @@
 """Whether each outcome fits its motion: slips in a table of outcomes, found by the other rows.
 
 Outcomes are predicted from the main directions in which plans differ, each from the others. A slip
-of the pen (two rows exchanged, rows shifted by one, a lost sign, a decimal point) is doubted where
-putting it right makes these predictions far better. Ours; linear, and so blind to small slips.
+of the pen (two rows exchanged, rows shifted by one or in another order, lost signs, a decimal
+point) is doubted where putting it right makes these predictions far better. Ours; linear, and so
+blind to small slips.
 """
 
 from __future__ import annotations
@@ -25,11 +26,15 @@ _FAR_BETTER, _TELLING, _DOUBTFUL = 2.8, 0.6, 0.5
 """By how much, below which error put right, above which error as they stand, in spreads. Ours."""
 _SHIFT_BETTER, _SIGN_BETTER, _POINT_BETTER = 4.0, 5.0, 5.0
 """The first for the other slips, of which more are tried."""
+_ORDER_BETTER, _SIGNS_BETTER, _FEWEST_BETTER = 2.5, 6.0, 6.0
+"""For all rows in another order, all signs of a component, and exchanges among `_FEWEST`."""
 _CERTAIN, _FAR = 0.0, 4.0
 """A number so many times as far out as the others reach widens the spread in which errors are
 counted: there errors in the outcomes' unit are to be `_FAR_BETTER` times smaller. Ours."""
 _FACTORS = (0.1, 10.0, 0.01, 100.0)
 """By which a wrong decimal point, or centimetres for metres, is put right."""
+_TURNS = 24
+"""Lines through the plane of two directions of plans that are tried to tell signs."""
 _BEYOND = 1.3
 """Half ranges of the others beyond which a number with a wrong decimal point lies. Ours."""
 
@@ -51,13 +56,16 @@ def slips(demonstrations: Demonstrations, episodes: tuple[str, ...]) -> list[Sli
     outcomes, n = demonstrations.outcomes_seen, demonstrations.n
     if not _FEWEST <= n <= _MOST:
         return []
-    hats = _hats(demonstrations)
+    directions = _directions(demonstrations)
+    hats = _hats(directions, outcomes.shape[1])
     if not hats:
         return []
     now = _error(hats, outcomes)
     found = []
-    for rows, what, other, least in _candidates(demonstrations, episodes):
+    for rows, what, other, least in _candidates(demonstrations, episodes, directions):
         columns = np.any(other != outcomes, axis=0)
+        if not columns.any():
+            continue  # that order is this one
         before, after = float(np.max(now[columns])), float(np.max(_error(hats, other)[columns]))
         better = before / max(after, 1e-12)
         told = better > least and after < _TELLING and before > _DOUBTFUL
@@ -69,16 +77,20 @@ def slips(demonstrations: Demonstrations, episodes: tuple[str, ...]) -> list[Sli
     return sorted(found, key=lambda slip: -slip.better)[:1]
 
 
-def _hats(demonstrations: Demonstrations) -> list[np.ndarray]:
-    """Matrices that predict outcomes from plans, of a few directions of them."""
-    n, k = demonstrations.outcomes_seen.shape
+def _directions(demonstrations: Demonstrations) -> Float[np.ndarray, "N D"]:
+    """Where each plan lies along the directions in which plans differ, the main one first."""
     plans = demonstrations.plans - demonstrations.plans.mean(axis=0)
     spread = demonstrations.plans.std(axis=(0, 1))
-    flat = (plans / np.where(spread > 0, spread, 1.0)).reshape(n, -1)
+    flat = (plans / np.where(spread > 0, spread, 1.0)).reshape(demonstrations.n, -1)
     left, sizes, _ = np.linalg.svd(flat, full_matrices=False)
-    hats = []
-    for directions in (k, k + 1):
-        columns = np.column_stack([np.ones(n), (left * sizes)[:, :directions]])
+    return left * sizes
+
+
+def _hats(directions: Float[np.ndarray, "N D"], k: int) -> list[np.ndarray]:
+    """Matrices that predict k components of outcomes from the first directions of plans."""
+    n, hats = len(directions), []
+    for count in (k, k + 1):
+        columns = np.column_stack([np.ones(n), directions[:, :count]])
         if n >= columns.shape[1] + 3:
             hats.append(columns @ np.linalg.pinv(columns))
     return hats
@@ -95,24 +107,49 @@ def _error(hats: list[np.ndarray], outcomes: Points) -> Float[np.ndarray, " k"]:
     return np.min([np.sqrt(np.mean(error**2, axis=0)) for error in each], axis=0)
 
 
+def _sides(directions: Float[np.ndarray, "N D"]) -> Iterator[Float[np.ndarray, " N"]]:
+    """Signs of plans on both sides of a line in the plane of their two main directions."""
+    for turn in np.linspace(0, np.pi, _TURNS, endpoint=False):
+        along = directions[:, :2] @ np.array([np.cos(turn), np.sin(turn)])
+        for at in np.sort(along)[1:]:
+            yield np.where(along < at, -1.0, 1.0)
+
+
 def _candidates(
-    demonstrations: Demonstrations, episodes: tuple[str, ...]
+    demonstrations: Demonstrations,
+    episodes: tuple[str, ...],
+    directions: Float[np.ndarray, "N D"],
 ) -> Iterator[tuple[tuple[int, ...], str, Points, float]]:
     """Rows, what slip it is, the outcomes without it, and how much better they must be."""
     outcomes, n = demonstrations.outcomes_seen, demonstrations.n
     names = demonstrations.outcome_format.names
-    if n > _FEWEST:
-        for i, j in combinations(range(n), 2):
+    every = tuple(range(n))
+    for i, j in combinations(every, 2):
+        other = outcomes.copy()
+        other[[i, j]] = other[[j, i]]
+        what = f"{episodes[i]} and {episodes[j]} may have each other's outcome"
+        yield (i, j), what, other, _FAR_BETTER if n > _FEWEST else _FEWEST_BETTER
+    as_text = sorted(every, key=lambda i: episodes[i])
+    for order, where in (
+        (as_text, "beside names in the order 1, 10, 11, 2"),
+        (np.argsort(as_text), "in the order 1, 10, 11, 2"),
+        (every[::-1], "in reverse"),
+    ):
+        yield every, f"all outcomes may stand {where}", outcomes[list(order)], _ORDER_BETTER
+    for c, name in enumerate(names):
+        sizes = np.abs(outcomes[:, c])
+        if n == _FEWEST or np.ptp(np.sign(outcomes[:, c])) > 1 or 2 * min(sizes) > max(sizes):
+            continue  # it has signs, or is a distance that is never near 0
+        for signs in _sides(directions):
             other = outcomes.copy()
-            other[[i, j]] = other[[j, i]]
-            what = f"{episodes[i]} and {episodes[j]} may have each other's outcome"
-            yield (i, j), what, other, _FAR_BETTER
+            other[:, c] *= signs
+            yield every, f"all of {name} may have lost their signs", other, _SIGNS_BETTER
     for start, by in [(s, b) for s in range(n - 3) for b in (1, -1)]:
         other = outcomes.copy()
         other[start:] = np.roll(outcomes[start:], by, axis=0)
         where = "high" if by > 0 else "low"
         what = f"outcomes from {episodes[start]} on may stand one row too {where}"
-        yield tuple(range(start, n)), what, other, _SHIFT_BETTER
+        yield every[start:], what, other, _SHIFT_BETTER
     for i in range(n):
         for c, name in enumerate(names):
             if not outcomes[i, c]:

@@ -54,16 +54,16 @@ def read(source: Path, options: ReadOptions) -> Episodes:
             data = _own(path, file, "data")
             top = data if isinstance(data, h5py.Group) else file
             made_by = json.loads(top.attrs.get("env_args", "{}"))
-            rate = made_by.get("env_kwargs", {}).get("control_freq")
+            said = dict(file.attrs) | dict(top.attrs) | made_by.get("env_kwargs", {})
             episodes = [name for name in top if top is not file or _EPISODE.fullmatch(name)]
             for within in sorted(episodes, key=natural_order) or [""]:
                 of_file = [path.stem] if len(paths) > 1 or not within else []
                 name = "-".join(filter(None, [*of_file, within]))
-                yield name, partial(_demo, path, top, within, rate, options, name)
+                yield name, partial(_demo, path, top, within, said, options, name)
 
 
 def _demo(
-    path: Path, top: Any, within: str, rate: float | None, options: ReadOptions, episode: str
+    path: Path, top: Any, within: str, said: dict[str, Any], options: ReadOptions, episode: str
 ) -> Recording:
     with named_damage(path, "HDF5"):
         group = _own(path, top, within)
@@ -74,14 +74,16 @@ def _demo(
         positions, names = joined(keys, arrays)
         there = _narrow(path, group, positions.shape) | arrays
         declared = int(group.attrs.get("num_samples", len(positions)))
-        rate = float(rate) if rate else None
+        said = said | dict(group.attrs) | dict(_own(path, group, key).attrs)
+        said = {
+            n: v for n, v in said.items() if np.size(v) == 1 and np.asarray(v).dtype.kind in "fiu"
+        }
     if declared != len(positions):
         raise FileFormatError(
             f"{path}: {episode} declares {declared} samples but {key} holds {len(positions)}; "
             "copy the file again, or leave that episode out"
         )
-    own = {"rate_name": "control_freq", "own_rate": rate}
-    clock = options.clock_among(path, episode, len(positions), there, **own)
+    clock = options.clock_among(path, episode, len(positions), there, said)
     return recorded(episode, clock, positions, names, left_out=moves_beside(keys, there))
 
 

@@ -19,7 +19,7 @@ import numpy as np
 from jaxtyping import Shaped
 
 from prior_reinforce.arm.recordings.bounds import check_bytes, check_numbers
-from prior_reinforce.arm.recordings.clock import Clock, Times
+from prior_reinforce.arm.recordings.clock import Clock, Times, hold_together, tells_time
 from prior_reinforce.arm.recordings.options import ReadOptions
 from prior_reinforce.arm.recordings.recording import (
     NO_COLUMN,
@@ -75,7 +75,9 @@ def read(source: Path, options: ReadOptions) -> Episodes:
             )
         positions, names = joined(keys, arrays, _names(features[key], arrays[key].shape[1]))
         beside = moves_beside(keys, arrays)
-        clock = _clock(str(number), index, stamps, rate, options)
+        clocks = {_STAMPS: stamps} if stamps is not None else {}
+        clocks |= {n: a.ravel() for n, a in arrays.items() if a.size == len(a) and n not in keys}
+        clock = _clock(source, str(number), index, clocks, rate, options)
         return recorded(str(number), clock, positions, names, remarks=remarks, left_out=beside)
 
     for number in sorted(lengths.keys() | frames.keys()):
@@ -83,25 +85,31 @@ def read(source: Path, options: ReadOptions) -> Episodes:
 
 
 def _clock(
-    episode: str, index: FrameNumbers, stamps: Times | None, rate: float, options: ReadOptions
+    source: Path,
+    episode: str,
+    index: FrameNumbers,
+    clocks: dict[str, Times],
+    rate: float,
+    options: ReadOptions,
 ) -> Clock:
     """Times by the frames' own numbers, since some may be missing, if their stamps agree with it.
 
     LeRobot writes number / fps as `timestamp`; converters and other recorders write when a frame
-    was taken, which counts where the rate is right and frames came late.
+    was taken, which counts where the rate is right and frames came late. What else tells the time
+    is held against it.
     """
-    if stamps is not None and options.time_column != NO_COLUMN and len(index) > 1:
-        # With a rate from the command line, stamps are asked for by name only.
-        asked = options.time_column == _STAMPS
-        own = None if asked else rate
-        even = np.abs(stamps - stamps[0] - (index - index[0]) / rate).max() <= _LATE / rate
-        if asked or (not even and options.rate is None):
-            return options.clock(
-                episode, len(index), stamps=stamps, name=_STAMPS, unit="s", own_rate=own,
-                rate_name="fps of meta/info.json",
-            )  # fmt: skip
+    asked = options.time_column not in (None, NO_COLUMN)
+    stamps = clocks.get(_STAMPS, index / rate)
+    late = np.abs(stamps - stamps[0] - (index - index[0]) / rate).max() > _LATE / rate
+    # With a rate from the command line, stamps are asked for by name only.
+    if asked or (late and options.rate is None and options.time_column is None):
+        return options.clock_among(source, episode, len(index), clocks, {"fps": rate})
     clock = options.clock(episode, len(index), rate_name="fps", own_rate=rate)
-    return replace(clock, times=index * clock.period)
+    clock = replace(clock, times=index * clock.period)
+    others = {n: a for n, a in clocks.items() if n != _STAMPS and tells_time(n, a)}
+    if options.time_column is None and others:
+        hold_together(f"{source}: {episode}", {_STAMPS: clock.times} | others)
+    return clock
 
 
 def _widths(features: dict[str, Any]) -> dict[str, int]:

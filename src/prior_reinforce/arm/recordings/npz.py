@@ -11,7 +11,6 @@ import json
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -99,8 +98,8 @@ def _episodes(path: Path, arrays: Arrays, name: str, options: ReadOptions) -> Ep
             for name, array in arrays.items()
             if array.ndim > several and array.dtype.kind in "fiu"
         }
-        rate = {} if options.time_column == NO_COLUMN else _rate(path, arrays)
-        clock = options.clock_among(path, episodes[index], motions.shape[1], there, **rate)
+        declared = {} if options.time_column == NO_COLUMN else arrays
+        clock = options.clock_among(path, episodes[index], motions.shape[1], there, declared)
         with_names = names if len(names) == motions.shape[2] or len(keys) == 1 else ()
         positions, said = joined(keys, there, with_names)
         beside = moves_beside((*keys, *_OUTCOME_KEYS), there)
@@ -127,12 +126,3 @@ def _arrays(path: Path) -> Arrays:
             content.setdefault("dt", np.array(float(form["dt"])))
             content.setdefault("names", np.array(form.get("names") or form.get("joint_names")))
         return content
-
-
-def _rate(path: Path, arrays: Arrays) -> dict[str, Any]:
-    """The rate that a file declares, if any, as `clock_of` takes it."""
-    said = next((n for n in ("dt", "rate") if n in arrays), "")
-    with named_damage(path, "NPZ with times t, or dt, or rate"):
-        number = float(arrays[said]) if said else 0.0
-    own = (1 / number if said == "dt" and number else number) if said else None
-    return {"own_rate": own, "rate_name": said}

@@ -12,12 +12,14 @@ import numpy as np
 import tyro
 
 from prior_reinforce.arm.recordings.clock import (
+    FRAME,
     TIME_UNITS,
     Clock,
     clock_of,
+    declared_rate,
     hold_together,
-    rises,
-    says_time,
+    skips_frames,
+    tells_time,
 )
 from prior_reinforce.arm.recordings.recording import NO_COLUMN
 from prior_reinforce.arm.recordings.tables import DELIMITERS
@@ -44,7 +46,7 @@ class ReadOptions:
     it again for what is stored beside it, such as a gripper's opening."""
     rate: float | None = None
     """Frames per second, for a source without times; if it has times, they must agree."""
-    time_unit: Literal["s", "ms", "us", "ns", "frame"] | None = None
+    time_unit: Literal["s", "ms", "us", "ns", "day", "frame"] | None = None
     """Unit of the recorded times, if their name does not give it (`t_ms`); `frame` for a column
     that counts frames."""
     time_column: str | None = None
@@ -110,26 +112,37 @@ class ReadOptions:
         return clock_of(episode, count, rate=self.rate, time_unit=self.time_unit, **of_file)
 
     def clock_among(
-        self, where: Path, episode: str, count: int, arrays: Mapping[str, np.ndarray], **own: Any
+        self,
+        where: Path,
+        episode: str,
+        count: int,
+        arrays: Mapping[str, np.ndarray],
+        said: Mapping[str, Any] | None = None,
     ) -> Clock:
         """Return times from the arrays of an episode that say they are, held against each other.
 
-        An array that is asked for by name counts more than a rate of the file's own.
+        `said` are further numbers of the file, a rate perhaps among them. An array that is asked
+        for by name counts more.
         """
+        own = declared_rate(where, said or {}, self.rate)
         there = {name: a.ravel() if a.size == count else a for name, a in arrays.items()}
         fit = [name for name, array in there.items() if array.shape == (count,)]
         times = [n for n in there if split_unit(n, SECONDS)[0] in TIMES]
-        times += [n for n in fit if n not in times and says_time(n) and rises(there[n])]
+        times += [n for n in fit if n not in times and tells_time(n, there[n])]
         if self.time_column is not None:
             if self.time_column not in (*there, NO_COLUMN):
                 raise FileFormatError(
                     f"{where} has no array {self.time_column}; it holds {sorted(arrays)}: name one"
                 )
             times, own = [n for n in there if n == self.time_column], own if not times else {}
+        others = [] if self.time_column else [n for n in fit if skips_frames(there[n])]
+        if not times and others and (own or self.rate is not None):
+            own |= {"stamps": there[others[0]], "name": others[0], "unit": FRAME}
         if not times:
             return self.clock(episode, count, **own)
-        clock = self.clock(episode, count, stamps=there[times[0]], name=times[0], **own)
+        first, *others = dict.fromkeys([*times, *others])
+        clock = self.clock(episode, count, stamps=there[first], name=first, **own)
         if count > 1:
-            others = {name: there[name].astype(float) for name in times[1:] if name in fit}
-            hold_together(f"{where}: {episode}", {times[0]: clock.times} | others)
+            held = {name: there[name].astype(float) for name in others if name in fit}
+            hold_together(f"{where}: {episode}", {first: clock.times} | held)
         return clock

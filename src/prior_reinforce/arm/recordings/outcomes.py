@@ -41,6 +41,9 @@ SD = "sd"
 """Column of the standard deviation of a row's components."""
 _HUNDREDS = re.compile(r"[+-]?[1-9]\d\d+")
 _THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}([.,]\d{3})+")
+_FAR, _FEW = 10.0, 3
+"""Times as far as all others that an outcome is in another unit, and outcomes of which it is not
+yet known how far they lie apart. Ours."""
 SOURCE = "source"
 _NOT_COMPONENTS = (SD, SOURCE, "note", "notes", "comment", "comments")
 
@@ -62,7 +65,7 @@ class Outcomes:
     units: tuple[str | None, ...]
     """Unit of each component; None if the source names none."""
     sd_unit: str | None = None
-    """Unit of `sd`; None for that of the first component."""
+    """Unit of `sd`; None for that of the first component, if the source names none."""
     named: bool = True
     """Whether the source names the components."""
     sources: tuple[str, ...] = ()
@@ -164,8 +167,8 @@ def read_outcomes(path: Path, names: Sequence[str] | None = None) -> Outcomes:
             f"{path} begins with {','.join(table.names)!r:.200}, expected column names such as "
             f"{example}"
         )
-    _doubt_thousands(path, table, columns)
     units = [table.units[i] or split[i][1] for i in columns]
+    _doubt_thousands(path, table, dict(zip(columns, units, strict=True)))
     scale = [base_of(unit)[1] if unit else 1.0 for unit in units]
     sd, source = (lower.index(name) if name in lower else None for name in (SD, SOURCE))
     cells = table.cells
@@ -181,26 +184,34 @@ def read_outcomes(path: Path, names: Sequence[str] | None = None) -> Outcomes:
         sources += [] if source is None else [cells[source][row]]
         places += ([_finite(path, table, row, i) * s for i, s in zip(columns, scale, strict=True)],)
         sds.append(0.0 if sd is None or not cells[sd][row] else _finite(path, table, row, sd))
-    sd_unit = None if sd is None else table.units[sd] or split[sd][1] or (units or [None])[0]
+    sd_unit = None if sd is None else table.units[sd] or split[sd][1]
+    sds = sds if sd_unit else [scale[0] * each for each in sds]
     bare = tuple(base_of(unit)[0] if unit else None for unit in units)
     values = np.array(places).reshape(len(rows), len(kept))
     found = Outcomes(str(path), (*rows,), values, np.array(sds), (*kept,), bare, sd_unit)
     return replace(found, sources=tuple(sources))
 
 
-def _doubt_thousands(path: Path, table: Table, columns: Sequence[int]) -> None:
+def _doubt_thousands(path: Path, table: Table, columns: Mapping[int, str | None]) -> None:
     """Refuse `1.488` beside `-302`: is that one and a half, or one and a half thousand?
 
-    FileFormatError if every number with a decimal sign may be a whole one of four digits or more.
+    FileFormatError if every number with a decimal sign may be a whole one of four digits or more,
+    beside whole hundreds, or with a point where semicolons say that commas are decimal signs.
+    `columns` have units that are stated, or None.
     """
     cells = [(table.cells[i][row], row, i) for i in columns for row in range(len(table))]
     signed = [each for each in cells if table.decimal in each[0]]
-    whole = [cell for cell, _, _ in cells if _HUNDREDS.fullmatch(cell)]
-    if signed and whole and all(_THOUSANDS.fullmatch(cell) for cell, _, _ in signed):
+    beside = [cell for cell, _, _ in cells if _HUNDREDS.fullmatch(cell)]
+    if table.delimiter == ";" and table.decimal == ".":
+        # Without a unit, 1.488 is in metres, and 1488 would be found to be in millimetres.
+        for i, (base, scale) in ((i, base_of(unit)) for i, unit in columns.items() if unit):
+            most = float(np.nanmax(np.abs(table.values[:, i]), initial=0.0)) * scale
+            beside += ["; between cells"] * is_possible(base, 1000 * most)
+    if signed and beside and all(_THOUSANDS.fullmatch(cell) for cell, _, _ in signed):
         cell, row, column = signed[0]
         raise FileFormatError(
             f"{path}, line {table.lines[row]}: {table.names[column]} is {cell!r} beside "
-            f"{whole[0]!r}; if that is a thousand, write it without a sign, else write {cell}0"
+            f"{beside[0]!r}; if that is a thousand, write it without a sign, else write {cell}0"
         )
 
 
@@ -243,6 +254,7 @@ def in_units(
             f"{SD} in {where} is one number for components in {', '.join(wanted)}; leave that "
             "column out"
         )
+    _refuse_odd_row(outcomes, wanted)
     reach = np.abs(outcomes.values).max(axis=0, initial=0.0, where=~np.isnan(outcomes.values))
     scale, unclear = [], dict[str, list[str]]()
     for name, own, spelt, largest in zip(outcomes.names, said, wanted, reach, strict=True):
@@ -279,7 +291,34 @@ def in_units(
     sd_scale = conversion(outcomes.sd_unit, first, SD) if outcomes.sd_unit else [*scale, 1.0][0]
     values, sd = outcomes.values * np.array(scale), outcomes.sd * sd_scale
     converted = replace(outcomes, values=values, sd=sd, units=tuple(wanted), sd_unit=first)
+    apart = float(np.nanmax(np.ptp(values, axis=0), initial=0.0)) if len(values) else 0.0
+    if outcomes.sd_unit is None and 0 < apart <= sd.max() and len(values) > _FEW:
+        raise InvalidDemonstrationsError(
+            f"{SD} in {where} is up to {sd.max():.4g} {first}, and all outcomes are within "
+            f"{apart:.4g} {first} of each other; say its unit in its head: {SD} [cm], or "
+            f"{SD} [{first}] if that is right"
+        )
     return converted, ambiguities
+
+
+def _refuse_odd_row(outcomes: Outcomes, units: Sequence[str]) -> None:
+    """Refuse a few rows that are in another unit than the others: 95 beside 0.8 and 1.05.
+
+    InvalidDemonstrationsError names them, if an arm reaches the others and not these.
+    """
+    columns = np.abs(outcomes.values).T
+    for column, own, unit in zip(columns, outcomes.units, units, strict=True):
+        unit = known_unit(unit) or unit
+        odd = np.array([judge_unit(unit, number) not in (unit, None) for number in column])
+        if not 0 < odd.sum() < len(odd) / 2 or (own and is_possible(own, max(column[odd]))):
+            continue
+        others = np.nanmax(column[~odd], initial=0.0)
+        if min(column[odd]) > _FAR * others:
+            raise InvalidDemonstrationsError(
+                f"in {outcomes.where}, {listed(np.array(outcomes.episodes)[odd].tolist())} is in "
+                f"another unit than the others: {min(column[odd]):g} beside {others:g} at most; "
+                "write all in one, and name it in the head"
+            )
 
 
 def missing_outcomes(episodes: Sequence[str], outcomes: Outcomes) -> list[str]:

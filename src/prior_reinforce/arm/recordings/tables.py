@@ -65,6 +65,7 @@ class Table:
     lines: tuple[int, ...]
     """Line or row of the file that each row stands in, from 1."""
     decimal: str = "."
+    delimiter: str = ","
 
     def __len__(self) -> int:
         """Number of rows."""
@@ -115,6 +116,11 @@ class Table:
             return None
         return np.array([time - found[0] for time in found], dtype=np.int64)  # type: ignore[operator]
 
+    def stamps(self, column: int) -> Column:
+        """Return a column as times: dates in [ns] from the first on, else its numbers."""
+        dates = self.nanoseconds(column)
+        return self.values[:, column] if dates is None else dates.astype(float)
+
 
 def read_table(
     path: Path, delimiter: str | None = None, decimal: str | None = None, head: Collection[str] = ()
@@ -146,19 +152,19 @@ def _read_csv(
     sample = [line for _, line in data[:_SAMPLE]]
     check_table(path, 1, 1 + max(line.count(mark) for line in sample for mark in ",;\t"))
     delimiter, decimal = _dialect(sample, delimiter, decimal)
-    check_table(path, len(data), max(len(_split(line, delimiter)) for _, line in data))
+    blank = delimiter == DELIMITERS["space"]
+    widest = max(len(line.split()) if blank else 1 + line.count(delimiter) for _, line in data)
+    check_table(path, len(data), widest)
     mark, lines = delimiter, [line for _, line in data]
-    if delimiter == DELIMITERS["space"]:
+    if blank:
         mark, lines = " ", [line.strip().replace("\t", " ") for line in lines]
     cells = csv.reader(
         (f"{line}\n" for line in lines), delimiter=mark, skipinitialspace=True, strict=True
     )
     rows = [(data[cells.line_num - 1][0], [cell.strip() for cell in row]) for row in cells]
-    width = max(len(row) for _, row in rows)
-    rows = [(i, row + [""] * (width - len(row))) for i, row in rows]
     above = [line for i, line in kept if i == data[0][0] - 1 and (i, line) not in data]
     title = [c.strip() for c in _split(above[0].lstrip(" #%/"), delimiter)] if above else []
-    return _table(str(path), rows, head, decimal, title)
+    return replace(_table(str(path), rows, head, decimal, title), delimiter=delimiter)
 
 
 def _decoded(path: Path) -> str:
@@ -179,7 +185,9 @@ def _decoded(path: Path) -> str:
 
 
 def _split(line: str, delimiter: str) -> list[str]:
-    return line.split() if delimiter == r"\s+" else line.split(delimiter)
+    if delimiter == DELIMITERS["space"]:
+        line, delimiter = line.strip().replace("\t", " "), " "
+    return next(csv.reader([line], delimiter=delimiter, skipinitialspace=True), [])
 
 
 def _dialect(lines: Sequence[str], delimiter: str | None, decimal: str | None) -> tuple[str, str]:
@@ -195,7 +203,9 @@ def _dialect(lines: Sequence[str], delimiter: str | None, decimal: str | None) -
 
     delimiters = [delimiter] if delimiter else [",", ";", "\t", "|", r"\s+"]
     pairs = product(delimiters, [decimal] if decimal else [".", ","])
-    return max((pair for pair in pairs if pair[0] != pair[1]), key=score, default=(",", "."))
+    quoted = any('"' in line for line in body)  # between commas, Google Sheets quotes its commas
+    apart = (pair for pair in pairs if pair[0] != pair[1] or quoted)
+    return max(apart, key=score, default=(",", "."))
 
 
 def _number(text: str, decimal: str = ".") -> float:
@@ -236,7 +246,7 @@ def _span(text: str) -> int | None:
 
 
 def _is_number(text: str, decimal: str) -> bool:
-    text = text.strip().strip('"')
+    text = text.strip()
     return text.lower() == "nan" or not math.isnan(_number(text, decimal))
 
 
@@ -247,12 +257,12 @@ def _table(
     decimal: str = ".",
     title: Sequence[str] = (),
 ) -> Table:
-    """Names, units and cells of rows of one width, with the numbers of their lines.
+    """Names, units and cells of rows, with the numbers of their lines.
 
     `title` are the cells of a comment right above: names, if there are as many as columns.
     """
     above = [any(cell.lower() in head for cell in row) for _, row in rows[:_SAMPLE]]
-    rows = rows[above.index(True) if any(above) else 0 :]
+    rows = _of_one_width(where, rows[above.index(True) if any(above) else 0 :])
     first = rows[0][1]
     units: list[str | None] = [None] * len(first)
     names, named = [f"column {i}" for i in range(1, len(first) + 1)], True
@@ -277,6 +287,21 @@ def _table(
         tuple(number for number, _ in rows),
         decimal,
     )
+
+
+def _of_one_width(where: str, rows: list[tuple[int, list[str]]]) -> list[tuple[int, list[str]]]:
+    """Rows as wide as the first; FileFormatError names one that holds more cells."""
+    width, names = max(len(row) for _, row in rows), len(rows[0][1])
+    for line, row in rows:
+        if any(row[names:]):
+            why = "where a comma is the decimal sign, put semicolons between cells"
+            if all(len(row) == names + 1 for _, row in rows[1:]):
+                why += "; of R, write it with col.names = NA"
+            raise FileFormatError(
+                f"{where}, line {line}: {len(row)} cells under {names} names; name every column, "
+                f"or mend that line ({why})"
+            )
+    return [(i, row + [""] * (width - len(row))) for i, row in rows]
 
 
 def _without_lists(
