@@ -1,9 +1,11 @@
 """LeRobot data sets in the layouts of both versions."""
 
+import json
+
 import numpy as np
 import pytest
 
-from prior_reinforce.arm.recordings import import_demonstrations
+from prior_reinforce.arm.recordings import import_demonstrations, read_recordings
 from prior_reinforce.errors import FileFormatError
 from tests.arm.recordings.recorded import (
     AS_IS,
@@ -11,6 +13,8 @@ from tests.arm.recordings.recorded import (
     OUTCOMES,
     N,
     check_motions,
+    lerobot_set,
+    sampled,
     write_lerobot,
     write_outcomes,
 )
@@ -68,3 +72,13 @@ def test_the_folder_above_a_data_set_names_it(tmp_path, table):
         import_demonstrations(above)
     assert "say its format" not in str(refused.value)
     assert f"name {above / 'throws'}, which looks like lerobot" in str(refused.value)
+
+
+@pytest.mark.parametrize("joints", [JOINTS, None])
+def test_lerobot_whose_action_alone_has_names(tmp_path, joints):
+    folder = lerobot_set(tmp_path / "set", 30, [sampled(0, 30)[1]], [*JOINTS[::-1]])
+    path = folder / "meta" / "info.json"
+    info = json.loads(path.read_text())
+    info["features"]["observation.state"]["names"] = None
+    path.write_text(json.dumps(info))
+    assert read_recordings(folder, joints=joints)[0].names == JOINTS[::-1]

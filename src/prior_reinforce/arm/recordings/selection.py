@@ -10,15 +10,14 @@ from typing import Literal
 
 import numpy as np
 
+from prior_reinforce.arm.recordings.beside import columns_beside
 from prior_reinforce.arm.recordings.naming import (
-    could_be_forgotten,
     find_channels,
     joint_vectors,
     missing_channels,
     numbered_like,
 )
 from prior_reinforce.arm.recordings.recording import Recording
-from prior_reinforce.arm.recordings.tables import counts
 from prior_reinforce.arm.recordings.units import (
     Ambiguity,
     conversion,
@@ -30,7 +29,6 @@ from prior_reinforce.arm.recordings.units import (
     say_names,
 )
 from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
-from prior_reinforce.plans.signals import held_channels
 from prior_reinforce.plans.whole_turns import TURN, attitudes
 from prior_reinforce.units import base_of
 
@@ -247,21 +245,9 @@ def _left_out(recordings: Sequence[Recording], columns: Sequence[list[int]]) -> 
     """Channels that move and are not selected, with their ranges over all recordings."""
     ranges: dict[str, list[tuple[float, float]]] = {}
     for recording, taken in zip(recordings, columns, strict=True):
-        for name, span in recording.left_out.items():
+        beside = columns_beside(recording.columns, recording.positions, taken, recording.times)
+        for name, span in (*recording.left_out.items(), *beside.items()):
             ranges.setdefault(name, []).append(span)
-        others = [i for i in range(len(recording.names)) if i not in taken]
-        names = recording.names
-        moving = could_be_forgotten([names[i] for i in others], [names[i] for i in taken])
-        for i in others:
-            values = recording.positions[:, i]
-            values = values[np.isfinite(values)]
-            if recording.names[i] not in moving or len(values) < 2 or counts(values):
-                continue
-            if np.ptp(values) <= 1e-9 * np.abs(values).max():
-                continue
-            if not held_channels([values[:, None]], (recording.units[i] or "",))[0]:
-                span = float(values.min()), float(values.max())
-                ranges.setdefault(recording.columns[i], []).append(span)
     said = [
         f"{name}, {min(low for low, _ in spans):.4g} to {max(high for _, high in spans):.4g}"
         for name, spans in ranges.items()
