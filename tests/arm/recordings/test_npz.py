@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from prior_reinforce.arm.recordings import import_demonstrations, read_recordings
+from prior_reinforce.arm.recordings.selection import select
 from prior_reinforce.arm.robots.plan_files import write_plan
-from prior_reinforce.errors import FileFormatError, PriorReinforceError
+from prior_reinforce.errors import FileFormatError, PriorReinforceError, UnclearUnitsError
 from prior_reinforce.plans.motions import Plan
 from tests.arm.recordings.recorded import (
     AS_IS,
@@ -173,3 +174,16 @@ def test_a_second_arm_and_a_hand_are_named_and_commands_are_not(tmp_path):
     hand = (q[:, 1] - q[0, 1])[:, None] * np.linspace(0.1, 0.9, 16)
     np.savez(tmp_path / "a.npz", t=t, q_right=q, q_left=0.5 * q[:, ::-1], hand=hand, q_cmd=q + 0.01)
     assert [*read_recordings(tmp_path, key="q_right")[0].left_out] == ["q_left", "hand"]
+
+
+def test_names_of_some_columns_are_asked_about_in_the_files_order(tmp_path):
+    t, q = sampled(0, 20)
+    plan = (*JOINTS, "gripper")
+    np.savez(tmp_path / "a.npz", t=t, q=np.column_stack([q[:, ORDER], q[:, 1]]), dof_names=SWAPPED)
+    with pytest.raises(UnclearUnitsError) as asked:
+        read_recordings(tmp_path, joints=plan)
+    said = (*SWAPPED, "gripper")
+    assert asked.value.options == f"--joints {' '.join(said)}"
+    (recording,) = read_recordings(tmp_path, joints=said)
+    chosen = select([recording], said, plan).recordings[0]
+    np.testing.assert_array_equal(chosen.positions[:, :7], q)

@@ -7,7 +7,8 @@ many as the columns; a command repeats the motion; a clock runs with it.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+import shlex
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,6 +25,7 @@ from prior_reinforce.arm.recordings.recording import (
 from prior_reinforce.arm.recordings.units import (
     CHANNEL_UNITS,
     SECONDS,
+    Ambiguity,
     is_no_angle,
     known_unit,
     say_names,
@@ -97,8 +99,25 @@ def recorded_among(
         clock = options.clock_among(where, episode, kept, arrays, **(own or {}))
     others = {name: array for name, array in arrays.items() if name not in keys}
     more = {"left_out": moves_beside(positions, others, clock.times)} | more
-    remarks = (*more.pop("remarks", ()), *why)
-    return recorded(episode, clock, positions, bare, units=units, remarks=remarks, **more)
+    more["remarks"] = (*more.get("remarks", ()), *why)
+    if not bare:
+        unclear = _other_names(episode, texts, positions.shape[1], options.joints or ())
+        more["ambiguities"] = (*clock.ambiguities, *unclear)
+    return recorded(episode, clock, positions, bare, units=units, **more)
+
+
+def _other_names(
+    episode: str, texts: Texts, count: int, joints: Sequence[str]
+) -> Iterator[Ambiguity]:
+    """Ask about texts that hold wanted joints and are not as many as the columns."""
+    for key, own in texts.items():
+        missing = missing_channels(joints, own)
+        if len(missing) < len(joints) and tuple(joints)[: len(own)] != own:
+            order = shlex.join((*own, *missing)) if len(own) + len(missing) == count else "NAME ..."
+            what = f"{episode} has {count} columns, and {key} names {say_names(own)}"
+            what += ": it looks as if these were the first, in that order"
+            yield Ambiguity(what, f"--joints {order}")
+            return
 
 
 def joined(

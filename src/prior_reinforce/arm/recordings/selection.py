@@ -121,7 +121,7 @@ def select(
             f"{n_units} units: {list(joints)}"
         )
     joints, guessed = _guess_names(recordings[0], joints) if unnamed else (joints, ())
-    columns = [_columns(recording, joints) for recording in recordings]
+    columns = [_columns(recording, joints, names) for recording in recordings]
     said = [
         _said_unit(recordings, columns, i, None if spread is None else spread[i])
         for i in range(len(joints))
@@ -179,6 +179,8 @@ def _guess_names(
     recording: Recording, joints: tuple[str, ...]
 ) -> tuple[tuple[str, ...], tuple[Ambiguity, ...]]:
     """The recorded names of the joints, if they can only be guessed: `q0`, `q1`, ..."""
+    if any(one.option.startswith("--joints") for one in recording.ambiguities):
+        return joints, ()
     own = recording.columns != recording.names  # numbered columns of a log whose order is known
     if not (recording.named or own) and len(recording.names) == len(joints) > 1:
         what = f"{recording.episode} names no columns: it looks as if they were {say_names(joints)}"
@@ -192,7 +194,7 @@ def _guess_names(
     return found, (Ambiguity(what, f"--joints {shlex.join(found)}"),)
 
 
-def _columns(recording: Recording, joints: tuple[str, ...]) -> list[int]:
+def _columns(recording: Recording, joints: tuple[str, ...], names: tuple[str, ...]) -> list[int]:
     found = find_channels(joints, recording.names)
     if found is not None:
         return found
@@ -211,7 +213,8 @@ def _columns(recording: Recording, joints: tuple[str, ...]) -> list[int]:
             f"{len(joints)} joints were given; name all its columns in order, or give some of "
             f"{there}"
         )
-    return list(range(len(joints)))
+    # Columns without names are called by the joints, which may be the plan's in another order.
+    return find_channels(names, joints) or list(range(len(joints)))
 
 
 def _picked(recording: Recording, columns: list[int], joints: tuple[str, ...]) -> Recording:
