@@ -333,3 +333,58 @@ def test_other_endings_are_read_where_the_format_is_said(tmp_path):
     with pytest.raises(FileFormatError, match="no format that can be read"):
         read_recordings(tmp_path)
     assert len(read_recordings(tmp_path, format="csv")) == N
+
+
+def texts(path, names, cells, q, heads):
+    """A table of times, texts and positions, as ROS tools write JointStates."""
+    rows = [",".join(["t", *names, *heads])]
+    for k, row in enumerate(q):
+        rows.append(",".join([f"{k / 50}", *cells, *(f"{v:.6f}" for v in row)]))
+    path.write_text("\n".join(rows) + "\n")
+
+
+@pytest.mark.parametrize("form", ["columns", "a cell"])
+def test_names_in_cells_are_those_of_the_numbers_beside(tmp_path, form):
+    q, said = sampled(0, 50)[1], JOINTS[::-1]
+    names, cells, heads = (
+        ([f"name{i}" for i in range(7)], said, [f"position{i}" for i in range(7)])
+        if form == "columns"
+        else (["name"], [f'"{list(said)}"'], [f"position_{i}" for i in range(7)])
+    )
+    velocities = [f"velocity{i}" for i in range(7)]
+    path = tmp_path / "a.csv"
+    texts(path, names, cells, np.column_stack([q, 0.1 * q]), [*heads, *velocities])
+    for how in ({"joints": JOINTS}, {"key": heads[0][:-1].rstrip("_")}):
+        (recording,) = read_recordings(tmp_path, **how)
+        assert [n for n in recording.names if n in JOINTS] == [
+            *(JOINTS if "joints" in how else said)
+        ]
+        assert not recording.left_out
+    wanted = read_recordings(tmp_path, joints=JOINTS)[0]
+    np.testing.assert_allclose(wanted.positions, q[:, ::-1], atol=1e-6)
+    lines = path.read_text().splitlines()
+    lines[9] = lines[9].replace("joint1", "elbow")
+    path.write_text("\n".join(lines))
+    with pytest.raises(FileFormatError, match=r"line 10: name.* before joint7.*of one publisher"):
+        read_recordings(tmp_path, joints=JOINTS)
+
+
+def test_gaps_and_switches_beside_the_joints_are_named(tmp_path):
+    t, q = sampled(0, 50)
+    rows = [f"{a:.2f},{b[1]:.6f},{b[3]:.6f}" for a, b in zip(t, q, strict=True)]
+    rows = [
+        f"{row},{80 - 70 * k / len(t) if k % 5 == 0 else ''},{'on' if k < 40 else 'off'},arm"
+        for k, row in enumerate(rows)
+    ]
+    (tmp_path / "a.csv").write_text("\n".join(["t,a,b,gripper,vacuum,frame_id", *rows]))
+    (recording,) = read_recordings(tmp_path, joints=["a", "b"])
+    assert [*recording.left_out] == ["gripper"]
+    assert recording.remarks == ("vacuum left out, which holds no number",)
+
+
+def test_a_rail_at_constant_speed_is_a_channel_and_no_clock(tmp_path):
+    t, q = sampled(0, 50)
+    table = np.column_stack([t, q[:, 1], 0.1 + 0.25 * t, np.arange(len(t)) + 7, 1e3 * t + 5])
+    np.savetxt(tmp_path / "a.csv", table, delimiter=",", header="t,a,rail,n,ms", comments="")
+    assert read_recordings(tmp_path)[0].names == ("a", "rail")
+    assert [*read_recordings(tmp_path, joints=["a"])[0].left_out] == ["rail"]

@@ -142,3 +142,61 @@ def test_a_header_that_claims_too_much_is_not_read(tmp_path):
         file.create_dataset(KEY, (10**12, 7), "f8", chunks=(1000, 7))
     with pytest.raises(FileFormatError, match="no recording of throws"):
         read_recordings(path)
+
+
+def one(tmp_path, arrays, attrs):
+    """A file an episode; `at@name` is an attribute of what stands at `at`."""
+    with h5py.File(tmp_path / "a.hdf5", "w") as file:
+        for name, array in arrays.items():
+            file[name] = array
+        for where, value in attrs.items():
+            at, _, name = where.partition("@")
+            (file[at] if at else file).attrs[name] = value
+    return tmp_path / "a.hdf5"
+
+
+T, Q = sampled(0, 20)
+QPOS = "observations/qpos"
+
+
+@pytest.mark.parametrize("at", ["", "observations", QPOS])
+def test_attributes_name_the_joints_and_give_units_and_the_rate(tmp_path, at):
+    path = one(
+        tmp_path, {QPOS: Q}, {f"{at}@joints": JOINTS[::-1], "@fps": 20, f"{QPOS}@units": "deg"}
+    )
+    (recording,) = read_recordings(path, joints=JOINTS)
+    assert recording.names == JOINTS[::-1]
+    assert recording.units == ("deg",) * 7
+    np.testing.assert_allclose(recording.times, T)
+
+
+def test_names_may_stand_in_an_array_of_texts(tmp_path):
+    path = one(tmp_path, {QPOS: Q, "joint_names": [name.encode() for name in JOINTS]}, {})
+    assert read_recordings(path, rate=20)[0].names == JOINTS
+
+
+@pytest.mark.parametrize("said", ["length", "is_pad", "nothing"])
+def test_frames_of_zeros_that_fill_up_an_episode_are_no_motion(tmp_path, said):
+    filled = np.concatenate([Q, np.zeros((9, 7))])
+    arrays = {"is_pad": np.arange(len(filled)) >= len(Q)} if said == "is_pad" else {}
+    path = one(tmp_path, {QPOS: filled, **arrays}, {"@length": len(Q)} if said == "length" else {})
+    (recording,) = read_recordings(path, rate=20)
+    np.testing.assert_array_equal(recording.positions, Q)
+    assert "9 frames at the end left out" in recording.remarks[0]
+
+
+def test_what_moves_is_named_by_what_it_is_and_not_by_a_word_in_its_path(tmp_path):
+    grip = Q[:, 1] - Q[0, 1]
+    arrays = {
+        "observation/robot_state/joint_positions": Q,
+        "observation/robot_state/gripper_position": grip,
+        "obs/gripper_states": np.column_stack([grip, -grip]),
+        "actions": np.column_stack([grip] * 7),
+        "action/joint_position": Q,
+        "next_obs/gripper": grip,
+        "dones": grip > 0.3,
+    }
+    path = one(tmp_path, arrays, {})
+    (recording,) = read_recordings(path, key="observation/robot_state/joint_positions", rate=20)
+    named = {"obs/gripper_states", "observation/robot_state/gripper_position"}
+    assert {*recording.left_out} == named

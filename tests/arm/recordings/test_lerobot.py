@@ -15,6 +15,8 @@ from tests.arm.recordings.recorded import (
     OUTCOMES,
     N,
     check_motions,
+    lerobot_set,
+    sampled,
     write_lerobot,
     write_outcomes,
 )
@@ -94,3 +96,13 @@ def test_the_folder_above_a_data_set_names_it(tmp_path, table):
         import_demonstrations(above)
     assert "say its format" not in str(refused.value)
     assert f"name {above / 'throws'}, which looks like lerobot" in str(refused.value)
+
+
+@pytest.mark.parametrize("joints", [JOINTS, None])
+def test_lerobot_whose_action_alone_has_names(tmp_path, joints):
+    folder = lerobot_set(tmp_path / "set", 30, [sampled(0, 30)[1]], [*JOINTS[::-1]])
+    path = folder / "meta" / "info.json"
+    info = json.loads(path.read_text())
+    info["features"]["observation.state"]["names"] = None
+    path.write_text(json.dumps(info))
+    assert read_recordings(folder, joints=joints)[0].names == JOINTS[::-1]

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from prior_reinforce.arm.recordings import import_demonstrations, read_recordings
+from prior_reinforce.arm.recordings.selection import select
 from prior_reinforce.arm.robots.plan_files import write_plan
-from prior_reinforce.errors import FileFormatError, PriorReinforceError
+from prior_reinforce.errors import FileFormatError, PriorReinforceError, UnclearUnitsError
 from prior_reinforce.plans.motions import Plan
 from tests.arm.recordings.recorded import (
     AS_IS,
@@ -13,6 +14,7 @@ from tests.arm.recordings.recorded import (
     OUTCOMES,
     N,
     check_motions,
+    sampled,
     throw,
     write_npz,
     write_outcomes,
@@ -118,3 +120,70 @@ def test_python_objects_are_named_without_advice_to_load_them_all_the_same(tmp_p
     with pytest.raises(FileFormatError, match="it holds Python objects") as caught:
         read_recordings(path, rate=100)
     assert "allow_pickle" not in str(caught.value)
+
+
+ORDER = [2, 1, 0, 3, 4, 5, 6]
+SWAPPED = [JOINTS[i] for i in ORDER]
+
+
+@pytest.mark.parametrize("name", ["dof_names", "channels", "order"])
+def test_names_in_any_array_of_texts_are_those_of_the_joints(tmp_path, name):
+    t, q = sampled(0, 20)
+    np.savez(tmp_path / "a.npz", t=t, q=q[:, ORDER], **{name: SWAPPED})
+    (recording,) = read_recordings(tmp_path, joints=JOINTS)
+    assert recording.names == tuple(SWAPPED)
+    np.savez(tmp_path / "a.npz", t=t, q=q[:, ORDER], joint_names=JOINTS, **{name: SWAPPED})
+    with pytest.raises(FileFormatError, match="names the columns in two ways"):
+        read_recordings(tmp_path, joints=JOINTS)
+
+
+@pytest.mark.parametrize("units", [["deg"] * 7, "deg"])
+def test_units_beside_the_names_are_those_of_the_joints(tmp_path, units):
+    t, q = sampled(0, 20)
+    np.savez(tmp_path / "a.npz", t=t, q=q, joint_names=JOINTS, units=units)
+    assert read_recordings(tmp_path)[0].units == ("deg",) * 7
+
+
+@pytest.mark.parametrize("said", ["lengths", "mask", "nothing"])
+@pytest.mark.parametrize("filled", [0.0, np.nan])
+def test_frames_that_fill_up_are_no_motion(tmp_path, said, filled):
+    lengths = np.array([60, 80, 100])
+    real = np.arange(100) < lengths[:, None]
+    q = np.where(
+        real[..., None], np.stack([throw(i, np.arange(100) / 50) for i in range(3)]), filled
+    )
+    more = {"lengths": {"lengths": lengths}, "mask": {"mask": real}, "nothing": {}}[said]
+    np.savez(tmp_path / "all.npz", q=q, rate=50, **more)
+    recordings = read_recordings(tmp_path / "all.npz")
+    if said != "nothing" or filled == 0:
+        assert [len(recording.times) for recording in recordings] == [60, 80, 100]
+        assert [len(recording.remarks) for recording in recordings] == [1, 1, 0]
+
+
+def test_one_array_a_joint_is_read_by_name_and_by_keys(tmp_path):
+    t, q = sampled(0, 20)
+    np.savez(tmp_path / "a.npz", time=t, **dict(zip(SWAPPED, q.T[ORDER], strict=True)))
+    for how in ({"joints": JOINTS}, {"key": JOINTS}):
+        (recording,) = read_recordings(tmp_path, **how)
+        assert recording.names == JOINTS
+        np.testing.assert_array_equal(recording.positions, q)
+
+
+def test_a_second_arm_and_a_hand_are_named_and_commands_are_not(tmp_path):
+    t, q = sampled(0, 50)
+    hand = (q[:, 1] - q[0, 1])[:, None] * np.linspace(0.1, 0.9, 16)
+    np.savez(tmp_path / "a.npz", t=t, q_right=q, q_left=0.5 * q[:, ::-1], hand=hand, q_cmd=q + 0.01)
+    assert [*read_recordings(tmp_path, key="q_right")[0].left_out] == ["q_left", "hand"]
+
+
+def test_names_of_some_columns_are_asked_about_in_the_files_order(tmp_path):
+    t, q = sampled(0, 20)
+    plan = (*JOINTS, "gripper")
+    np.savez(tmp_path / "a.npz", t=t, q=np.column_stack([q[:, ORDER], q[:, 1]]), dof_names=SWAPPED)
+    with pytest.raises(UnclearUnitsError) as asked:
+        read_recordings(tmp_path, joints=plan)
+    said = (*SWAPPED, "gripper")
+    assert asked.value.options == f"--joints {' '.join(said)}"
+    (recording,) = read_recordings(tmp_path, joints=said)
+    chosen = select([recording], said, plan).recordings[0]
+    np.testing.assert_array_equal(chosen.positions[:, :7], q)

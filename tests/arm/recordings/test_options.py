@@ -1,6 +1,7 @@
 """What is said of recordings is one record, checked when it is made."""
 
 import pytest
+import tyro
 
 from prior_reinforce.arm.recordings import FORMATS, ReadOptions
 from prior_reinforce.errors import ConfigurationError
@@ -35,3 +36,8 @@ def test_values_are_checked(said, message):
 def test_what_was_not_asked_for_is_left_out():
     options = ReadOptions(episodes=("a", "b"), leave_out=("b",))
     assert [options.leaves_out(name) for name in "abc"] == [False, True, True]
+
+
+def test_the_key_may_be_given_again():
+    assert tyro.cli(ReadOptions, args=["--key", "q", "--key", "grip"]).key == ("q", "grip")
+    assert "key" not in tyro.cli(ReadOptions, args=[]).given

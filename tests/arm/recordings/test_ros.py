@@ -132,7 +132,10 @@ def test_a_topic_without_messages_is_named_with_a_remedy(tmp_path):
 
 
 def publishing(path, kind, more):
-    """A bag of a throw, each message followed by one of what `more(positions)` says."""
+    """A bag of a throw, each message followed by one of what `more(positions)` says.
+
+    A number is one of a gripper, in a topic of its own.
+    """
     t, q = sampled(0, 20)
     store = get_typestore(Stores.ROS1_NOETIC if kind == "ros1" else Stores.ROS2_HUMBLE)
     name = "sensor_msgs/msg/JointState"
@@ -142,18 +145,22 @@ def publishing(path, kind, more):
         own = other = writer.add_connection("/joint_states", name, typestore=store)
         if second:
             other = writer.add_connection("/joint_states", name, typestore=store, **second)
+        grip = "std_msgs/msg/UInt8"
+        if isinstance(more(q[0]), int):
+            other = writer.add_connection("/robotiq/position", grip, typestore=store)
         for seconds, row in zip(t, q, strict=True):
             stamp = time(sec=7 + int(seconds), nanosec=round(seconds % 1 * 1e9))
             seq = {"seq": 0} if kind == "ros1" else {}
-            for connection, late, (joints, values) in (
-                (own, 0, (JOINTS, row)),
-                (other, 1000, more(row)),
-            ):
+            for connection, late, said in ((own, 0, (JOINTS, row)), (other, 1000, more(row))):
+                at = 7 * 10**9 + round(seconds * 1e9) + late
+                if isinstance(said, int):
+                    writer.write(other, at, serialize(store.types[grip](data=said), grip))
+                    continue
+                joints, values = said
                 message = store.types[name](
                     header=header(stamp=stamp, frame_id="", **seq), name=list(joints),
                     position=np.array(values, float), velocity=np.zeros(0), effort=np.zeros(0),
                 )  # fmt: skip
-                at = 7 * 10**9 + round(seconds * 1e9) + late
                 writer.write(connection, at, serialize(message, name))
 
     if kind == "ros1":  # a connection for each publisher, where ROS 2 has one for the topic
@@ -182,3 +189,19 @@ def test_a_topic_with_two_publishers(tmp_path, kind, case):
     (recording,) = read_recordings(bag, joints=JOINTS)
     np.testing.assert_allclose(recording.positions[:, :7], sampled(0, 20)[1])
     assert any("messages" in remark for remark in recording.remarks)
+
+
+@pytest.mark.parametrize("kind", ["ros1", "mcap"])
+def test_a_gripper_of_plain_numbers_is_named_and_can_be_taken(tmp_path, kind):
+    def gripper(q):
+        return int(200 * (q[1] > -0.2))
+
+    bag = publishing(tmp_path / ("throw.bag" if kind == "ros1" else "throw"), kind, gripper)
+    (recording,) = read_recordings(bag)
+    assert recording.left_out == {"/robotiq/position": (0.0, 200.0)}
+    (both,) = read_recordings(bag, key=["/joint_states", "/robotiq/position"])
+    assert both.names == (*JOINTS, "/robotiq/position")
+    assert np.ptp(both.positions[:, 7]) == 200
+    assert not both.left_out
+    with pytest.raises(FileFormatError, match="no joint topic /robotiq/position"):
+        read_recordings(bag, key="/robotiq/position")

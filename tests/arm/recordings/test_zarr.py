@@ -108,3 +108,13 @@ def test_consolidated_metadata_says_nothing(tmp_path):
     whole.write_text(whole.read_text().replace("<f8", "<i8"))
     again = read_recordings(path, key="joint_pos", rate=50)
     np.testing.assert_array_equal(again[0].positions, good[0].positions)
+
+
+def test_attributes_name_the_joints_and_a_gripper_is_named(tmp_path):
+    path = write_zarr(tmp_path)
+    root = zarr.open_group(str(path), mode="r+")
+    root["data/joint_pos"].attrs["names"] = [*JOINTS[::-1]]
+    root["data"].create_array("grip", data=np.array(root["data/joint_pos"][:, 1:2]) ** 2)
+    (first, *_) = read_recordings(path, key="joint_pos", rate=50, joints=JOINTS)
+    assert first.names == JOINTS[::-1]
+    assert [*first.left_out] == ["grip"]

@@ -15,25 +15,25 @@ from typing import NamedTuple
 
 import numpy as np
 
+from prior_reinforce.arm.recordings.beside import columns_beside, is_clock, names_said, words
 from prior_reinforce.arm.recordings.clock import (
     FRAME,
     Clock,
+    Times,
     hold_together,
     rises,
     says_time,
     skips_frames,
     tells_time,
 )
-from prior_reinforce.arm.recordings.naming import could_be_forgotten, find_channels, vectors
+from prior_reinforce.arm.recordings.naming import find_channels, numbered_like, vectors
 from prior_reinforce.arm.recordings.options import ReadOptions
 from prior_reinforce.arm.recordings.recording import (
     EPISODE_COLUMNS,
     NO_COLUMN,
     Episodes,
-    Positions,
     Recording,
     files_at,
-    moves_beside,
     natural_order,
     recorded,
     unread,
@@ -58,6 +58,8 @@ _TIMES = (
 )  # fmt: skip
 _FEWEST_COUNTS = 20
 """Rows of which it can be said that a column counts them. Ours."""
+_MOST_WORDS = 8
+"""Texts between which a column switches. Ours."""
 _SECONDS = re.compile(r"(?P<stem>.*?)(secs?|seconds|s)")
 
 
@@ -181,50 +183,89 @@ def _episode(
 ) -> Recording:
     log = next((g for g in LOG_FORMATS if set(g.columns) <= set(table.names)), None)
     joints = options.joints if table.named else None
-    found = None if joints is None else find_channels(joints, table.names)
+    said, told = _names_in_cells(table, options)
+    called = [name or f"column {i + 1}" for i, name in enumerate(table.names)]
+    names = [said.get(i, name) for i, name in enumerate(table.names)]
+    found = None if joints is None else find_channels(joints, names)
     times = _time_columns(table, options, [episode_column, *(found or ())])
-    aside = {*times.columns, *times.held, episode_column}
-    others = [i for i in range(len(table.names)) if i not in aside]
-    channels, named = _channels(table, others, options, log)
+    aside = {*times.columns, *times.held, episode_column, *told}
+    others = [i for i in range(len(names)) if i not in aside]
+    channels, named = _channels(table, names, others, options, log)
     remarks = []
     if log is not None:
         remarks.append(f"{log.name}: time in {log.time_unit}, motion is {log.key} (measured)")
     clock = _clock(table, episode, times, options, log and log.time_unit)
-    rising = [i for i in channels if channels == others and table.named and _counts(table, i)]
-    rising = [] if options.joints else rising
-    texts = [i for i in channels if table.is_text(i) and options.key is None and found is None]
-    called = [name or f"column {i + 1}" for i, name in enumerate(table.names)]
+    counts = [i for i in others if table.is_number(i) and _counts(table, i, clock.times)]
+    rising = [i for i in counts if channels == others and table.named and not options.joints]
+    all_read = not options.key and found is None
+    texts = [i for i in others if table.is_text(i) and (all_read or _switches(table, i))]
     for left, why in (
         (rising, "rises with every row, as times and counters do"),
         (texts, "holds no number"),
     ):
         channels = [i for i in channels if i not in left]
-        said = say_names([called[i] for i in left])
-        remarks += [f"{said} left out, which {why}"] * bool(left)
-    names, units = without_units([called[i] for i in channels])
-    motion = table.columns(channels)
+        remarks += [f"{say_names([called[i] for i in left])} left out, which {why}"] * bool(left)
+    own, units = without_units([called[i] for i in channels])
+    rest = [i for i in others if i not in (*channels, *counts) and not table.is_text(i)]
     return recorded(
         episode,
         clock,
-        motion,
-        names if named else (),
+        table.columns(channels),
+        tuple(said.get(i, name) for i, name in zip(channels, own, strict=True))
+        if named or said.keys() >= {*channels}
+        else (),
         remarks=tuple(remarks),
         units=tuple(table.units[i] or u for i, u in zip(channels, units, strict=True)),
         ambiguities=(*guessed, *times.guessed, *clock.ambiguities),
-        columns=names if table.named else (),
-        left_out=_unread_motion(table, others, channels, motion),
+        columns=own if table.named else (),
+        left_out=columns_beside(
+            [called[i] for i in (*channels, *rest)],
+            table.values[:, [*channels, *rest]],
+            range(len(channels)),
+            clock.times,
+        ),
     )
 
 
-def _unread_motion(
-    table: Table, others: Sequence[int], channels: Sequence[int], motion: Positions
-) -> dict[str, tuple[float, float]]:
-    """Range of each column of numbers that moves and is not read, such as a gripper's."""
-    rest = {table.names[i]: i for i in others if i not in channels and table.is_number(i)}
-    moving = could_be_forgotten([*rest], [table.names[i] for i in channels])
-    return moves_beside(
-        ("",), {"": motion} | {name: table.values[:, rest[name]] for name in rest if name in moving}
-    )
+def _names_in_cells(table: Table, options: ReadOptions) -> tuple[dict[int, str], set[int]]:
+    """Names of numbered columns that stand in the cells of others, and which others these are.
+
+    ROS writes `name0`, `name1`, ... beside `position0`, ..., or a cell of names beside one of
+    positions. FileFormatError where they change, as they do if two publishers are in one table.
+    """
+    texts = [i for i in range(len(table.names)) if table.named and table.is_text(i)]
+    groups = {s: [texts[i] for i in g] for s, g in vectors([table.names[i] for i in texts]).items()}
+    groups |= {table.names[i]: [i] for i in texts}
+    cells = {stem: _cells(table, group, 0) for stem, group in groups.items()}
+    numbers = [i for i in range(len(table.names)) if i not in texts]
+    called = [table.names[i] for i in numbers]
+    for count in sorted({len(own) for own in cells.values() if len(own) > 1}):
+        said = names_said(table.where, cells, count, options.joints)
+        named = [i for key in options.key for i in vectors(called).get(key, ())]
+        if said and not options.key:
+            named = [called.index(name) for name in numbered_like(said, called) or ()]
+        if not said or len(named) != count:
+            continue
+        stem = next(stem for stem, own in cells.items() if own == said)
+        for row, line in enumerate(table.lines):
+            if (own := _cells(table, groups[stem], row)) != said and any(own):
+                raise FileFormatError(
+                    f"{table.where}, line {line}: {stem} says {say_names(own)}, before "
+                    f"{say_names(said)}; write rows of one publisher, in one order"
+                )
+        return dict(zip((numbers[i] for i in named), said, strict=True)), {*groups[stem]}
+    return {}, set()
+
+
+def _cells(table: Table, columns: Sequence[int], row: int) -> tuple[str, ...]:
+    """The texts of some cells of a row, or of the list in an only one."""
+    own = [table.cells[i][row] for i in columns]
+    return words(own[0] if len(own) == 1 else own)
+
+
+def _switches(table: Table, column: int) -> bool:
+    """Whether a column of texts changes between a few of them: `on` and `off`."""
+    return 1 < len({*table.cells[column]} - {""}) <= _MOST_WORDS
 
 
 class _Times(NamedTuple):
@@ -294,14 +335,12 @@ def _has_no_name(table: Table, column: int) -> bool:
     return not table.names[column] or table.names[column].startswith("Unnamed:")
 
 
-def _counts(table: Table, column: int) -> bool:
-    """Whether a column rises by one step all along, which no joint does."""
-    values = table.values[:, column]
+def _counts(table: Table, column: int, times: Times) -> bool:
+    """Whether a column counts rows or tells the time, which no joint does."""
     if _has_no_name(table, column):
         return rises(table.stamps(column))
-    steps = np.diff(values)
-    long = len(values) >= _FEWEST_COUNTS and table.is_number(column)
-    return long and bool(np.all(steps > 0) and steps.max() < 1.5 * np.median(steps))
+    long = len(table) >= _FEWEST_COUNTS
+    return long and is_clock(table.names[column], table.values[:, column], times)
 
 
 def _clock(
@@ -325,17 +364,21 @@ def _clock(
 
 
 def _channels(
-    table: Table, others: Sequence[int], options: ReadOptions, log: LogFormat | None
+    table: Table,
+    called: Sequence[str],
+    others: Sequence[int],
+    options: ReadOptions,
+    log: LogFormat | None,
 ) -> tuple[list[int], bool]:
-    """Columns of the motion, and whether their names are those of joints.
+    """Columns of the motion, and whether they are called like joints.
 
     Only these need to be numbers in every row; a log may carry others beside them.
     """
     names, joints = [table.names[i] for i in others], options.joints or ()
     if not table.named:
         return list(others), False
-    if options.key is None and joints:
-        found = find_channels(joints, names)
+    if not options.key and joints:
+        found = find_channels(joints, [called[i] for i in others])
         if found is not None:
             return [others[i] for i in found], True
     keys, groups = options.key or ((log.key,) if log else ()), vectors(names)

@@ -7,6 +7,7 @@ one episode a file, with `observations/qpos`.
 
 from __future__ import annotations
 
+import contextlib
 import json
 import re
 from functools import partial
@@ -15,28 +16,26 @@ from typing import Any
 
 import numpy as np
 
-from prior_reinforce.arm.recordings.bounds import check_numbers
+from prior_reinforce.arm.recordings.beside import may_move, recorded_among, words
+from prior_reinforce.arm.recordings.bounds import MOST_COLUMNS, check_numbers
 from prior_reinforce.arm.recordings.clock import Stamps
 from prior_reinforce.arm.recordings.options import ReadOptions
 from prior_reinforce.arm.recordings.recording import (
     Episodes,
-    Positions,
     Recording,
     files_at,
     has_files,
-    joined,
-    moves_beside,
     named_damage,
     natural_order,
-    recorded,
 )
 from prior_reinforce.errors import FileFormatError
 
 _SUFFIXES = (".h5", ".hdf5")
 _KEYS = ("obs/robot0_joint_pos", "obs/agent/qpos", "observations/qpos")
 """Measured positions of the first arm; `actions` are mostly pose increments or targets."""
+_MOST_BESIDE, _MOST_BYTES_OF_NAMES = 64, 100_000
+"""Members of a group that is looked through for names, and bytes of these."""
 _EPISODE = re.compile(r"(demo|traj|episode)_?\d+")
-_NO_MOTION = re.compile(r"reward|done|success|terminal|action|state|discount", re.IGNORECASE)
 
 
 def recognises(source: Path) -> bool:
@@ -53,17 +52,16 @@ def read(source: Path, options: ReadOptions) -> Episodes:
         with named_damage(path, "HDF5"), h5py.File(path, "r") as file:
             data = _own(path, file, "data")
             top = data if isinstance(data, h5py.Group) else file
-            made_by = json.loads(top.attrs.get("env_args", "{}"))
-            said = dict(file.attrs) | dict(top.attrs) | made_by.get("env_kwargs", {})
+            made_by = json.loads(top.attrs.get("env_args", "{}")).get("env_kwargs", {})
             episodes = [name for name in top if top is not file or _EPISODE.fullmatch(name)]
             for within in sorted(episodes, key=natural_order) or [""]:
                 of_file = [path.stem] if len(paths) > 1 or not within else []
                 name = "-".join(filter(None, [*of_file, within]))
-                yield name, partial(_demo, path, top, within, said, options, name)
+                yield name, partial(_demo, path, top, within, made_by, options, name)
 
 
 def _demo(
-    path: Path, top: Any, within: str, said: dict[str, Any], options: ReadOptions, episode: str
+    path: Path, top: Any, within: str, made_by: Any, options: ReadOptions, episode: str
 ) -> Recording:
     with named_damage(path, "HDF5"):
         group = _own(path, top, within)
@@ -71,20 +69,61 @@ def _demo(
         keys = keys or _KEYS[:1]
         key = keys[0]
         arrays = {name: _motion(path, group, name) for name in keys}
-        positions, names = joined(keys, arrays)
-        there = _narrow(path, group, positions.shape) | arrays
-        declared = int(group.attrs.get("num_samples", len(positions)))
-        said = said | dict(group.attrs) | dict(_own(path, group, key).attrs)
-        said = {
-            n: v for n, v in said.items() if np.size(v) == 1 and np.asarray(v).dtype.kind in "fiu"
-        }
-    if declared != len(positions):
+        count = len(arrays[key])
+        there = _beside(path, group, count) | arrays
+        texts, stated = _said(path, top, group, key)
+        stated |= {n: np.asarray(v) for n, v in made_by.items() if isinstance(v, (int, float))}
+        declared = int(stated.get("num_samples", count))
+    if declared > count:
         raise FileFormatError(
-            f"{path}: {episode} declares {declared} samples but {key} holds {len(positions)}; "
+            f"{path}: {episode} declares {declared} samples but {key} holds {count}; "
             "copy the file again, or leave that episode out"
         )
-    clock = options.clock_among(path, episode, len(positions), there, said)
-    return recorded(episode, clock, positions, names, left_out=moves_beside(keys, there))
+    return recorded_among(path, episode, keys, there, options, texts=texts, stated=stated)
+
+
+def _said(
+    path: Path, top: Any, group: Any, key: str
+) -> tuple[dict[str, tuple[str, ...]], dict[str, np.ndarray]]:
+    """Texts and numbers that attributes hold, and arrays of texts, the nearest to the motion first.
+
+    An only unit is of the motion if it stands at it, not at what holds it.
+    """
+    texts: dict[str, tuple[str, ...]] = {}
+    stated: dict[str, np.ndarray] = {}
+    own = _own(path, group, key)
+    for node in dict.fromkeys((own, own.parent, group, top, top.file)):
+        found = {name: (node.attrs.get_id, node.attrs) for name in node.attrs}
+        if node != own and len(node) <= _MOST_BESIDE:
+            found |= {name: (node.__getitem__, node) for name in node if _is_small(node, name)}
+        for name, (kind, within) in found.items():
+            # What h5py has no type for is no name.
+            with contextlib.suppress(TypeError, ValueError, OSError):
+                if np.prod(kind(name).shape) > MOST_COLUMNS:
+                    continue
+                value = np.asarray(within[name])
+                if value.dtype.kind in "biuf":
+                    stated.setdefault(name, value)
+                elif len(text := words(value)) > 1 or node == own:
+                    texts.setdefault(name, text)
+    return texts, stated
+
+
+def _is_small(group: Any, name: str) -> bool:
+    """Whether a name is of a data set of this very file that holds no more than names do."""
+    import h5py
+
+    hard = isinstance(group.get(name, getlink=True), h5py.HardLink)
+    found: Any = group[name] if hard else None
+    small = _is_own(found) and found.shape is not None
+    return small and found.size * found.dtype.itemsize < _MOST_BYTES_OF_NAMES
+
+
+def _is_own(found: Any) -> bool:
+    """Whether an item is a data set whose numbers are in this very file."""
+    import h5py
+
+    return isinstance(found, h5py.Dataset) and not (found.external or found.is_virtual)
 
 
 def _shapes(group: Any) -> dict[str, tuple[int, ...]]:
@@ -92,24 +131,23 @@ def _shapes(group: Any) -> dict[str, tuple[int, ...]]:
     found: dict[str, tuple[int, ...]] = {}
 
     def collect(name: str, item: Any) -> None:
-        if getattr(item, "shape", None) and item.dtype.kind in "fiu":
+        if _is_own(item) and item.shape and item.dtype.kind in "biuf":
             found[name] = item.shape
 
     group.visititems(collect)
     return found
 
 
-def _narrow(path: Path, group: Any, shape: tuple[int, ...]) -> dict[str, np.ndarray]:
-    """Arrays of as many frames and fewer columns."""
+def _beside(path: Path, group: Any, count: int) -> dict[str, np.ndarray]:
+    """Arrays of as many frames that may move, tell the time, or mark what is padding."""
     return {
         name: _numbers(path, name, _own(path, group, name))
         for name, own in _shapes(group).items()
-        if own[:1] == shape[:1] and len(own) <= 2 and (own[1:] or (1,)) < shape[1:]
-        if not _NO_MOTION.search(name)
+        if own[0] == count and (len(own) == 1 or (len(own) == 2 and may_move(name, own[1])))
     }
 
 
-def _motion(path: Path, group: Any, key: str) -> Positions:
+def _motion(path: Path, group: Any, key: str) -> np.ndarray:
     """The motion under a key, or an error that lists the candidates."""
     found = _own(path, group, key)
     if len(getattr(found, "shape", ())) not in (1, 2):
@@ -150,7 +188,7 @@ def _own(path: Path, group: Any, key: str, depth: int = 8) -> Any:
             group = _own(path, start, link.path, depth - 1)
         else:
             group = None if link is None else group[part]
-    if isinstance(group, h5py.Dataset) and (group.external or group.is_virtual):
+    if isinstance(group, h5py.Dataset) and not _is_own(group):
         raise FileFormatError(
             f"{path}: the numbers of {key} are in another file, which is not read; copy the data "
             "into one file"

@@ -18,18 +18,16 @@ from typing import Any
 import numpy as np
 from jaxtyping import Shaped
 
+from prior_reinforce.arm.recordings.beside import may_move, recorded_among
 from prior_reinforce.arm.recordings.bounds import check_bytes, check_numbers
-from prior_reinforce.arm.recordings.clock import Clock, Times, hold_together, tells_time
+from prior_reinforce.arm.recordings.clock import Clock, Times, hold_together, says_time, tells_time
 from prior_reinforce.arm.recordings.options import ReadOptions
 from prior_reinforce.arm.recordings.recording import (
     NO_COLUMN,
     Episodes,
     Positions,
     Recording,
-    joined,
-    moves_beside,
     named_damage,
-    recorded,
 )
 from prior_reinforce.errors import FileFormatError
 
@@ -57,13 +55,18 @@ def read(source: Path, options: ReadOptions) -> Episodes:
         features = dict(info["features"])
         rate = float(info["fps"])
         keys = tuple(_column(source, features, key) for key in options.key or (None,))
-        key, widths = keys[0], _widths(features)
-        narrow = [n for n, width in widths.items() if 0 < width < widths.get(key, 0)]
-        narrow = [name for name in narrow if name not in (*keys, *_OWN)]
+        key = keys[0]
+        widths = {n: w for n, w in _widths(features).items() if w > 0 and n not in _OWN}
+        beside = [
+            n for n, w in widths.items() if n not in keys and (may_move(n, w) or says_time(n))
+        ]
+        texts = {
+            f"{name} names": _names(features[name]) for name in {**dict.fromkeys(keys), **widths}
+        }
     remarks: tuple[str, ...] = ()
-    if options.key is None and key == _MEASURED and _COMMANDED in features:
+    if not options.key and key == _MEASURED and _COMMANDED in features:
         remarks = (f"motion is {_MEASURED} (measured); key {_COMMANDED} has the commanded one",)
-    lengths, frames = _listed_lengths(source), _frames(source, (*keys, *narrow))
+    lengths, frames = _listed_lengths(source), _frames(source, (*keys, *beside))
 
     def episode_of(number: int) -> Recording:
         index, stamps, arrays = frames.get(number, (np.zeros(0), None, {}))
@@ -73,12 +76,14 @@ def read(source: Path, options: ReadOptions) -> Episodes:
                 f"{source}: episode {number} has {len(index)} of {listed} listed frames under "
                 "data/; copy the data set again, or name only the other episodes"
             )
-        positions, names = joined(keys, arrays, _names(features[key], arrays[key].shape[1]))
-        beside = moves_beside(keys, arrays)
+        own = texts[f"{key} names"]
+        said = {"names": own} if len(own) == arrays[key].shape[1] else texts
         clocks = {_STAMPS: stamps} if stamps is not None else {}
         clocks |= {n: a.ravel() for n, a in arrays.items() if a.size == len(a) and n not in keys}
         clock = _clock(source, str(number), index, clocks, rate, options)
-        return recorded(str(number), clock, positions, names, remarks=remarks, left_out=beside)
+        return recorded_among(
+            source, str(number), keys, arrays, options, texts=said, clock=clock, remarks=remarks
+        )
 
     for number in sorted(lengths.keys() | frames.keys()):
         yield str(number), partial(episode_of, number)
@@ -118,7 +123,7 @@ def _widths(features: dict[str, Any]) -> dict[str, int]:
         name: int(feature["shape"][0])
         for name, feature in features.items()
         if isinstance(feature, dict)
-        and str(feature.get("dtype", "")).startswith(("float", "int", "uint"))
+        and str(feature.get("dtype", "")).startswith(("float", "int", "uint", "bool"))
         and isinstance(feature.get("shape"), list)
         and len(feature["shape"]) == 1
     }
@@ -216,12 +221,13 @@ def _rows(column: Any) -> Positions:
     return np.asarray(flat, dtype=np.float64).reshape(-1, widths[0])
 
 
-def _names(feature: dict[str, Any], count: int) -> tuple[str, ...]:
-    """Channel names in every form that writers give them; none where they do not fit."""
-    names = _flat(feature.get("names"))
+def _names(feature: Any) -> tuple[str, ...]:
+    """Channel names in every form that writers give them; none where there are none."""
+    said = feature.get("names") if isinstance(feature, dict) else None
+    names = _flat(said)
     if len(set(names)) < len(names):  # two arms whose joints have one name each
-        names = _flat(feature.get("names"), "")
-    return tuple(names) if len(names) == count else ()
+        names = _flat(said, "")
+    return tuple(names)
 
 
 def _flat(names: Any, group: str | None = None) -> list[str]:

@@ -59,17 +59,6 @@ def joint_vectors(names: Sequence[str], count: int) -> dict[str, list[int]]:
     }
 
 
-def could_be_forgotten(names: Sequence[str], taken: Sequence[str]) -> set[str]:
-    """Return which of the channels left out may belong to the motion, such as a gripper's.
-
-    Velocities, torques and the like do not, nor does a numbered group of at least as many channels
-    as the joints that are taken, such as their commands.
-    """
-    count = max(map(len, vectors(taken).values()), default=len(taken))
-    groups = {i for group in vectors(names).values() if len(group) >= max(count, 2) for i in group}
-    return {name for i, name in enumerate(names) if i not in groups and not says_no_position(name)}
-
-
 def numbered_like(joints: Sequence[str], there: Sequence[str]) -> tuple[str, ...] | None:
     """Return the group of as many numbered channels as joints; None if it is not clear which.
 

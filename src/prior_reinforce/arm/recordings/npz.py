@@ -1,37 +1,33 @@
 """Recordings in NPZ or NPY: a file an episode, or one file whose motion has shape (N, T, D).
 
 An NPY holds the motion alone. Arrays of an NPZ: the motion (`key`, or `q`, `plans`, `positions`,
-`actions`), `t` or `dt` or `rate`, and optionally `joint_names` or `names`, and `outcome`,
-`outcomes` or `outcomes_seen`.
+`actions`, or one array a joint), `t` or `dt` or `rate`, and optionally names of the joints, their
+units, `lengths`, and `outcome`, `outcomes` or `outcomes_seen`.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 
+from prior_reinforce.arm.recordings.beside import Arrays, recorded_among, words
 from prior_reinforce.arm.recordings.bounds import MOST_BYTES, check_bytes
+from prior_reinforce.arm.recordings.naming import find_channels
 from prior_reinforce.arm.recordings.options import ReadOptions
 from prior_reinforce.arm.recordings.recording import (
     EPISODE_COLUMNS,
-    NO_COLUMN,
     Episodes,
     Recording,
     files_at,
-    joined,
-    moves_beside,
     named_damage,
-    recorded,
     unread,
 )
 from prior_reinforce.errors import FileFormatError
 from prior_reinforce.files import open_npz
 
-Arrays = Mapping[str, np.ndarray]
 SUFFIXES = (".npz", ".npy")
 _MOTION_KEYS = ("q", "plans", "positions", "actions")
 _OUTCOME_KEYS = ("outcome", "outcomes", "outcomes_seen")
@@ -62,6 +58,9 @@ def _each(path: Path, arrays: Arrays, options: ReadOptions) -> Episodes:
 
 def _episodes(path: Path, arrays: Arrays, name: str, options: ReadOptions) -> Episodes:
     keys = options.key or tuple(name for name in _MOTION_KEYS if name in arrays)[:1]
+    if not keys:
+        single = [name for name, array in arrays.items() if array.ndim == 1]
+        keys = tuple(single[i] for i in find_channels(options.joints or (), single) or ())
     key = next((name for name in keys if name not in arrays), None)
     if not keys or key is not None:
         raise FileFormatError(
@@ -70,7 +69,7 @@ def _episodes(path: Path, arrays: Arrays, name: str, options: ReadOptions) -> Ep
         )
     motions = arrays[keys[0]]
     for key in keys:
-        least = 1 if key != keys[0] else 2
+        least = 1 if len(keys) > 1 else 2
         if not least <= arrays[key].ndim <= 3 or arrays[key].dtype.kind not in "fiu":
             raise FileFormatError(
                 f"{path}: {key} has shape {arrays[key].shape} and type {arrays[key].dtype}, "
@@ -78,7 +77,7 @@ def _episodes(path: Path, arrays: Arrays, name: str, options: ReadOptions) -> Ep
             )
     outcomes = next((arrays[name] for name in _OUTCOME_KEYS if name in arrays), None)
     episodes, several = [name], motions.ndim == 3
-    if motions.ndim == 2:
+    if not several:
         motions, outcomes = motions[None], None if outcomes is None else outcomes.reshape(1, -1)
     else:
         episodes = [str(index) for index in range(len(motions))]
@@ -89,22 +88,28 @@ def _episodes(path: Path, arrays: Arrays, name: str, options: ReadOptions) -> Ep
             f"{path}: outcomes have shape {outcomes.shape}, expected numbers of shape "
             f"({len(motions)}, k)"
         )
-    names = tuple(map(str, np.ravel(arrays.get("joint_names", arrays.get("names", ())))))
+    texts = {name: words(array) for name, array in arrays.items() if array.dtype.kind in "SU"}
+    names = next((texts[name] for name in ("joint_names", "names") if name in texts), ())
+    wrong = len(keys) == 1 and len(set(names)) != motions.shape[2]
 
     def episode_of(index: int) -> Recording:
         outcome = None if outcomes is None else outcomes[index]
-        there = {
-            name: array[index] if several and len(array) == len(motions) else array
+        own = {
+            name: array[index] if several and array.shape[:1] == motions.shape[:1] else array
             for name, array in arrays.items()
-            if array.ndim > several and array.dtype.kind in "fiu"
+            if array.dtype.kind in "biuf" and name not in _OUTCOME_KEYS
         }
-        declared = {} if options.time_column == NO_COLUMN else arrays
-        clock = options.clock_among(path, episodes[index], motions.shape[1], there, declared)
-        with_names = names if len(names) == motions.shape[2] or len(keys) == 1 else ()
-        positions, said = joined(keys, there, with_names)
-        beside = moves_beside((*keys, *_OUTCOME_KEYS), there)
-        return recorded(
-            episodes[index], clock, positions, said or names, outcome=outcome, left_out=beside
+        there = {name: array for name, array in own.items() if array.ndim > 0}
+        return recorded_among(
+            path,
+            episodes[index],
+            keys,
+            there,
+            options,
+            texts=texts,
+            stated=own,
+            names=names if wrong else (),
+            outcome=outcome,
         )
 
     for index, episode in enumerate(episodes):

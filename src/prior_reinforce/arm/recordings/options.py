@@ -40,7 +40,7 @@ class ReadOptions:
 
     format: str | None = None
     """Format of the source: npz, csv, lerobot, hdf5, ros, zarr; detected if not given."""
-    key: Annotated[tuple[str, ...] | None, tyro.conf.UseAppendAction] = None
+    key: Annotated[tuple[str, ...], tyro.conf.UseAppendAction] = ()
     """Place of the motion in the source: array of an NPZ, feature of a LeRobot data set, path
     of an HDF5 data set inside an episode, topic of a bag. If not given, the only candidate; give
     it again for what is stored beside it, such as a gripper's opening."""
@@ -100,7 +100,7 @@ class ReadOptions:
     @property
     def given(self) -> dict[str, object]:
         """The options that were given, by field."""
-        return {name: value for name, value in vars(self).items() if value is not None}
+        return {name: value for name, value in vars(self).items() if value not in (None, ())}
 
     def leaves_out(self, episode: str) -> bool:
         """Whether an episode was not asked for."""

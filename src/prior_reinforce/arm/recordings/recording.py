@@ -16,7 +16,7 @@ import numpy as np
 from jaxtyping import Float
 
 from prior_reinforce.arm.recordings.bounds import check_names
-from prior_reinforce.arm.recordings.clock import Clock, Times, says_time
+from prior_reinforce.arm.recordings.clock import Clock, Times
 from prior_reinforce.arm.recordings.units import (
     CHANNEL_UNITS,
     Ambiguity,
@@ -24,7 +24,6 @@ from prior_reinforce.arm.recordings.units import (
     split_unit,
     stated_unit,
 )
-from prior_reinforce.arm.robots.limits import says_no_position
 from prior_reinforce.arrays import Point
 from prior_reinforce.errors import FileFormatError, InvalidDemonstrationsError, PriorReinforceError
 from prior_reinforce.files import without_advice
@@ -36,6 +35,8 @@ Episodes = Iterable[tuple[str, Callable[[], "Recording"]]]
 _POINTER = b"version https://git-lfs.github.com/spec/"
 _LARGEST_POINTER, _MOST_FILES = 1024, 5_000
 """Bytes of a Git LFS pointer (its specification), and files that are looked through for one."""
+_LEAP = 3.0
+"""Steps of a motion, as large as its largest, that make a leap. Ours."""
 NO_COLUMN = "none"
 """Value of `time_column` by which no times are read, and of `episode_column`."""
 EPISODE_COLUMNS = tuple(
@@ -117,7 +118,14 @@ class Recording:
             )
         # A frame that repeats the one before, time and all; another at the same time is an error.
         same = (np.diff(times) == 0) & np.all(np.diff(positions, axis=0) == 0, axis=1)
-        remarks = self.remarks
+        remarks, kept_frames = self.remarks, _without_zeros(positions)
+        if kept_frames < times.size:
+            remarks += (f"{times.size - kept_frames} frames at the end left out, which are all 0",)
+            times, positions, same = (
+                times[:kept_frames],
+                positions[:kept_frames],
+                same[: kept_frames - 1],
+            )
         if np.any(same) and not np.all(same):
             kept = np.concatenate([[True], ~same])
             times, positions = times[kept], positions[kept]
@@ -159,50 +167,18 @@ def recorded(
     return Recording(episode, clock.times, positions, names, **said)
 
 
-def joined(
-    keys: Sequence[str], arrays: Mapping[str, np.ndarray], names: Sequence[str] = ()
-) -> tuple[Positions, tuple[str, ...]]:
-    """Put arrays (T,) and (T, D) of the same frames side by side; `names` are of the first.
+def _without_zeros(positions: Positions) -> int:
+    """Frames without those at the end that are all 0, if the motion does not get there.
 
-    Returns the positions, and their names; none where neither the file nor several keys name them.
+    Zeros fill up what is shorter than others. A motion leaps into them: at least two of its
+    channels, or its only one, at once and by more than in any frames before.
     """
-    columns = [arrays[key] if arrays[key].ndim > 1 else arrays[key][:, None] for key in keys]
-    if len({len(column) for column in columns}) > 1:
-        each = ", ".join(f"{key} has {len(arrays[key])}" for key in keys)
-        raise FileFormatError(f"the arrays have different frames: {each}; take one of them")
-    first = columns[0].shape[1]
-    said = list(names) if len(names) == first else []
-    if len(keys) > 1:
-        said = said or [f"joint{i + 1}" for i in range(first)]
-        for key, column in zip(keys[1:], columns[1:], strict=True):
-            width = column.shape[1]
-            said += [key if width == 1 else f"{key}_{i}" for i in range(width)]
-    return np.concatenate(columns, axis=1).astype(np.float64), tuple(said)
-
-
-def moves_beside(
-    keys: Sequence[str], arrays: Mapping[str, np.ndarray]
-) -> dict[str, tuple[float, float]]:
-    """Return the range of each array of the same frames that moves and is not taken.
-
-    Velocities, times and the like are no positions, and what is as wide as the motion is another
-    reading of it, such as its commands.
-    """
-    motion, found = arrays[keys[0]], {}
-    width = motion.shape[1] if motion.ndim > 1 else 1
-    for name, values in arrays.items():
-        if name in keys or values.ndim not in (1, 2) or len(values) != len(motion):
-            continue
-        narrow = values.ndim == 1 or values.shape[1] < max(width, 2)
-        own = name.rpartition("/")[2]
-        if not narrow or values.dtype.kind not in "fiu" or says_no_position(own):
-            continue
-        columns = values.reshape(len(values), -1).astype(np.float64)
-        columns = columns[:, np.all(np.isfinite(columns), axis=0)]
-        moving = columns[:, np.ptp(columns, axis=0) > 0] if len(columns) > 1 else columns[:, :0]
-        if moving.size and not says_time(own) and not np.all(np.diff(moving, axis=0) > 0):
-            found[name] = float(moving.min()), float(moving.max())
-    return found
+    count = int(np.max(np.flatnonzero(np.any(positions != 0, axis=1)), initial=-1)) + 1
+    if not 2 < count < len(positions) or not np.all(np.isfinite(positions)):
+        return len(positions)
+    steps = np.abs(np.diff(positions[:count], axis=0)).max(axis=0)
+    leaps = (steps > 0) & (np.abs(positions[count - 1]) > _LEAP * steps)
+    return count if np.sum(leaps) >= min(2, positions.shape[1]) else len(positions)
 
 
 def unread() -> Recording:

@@ -8,14 +8,16 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from prior_reinforce.arm.recordings.beside import moves_beside
 from prior_reinforce.arm.recordings.bounds import check_names, check_numbers
 from prior_reinforce.arm.recordings.clock import Times
 from prior_reinforce.arm.recordings.naming import find_channels
@@ -44,6 +46,9 @@ _MOVES, _LEAP, _OFTEN = 0.02, 0.5, 0.05
 """Range in [rad] or [m] that is a motion; part of it that is a leap; share of frames in which no
 joint leaps, but two publishers do in turn. Ours."""
 _STATE, _TRAJECTORY = "sensor_msgs/msg/JointState", "trajectory_msgs/msg/JointTrajectory"
+
+_NUMBERS = re.compile(r"std_msgs/msg/(Bool|U?Int\d+|Float\d+)(MultiArray)?")
+"""Types of messages of numbers alone, as drivers of grippers send them."""
 
 
 class Message(NamedTuple):
@@ -98,24 +103,25 @@ def read(source: Path, options: ReadOptions) -> Episodes:
             definitions = get_typestore(Stores.LATEST)
             with AnyReader(files, default_typestore=definitions) as reader:
                 check_numbers(bag, "all topics", (reader.message_count,))
-                topics = [_topic(bag, reader, key) for key in options.key or (None,)]
-                messages, *beside = (
-                    [
-                        Message(stamp, connection.id, reader.deserialize(raw, connection.msgtype))
-                        for connection, stamp, raw in reader.messages(connections=connections)
-                    ]
-                    for connections, _ in topics
-                )
+                keys = options.key or (None,)
+                topics = [_topic(bag, reader, key, beside=i > 0) for i, key in enumerate(keys)]
+                messages, *beside = (_messages(reader, own) for own, _ in topics)
                 (connections, kind), *_ = topics
-                there = {c.topic for c in reader.connections if _may_move(c)}
-                unread_topics = sorted(there - {of_topic[0].topic for of_topic, _ in topics})
+                taken = {own[0].topic for own, _ in topics}
+                rest = {c.topic: c for c in reader.connections if c.topic not in taken}
+                unread_topics = sorted(n for n, c in rest.items() if c.msgtype == _STATE)
+                moving: dict[str, tuple[float, float]] = {}
+                for c in rest.values():
+                    if _NUMBERS.fullmatch(c.msgtype):
+                        moving |= _moving(c.topic, _messages(reader, [c]))
         if not messages:
             raise FileFormatError(
                 f"{bag}: topic {connections[0].topic} has no messages; drop that bag, or leave it "
                 "out with --leave-out"
             )
         if kind == _STATE:
-            yield name, partial(_states, bag, name, messages, options, beside, unread_topics)
+            there = (beside, unread_topics, moving)
+            yield name, partial(_states, bag, name, messages, options, *there)
             continue
         for index, message in enumerate(messages):
             episode = name if len(messages) == 1 else f"{name}-{index}"
@@ -143,24 +149,45 @@ def _files_of(folder: Path) -> list[Path]:
     return [path for path in folder.iterdir() if path.is_file() and has_suffix(path, _SUFFIXES)]
 
 
-def _may_move(connection: Any) -> bool:
-    """Whether a topic that is not read could hold a part of the motion."""
-    says = re.search("grip|finger|hand|jaw", connection.topic, re.IGNORECASE)
-    number = connection.msgtype.startswith("std_msgs/msg/Float")
-    return connection.msgtype == _STATE or (number and says is not None)
+def _numbers(topic: str, message: Any) -> Any:
+    """A message of numbers as one of joints that are called by its topic; others as they are."""
+    if not hasattr(message, "data"):
+        return message
+    values = np.ravel(np.asarray(message.data, dtype=float))
+    names = [topic] if len(values) == 1 else [f"{topic}_{i}" for i in range(len(values))]
+    return SimpleNamespace(name=names, position=values)
 
 
-def _topic(bag: Path, reader: Any, key: str | None) -> tuple[list[Any], str]:
-    usable = {c.topic: c.msgtype for c in reader.connections if c.msgtype in (_STATE, _TRAJECTORY)}
+def _moving(topic: str, messages: Sequence[Message]) -> dict[str, tuple[float, float]]:
+    """The range of a topic of numbers that is not read, if it moves."""
+    rows = [m.content.position for m in messages]
+    if len(rows) < 2 or len({len(row) for row in rows}) > 1:
+        return {}
+    times = np.array([m.stamp - messages[0].stamp for m in messages]) * 1e-9
+    return moves_beside(np.zeros((len(rows), 1)), {topic: np.array(rows)}, times)
+
+
+def _messages(reader: Any, connections: Sequence[Any]) -> list[Message]:
+    return [
+        Message(stamp, c.id, _numbers(c.topic, reader.deserialize(raw, c.msgtype)))
+        for c, stamp, raw in reader.messages(connections=connections)
+    ]
+
+
+def _topic(bag: Path, reader: Any, key: str | None, *, beside: bool) -> tuple[list[Any], str]:
+    """The connections and the type of a topic of joints; beside another, also of numbers."""
+    kinds = {c.topic: c.msgtype for c in reader.connections}
+    usable = {topic: kind for topic, kind in kinds.items() if kind in (_STATE, _TRAJECTORY)}
     if key is None and len(usable) == 1:
         key = next(iter(usable))
-    if key not in usable:
+    number = beside and _NUMBERS.fullmatch(kinds.get(str(key), "")) is not None
+    if key is None or not (key in usable or number):
         listed = ", ".join(f"{topic} ({kind})" for topic, kind in sorted(usable.items()))
         raise FileFormatError(
             f"{bag}: {'no joint topic ' + key if key else f'{len(usable)} joint topics'}; topics "
             f"of JointState or JointTrajectory are {listed or 'none'}: say which with the key"
         )
-    return [c for c in reader.connections if c.topic == key], usable[key]
+    return [c for c in reader.connections if c.topic == key], kinds[key]
 
 
 def _states(
@@ -170,6 +197,7 @@ def _states(
     options: ReadOptions,
     beside: Sequence[list[Message]],
     unread_topics: Sequence[str],
+    moving: Mapping[str, tuple[float, float]],
 ) -> Recording:
     """One episode of JointStates of one publisher.
 
@@ -217,7 +245,7 @@ def _states(
     sent = [stamp.sec * 10**9 + stamp.nanosec for stamp in header]
     times, source, said = _clock_of(bag, sent, came, options.time_column)
     clock = options.clock(name, len(kept), stamps=times, name=source, unit="ns")
-    return recorded(name, clock, positions, names, remarks=(*remarks, *said))
+    return recorded(name, clock, positions, names, remarks=(*remarks, *said), left_out=moving)
 
 
 def _of_one_publisher(

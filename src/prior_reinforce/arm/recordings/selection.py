@@ -10,15 +10,14 @@ from typing import Literal
 
 import numpy as np
 
+from prior_reinforce.arm.recordings.beside import columns_beside
 from prior_reinforce.arm.recordings.naming import (
-    could_be_forgotten,
     find_channels,
     joint_vectors,
     missing_channels,
     numbered_like,
 )
 from prior_reinforce.arm.recordings.recording import Recording
-from prior_reinforce.arm.recordings.tables import counts
 from prior_reinforce.arm.recordings.units import (
     Ambiguity,
     conversion,
@@ -31,7 +30,6 @@ from prior_reinforce.arm.recordings.units import (
     say_names,
 )
 from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
-from prior_reinforce.plans.signals import held_channels
 from prior_reinforce.plans.whole_turns import TURN, attitudes
 from prior_reinforce.units import base_of
 
@@ -124,7 +122,7 @@ def select(
             f"{n_units} units: {list(joints)}"
         )
     joints, guessed = _guess_names(recordings[0], joints) if unnamed else (joints, ())
-    columns = [_columns(recording, joints) for recording in recordings]
+    columns = [_columns(recording, joints, names) for recording in recordings]
     said = [
         _said_unit(recordings, columns, i, None if spread is None else spread[i])
         for i in range(len(joints))
@@ -188,6 +186,8 @@ def _guess_names(
     recording: Recording, joints: tuple[str, ...]
 ) -> tuple[tuple[str, ...], tuple[Ambiguity, ...]]:
     """The recorded names of the joints, if they can only be guessed: `q0`, `q1`, ..."""
+    if any(one.option.startswith("--joints") for one in recording.ambiguities):
+        return joints, ()
     own = recording.columns != recording.names  # numbered columns of a log whose order is known
     if not (recording.named or own) and len(recording.names) == len(joints) > 1:
         what = f"{recording.episode} names no columns: it looks as if they were {say_names(joints)}"
@@ -201,7 +201,7 @@ def _guess_names(
     return found, (Ambiguity(what, f"--joints {shlex.join(found)}"),)
 
 
-def _columns(recording: Recording, joints: tuple[str, ...]) -> list[int]:
+def _columns(recording: Recording, joints: tuple[str, ...], names: tuple[str, ...]) -> list[int]:
     found = find_channels(joints, recording.names)
     if found is not None:
         return found
@@ -220,7 +220,8 @@ def _columns(recording: Recording, joints: tuple[str, ...]) -> list[int]:
             f"{len(joints)} joints were given; name all its columns in order, or give some of "
             f"{there}"
         )
-    return list(range(len(joints)))
+    # Columns without names are called by the joints, which may be the plan's in another order.
+    return find_channels(names, joints) or list(range(len(joints)))
 
 
 def _picked(recording: Recording, columns: list[int], joints: tuple[str, ...]) -> Recording:
@@ -254,21 +255,9 @@ def _left_out(recordings: Sequence[Recording], columns: Sequence[list[int]]) -> 
     """Channels that move and are not selected, with their ranges over all recordings."""
     ranges: dict[str, list[tuple[float, float]]] = {}
     for recording, taken in zip(recordings, columns, strict=True):
-        for name, span in recording.left_out.items():
+        beside = columns_beside(recording.columns, recording.positions, taken, recording.times)
+        for name, span in (*recording.left_out.items(), *beside.items()):
             ranges.setdefault(name, []).append(span)
-        others = [i for i in range(len(recording.names)) if i not in taken]
-        names = recording.names
-        moving = could_be_forgotten([names[i] for i in others], [names[i] for i in taken])
-        for i in others:
-            values = recording.positions[:, i]
-            values = values[np.isfinite(values)]
-            if recording.names[i] not in moving or len(values) < 2 or counts(values):
-                continue
-            if np.ptp(values) <= 1e-9 * np.abs(values).max():
-                continue
-            if not held_channels([values[:, None]], (recording.units[i] or "",))[0]:
-                span = float(values.min()), float(values.max())
-                ranges.setdefault(recording.columns[i], []).append(span)
     said = [
         f"{name}, {min(low for low, _ in spans):.4g} to {max(high for _, high in spans):.4g}"
         for name, spans in ranges.items()

@@ -17,16 +17,14 @@ from typing import Any
 
 import numpy as np
 
+from prior_reinforce.arm.recordings.beside import may_move, recorded_among, words
 from prior_reinforce.arm.recordings.bounds import check_bytes, check_chunks, check_numbers
 from prior_reinforce.arm.recordings.clock import Stamps
 from prior_reinforce.arm.recordings.options import ReadOptions
 from prior_reinforce.arm.recordings.recording import (
     Episodes,
     Recording,
-    joined,
-    moves_beside,
     named_damage,
-    recorded,
 )
 from prior_reinforce.errors import FileFormatError
 from prior_reinforce.files import require_inside
@@ -75,27 +73,29 @@ def read(source: Path, options: ReadOptions) -> Episodes:
         if _ENDS not in arrays:
             raise FileFormatError(f"{source} has no numbers at {_ENDS}; copy the store again")
         ends = np.asarray(_numbers(source, group, arrays, _ENDS), dtype=np.int64).ravel()
-        narrow = {n for n in there if arrays[f"data/{n}"][0][1:] < arrays[f"data/{keys[0]}"][0][1:]}
+        shapes = {name: arrays[f"data/{name}"][0] for name in there}
+        count = shapes[keys[0]][0]
         numbers = {
-            n: _numbers(source, group, arrays, f"data/{n}") for n in sorted({*keys, *narrow})
+            name: _numbers(source, group, arrays, f"data/{name}")
+            for name, (frames, *width) in shapes.items()
+            if name in keys
+            or (frames == count and (not width or (len(width) == 1 and may_move(name, width[0]))))
         }
-        positions, names = joined(keys, numbers)
-        numbers = {name: array for name, array in numbers.items() if len(array) == len(positions)}
+        nodes = (group[f"data/{keys[0]}"], group["data"], group)
+        texts = {name: words(said) for node in nodes[::-1] for name, said in node.attrs.items()}
     if ends.size == 0:
         raise FileFormatError(f"{source} holds no episode; copy the store again")
     starts = np.concatenate([[0], ends[:-1]])
-    if np.any(ends <= starts) or ends[-1] != len(positions):
+    if np.any(ends <= starts) or ends[-1] != count:
         raise FileFormatError(
-            f"{source}: episodes end at {ends[:8].tolist()} but there are {len(positions)} frames; "
+            f"{source}: episodes end at {ends[:8].tolist()} but there are {count} frames; "
             "copy the store again"
         )
     for number, (start, end) in enumerate(zip(starts.tolist(), ends.tolist(), strict=True)):
 
         def one(episode: str = str(number), start: int = start, end: int = end) -> Recording:
             own = {name: array[start:end] for name, array in numbers.items()}
-            clock = options.clock_among(source, episode, end - start, own)
-            beside = moves_beside(keys, own)
-            return recorded(episode, clock, positions[start:end], names, left_out=beside)
+            return recorded_among(source, episode, keys, own, options, texts=texts)
 
         yield str(number), one
 

@@ -1,0 +1,326 @@
+"""What a file holds beside the motion: its names and units, its length, and what else moves.
+
+Recorders call these things as they like. So they are told by what they hold: names are texts, as
+many as the columns; a command repeats the motion; a clock runs with it.
+"""
+
+from __future__ import annotations
+
+import re
+import shlex
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from prior_reinforce.arm.recordings.clock import Clock, Times, says_time
+from prior_reinforce.arm.recordings.naming import missing_channels, vectors
+from prior_reinforce.arm.recordings.recording import (
+    NO_COLUMN,
+    Positions,
+    Recording,
+    recorded,
+    without_units,
+)
+from prior_reinforce.arm.recordings.units import (
+    CHANNEL_UNITS,
+    SECONDS,
+    Ambiguity,
+    is_no_angle,
+    known_unit,
+    say_names,
+)
+from prior_reinforce.arm.robots.limits import says_no_position
+from prior_reinforce.errors import FileFormatError
+from prior_reinforce.plans.signals import held_channels
+from prior_reinforce.plans.whole_turns import TURN
+
+if TYPE_CHECKING:
+    from prior_reinforce.arm.recordings.options import ReadOptions
+
+Arrays = Mapping[str, np.ndarray]
+Texts = Mapping[str, tuple[str, ...]]
+"""Texts of a file, by what it calls them."""
+_MOST_BESIDE = 64
+"""Numbers a frame of what may be a part of the motion; ours: two hands have fewer, a lidar more."""
+_NAMES = re.compile(r"name|joint|dof|motor|actuator|channel|column|label|ax[ei]s", re.IGNORECASE)
+_OTHER_NAMES = re.compile(r"link|body|bodies|camera|task|object|site|sensor|frame", re.IGNORECASE)
+_ELSE = re.compile(
+    r"(^|/)(next_obs|env_states?|timestamps?)/|(^|[/.])(actions?|states|objects?)$|(^|[/._])"
+    r"(rewards?|dones?|success(es)?|terminals?|terminated|truncated|discounts?)$|(^|[/._])(cos|sin"
+    r"|modes?|status)($|_)|volt|control_output|camera|image|f_ext|dtheta",
+    re.IGNORECASE,
+)
+"""Names of what moves and is no part of an arm: outcomes and whole states of a simulator."""
+_COUNTER = re.compile(r"(^|[^a-z])(seq|frame|index|idx|count|counter|tick|row|nr|step)s?($|[^a-z])")
+_FRAMES = re.compile(
+    r"lengths?|(n|num)_?(frames|steps|samples)|(episode|traj|trajectory|sequence)_(len|lengths?)"
+)
+_MASK = re.compile(
+    r"((is|frame|attention|episode)_)?(pad|padded|padding|valid|masks?|(pad|padding|valid)_mask)"
+)
+_SAME, _SHIFTS = 0.3, 21
+"""Part of its spread by which a reading may differ from another, and delays that are tried, up to a
+fifth of the recording either way. Ours: a command differs by what a controller lags behind."""
+_SCALES = (1.0, TURN["deg"] / TURN["rad"], TURN["rad"] / TURN["deg"], 1000.0, 100.0, 0.01, 0.001)
+"""Factors between readings in two units."""
+_SAME_CLOCK = 0.01
+"""Share by which two clocks of a recording differ at most. Ours."""
+
+
+def recorded_among(
+    where: Path,
+    episode: str,
+    keys: Sequence[str],
+    arrays: Arrays,
+    options: ReadOptions,
+    *,
+    texts: Texts,
+    stated: Mapping[str, Any] | None = None,
+    names: Sequence[str] = (),
+    clock: Clock | None = None,
+    **more: Any,
+) -> Recording:
+    """Return the recording whose motion is the arrays `keys`, (T,) or (T, D), side by side.
+
+    `arrays` are all that may say something of it, `texts` what the file says in words, and `stated`
+    further numbers, of which one may count frames, or be the rate. `names` are those of the columns
+    if they are known.
+    """
+    count = len(arrays[keys[0]])
+    kept, why = frames_said(f"{where}: {episode}", keys[0], {**(stated or {}), **arrays}, count)
+    arrays = {n: a[:kept] if a.shape[:1] == (count,) else a for n, a in arrays.items()}
+    positions, known = joined(where, keys, arrays, texts, options.joints)
+    bare, units = without_units(names or known)
+    said = units_said(texts, bare or ("",) * positions.shape[1])
+    units = tuple(a or b for a, b in zip(said, units or (None,) * len(said), strict=False))
+    if clock is None:
+        declared = None if options.time_column == NO_COLUMN else stated
+        clock = options.clock_among(where, episode, kept, arrays, declared)
+    others = {name: array for name, array in arrays.items() if name not in keys}
+    more = {"left_out": moves_beside(positions, others, clock.times)} | more
+    more["remarks"] = (*more.get("remarks", ()), *why)
+    if not bare:
+        unclear = _other_names(episode, texts, positions.shape[1], options.joints or ())
+        more["ambiguities"] = (*clock.ambiguities, *unclear)
+    return recorded(episode, clock, positions, bare, units=units, **more)
+
+
+def _other_names(
+    episode: str, texts: Texts, count: int, joints: Sequence[str]
+) -> Iterator[Ambiguity]:
+    """Ask about texts that hold wanted joints and are not as many as the columns."""
+    for key, own in texts.items():
+        missing = missing_channels(joints, own)
+        if len(missing) < len(joints) and tuple(joints)[: len(own)] != own:
+            order = shlex.join((*own, *missing)) if len(own) + len(missing) == count else "NAME ..."
+            what = f"{episode} has {count} columns, and {key} names {say_names(own)}"
+            what += ": it looks as if these were the first, in that order"
+            yield Ambiguity(what, f"--joints {order}")
+            return
+
+
+def joined(
+    where: Path,
+    keys: Sequence[str],
+    arrays: Arrays,
+    texts: Texts,
+    joints: Sequence[str] | None = None,
+) -> tuple[Positions, tuple[str, ...]]:
+    """Put arrays (T,) and (T, D) of the same frames side by side, with the names of the columns.
+
+    Names are of all columns, or of the first array's; without any, several keys name the columns.
+    """
+    columns = [arrays[key] if arrays[key].ndim > 1 else arrays[key][:, None] for key in keys]
+    if len({len(column) for column in columns}) > 1:
+        each = ", ".join(f"{key} has {len(arrays[key])}" for key in keys)
+        raise FileFormatError(f"the arrays have different frames: {each}; take one of them")
+    widths = [column.shape[1] for column in columns]
+    said = list(names_said(where, texts, sum(widths), joints))
+    if len(keys) > 1 and not said:
+        said = list(names_said(where, texts, widths[0], joints)) if widths[0] > 1 else [keys[0]]
+        said = said or [f"joint{i + 1}" for i in range(widths[0])]
+        for key, width in zip(keys[1:], widths[1:], strict=True):
+            said += [key if width == 1 else f"{key}_{i}" for i in range(width)]
+    return np.concatenate(columns, axis=1).astype(np.float64), tuple(said)
+
+
+def names_said(
+    where: object, texts: Texts, count: int, joints: Sequence[str] | None = None
+) -> tuple[str, ...]:
+    """Return the names that a file's texts give to so many columns; none if none fit.
+
+    Texts that hold a wanted joint are names, whatever they are called; others if they are called
+    so. FileFormatError where two contradict each other.
+    """
+    wanted = tuple(joints or ())
+    fit = {
+        key: own
+        for key, own in texts.items()
+        if len(own) == len(set(own)) == count and all(own) and not says_no_position(key)
+        if not all(known_unit(word) for word in own)
+    }
+    sure = {k: own for k, own in fit.items() if len(missing_channels(wanted, own)) < len(wanted)}
+    called = {k: own for k, own in fit.items() if _NAMES.search(k) and not _OTHER_NAMES.search(k)}
+    found = {own: key for key, own in (sure or called).items()}
+    if len(found) > 1:
+        each = "; ".join(f"{key} says {say_names(own)}" for own, key in found.items())
+        raise FileFormatError(
+            f"{where} names the columns in two ways: {each}; keep the right one in the file"
+        )
+    return next(iter(found), ())
+
+
+def units_said(texts: Texts, names: Sequence[str]) -> tuple[str | None, ...]:
+    """Return the unit of each column as a file's texts state it; none if they state no unit.
+
+    A single angle's unit holds for all but grippers.
+    """
+    for key, own in texts.items():
+        if "unit" not in key.lower() or says_time(key) or len(own) not in (1, len(names)):
+            continue
+        units = [unit if unit in CHANNEL_UNITS else None for unit in map(known_unit, own)]
+        if any(units) and len(own) == 1:
+            no_angle = units[0] in TURN
+            units = [None if no_angle and is_no_angle(name) else units[0] for name in names]
+        if any(units):
+            return tuple(units)
+    return (None,) * len(names)
+
+
+def words(said: Any) -> tuple[str, ...]:
+    """Return the texts of an array, or of one text that lists several; none if they are none."""
+    found = [t.decode(errors="replace") if isinstance(t, bytes) else t for t in _flat(said)]
+    if not all(isinstance(text, str) for text in found):
+        return ()
+    if len(found) == 1:
+        text = found[0].strip().strip("[]()")
+        found = text.split(",") if "," in text else text.split()
+    return tuple(str(text).strip().strip("'\"") for text in found)
+
+
+def _flat(said: Any) -> list[Any]:
+    if isinstance(said, np.ndarray):
+        return list(said.ravel().tolist())
+    return list(said) if isinstance(said, (list, tuple)) else [said]
+
+
+def frames_said(
+    where: str, key: str, stated: Mapping[str, Any], count: int
+) -> tuple[int, tuple[str, ...]]:
+    """Return how many of the frames were recorded, the rest being padding, and a remark on it.
+
+    A number of frames says so, or a mask that is one thing for the first frames and another for the
+    rest. FileFormatError where frames beyond that number move.
+    """
+    found, kept = "", count
+    for name, value in stated.items():
+        own, numbers = name.rpartition("/")[2].lower(), np.asarray(value)
+        n = count
+        if _MASK.fullmatch(own) and numbers.shape == (count,) and numbers.dtype.kind in "biuf":
+            real = numbers.astype(bool) == bool(numbers[0])
+            n = int(np.argmin(np.append(real, False)))
+            n = count if np.any(real[n:]) else n
+        elif _FRAMES.fullmatch(own) and numbers.size == 1 and numbers.dtype.kind in "iu":
+            n = int(numbers.reshape(()))
+            rest = np.nan_to_num(np.asarray(stated[key], dtype=float)[n:])
+            if 0 < n < count and np.any(np.diff(rest, axis=0)):
+                raise FileFormatError(
+                    f"{where} declares {n} samples by {name} but {key} holds {count}; copy the "
+                    "file again, or leave that episode out"
+                )
+        if 1 < n < kept:
+            found, kept = name, n
+    remark = f"{count - kept} frames at the end left out, which are padding by {found}"
+    return kept, (remark,) * (kept < count)
+
+
+def columns_beside(
+    names: Sequence[str], values: Positions, taken: Sequence[int], times: Times
+) -> dict[str, tuple[float, float]]:
+    """Return the range of each column that moves beside those taken; numbered ones are a group."""
+    others = [i for i in range(len(names)) if i not in taken]
+    groups = [[others[i] for i in g] for g in vectors([names[i] for i in others]).values()]
+    in_groups = {i for group in groups for i in group}
+    groups += [[i] for i in others if i not in in_groups]
+    arrays = {say_names([names[i] for i in group]): values[:, group] for group in groups}
+    return moves_beside(values[:, list(taken)], arrays, times)
+
+
+def moves_beside(motion: Positions, others: Arrays, times: Times) -> dict[str, tuple[float, float]]:
+    """Return the range of each array of the same frames that moves and is not taken.
+
+    Not listed are clocks, other readings of the motion such as its commands, and what is named like
+    rates, forces, poses, or anything else that is no part of an arm.
+    """
+    found = {}
+    for name, values in others.items():
+        if (
+            values.ndim not in (1, 2)
+            or len(values) != len(motion)
+            or values.dtype.kind not in "biuf"
+        ):
+            continue
+        columns = values.reshape(len(values), -1).astype(np.float64)
+        if not may_move(name, columns.shape[1]):
+            continue
+        moving = columns[:, [i for i in range(columns.shape[1]) if _moves(columns[:, i])]]
+        clocks = all(is_clock(name, column, times) for column in moving.T)
+        if not clocks and not _follows(columns, motion):
+            found[name] = float(np.nanmin(moving)), float(np.nanmax(moving))
+    return found
+
+
+def may_move(name: str, width: int) -> bool:
+    """Whether an array of so many numbers a frame could be a part of the motion, by its name."""
+    own = name.rpartition("/")[2]
+    no_motion = says_no_position(own) or says_time(own) or _MASK.fullmatch(own)
+    return width <= _MOST_BESIDE and not no_motion and not _ELSE.search(name)
+
+
+def is_clock(name: str, values: Times, times: Times) -> bool:
+    """Whether a column tells the time or counts frames: by its name, or by how fast it rises."""
+    steps = np.diff(values)
+    seconds = times[-1] - times[0]
+    if len(steps) < 2 or not np.all(steps > 0) or seconds <= 0:
+        return False
+    whole = bool(np.all(values % 1 == 0))
+    if says_time(name) or (whole and (np.median(steps) == 1 or _COUNTER.search(name.lower()))):
+        return True
+    rates = [(values[-1] - values[0]) * scale / seconds for scale in SECONDS.values()]
+    line = values[0] + (values[-1] - values[0]) * (times - times[0]) / seconds
+    near = np.abs(values - line).max() <= 3 * np.median(steps)
+    return bool(near and any(abs(rate - 1) < _SAME_CLOCK for rate in rates))
+
+
+def _moves(values: Times) -> bool:
+    """Whether what there is of a column moves, other than by noise."""
+    values = values[np.isfinite(values)]
+    if len(values) < 2 or np.ptp(values) <= 1e-9 * np.abs(values).max():
+        return False
+    return not held_channels([values[:, None]], ("rad",))[0]
+
+
+def _follows(values: np.ndarray, motion: Positions) -> bool:
+    """Whether columns are another reading of the motion's: in another unit, from another zero."""
+    width, most = values.shape[1], motion.shape[1]
+    if width > most and width % most == 0:  # several vectors under one name
+        return all(_follows(values[:, k :: width // most], motion) for k in range(width // most))
+    finite = np.all(np.isfinite(np.concatenate([values, motion], axis=1)), axis=1)
+    values, motion = values[finite], motion[finite]
+    if not max(2, most / 2) <= width <= most or not len(values):
+        return False
+    delays = np.unique(np.linspace(-(len(values) // 5), len(values) // 5, _SHIFTS).astype(int))
+    for first in range(most - width + 1):
+        own = motion[:, first : first + width]
+        for delay in sorted(delays.tolist(), key=abs):
+            one = values[max(0, delay) : len(values) + min(0, delay)]
+            two = own[max(0, -delay) : len(own) - max(0, delay)]
+            one, two = one - one.mean(axis=0), two - two.mean(axis=0)
+            spread = np.std(two, axis=0)
+            spread = np.maximum(spread, np.median(spread))
+            for scale in _SCALES:
+                if np.all(np.std(one - scale * two, axis=0) <= _SAME * scale * spread):
+                    return True
+    return False
