@@ -123,6 +123,8 @@ def select(
         )
     joints, guessed = _guess_names(recordings[0], joints) if unnamed else (joints, ())
     columns = [_columns(recording, joints, names) for recording in recordings]
+    if spread is not None and given == "each" and not recordings[0].named:
+        spread = [spread[i] for i in find_channels(names, joints) or range(len(joints))]
     said = [
         _said_unit(recordings, columns, i, None if spread is None else spread[i])
         for i in range(len(joints))
