@@ -9,12 +9,11 @@ from prior_reinforce.generators import make_generator
 from reproduction.evaluation import LearnedGenerator, Training
 from reproduction.recipes import Scale
 from reproduction.recipes.papers_loop import (
-    FORMS,
+    FRAMES,
     GATE,
     KNOWN,
-    OWN_SIZE,
     RECIPE,
-    SMALL,
+    SPLINES,
     Executable,
     PerceivedGoalTrials,
     units,
@@ -27,17 +26,13 @@ TINY = (
 )
 
 
-def test_one_training_a_set_and_form_with_the_own_size_alone_on_the_gpu():
+def test_one_training_a_set_and_code_serves_everything():
     planned = units(Scale(device="cuda"))
     trainings = {unit.training for unit, _ in planned}
-    assert {t.generator for t in trainings} == {form.generator for form in FORMS}
-    assert {t.perception for t in trainings} == {"camera"}
-    by = {f.generator: sorted(t.demonstrations for t in trainings if t.generator == f.generator)
-          for f in FORMS}  # fmt: skip
-    assert by[OWN_SIZE] == ["A", "B"]
-    assert by[SMALL] == ["A", "B"]
-    on_gpu = {t.generator for t in trainings if t.device == "cuda"}
-    assert on_gpu == {form.generator for form in FORMS if form.own_size}
+    assert {(t.generator, t.demonstrations) for t in trainings} == {
+        (generator, name) for generator in (FRAMES, SPLINES) for name in ("A", "B")
+    }
+    assert {(t.perception, t.device) for t in trainings} == {("camera", "cuda")}
 
 
 @pytest.fixture(scope="module")

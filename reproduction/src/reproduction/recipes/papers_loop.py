@@ -1,9 +1,9 @@
-"""The paper's loop as the paper has it, at the paper's own size and at one that a core learns.
+"""The paper's loop as the paper has it, at the paper's own size: 256, 512 and 1024, Mish.
 
 Outcomes of the demonstrations are read by a camera, so is each goal, once; for every trial the
 network is sampled anew, and the paper's Gaussian process corrects the condition from what is seen
-by eye. Controls: goals known exactly; then one noise for all trials, or no adapter. The own size
-(256, 512 and 1024, Mish) wants a GPU: three minutes a training there, four hours of two cores.
+by eye. Controls: goals known exactly; then one noise for all trials, or no adapter. The networks
+want a GPU: three minutes a training there beside another, four hours of two cores.
 
 The paper does not say how its plans reach the arm, whose controllers are low-pass filters. Plans of
 the network's raw frames, smoothed ones, and ones of a network that learns spline control points are
@@ -30,15 +30,14 @@ from prior_reinforce.simulation.protocol import is_hit
 from prior_reinforce.simulation.tasks import make_task
 from reproduction.evaluation import GOAL_SEED, OfTraining, Training, Trials, ZeroShot
 from reproduction.recipes.base import TASK, Planned, Recipe, Scale
-from reproduction.recipes.generators import PAPERS_FORM, FreshNoise, FreshNoiseTrials
+from reproduction.recipes.generators import FreshNoise, FreshNoiseTrials
 from reproduction.recipes.tables import Columns, Table, mean_of
 from reproduction.results import FIRST, TRIALS, Results, column, reached, rows_of
 from reproduction.statistics import SHARE
 
-OWN_SIZE = "diffusion-paper,training_steps=20000"
-OWN_SIZE_SPLINES = "diffusion-paper,training_steps=6000,representation=splines"
+FRAMES = "diffusion-paper,training_steps=20000"
+SPLINES = "diffusion-paper,training_steps=6000,representation=splines"
 """On spline control points; as many steps as there was time for on the GPU."""
-SMALL, SMALL_SPLINES = PAPERS_FORM, f"{PAPERS_FORM},representation=splines"
 _VARIANTS = {"V1": "basketball-v1", "V2": "basketball-v2", "V3": "basketball-v3"}
 LOOP, EXACT = "the paper's loop", "goals known exactly"
 ONE_NOISE, ALONE = f"{EXACT}, one noise for all trials", f"{EXACT}, no adapter"
@@ -112,66 +111,40 @@ def smoothed(generator: Generator, frames: float) -> Generator:
     return other
 
 
-@dataclass(frozen=True)
-class Form:
-    """What the paper's generator is learned as."""
-
-    label: str
-    """For tables."""
-    generator: str
-    """Its choice."""
-    own_size: bool
-    """Of the paper's size: on V2 and V3 too, and on a GPU where one is asked for."""
-    splines: bool = False
-    """On spline control points: tried on V1, unsmoothed."""
-
-
-FORMS = (
-    Form("own size", OWN_SIZE, own_size=True),
-    Form("small", SMALL, own_size=False),
-    Form("own size, splines", OWN_SIZE_SPLINES, own_size=True, splines=True),
-    Form("small, splines", SMALL_SPLINES, own_size=False, splines=True),
-)
-
-
 def units(scale: Scale, include: Sequence[str] = ()) -> list[Planned]:
-    """Every form's trials and plans, of one training a set."""
-    return [
-        planned
-        for form in FORMS
-        for name in scale.sets
-        for planned in _of_training(
-            form,
-            Training(
-                TASK, name, form.generator, scale.seeds[0], perception="camera",
-                device=scale.device if form.own_size else "cpu",
-            ),
-            scale,
-        )
-    ]  # fmt: skip
+    """Trials and plans of one training a set, of raw frames and of spline control points."""
+    planned = list[Planned]()
+    for coded, generator in (("frames", FRAMES), ("splines", SPLINES)):
+        for name in scale.sets:
+            training = Training(
+                TASK, name, generator, scale.seeds[0], perception="camera", device=scale.device
+            )
+            planned += _of_training(coded, training, scale)
+    return planned
 
 
-def _of_training(form: Form, training: Training, scale: Scale) -> list[Planned]:
+def _of_training(coded: str, training: Training, scale: Scale) -> list[Planned]:
     """The loop on variants of the hardware, its controls on V1; plans before the gate."""
 
     def tried(kind: type[Trials], adapter: str, variant: str, method: str) -> Planned:
         unit = scale.trials(training, adapter, "eye", task=_VARIANTS[variant])
-        told = {"condition": f"{variant}, by eye", "method": f"{form.label}: {method}"}
+        told = {"condition": f"{variant}, by eye", "method": f"{coded}: {method}"}
         return kind(**vars(unit)), told
 
+    raw = coded == "frames"
     planned = [
         tried(PerceivedGoalTrials, "gp", variant, LOOP)
-        for variant in (_VARIANTS if form.own_size and not form.splines else ("V1",))
+        for variant in (_VARIANTS if raw else ["V1"])
     ]
-    if not form.splines:
+    if raw:
         planned += [
             tried(FreshNoiseTrials, "gp", "V1", EXACT),
             tried(Trials, "gp", "V1", ONE_NOISE),
             tried(FreshNoiseTrials, "frozen", "V1", ALONE),
         ]
-    planned.append((ZeroShot(training), {"condition": KNOWN, "method": form.label}))
-    for by in _SMOOTHINGS[:1] if form.splines else _SMOOTHINGS:
-        method = f"{form.label}, smoothed by {1000 * by:.0f} ms" if by else form.label
+    planned.append((ZeroShot(training), {"condition": KNOWN, "method": coded}))
+    for by in _SMOOTHINGS if raw else _SMOOTHINGS[:1]:
+        method = f"{coded}, smoothed by {1000 * by:.0f} ms" if by else coded
         told = {"condition": GATE, "method": method}
         planned.append((Executable(training, scale.goals, by), told))
     return planned

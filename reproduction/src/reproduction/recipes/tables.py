@@ -9,7 +9,7 @@ from typing import Any
 from reproduction.results import TRIALS, Measure, Results, reached
 from reproduction.statistics import Interval
 
-_ROUNDS_SHOWN = (1, 2, 4, 10)
+_ROUNDS_SHOWN = (1, 4, 10)
 Columns = Mapping[str, Callable[[Any], object]]
 """What each column of a table shows of a row, by its head."""
 
