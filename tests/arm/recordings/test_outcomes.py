@@ -326,7 +326,7 @@ def test_a_thousand_that_may_be_one_and_a_half_is_doubted(tmp_path, rows, doubte
     if not doubted:
         assert read_outcomes(path).values.shape == (2, 2)
         return
-    with pytest.raises(FileFormatError, match=r"line 2: x \[mm\] is '1.488' beside '902'.*1.4880"):
+    with pytest.raises(FileFormatError, match=r"line 2: x \[mm\] is '1.488' beside 902.*1.4880"):
         read_outcomes(path)
 
 
@@ -346,7 +346,7 @@ def test_a_point_before_three_digits_between_semicolons_is_doubted(tmp_path, hea
     if not doubted:
         assert abs(read_outcomes(path).values).max() < 100
         return
-    with pytest.raises(FileFormatError, match=r"line 2: x \[m[ml]\] is '1.012' beside '; between"):
+    with pytest.raises(FileFormatError, match=r"line 2: x \[m[ml]\] is '1.012' beside semicolons"):
         read_outcomes(path)
 
 

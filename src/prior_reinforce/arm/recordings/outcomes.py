@@ -41,6 +41,7 @@ SD = "sd"
 """Column of the standard deviation of a row's components."""
 _HUNDREDS = re.compile(r"[+-]?[1-9]\d\d+")
 _THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}([.,]\d{3})+")
+_SEMICOLONS = "semicolons, where a comma is the decimal sign"
 _FAR, _FEW = 10.0, 3
 """Times as far as all others that an outcome is in another unit, and outcomes of which it is not
 yet known how far they lie apart. Ours."""
@@ -206,12 +207,12 @@ def _doubt_thousands(path: Path, table: Table, columns: Mapping[int, str | None]
         # Without a unit, 1.488 is in metres, and 1488 would be found to be in millimetres.
         for i, (base, scale) in ((i, base_of(unit)) for i, unit in columns.items() if unit):
             most = float(np.nanmax(np.abs(table.values[:, i]), initial=0.0)) * scale
-            beside += ["; between cells"] * is_possible(base, 1000 * most)
+            beside += [_SEMICOLONS] * is_possible(base, 1000 * most)
     if signed and beside and all(_THOUSANDS.fullmatch(cell) for cell, _, _ in signed):
         cell, row, column = signed[0]
         raise FileFormatError(
             f"{path}, line {table.lines[row]}: {table.names[column]} is {cell!r} beside "
-            f"{beside[0]!r}; if that is a thousand, write it without a sign, else write {cell}0"
+            f"{beside[0]}; if that is a thousand, write it without a sign, else write {cell}0"
         )
 
 
