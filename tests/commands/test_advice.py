@@ -4,6 +4,8 @@ import re
 
 import pytest
 
+import prior_reinforce as pr
+from prior_reinforce.arm.workspace.workspace import Workspace
 from prior_reinforce.commands import advice
 from tests.arm.workspace.planar import events_in
 
@@ -32,5 +34,26 @@ def test_advice_needs_an_adapter_that_knows_probabilities(run, folder):
 
 
 def test_advice_needs_a_goal_and_a_png(run, folder):
-    assert "set one" in run("advise", folder)[2]
+    assert "set a goal first" in run("advise", folder)[2]
     assert ".png" in run("advise", folder, "--out", "map.jpg")[2]
+
+
+@pytest.mark.slow
+def test_before_a_goal_it_draws_what_moved_motions_can_reach(run, tmp_path):
+    folder = tmp_path / "hoop"
+    one = pr.make_task("basketball-v1").demonstrations("A").only([0]).without_symmetry()
+    with Workspace.create(folder, symmetry="carried", no_box=True) as hoop:
+        hoop.import_demonstrations(one, "a throw")
+        model = hoop.learn().model
+    status, out, _ = run("advise", folder)
+    assert status == 0
+    share = int(re.search(r"(\d+)% of the goals as far as motions may be moved", out)[1])
+    assert 20 < share < 90
+    picture = folder / "pictures" / f"reach-{model}.png"
+    assert f"picture: {picture}" in out
+    assert picture.is_file()
+    run("goal", folder, "1.0", "0.1")
+    run("ask", folder)
+    run("tell", folder, 1, "hit")
+    assert run("report", folder)[0] == 0
+    assert "What can be reached" in (folder / "report" / "report.html").read_text()

@@ -6,12 +6,14 @@ import pytest
 from prior_reinforce.arm.robots.presets import robot_limits
 from prior_reinforce.errors import OutOfReachError
 from prior_reinforce.generators import make_generator
-from prior_reinforce.generators.reach import reach, refusal
+from prior_reinforce.generators.reach import goals_around, reach, refusal
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.plans.plan_format import PlanFormat
 from prior_reinforce.plans.symmetry import TurnJoint, TurnPath, turn_and_scale
 
-REGION = np.array([[0.5, -0.6], [1.5, 0.6]])
+GOALS = np.stack(
+    np.meshgrid(np.linspace(0.5, 1.5, 7), np.linspace(-0.6, 0.6, 7), indexing="ij"), -1
+)
 
 
 def learned(symmetry, outcome=(1.0, 0.0)):
@@ -36,17 +38,16 @@ def test_goals_are_reached_where_their_plans_pass():
     assert refusal(generator, [1.0, 0.0], gentle) == ""
     assert "joint1" in refusal(generator, [1.0, 0.6], gentle)
     assert "too fast" in refusal(generator, [1.5, 0.0], gentle)
-    found = reach(generator, REGION, gentle, steps=7)
+    found = reach(generator, GOALS, gentle)
     assert found.reached.shape == (7, 7)
-    at = {(x, y): found.reached[j, i] for i, x in enumerate(found.x) for j, y in enumerate(found.y)}
-    for goal, reached in at.items():
+    for goal, reached in zip(GOALS.reshape(-1, 2), found.reached.ravel(), strict=True):
         assert reached == (refusal(generator, goal, gentle) == "")
     assert 0 < found.reached.mean() < 1
 
 
 def test_the_nearest_goal_that_passes_is_found_at_the_edge():
     generator = learned(turn_and_scale(TurnJoint()))
-    found = reach(generator, REGION, gentle, steps=7)
+    found = reach(generator, GOALS, gentle)
     np.testing.assert_array_equal(found.nearest(generator, [1.0, 0.1], gentle), [1.0, 0.1])
     near = found.nearest(generator, [1.0, 0.6], gentle)
     assert refusal(generator, near, gentle) == ""
@@ -56,7 +57,7 @@ def test_the_nearest_goal_that_passes_is_found_at_the_edge():
 
 def test_nothing_in_reach_is_said():
     generator = learned(turn_and_scale(TurnJoint()))
-    found = reach(generator, REGION, lambda *_: "never", steps=3)
+    found = reach(generator, GOALS[::3, ::3], lambda *_: "never")
     with pytest.raises(OutOfReachError, match=r"no goal can be reached .*never"):
         found.nearest(generator, [1.0, 0.0], lambda *_: "never")
 
@@ -66,3 +67,16 @@ def test_what_kinematics_cannot_do_is_out_of_reach_by_name():
     generator = learned(turn_and_scale(turn, (1.2, 0.0)), outcome=(1.5, 0.0))
     assert refusal(generator, [1.5, 0.01], lambda *_: "") == ""
     assert "out of reach: turned by" in refusal(generator, [0.9, 0.0], lambda *_: "")
+
+
+def test_goals_are_tried_all_round_as_far_as_a_symmetry_is_believed():
+    form = PlanFormat(("joint1",), ("rad",), 0.02)
+    plans = np.linspace(0, 1, 20)[None, :, None]
+    one = Demonstrations(plans, [(1.0, 0.0)], form, symmetry=turn_and_scale(TurnJoint()))
+    goals = goals_around(one)
+    distances = np.linalg.norm(goals, axis=-1)
+    np.testing.assert_allclose(distances[:, 0], np.exp(np.linspace(-0.9, 0.9, len(goals))))
+    np.testing.assert_allclose(np.ptp(distances, axis=1), 0, atol=1e-12)
+    bearings = np.arctan2(goals[4, :, 1], goals[4, :, 0])
+    np.testing.assert_allclose(bearings[1:-1], np.linspace(-np.pi, np.pi, goals.shape[1])[1:-1])
+    assert not np.any(one.far_outside(goals[0, 3]))

@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
-from prior_reinforce.arm.workspace.reaching import reach_check
+from prior_reinforce.arm.workspace.reaching import reach_picture, region_of
 from prior_reinforce.arm.workspace.view import AdviceView
 from prior_reinforce.arm.workspace.workspace import Workspace
 from prior_reinforce.arrays import Point, Points
-from prior_reinforce.commands.base import Json, OnWorkspace, print_json
+from prior_reinforce.commands.base import Json, OnWorkspace, print_json, print_next
 from prior_reinforce.errors import ConfigurationError
-from prior_reinforce.generators.reach import reach, region_around
+from prior_reinforce.generators.reach import Reach, region_around
 from prior_reinforce.wording import say_chance, say_place
 
 _ACROSS = 15
@@ -32,7 +32,7 @@ _MARGIN = 0.1
 class Advise(OnWorkspace):
     """Say where first throws would hit, and where one more throw or demonstration teaches most.
 
-    For a goal that was set with the adapter bayes.
+    For a goal that was set with the adapter bayes; before any goal, what motions can reach.
 
     For example:
         prior-reinforce advise hoop --out advice.png
@@ -46,6 +46,9 @@ class Advise(OnWorkspace):
         out = self.out or workspace.folder / "advice.png"
         if out.suffix != ".png":
             raise ConfigurationError(f"--out must name a .png file, got {out}")
+        if workspace.state.goal is None and not self.json:
+            self._before_a_goal(workspace)
+            return
         session = workspace.session()
         adapter = session.informed_adapter()
         p_hit, gain = getattr(adapter, "p_hit", None), getattr(adapter, "gain", None)
@@ -62,7 +65,7 @@ class Advise(OnWorkspace):
         p = p_hit(conditions, goals, session.tolerance)
         reached = None
         if moved:  # what is learned of a move serves everywhere: no throw teaches most
-            reached = reach(session.generator, np.stack([low, high]), reach_check(workspace))
+            reached = region_of(workspace)
             throws, shown = np.zeros(len(goals)), np.zeros(1)
         else:
             throws = gain(conditions, conditions)
@@ -101,7 +104,7 @@ class Advise(OnWorkspace):
             f"least likely at {say_place(goals[worst], form)} ({say_chance(p[worst])})"
         )
         if reached is not None:
-            print(f"{reached.reached.mean():.0%} of it can be reached within the arm's limits")
+            print(_say_reached(reached))
         if throw is not None:
             print(
                 f"the throw that teaches most: {say_place(throw, form)} ({throws.max():.0%} of "
@@ -116,6 +119,30 @@ class Advise(OnWorkspace):
             print(f"the demonstration that teaches most: one that ends at {place}")
         if picture is not None:
             print(f"picture: {picture}")
+
+    def _before_a_goal(self, workspace: Workspace) -> None:
+        """Say and draw what can be reached, as the report then shows it."""
+        region, form = region_of(workspace), workspace.manifest.outcome_format
+        if region is None:
+            raise ConfigurationError(
+                "no goal is set, and no motion is moved within a robot's limits: set a goal first"
+            )
+        print(_say_reached(region))
+        if region.goals.shape[-1] == 2:
+            from prior_reinforce.report.advice import draw_advice
+
+            assert workspace.state.training is not None
+            kept = reach_picture(workspace.folder, workspace.state.training.model)
+            kept.parent.mkdir(exist_ok=True)
+            shown = workspace.demonstrations.outcomes_seen
+            out = self.out or kept
+            print(f"picture: {draw_advice(out, None, None, shown, None, None, None, form, region)}")
+        print_next(workspace)
+
+
+def _say_reached(region: Reach) -> str:
+    share = f"{region.reached.mean():.0%} of the goals as far as motions may be moved"
+    return f"{share} can be reached within the arm's limits"
 
 
 def _around(outcomes: Points) -> tuple[Point, Point]:

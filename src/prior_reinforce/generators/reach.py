@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 from numpy.typing import ArrayLike
 
-from prior_reinforce.arrays import Frames, Point, Points
+from prior_reinforce.arrays import Frames, Point
 from prior_reinforce.errors import OutOfReachError
 from prior_reinforce.generators.base import Generator
 from prior_reinforce.plans.motions import Demonstrations
@@ -22,6 +22,8 @@ Check = Callable[[Frames, Point], str]
 """Why a plan (H, D) for a goal (k,) must not be executed; empty where it may."""
 _MARGIN = 3.0
 """Of that box, in the demonstrations' spreads (ours)."""
+_STEPS = 9, 13
+"""Goals along each of the first two components (ours)."""
 _HALVINGS = 8
 """Of the way between a goal that can be reached and one that cannot (ours): 0.4 % of it is left."""
 
@@ -44,29 +46,24 @@ def refusal(generator: Generator, goal: ArrayLike, check: Check) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Reach:
-    """Which goals of a grid can be reached, over two components of the outcome."""
+    """Which of some goals can be reached."""
 
-    x: Float[np.ndarray, " columns"]
-    """Values of the first component."""
-    y: Float[np.ndarray, " rows"]
-    """Values of the second; one number where k = 1."""
+    goals: Float[np.ndarray, "rows columns k"]
+    """Neighbours in a row or a column are neighbours in space."""
     reached: Bool[np.ndarray, "rows columns"]
-    """A row for each y, a column for each x: as matplotlib's `contourf` takes it."""
-    goals: Points
-    """The same goals in a list, y by y, shape (rows columns, k)."""
 
     def nearest(self, generator: Generator, goal: ArrayLike, check: Check) -> Point:
         """Return the goal itself if it can be reached, else the nearest found that can.
 
-        It lies on the line from the nearest goal of the grid that can be reached.
+        It lies on the line from the nearest of the goals that can be reached.
 
         Raises:
-            OutOfReachError: No goal of the grid can be reached, and the goal cannot.
+            OutOfReachError: None of the goals can be reached, and the goal cannot.
         """
         wanted = np.asarray(goal, dtype=np.float64)
         if not (why := refusal(generator, wanted, check)):
             return wanted
-        possible = self.goals[self.reached.ravel()]
+        possible = self.goals[self.reached]
         if not len(possible):
             raise OutOfReachError(f"no goal can be reached from these demonstrations: {why}")
         within = possible[np.argmin(np.linalg.norm(possible - wanted, axis=1))]
@@ -91,23 +88,35 @@ def region_around(demonstrations: Demonstrations) -> Float[np.ndarray, "2 k"]:
     return np.stack([outcomes.min(axis=0) - margin, outcomes.max(axis=0) + margin])
 
 
-def reach(
-    generator: Generator, region: Float[np.ndarray, "2 k"], check: Check, steps: int = 9
-) -> Reach:
-    """Try goals on a grid over a box.
+def goals_around(demonstrations: Demonstrations) -> Float[np.ndarray, "rows columns k"]:
+    """Return goals as far as a symmetry is believed: a ring about an axis, or a box.
+
+    Components after the second stay in the middle of what was shown.
+
+    Args:
+        demonstrations: With a symmetry.
+    """
+    assert demonstrations.symmetry is not None
+    chart = demonstrations.symmetry.chart
+    z = chart.to(demonstrations.outcomes_seen)
+    low, high, farthest = z.min(axis=0), z.max(axis=0), demonstrations.symmetry.farthest_from(z)
+    spans = zip(low - farthest, high + farthest, _STEPS, strict=False)
+    axes = [np.linspace(*span) for span in spans]
+    rows, columns = np.meshgrid(axes[0], axes[1] if len(axes) > 1 else [0.0], indexing="ij")
+    grid = np.tile((low + high) / 2, (*rows.shape, 1))
+    grid[..., 0] = rows
+    if len(axes) > 1:
+        grid[..., 1] = columns
+    return np.asarray(chart.back(grid))
+
+
+def reach(generator: Generator, goals: Float[np.ndarray, "rows columns k"], check: Check) -> Reach:
+    """Try goals, for instance those of `goals_around`.
 
     Args:
         generator: Fitted.
-        region: Lower and upper corner. Components after the second stay in the middle.
+        goals: What to try.
         check: Of each goal's plan.
-        steps: Of the grid, along each of the first two components.
     """
-    low, high = np.asarray(region, dtype=np.float64)
-    x = np.linspace(low[0], high[0], steps)
-    y = np.linspace(low[1], high[1], steps) if len(low) > 1 else np.zeros(1)
-    goals = np.tile((low + high) / 2, (len(y) * len(x), 1))
-    goals[:, 0] = np.tile(x, len(y))
-    if len(low) > 1:
-        goals[:, 1] = np.repeat(y, len(x))
-    reached = np.array([not refusal(generator, goal, check) for goal in goals])
-    return Reach(x, y, reached.reshape(len(y), len(x)), goals)
+    reached = [[not refusal(generator, goal, check) for goal in row] for row in goals]
+    return Reach(goals, np.array(reached))

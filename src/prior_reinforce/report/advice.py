@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from prior_reinforce.arrays import Point, Points
 from prior_reinforce.formats import OutcomeFormat
@@ -19,10 +22,10 @@ from prior_reinforce.wording import CHANCES, say_chance
 @style.drawing()
 def draw_advice(
     path: Path,
-    goals: Points,
-    p_hit: Float[np.ndarray, " n"],
+    goals: Points | None,
+    p_hit: Float[np.ndarray, " n"] | None,
     demonstrated: Float[np.ndarray, "N k"],
-    goal: Point,
+    goal: Point | None,
     throw: Point | None,
     demonstration: Point | None,
     form: OutcomeFormat,
@@ -32,10 +35,10 @@ def draw_advice(
 
     Args:
         path: PNG.
-        goals: A grid, shape (n, 2), the second component fastest.
-        p_hit: Probability that a first throw hits each.
+        goals: A grid, shape (n, 2), the second component fastest; None shows what is reached.
+        p_hit: Probability that a first throw hits each; None without goals.
         demonstrated: Outcomes of the demonstrations.
-        goal: That is set.
+        goal: That is set; None before one is.
         throw: Goal of the throw that teaches most; None if none does.
         demonstration: Where the demonstration that teaches most ends; None if none would teach.
         form: What the two components are.
@@ -45,8 +48,10 @@ def draw_advice(
         The path.
     """
     scale, units = drawn_scale(form), form.units
-    goals, demonstrated = scale * goals, scale * demonstrated
-    x, y = (np.unique(goals[:, j]) for j in range(2))
+    demonstrated = scale * demonstrated
+    places = demonstrated if reached is None else scale * reached.goals.reshape(-1, len(units))
+    places = places if goals is None else scale * goals
+    x, y = (np.unique(places[:, j]) for j in range(2))
     # As high as the region at this width, and what stands below it.
     height = 4.8 * np.ptp(x) / np.ptp(y) if units[0] == units[1] else 3.0
     height = float(np.clip(height, 1.5, 6.0))
@@ -54,29 +59,25 @@ def draw_advice(
     axes = figure.add_subplot()
     style.calm_axes(axes, grid=False)
     # As seen from the robot: ahead is up, left is left.
-    shade = axes.pcolormesh(
-        y, x, p_hit.reshape(len(x), len(y)), cmap="Greys", vmin=0.0, vmax=1.0, shading="gouraud"
-    )
-    bar = figure.colorbar(shade, cax=axes.inset_axes((1.04, 0, 0.035, 1)))  # as high as the panel
-    bar.set_label("a first throw's hit is", color=style.INK_SOFT)
-    bar.set_ticks(np.mean(CHANCES, axis=1), labels=[say_chance(low) for low, _ in CHANCES])
-    bar.ax.hlines([high for _, high in CHANCES[:-1]], 0, 1, colors=style.INK_SOFT, linewidths=1)
-    bar.ax.tick_params(labelsize=9, colors=style.INK_SOFT)
+    axes.set_xlim(y[0], y[-1])
+    axes.set_ylim(x[0], x[-1])
+    if p_hit is not None:
+        _shade(figure, axes, x, y, p_hit)
     marks = [
         (demonstrated, "o", 42, style.DEMONSTRATION, "demonstrated"),
     ]
     if throw is not None:
         marks.append((scale * throw[None], "*", 260, style.GOAL, "throw that teaches most"))
-    if reached is not None and not reached.reached.all():
-        axes.contourf(
-            scale * reached.y,
-            scale * reached.x,
-            reached.reached.T.astype(float),
-            levels=(-0.5, 0.5),
-            colors="none",
-            hatches=["///"],
-        )
-        axes.plot([], [], color=style.INK_SOFT, label="hatched: out of reach")
+    if reached is not None:
+        at = scale * reached.goals[..., 1], scale * reached.goals[..., 0]
+        inside = reached.reached.astype(float)
+        if goals is None:
+            axes.contourf(*at, inside, levels=(0.5, 1.5), colors=[style.HIT], alpha=0.25)
+            marks += [(np.zeros((1, 2)), "s", 42, style.INK_SOFT, "robot's base")]
+            axes.fill([], [], color=style.HIT, alpha=0.25, label="can be reached")
+        elif not reached.reached.all():
+            axes.contourf(*at, inside, levels=(-0.5, 0.5), colors="none", hatches=["///"])
+            axes.plot([], [], color=style.INK_SOFT, label="hatched: out of reach")
     if demonstration is not None:  # the diamond fits into the star, for both are often at one place
         shown = scale * demonstration[None]
         marks.append((shown, "D", 26, style.HIT, "demonstration that teaches most"))
@@ -85,8 +86,10 @@ def draw_advice(
             points[:, 1], points[:, 0], marker=mark, s=size, color=colour,
             edgecolors=style.INK, linewidths=0.8, label=label, zorder=3, clip_on=False,
         )  # fmt: skip
-    y, x = scale * goal[1], scale * goal[0]
-    axes.plot(y, x, "+", color=style.GOAL, ms=11, mew=2.2, label="goal", zorder=4, clip_on=False)
+    if goal is not None:
+        place = scale * goal
+        cross: Any = {"color": style.GOAL, "ms": 11, "mew": 2.2, "zorder": 4, "clip_on": False}
+        axes.plot(place[1], place[0], "+", label="goal", **cross)
     axes.invert_xaxis()
     axes.set_xlabel(axis_label(form, 1, mirrored=True))
     axes.set_ylabel(axis_label(form, 0))
@@ -96,3 +99,21 @@ def draw_advice(
         loc="upper center", bbox_to_anchor=(0.5, -0.6 / height), ncols=3, frameon=False, fontsize=8
     )
     return style.save_figure(figure, path)
+
+
+def _shade(
+    figure: Figure,
+    axes: Axes,
+    x: Float[np.ndarray, " rows"],
+    y: Float[np.ndarray, " columns"],
+    p_hit: Float[np.ndarray, " n"],
+) -> None:
+    """Shade places by how likely a first throw hits them, with what shades mean beside."""
+    shade = axes.pcolormesh(
+        y, x, p_hit.reshape(len(x), len(y)), cmap="Greys", vmin=0.0, vmax=1.0, shading="gouraud"
+    )
+    bar = figure.colorbar(shade, cax=axes.inset_axes((1.04, 0, 0.035, 1)))  # as high as the panel
+    bar.set_label("a first throw's hit is", color=style.INK_SOFT)
+    bar.set_ticks(np.mean(CHANCES, axis=1), labels=[say_chance(low) for low, _ in CHANCES])
+    bar.ax.hlines([high for _, high in CHANCES[:-1]], 0, 1, colors=style.INK_SOFT, linewidths=1)
+    bar.ax.tick_params(labelsize=9, colors=style.INK_SOFT)

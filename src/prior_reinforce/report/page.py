@@ -47,6 +47,7 @@ def write_report(
     facts: Mapping[str, str] | None = None,
     region: ArrayLike | None = None,
     note: str = "",
+    reach: Path | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Path:
     """Write `report.html` and its pictures as SVGs beside it, whole in one file while it is small.
@@ -62,6 +63,7 @@ def write_report(
         facts: What made these results: generator with its remarks, adapter, perception, seeds.
         region: Region of goals, lower and upper corner, shape (2, k).
         note: What else is to be said under the headline.
+        reach: Picture (PNG) of the goals that can be reached, if there is one.
         progress: Called with the number of goals drawn, and of all, after each.
 
     Returns:
@@ -117,6 +119,7 @@ def write_report(
         by_goal=by_goal,
         sections=sections,
         note=note,
+        reach={"source": data_uri(reach), "wide": False} if reach else None,
         from_behind=first.outcome_dim > 1 and in_words(first.outcome_format),
         any_truth=any(_knows_truth(record) for record in adaptations),
         words=summary.explain_words(adaptations[0]),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,10 +14,11 @@ from prior_reinforce.arrays import Frames, Point
 from prior_reinforce.errors import OutOfReachError
 from prior_reinforce.generators.reach import (
     Check,
+    Reach,
     farthest_between,
+    goals_around,
     reach,
     refusal,
-    region_around,
 )
 from prior_reinforce.parsing import as_place
 from prior_reinforce.plans.motions import Demonstrations
@@ -45,15 +47,31 @@ def require_reach(workspace: Workspace, goal: ArrayLike) -> None:
     if why := refusal(generator, place, check):
         straight = _same_direction(shown, shown.symmetry, place)
         if refusal(generator, straight, check):
-            region = region_around(shown)
-            region = np.stack([np.minimum(region[0], place), np.maximum(region[1], place)])
-            nearest = reach(generator, region, check).nearest(generator, place, check)
+            possible = reach(generator, goals_around(shown), check)
+            nearest = possible.nearest(generator, place, check)
         else:
             nearest = farthest_between(generator, straight, place, check)
         raise OutOfReachError(
             f"goal {say_place(place, form)} is out of reach: {why}; the nearest that can be "
             f"reached is {say_place(nearest, form)}; demonstrate closer to the goal"
         )
+
+
+def region_of(workspace: Workspace) -> Reach | None:
+    """Which goals can be reached with the model in use, as far as motions may be moved.
+
+    None where no demonstration is moved, or no robot's limits are known.
+    """
+    shown = workspace.demonstrations
+    if shown.symmetry is None or workspace.manifest.robot is None:
+        return None
+    generator = model_in_use(workspace.standing, workspace.store)
+    return reach(generator, goals_around(shown), reach_check(workspace))
+
+
+def reach_picture(folder: Path, model: str) -> Path:
+    """Where in a workspace the picture of that region lies, for a model."""
+    return folder / "pictures" / f"reach-{model}.png"
 
 
 def reach_check(workspace: Workspace) -> Check:

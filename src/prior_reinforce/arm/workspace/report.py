@@ -14,6 +14,7 @@ import prior_reinforce
 from prior_reinforce.arm.executing.result import read_path
 from prior_reinforce.arm.robots.report import LimitLine, LimitReport
 from prior_reinforce.arm.workspace.events import Moved, Moving
+from prior_reinforce.arm.workspace.reaching import reach_picture
 from prior_reinforce.arm.workspace.state import Standing, WorkspaceState
 from prior_reinforce.arm.workspace.store import Store
 from prior_reinforce.arm.workspace.view import TrialView, trial_view
@@ -69,8 +70,12 @@ def report_workspace(
     claim_folder(folder)
     title = f"{manifest.name}: {len(goals)} goal" + "s" * (len(goals) > 1)
     note = f"No plan was given for {_name_goals(without)}." if without else ""
+    reach = None if training is None else reach_picture(now.folder, training.model)
+    reach = reach if reach is not None and reach.is_file() and not reach.is_symlink() else None
     with named_disk_errors(folder):
-        return write_report(folder, records, title=title, facts=facts, note=note, progress=progress)
+        return write_report(
+            folder, records, title=title, facts=facts, note=note, reach=reach, progress=progress
+        )
 
 
 def _say_model(state: WorkspaceState, model: str) -> str:
