@@ -119,7 +119,8 @@ class Generator(ABC):
         if demonstrations.n == 1:
             raise InvalidDemonstrationsError(
                 f"generator {self.name} learns from at least two demonstrations, got one; "
-                "demonstrate more, or state how this one may be moved (docs/symmetry.md)"
+                "demonstrate more, or say how this one may be moved (docs/symmetry.md), and learn "
+                "with auto"
             )
         check_spread(demonstrations.outcomes_seen)
 
