@@ -73,6 +73,7 @@ def test_tables_of_a_page_are_filled_where_they_are_marked(tmp_path):
         (["all", "--include", "nothing-of-ours"], "registered by the module that --plugins names"),
         (["all", "--include", "exact"], "neither"),
         (["all", "--goals", "0"], "at least 1"),
+        (["alignment", "--device", "cuda"], "runs on the CPU; leave out --device"),
         (["all", "--seeds", "0", "0", "1"], "different"),
         (["all", "--seeds", "-1"], "not negative"),
         (["all", "--sets", "A", "A"], "A, B, or both"),

@@ -81,7 +81,7 @@ UNITS: Mapping[str, Unit] = {
     ),
     "share": Unit(kind="share", factor=1.0, plural="shares", spellings="fraction"),
     "rev": Unit(
-        kind="angle", factor=2 * math.pi, plural="revolutions", spellings="revs turn turns"
+        kind="angle", factor=2 * math.pi, plural="revolutions", spellings="revs revolution"
     ),
 }  # fmt: skip
 SPELT = {

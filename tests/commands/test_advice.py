@@ -47,7 +47,7 @@ def test_before_a_goal_it_draws_what_moved_motions_can_reach(run, tmp_path):
         model = hoop.learn().model
     status, out, _ = run("advise", folder)
     assert status == 0
-    share = int(re.search(r"(\d+)% of the goals as far as motions may be moved", out)[1])
+    share = int(re.search(r"(\d+)% of the goals to which motions may be moved", out)[1])
     assert 20 < share < 90
     picture = folder / "pictures" / f"reach-{model}.png"
     assert f"picture: {picture}" in out

@@ -148,3 +148,33 @@ def test_a_joint_is_held_somewhere(run, tmp_path, held):
     status, _, err = run("new", tmp_path / "w", "--robot", "arm.urdf", "--hold", held)
     assert status == 2
     assert "lift=0.2" in err
+
+
+@pytest.mark.parametrize(("beside", "warned"), [("0.5 -0.3 0.8", True), ("0.03 0 0.8", False)])
+def test_new_says_where_an_arm_stands_beside_its_descriptions_origin(run, tmp_path, beside, warned):
+    joint = (
+        '<joint name="{}" type="{}"><origin xyz="{}" rpy="0 0 0"/><parent link="{}"/>'
+        '<child link="{}"/><axis xyz="{}"/><limit lower="-3" upper="3" velocity="3"/></joint>'
+    )
+    links = ["world", "base", "one", "tool0"]
+    parts = [
+        joint.format("fixed", "fixed", beside, "world", "base", "0 0 1"),
+        joint.format("turn", "revolute", "0 0 0.2", "base", "one", "0 0 1"),
+        joint.format("lift", "revolute", "0 0 0.2", "one", "tool0", "0 1 0"),
+    ]
+    path = tmp_path / "arm.urdf"
+    shown = "".join(f'<link name="{name}"/>' for name in links)
+    path.write_text(f'<robot name="arm">{shown}{"".join(parts)}</robot>')
+    _, out, _ = run("new", tmp_path / "w", "--robot", path, "--symmetry", "carried", "--no-box")
+    assert ("WARNING: turn turns about a place (0.50, -0.30) m" in out) == warned
+
+
+def test_new_asks_again_after_a_slip_and_only_for_a_new_folder(run, tmp_path, monkeypatch):
+    monkeypatch.setattr("sys.stdin.isatty", lambda: True)
+    answers = iter(["carry", "carried", "no box"])
+    monkeypatch.setattr("builtins.input", lambda question: next(answers))
+    status, out, _ = run("new", tmp_path / "w")
+    assert status == 0
+    assert "got 'carry'" in out
+    assert 'object = "carried"' in (tmp_path / "w" / "workspace.toml").read_text()
+    assert "exists and is not empty" in run("new", tmp_path / "w")[2]  # no answer is left to take

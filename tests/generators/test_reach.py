@@ -1,5 +1,7 @@
 """Which goals can be reached, by the plans that are made for them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -80,3 +82,6 @@ def test_goals_are_tried_all_round_as_far_as_a_symmetry_is_believed():
     bearings = np.arctan2(goals[4, :, 1], goals[4, :, 0])
     np.testing.assert_allclose(bearings[1:-1], np.linspace(-np.pi, np.pi, goals.shape[1])[1:-1])
     assert not np.any(one.far_outside(goals[0, 3]))
+    apart = replace(one, plans=np.repeat(plans, 2, axis=0), outcomes_seen=[(1.0, 0.0), (0.8, 0.6)])
+    bearings = np.unwrap(np.arctan2(*np.moveaxis(goals_around(apart)[4], -1, 0)[::-1]))
+    assert np.ptp(bearings) <= 2 * np.pi + 1e-9  # no goal twice

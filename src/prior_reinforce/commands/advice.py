@@ -39,7 +39,8 @@ class Advise(OnWorkspace):
     """
 
     out: Path | None = None
-    """Picture, a .png; advice.png in the workspace if not given."""
+    """Picture, a .png; if not given, advice.png in the workspace, or before any goal one that the
+    report shows."""
     json: Json = False
 
     def _run_on(self, workspace: Workspace, words: tuple[str, ...]) -> None:
@@ -125,24 +126,24 @@ class Advise(OnWorkspace):
         region, form = region_of(workspace), workspace.manifest.outcome_format
         if region is None:
             raise ConfigurationError(
-                "no goal is set, and no motion is moved within a robot's limits: set a goal first"
+                "no goal is set, and without a symmetry and a robot there is no reach to draw: set a "
+                "goal first"
             )
         print(_say_reached(region))
         if region.goals.shape[-1] == 2:
             from prior_reinforce.report.advice import draw_advice
 
             assert workspace.state.training is not None
-            kept = reach_picture(workspace.folder, workspace.state.training.model)
-            kept.parent.mkdir(exist_ok=True)
+            out = self.out or reach_picture(workspace.folder, workspace.state.training.model)
+            out.parent.mkdir(exist_ok=True)
             shown = workspace.demonstrations.outcomes_seen
-            out = self.out or kept
             print(f"picture: {draw_advice(out, None, None, shown, None, None, None, form, region)}")
         print_next(workspace)
 
 
 def _say_reached(region: Reach) -> str:
-    share = f"{region.reached.mean():.0%} of the goals as far as motions may be moved"
-    return f"{share} can be reached within the arm's limits"
+    share = f"{region.reached.mean():.0%} of the goals to which motions may be moved"
+    return f"{share} are within the arm's limits"
 
 
 def _around(outcomes: Points) -> tuple[Point, Point]:

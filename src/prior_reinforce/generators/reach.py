@@ -17,6 +17,7 @@ from prior_reinforce.arrays import Frames, Point
 from prior_reinforce.errors import OutOfReachError
 from prior_reinforce.generators.base import Generator
 from prior_reinforce.plans.motions import Demonstrations
+from prior_reinforce.plans.symmetry import Polar
 
 Check = Callable[[Frames, Point], str]
 """Why a plan (H, D) for a goal (k,) must not be executed; empty where it may."""
@@ -99,8 +100,12 @@ def goals_around(demonstrations: Demonstrations) -> Float[np.ndarray, "rows colu
     assert demonstrations.symmetry is not None
     chart = demonstrations.symmetry.chart
     z = chart.to(demonstrations.outcomes_seen)
-    low, high, farthest = z.min(axis=0), z.max(axis=0), demonstrations.symmetry.farthest_from(z)
-    spans = zip(low - farthest, high + farthest, _STEPS, strict=False)
+    farthest = demonstrations.symmetry.farthest_from(z)
+    low, high = z.min(axis=0) - farthest, z.max(axis=0) + farthest
+    if isinstance(chart, Polar):  # once round: bearings beyond that are the same goals
+        middle = (low[1] + high[1]) / 2
+        low[1], high[1] = max(low[1], middle - np.pi), min(high[1], middle + np.pi)
+    spans = zip(low, high, _STEPS, strict=False)
     axes = [np.linspace(*span) for span in spans]
     rows, columns = np.meshgrid(axes[0], axes[1] if len(axes) > 1 else [0.0], indexing="ij")
     grid = np.tile((low + high) / 2, (*rows.shape, 1))

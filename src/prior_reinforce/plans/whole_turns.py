@@ -28,6 +28,7 @@ _OF_VECTOR = re.compile(r"rot_?vec|axis_?angle", re.IGNORECASE)
 _PATTERNS = ((_QUATERNION, _OF_ATTITUDE, "wxyz"), (_VECTOR, _OF_VECTOR, "xyz"))
 
 _LAST_WORD = re.compile(r"(?P<stem>|.*[^a-z])(?P<word>[a-z]+)")
+"""`tool_yaw`: what it is of, and which angle."""
 
 Frames = TypeVar("Frames", bound=np.ndarray)
 
@@ -73,7 +74,7 @@ def euler_angles(names: Sequence[str], units: Sequence[str]) -> tuple[tuple[str,
     The second of each is the middle turn, whatever the order in which they are recorded.
     """
     found = []
-    for letters in (("roll", "pitch", "yaw"), ("a", "b", "c"), ("rx", "ry", "rz")):
+    for letters in (("roll", "pitch", "yaw"), ("a", "b", "c")):
         groups: dict[str, dict[str, str]] = {}
         for name, unit in zip(names, units, strict=True):
             match = _LAST_WORD.fullmatch(name.strip().lower())

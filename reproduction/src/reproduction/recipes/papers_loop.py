@@ -1,9 +1,9 @@
 """The paper's loop as the paper has it, at the paper's own size: 256, 512 and 1024, Mish.
 
-Outcomes of the demonstrations are read by a camera, so is each goal, once; for every trial the
-network is sampled anew, and the paper's Gaussian process corrects the condition from what is seen
-by eye. Controls: goals known exactly; then one noise for all trials, or no adapter. The networks
-want a GPU: three minutes a training there beside another, four hours of two cores.
+Outcomes of the demonstrations are read by a camera; each goal is known with an error as large as a
+camera's, drawn once; for every trial the network is sampled anew, and the paper's Gaussian process
+corrects the condition from what is seen by eye. Controls: goals known exactly; then one noise for
+all trials, or no adapter. The networks want a GPU: six minutes of an H100 for A and B at once.
 
 The paper does not say how its plans reach the arm, whose controllers are low-pass filters. Plans of
 the network's raw frames, smoothed ones, and ones of a network that learns spline control points are

@@ -35,15 +35,16 @@ Ours: no joint turns two turns; above 300, millimetres are likelier than an arm 
 gripper opens by 30 cm; one that moves by less than a percent is recorded as a share."""
 _NO_ANGLE = re.compile(
     r"grip|jaw|finger|width|claw|opening|suction|robotiq|wsg|greifer|pince|夹爪|夹具|vacuum|valve"
-    r"|pressure|force|torque|current|voltage|temperature",
+    r"|pressure|force|torque|voltage|temperature",
     re.I,
 )
 _PLACE = re.compile(r"(?P<stem>|.*[^a-z0-9])(?P<axis>[xyz])", re.IGNORECASE)
-_NO_PLACE = re.compile(
-    r"rot|quat|orient|euler|rpy|vel|speed|acc|gyro|ang|force|torque|moment|(^|[^a-z])[rwqv][^a-z]*$",
+_OF_PLACE = re.compile(
+    r"(.*[^a-z])?(p|pos|positions?|place|trans(lation)?|cart(esian)?|tcp|tool|tip|ee|eef|pose|xyz"
+    r"|(end_?)?effector|flange|hand|location)[^a-z]*",
     re.IGNORECASE,
 )
-"""What x, y and z are of where they are no place."""
+"""What x, y and z are the place of: `tool_x`. Others may be joints: `hip_x`, `hip_y`."""
 _BRACKETS = re.compile(r"(?P<name>.+?)\s*[\[(]\s*(?P<unit>[^\[\]()]+?)\s*[\])]")
 _ENDING = re.compile(r"(?P<name>.+?)[_ ](?P<unit>[a-zµμ°]+)")
 _BEFORE_NUMBER = re.compile(r"(?P<name>.+?)_(?P<unit>deg|rad|mm|cm)(?P<number>_?\d+)", re.I)
@@ -91,7 +92,12 @@ def place_names(names: Sequence[str]) -> set[str]:
     groups: dict[str, dict[str, str]] = {}
     for name in names:
         match = _PLACE.fullmatch(name.strip())
-        if match is not None and name not in of_attitudes and not _NO_PLACE.search(match["stem"]):
+        stem = "" if match is None else match["stem"]
+        if (
+            match is not None
+            and name not in of_attitudes
+            and (not stem or _OF_PLACE.fullmatch(stem))
+        ):
             groups.setdefault(match["stem"], {})[match["axis"].lower()] = name
     return {name for group in groups.values() if len(group) > 1 for name in group.values()}
 

@@ -77,7 +77,7 @@ def reach_picture(folder: Path, model: str) -> Path:
 def reach_check(workspace: Workspace) -> Check:
     """What decides whether a goal can be reached: how far motions may be moved, and the gate."""
     shown = workspace.demonstrations
-    # What several demonstrations tell of a distance is warned about only: more of them tell more.
+    # A learned distance has no such bound: there `check_goal` warns of extrapolation.
     moved = shown.symmetry if shown.symmetry and not shown.symmetry.learned.any() else None
 
     def check(plan: Frames, goal: Point) -> str:
@@ -89,7 +89,7 @@ def reach_check(workspace: Workspace) -> Check:
 
 
 def _same_direction(shown: Demonstrations, symmetry: Symmetry, goal: Point) -> Point:
-    """As far off as the nearest demonstration, where the goal is in all that is exact."""
+    """Return the goal's bearing or shift at the distance of the nearest demonstration."""
     z, aim = symmetry.chart.to(shown.outcomes_seen), symmetry.chart.to(goal)
     apart = np.linalg.norm(np.where(symmetry.exact, 0.0, z - aim), axis=1)
     return np.asarray(symmetry.chart.back(np.where(symmetry.exact, aim, z[np.argmin(apart)])))

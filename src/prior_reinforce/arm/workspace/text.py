@@ -74,7 +74,7 @@ def say_expectation(now: Standing, trial: Trial) -> list[str]:
             f"{name} +- {100 * value:.0f} cm" if unit == "m" else f"{name} +- {value:.2g} {unit}"
             for name, value, unit in zip(form.names, trial.expected_sd, form.units, strict=True)
         )
-        lines.append(f"it teaches how {moved.distance} changes the distance; expect {sd}")
+        lines.append(f"this trial teaches how {moved.distance} changes the distance; expect {sd}")
     if told and told[-1].surprise:
         lines.append(f"trial {told[-1].number} was {told[-1].surprise}")
     missed = sum(known.goal_number == trial.goal_number for known in told)

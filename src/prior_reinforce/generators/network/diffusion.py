@@ -82,9 +82,8 @@ class DiffusionGenerator(NetworkGenerator):
         self, network: nn.Module, codes: Tensor, conditions: Tensor, rng: torch.Generator
     ) -> Callable[[], Tensor]:
         from prior_reinforce.generators.network.denoiser import loss
-        from prior_reinforce.generators.network.training import replayed
 
-        return loss(replayed(network), codes, conditions, self.config, rng)
+        return loss(network, codes, conditions, self.config, rng)
 
     def _optimiser(self, rng: torch.Generator) -> Mapping[str, Any]:
         return {"betas": _BETAS, "decay": self.config.decay, "rng": rng}

@@ -46,40 +46,6 @@ def build(make: Callable[[], Network], seed: int) -> Network:
         return make()
 
 
-def replayed(network: torch.nn.Module) -> Callable[..., torch.Tensor]:
-    """A network in training whose forward and backward passes a GPU replays (CUDA graphs).
-
-    A batch of a handful of plans is computed in less time than it takes to launch its kernels one
-    by one. All batches have the shape of the first; on a CPU this is the network itself.
-    """
-    if next(network.parameters()).device.type != "cuda":
-        return network
-    recorded: list[Any] = []
-
-    def call(*batch: torch.Tensor) -> torch.Tensor:
-        if not recorded:
-            # Around the network, whose own forward pass, and copies of it, so stay as they are.
-            around = _Around(network)
-            shapes = tuple(torch.clone(part) for part in batch)
-            recorded.append(torch.cuda.make_graphed_callables(around, shapes))
-        output: torch.Tensor = recorded[0](*batch)
-        return output
-
-    return call
-
-
-class _Around(torch.nn.Module):
-    """A module around another one, which it calls."""
-
-    def __init__(self, inner: torch.nn.Module) -> None:
-        super().__init__()
-        self.inner = inner
-
-    def forward(self, *batch: torch.Tensor) -> torch.Tensor:
-        output: torch.Tensor = self.inner(*batch)
-        return output
-
-
 def optimise(
     network: Network,
     loss_of_step: Callable[[], torch.Tensor],
