@@ -126,8 +126,8 @@ class Advise(OnWorkspace):
         region, form = region_of(workspace), workspace.manifest.outcome_format
         if region is None:
             raise ConfigurationError(
-                "no goal is set, and without a symmetry and a robot there is no reach to draw: set a "
-                "goal first"
+                "no goal is set, and without a symmetry and a robot there is no reach to draw: set "
+                "a goal first"
             )
         print(_say_reached(region))
         if region.goals.shape[-1] == 2:

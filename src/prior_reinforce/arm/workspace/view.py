@@ -198,8 +198,8 @@ class AdviceView(View, frozen=True):
     demonstrations are moved, for what is learned of a move serves everywhere."""
     throw_teaches: float
     reached: float | None
-    """Share of the goals to which motions may be moved that is within the arm's limits; null without
-    a symmetry."""
+    """Share of the goals to which motions may be moved that is within the arm's limits; null
+    without a symmetry."""
     demonstration: list[float] | None
     """The outcome of the demonstration that teaches most; null where none would."""
     demonstration_teaches: float
