@@ -54,6 +54,19 @@ def test_two_ways_round_that_end_alike_are_told_apart_by_how_they_move(name):
     assert len({np.sign(far[list(one)]).sum(), -np.sign(far[list(other)]).sum()}) == 1
 
 
+def test_two_ways_that_were_shown_along_lines_are_sorted():
+    """The outcomes of each lie on a diagonal, so that no spline tells what is left out."""
+    along = np.array([-0.2, -0.1, 0.05, 0.12, 0.2])[:, None]
+    outcomes = np.vstack([along * [1.0, side] + [0.9, 0.0] for side in (1.0, -1.0)])
+    s = np.clip(np.arange(60) / 40, 0, 1)
+    swing = 10 * s**3 - 15 * s**4 + 6 * s**5
+    back = swing + 2.0 * np.sin(np.pi * s) ** 2
+    size = 0.5 + outcomes[:, :1]
+    plans = np.stack([size * swing, size * np.where(np.arange(10)[:, None] < 5, back, swing)], -1)
+    demos = Demonstrations(plans, outcomes, PlanFormat(("a", "b"), ("rad",) * 2, 0.02))
+    assert patterns(demos) == (tuple(range(10)),)
+
+
 def test_what_does_not_move_is_one_pattern():
     still = Demonstrations(
         np.ones((6, 20, 2)), OUTCOMES, PlanFormat(("a", "b"), ("rad",) * 2, 0.02)

@@ -6,6 +6,7 @@ from scipy.interpolate import RBFInterpolator
 
 from prior_reinforce.plans.outcome_weights import (
     amplification,
+    left_out_errors,
     smooth_weights,
 )
 
@@ -105,3 +106,18 @@ def test_where_outcomes_lie_close_together_plans_bend_less(outcomes, kernel):
 
 def test_no_conditions_have_no_weights():
     assert smooth_weights(OUTCOMES)(CONDITIONS[:0]).shape == (0, len(OUTCOMES))
+
+
+@pytest.mark.parametrize(("n", "k"), [(3, 1), (3, 2), (4, 2), (9, 2), (30, 3)])
+def test_what_is_left_out_is_missed_as_if_the_others_were_learned_alone(n, k):
+    rng = np.random.default_rng([n, k])
+    outcomes, values = rng.uniform(size=(n, k)) * [1.0, 300.0, 0.2][:k], rng.normal(size=(n, 4))
+    expected = []
+    for i in range(n):
+        others = np.delete(np.arange(n), i)
+        scale = np.ptp(outcomes[others], axis=0)
+        spline = RBFInterpolator(
+            outcomes[others] / scale, values[others], kernel="linear", degree=int(n - 1 > k)
+        )
+        expected.append(values[i] - spline(outcomes[i : i + 1] / scale)[0])
+    np.testing.assert_allclose(left_out_errors(outcomes, values), expected, atol=1e-4)

@@ -19,7 +19,7 @@ from prior_reinforce.errors import InvalidDemonstrationsError
 from prior_reinforce.generators.timing.registration import best_correlations
 from prior_reinforce.generators.timing.timeline import decompose
 from prior_reinforce.plans.motions import Demonstrations
-from prior_reinforce.plans.outcome_weights import smooth_weights
+from prior_reinforce.plans.outcome_weights import left_out_errors
 
 _AGREE = 0.1
 """Least correlation of two motions of one pattern. Ours: on the zoo's development tasks every
@@ -130,14 +130,19 @@ def _ways(
 
 def _left_out(motions: _Motions, outcomes: Float[np.ndarray, "N k"]) -> float:
     """Squared error of motions that are interpolated from the others; inf where that cannot be."""
-    squares = 0.0
-    for i in range(len(motions)):
-        others = np.delete(np.arange(len(motions)), i)
-        if len(others) == 0 or np.any(np.ptp(outcomes[others], axis=0) == 0.0):
-            return float("inf")
-        weights = smooth_weights(outcomes[others], kernel="linear")(outcomes[i : i + 1])
-        squares += float(np.sum((weights @ motions[others] - motions[i]) ** 2))
-    return squares
+    n = len(motions)
+    if n < 2 or not all(_spread(np.delete(outcomes, i, axis=0)) for i in range(n)):
+        return float("inf")
+    return float(np.sum(left_out_errors(outcomes, motions) ** 2))
+
+
+def _spread(outcomes: Float[np.ndarray, "N k"]) -> bool:
+    """Whether every component varies, and enough outcomes for an affine function lie on no line."""
+    n, k = outcomes.shape
+    extent = np.ptp(outcomes, axis=0)
+    if np.any(extent == 0.0):
+        return False
+    return n <= k or bool(np.linalg.matrix_rank((outcomes - outcomes[0]) / extent) == k)
 
 
 def _explained(motions: _Motions, outcomes: Float[np.ndarray, "N k"]) -> bool:

@@ -114,3 +114,33 @@ def amplification(weights: SmoothWeights, outcomes: Float[np.ndarray, "N k"]) ->
     i, j = np.triu_indices(len(outcomes), k=1)
     halfway = 0.5 * (outcomes[i] + outcomes[j])
     return float(np.mean(np.sum(weights(halfway) ** 2, axis=1)))
+
+
+def left_out_errors(
+    outcomes: Float[np.ndarray, "N k"], values: Float[np.ndarray, "N F"]
+) -> Float[np.ndarray, "N F"]:
+    r"""Return by how much each value is missed that a linear spline interpolates from the others.
+
+    One inverse tells all of them: :math:`(M^{-1} f)_i / (M^{-1})_{ii}`, where M is the matrix of
+    the spline of all values. Not so the ends of a range, by which distances are divided: without
+    one of these a spline of its own is fitted.
+
+    Source: Rippa, "An algorithm for selecting a good value for the parameter c in radial basis
+    function interpolation", 1999.
+    """
+    n, k = outcomes.shape
+    extent = np.ptp(outcomes, axis=0)
+    scaled = (outcomes - outcomes.mean(axis=0)) / extent
+    apart = np.linalg.norm(scaled[:, None] - scaled[None], axis=2)
+    # The others have an affine tail where there are enough of them, as in `smooth_weights`.
+    tail = np.column_stack([np.ones(n), scaled]) if n - 1 > k else np.ones((n, 1))
+    nothing = np.zeros((tail.shape[1], tail.shape[1]))
+    matrix = np.block([[_REPEATED * np.eye(n) - apart, tail], [tail.T, nothing]])
+    inverse = np.linalg.inv(matrix)[:n, :n]
+    errors = inverse @ values / np.diag(inverse)[:, None]
+    for i in range(n):
+        others = np.delete(np.arange(n), i)
+        if np.any(np.ptp(outcomes[others], axis=0) < extent):
+            weights = smooth_weights(outcomes[others], kernel="linear")(outcomes[i : i + 1])
+            errors[i] = values[i] - weights[0] @ values[others]
+    return np.asarray(errors)
