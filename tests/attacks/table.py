@@ -22,12 +22,12 @@ from tests.attacks.classes import CLASSES, WRITERS, Attack, recordings
 from tests.attacks.harness import HELD, prepare, where
 
 ATTACKS: dict[str, tuple[Attack, int]] = {
-    **{name: (attack, 10) for name, attack in CLASSES.items()},
+    **{name: (attack, 5) for name, attack in CLASSES.items()},
     **{f"recordings: {kind}": (partial(recordings, kind), 2) for kind in WRITERS},
     **{f"motions: {kind}": (partial(execution.attack, kind), 2) for kind in execution.KINDS},
-    "flips": (flips.attack, 10),
+    "flips": (flips.attack, 5),
     "arms": (arms.attack, 5),
-    "watching": (watching.attack, 30),
+    "watching": (watching.attack, 15),
     **{
         f"{how}: {name}": (partial(interruptions.attack, how, name), 1)
         for how in interruptions.HOW
