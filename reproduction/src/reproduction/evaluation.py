@@ -277,16 +277,18 @@ class Trials(OfTraining):
         """Where goals are perceived; None: exactly where they are."""
         return None
 
+    def drawn(self, task: Task) -> Points:
+        """Goals, the same for every method."""
+        rng = np.random.default_rng(GOAL_SEED)
+        if not self.unseen:
+            return task.sample_goals(self.goals, rng)
+        # Far from where demonstrations truly went, so that goals are the same for every perception.
+        return unseen_goals(task, self.training.recorded(), self.goals, rng)
+
     def trials(self, folder: Path) -> list[GoalTrials]:
         """Run the protocol."""
         task, learned = make_task(self.task), self.learned(folder)
-        rng = np.random.default_rng(GOAL_SEED)
-        # Far from where demonstrations truly went, so that goals are the same for every perception.
-        goals = (
-            unseen_goals(task, self.training.recorded(), self.goals, rng)
-            if self.unseen
-            else task.sample_goals(self.goals, rng)
-        )
+        goals = self.drawn(task)
         seed = GOAL_SEED + self.training.seed
         with make_perception(
             self.perception, scene=task.scene, config=self.model, seed=seed

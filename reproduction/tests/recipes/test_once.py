@@ -19,6 +19,7 @@ from reproduction.recipes.once import (
     MEASURED,
     NONE,
     OURS,
+    OUTSIDE,
     RECIPE,
     ZOO,
     Shown,
@@ -50,6 +51,17 @@ def test_a_quick_run_takes_set_a_and_the_symmetry_alone_and_another_adapter_can_
     assert {names["method"] for _, names in quick} == {OURS}
     beside = {names["method"] for _, names in units(Scale(), ("proportional",))}
     assert {OURS, NONE, COPIES, GP, "proportional"} < beside
+
+
+def test_goals_outside_lie_all_round_the_region_and_others_on_every_set():
+    task = make_task("basketball-v1")
+    planned = [unit for unit, names in units(Scale()) if names["method"] == OUTSIDE]
+    assert len(planned) == 4 * 22
+    goals = np.vstack([unit.drawn(task) for unit in planned])
+    far = np.linalg.norm(goals - np.clip(goals, *task.region), axis=1)
+    assert far.min() >= 0.1
+    assert len(np.unique(goals, axis=0)) == 4 * 22
+    assert np.all((goals < task.region[0]).any(axis=0) & (goals > task.region[1]).any(axis=0))
 
 
 def test_copies_lie_on_a_grid_and_are_the_less_sure_the_farther_they_were_moved():
@@ -117,7 +129,7 @@ def test_a_few_rows_give_table_verdict_and_picture(tmp_path):
     results = gather(tmp_path, planned, "once")
     table = RECIPE.table(results)
     assert [row[:3] for row in table.rows] == [
-        ("basketball-v1", name, EYE) for name in (OURS, COPIES, GP, NONE)
+        ("basketball-v1", name, EYE) for name in (OURS, COPIES, GP, NONE, OUTSIDE)
     ]
     assert table.header[3:] == ("1 shown: N; first", "6 shown: N; first", "within 4, 1 shown")
     one = results.where(method=OURS, count=1)

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from reproduction.recipes import (
     adaptation,
     adapters,
+    afternoon,
     alignment,
     displacement,
     generators,
@@ -44,6 +45,7 @@ RECIPES: Mapping[str, Recipe] = {
         variation.RECIPE,
         ways.RECIPE,
         once.RECIPE,
+        afternoon.RECIPE,
     )
 }
 """Every recipe by its name, in the order of the evidence page."""
