@@ -26,7 +26,6 @@ from prior_reinforce.arm.workspace.execute import (
     say_look,
     to_execute,
 )
-from prior_reinforce.arm.workspace.state import Standing
 from prior_reinforce.arm.workspace.text import (
     execution_warning,
     next_step,
@@ -139,8 +138,8 @@ class Ask(OnWorkspace):
         recovered = recover(workspace)
         if recovered is not None:
             print(f"trial {recovered.number}: {say_trial(workspace.standing, recovered)}")
-        did_not_move = self.arm_did_not_move
-        if not did_not_move and sys.stdin.isatty() and (cut := _cut_off(now)) is not None:
+        did_not_move, cut = self.arm_did_not_move, now.executing
+        if cut is not None and not now.moving and not did_not_move and sys.stdin.isatty():
             print(f"trial {cut.number}: {say_trial(now, cut)}")
             if _ask_whether_it_moved():
                 print_next(workspace)
@@ -368,14 +367,6 @@ class Export(OnWorkspace):
             raise ConfigurationError("say the file to write after the trial: .npz, .csv or .json")
         written = workspace.export(number, check_path(Path(rest[0])), rate=self.rate)
         print(f"written: {written.path}  sha256 {written.sha256}")
-
-
-def _cut_off(now: Standing) -> Trial | None:
-    """The trial that was executing when the program stopped, if any."""
-    trial = now.state.open_trial
-    if trial is None or now.state.stage(trial) != "executing" or now.moving:
-        return None
-    return trial
 
 
 def _ask_whether_it_moved() -> bool:

@@ -157,6 +157,26 @@ class Standing:
             )
         return self.state.demonstrations
 
+    @property
+    def trained(self) -> ModelTrained:
+        """The training of the model in use.
+
+        Raises:
+            WorkspaceError: There is none, or other demonstrations were imported since.
+        """
+        imported, training = self.imported, self.state.training
+        if training is None or training.demonstrations_sha256 != imported.sha256:
+            why = "other demonstrations were imported since the model was learned"
+            why = why if training is not None else "nothing is learned yet"
+            raise WorkspaceError(f"{why}; run: prior-reinforce learn {self.folder}")
+        return training
+
+    @property
+    def executing(self) -> Trial | None:
+        """The trial that waits, if the journal's last word is that it executes."""
+        trial = self.state.open_trial
+        return trial if trial is not None and self.state.stage(trial) == "executing" else None
+
     def ended_badly(self, trial: Trial) -> bool:
         """Whether nobody wrote down how a trial's execution ended, or it was aborted."""
         latest = self.state.executions.get(trial.number)
