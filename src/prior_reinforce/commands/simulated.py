@@ -44,7 +44,7 @@ from prior_reinforce.simulation.protocol import (
     unseen_goals,
 )
 from prior_reinforce.simulation.tasks import TASKS, make_task
-from prior_reinforce.wording import say_tolerance
+from prior_reinforce.wording import say_count, say_tolerance
 
 SEEN = "seen"
 """Folder beside the report for what a camera or a model saw and said."""
@@ -120,8 +120,8 @@ class Reached:
 
     def __str__(self) -> str:
         """The count, for a person."""
-        reached, count = goals_reached(self.records[0].demonstrations.n, self.results)
-        return f"{reached}, {count}"
+        said = goals_reached(self.records[0].demonstrations.n, self.results)
+        return ", ".join(filter(None, said))
 
     def write(self, note: str = "") -> int:
         """Write the report; exit status 1 if a goal was not reached."""
@@ -211,14 +211,14 @@ class Adapt(_Reaching, OnTask):
             "Earlier goals' trials used": "yes" if session.goals[-1].carry_over else "no",
             "Version": prior_reinforce.__version__,
         }
-        title = f"{task.name}: {len(goals)} new goal" + "s" * (len(goals) > 1)
+        title = f"{task.name}: {say_count(len(goals), 'new goal')}"
         return Reached(self.out, results, records, title, facts, task.region)
 
     def _perceive(
         self, task: Task, recorded: Demonstrations, perception: Perception, console: Console
     ) -> Demonstrations:
         """Execute the demonstrations once, see where they go, and keep that for `adapt`."""
-        shown = "1 demonstration" if recorded.n == 1 else f"{recorded.n} demonstrations"
+        shown = say_count(recorded.n, "demonstration")
         say(console, f"executing {shown} once, seen by {self.perception}")
         eyes = recording(perception, self.out / SEEN, "demonstration")
         ask = asking(console, recorded, eyes)
