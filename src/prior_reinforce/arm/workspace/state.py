@@ -11,6 +11,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import Literal
 
+from msgspec import structs
+
+from prior_reinforce.adapters import DEFAULT_ADAPTER
 from prior_reinforce.arm.executing.base import Motion
 from prior_reinforce.arm.executing.lock import is_executing
 from prior_reinforce.arm.workspace.events import (
@@ -23,7 +26,7 @@ from prior_reinforce.arm.workspace.events import (
 )
 from prior_reinforce.arm.workspace.manifest import Manifest
 from prior_reinforce.errors import WorkspaceError
-from prior_reinforce.session.events import Event
+from prior_reinforce.session.events import Event, GoalSet
 from prior_reinforce.session.trials import State, Trial
 
 Stage = Literal["asked", "executing", "executed", "told", "voided"]
@@ -85,6 +88,8 @@ class WorkspaceState(State):
 
     def _apply(self, event: Event, time: str) -> None:
         match event:
+            case GoalSet(adapter=""):  # by a session in Python, which makes it by default
+                super()._apply(structs.replace(event, adapter=DEFAULT_ADAPTER), time)
             case DemonstrationsImported():
                 self.demonstrations = event
             case ModelTrained():

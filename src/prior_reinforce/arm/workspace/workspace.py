@@ -179,7 +179,7 @@ class Workspace:
         """The trials of this workspace. Telling needs no model; asking loads it."""
         return Session(
             lambda: self.model,
-            lambda: make_adapter(getattr(self.state.goal, "adapter", "") or DEFAULT_ADAPTER),
+            lambda: make_adapter(getattr(self.state.goal, "adapter", DEFAULT_ADAPTER)),
             lambda: self.demonstrations,
             tolerance=self.manifest.outcome_format.tolerance,
             log=self.log,
