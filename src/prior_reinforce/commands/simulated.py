@@ -28,7 +28,6 @@ from prior_reinforce.environment import Task
 from prior_reinforce.errors import ConfigurationError, InvalidGoalError
 from prior_reinforce.files import claim_folder
 from prior_reinforce.generators import make_generator
-from prior_reinforce.generators.base import Generator
 from prior_reinforce.perception import PERCEPTIONS, make_perception
 from prior_reinforce.perception.base import Perception
 from prior_reinforce.perception.vlm_client import without_secrets
@@ -81,17 +80,6 @@ class OnTask:
                 f"{task.format.names}; choose the task that it was recorded on"
             )
         return task, loaded
-
-
-def learn(
-    demonstrations: Demonstrations, folder: Path, generator: Generator, seed: int, console: Console
-) -> Generator:
-    """Fit a generator under a progress line, say what it could not learn, and save it."""
-    with fit_progress(console) as progress:
-        generator = generator.fit(demonstrations, seed=seed, progress=progress)
-    say(console, f"learned: {'; '.join(generator.remarks) or 'in closed form'}")
-    save_learned(folder, generator, demonstrations, seed)
-    return generator
 
 
 @dataclass(frozen=True)
@@ -180,7 +168,7 @@ class Adapt(_Reaching, OnTask):
         """
         console = Console()
         # Made first, so that a wrong setting is reported before anything is learned.
-        adapter, unfitted = make_adapter(self.adapter), make_generator(self.generator)
+        adapter, generator = make_adapter(self.adapter), make_generator(self.generator)
         model = model_of(self.vlm)
         with make_perception(
             self.perception, scene=task.scene, config=model, seed=self.seed
@@ -189,8 +177,10 @@ class Adapt(_Reaching, OnTask):
             if perceive:
                 demonstrations = self._perceive(task, demonstrations, perception, console)
             if self.model is None:
-                folder = self.out / "model"
-                generator = learn(demonstrations, folder, unfitted, self.seed, console)
+                with fit_progress(console) as progress:
+                    generator = generator.fit(demonstrations, seed=self.seed, progress=progress)
+                say(console, f"learned: {'; '.join(generator.remarks) or 'in closed form'}")
+                save_learned(self.out / "model", generator, demonstrations, self.seed)
             else:
                 generator = load_learned(self.model, demonstrations)
             session = Session(generator, adapter, demonstrations)
